@@ -34,6 +34,8 @@ def load_case(case: AnyCase, /, **overrides: Any) -> Case:
     Returns the frozen case, its entries as attributes, in base units. Raises :class:`CaseError`,
     a line for each thing wrong, in the words of the command.
 
+    Examples
+    --------
     >>> import fretscale
     >>> case = fretscale.load_case("cases/sphere_normal.yaml", friction__coefficient=0.6)
     >>> case.friction.coefficient
@@ -64,6 +66,15 @@ class Check:
     ``memory`` is the upper estimate of what it needs [bytes], ``seconds`` the order of magnitude of
     its time [s], ``outline`` what would run in rows of name and text, ``doubts`` what looks like a
     slip.
+
+    Examples
+    --------
+    Printed, it is what ``fretscale check`` says:
+
+    >>> import fretscale
+    >>> checked = fretscale.check("cases/sphere_normal.yaml")
+    >>> print(checked.title, checked.outline[1], checked.doubts)
+    Sphere pressed on a flat (Hertz) ('load path', '1 increment of P') ()
     """
 
     title: str
@@ -85,6 +96,8 @@ def check(case: AnyCase, /, **overrides: Any) -> Check:
     Takes what :func:`load_case` takes. Raises :class:`CaseError`; :class:`OutOfMemory` where the
     machine has too little.
 
+    Examples
+    --------
     >>> import fretscale
     >>> checked = fretscale.check("cases/sphere_normal.yaml")
     >>> checked.seconds < 60.0

@@ -28,6 +28,8 @@ def compare(*runs: AnyRun) -> Comparison:
     :class:`UserError` for less than two, one twice, a folder without a finished run, and runs of
     different analyses.
 
+    Examples
+    --------
     >>> import fretscale, tempfile
     >>> coarse = {
     ...     "contact__grid": [16, 16],
@@ -61,6 +63,26 @@ class ComparedResult(NamedTuple):
     estimated ones and ``differences`` those to the first run, both relative and None where there is
     none; ``beyond`` is whether a difference is more than both estimated errors, None where nobody
     knows.
+
+    Examples
+    --------
+    Hertz's bodies move by P to the power 2/3, so twice the load is 0.59 more:
+
+    >>> import fretscale, tempfile
+    >>> coarse = fretscale.load_case(
+    ...     "cases/sphere_normal.yaml",
+    ...     contact__grid=[16, 16],
+    ...     output__paraview=False,
+    ...     output__figures=False,
+    ... )
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     for name, force in {"light": "200 N", "heavy": "400 N"}.items():
+    ...         more = {"load_path.legs.0.P": force}
+    ...         _ = fretscale.run(coarse, f"{folder}/{name}", quiet=True, **more)
+    ...     balls = fretscale.compare(f"{folder}/light", f"{folder}/heavy")
+    >>> motion = balls["motion of the bodies towards each other"]
+    >>> print(f"{motion.differences[1]:.3f} of {2.0 ** (2.0 / 3.0) - 1.0:.3f}")
+    0.586 of 0.587
     """
 
     of: str
@@ -78,6 +100,25 @@ class Comparison:
     ``names`` are those of the runs, ``results`` the main results of all,
     ``comparison["depth"]`` the one of that name, or of ``"flank, depth"``, and ``entries`` in words
     what differs in the cases, by dotted path.
+
+    Examples
+    --------
+    Two loads on one ball, as tables and pages have them:
+
+    >>> import fretscale, tempfile
+    >>> coarse = fretscale.load_case(
+    ...     "cases/sphere_normal.yaml",
+    ...     contact__grid=[16, 16],
+    ...     output__paraview=False,
+    ...     output__figures=False,
+    ... )
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     for name, force in {"light": "200 N", "heavy": "400 N"}.items():
+    ...         more = {"load_path.legs.0.P": force}
+    ...         _ = fretscale.run(coarse, f"{folder}/{name}", quiet=True, **more)
+    ...     balls = fretscale.compare(f"{folder}/light", f"{folder}/heavy")
+    >>> print(balls.names, balls.entries, len(balls.results))
+    ('light', 'heavy') {'load_path.legs.0.P': ('200 N', '400 N')} 9
     """
 
     def __init__(self, compared: comparing.Comparison) -> None:

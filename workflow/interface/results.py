@@ -23,6 +23,8 @@ def open(folder: str | os.PathLike[str]) -> Results:  # noqa: A001 - fretscale.o
     Raises :class:`UserError` where the folder has no run of fretscale, one that is not finished, or
     one whose results are not as it has left them.
 
+    Examples
+    --------
     >>> import fretscale
     >>> try:
     ...     fretscale.open("no/such/folder")
@@ -41,6 +43,22 @@ class MainResult(NamedTuple):
     """A main result: of what, its name and value in a base ``unit``, its estimated error.
 
     ``of`` is empty for the whole run; ``error`` is relative, None where nobody knows.
+
+    Examples
+    --------
+    The load that was asked for:
+
+    >>> import fretscale, tempfile
+    >>> coarse = fretscale.load_case(
+    ...     "cases/sphere_normal.yaml",
+    ...     contact__grid=[16, 16],
+    ...     output__paraview=False,
+    ...     output__figures=False,
+    ... )
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     first = fretscale.run(coarse, folder, quiet=True).main[0]
+    >>> print(f"{first.name} = {first.value:.3f} {first.unit}, error {first.error}")
+    normal force on body 2, P = 400.000 N, error None
     """
 
     of: str
@@ -57,6 +75,23 @@ class Results(Group):
     with units and estimated errors. ``results["contact"]`` is
     a :class:`Group`, ``results["kinetics/cycles"]`` are :class:`Values`; ``tree()`` tells what
     there is.
+
+    Examples
+    --------
+    On a grid so coarse the largest pressure is within 1 % of Hertz's, 1450 MPa:
+
+    >>> import fretscale, tempfile
+    >>> coarse = fretscale.load_case(
+    ...     "cases/sphere_normal.yaml",
+    ...     contact__grid=[16, 16],
+    ...     output__paraview=False,
+    ...     output__figures=False,
+    ... )
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     ball = fretscale.run(coarse, folder, quiet=True)
+    ...     peak = {result.name: result.value for result in ball.main}["largest pressure"]
+    ...     print(f"{ball.title}: {peak / 1450.33:.2f}", ball.warnings)
+    Sphere pressed on a flat (Hertz): 0.99 []
     """
 
     def __init__(self, folder: Path, summary: dict[str, Any]) -> None:

@@ -47,6 +47,8 @@ def run(
     :class:`FretscaleError`; KeyboardInterrupt leaves a folder to go on from, by the same call or
     by ``fretscale resume``.
 
+    Examples
+    --------
     >>> import fretscale, tempfile
     >>> coarse = fretscale.load_case(
     ...     "cases/sphere_normal.yaml",
