@@ -13,9 +13,10 @@ ROOT = Path(__file__).parent.parent
 FACES = ["sa_solver", "wear", "wear.joints"]
 FACES += ["fe_models", "fe_models.dynamics", "fe_models.geometry", "fretscale"]
 LARGEST = 28
-# Protocols and bases, and what the examples of its neighbours show at work.
-WITHOUT_EXAMPLE = {"Observer", "WearLaw", "Contacts", "CoupledState", "ImplicitStepper"}
-WITHOUT_EXAMPLE |= {"InterfaceSettings", "SecondOrderStepper"}
+# A protocol and a base, which name what implements them, ...
+WITHOUT_EXAMPLE = {"Observer", "WearLaw"}
+# ... and what the examples of CoupledWear and of the other steppers show at work.
+WITHOUT_EXAMPLE |= {"Contacts", "CoupledState", "ImplicitStepper", "SecondOrderStepper"}
 INSTALLED = {"numpy", "scipy", "numba", "llvmlite", "pyfftw"}
 
 REFUSING = """

@@ -274,7 +274,10 @@ class CoupledState:
 
 
 class Observer:
-    """Looks on while a run goes; a subclass has those methods that it needs."""
+    """Looks on while a run goes; a subclass has those methods that it needs.
+
+    The example of :class:`CoupledWear` has one; those of `fretscale` write the log and the results.
+    """
 
     def stage(self, name: Stage) -> AbstractContextManager[object]:
         """Entered while the part ``name`` of a run is computed."""

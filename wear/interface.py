@@ -63,6 +63,21 @@ class InterfaceSettings:
     (:func:`wear.moving.moves`). The ``link`` to the structure of the loads is corrected for what
     its bodies do beyond half-spaces (:mod:`wear.link`), where they say it at their nodes, or they
     are taken for half-spaces. ``tolerance`` is the contact solver's.
+
+    Examples
+    --------
+    A steel cylinder on steel whose bodies wear by Archard's law:
+
+    >>> from sa_solver import ElasticPair, Grid, Material
+    >>> from wear import ArchardLaw, CellNodes, ImplicitStepper, InterfaceSettings
+    >>> grid, steel, law = Grid.strips(1.4, 70), Material(210e3, 0.3), ArchardLaw(1e-4, 3000.0)
+    >>> settings = InterfaceSettings(
+    ...     name="cylinder", grid=grid, gap=grid.x**2 / 20.0, transfer=CellNodes(grid),
+    ...     pair=ElasticPair(steel, steel), laws=(law, law),
+    ...     friction=lambda energy: 0.5, stepper=ImplicitStepper(),
+    ... )
+    >>> print(settings.method, settings.friction(0.0))
+    normal 0.5
     """
 
     name: str

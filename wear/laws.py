@@ -31,7 +31,11 @@ class SlidingConditions:
 
 
 class WearLaw(Protocol):
-    """Wear of one body."""
+    """Wear of one body.
+
+    Laws that have it are :class:`ArchardLaw`, :class:`EnergyLaw`, :class:`EnergyAmplitudeLaw`, and
+    :class:`EvolvingLaw` of one of them; anything with this method is one.
+    """
 
     def depth_per_pressure(self, sliding: SlidingConditions) -> Array:
         """Depth per pressure worn in each increment ``(t, ...)`` [mm/MPa per cycle]."""
