@@ -45,6 +45,7 @@ release = version_of("fretscale")
 extensions = [
     "myst_nb",
     "sphinx.ext.autodoc",
+    "sphinx.ext.napoleon",
     "mathml",
     "sphinx_click",
     "sphinx_copybutton",

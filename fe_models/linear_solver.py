@@ -27,6 +27,8 @@ RESIDUAL_LIMIT = 1e-9
 GROWTH_LIMIT = 1e12
 # Right-hand sides solved at once, where there may be thousands: enough to amortise, little memory.
 COLUMNS_AT_ONCE = 256
+# Inner unknowns from which PARDISO condenses: its analysis has crashed the process with one.
+FEWEST_INNER = 8
 BYTES = 8
 # Residual over the load at which iterations end, and how many of them are an error.
 ITERATED = 1e-10
@@ -192,12 +194,14 @@ def _pardiso(matrix: sp.csr_matrix, limit: float) -> Pardiso | None:
 def _condense_by_pardiso(
     matrix: sp.csr_matrix, loads: Array, kept: Indices, limit: float
 ) -> tuple[Array, Array] | None:
-    """PARDISO's own Schur complement; None where it is not installed, or fails.
+    """PARDISO's own Schur complement; None where it is not installed, fails, or hardly pays.
 
     That of the matrix bordered by the loads as if they were more unknowns to keep: its entries
     between these and the others are the condensed loads.
     """
     size, cases = loads.shape
+    if size - len(kept) < FEWEST_INNER:
+        return None
     border = sp.csr_matrix(loads)
     bordered = sp.bmat([[matrix, border], [border.T, sp.identity(cases)]], format="csr")
     try:

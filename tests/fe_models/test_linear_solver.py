@@ -118,6 +118,16 @@ def test_schur_complement_of_a_singular_matrix(rng, split, solver):
     np.testing.assert_allclose(result.sum(axis=1), 0.0, atol=1e-11)
 
 
+@pytest.mark.parametrize("inner", [1, 2, 9])
+def test_hardly_anything_to_condense_away(matrix, split, inner):
+    """PARDISO's analysis has crashed on one unknown, after larger matrices."""
+    condensed(matrix, *split)
+    few = matrix[-(inner + 2) :, -(inner + 2) :].tocsr()
+    parts = np.arange(2), np.arange(2, inner + 2)
+    expected = dense_schur(few, *parts)
+    np.testing.assert_allclose(condensed(few, *parts), expected, rtol=1e-12)
+
+
 def test_pardiso_does_the_work_where_it_is_installed(matrix, split, monkeypatch):
     need_pardiso()
 
