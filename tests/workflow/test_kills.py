@@ -213,8 +213,8 @@ class Kill:
     lost: float
 
 
-def killed(command: list[object], out: Path, seconds: float, code: str) -> Kill | None:
-    """Run as a process, and kill it so long after it has begun; None if it has ended by then.
+def killed(command: list[object], out: Path, seconds: float, code: str) -> Kill | float:
+    """Run as a process, and kill it so long after it has begun; if it ends before, in how long.
 
     It has begun with the first step that it keeps, or if few are kept once its log says so.
     """
@@ -237,7 +237,7 @@ def killed(command: list[object], out: Path, seconds: float, code: str) -> Kill 
         process.wait()
     else:
         assert process.returncode == 0
-        return None
+        return time.time() - begun
     moment, kept = time.time(), kept_in(out)
     last = max(begun, path.stat().st_mtime) if path.exists() else begun
     return Kill(before, kept, moment - last)
@@ -245,12 +245,16 @@ def killed(command: list[object], out: Path, seconds: float, code: str) -> Kill 
 
 def kill_at_random(
     command: list[object], out: Path, dice: random.Random, whole: float, code: str, most: int
-) -> list[Kill]:
-    """Kill a run and its resumptions at random moments of the ``whole`` seconds; it then ends."""
+) -> tuple[list[Kill], float]:
+    """Kill a run and its resumptions at random moments of the ``whole`` seconds; it then ends.
+
+    With the seconds that are all of it where it ended before the first of them.
+    """
     kills: list[Kill] = []
     for _ in range(most):
         kill = killed(command, out, dice.uniform(0.0, whole), code)
-        if kill is None:
+        if isinstance(kill, float):
+            whole = whole if kills else kill
             break
         # Nothing that was kept is lost again.
         assert kill.kept >= kill.before
@@ -260,7 +264,7 @@ def kill_at_random(
         run_here(command)
         assert not list(out.rglob("*.part.*"))
         assert not (out / "jumps").exists()
-    return kills
+    return kills, whole
 
 
 def kills_of(kind: str, folder: Path, most: int) -> list[Kill]:
@@ -282,7 +286,9 @@ def kills_of(kind: str, folder: Path, most: int) -> list[Kill]:
         out = folder / str(number)
         most_now = min(IN_ONE_RUN, max(most - len(kills), 1))
         command = RUNS[kind].command(folder, out)
-        new = kill_at_random(command, out, dice, share * seconds, code, most_now)
+        # The first run of all may have been long, with functions to compile.
+        new, within = kill_at_random(command, out, dice, share * seconds, code, most_now)
+        seconds = within / share
         assert results_of(out) == reference
         computed, kept = counted(out)
         # Nothing that was kept has been computed again.
