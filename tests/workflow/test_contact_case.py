@@ -121,6 +121,11 @@ def test_bases_are_cases_that_read_back_equal():
         assert parse_case(dump_case(case), "dump") == case
 
 
+def test_like_bodies_that_are_only_pressed_need_no_friction():
+    pressed = BALL.replace("friction: {coefficient: 0.7}\n", "").replace("Qx: 210 N", "Mx: 1 N*mm")
+    assert parse_case(pressed, "case.yaml").friction.coefficient == 0.0
+
+
 def test_rigid_body_is_written_as_a_word():
     case = parse_case(BALL.replace(*RIGID_2), "case.yaml")
     assert "body_2: rigid " in dump_case(case)
