@@ -46,7 +46,8 @@ from typing import TYPE_CHECKING
 from sa_solver.lazy import lazy_names
 
 if TYPE_CHECKING:
-    from sa_solver.contact import ContactLoad, FrictionalContact
+    from sa_solver.contact import FrictionalContact
+    from sa_solver.contact_state import ContactLoad
     from sa_solver.coupled import CoupledContact
     from sa_solver.errors import ConvergenceError, FretscaleError, InputError
     from sa_solver.half_space import HalfSpace
@@ -84,7 +85,8 @@ __all__ = [
 __getattr__, __dir__ = lazy_names(
     __name__,
     {
-        "contact": ("ContactLoad", "FrictionalContact"),
+        "contact": ("FrictionalContact",),
+        "contact_state": ("ContactLoad",),
         "coupled": ("CoupledContact",),
         "errors": ("ConvergenceError", "FretscaleError", "InputError"),
         "half_space": ("HalfSpace",),

@@ -13,13 +13,14 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 from typing import TypeVar
 
 import numpy as np
 
 from sa_solver.ciavarella_jaeger import first_loading
+from sa_solver.contact_state import ContactLoad, ContactStart, ContactState
 from sa_solver.coupled import CoupledContact, CoupledState
 from sa_solver.errors import InputError
 from sa_solver.friction_limit import largest_share
@@ -34,7 +35,7 @@ from sa_solver.tangential import (
     TangentialContactError,
     TangentialState,
 )
-from sa_solver.types import Array, Mask
+from sa_solver.types import Array
 
 GROSS_SHARE = 0.99
 """Share of the largest shear force from which the contact counts as sliding, where energies are at
@@ -53,86 +54,6 @@ _State = TypeVar("_State", TangentialState, CoupledState)
 
 class FrictionError(InputError):
     """The friction coefficient is not a number of 0 or more."""
-
-
-@dataclass(frozen=True)
-class ContactLoad:
-    """What is imposed at the end of an increment.
-
-    ``values`` (6,) are (P, Qx, Qy, Mx, My, Mz) [N, N mm; per mm on line grids] or, where
-    ``motion`` (6,) says so, the motions (δz, δx, δy, φx, φy, φz) [mm, rad] since the bodies were
-    apart. ``strain`` is the mismatch ε_2 - ε_1 along x of the unloaded surfaces (bulk stress).
-    ``along`` ``(2, nx, ny)`` [mm] is what these have moved relative to each other beside that,
-    tractions and rigid motions apart. ``energy`` (2,) [N mm], if known, is what the increment
-    dissipates in x and in y.
-
-    Examples
-    --------
-    500 N, and then a motion of 2 µm along x while it is kept:
-
-    >>> import numpy as np
-    >>> from sa_solver import ContactLoad
-    >>> from sa_solver import ElasticPair, FrictionalContact, Grid, HalfSpace, Material
-    >>> steel, grid = Material(young=210e3, poisson=0.3), Grid.covering((1.0, 1.0), (32, 32))
-    >>> contact = FrictionalContact(HalfSpace(grid, ElasticPair(steel, steel)), friction=0.5)
-    >>> height = (grid.x**2 + grid.y**2) / 20.0
-    >>> pressed = ContactLoad(np.array([500.0, 0, 0, 0, 0, 0]))
-    >>> moved = ContactLoad(np.array([500.0, 0.002, 0, 0, 0, 0]), (False, True, *[False] * 4))
-    >>> state = contact.advance(contact.apart(height), height, pressed)
-    >>> state = contact.advance(state, height, moved)
-    >>> print(f"Qx {state.resultants[1]:.0f} N")
-    Qx 111 N
-    """
-
-    values: Array
-    motion: tuple[bool, ...] = (False,) * 6
-    strain: float = 0.0
-    energy: Array | None = None
-    along: Array | None = None
-
-
-@dataclass(frozen=True)
-class ContactState:
-    """State of a frictional contact at the end of an increment.
-
-    Fields: ``traction`` ``(3, nx, ny)`` ordered qx, qy, p [MPa], its ``displacement`` K t
-    ``(3, nx, ny)`` [mm], ``slip`` ``(2, nx, ny)`` of the increment [mm], ``gap`` ``(nx, ny)`` [mm],
-    ``sticking`` ``(nx, ny)``. ``resultants`` (6,) and ``rigid`` (6,) are ordered as in
-    :class:`ContactLoad`, of which ``strain`` and ``along`` are; ``rigid`` counts from the bodies
-    apart. ``energy`` (2,) is dissipated in the increment in x and y [N mm]. ``sliding`` says that
-    the whole contact slipped by its energy: then the Q in ``resultants`` follows, and need not be
-    the one given. ``residual`` is the largest of the residuals of the problems solved; ``message``
-    is empty when ``converged``.
-    """
-
-    traction: Array
-    displacement: Array
-    slip: Array
-    gap: Array
-    sticking: Mask
-    resultants: Array
-    rigid: Array
-    energy: Array
-    converged: bool
-    strain: float = 0.0
-    along: Array | None = None
-    sliding: bool = False
-    residual: float = 0.0
-    message: str = ""
-    convolutions: int = 0
-    border_load: float = 0.0
-    start: Array | None = None
-
-    @property
-    def pressure(self) -> Array:
-        """p ``(nx, ny)`` [MPa]."""
-        pressure: Array = self.traction[2]
-        return pressure
-
-    @property
-    def shear(self) -> Array:
-        """qx, qy ``(2, nx, ny)`` [MPa]."""
-        return self.traction[:2]
 
 
 class FrictionalContact:
@@ -195,15 +116,23 @@ class FrictionalContact:
             along=along,
         )
 
-    def advance(self, before: ContactState, height: Array, load: ContactLoad) -> ContactState:
+    def advance(
+        self,
+        before: ContactState,
+        height: Array,
+        load: ContactLoad,
+        start: ContactStart | None = None,
+    ) -> ContactState:
         """The state under ``load``, from the state ``before`` it.
 
-        ``height`` ``(nx, ny)`` [mm] is the gap of the unloaded bodies. Raises what the solvers
-        raise for impossible data: NormalContactError, TangentialContactError.
+        ``height`` ``(nx, ny)`` [mm] is the gap of the unloaded bodies. The search begins from
+        ``start``, or from the state before. Raises what the solvers raise for impossible data:
+        NormalContactError, TangentialContactError.
         """
+        known = start or ContactStart()
         if not self.half_space.pair.similar:
-            return self._together(before, height, load)
-        normal = self._press(before, height, load)
+            return self._together(before, height, load, known.together)
+        normal = self._press(before, height, load, known.normal)
         limit = self.friction * normal.pressure
         offset, area = self.offset(before, load), self.grid.cell_area
         sliding = self._slides(limit, load)
@@ -216,7 +145,8 @@ class FrictionalContact:
                 self.normal, height, normal, self.friction, load.values[1], self.tolerance
             )
         else:
-            tangential = self._shear(before, limit, offset, load)
+            shear = before.shear if known.shear is None else known.shear
+            tangential = self._shear(before, limit, offset, load, shear)
         return self._state(before, load, normal, tangential, sliding)
 
     def two_normal_problems(self, before: ContactState, load: ContactLoad) -> bool:
@@ -246,7 +176,9 @@ class FrictionalContact:
     def tangential(self) -> TangentialContact:
         return TangentialContact(self.half_space)
 
-    def _press(self, before: ContactState, height: Array, load: ContactLoad) -> NormalState:
+    def _press(
+        self, before: ContactState, height: Array, load: ContactLoad, start: NormalStart | None
+    ) -> NormalState:
         P, Mx, My, approach, tilt_x, tilt_y = (
             float(load.values[k]) if load.motion[k] is moved else None
             for moved in (False, True)
@@ -254,8 +186,7 @@ class FrictionalContact:
         )
         if self.grid.line:
             Mx = tilt_x = None
-        start = None
-        if before.pressure.any():
+        if start is None and before.pressure.any():
             start = NormalStart(before.pressure, before.displacement[2])
         return self.normal.solve(
             height,
@@ -270,7 +201,7 @@ class FrictionalContact:
         )
 
     def _shear(
-        self, before: ContactState, limit: Array, offset: Array, load: ContactLoad
+        self, before: ContactState, limit: Array, offset: Array, load: ContactLoad, start: Array
     ) -> TangentialState:
         names = ("Qx", "Qy", "Mz"), ("shift_x", "shift_y", "twist")
         imposed: dict[str, float] = {}
@@ -278,7 +209,7 @@ class FrictionalContact:
             value = load.values[k] - (before.rigid[k] if load.motion[k] else 0.0)
             imposed[names[load.motion[k]][place]] = float(value)
         return self.tangential.solve(
-            limit, offset, **imposed, tolerance=self.tolerance, start=before.shear
+            limit, offset, **imposed, tolerance=self.tolerance, start=start
         )
 
     def _held(
@@ -290,7 +221,7 @@ class FrictionalContact:
         increment is to be believed, not its energy.
         """
         try:
-            state = self._shear(before, limit, offset, load)
+            state = self._shear(before, limit, offset, load, before.shear)
         except FrictionLimitError:
             return None
         return state if state.converged else None
@@ -414,12 +345,15 @@ class FrictionalContact:
     def _coupled(self) -> CoupledContact:
         return CoupledContact(self.half_space, self.friction)
 
-    def _together(self, before: ContactState, height: Array, load: ContactLoad) -> ContactState:
+    def _together(
+        self, before: ContactState, height: Array, load: ContactLoad, start: Array | None
+    ) -> ContactState:
         offset = self.offset(before, load)
         sliding = False
         if load.energy is not None:
             # The pressure hardly changes with shear: that without friction will do to judge it.
-            limit = self.friction * self._press(before, height, load).pressure
+            unsheared = NormalStart(before.pressure, self.half_space.normal(before.pressure))
+            limit = self.friction * self._press(before, height, load, unsheared).pressure
             sliding = self._slides(limit, load)
         if sliding:
             state = self._slide_together(before, height, offset, load, limit)
@@ -427,8 +361,9 @@ class FrictionalContact:
             values = load.values.copy()
             for k in PLANAR:
                 values[k] -= before.rigid[k] if load.motion[k] else 0.0
+            start = before.start if start is None else start
             state = self._coupled.solve(
-                height, offset, values, load.motion, tolerance=self.tolerance, start=before.start
+                height, offset, values, load.motion, tolerance=self.tolerance, start=start
             )
         rigid = state.rigid.copy()
         rigid[list(PLANAR)] += before.rigid[list(PLANAR)]

@@ -228,7 +228,8 @@ def inverse_symbols(symbols: list[list[Array]]) -> list[list[Array]]:
     if len(symbols) == 2:
         (a, b), (c, d) = symbols
         determinant = a * d - b * c
-        return [[d / determinant, -b / determinant], [-c / determinant, a / determinant]]
+        across = -b / determinant
+        return [[d / determinant, across], [across, a / determinant]]
     matrices = np.moveaxis(np.array(symbols), (0, 1), (-2, -1))
     inverses = np.linalg.inv(matrices)
     count = range(len(symbols))

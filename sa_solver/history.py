@@ -22,7 +22,8 @@ from typing import Literal
 
 import numpy as np
 
-from sa_solver.contact import ContactLoad, ContactState, FrictionalContact
+from sa_solver.contact import FrictionalContact
+from sa_solver.contact_state import ContactLoad, ContactState
 from sa_solver.errors import InputError
 from sa_solver.half_space import HalfSpace
 from sa_solver.rigid_modes import NORMAL, PLANAR

@@ -25,7 +25,8 @@ from typing import Literal
 import numpy as np
 from scipy.sparse.linalg import LinearOperator, cg
 
-from sa_solver.contact import ContactLoad, ContactState, FrictionalContact
+from sa_solver.contact import FrictionalContact
+from sa_solver.contact_state import ContactLoad, ContactState
 from sa_solver.errors import ConvergenceError, InputError
 from sa_solver.half_space import HalfSpace
 from sa_solver.influence import Z

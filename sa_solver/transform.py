@@ -5,7 +5,7 @@ The DFT is unnormalised forwards and carries ``1/N`` backwards.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 
 import numpy as np
@@ -13,11 +13,8 @@ from numpy.typing import NDArray
 
 from sa_solver.types import Array
 
-Spectrum = NDArray[np.complex128]
-
-BLOCK = 1 << 15
-"""Complex numbers of a spectrum multiplied at once, about what the cache holds."""
-
+Spectra = NDArray[np.complex128]
+Multiplication = Callable[[Spectra], None]
 
 SPARE_COLUMNS = 4
 """Unused complex numbers after each row of a spectrum: rows of 2ⁿ + 1 of them lie so close to a
@@ -27,7 +24,7 @@ multiple of a memory page that the pass along columns takes 1.6 to 2 times as lo
 class Transform:
     """Real DFT of ``(nx, ny)`` fields zero-padded to ``padded``, and back, planned once with FFTW.
 
-    ``spectra`` holds one spectrum ``(mx, my//2 + 1)`` per component; a backward transform uses its
+    ``spectra`` ``(k, mx, my//2 + 1)`` holds one of each component; a backward transform uses its
     component's up.
 
     Plans are estimated, not measured: measuring picks another algorithm, and with it another
@@ -46,11 +43,8 @@ class Transform:
         self.shape, self.padded = shape, padded
         rows, columns = shape[0], padded[1] // 2 + 1
         self._field = pyfftw.zeros_aligned((rows, padded[1]), dtype=np.float64)
-        stored = (padded[0], columns + SPARE_COLUMNS)
-        self.spectra: list[Spectrum] = [
-            pyfftw.zeros_aligned(stored, dtype=np.complex128)[:, :columns]
-            for _ in range(components)
-        ]
+        stored = (components, padded[0], columns + SPARE_COLUMNS)
+        self.spectra: Spectra = pyfftw.zeros_aligned(stored, dtype=np.complex128)[:, :, :columns]
         self._forward, self._backward = [], []
         for spectrum in self.spectra:
             along_x, along_y = {"axes": (0,)}, {"axes": (1,)}
@@ -100,39 +94,52 @@ class SpectralFilter:
     ) -> None:
         """``transform`` needs as many spectra as there are inputs or outputs."""
         self._transform = transform
-        # Spectra are multiplied as pairs of reals: numpy would make a real factor complex first.
-        self._symbols = [[np.repeat(symbol, 2, axis=1) for symbol in row] for row in symbols]
-        self._inputs, self._outputs = imaginary
-        rows = transform.padded[0]
-        row_size = transform.spectra[0].size // rows
-        step = max(1, BLOCK // row_size)
-        self._blocks = [slice(start, start + step) for start in range(0, rows, step)]
+        self._outputs = len(symbols)
+        single = len(symbols) == len(symbols[0]) == 1 and not any(imaginary)
+        self._multiply = _by_one(symbols[0][0]) if single else _by_several(symbols, imaginary)
 
     def apply(self, fields: Array) -> Array:
         """Outputs ``(r, nx, ny)`` from inputs ``(c, nx, ny)``."""
         transform = self._transform
         for component, field in enumerate(fields):
             transform.forward(field, component)
-        for block in self._blocks:
-            self._multiply([spectrum[block] for spectrum in transform.spectra], block)
-        outputs = np.empty((len(self._symbols), *transform.shape))
+        self._multiply(transform.spectra)
+        outputs = np.empty((self._outputs, *transform.shape))
         for component in range(len(outputs)):
             transform.backward(component, outputs[component])
         return outputs
 
-    def _multiply(self, spectra: list[Spectrum], block: slice) -> None:
-        """Replace the inputs in ``spectra`` by the outputs."""
-        pairs = [spectrum.view(np.float64) for spectrum in spectra]
-        if len(self._symbols) == len(self._symbols[0]) == 1 and not (self._inputs or self._outputs):
-            pairs[0] *= self._symbols[0][0][block]
-            return
-        for j in self._inputs:
-            spectra[j] *= -1j
-        inputs = [pairs[j].copy() for j in range(len(self._symbols[0]))]
-        product = np.empty_like(inputs[0])
-        for i, row in enumerate(self._symbols):
-            np.multiply(row[0][block], inputs[0], out=pairs[i])
-            for j in range(1, len(row)):
-                pairs[i] += np.multiply(row[j][block], inputs[j], out=product)
-            if i in self._outputs:
-                spectra[i] *= 1j
+
+def _by_one(symbol: Array) -> Multiplication:
+    """Multiplies a spectrum by one symbol."""
+    # As pairs of reals: numpy would make a real factor complex first.
+    pairs = np.repeat(symbol, 2, axis=1)
+
+    def multiply(spectra: Spectra) -> None:
+        spectrum: Array = spectra[0].view(np.float64)
+        spectrum *= pairs
+
+    return multiply
+
+
+def _by_several(
+    symbols: Sequence[Sequence[Array]], imaginary: tuple[Sequence[int], Sequence[int]]
+) -> Multiplication:
+    """Replaces the inputs among spectra by the outputs."""
+    # A fifth of a second to import: where it is used.
+    from sa_solver.kernels import multiply_spectra
+
+    rows = [list(row) for row in symbols]
+    place: dict[int, int] = {}
+    # Symmetric kernels give some of their symbols twice.
+    places = np.array(
+        [[place.setdefault(id(symbol), len(place)) for symbol in row] for row in rows]
+    )
+    stacked = np.stack(list({id(symbol): symbol for row in rows for symbol in row}.values()))
+    turned_outputs, turned_inputs = np.zeros(places.shape[0], bool), np.zeros(places.shape[1], bool)
+    turned_inputs[list(imaginary[0])] = turned_outputs[list(imaginary[1])] = True
+
+    def multiply(spectra: Spectra) -> None:
+        multiply_spectra(spectra, stacked, places, turned_inputs, turned_outputs)
+
+    return multiply

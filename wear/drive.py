@@ -12,7 +12,7 @@ from typing import Self
 
 import numpy as np
 
-from sa_solver.contact import ContactLoad
+from sa_solver.contact_state import ContactLoad
 from sa_solver.history import ContactLoadPath
 from sa_solver.rigid_modes import NORMAL
 from sa_solver.types import Array, LoadHistory, Tilt

@@ -7,12 +7,15 @@ imposed instead (:mod:`wear.drive`).
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
 
-from sa_solver.contact import ContactLoad, ContactState, FrictionalContact
+from sa_solver.contact import FrictionalContact
+from sa_solver.contact_state import ContactLoad, ContactStart, ContactState
 from sa_solver.errors import ContactProblemError
+from sa_solver.normal import NormalStart
 from sa_solver.types import Array, LoadHistory
 from wear.drive import Drive
 from wear.stepping import ContactFailure
@@ -33,6 +36,7 @@ def march_cycle(
     loads: LoadHistory,
     drive: Drive | None = None,
     moved: Array | None = None,
+    starts: Mapping[int, NormalStart] | None = None,
 ) -> list[ContactState]:
     """States at the ends of the increments of one closed cycle, on surfaces that do not change.
 
@@ -42,7 +46,8 @@ def march_cycle(
     cycle of its own, begun with the bodies apart. A ``drive`` may impose motions in the place of
     forces; without one all is forces. What the bodies' own deformation has ``moved``
     ``(t, 3, nx, ny)`` [mm] at the end of an increment lies along the surfaces in its first two
-    components; the third is part of ``height``.
+    components; the third is part of ``height``. ``starts`` are pressures near those of some
+    increments, by their number.
 
     Raises :class:`ContactFailure` where an increment does not converge, its load is more than the
     contact can carry, or the cycle does not repeat.
@@ -55,12 +60,17 @@ def march_cycle(
         if moved is not None:
             pairs = zip(increments, moved[mission, :2], strict=True)
             increments = [replace(load, along=along) for load, along in pairs]
-        states += _closed_cycle(contact, heights[mission], increments, mission.start)
+        begun = [ContactStart((starts or {}).get(t)) for t in range(mission.start, mission.stop)]
+        states += _closed_cycle(contact, heights[mission], increments, begun, mission.start)
     return states
 
 
 def _closed_cycle(
-    contact: FrictionalContact, heights: Array, loads: list[ContactLoad], first: int
+    contact: FrictionalContact,
+    heights: Array,
+    loads: list[ContactLoad],
+    starts: list[ContactStart],
+    first: int,
 ) -> list[ContactState]:
     """States of one closed cycle, whose first increment is number ``first`` of all."""
     # Bodies apart at the end are so at the beginning: what their surfaces have moved is the same.
@@ -72,9 +82,11 @@ def _closed_cycle(
     states: list[ContactState] = []
     for passed in range(1, MOST_PASSES + 1):
         begun, states = state, []
-        for t, (height, load) in enumerate(zip(heights, loads, strict=True), first):
-            state = _advance(contact, state, height, load, t)
+        increments = zip(heights, loads, starts, strict=True)
+        for t, (height, load, start) in enumerate(increments, first):
+            state = _advance(contact, state, height, load, start, t)
             states.append(state)
+        starts = [solved.as_start for solved in states]
         limit = contact.friction * max(float(s.pressure.max()) for s in states)
         change = float(np.abs(state.shear - begun.shear).max())
         if apart or (passed > 1 and change <= CLOSED * limit):
@@ -99,12 +111,17 @@ def _apart(contact: FrictionalContact, height: Array, load: ContactLoad) -> Cont
 
 
 def _advance(
-    contact: FrictionalContact, before: ContactState, height: Array, load: ContactLoad, t: int
+    contact: FrictionalContact,
+    before: ContactState,
+    height: Array,
+    load: ContactLoad,
+    start: ContactStart,
+    t: int,
 ) -> ContactState:
     if _lifted(load):
         return _apart(contact, height, load)
     try:
-        state = contact.advance(before, height, load)
+        state = contact.advance(before, height, load, start)
     except ContactProblemError as error:
         raise ContactFailure(f"increment {t + 1}: {error}") from error
     if not state.converged:

@@ -15,10 +15,11 @@ from typing import Literal
 
 import numpy as np
 
-from sa_solver.contact import ContactState, FrictionalContact
+from sa_solver.contact import FrictionalContact
+from sa_solver.contact_state import ContactState
 from sa_solver.errors import InputError
 from sa_solver.half_space import HalfSpace
-from sa_solver.normal import NormalContact
+from sa_solver.normal import NormalContact, NormalStart
 from sa_solver.rigid_modes import NORMAL
 from sa_solver.ties import first_largest
 from sa_solver.types import Array, ElasticPair, Grid, LoadHistory
@@ -213,9 +214,13 @@ class InterfaceContact:
             paths=np.empty((0, 3, 2)),
         )
         loaded = self._loaded(state)
+        if self.pair.similar:
+            # Unlike bodies are pressed otherwise while friction holds them.
+            solved = [NormalStart(end.pressure, end.displacement[2]) for end in loaded.cycle]
+            state = replace(state, starts=dict(enumerate(solved)))
         result = loaded.contact.cycle(state, np.flatnonzero(history.loads.P > 0.0).tolist())
         depth_rate, volume_rate = result.per_cycle(self.grid.cell_area)
-        starts = {t: solved.start for t, solved in result.states.items()}
+        starts = {t: pressed.start for t, pressed in result.states.items()}
         state = replace(
             state,
             depth_rate=depth_rate,
@@ -408,7 +413,8 @@ class InterfaceContact:
         """The closed cycle with its own friction, on surfaces ``moved`` ``(t, 3, nx, ny)`` [mm]."""
         gaps = np.stack([sliding.gap(state.surfaces, t) for t in range(len(state.loads))])
         contact = self.frictional(state.energy)
-        cycle = tuple(march_cycle(contact, gaps, state.loads, self.settings.drive, moved))
+        drive, starts = self.settings.drive, state.starts
+        cycle = tuple(march_cycle(contact, gaps, state.loads, drive, moved, starts))
         self._spent += Spent(len(cycle), sum(increment.convolutions for increment in cycle))
         return cycle
 

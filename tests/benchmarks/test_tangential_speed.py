@@ -6,7 +6,8 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from sa_solver.contact import ContactLoad, FrictionalContact
+from sa_solver.contact import FrictionalContact
+from sa_solver.contact_state import ContactLoad
 from sa_solver.half_space import HalfSpace
 from sa_solver.reference.hertz import HertzSphere
 from sa_solver.tangential import TangentialContact

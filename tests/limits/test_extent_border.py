@@ -19,7 +19,8 @@ do not close their gap h1: up to p = h1 / (K00 - K01), with Love's coefficients.
 import numpy as np
 import pytest
 
-from sa_solver.contact import ContactLoad, FrictionalContact
+from sa_solver.contact import FrictionalContact
+from sa_solver.contact_state import ContactLoad
 from sa_solver.coupled import CoupledContact
 from sa_solver.half_space import HalfSpace
 from sa_solver.normal import NormalContact

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from sa_solver.contact import ContactLoad, FrictionalContact
+from sa_solver.contact import FrictionalContact
+from sa_solver.contact_state import ContactLoad
 from sa_solver.half_space import HalfSpace
 from sa_solver.reference.hertz import HertzSphere
 from sa_solver.types import ElasticPair, Grid, Material

@@ -7,7 +7,8 @@ touch again as if they never had.
 import numpy as np
 import pytest
 
-from sa_solver.contact import ContactLoad, FrictionalContact
+from sa_solver.contact import FrictionalContact
+from sa_solver.contact_state import ContactLoad
 from sa_solver.half_space import HalfSpace
 from sa_solver.history import ContactLoadPath, march_history
 from sa_solver.reference.mindlin import ShearedSphere

@@ -8,12 +8,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sa_solver.contact import ContactLoad, FrictionalContact, FrictionError
+from sa_solver.contact import FrictionalContact, FrictionError
+from sa_solver.contact_state import ContactLoad
 from sa_solver.half_space import HalfSpace
 from sa_solver.tangential import FrictionLimitError
 from sa_solver.types import ElasticPair, Grid, Material
 
-TITANIUM = Material(115e3, 0.29)
+TITANIUM, STEEL = Material(115e3, 0.29), Material(200e3, 0.3)
 GRID = Grid.covering((1.0, 1.0), (32, 32))
 HEIGHT = (GRID.x**2 + GRID.y**2) / 20.0
 FRICTION = 0.6
@@ -72,6 +73,22 @@ def test_energy_is_of_second_order_in_the_increments():
     changes = np.abs(np.diff(energies))
     assert np.log2(changes[:-1] / changes[1:]).mean() > 1.5
     assert changes[-1] < 1e-2 * energies[-1]
+
+
+@pytest.mark.parametrize("second", [TITANIUM, STEEL], ids=["alike", "unlike"])
+def test_a_near_state_to_begin_from_changes_the_work_only(second):
+    """On a surface that has worn by a thousandth of the approach since."""
+    solver = FrictionalContact(HalfSpace(GRID, ElasticPair(TITANIUM, second)), FRICTION)
+    pressed = solver.advance(solver.apart(HEIGHT), HEIGHT, load(300.0, 20.0))
+    near = solver.advance(pressed, HEIGHT, load(400.0, 150.0))
+    worn = HEIGHT + 1e-6 * near.pressure / near.pressure.max()
+    known = solver.advance(pressed, worn, load(400.0, 150.0), near.as_start)
+    found = solver.advance(pressed, worn, load(400.0, 150.0))
+    assert known.converged
+    assert known.convolutions < 0.8 * found.convolutions
+    atol = 1e-6 * found.pressure.max()
+    np.testing.assert_allclose(known.traction, found.traction, rtol=0, atol=atol)
+    np.testing.assert_allclose(known.rigid, found.rigid, rtol=1e-6, atol=1e-12)
 
 
 def test_motions_bring_the_same_state_as_their_forces():

@@ -7,7 +7,8 @@ pitch; what is an integral of them (approach, twist, shift) does about as its 3/
 import numpy as np
 import pytest
 
-from sa_solver.contact import ContactLoad, FrictionalContact
+from sa_solver.contact import FrictionalContact
+from sa_solver.contact_state import ContactLoad
 from sa_solver.half_space import HalfSpace
 from sa_solver.normal import NormalContact
 from sa_solver.reference.flat_rounded import FlatRoundedPunch

@@ -6,10 +6,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sa_solver.contact import ContactLoad, FrictionalContact
+from sa_solver.contact import FrictionalContact
+from sa_solver.contact_state import ContactLoad
 from sa_solver.half_space import HalfSpace
 from sa_solver.types import ElasticPair, Grid, LoadHistory, Material
-from wear.full_cycle import march_cycle
+from wear.full_cycle import CLOSED, march_cycle
 from wear.stepping import ContactFailure
 
 TITANIUM, STEEL = Material(115e3, 0.29), Material(200e3, 0.3)
@@ -84,6 +85,22 @@ def test_a_cycle_that_ends_loaded_is_closed():
     np.testing.assert_allclose(
         repeated.shear, states[0].shear, atol=1e-3 * FRICTION * states[0].pressure.max()
     )
+
+
+def test_the_next_pass_knows_the_last_one():
+    """Pressures are then found at once, and shear in a half of the convolutions."""
+    loads, solver = mission(last=4e3), contact(ElasticPair(TITANIUM, TITANIUM))
+    loads = replace(loads, Edx=0.0 * ENERGY, sliding=np.zeros(len(P), bool))
+    loads = replace(loads, Qx=0.5 * loads.Qx)
+    passes = march_cycle(solver, GAP, loads)
+    state, convolutions = passes[-1], 0
+    for t in range(len(P)):
+        values = np.array([getattr(loads, name)[t] for name in ("P", "Qx", "Qy", "Mx", "My", "Mz")])
+        state = solver.advance(state, GAP, ContactLoad(values))
+        convolutions += state.convolutions
+        atol = CLOSED * FRICTION * float(state.pressure.max())
+        np.testing.assert_allclose(state.shear, passes[t].shear, rtol=0, atol=atol)
+    assert sum(passed.convolutions for passed in passes) < 0.6 * convolutions
 
 
 def test_no_load_no_slip():

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from sa_solver.contact import ContactState
+from sa_solver.contact_state import ContactState
 from sa_solver.errors import ContactProblemError
 from sa_solver.history import ContactLoadPath, History, HistoryError, march_history
 from workflow.analyses.contact.bodies import bodies_of, bulk_strain, half_space_of

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from scipy.integrate import trapezoid
 
-from sa_solver.contact import ContactState
+from sa_solver.contact_state import ContactState
 from sa_solver.history import History
 from sa_solver.ties import first_largest
 from sa_solver.types import Array, Grid, Mask

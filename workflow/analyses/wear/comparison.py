@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from sa_solver.contact import ContactState
+from sa_solver.contact_state import ContactState
 from sa_solver.types import LoadHistory
 from workflow.analyses.contact.datasets import load_columns, traction_fields
 from workflow.shell.results import On, ResultsWriter
