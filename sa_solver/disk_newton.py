@@ -19,6 +19,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from sa_solver.kernels import add_scaled, tensor_product
 from sa_solver.rigid_modes import RANK_CUTOFF
 from sa_solver.tangential_problem import TangentialProblem, dot, squared
 from sa_solver.types import Array, Mask
@@ -84,15 +85,11 @@ class _Tensor:
 
     def __init__(self, xx: Array, xy: Array, yy: Array) -> None:
         self._xx, self._xy, self._yy = xx, xy, yy
-        self._scratch = np.empty_like(xx)
 
     def times(self, field: Array) -> Array:
         """Product ``(2, nx, ny)`` with a field of that shape."""
         product = np.empty_like(field)
-        np.multiply(self._xx, field[0], out=product[0])
-        np.multiply(self._yy, field[1], out=product[1])
-        product[0] += np.multiply(self._xy, field[1], out=self._scratch)
-        product[1] += np.multiply(self._xy, field[0], out=self._scratch)
+        tensor_product(self._xx, self._xy, self._yy, field, product)
         return product
 
     def weighted(self, weight: Array) -> _Tensor:
@@ -211,17 +208,15 @@ class _Search:
             change = decrement - float(np.vdot(search, self._last_gradient))
             conjugacy = change / self._last_decrement
             if conjugacy > 0.0:
-                self._direction *= conjugacy
-                direction += self._direction
+                add_scaled(direction, self._direction, conjugacy)
         image = self._problem.operator.displacement(direction)
         image += self._bend.times(direction)
         curvature = float(np.vdot(direction, image))
         if not curvature > 0.0:
             return False
         length = -float(np.vdot(gradient, direction)) / curvature
-        step += length * direction
-        image *= length
-        self._moved += image
+        add_scaled(step, direction, length)
+        add_scaled(self._moved, image, length)
         self._direction, self._last_gradient, self._last_decrement = direction, gradient, decrement
         self._find_rigid()
         return True
@@ -229,8 +224,9 @@ class _Search:
     def _without_resultants(self, field: Array) -> Array:
         """``field`` less the punches that carry its resultants."""
         if len(self._punches):
-            sums = self._problem.modes.sums(field) @ self._inverse
-            field -= np.tensordot(sums, self._punches, 1)
+            shares = self._problem.modes.sums(field) @ self._inverse
+            for share, punch in zip(shares, self._punches, strict=True):
+                add_scaled(field, punch, -share)
         return field
 
     # -- back to the disks ----------------------------------------------------------------------

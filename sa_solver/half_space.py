@@ -33,6 +33,11 @@ SMALLEST_EIGENVALUE = 0.5
 """Smallest eigenvalue of K over the self-compliance of a cell, about, on square cells; less on long
 ones (0.2) and lines (0.1). It only sets ρ, not the solution."""
 
+POWER_OF_TWO = 1.15
+"""Powers of two transform faster than any other length, so one that is at most this far above is
+taken: 256² in place of 225² or 240² in three quarters of the time, 1024² in place of 960² in four
+fifths. From 200 or 400, which are a quarter away, it would take longer."""
+
 Components = tuple[int, ...]
 GridShape = tuple[int, int]
 
@@ -159,7 +164,13 @@ def padded_shape(grid: Grid) -> GridShape:
 
 def fast_lengths(nx: int, ny: int) -> GridShape:
     """The next lengths that transform fast."""
-    return int(scipy.fft.next_fast_len(nx, real=True)), int(scipy.fft.next_fast_len(ny, real=True))
+    return _fast_length(nx), _fast_length(ny)
+
+
+def _fast_length(count: int) -> int:
+    power = 1 << (int(count) - 1).bit_length()
+    near = power <= POWER_OF_TWO * count
+    return power if near else int(scipy.fft.next_fast_len(count, real=True))
 
 
 def quarter_edges(period: int, pitch: float) -> Array:

@@ -39,3 +39,24 @@ def multiply_spectra(spectra, symbols, places, turned_inputs, turned_outputs):  
                 for n in range(length):
                     z = spectra[i, line, n]
                     spectra[i, line, n] = complex(-z.imag, z.real)
+
+
+@njit(cache=True, nogil=True)
+def tensor_product(xx, xy, yy, field, product):  # type: ignore[no-untyped-def]
+    """``product`` ``(2, nx, ny)`` of symmetric tensors ``(nx, ny)`` with a ``field``."""
+    rows, columns = xx.shape
+    for i in range(rows):
+        for j in range(columns):
+            x, y = field[0, i, j], field[1, i, j]
+            product[0, i, j] = xx[i, j] * x + xy[i, j] * y
+            product[1, i, j] = yy[i, j] * y + xy[i, j] * x
+
+
+@njit(cache=True, nogil=True)
+def add_scaled(total, field, scale):  # type: ignore[no-untyped-def]
+    """Add ``scale`` times a ``field`` to ``total``, both ``(k, nx, ny)``."""
+    parts, rows, columns = total.shape
+    for k in range(parts):
+        for i in range(rows):
+            for j in range(columns):
+                total[k, i, j] += scale * field[k, i, j]

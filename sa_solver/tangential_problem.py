@@ -16,7 +16,13 @@ from functools import cached_property
 
 import numpy as np
 
-from sa_solver.half_space import SHEAR, HalfSpace, inverse_symbols, spectral_filter
+from sa_solver.half_space import (
+    SHEAR,
+    HalfSpace,
+    fast_lengths,
+    inverse_symbols,
+    spectral_filter,
+)
 from sa_solver.rigid_modes import PlanarModes
 from sa_solver.transform import SpectralFilter
 from sa_solver.types import Array, Mask
@@ -212,8 +218,8 @@ def _solved(matrix: Array, right: Array) -> Array:
 class BoxOperator:
     """K for shear on a box of cells, and its approximate inverse.
 
-    The preconditioner is the inverse symbol of the box made periodic, without padding (Vollebregt
-    2014, doi:10.1016/j.jcp.2013.10.005).
+    The preconditioner is the inverse symbol of the box made periodic, with next to no padding
+    (Vollebregt 2014, doi:10.1016/j.jcp.2013.10.005).
     """
 
     def __init__(self, half_space: HalfSpace) -> None:
@@ -257,9 +263,10 @@ class BoxOperator:
 
     def _inverse(self, level: int) -> SpectralFilter:
         half_space, shape = self._half_space, self._half_space.grid.shape
-        symbols = [[half_space.symbol(i, j, shape) for j in SHEAR] for i in SHEAR]
+        period = fast_lengths(*shape)
+        symbols = [[half_space.symbol(i, j, period) for j in SHEAR] for i in SHEAR]
         local = (SOFTENING + LEVEL_RATIO**level - 1.0) * self.self_compliance
         for k, row in enumerate(symbols):
             row[k] = row[k] + local
-        transform = half_space.transform(shape, shape, 2)
+        transform = half_space.transform(shape, period, 2)
         return spectral_filter(transform, inverse_symbols(symbols), SHEAR, SHEAR)
