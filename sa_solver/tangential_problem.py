@@ -51,11 +51,11 @@ SMALLEST_INCREMENT = 1e-4
 """Residuals are relative to the displacement of an increment, unless it is so small a share of the
 displacement present that rounding would be measured."""
 
-LEVELS = 2
+LEVELS = 3
 LEVEL_RATIO = 8.0
 """Local compliances for which the preconditioner has an inverse, over one another and, the first,
-over a cell's own. On spheres of 256² cells at Q/µP 0.75 one level takes 40 conjugate directions and
-two take 14; three take no fewer up to there, and a quarter fewer at 512²."""
+over a cell's own. On spheres at Q/µP 0.75 one level takes 40 conjugate directions of 256² cells and
+two take 14; three take as many there, and of 512² two thirds of what two take."""
 
 FEW = 0.05
 """Share of cells with more compliance than between the levels, below which the first one will do:
