@@ -26,7 +26,7 @@ from sa_solver.types import Array, Grid, Indices, Mask
 GAUSS = np.sqrt(1.0 / 3.0)
 # Differences leave rounding in cells that a triangle does not meet: below this share of its area.
 ROUNDING = 1e-12
-# A node whose area the cells cover but for this share is covered.
+# Areas that differ by this share of them are equal: of a node, and of half a cell.
 SHARED = 1e-6
 # Pairs of lines near triangles that are looked at together.
 AT_ONCE = 20_000
@@ -89,6 +89,12 @@ class FaceTransfer:
     def covered(self) -> Array:
         """Area of each cell that the face covers ``(nx ny,)`` [mm²]."""
         return np.asarray(self.shared.sum(axis=1)).ravel()
+
+    @cached_property
+    def inside(self) -> Mask:
+        """Cells ``(nx, ny)`` of which the face covers a half or more."""
+        covered = self.covered.reshape(self.grid.shape)
+        return np.asarray(covered >= (0.5 - SHARED) * self.grid.cell_area)
 
     def to_cells(self, nodal: Array) -> Array:
         """Cell means ``(..., nx, ny)`` of nodal values ``(..., n)``."""

@@ -6,6 +6,7 @@ import errno
 import os
 from collections.abc import Iterable
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from xml.sax.saxutils import quoteattr
@@ -13,7 +14,7 @@ from xml.sax.saxutils import quoteattr
 import h5py
 import numpy as np
 
-from sa_solver.types import Array, Frame, Grid
+from sa_solver.types import Array, Frame, Grid, Indices, Mask
 from workflow.shell.store import replacing
 
 if TYPE_CHECKING:
@@ -34,19 +35,20 @@ PROFILE = "normal_traction [MPa]"
 
 @dataclass(frozen=True)
 class FacePoints:
-    """Cells of a ``grid`` as points of a surface, of a line in line contacts, at their centres.
+    """Cells of a ``grid`` as points at their centres, in the nominal plane of a face.
 
-    They are those in the ``window`` of rows and columns, all without one, in the nominal plane of
-    the face.
+    They are those that ``on_face`` ``(nx, ny)`` marks, all without it. Triangles join them, in line
+    contacts lines.
     """
 
     grid: Grid
     frame: Frame
-    window: tuple[slice, slice] = (slice(None), slice(None))
+    on_face: Mask | None = None
 
     def of(self, field: h5py.Dataset | Array) -> Array:
         """A grid field ``(nx, ny)`` at the points ``(n,)``, x fastest."""
-        return np.ravel(field[()][self.window], order="F")
+        values: Array = field[()].T[self._shown.T]
+        return values
 
     def normal(self, heights: Array) -> Array:
         """Global vectors ``(n, 3)`` along the face's normal, so long at the points ``(n,)``."""
@@ -57,27 +59,65 @@ class FacePoints:
         x, y = (self.of(component) for component in field[()])
         return self.frame.to_global(np.stack([x, y, np.zeros_like(x)], axis=1)), x, y
 
-    def mesh(self, fields: Fields) -> pyvista.PolyData | pyvista.StructuredGrid:
+    def mesh(self, fields: Fields) -> pyvista.PolyData:
         """The points with their fields, a line or a surface."""
         import pyvista
 
-        local = np.stack([*map(self.of, self.grid.centres), self.of(np.zeros(self.grid.shape))])
-        points = self.frame.to_global(local.T) + self.frame.origin
         if self.grid.line:
-            # One line, of so many points.
-            mesh = pyvista.PolyData(points, lines=np.array([len(points), *range(len(points))]))
+            mesh = pyvista.PolyData(self.places, lines=self._lines)
         else:
-            mesh = pyvista.StructuredGrid()
-            mesh.points = points
-            nx, ny = np.zeros(self.grid.shape)[self.window].shape
-            mesh.dimensions = (nx, ny, 1)
+            mesh = pyvista.PolyData.from_regular_faces(self.places, self.triangles)
         attach(mesh.point_data, fields)
         return mesh
 
+    @cached_property
+    def places(self) -> Array:
+        """The points in space ``(n, 3)`` [mm]."""
+        local = np.stack([*map(self.of, self.grid.centres), self.of(np.zeros(self.grid.shape))])
+        return self.frame.to_global(local.T) + self.frame.origin
+
+    @cached_property
+    def triangles(self) -> np.ndarray:
+        """Points of the triangles ``(m, 3)`` of a surface, counterclockwise seen from body 2.
+
+        Two in a square of four points, and one where three are on the face.
+        """
+        a, b, c, d = _corners(self._numbers)
+        ways = np.array([[a, b, c], [a, c, d], [a, b, d], [b, c, d]]).swapaxes(1, 2)
+        there = np.all(ways >= 0, axis=2)
+        # The last two ways are of squares that have no others.
+        there = np.concatenate([there[:2], there[2:] & ~there[:2].any(axis=0)])
+        triangles: np.ndarray = ways[there]
+        return triangles
+
+    @cached_property
+    def _shown(self) -> Mask:
+        return np.ones(self.grid.shape, dtype=np.bool_) if self.on_face is None else self.on_face
+
+    @cached_property
+    def _numbers(self) -> Indices:
+        """Numbers of the points at their cells ``(nx, ny)``; -1 where there is none."""
+        numbers = np.full(self.grid.shape, -1)
+        numbers.T[self._shown.T] = np.arange(np.count_nonzero(self._shown))
+        return numbers
+
     @property
-    def suffix(self) -> str:
-        """What the name of its file ends in."""
-        return ".vtp" if self.grid.line else ".vts"
+    def _lines(self) -> Indices:
+        """Lines along x as VTK has them, each as long as it is not interrupted."""
+        cells = np.flatnonzero(self._shown)
+        pieces = np.split(np.arange(len(cells)), np.flatnonzero(np.diff(cells) > 1) + 1)
+        return np.concatenate([np.insert(piece, 0, len(piece)) for piece in pieces])
+
+
+def _corners(numbers: Indices) -> tuple[Indices, ...]:
+    """Four corners ``(m,)`` of each square between so numbered points, counterclockwise."""
+    corners = numbers[:-1, :-1], numbers[1:, :-1], numbers[1:, 1:], numbers[:-1, 1:]
+    return tuple(corner.ravel() for corner in corners)
+
+
+def quadrilaterals(numbers: Indices) -> Indices:
+    """Corners ``(m, 4)`` of the squares between points that are ``numbers`` ``(nx, ny)``."""
+    return np.stack(_corners(numbers), axis=1)
 
 
 def traction_fields(contact: h5py.Group, points: FacePoints) -> Fields:

@@ -1,7 +1,7 @@
 """A contact run for ParaView: ``contact.pvd``, the face at every computed increment.
 
-Its steps have the cells of the grid as points of a surface (``contact/<increment>.vts``), of a line
-in line contacts (``.vtp``). ``view.py`` shows them.
+Its steps have the cells of the grid as points of a surface, of a line in line contacts
+(``contact/<increment>.vtp``). ``view.py`` shows them.
 """
 
 from __future__ import annotations
@@ -48,5 +48,5 @@ def _faces(file: h5py.File, folder: Path) -> Iterator[Step]:
     points = FacePoints(grid_of(file["grid"][BODIES]), frame_of(file["grid"][BODIES]))
     for name, state in file["contact"][BODIES].items():
         fields = traction_fields(state, points) | {"gap": (points.of(state["gap"]), "mm")}
-        path = folder / "contact" / f"{name}{points.suffix}"
+        path = folder / "contact" / f"{name}.vtp"
         yield float(state.attrs["increment"]), BODIES, path, points.mesh(fields)

@@ -22,7 +22,7 @@ from sa_solver.types import Array
 from workflow.analyses.vibration.outcome import Contents
 from workflow.analyses.vibration.pad_nodes import rows_and_columns
 from workflow.pictures.view import FIRST, Scene, Shown, View, write_view
-from workflow.pictures.vtk import SECONDS, Fields, Step, attach, write_series
+from workflow.pictures.vtk import SECONDS, Fields, Step, attach, quadrilaterals, write_series
 
 if TYPE_CHECKING:
     import pyvista
@@ -96,6 +96,4 @@ def pad_mesh(places: h5py.Group) -> pyvista.UnstructuredGrid:
     if numbers is None:
         vertices = np.arange(len(x))[:, None]
         return pyvista.UnstructuredGrid({pyvista.CellType.VERTEX: vertices}, points)
-    corners = numbers[:-1, :-1], numbers[1:, :-1], numbers[1:, 1:], numbers[:-1, 1:]
-    quads = np.stack([corner.ravel() for corner in corners], axis=1)
-    return pyvista.UnstructuredGrid({pyvista.CellType.QUAD: quads}, points)
+    return pyvista.UnstructuredGrid({pyvista.CellType.QUAD: quadrilaterals(numbers)}, points)

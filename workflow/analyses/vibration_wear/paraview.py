@@ -41,7 +41,7 @@ def _cells(file: h5py.File, folder: Path) -> Iterator[Step]:
     for name, state in file[WORN].items():
         contact = state[CONTACT]
         shown = {key: points.of(contact[key]) for key in ("pressure", "energy")}
-        path = folder / "contact" / f"{name}{points.suffix}"
+        path = folder / "contact" / f"{name}.vtp"
         mesh = points.mesh(_fields(contact, shown, points.of))
         yield float(state.attrs["cycles"]), CONTACT, path, mesh
 

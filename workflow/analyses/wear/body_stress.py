@@ -15,7 +15,7 @@ import numpy as np
 
 from fe_models.cut_face import WholeStress
 from sa_solver.subsurface import SubsurfaceStress
-from sa_solver.types import Array, Grid, Material
+from sa_solver.types import Array, Grid, Mask, Material
 from wear.bulk_stress import SIDE, BodyFace, BulkStress
 from wear.face_loads import FaceLoads
 from wear.sticking import with_sticking_shear
@@ -42,9 +42,9 @@ class Planes:
         """Stress ``(6, n, k)`` in the section at ``depths`` under ``traction`` ``(3, nx, ny)``."""
         return stress.section(traction, "y" if self._along else "x", self.at, depths)
 
-    def row(self, places: Array) -> Array:
-        """Those of the section ``(2, n, 1)`` of the places of cells ``(2, nx, ny)``."""
-        return np.expand_dims(np.take(places, self._row, axis=2 - self._along), -1)
+    def row(self, values: np.ndarray) -> np.ndarray:
+        """Those of the section ``(c, n, 1)`` of values at cells ``(c, nx, ny)``."""
+        return np.expand_dims(np.take(values, self._row, axis=2 - self._along), -1)
 
     def points(self, heights: Array) -> Array:
         """The section's points at such ``heights`` ``(k,)``, ``(n k, 3)`` in the frame [mm]."""
@@ -91,6 +91,8 @@ class StressedBody:
         # Each keeps the symbols of a depth, or its own: one per body serves both moments.
         self._solver = SubsurfaceStress(stage.grid, material, number)
         self._face = BodyFace(stage.grid, stage.transfer, material, number)
+        # Where bodies overhang, the contact's face goes on to the end of an element.
+        self._on_face = stage.transfer.inside & stage.transfer_of(number).inside
 
     @property
     def convolutions(self) -> int:
@@ -109,7 +111,7 @@ class StressedBody:
     ) -> Array:
         """Stress ``(t, 6, nx, ny)`` at ``depth``; 0 in increments that are not ``known`` ``(t,)``.
 
-        Without a structure it is that of the contact alone.
+        It is 0 outside the body, too. Without a structure it is that of the contact alone.
         """
         pressed = cycle.tractions.pressure.any(axis=(1, 2))
         stress = np.zeros((len(known), 6, *self._stage.grid.shape))
@@ -118,7 +120,25 @@ class StressedBody:
         for t in np.flatnonzero(known & pressed).tolist():
             stress[t] += self._solver.at_depth(cycle.traction(t), depth)
         stress[~known] = 0.0
+        grid = self._stage.grid
+        x, y = grid.centres.reshape(2, -1)
+        places = np.stack([x, y, np.full_like(x, SIDE[self.number] * depth)], axis=1)
+        there = self._there(cycle, places, self._on_face.ravel())
+        stress[:, :, ~there.reshape(grid.shape)] = 0.0
         return stress
+
+    def _there(self, cycle: StressedCycle, points: Array, on_face: Mask) -> Mask:
+        """Which ``points`` ``(n, 3)`` are in the body: below its contact face, or in its mesh.
+
+        A face need not be flat: what is ``on_face`` ``(n,)`` is in the body at any small depth.
+        Without a mesh nothing is known of what lies beyond.
+        """
+        there = np.ones_like(on_face)
+        if cycle.fields is not None and not on_face.all():
+            field, frame = cycle.fields[self.number - 1], self._stage.face.frame
+            there = on_face.copy()
+            there[~on_face] = np.isfinite(field.at(points[~on_face], frame)[0])
+        return there
 
     def section(
         self, cycle: StressedCycle, bulk: BulkStress | None, planes: Planes, peak: int
@@ -145,5 +165,8 @@ class StressedBody:
         # Where the mesh ends above that depth, nothing but the face tells.
         bend = np.nan_to_num(at_whole - surface[..., :1]) * (near / whole) ** 2
         shallow = planes.section(self._solver, fine, near) + surface[..., 1:] + bend
+        on_face = np.repeat(planes.row(self._on_face[None])[0], len(near), axis=1)
+        places = planes.points(SIDE[self.number] * near)
+        shallow[:, ~self._there(cycle, places, on_face.ravel()).reshape(on_face.shape)] = np.nan
         deep = planes.section(self._solver, fine - nodal, below) + mesh[..., 1:]
         return np.concatenate([shallow, deep], axis=2)

@@ -62,11 +62,15 @@ class ContactStage(InterfaceContact):
         """The face of one body, with its own nodes."""
         return self.face.face(body)
 
+    def transfer_of(self, body: Literal[1, 2]) -> FaceTransfer:
+        """Transfer between the face of one body and the grid."""
+        face = self.face_of(body)
+        return self.transfer if face is self.face else FaceTransfer.between(face, self.grid)
+
     def depths_of_bodies(self, state: InterfaceState) -> tuple[Array, Array]:
         """Worn depths of body 1 and body 2 at the nodes of their own faces, volumes kept."""
-        face_1 = self.face_of(1)
-        to_1 = self.transfer if face_1 is self.face else FaceTransfer.between(face_1, self.grid)
         surfaces = state.surfaces
+        to_1 = self.transfer_of(1)
         return to_1.to_nodes(surfaces.depth_1), self.transfer.to_nodes(surfaces.depth_2)
 
     def loop(self, state: InterfaceState, peak: int) -> WornLoop:

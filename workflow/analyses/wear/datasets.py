@@ -18,6 +18,9 @@ from workflow.analyses.contact.datasets import (
 from workflow.shell.dataset import Dataset
 from workflow.shell.results import ResultsWriter
 
+# Group of body 1's face, below the contact's own, which is body 2's.
+OTHER_FACE = "face_1"
+
 
 def face_mesh(face: Face) -> dict[str, Dataset]:
     """Nodes ``(n, 2)`` and facets ``(m, 3)``, in a line contact ``(m, 2)``, of a face."""
@@ -42,6 +45,8 @@ def put_face(
     writer.put(f"{group}/load_history", columns)
     datasets = face_mesh(face) | {"slip": slip_field(carried.slip)}
     writer.put(group, datasets, weighted=face.weighted or None)
+    if (other := face.face(1)) is not face:
+        writer.put(f"{group}/{OTHER_FACE}", face_mesh(other))
     force, displacement = carried.force, carried.displacement
     if force is not None and displacement is not None:
         pressure, shear = force[:, 2] / face.nodal_areas, force[:, :2] / face.nodal_areas

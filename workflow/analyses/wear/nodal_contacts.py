@@ -102,8 +102,7 @@ class NodalStage(ContactStage):
 
     def depths_of_bodies(self, state: InterfaceState) -> tuple[Array, Array]:
         depth_1, depth_2 = state.surfaces.depths
-        if (face_1 := self.face_of(1)) is not self.face:
-            to_1 = FaceTransfer.between(face_1, self.grid)
+        if (to_1 := self.transfer_of(1)) is not self.transfer:
             depth_1 = to_1.to_nodes(self.transfer.to_cells(depth_1))
         return depth_1, depth_2
 

@@ -12,7 +12,15 @@ import numpy as np
 from fe_models.stress import turned
 from sa_solver.types import Array, Frame
 from workflow.analyses.wear.layout import Contents
-from workflow.pictures.vtk import CYCLES, FacePoints, Fields, Step, attach, write_series
+from workflow.pictures.vtk import (
+    CYCLES,
+    FacePoints,
+    Fields,
+    Step,
+    attach,
+    quadrilaterals,
+    write_series,
+)
 from workflow.shell.results import frame_of
 
 if TYPE_CHECKING:
@@ -39,7 +47,7 @@ def _maps(
             for key, values in life[state][f"body_{body}"].items():
                 if values.ndim == 2:
                     fields[f"{key}_{body}"] = points.of(values), str(values.attrs["unit"])
-        path = folder / f"{interface}_{state}{points.suffix}"
+        path = folder / f"{interface}_{state}.vtp"
         yield float(contact[jump].attrs["cycles"]), interface, path, points.mesh(fields)
 
 
@@ -67,8 +75,7 @@ def _section(group: h5py.Group, state: str, body: int, frame: Frame) -> pyvista.
 
     places, equivalent = _places(group, body), group[state]["von_mises"][()]
     number = np.arange(equivalent.size).reshape(equivalent.shape)
-    corners = number[:-1, :-1], number[1:, :-1], number[1:, 1:], number[:-1, 1:]
-    quads = np.stack([corner.ravel() for corner in corners], axis=1)
+    quads = quadrilaterals(number)
     inside = np.isfinite(equivalent.ravel()[quads]).all(axis=1)
     points, cells = np.unique(quads[inside], return_inverse=True)
     mesh = pyvista.UnstructuredGrid(

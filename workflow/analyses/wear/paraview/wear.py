@@ -4,8 +4,8 @@ Written into one folder:
 
 - ``view.py``, to be opened first, and ``view_mission.py``: scripts that show what is there;
 - ``<interface>.pvd``: time series over the cycles; every step has the points of the contact grid
-  that lie on the face (``<interface>/<jump>.vts``, a line ``.vtp`` in line contacts), in its
-  nominal plane. Warp By Vector on ``surface_1`` or ``surface_2`` makes them the surface of a body
+  that lie on the face (``<interface>/<jump>.vtp``, a line in line contacts), in its nominal
+  plane. Warp By Vector on ``surface_1`` or ``surface_2`` makes them the surface of a body
   as it is, rounded edges and wear included, on ``worn_1`` or ``worn_2`` its wear alone;
 - ``life_<interface>.pvd``: the fretting parameter on the same points, unworn and worn;
 - ``section_<interface>.pvd``: stress in a plane through both bodies under the contact, unworn and
@@ -25,7 +25,9 @@ from pathlib import Path
 import h5py
 import numpy as np
 
-from sa_solver.types import Array, Grid
+from fe_models.mesh import Face
+from fe_models.transfer import FaceTransfer
+from workflow.analyses.wear.datasets import OTHER_FACE
 from workflow.analyses.wear.layout import Contents, jump_name
 from workflow.analyses.wear.paraview.structure import write_structure
 from workflow.analyses.wear.paraview.subsurface import write_life, write_sections
@@ -62,13 +64,16 @@ def write_wear(contents: Contents, file: h5py.File, folder: Path) -> list[Path]:
 
 
 def _face_points(file: h5py.File, interface: str) -> FacePoints:
-    """The cells of an interface's grid that lie on the FE contact face, rounding included.
+    """The cells of an interface's grid that lie on the FE contact faces, rounding included.
 
-    What the grid has beyond it is no part of the bodies.
+    What the grid has beyond these is no part of the bodies.
     """
     grid, frame = grid_of(file["grid"][interface]), frame_of(file["grid"][interface])
-    window = _face_window(file["structure"][interface]["coordinates"][()], grid)
-    return FacePoints(grid, frame, window)
+    group = file["structure"][interface]
+    meshes = [group, *([group[OTHER_FACE]] if OTHER_FACE in group else [])]
+    faces = [Face("", frame, m["coordinates"][()], m["facets"][()]) for m in meshes]
+    inside = [FaceTransfer.between(face, grid).inside for face in faces]
+    return FacePoints(grid, frame, np.all(inside, axis=0))
 
 
 def _faces(
@@ -78,7 +83,7 @@ def _faces(
     contact, surfaces = file["contact"][interface], file["surfaces"][interface]
     for jump in contents.jump_names:
         fields = traction_fields(contact[jump], points) | _surface_fields(surfaces, jump, points)
-        path = folder / f"{jump}{points.suffix}"
+        path = folder / f"{jump}.vtp"
         yield float(contact[jump].attrs["cycles"]), interface, path, points.mesh(fields)
 
 
@@ -109,34 +114,14 @@ def _write_worn_surfaces(
     """
     import pyvista
 
-    plane, last = points.mesh({}), contents.jump_names[-1]
-    nx, ny, _ = plane.dimensions
-    written = []
+    last, written = contents.jump_names[-1], []
     for body, name in enumerate(contents.bodies, start=1):
         height = points.of(file["surfaces"][interface][last][f"body_{body}"])
-        triangles = _triangles(nx, ny)
-        if body == 2:
-            triangles = triangles[:, ::-1]
+        triangles = points.triangles if body == 1 else points.triangles[:, ::-1]
         surface = pyvista.PolyData.from_regular_faces(
-            np.asarray(plane.points) + points.normal(height), triangles
+            points.places + points.normal(height), triangles
         )
         path = folder / f"flank_{interface}_{name}.stl"
         write_stl(surface, path)
         written.append(path)
     return written
-
-
-def _face_window(face: Array, grid: Grid) -> tuple[slice, slice]:
-    """Rows and columns of the grid whose centres lie on the face with the nodes ``(n, 2)``."""
-    low, high = np.min(face, axis=0), np.max(face, axis=0)
-    inside_x = np.flatnonzero((grid.x.ravel() >= low[0]) & (grid.x.ravel() <= high[0]))
-    inside_y = np.flatnonzero((grid.y.ravel() >= low[1]) & (grid.y.ravel() <= high[1]))
-    return slice(inside_x[0], inside_x[-1] + 1), slice(inside_y[0], inside_y[-1] + 1)
-
-
-def _triangles(nx: int, ny: int) -> np.ndarray:
-    """Two triangles per square ``(m, 3)`` of ``nx`` by ``ny`` points, x fastest, normal to +z."""
-    index = np.arange(nx * ny).reshape(nx, ny, order="F")
-    corners = index[:-1, :-1], index[1:, :-1], index[1:, 1:], index[:-1, 1:]
-    a, b, c, d = (corner.ravel() for corner in corners)
-    return np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)])
