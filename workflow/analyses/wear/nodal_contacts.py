@@ -16,7 +16,6 @@ import numpy as np
 
 from fe_models.cut_face import whole_values
 from fe_models.structure import CycleSolution, InterfaceHistory
-from fe_models.transfer import FaceTransfer
 from sa_solver.types import Array
 from wear.coupled import CoupledState
 from wear.face_loads import FaceLoads
