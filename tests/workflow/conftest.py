@@ -89,7 +89,8 @@ def put_structure(file: h5py.File, name: str, load: float, cycles: float) -> Non
     )
     x, y = (axis.ravel() for axis in nodes)
     index = np.arange(x.size).reshape(20, 34)
-    facets = np.stack([index[:-1, :-1], index[1:, :-1], index[1:, 1:]], -1).reshape(-1, 3)
+    a, b, c, d = index[:-1, :-1], index[1:, :-1], index[1:, 1:], index[:-1, 1:]
+    facets = np.array([[a, b, c], [a, c, d]]).swapaxes(1, 3).reshape(-1, 3)
     t = np.arange(INCREMENTS)
     level = np.where(t <= PEAK, (t + 1) / (PEAK + 1), 1 - (t - PEAK) / (INCREMENTS - PEAK)) ** 2
     pressure = 0.7 * np.outer(level, peak_pressure(x, y, cycles, load))

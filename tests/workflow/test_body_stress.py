@@ -1,12 +1,17 @@
 """Stress of a body under its contact: its mesh, finer meshes, the other method, balances."""
 
 from dataclasses import dataclass
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from skfem import MeshTet
 
+from fe_models.mesh import Body, Face
+from fe_models.stress import StressField
+from fe_models.transfer import FaceTransfer
 from sa_solver.subsurface import SubsurfaceStress
-from sa_solver.types import Array
+from sa_solver.types import Array, Frame, Grid, Material
 from tests.conftest import CASES
 from wear.bulk_stress import SIDE
 from wear.life import smith_watson_topper
@@ -16,6 +21,7 @@ from workflow.analyses.wear.body_stress import (
     StressedCycle,
     with_known_shear,
 )
+from workflow.analyses.wear.case.sections import ContactStress
 from workflow.analyses.wear.contact_stage import ContactStage
 from workflow.analyses.wear.structure_stage import StructureStage
 from workflow.analyses.wear.structures import structure_of
@@ -28,6 +34,7 @@ COARSE = (
 )
 FRICTION = 0.4
 DEPTH = 0.02
+FLAT = Frame(np.zeros(3), np.eye(3))
 
 
 @dataclass
@@ -140,6 +147,40 @@ def test_unloaded_flanks_are_not_stressed(coarse: Flank) -> None:
     for body in (1, 2):
         history = coarse.history(body)
         assert np.abs(history[-1]).max() < 1e-9 * np.abs(history).max()
+
+
+@pytest.mark.parametrize("body", [1, 2])
+def test_there_is_no_stress_where_the_body_is_not(body) -> None:
+    """A foot over x > 0 on a plate over x < 1, pressed all over a grid from -2 to 2 mm."""
+    reach = {1: (-2.0, 1.0), 2: (0.0, 2.0)}
+    faces, fields = {}, []
+    for number, (low, high) in reach.items():
+        x, z = np.linspace(low, high, 7), SIDE[number] * np.linspace(0.0, 1.0, 4)
+        mesh = MeshTet.init_tensor(x, np.linspace(-2.0, 2.0, 5), np.sort(z))
+        solid = Body("", mesh.with_boundaries({"face": lambda p: p[2] == 0.0}))
+        nodes, facets = np.unique(solid.facets("face"), return_inverse=True)
+        corners = solid.points[nodes, :2]
+        faces[number] = Face("face", FLAT, corners, facets.reshape(-1, 3))
+        still, free = np.zeros((mesh.nvertices, 3)), np.zeros((6, mesh.nvertices))
+        fields.append(StressField(solid, still, free, None, None))
+    grid = Grid.over((4.0, 4.0), (16, 8), line=False)
+    to = {number: FaceTransfer.between(face, grid) for number, face in faces.items()}
+    stage = SimpleNamespace(grid=grid, transfer=to[2], transfer_of=to.get, face=faces[2])
+    pressed = np.ones((1, *grid.shape))
+    loads = SimpleNamespace(force=np.zeros((1, 3, len(faces[2]))))
+    tractions = SimpleNamespace(pressure=pressed, shear=np.zeros((1, 2, *grid.shape)))
+    stressed = StressedBody(stage, Material(1.0, 0.3), body)
+    cycle = StressedCycle(tractions, loads, fields=tuple(fields))
+    history = stressed.history(cycle, None, DEPTH, np.array([True]))
+    low, high = reach[body]
+    there = (grid.x[:, 0] > low) & (grid.x[:, 0] < high)
+    assert history[0, 2][there].max() < 0.0
+    assert not history[0, :, ~there].any()
+    planes = Planes(ContactStress(section="x", depth=0.9), grid)
+    past = SimpleNamespace(increment=lambda _: past, at=lambda row, z: np.zeros((1, 6, 16, len(z))))
+    section = stressed.section(cycle, past, planes, 0)
+    assert np.isfinite(section[:, there]).all()
+    assert np.isnan(section[:, ~there]).all()
 
 
 @pytest.mark.slow

@@ -383,7 +383,7 @@ def test_maps_are_on_the_flanks(normal: Any, paraview: Path) -> None:
         reader = pyvista.PVDReader(paraview / "life_intrados.pvd")
         assert reader.time_values == file["kinetics/cycles"][()][[0, -1]].tolist()
         for moment in ("unworn", "worn"):
-            mesh = pyvista.read(paraview / "life" / f"intrados_{moment}.vts")
+            mesh = pyvista.read(paraview / "life" / f"intrados_{moment}.vtp")
             x, y, _ = local_points(mesh, file["grid/intrados"]).T
             grid = grid_of(file["grid/intrados"])
             rows, columns = (

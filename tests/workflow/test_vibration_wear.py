@@ -346,7 +346,7 @@ def test_the_worn_contact_is_shown_in_paraview(tmp_path):
     check_scene(folder / "view.py")
     series = pyvista.PVDReader(folder / "contact.pvd")
     assert series.time_values == [0.0, 2e4]
-    face = pyvista.read(folder / "contact" / "00001.vts")
+    face = pyvista.read(folder / "contact" / "00001.vtp")
     with h5py.File(tmp_path / "out" / "results.h5") as file:
         contact = file["worn/00001/contact"]
         for name, shown in {"pressure": "pressure [MPa]", "path": "cycle_slip [mm]"}.items():
