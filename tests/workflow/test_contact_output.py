@@ -1,6 +1,8 @@
 """Summary, results, figures and ParaView files of contact runs, from closed-form states."""
 
 import json
+import shutil
+from pathlib import Path
 from types import SimpleNamespace
 
 import h5py
@@ -334,7 +336,7 @@ def test_line_has_no_maps_and_is_a_line(tmp_path):
     np.testing.assert_allclose(line.points[:, 0], grid.x.ravel())
     assert line.length == pytest.approx(1.0 - 1.0 / 64)
     check_arrays(shown)
-    check_scene(shown / "view.py")
+    assert len(check_scene(shown / "view.py")["views"]) == 3
     written = write_figures(*told, folder.root / "figures")
     assert {path.stem for path in written} == {"profiles", "forces"}
     with h5py.File(folder.results) as file:
@@ -342,3 +344,14 @@ def test_line_has_no_maps_and_is_a_line(tmp_path):
         assert grid_of(file["grid/bodies"]).line
         assert file["history/P"].attrs["unit"] == "N/mm"
         assert file["history/Edx"].attrs["unit"] == "N mm/mm"
+
+
+def test_what_is_zero_has_no_view(folder, tmp_path):
+    results = shutil.copy(folder.results, tmp_path)
+    with h5py.File(results, "r+") as file:
+        for state in file["contact/bodies"].values():
+            state["slip"][...] = 0.0
+    write_paraview(ANALYSIS.pictures, AREA, Path(results), tmp_path / "shown")
+    scene = check_scene(tmp_path / "shown" / "view.py")
+    colours = [view["shown"][0]["colour"] for view in scene["views"]]
+    assert colours == ["pressure [MPa]", "shear [MPa]"]

@@ -54,6 +54,14 @@ def test_claim_removes_only_what_the_earlier_run_wrote(case, folder):
     assert files(folder) == ["case.yaml", "jumps", "loops_mine.csv", "manifest.json", "notes.txt"]
 
 
+def test_a_folder_with_nothing_in_it_does_not_stay(case, folder):
+    folder.claim(case, force=False, resumable=True)
+    with folder.filling("paraview", "a test") as empty:
+        assert empty.is_dir()
+    assert not empty.exists()
+    assert "paraview" not in folder.manifest
+
+
 @pytest.mark.parametrize("force", [False, True])
 def test_own_files_in_the_folders_of_a_run_stay(case, folder, force):
     folder.claim(case, force=False, resumable=True)

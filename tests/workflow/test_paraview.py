@@ -12,7 +12,7 @@ import pyvista as pv
 
 from sa_solver.types import Array, Frame, Grid
 from tests.workflow.conftest import CONTENTS, PEAK
-from tests.workflow.shown_files import check_arrays, check_scene
+from tests.workflow.shown_files import check_arrays, check_scene, scene_of
 from workflow.analyses.wear import ANALYSIS
 from workflow.analyses.wear.layout import Contents
 from workflow.analyses.wear.worn_structure import MOST_INCREMENTS, shown_increments
@@ -268,7 +268,9 @@ def test_same_results_make_the_same_files(results: Path, folder: Path, tmp_path:
 
 
 def test_run_that_wore_nothing_shows_each_thing_once(results: Path, tmp_path: Path) -> None:
-    write_wear(replace(CONTENTS, jumps=0), results, tmp_path)
+    write_wear(replace(CONTENTS, jumps=0, worn=False), results, tmp_path)
+    titles = [view["title"] for view in scene_of(tmp_path / "view.py")["views"]]
+    assert titles == ["Structure at peak load", "Contact pressure at peak load"]
     assert pv.PVDReader(tmp_path / "structure.pvd").time_values == [0.0]
     assert not (tmp_path / "mission_worn.pvd").exists()
 

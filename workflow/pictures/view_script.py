@@ -112,8 +112,9 @@ class View:
         colours = simple.GetColorTransferFunction(name)
         low, high = series.span(name)
         known = COLOURED.get(name, (low, high))
-        COLOURED[name] = min(low, known[0]), max(high, known[1])
-        colours.RescaleTransferFunction(*COLOURED[name])
+        low, high = COLOURED[name] = min(low, known[0]), max(high, known[1])
+        # Of what is the same everywhere, a scale that shows this.
+        colours.RescaleTransferFunction(low, high if high > low else low + (abs(low) or 1.0))
         display.SetScalarBarVisibility(self.view, True)
         bar = simple.GetScalarBar(colours, self.view)
         bar.Title, bar.ComponentTitle = name, ""

@@ -116,7 +116,10 @@ class OutputFolder:
 
     @contextmanager
     def filling(self, name: str, what: str) -> Iterator[Path]:
-        """A folder of the run; the files that are written there meanwhile are listed."""
+        """A folder of the run; the files that are written there meanwhile are listed.
+
+        One that stays empty is removed.
+        """
         folder = self.reserve(name, what)
         folder.mkdir(exist_ok=True)
         before = self._files(folder)
@@ -125,6 +128,8 @@ class OutputFolder:
         finally:
             written = sorted(file for file, _ in self._files(folder) - before)
             self._list((self.manifest or {}) | dict.fromkeys(written, what))
+            if not any(folder.iterdir()):
+                self.discard(name)
 
     def _files(self, folder: Path) -> set[tuple[str, int]]:
         """Names of the files below a folder, with the moment when each was written."""

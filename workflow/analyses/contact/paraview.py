@@ -18,15 +18,17 @@ from workflow.pictures.vtk import (
     PROFILE,
     FacePoints,
     Step,
+    named,
     traction_fields,
     write_series,
 )
 from workflow.shell.results import frame_of, grid_of
 
+# Titles of the views, the fields that they show and their units.
 VIEWS = {
-    "Contact pressure": "pressure [MPa]",
-    "Shear on body 2": "shear [MPa]",
-    "Slip of body 2 over body 1": "slip [mm]",
+    "Contact pressure": ("pressure", "MPa"),
+    "Shear on body 2": ("shear", "MPa"),
+    "Slip of body 2 over body 1": ("slip", "mm"),
 }
 
 
@@ -35,10 +37,11 @@ def write_contact(contents: Contents, file: h5py.File, folder: Path) -> list[Pat
     written = write_series(folder / "contact.pvd", INCREMENTS, _faces(file, folder))
     states = file["contact"][BODIES].values()
     last = max(float(state.attrs["increment"]) for state in states)
-    warps = {"pressure [MPa]": PROFILE} if contents.line else {}
+    warps = {"pressure": PROFILE} if contents.line else {}
     views = [
-        View(title, [Shown("contact.pvd", colour, warps.get(colour, ""))])
-        for title, colour in VIEWS.items()
+        View(title, [Shown("contact.pvd", named(name, unit), warps.get(name, ""))])
+        for title, (name, unit) in VIEWS.items()
+        if name == "pressure" or any(state[name][()].any() for state in states)
     ]
     scene = Scene(str(file.attrs["title"]), INCREMENTS, last, views)
     return [*written, write_view(scene, folder / FIRST)]

@@ -38,7 +38,8 @@ def _views_of_wear(contents: Contents, file: h5py.File) -> Iterator[View]:
     worn = [
         Shown(path, "depth [mm]", f"worn_{_wears_most(file, name)} [mm]") for name, path in series
     ]
-    yield View("Worn depth of both bodies", worn)
+    if contents.worn:
+        yield View("Worn depth of both bodies", worn)
     profile = PROFILE if contents.line else ""
     pressure = [Shown(path, "pressure [MPa]", profile) for _, path in series]
     yield View("Contact pressure at peak load", pressure)
