@@ -9,7 +9,7 @@ import numpy as np
 import pyvista as pv
 
 SUFFIXES = {".vts", ".vtp", ".vtu", ".vti"}
-UNITS = {"1", "mm", "MPa", "N", "s", "N/mm", "N^2/mm^3", "MPa^2", "N mm"}
+UNITS = {"1", "mm", "mm^2", "MPa", "N", "s", "N/mm", "N^2/mm^3", "MPa^2", "N mm"}
 
 
 def check_arrays(folder: Path) -> None:

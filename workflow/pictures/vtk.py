@@ -67,8 +67,15 @@ class FacePoints:
             mesh = pyvista.PolyData(self.places, lines=self._lines)
         else:
             mesh = pyvista.PolyData.from_regular_faces(self.places, self.triangles)
-        attach(mesh.point_data, fields)
+        attach(mesh.point_data, {**fields, **self._shares})
         return mesh
+
+    @property
+    def _shares(self) -> Fields:
+        """What of the face each point stands for: sums of a field times this are its integrals."""
+        if self.grid.line:
+            return {"length": (np.full(len(self.places), self.grid.pitch[0]), "mm")}
+        return {"area": (np.full(len(self.places), self.grid.cell_area), "mm^2")}
 
     @cached_property
     def places(self) -> Array:

@@ -52,6 +52,7 @@ def _steps(file: h5py.File, load: h5py.Group, folder: Path) -> Iterator[Step]:
         for body, into in INTO_BODY.items():
             worn = into * state[f"worn_{body}"][()]
             fields[f"worn_{body}"] = np.outer(worn, frame.axes[2]), "mm"
+        fields["area"] = pad["area"][()], "mm^2"
         attach(mesh.point_data, fields)
         yield float(state.attrs["cycles"]), "pad", folder / f"{name}.vtu", mesh
 

@@ -92,7 +92,8 @@ def _write_results(outcome: SpecimensOutcome, run: Run[SpecimensCase]) -> None:
     with run_results(run, case, {"friction": case.friction.coefficient}) as writer:
         writer.put_contents(None)
         writer.put_grid(f"grid/{PAD}", outcome.half_space.grid, face.frame)
-        writer.put("specimens/pad", face_mesh(face))
+        shares = {"area": Dataset(areas, "mm^2", "of contact that belongs to each node")}
+        writer.put("specimens/pad", face_mesh(face) | shares)
         for number, both in enumerate(outcome.model.reduction.frequencies, 1):
             writer.put(f"specimens/body_{number}", described(FREQUENCIES, both))
         for number, load in enumerate(outcome.loads):

@@ -82,6 +82,7 @@ def _fields(contact: h5py.Group, cycle: h5py.Group, step: int, mean: Array) -> F
         "force": (force, "N"),
         "pressure": (force[:, 2] / contact["area"][()], "MPa"),
         "gap": (contact["gap"][()] + displacement[:, 2], "mm"),
+        "area": (contact["area"][()], "mm^2"),
         "state": (cycle["state"][step], "1"),
     }
 

@@ -53,7 +53,8 @@ def _nodes(file: h5py.File, folder: Path) -> Iterator[Step]:
         nodes = state[NODES]
         shown = {"pressure": nodes["normal_force"][()] / area, "energy": nodes["energy"][()] / area}
         mesh = pad_mesh(places)
-        attach(mesh.point_data, _fields(nodes, shown, lambda dataset: np.asarray(dataset[()])))
+        fields = _fields(nodes, shown, lambda dataset: np.asarray(dataset[()]))
+        attach(mesh.point_data, fields | {"area": (area, "mm^2")})
         yield float(state.attrs["cycles"]), CONTACT, folder / "contact" / f"{name}.vtu", mesh
 
 
