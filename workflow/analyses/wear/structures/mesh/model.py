@@ -167,36 +167,47 @@ class _MeshGap:
 
     def __call__(self, x: Array, y: Array) -> Array:
         """Gap ``(nx, ny)`` [mm] at ``x`` ``(nx, 1)`` and ``y`` ``(1, ny)``."""
-        gap = self._on_segments(x, y) if self._face.line else self._on_triangles(x, y)
-        outside = np.isnan(gap)
-        points = np.stack(np.broadcast_arrays(x, y), axis=-1)[outside]
-        distance, nearest = cKDTree(self._face.coordinates).query(points)
-        gap[outside] = self._gap[nearest] + PARTING_SLOPE * distance
+        gap = _extended(self._face, self._gap, x, y)
+        if (other := self._face.face(1)) is not self._face:
+            # The last facets of body 2 may hang over the end of body 1.
+            gap += _extended(other, np.zeros(len(other)), x, y)
         return gap if self._extra is None else gap + self._extra(x, y)
 
-    def _on_segments(self, x: Array, y: Array) -> Array:
-        gap = np.full((x.size, y.size), np.nan)
-        for segment in self._face.facets:
-            start, end = self._face.coordinates[segment, 0]
-            share = (x.ravel() - start) / (end - start)
-            met = (share >= -INSIDE) & (share <= 1.0 + INSIDE)
-            ends = self._gap[segment]
-            gap[met, 0] = ends[0] + share[met] * (ends[1] - ends[0])
-        return gap
 
-    def _on_triangles(self, x: Array, y: Array) -> Array:
-        gap = np.full((x.size, y.size), np.nan)
-        for triangle in self._face.facets:
-            corners = self._face.coordinates[triangle]
-            low, high = corners.min(axis=0), corners.max(axis=0)
-            i = slice(*np.searchsorted(x.ravel(), (low[0], high[0])))
-            j = slice(*np.searchsorted(y.ravel(), (low[1], high[1])))
-            arms = np.stack(np.broadcast_arrays(x[i] - corners[0, 0], y[:, j] - corners[0, 1]))
-            shares = np.einsum("ab,bij->aij", np.linalg.inv((corners[1:] - corners[0]).T), arms)
-            shares = np.concatenate([1.0 - shares.sum(axis=0, keepdims=True), shares])
-            met = np.all(shares >= -INSIDE, axis=0)
-            gap[i, j][met] = np.einsum("a,an->n", self._gap[triangle], shares[:, met])
-        return gap
+def _extended(face: Face, values: Array, x: Array, y: Array) -> Array:
+    """Values ``(n,)`` at a face's nodes, linear between them; larger and larger beyond it."""
+    found = (_on_segments if face.line else _on_triangles)(face, values, x, y)
+    outside = np.isnan(found)
+    points = np.stack(np.broadcast_arrays(x, y), axis=-1)[outside]
+    distance, nearest = cKDTree(face.coordinates).query(points)
+    found[outside] = values[nearest] + PARTING_SLOPE * distance
+    return found
+
+
+def _on_segments(face: Face, values: Array, x: Array, y: Array) -> Array:
+    found = np.full((x.size, y.size), np.nan)
+    for segment in face.facets:
+        start, end = face.coordinates[segment, 0]
+        share = (x.ravel() - start) / (end - start)
+        met = (share >= -INSIDE) & (share <= 1.0 + INSIDE)
+        ends = values[segment]
+        found[met, 0] = ends[0] + share[met] * (ends[1] - ends[0])
+    return found
+
+
+def _on_triangles(face: Face, values: Array, x: Array, y: Array) -> Array:
+    found = np.full((x.size, y.size), np.nan)
+    for triangle in face.facets:
+        corners = face.coordinates[triangle]
+        low, high = corners.min(axis=0), corners.max(axis=0)
+        i = slice(*np.searchsorted(x.ravel(), (low[0], high[0])))
+        j = slice(*np.searchsorted(y.ravel(), (low[1], high[1])))
+        arms = np.stack(np.broadcast_arrays(x[i] - corners[0, 0], y[:, j] - corners[0, 1]))
+        shares = np.einsum("ab,bij->aij", np.linalg.inv((corners[1:] - corners[0]).T), arms)
+        shares = np.concatenate([1.0 - shares.sum(axis=0, keepdims=True), shares])
+        met = np.all(shares >= -INSIDE, axis=0)
+        found[i, j][met] = np.einsum("a,an->n", values[triangle], shares[:, met])
+    return found
 
 
 def _coarse(face: Face, size: tuple[float, float]) -> tuple[int, int]:
