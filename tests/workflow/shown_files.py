@@ -29,6 +29,12 @@ def check_arrays(folder: Path) -> None:
             assert np.isfinite(values).all(), f"{path}: {name}"
 
 
+def total(mesh: Any, name: str) -> float:
+    """The integral of a field of a face: its sum over the points with what each stands for."""
+    shares = mesh["length [mm]" if "length [mm]" in mesh.point_data else "area [mm^2]"]
+    return float(mesh[name].astype(float) @ shares.astype(float))
+
+
 def scene_of(script: Path) -> dict[str, Any]:
     """What a script shows."""
     for node in ast.parse(script.read_text(encoding="utf-8")).body:

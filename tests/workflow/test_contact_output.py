@@ -14,7 +14,7 @@ from sa_solver.history import History
 from sa_solver.reference.mindlin import ShearedSphere
 from sa_solver.reference.torsion import TwistedSphere
 from sa_solver.types import Grid, Material
-from tests.workflow.shown_files import check_arrays, check_scene
+from tests.workflow.shown_files import check_arrays, check_scene, total
 from workflow.analyses.contact import ANALYSIS, figures
 from workflow.analyses.contact.datasets import Contents
 from workflow.analyses.contact.load_table import LoadTable
@@ -312,6 +312,7 @@ def test_paraview_steps_through_the_increments(outcome, folder, tmp_path):
     np.testing.assert_allclose(
         face.point_data["shear [MPa]"][:, 0], last.traction[0].ravel(order="F"), rtol=2e-7
     )
+    assert total(face, "pressure [MPa]") == pytest.approx(LOAD, rel=1e-2)  # of the exact pressure
     check_arrays(tmp_path)
     check_scene(tmp_path / "view.py")
 

@@ -7,10 +7,12 @@ from dataclasses import replace
 import h5py
 import numpy as np
 import pytest
+import pyvista
 import yaml
 
 from fe_models.dynamics.rig import natural_frequencies
 from tests.workflow.conftest import invoke, manifest_has_all
+from tests.workflow.shown_files import check_arrays, check_scene, total
 from tests.workflow.test_friction_rig import NODES, RIG, SPECIMENS
 from tests.workflow.time_scenes import refused
 from wear.evolution import EnergyTable
@@ -298,6 +300,21 @@ def test_results_hold_nodes_loops_and_responses(ended, summary):
         state["touching"] for state in summary["states"]
     ]
     assert len(list(ended.root.glob("frf_*.csv"))) == 4
+
+
+def test_pads_in_paraview_balance(ended, summary, tmp_path):
+    from workflow.analyses.vibration_wear import ANALYSIS
+    from workflow.analyses.vibration_wear.outcome import Contents
+    from workflow.pictures.drawing import write_paraview
+
+    write_paraview(ANALYSIS.pictures, Contents(at_nodes=True), ended.results, tmp_path)
+    check_arrays(tmp_path)
+    check_scene(tmp_path / "view.py")
+    pad, numbers = pyvista.read(tmp_path / "contact" / "00001.vtu"), summary["states"][1]
+    assert total(pad, "pressure [MPa]") == pytest.approx(60.0, rel=1e-6)
+    assert total(pad, "depth [mm]") == pytest.approx(numbers["volume"], rel=1e-6)
+    assert total(pad, "cycle_energy [N/mm]") == pytest.approx(numbers["energy_per_cycle"], rel=1e-6)
+    assert np.all(pad["unloaded_gap [mm]"] >= pad["depth [mm]"])
 
 
 @pytest.mark.slow

@@ -13,7 +13,7 @@ from sa_solver.reference.hertz import HertzSphere
 from sa_solver.types import ElasticPair, Frame, Material
 from tests.workflow.commands import invoke
 from tests.workflow.conftest import manifest_has_all
-from tests.workflow.shown_files import check_arrays, check_scene
+from tests.workflow.shown_files import check_arrays, check_scene, total
 from wear.link import LARGEST_RESIDUAL
 from workflow.analyses.specimens.case import SpecimensCase
 from workflow.analyses.specimens.half_space import NodeGrid, PadHalfSpace
@@ -284,6 +284,11 @@ class TestResults:
             *_, last = load["states"].values()
             np.testing.assert_allclose(mesh["pressure [MPa]"], last["pressure"], rtol=1e-6)
             assert mesh.area == pytest.approx(1.0)
+            force = load.attrs["normal_force"]
+            assert total(mesh, "pressure [MPa]") == pytest.approx(force, rel=1e-6)
+            for body in (1, 2):
+                volume = load[f"kinetics/volume_{body}"][-1]
+                assert total(mesh, f"depth_{body} [mm]") == pytest.approx(volume, rel=1e-6)
             normal = file["grid/pad"].attrs["axes"][2]
             for body, into in {1: -1.0, 2: 1.0}.items():
                 worn = mesh[f"worn_{body} [mm]"] @ normal

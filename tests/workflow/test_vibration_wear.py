@@ -13,7 +13,7 @@ from fe_models.dynamics.harmonic_balance import HarmonicBalance, PeriodicLoad
 from fe_models.dynamics.harmonics import Resolution
 from tests.workflow.conftest import invoke
 from tests.workflow.scenes import RIG_OF_THESIS
-from tests.workflow.shown_files import check_arrays, check_scene
+from tests.workflow.shown_files import check_arrays, check_scene, total
 from wear.joints.periodic import PeriodicMarch
 from wear.marching import advance_cycles
 from wear.steppers import ErrorControl, ImplicitStepper, first_cycles
@@ -354,3 +354,6 @@ def test_the_worn_contact_is_shown_in_paraview(tmp_path):
             np.testing.assert_allclose(face[shown], expected, rtol=1e-6)
         worn = face["worn_1 [mm]"][:, 2]
         np.testing.assert_allclose(worn, -contact["depth_1"][()].ravel(order="F"), rtol=1e-6)
+    state = json.loads((tmp_path / "out" / "summary.json").read_text("utf-8"))["states"][-1]
+    assert total(face, "depth [mm]") == pytest.approx(state["volume"], rel=1e-6)
+    assert total(face, "cycle_energy [N/mm]") == pytest.approx(state["energy_per_cycle"], rel=1e-6)

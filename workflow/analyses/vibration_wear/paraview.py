@@ -42,7 +42,7 @@ def _cells(file: h5py.File, folder: Path) -> Iterator[Step]:
         contact = state[CONTACT]
         shown = {key: points.of(contact[key]) for key in ("pressure", "energy")}
         path = folder / "contact" / f"{name}.vtp"
-        mesh = points.mesh(_fields(contact, shown, points.of))
+        mesh = points.mesh(_fields(contact, shown, points.of, "gap"))
         yield float(state.attrs["cycles"]), CONTACT, path, mesh
 
 
@@ -53,17 +53,20 @@ def _nodes(file: h5py.File, folder: Path) -> Iterator[Step]:
         nodes = state[NODES]
         shown = {"pressure": nodes["normal_force"][()] / area, "energy": nodes["energy"][()] / area}
         mesh = pad_mesh(places)
-        fields = _fields(nodes, shown, lambda dataset: np.asarray(dataset[()]))
+        fields = _fields(nodes, shown, lambda dataset: np.asarray(dataset[()]), "unloaded_gap")
         attach(mesh.point_data, fields | {"area": (area, "mm^2")})
         yield float(state.attrs["cycles"]), CONTACT, folder / "contact" / f"{name}.vtu", mesh
 
 
-def _fields(contact: h5py.Group, shown: dict[str, Array], of: Any) -> Fields:
-    """Of a state: at rest pressure and gap, of a cycle path and energy, and what is worn."""
+def _fields(contact: h5py.Group, shown: dict[str, Array], of: Any, gap: str) -> Fields:
+    """Of a state: at rest pressure and gap, of a cycle path and energy, and what is worn.
+
+    ``gap`` is what the one in the results is called: at rest, or that of bodies without load.
+    """
     depths = {body: of(contact[f"depth_{body}"]) for body in INTO_BODY}
     fields: Fields = {
         "pressure": (shown["pressure"], "MPa"),
-        "gap": (of(contact["gap"]), "mm"),
+        gap: (of(contact["gap"]), "mm"),
         "cycle_slip": (of(contact["path"]), "mm"),
         "cycle_energy": (shown["energy"], PER_AREA),
         "depth": (depths[1] + depths[2], "mm"),
