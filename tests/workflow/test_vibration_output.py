@@ -22,7 +22,7 @@ from workflow.analyses.vibration.figures import response as vibration
 from workflow.analyses.vibration.figures import states as vibration_states
 from workflow.analyses.vibration.outcome import Contents
 from workflow.analyses.vibration.pad_nodes import rows_and_columns
-from workflow.analyses.vibration.paraview import write_vibration
+from workflow.analyses.vibration.paraview import MOST_STEPS, shown_samples, write_vibration
 from workflow.pictures.drawing import write_figures
 from workflow.pictures.style import STYLE
 
@@ -332,6 +332,17 @@ def test_paraview_plays_a_cycle(folder: Path, results: h5py.File) -> None:
     assert mesh.compute_cell_sizes().cell_data["Area"].sum() == pytest.approx(100.0)
     vibration_ = np.mean([mesh.point_data["vibration [mm]"] for mesh in meshes], axis=0)
     np.testing.assert_allclose(vibration_, 0.0, atol=1e-9)
+
+
+@pytest.mark.parametrize("count", [1, 32, 48, 49, 64, 97, 128, 256, 360, 1000])
+def test_a_cycle_is_played_evenly(count: int) -> None:
+    """All samples or every so many, the last step as long as the others where that can be."""
+    shown = shown_samples(count)
+    assert shown[0] == 0
+    assert min(count, MOST_STEPS) / 2 < len(shown) <= MOST_STEPS
+    assert shown.step == 1 or count > MOST_STEPS
+    whole = [n for n in range(1, count + 1) if count % n == 0 and count / n <= MOST_STEPS]
+    assert count % shown.step == 0 or whole[0] >= 2 * -(-count // MOST_STEPS)
 
 
 def test_friction_takes_energy_from_the_upper_body(folder: Path, results: h5py.File) -> None:

@@ -64,13 +64,20 @@ def _cycle(contact: h5py.Group, response: h5py.Group, folder: Path) -> Iterator[
     cycle, frequency = response["resonance"], float(response.attrs["resonance"])
     count = len(cycle["state"])
     mean = TO_FRAME * cycle["displacement"][()].mean(axis=0)
-    # Every so many samples, as evenly as they can be.
-    shown = min(count, MOST_STEPS)
-    samples = (np.arange(shown) * count / shown).round().astype(int).tolist()
-    for number, step in enumerate(samples):
+    for number, step in enumerate(shown_samples(count)):
         mesh = pad_mesh(contact)
         attach(mesh.point_data, _fields(contact, cycle, step, mean))
         yield step / count / frequency, "pad", folder / f"{number:03d}.vtu", mesh
+
+
+def shown_samples(count: int) -> range:
+    """The samples of a cycle that are shown, of so many: in even steps, a whole number if can be.
+
+    >>> shown_samples(256)
+    range(0, 256, 8)
+    """
+    least = -(-count // MOST_STEPS)
+    return range(0, count, next((n for n in range(least, 2 * least) if count % n == 0), least))
 
 
 def _fields(contact: h5py.Group, cycle: h5py.Group, step: int, mean: Array) -> Fields:
