@@ -258,11 +258,17 @@ def _in_elements(body: Body, points: Array) -> tuple[Indices, Array]:
     near = np.flatnonzero(np.all((low <= last) & (high >= first), axis=0))
     corners = np.zeros((len(points), len(mesh.t)), dtype=np.int64)
     weights = np.full((len(mesh.t), len(points)), np.nan)
-    for element in near:
+    # Only points between an element's ends along the first axis can be in it.
+    order = np.argsort(places[:, 0], kind="stable")
+    margin = len(mesh.t) * ON_BORDER * (high[0] - low[0])
+    ends = np.stack([low[0] - margin, high[0] + margin])[:, near]
+    begins, stops = np.searchsorted(places[order, 0], ends)
+    for element, begin, stop in zip(near, begins, stops, strict=True):
+        points_near = order[begin:stop]
         vertices = mesh.t[:, element]
         edges = (mesh.p[:, vertices[1:]] - mesh.p[:, vertices[:1]]).T
-        inner = np.linalg.solve(edges.T, (places - mesh.p[:, vertices[0]]).T)
+        inner = np.linalg.solve(edges.T, (places[points_near] - mesh.p[:, vertices[0]]).T)
         shares = np.concatenate([1.0 - inner.sum(axis=0, keepdims=True), inner])
         held = np.all(shares >= -ON_BORDER, axis=0)
-        corners[held], weights[:, held] = vertices, shares[:, held]
+        corners[points_near[held]], weights[:, points_near[held]] = vertices, shares[:, held]
     return corners, weights
