@@ -384,7 +384,10 @@ class InterfaceContact:
         key: tuple[Array, ...] = columns, state.slip, state.paths, np.array([friction])
         key = *key, state.link.coefficients, state.link.region
         if settings.method == "full":
-            key = *key, state.surfaces.gap, state.surfaces.depth_1
+            # What it starts from leaves its rounding, which a run that goes on must find again.
+            starts = [start.pressure for start in state.starts.values()]
+            key = *key, state.surfaces.gap, state.surfaces.depth_1, np.array([*state.starts])
+            key = *key, *starts
         if self._current is not None and all(map(np.array_equal, self._current[0], key)):
             return self._current[1]
         slip, ways = self.transfer.to_cells(state.slip), passages(self.grid, state.paths)
