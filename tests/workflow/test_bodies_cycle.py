@@ -138,3 +138,19 @@ def test_the_force_of_a_held_approach_is_told_worn_too(tmp_path: Path) -> None:
     hertz = 4.0 / 3.0 * modulus * np.sqrt(10.0) * 1.2e-3**1.5
     assert found["unworn"]["P"] == pytest.approx(hertz, rel=0.05)
     assert 0.0 < found["worn"]["P"] < 0.95 * found["unworn"]["P"]
+
+
+def test_what_forces_dissipate_only_the_half_space_knows(tmp_path: Path) -> None:
+    """Slip and energies that imposed forces do not tell are left out, in all that is written."""
+    settings = ["wear.cycles=200", "wear.step.cycles=200", NO_STRESS, "output.paraview=false"]
+    found = run(area(FORCED, *settings), tmp_path / "out")["interface"]
+    assert found["energy_per_cycle"].keys() == {"half_space"}
+    assert found["energy_per_cycle"]["half_space"] > 0.0
+    assert found["by_increment"]["Edx"].keys() == {"half_space"}
+    assert found["by_increment"]["Qx"].keys() == {"half_space", "structure"}
+    with h5py.File(tmp_path / "out" / "results.h5") as file:
+        structure = file["structure/interface"]
+        assert "slip" not in structure
+        assert not {"Edx", "Edy"} & structure["load_history"].keys()
+    page = (tmp_path / "out" / "report.html").read_text("utf-8")
+    assert "energy dissipated in a cycle, unworn" in page

@@ -42,17 +42,18 @@ def write_comparison(
         writer.put(f"{group}/{increment:05d}", fields, On(f"grid/{name}"))
 
 
-def comparison_summary(cycle: tuple[ContactState, ...], structure: LoadHistory) -> dict[str, Any]:
-    """By increment, what follows in the half-space and what the structure says."""
+def comparison_summary(
+    cycle: tuple[ContactState, ...], structure: LoadHistory, slip_known: bool
+) -> dict[str, Any]:
+    """By increment, what follows in the half-space and what the structure says, if it does."""
     half_space = half_space_loads(cycle, structure)
-    columns = ("Qx", "Qy", "Mz", "Edx", "Edy")
+    forces, energies = ("Qx", "Qy", "Mz"), ("Edx", "Edy")
+    told = {*forces, *(energies if slip_known else ())}
     return {
         "sliding": half_space.sliding.tolist(),
         **{
-            name: {
-                "half_space": getattr(half_space, name).tolist(),
-                "structure": getattr(structure, name).tolist(),
-            }
-            for name in columns
+            name: {"half_space": getattr(half_space, name).tolist()}
+            | ({"structure": getattr(structure, name).tolist()} if name in told else {})
+            for name in (*forces, *energies)
         },
     }

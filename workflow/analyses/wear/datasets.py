@@ -32,18 +32,26 @@ def face_mesh(face: Face) -> dict[str, Dataset]:
 
 
 def put_face(
-    writer: ResultsWriter, group: str, face: Face, carried: FaceLoads, drive: Drive | None = None
+    writer: ResultsWriter,
+    group: str,
+    face: Face,
+    carried: FaceLoads,
+    drive: Drive | None = None,
+    slip_known: bool = True,
 ) -> None:
     """A contact face over a cycle; forces, tractions and displacements where these are known.
 
-    Where a ``drive`` imposes a tilt, the loads have no moment of the pressure about its axis.
+    Where a ``drive`` imposes a tilt, the loads have no moment of the pressure about its axis; slip
+    and energies are left out where the loads do not tell them.
     """
     columns = load_columns(carried.loads)
     for name, k in zip(("Mx", "My"), TILTS, strict=True):
         if drive is not None and drive.motion[k]:
             del columns[name]
+    if not slip_known:
+        del columns["Edx"], columns["Edy"]
     writer.put(f"{group}/load_history", columns)
-    datasets = face_mesh(face) | {"slip": slip_field(carried.slip)}
+    datasets = face_mesh(face) | ({"slip": slip_field(carried.slip)} if slip_known else {})
     writer.put(group, datasets, weighted=face.weighted or None)
     if (other := face.face(1)) is not face:
         writer.put(f"{group}/{OTHER_FACE}", face_mesh(other))

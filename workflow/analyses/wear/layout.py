@@ -34,13 +34,14 @@ class Contents:
 
     ``bodies`` are the names of body 1 and 2, ``jumps`` how many there are beside the unworn state.
     ``line`` contacts have forces and energies per length, a ``mix`` of missions has the share of
-    each. A ``structure`` of finite elements gives tractions at its nodes, and both bodies unworn
-    and worn, with ``mission`` over the increments too; its ``nodes`` wear, or half-spaces.
-    ``coarse`` are the interfaces with a solution on a coarse grid. The rest is there where a case
-    asks for it: a ``comparison`` of half-space and structure, tangential ``loops``, ``sections`` of
-    the stress under the contacts, and the interfaces with maps of fretting ``life``, of which only
-    those ``cracking`` are above 0 anywhere; the bodies ``strained`` have such stresses, a rigid one
-    has none. ``worn`` says whether anything has been lost.
+    each; ``dissipation`` says whether the loads tell what they dissipate. A ``structure`` of finite
+    elements gives tractions at its nodes, and both bodies unworn and worn, with ``mission`` over
+    the increments too; its ``nodes`` wear, or half-spaces. ``coarse`` are the interfaces with a
+    solution on a coarse grid. The rest is there where a case asks for it: a ``comparison`` of
+    half-space and structure, tangential ``loops``, ``sections`` of the stress under the contacts,
+    and the interfaces with maps of fretting ``life``, of which only those ``cracking`` are above 0
+    anywhere; the bodies ``strained`` have such stresses, a rigid one has none. ``worn`` says
+    whether anything has been lost.
     """
 
     names: tuple[str, ...]
@@ -48,6 +49,7 @@ class Contents:
     jumps: int
     line: bool = False
     mix: bool = False
+    dissipation: bool = True
     structure: bool = False
     mission: bool = False
     nodes: bool = False

@@ -74,6 +74,11 @@ class LoadSource(coupled.LoadSource, Protocol):
         """Whether the contacts are line contacts, all forces per length."""
         ...
 
+    @property
+    def slip_known(self) -> bool:
+        """Whether its loads say how faces slip and what that dissipates; else both are 0 there."""
+        ...
+
     def prepare(self) -> None:
         """Do the costly part now."""
         ...
@@ -91,6 +96,7 @@ class UncoupledSource(ABC):
     """Base of load sources without a structure of ours: nothing to solve, no response to wear."""
 
     peak: int
+    slip_known: bool = True
 
     def prepare(self) -> None:  # noqa: B027 - nothing is costly here
         """Nothing."""

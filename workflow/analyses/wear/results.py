@@ -154,7 +154,8 @@ def _write_results(
             stage, first, loads = contact.stage, contact.first, contact.unworn.loads
             writer.put_grid(f"grid/{stage.name}", stage.grid, stage.face.frame)
             drive = stage.settings.drive
-            put_face(writer, f"structure/{stage.name}", stage.face, contact.unworn, drive)
+            place, known = f"structure/{stage.name}", source.slip_known
+            put_face(writer, place, stage.face, contact.unworn, drive, known)
             if not nodes and _write_coarse(writer, contact, source.peak):
                 coarse.append(stage.name)
             dissipated = f"energy dissipated in each increment, {by} pressure"
@@ -177,6 +178,7 @@ def _write_results(
             jumps=outcome.state.jump,
             line=source.line,
             mix=outcome.interfaces[0].unworn.loads.mixed,
+            dissipation=source.slip_known,
             structure=structure is not None,
             mission=structure is not None and bool(structure.shown),
             nodes=nodes,
@@ -299,6 +301,7 @@ def _summary(
 def _interface_summary(outcome: Outcome, contact: InterfaceOutcome) -> dict[str, Any]:
     first, loads = contact.first, contact.carried["unworn"]
     wearing = "nodes" if outcome.case.contact.method == "nodes" else "half_space"
+    known = outcome.source.slip_known
     return {
         **dict(zip(KINETICS, contact.kinetics[-1].tolist(), strict=True)),
         "peak_load": {
@@ -309,9 +312,9 @@ def _interface_summary(outcome: Outcome, contact: InterfaceOutcome) -> dict[str,
         "slip_per_cycle": contact.slip_per_cycle,
         "energy_per_cycle": {
             wearing: float(first.energy.sum()),
-            "structure": loads.mean_energy,
+            **({"structure": loads.mean_energy} if known else {}),
         },
-        **({"by_increment": comparison_summary(first.cycle, loads)} if first.cycle else {}),
+        **({"by_increment": comparison_summary(first.cycle, loads, known)} if first.cycle else {}),
         "step_error": contact.step_error,
         "increments_error": contact.increments_error,
         "explicit_limit": first.stable_cycles if np.isfinite(first.stable_cycles) else None,

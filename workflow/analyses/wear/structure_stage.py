@@ -102,6 +102,8 @@ class StructureStage:
     are one per interface; those before any wear where they are not given.
     """
 
+    slip_known = True
+
     def __init__(self, model: StructureModel) -> None:
         self.model = model
         self.peak = model.peak

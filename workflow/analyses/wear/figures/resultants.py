@@ -43,7 +43,8 @@ def resultants(file: h5py.File, contents: Contents) -> Figure:
     scale, unit = force_unit(largest)
     friction = float(file.attrs["friction"])
     energies = {name: _energies(file, contents, name, loads[name]) for name in names}
-    dissipated = max(float(np.sum(pair)) for pair in energies.values())
+    known = [energy for pair in energies.values() for energy in pair if energy is not None]
+    dissipated = max(float(energy.sum()) for energy in known)
     rows = 2 + (dissipated > NOTHING * friction * largest)
     figure = new_figure(title, 3.2 * rows * blocks(len(names)))
     axes = panel_rows(figure, rows, len(names))
@@ -66,10 +67,15 @@ def resultants(file: h5py.File, contents: Contents) -> Figure:
 
 def _energies(
     file: h5py.File, contents: Contents, interface: str, history: dict[str, Array]
-) -> tuple[Array, Array]:
-    """Energy of every increment, of the loads and of what wears; of a mix per mean cycle."""
+) -> tuple[Array | None, Array]:
+    """Energy of every increment, of the loads if they tell, and of what wears.
+
+    Of a mix per mean cycle.
+    """
     share = history["share"] if contents.mix else 1.0
     wearing = file["contact"][interface][energy_name(contents.nodes)][()]
+    if not contents.dissipation:
+        return None, wearing
     return share * (history["Edx"] + history["Edy"]), wearing
 
 
@@ -129,17 +135,15 @@ def _ranges(numbers: Iterable[Any]) -> str:
 
 
 def _draw_energy(
-    axis: Axes, increments: Array, reference: Array, wearing: Array, contents: Contents
+    axis: Axes, increments: Array, reference: Array | None, wearing: Array, contents: Contents
 ) -> None:
     """What is said of the loads in bars, what wears in diamonds."""
-    wears, loads = contents.wears, contents.loads
-    axis.bar(increments, reference, width=0.8, color="#9DC3DE", label=loads)
+    wears, loads, unit = contents.wears, contents.loads, f"mJ{contents.per}"
+    after, against = float(wearing.sum()), ""
+    if reference is not None:
+        axis.bar(increments, reference, width=0.8, color="#9DC3DE", label=loads)
+        before = float(reference.sum())
+        told = change(before, after, unit)
+        against = f", {told} against {loads}" if told.endswith("%") else f", {loads} {before:.3g}"
     axis.plot(increments, wearing, "D", color=ORANGE, markersize=5, label=wears)
-    before, after = float(reference.sum()), float(wearing.sum())
-    unit = f"mJ{contents.per}"
-    told = change(before, after, unit)
-    if told.endswith("%"):
-        text = f"energy over the cycle: {wears} {after:.4g} {unit}, {told} against {loads}"
-    else:
-        text = f"energy over the cycle: {wears} {after:.3g} {unit}, {loads} {before:.3g}"
-    axis.set_title(text)
+    axis.set_title(f"energy over the cycle: {wears} {after:.4g} {unit}{against}")

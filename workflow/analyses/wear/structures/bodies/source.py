@@ -42,7 +42,7 @@ class BodiesSource(UncoupledSource):
     """Two bodies as load source of a wear run: a cycle of forces and motions.
 
     Loads that nobody imposes are those of bodies that slide as a whole, along the face, and of the
-    unworn contact across it.
+    unworn contact across it. What forces alone dissipate is for the half-space to find.
     """
 
     def __init__(self, case: BodiesWearCase | LineBodiesWearCase) -> None:
@@ -54,6 +54,7 @@ class BodiesSource(UncoupledSource):
             self._table.is_motion, self._table.imposed, strain if strain.any() else None
         )
         self.peak = self._peak()
+        self.slip_known = bool(self.motion.any())
 
     def _peak(self) -> int:
         """The increment of the largest normal force, and there of the largest shear force."""
