@@ -256,6 +256,7 @@ def check(case: str, overrides: tuple[str, ...]) -> None:
     Says what is given in plain units, what looks like a slip, and whether the memory is enough.
     """
     from workflow.case.doubts import doubts_of
+    from workflow.case.leaves import taken
     from workflow.kinds import analysis_of, load_case
 
     loaded = load_case(case, overrides)
@@ -264,7 +265,7 @@ def check(case: str, overrides: tuple[str, ...]) -> None:
     memory.check()
     click.echo(f"OK {case}: {loaded.title}")
     needed = ("memory", f"up to {memory.required / 1e9:.1f} GB"), ("time", run_time.text)
-    for name, text in [*loaded.outline(), *needed]:
+    for name, text in [*loaded.outline(), *taken(loaded), *needed]:
         click.echo(_fitted(f"  {name:<10} {text}", indent=13))
     for doubt in doubts_of(loaded):
         click.echo(_fitted(f"doubt: {doubt}", indent=2))

@@ -295,7 +295,7 @@ def test_a_case_is_written_as_it_was_read(tmp_path):
     assert isinstance(case, VibrationWearCase)
     assert parse_case(dump_case(case), str(tmp_path / "again.yaml")) == case
     rows = dict(case.outline())
-    assert rows["wear"] == "20000 cycles of 75 N at 100 Hz"
+    assert rows["wear"] == "100 and 20000 cycles of 75 N at 100 Hz"
 
 
 # --- mistakes -----------------------------------------------------------------------------------

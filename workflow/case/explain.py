@@ -6,11 +6,13 @@ import difflib
 from collections.abc import Iterable, Sequence
 from typing import Any, get_args
 
+from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails
 
 from workflow.case.fields import shown
 from workflow.case.sections import KINDS_ARE_NAMED_BY, Section, sections_of
 from workflow.case.source import KeyPath, Source, child, dotted, split_path
+from workflow.case.writing import scalar
 
 # The one of KINDS_ARE_NAMED_BY that a section takes from that around it.
 INHERITED = "law"
@@ -24,10 +26,11 @@ SENTENCES = {
     "bool_type": "not a switch; allowed: true or false",
     "model_type": "not a section; allowed: entries below it, as key: value",
     "model_attributes_type": "not a section; allowed: entries below it, as key: value",
-    "tuple_type": "not a list; allowed: such as [a, b]",
+    "tuple_type": "not a list; allowed: a list",
     "too_long": "too long; allowed: a list of {max_length}",
     "too_short": "too short; allowed: a list of at least {min_length}",
 }
+LISTS = ("tuple_type", "too_long", "too_short")
 
 
 class Explanation:
@@ -75,7 +78,8 @@ class Explanation:
             case "union_tag_not_found" | "union_tag_invalid":
                 return self._wrong_kind(path, context["discriminator"].strip("'"))
         sentence = SENTENCES[kind].format(**context) if kind in SENTENCES else details["msg"]
-        return path, f"{value}: {sentence}"
+        example = self._example(path) if kind in LISTS else ""
+        return path, f"{value}: {sentence}{example}"
 
     def _disagreeing(self, path: KeyPath, keys: Sequence[str]) -> KeyPath:
         """The entry to point at: one that an override has set, else the first."""
@@ -86,11 +90,32 @@ class Explanation:
     def _missing(self, path: KeyPath) -> tuple[KeyPath, str]:
         *parent, key = path
         if isinstance(key, int):
-            return tuple(parent), f"a list of {key}: too short; allowed: such as [a, b]"
+            place = tuple(parent)
+            return place, f"a list of {key}: too short; allowed: a longer one{self._example(place)}"
+        field = self._field_at(path)
+        assert field is not None
+        return path, f"missing; allowed: {field.description}{self._example(path)}"
+
+    def _field_at(self, path: KeyPath) -> FieldInfo | None:
+        *parent, key = path
         models = self._models_at(parent)
-        field = next(m.model_fields[key] for m in models if key in m.model_fields)
-        example = f", such as {field.examples[0]}" if field.examples else ""
-        return path, f"missing; allowed: {field.description}{example}"
+        fields = [m.model_fields[key] for m in models if key in m.model_fields]
+        return fields[0] if fields else None
+
+    def _example(self, path: KeyPath) -> str:
+        """How the entry at a path is written, or what a section has below it."""
+        field = self._field_at(path)
+        if field is None:
+            return ""
+        if field.examples:
+            told = "such as" in (field.description or "")
+            return "" if told else f", such as {scalar(field.examples[0])}"
+        sections = list(sections_of(field.annotation))
+        if not sections:
+            return ""
+        fields = sections[0].model_fields
+        asked = [name for name, below in fields.items() if below.is_required()] or list(fields)
+        return f", with {', '.join(asked)} below it"
 
     def _unknown(self, path: KeyPath) -> str:
         for model in self._models_at(path[:-1]):

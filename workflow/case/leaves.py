@@ -11,11 +11,15 @@ from typing import Any
 from pydantic import BaseModel
 
 from workflow.case.fields import File, Quantity
+from workflow.case.plain import plain
 from workflow.case.readable import readable
-from workflow.case.sections import Section, entries_of, entry_of
+from workflow.case.sections import LAST, Case, Section, entries_of, entry_of
+from workflow.case.writing import scalar
 
 # In the description of an entry: its base unit.
 UNIT = re.compile(r"\s*\[[^\]]*\]")
+# In a path: which one of a list.
+NUMBERS = re.compile(r"\.\d+(?=\.|$)")
 # What is no energy or load though its unit is that of one, by a part of its name.
 EVERYDAY = {
     "N*mm": (("moment", "N*m"), ("Mx", "N*mm"), ("My", "N*mm"), ("Mz", "N*mm")),
@@ -53,6 +57,34 @@ def leaves_of(section: BaseModel, above: str = "") -> Iterator[Leaf]:
                 if isinstance(quantity, File):  # wherever it is
                     text = PurePath(text).name
                 yield Leaf(place, what, item, text, told)
+
+
+def taken(case: Case) -> list[tuple[str, str]]:
+    """A row of what a case takes without being told, as one would write it; none if all is told.
+
+    Of each item of a list alike, once. What is written beside the results is left out.
+    """
+    texts = dict.fromkeys(
+        f"{NUMBERS.sub('.*', path)} {scalar(value) if unit is None else plain(value, unit)}"
+        for path, value, unit in _not_given(case, "", True)
+        if path.partition(".")[0] not in LAST
+    )
+    return [("defaults", ", ".join(texts))] if texts else []
+
+
+def _not_given(
+    section: BaseModel, above: str, given: bool
+) -> Iterator[tuple[str, Any, str | None]]:
+    """Path, value and unit of all entries that are not ``given`` and have a value nevertheless."""
+    for name, field in entries_of(type(section)).items():
+        quantity, here = entry_of(field), given and name in section.model_fields_set
+        for place, item in _items(getattr(section, name), f"{above}{name}"):
+            if isinstance(item, Section):
+                if getattr(item, "wanted", True):  # else none of it is used
+                    yield from _not_given(item, f"{place}.", here)
+            elif not here and item != ():
+                single = isinstance(quantity, Quantity) and isinstance(item, float)
+                yield place, item, quantity.unit if single else None
 
 
 def _items(value: Any, path: str) -> Iterator[tuple[str, Any]]:

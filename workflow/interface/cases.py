@@ -10,6 +10,7 @@ from typing import Any
 
 from workflow import kinds
 from workflow.case.doubts import doubts_of
+from workflow.case.leaves import taken
 from workflow.case.sections import Case
 from workflow.case.source import IN_PYTHON, dotted
 from workflow.case.writing import dump_case
@@ -107,7 +108,7 @@ def check(case: AnyCase, /, **overrides: Any) -> Check:
     analysis = kinds.analysis_of(loaded)
     memory, time = analysis.memory(loaded), analysis.run_time(loaded)
     memory.check()
-    outline, doubts = tuple(loaded.outline()), tuple(doubts_of(loaded))
+    outline, doubts = (*loaded.outline(), *taken(loaded)), tuple(doubts_of(loaded))
     return Check(loaded.title, outline, memory.required, time.seconds, doubts)
 
 

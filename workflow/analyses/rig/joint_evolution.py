@@ -125,6 +125,17 @@ class JointEvolution(Section):
         return self
 
     @property
+    def text(self) -> str:
+        """What changes, and how."""
+        given = {name: getattr(self, name) for name in type(self).model_fields}
+        laws = [
+            f"{name.replace('_', ' ')} {Path(law).name if isinstance(law, str) else law.kind}"
+            for name, law in given.items()
+            if law is not None
+        ]
+        return f"{', '.join(laws)},"
+
+    @property
     def is_empty(self) -> bool:
         """Whether nothing changes."""
         return all(getattr(self, name) is None for name in type(self).model_fields)

@@ -47,7 +47,9 @@ class Rig(Section):
     @property
     def text(self) -> str:
         """The rig in a few words."""
-        return f"rig of {', '.join(f'{1e3 * mass:g}' for mass in self.masses)} kg"
+        masses = ", ".join(f"{1e3 * mass:g}" for mass in self.masses)
+        springs = ", ".join(f"{1e-3 * spring:g}" for spring in self.springs)
+        return f"rig of {masses} kg on springs of {springs} N/um"
 
 
 class Points(Section):
@@ -145,7 +147,12 @@ class ReducedBody(Section):
     def text(self) -> str:
         """The structure in a few words."""
         places = ", ".join(joint.points for joint in self.joints)
-        return f"reduced body of {Path(self.file).name}, joints at {places}"
+        added = [f"{1e3 * added.mass:g} kg at {added.points}" for added in self.masses] + [
+            f"{1e-3 * spring.stiffness:g} N/um at {spring.points} along {spring.direction}"
+            for spring in self.springs
+        ]
+        beside = f"; added: {', '.join(added)}" if added else ""
+        return f"reduced body of {Path(self.file).name}, joints at {places}{beside}"
 
 
 class FrictionRig(Section):
@@ -178,7 +185,11 @@ class FrictionRig(Section):
     def text(self) -> str:
         """The structure in a few words."""
         masses = " and ".join(f"{1e3 * mass:g} kg" for mass in self.masses)
-        return f"specimens of {Path(self.specimens).name} in a rig of {masses}"
+        springs = " and ".join(f"{1e-3 * spring:g}" for spring in self.springs)
+        return (
+            f"specimens of {Path(self.specimens).name} in a rig of {masses} on springs of "
+            f"{springs} N/um"
+        )
 
 
 def driven_place(structure: Section, mass: int | None) -> str:

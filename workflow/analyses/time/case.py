@@ -268,7 +268,7 @@ def check_within(energies: tuple[float, ...], ageing: Ageing) -> None:
 
 def joint_outline(case: TimeCase) -> list[tuple[str, str]]:
     """The joint, whether it evolves, and where it is looked at."""
-    evolves = "fixed" if case.evolution.is_empty else "evolving with energy"
+    evolves = "fixed" if case.evolution.is_empty else f"{case.evolution.text} with energy"
     count = len(case.energies)
     looked_at = f"looked at {count} energies" if count > 1 else "looked at one energy"
     return [

@@ -140,6 +140,12 @@ class LoopsAt(Section):
         default=(),
     )
 
+    @property
+    def text(self) -> str:
+        """Where they are found, and how finely."""
+        highest = " and to ".join(str(harmonics[-1]) for harmonics in self.harmonics)
+        return f"at {self.frequency:g} Hz" + (f", harmonics to {highest}" if highest else "")
+
     @model_validator(mode="after")
     def _finer_and_finer(self) -> LoopsAt:
         if any(after[-1] <= before[-1] for before, after in pairwise(self.harmonics)):
@@ -322,4 +328,5 @@ class VibrationCase(DrivenMass):
             ("joint", f"{joint.law}, {entries(joint)}"),
             ("forces", self.driving),
             ("resolution", self.resolved),
+            *([] if self.loops is None else [("loops", self.loops.text)]),
         ]

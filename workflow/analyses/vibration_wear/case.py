@@ -114,9 +114,11 @@ class VibrationWearCaseBase(VibrationCaseBase):
 
     def outline(self) -> list[tuple[str, str]]:
         structure, wear = self.structure, self.wear
+        *before, last = (f"{count:g}" for count in wear.cycles)
+        cycles = f"{', '.join(before)} and {last}" if before else last
         return [
             ("structure", f"{structure.text}, damping ratio {shares(structure.damping_ratio)}"),
-            ("wear", f"{wear.cycles[-1]:g} cycles of {wear.force:g} N at {wear.frequency:g} Hz"),
+            ("wear", f"{cycles} cycles of {wear.force:g} N at {wear.frequency:g} Hz"),
             ("forces", self.driving),
             ("resolution", self.resolved),
         ]

@@ -13,7 +13,7 @@ from pydantic import model_validator
 
 from fe_models.mesh import Interface, MeshError, StructureMesh
 from workflow.analyses.wear.case.base import FiniteElementCase, check_interface_name
-from workflow.analyses.wear.case.gaps import Gap, HeightsGap, check_gap
+from workflow.analyses.wear.case.gaps import Gap, GapShape, HeightsGap, check_gap
 from workflow.analyses.wear.case.sections import (
     Density,
     Share,
@@ -270,11 +270,14 @@ class MeshCase(FiniteElementCase):
         structure, path = self.structure, self.load_path
         cycles = f", {len(path.mix)} cycles mixed" if path.mix else ""
         before = f", those before it in {path.cycle_from - 1} legs" if path.cycle_from > 1 else ""
-        mesh = structure.mesh(self.mesh.size)
+        mesh, gaps = structure.mesh(self.mesh.size), {c.name: c.gap for c in structure.contacts}
         bodies = [f"{b.name} of {b.mesh.nvertices} nodes" for b in (mesh.body_1, mesh.body_2)]
         return [
             ("structure", f"{Path(structure.file).name}: {' and '.join(bodies)}"),
-            *(("face", _outline_of(interface)) for interface in mesh.interfaces),
+            *(
+                ("face", _outline_of(interface, gaps[interface.name]))
+                for interface in mesh.interfaces
+            ),
             ("load path", f"{self.increments_outline} in {len(self.legs)} legs{before}{cycles}"),
             *(
                 ("load", f"{load.kind}: {entries(load, ('path', 'axis', 'through'))}")
@@ -440,7 +443,7 @@ def planes_of_symmetry(planes: Sequence[int]) -> str:
     return " and ".join(f"a plane of symmetry across {AXIS_NAMES[axis]}" for axis in planes)
 
 
-def _outline_of(interface: Interface) -> str:
+def _outline_of(interface: Interface, gap: GapShape | None) -> str:
     """What a user should see of an interface before running it."""
     meet = "meet node to node" if interface.projection is None else "do not match"
     area = f"{interface.nodal_areas.sum():.4g} {'mm' if interface.line else 'mm²'}"
@@ -451,9 +454,10 @@ def _outline_of(interface: Interface) -> str:
         x, y = face_size(interface)
         whole = f"{x:.4g} mm" if interface.line else f"{x:.4g} x {y:.4g} mm"
         cut = f"; cut by {planes_of_symmetry(interface.planes)}, on a grid over the whole, {whole}"
+    beside = "" if gap is None else f" and {gap.shape} {entries(gap)}".rstrip()
     return (
         f"{interface.name}, {len(interface)} nodes that {meet}, {area}, gap of the meshes "
-        f"{low:.3g} to {high:.3g} mm{cut}"
+        f"{low:.3g} to {high:.3g} mm{beside}{cut}"
     )
 
 
