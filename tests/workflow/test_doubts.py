@@ -13,12 +13,14 @@ import pytest
 from click.testing import CliRunner
 
 from sa_solver.reference.hertz import HertzCylinder, HertzSphere
+from workflow.analyses.rig.doubts import modes
+from workflow.analyses.rig.structure import Rig
 from workflow.case.doubts import SQUARE, USUAL, doubts_of, hertz, uneven_cells
 from workflow.case.fields import Quantity
 from workflow.case.plain import between, plain
 from workflow.case.sections import Section, entry_of, sections_of
 from workflow.cli import cli
-from workflow.kinds import kinds, load_case, template
+from workflow.kinds import kinds, load_case, parse_case, template
 
 CASES = sorted(Path("cases").glob("*.yaml"))
 
@@ -36,6 +38,7 @@ def test_nothing_is_doubted_of_templates(kind: str, template_files: Path, tmp_pa
     assert list(doubts_of(load_case(path))) == []
 
 
+LIGHT = "load_path={legs: [{P: 50, Qx: 1e-3}, {Qx: -1e-3}]}"
 LEGS = "[{P: 50 kN, shift_x: 25 um}, {shift_x: -25 um}, {shift_x: 25 um}]"
 SLIPS = [
     # A unit forgotten, or another than was meant.
@@ -70,6 +73,27 @@ SLIPS = [
     ("dovetail", "contact.grid=[512, 16]", "175 times longer than wide"),
     ("bodies", "contact.grid=[512, 16]", "32 times longer than wide"),
     ("dovetail", "wear.step.cycles=1e6", "1e+06 cycles, of 300000 in all: one jump"),
+    ("dovetail", "structure.edge_radius=30 m", "edge_width 1.5 mm falls off by 0.0375 um"),
+    ("dovetail", "structure.neck_fillet=3 um", "3 um; usual: 0.05 to 100 mm; 3 mm meant?"),
+    ("dovetail", "mesh.size=5 m", "5000 mm; usual: 0.05 to 100 mm"),
+    ("dovetail", "load_path.aerodynamic_moment=30 kN*m", "would lift the blade off a flank"),
+    ("specimens", "structure.diameter=8 m", "8000 mm; usual: 0.5 to 500 mm; 8000 um meant?"),
+    # Contacts and their grids, shear and friction.
+    ("bodies", "contact.size=[1 m, 1 m]", "cells of 7.81 mm, but the contact is about"),
+    ("bodies_wear", "contact.size=[1 um, 1 um]", "contact.size: 1 um, but the contact is about"),
+    ("line", "structure.radius=10 m", "contact.size: 2 mm, but the contact is about"),
+    ("bodies", "load_path={legs: [{P: 400 N}, {Qx: 15 kN}]}", "friction carries 160 N: the run"),
+    ("bodies", "load_path={legs: [{P: 400 N}, {Qx: 15 mN}]}", "Qx up to 0.015 N, where friction"),
+    ("bodies_wear", LIGHT, "Qx up to 0.001 N, where friction carries 20 N: is the unit right?"),
+    # Rigs: springs, masses and forces, and the modes that they make.
+    ("vibration", "structure.springs=[1.4 kN/um, 273 kN/um]", "273000 kN/mm; usual: 5e-05 to"),
+    ("vibration", "structure.masses=[21.2 g, 1.2 g]", "frequencies: no mode of the rig is near"),
+    ("vibration", "frequencies=[20 kHz, 400 kHz]", "frequencies: no mode of the rig is near"),
+    ("rig", "excitation.frequency=100 kHz", "excitation.frequency: no mode of the rig is near"),
+    ("joint", "joint.stiffness=27.3", "27.3 N/mm; usual: 0.05 to 10000 kN/mm; 27.3 N/um meant?"),
+    ("joint", "drive.stroke=14 mm", "14 mm; usual: 0.0001 to 1 mm; 14 um meant?"),
+    ("vibration", "forces=[10 kN, 40 kN]", "40 kN; usual: 1e-06 to 20 kN; 40 N meant?"),
+    ("rig", "evolution={friction: {kind: exponential, final: 72, rate: 1}}", "72 % meant?"),
 ]
 
 
@@ -82,7 +106,11 @@ def told_of(kind: str, slip: str, folder: Path) -> list[str]:
 # What else has to be changed for a case to be valid.
 BESIDE = {
     "load_path.stroke=20 mm": ("contact.size=40 mm",),
+    "excitation.frequency=100 kHz": ("integration.step=0.1 us",),
+    "joint.stiffness=27.3": ("joint.residual_stiffness=0.88",),
     "load_path.stroke=50": ("wear.motion=neglect",),
+    LIGHT: ("contact.method=full",),
+    "contact.size=[1 um, 1 um]": ("wear.motion=neglect",),
 }
 
 
@@ -91,8 +119,30 @@ def test_a_slip_is_doubted(kind: str, slip: str, words: str, tmp_path: Path) -> 
     """By the entry that it is in, on one line."""
     told = [doubt for doubt in told_of(kind, slip, tmp_path) if words in doubt]
     assert told, told_of(kind, slip, tmp_path)
-    assert slip.replace("=", ".").split(".")[0] in told[0]
+    # What two entries say together is told of one of them.
+    together = "no mode of the rig", "but the contact is"
+    assert slip.replace("=", ".").split(".")[0] in told[0] or any(w in told[0] for w in together)
     assert "\n" not in told[0]
+
+
+@pytest.mark.parametrize(
+    ("slip", "words"),
+    [
+        ("structure.contacts.0.gap.end_width=3 um", "contacts.0.gap.end_radius: 150 mm over end_"),
+        ("structure.loads.0.pressure=10 GPa", "structure.loads.0.pressure: 10 GPa; usual"),
+    ],
+)
+def test_a_slip_beside_a_mesh_is_doubted(slip: str, words: str, folders: dict[str, Path]) -> None:
+    (told,) = doubts_of(parse_case(template("mesh"), str(folders["mesh"] / "case.yaml"), [slip]))
+    assert words in told
+
+
+def test_modes_are_those_of_masses_in_a_row() -> None:
+    """Two of 1 kg on springs of 1 N/um: ω² = (3 ∓ √5)/2 k/m; k/m and 3 k/m with a joint alike."""
+    rig = Rig(kind="rig", masses=(1e-3, 1e-3), springs=(1e3, 1e3), damping_ratio=0.0)
+    opened = np.sqrt(0.5 * (3.0 + np.sqrt(5.0) * np.array([-1.0, 1.0])))
+    for held, expected in ((0.0, opened), (1e3, np.sqrt([1.0, 3.0]))):
+        assert 2.0 * np.pi * modes(rig, held) == pytest.approx(1e3 * expected, rel=1e-12)
 
 
 @pytest.mark.parametrize(("scale", "words"), [(1e3, "are they in um?"), (1e-3, "are they in m?")])
@@ -121,9 +171,9 @@ def test_all_that_is_usual_is_usual_of_some_entry() -> None:
 def quantities_of(model: type[Section], path: str = "") -> Iterator[tuple[str, str | None]]:
     """Dotted paths of all quantities that a model may have, and their units."""
     for name, field in model.model_fields.items():
-        if isinstance(quantity := entry_of(field), Quantity):
-            yield f"{path}{name}", quantity.unit
         listed = "0." if get_origin(field.annotation) is tuple else ""
+        if isinstance(quantity := entry_of(field), Quantity):
+            yield f"{path}{name}.{listed}".rstrip("."), quantity.unit
         for section in sections_of(field.annotation):
             yield from quantities_of(section, f"{path}{name}.{listed}")
 

@@ -210,6 +210,7 @@ class StampLoads:
 
     line = False
     peak = 0
+    slip_known = True
 
     def __init__(self, case: StampCase) -> None:
         self._case = case

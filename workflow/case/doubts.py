@@ -21,8 +21,11 @@ from workflow.case.sections import Case, entry_of
 
 # Cells so many times longer than wide waste most of them.
 SQUARE = 5.0
-# Pressures below this [MPa], and beyond so many times the yield stress, are none of a test.
-WEAK, BEYOND = 1e-3, 5.0
+# Pressures below this [MPa], and beyond so many times the yield stress, are none of a test; beyond
+# this share of Young's modulus nothing stays as it is.
+WEAK, BEYOND, STRENGTH = 1e-3, 5.0, 0.1
+# Roundings that fall off by less than this [mm] are rougher than they are round.
+ROUND = 1e-4
 # Strokes over so many widths of the contact are rare even where wear is wanted.
 LONG = 50.0
 # Heights that rise by more than this share of a face are no roughness, nor are those of less [mm].
@@ -59,8 +62,22 @@ USUAL = (
     Usual("*.rotation_speed", "rad/s", 10.0, 2600.0),
     Usual("structure.loads.*.speed", "rad/s", 10.0, 2600.0),
     Usual("load_path.airfoil_mass", "t", 5e-6, 0.1),
-    Usual("*.stroke", "mm", 1e-5, 30.0),
+    # Of a joint that frets.
+    Usual("drive.stroke", "mm", 1e-4, 1.0),
+    Usual("*.stroke", "mm", 1e-4, 30.0),
+    Usual("loops.amplitude", "mm", 1e-5, 1.0),
     Usual("*.amplitude", "mm", 1e-6, 10.0),
+    # Interfaces have 0.1 to 1000 N/um, and springs of rigs more or less.
+    Usual("joint.stiffness", "N/mm", 50.0, 1e7),
+    Usual("joint.normal_stiffness", "N/mm", 50.0, 1e7),
+    Usual("structure.springs.*", "N/mm", 0.05, 1e7),
+    Usual("structure.masses.*", "t", 1e-6, 5.0),
+    Usual("joint.normal_load", "N", 0.01, 1e6),
+    Usual("excitation.force", "N", 1e-3, 2e4),
+    Usual("forces.*", "N", 1e-3, 2e4),
+    Usual("wear.force", "N", 1e-3, 2e4),
+    Usual("evolution.*.change", "1", 0.005, 20.0),
+    Usual("evolution.*.final", "1", 0.05, 20.0),
     Usual("structure.radius", "mm", 0.01, 1e5),
     Usual("structure.radius_*", "mm", 0.01, 1e5),
     Usual("structure.half_width", "mm", 0.005, 100.0),
@@ -68,6 +85,14 @@ USUAL = (
     Usual("structure.slot_length", "mm", 1.0, 1000.0),
     Usual("structure.rim_radius", "mm", 20.0, 2000.0),
     Usual("structure.strip_width", "mm", 0.05, 50.0),
+    Usual("structure.chamfer_depth", "mm", 0.01, 50.0),
+    Usual("structure.diameter", "mm", 0.5, 500.0),
+    Usual("structure.*_fillet", "mm", 0.05, 100.0),
+    Usual("structure.slot_clearance", "mm", 0.01, 50.0),
+    Usual("structure.neck_width", "mm", 0.5, 500.0),
+    Usual("structure.lug_height", "mm", 0.1, 200.0),
+    Usual("structure.loads.*.pressure", "MPa", 1e-3, 5e3),
+    Usual("mesh.size", "mm", 0.05, 100.0),
     Usual("*.frequency", "Hz", 1e-4, 1e5),
     Usual("stress.life.depth", "mm", 1e-3, 1.0),
 )
@@ -80,6 +105,7 @@ MEANT: dict[str, tuple[tuple[str, float], ...]] = {
     "t": (("kg", 1e-3),),
     "mm": (("mm", 1.0), ("um", 1e-3), ("m", 1e3), ("nm", 1e-6)),
     "N": (("N", 1.0), ("kN", 1e3)),
+    "N/mm": (("N/um", 1e3), ("N/m", 1e-3), ("N/mm", 1.0), ("kN/mm", 1e3)),
     "Hz": (("kHz", 1e3), ("Hz", 1.0)),
     "1": (("%", 0.01),),
 }
@@ -88,6 +114,7 @@ MEANT: dict[str, tuple[tuple[str, float], ...]] = {
 def doubts_of(case: Case) -> Iterator[str]:
     """A line for each value that is hardly meant, by itself or beside others."""
     yield from _unusual(case)
+    yield from _hardly_round(case)
     yield from case.doubts()
 
 
@@ -101,6 +128,25 @@ def _unusual(case: Case) -> Iterator[str]:
             continue
         value, range_text = plain(number, usual.unit), between(usual.low, usual.high, usual.unit)
         yield f"{path}: {value}; usual: {range_text}{_question(abs(number), usual)}"
+
+
+def _hardly_round(section: BaseModel, path: str = "") -> Iterator[str]:
+    """Doubts about rounded edges and ends of faces, anywhere in a section, that are flat."""
+    for name in ("edge", "end"):
+        width, radius = (getattr(section, f"{name}_{of}", None) for of in ("width", "radius"))
+        if width is not None and radius is not None and 0.5 * width**2 / radius < ROUND:
+            yield (
+                f"{path}{name}_radius: {plain(radius, 'mm')} over {name}_width "
+                f"{plain(width, 'mm')} falls off by {plain(0.5 * width**2 / radius, 'mm', 3)}: "
+                "are the units right?"
+            )
+    for name in type(section).model_fields:
+        value = getattr(section, name)
+        items = enumerate(value) if isinstance(value, tuple) else [("", value)]
+        for index, item in items:
+            if isinstance(item, BaseModel):
+                place = f"{path}{name}" + (f".{index}" if index != "" else "")
+                yield from _hardly_round(item, f"{place}.")
 
 
 def _quantities(section: BaseModel, path: str = "") -> Iterator[tuple[str, float, Quantity]]:
@@ -141,8 +187,13 @@ def uneven_cells(sides: tuple[float, float], cells: tuple[int, int]) -> Iterator
         )
 
 
-def pressed(path: str, pressure: float, yields: Iterable[float | None]) -> Iterator[str]:
-    """A doubt about a load that presses with ``pressure`` [MPa] on bodies that yield at these."""
+def pressed(
+    path: str, pressure: float, yields: Iterable[float | None], moduli: Iterable[float] = ()
+) -> Iterator[str]:
+    """A doubt about a load that presses with ``pressure`` [MPa] on bodies that yield at these.
+
+    Where that is not known, of these Young's ``moduli`` [MPa].
+    """
     if 0.0 < pressure < WEAK:
         yield f"{path}: presses with about {plain(pressure, 'MPa', 3)} at most: is its unit right?"
     limits = [limit for limit in yields if limit is not None]
@@ -150,6 +201,11 @@ def pressed(path: str, pressure: float, yields: Iterable[float | None]) -> Itera
         yield (
             f"{path}: presses with about {plain(pressure, 'MPa', 3)}, "
             f"{pressure / min(limits):.0f} times the yield stress: is its unit right?"
+        )
+    elif pressure > STRENGTH * min(moduli, default=np.inf):
+        yield (
+            f"{path}: presses with about {plain(pressure, 'MPa', 3)}, more than any material with "
+            "such a Young's modulus bears: is its unit right?"
         )
 
 

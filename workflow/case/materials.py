@@ -34,7 +34,10 @@ class KnownMaterial:
 
 
 _SHIGLEY = "Budynas and Nisbett, Shigley's Mechanical Engineering Design, table A-5"
-_STAINLESS = "EN 1993-1-4 (elasticity), EN 10088-1 (density), ASTM A240 (least yield stress)"
+_STAINLESS = (
+    "EN 10088-1 (Young's modulus, density), EN 1993-1-4 (Poisson's ratio), ASTM A240 (least yield "
+    "stress)"
+)
 _ALUMINIUM = (
     "Aluminum Association, Aluminum Standards and Data (typical); Poisson's ratio MIL-HDBK-5"
 )
@@ -51,8 +54,9 @@ MATERIALS = {
         ("IN718", "Alloy 718", "2.4668"),
     ),
     "100Cr6": KnownMaterial(
-        *(207.0, 0.292, 7800, None, "hardened; yield stress left to you"),
-        f"{_SHIGLEY} (carbon steel)",
+        *(210.0, 0.3, 7830, None, "hardened; yield stress left to you"),
+        "Lucefin, technical card 100Cr6 to EN ISO 683-17 (elasticity); balls of AISI 52100, "
+        "0.283 lb/in^3 (density)",
         ("52100", "AISI 52100", "SUJ2", "1.3505"),
     ),
     "42CrMo4": KnownMaterial(

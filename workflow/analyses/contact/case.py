@@ -15,9 +15,10 @@ from pydantic import Discriminator, Field, Tag, model_validator
 
 from sa_solver.types import Array, ElasticPair, Grid
 from sa_solver.types import Material as ElasticMaterial
+from workflow.analyses.contact.doubts import about_grid, about_pressure, about_shear
 from workflow.analyses.contact.load_path import ContactPath, LegsOrFile, LineContactPath
 from workflow.analyses.contact.load_table import PRESSING, LoadTable
-from workflow.case.doubts import heights, hertz, pressed, uneven_cells
+from workflow.case.doubts import heights, hertz, uneven_cells
 from workflow.case.fields import File, Quantity
 from workflow.case.input_files import InputFileError, read_heights
 from workflow.case.loading import word_at
@@ -312,7 +313,8 @@ class BodiesCase(Case):
         ]
 
     def doubts(self) -> Iterator[str]:
-        grid, loads = self.contact.centred(), self.load_path.table().columns
+        grid, table = self.contact.centred(), self.load_path.table()
+        loads = table.columns
         sides = grid.shape[0] * grid.pitch[0], grid.shape[1] * grid.pitch[1]
         if grid.line:
             sides = sides[0], sides[0]
@@ -323,8 +325,10 @@ class BodiesCase(Case):
         elif "P" in loads and (load := float(loads["P"].max())) > 0.0:
             bodies = self.materials.body_1, self.materials.body_2
             if found := unworn_contact(self.structure, bodies, load, grid.line):
-                limits = [getattr(body, "yield_stress", None) for body in bodies]
-                yield from pressed("load_path", found[1], limits)
+                yield from about_pressure("load_path", found[1], bodies)
+                yield from about_grid(found[0], sides, grid.shape)
+        unit = "N/mm" if grid.line else "N"
+        yield from about_shear("load_path", table, self.friction.coefficient, unit)
 
 
 class ContactCase(BodiesCase):

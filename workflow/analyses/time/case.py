@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from itertools import pairwise
 from typing import Annotated, ClassVar, Literal
 
 import numpy as np
 from pydantic import Field, model_validator
 
+from workflow.analyses.rig.doubts import AWAY, about_modes
 from workflow.analyses.rig.excitation import Drive, Excitation, Hammer, Harmonic, Recorded, Time
 from workflow.analyses.rig.joint_evolution import JointEvolution
 from workflow.analyses.rig.joint_sections import ContactLaw, FrictionContactJoint, Joint, JointLaw
@@ -226,6 +228,14 @@ class RigCase(TimeCase):
         if self.ageing.wanted:
             rows.append(("ageing", ageing_outline(self.ageing)))
         return rows
+
+    def doubts(self) -> Iterator[str]:
+        excitation, stiffness = self.excitation, self.joint.stiffness
+        if isinstance(excitation, Harmonic):
+            span = excitation.frequency / AWAY, excitation.frequency * AWAY
+            yield from about_modes("excitation.frequency", span, self.structure, stiffness)
+        elif isinstance(excitation, Hammer):
+            yield from about_modes("excitation.band", excitation.band, self.structure, stiffness)
 
 
 # Of the difference of two recorded times.

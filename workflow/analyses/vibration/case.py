@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from math import radians
@@ -10,6 +10,7 @@ from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import Field, StrictBool, model_validator
 
+from workflow.analyses.rig.doubts import RIGID, about_modes
 from workflow.analyses.rig.excitation import DrivingForce, Frequency, MassNumber
 from workflow.analyses.rig.joint_sections import ContactLaw, FrictionContactJoint
 from workflow.analyses.rig.structure import (
@@ -193,6 +194,10 @@ class VibrationCaseBase(Case):
     def with_mean(self, harmonics: Sequence[int]) -> tuple[int, ...]:
         """Harmonics, with 0 where joints are contacts."""
         return tuple(sorted({0, *harmonics} if self.contacts else harmonics))
+
+    def doubts(self) -> Iterator[str]:
+        stiffness = getattr(getattr(self, "joint", None), "stiffness", RIGID)
+        yield from about_modes("frequencies", self.frequencies, self.structure, stiffness)
 
     @property
     def driving(self) -> str:

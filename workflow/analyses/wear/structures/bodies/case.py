@@ -30,11 +30,12 @@ from workflow.analyses.contact.case import (
     touches_along_a_line,
     unworn_contact,
 )
+from workflow.analyses.contact.doubts import about_grid, about_pressure, about_shear
 from workflow.analyses.contact.load_path import Leg, LegsOrFile, LegT, LineLeg
 from workflow.analyses.contact.load_table import LoadTable
 from workflow.analyses.wear.case.base import WearCase
 from workflow.analyses.wear.case.sections import Contact, Cycles, PressingForce, Wear
-from workflow.case.doubts import heights, long_stroke, pressed
+from workflow.case.doubts import heights, long_stroke
 from workflow.case.fields import Quantity, Whole
 from workflow.case.input_files import read_heights
 from workflow.case.plain import plain
@@ -81,6 +82,9 @@ class FlatStrip(Shape):
     def height(self, x: Array, y: Array) -> Array:
         return np.where(np.abs(x) < self.half_width, 0.0, self.step)
 
+
+BodiesOfArea = Annotated[Sphere | Ellipsoid | Flat | Heights, Field(discriminator="shape")]
+BodiesOfLine = Annotated[Cylinder | FlatRounded | FlatStrip | Heights, Field(discriminator="shape")]
 
 # --- loads --------------------------------------------------------------------------------------
 
@@ -232,97 +236,85 @@ class LineWearGrid(Contact):
 # --- cases --------------------------------------------------------------------------------------
 
 
-class BodiesWearCase(WearCase):
-    """Two bodies that wear over an area of both directions."""
+class TwoBodiesWearCase(WearCase):
+    """Two bodies that wear without a structure, over an area or along a line."""
 
-    about: ClassVar[str] = "a ball, flat or measured heights that wear under a cycle of loads"
     half_spaces: ClassVar[bool] = True
+    line: ClassVar[bool]
 
-    title: Title = entry("one line", "Ball that wears on a flat")
-    structure: Annotated[Sphere | Ellipsoid | Flat | Heights, Field(discriminator="shape")] = entry(
-        "the bodies: no finite elements; body 2 has the form"
-    )
+    structure: BodiesOfArea | BodiesOfLine = entry("the bodies: no finite elements")
     materials: BodyMaterials = entry("the two bodies in contact")
-    load_path: LoadPath = entry("of body 2 on body 1: a stroke, or legs or a file of a cycle")
-    contact: WearGrid = entry("half-space grid")
+    load_path: LoadPath | LineLoadPath
+    contact: WearGrid | LineWearGrid
     wear: BodiesWear = entry("law, length of the run and step")
 
     @classmethod
     def suits(cls, source: Source) -> bool:
-        return not touches_along_a_line(source, (HEIGHTS, FLAT))
+        return touches_along_a_line(source, (HEIGHTS, FLAT)) == cls.line
+
+    @property
+    def size(self) -> tuple[float, float]:
+        """Of the grid along x and y [mm]; nothing ends along a line."""
+        size = self.contact.size
+        return size if isinstance(size, tuple) else (size, inf)
 
     @model_validator(mode="after")
     def _can_run(self) -> Self:
-        _check(self, self.contact.size)
+        _check(self)
         return self
 
     def material(self, number: int) -> ElasticMaterial:
         return elastic(getattr(self.materials, self.bodies[number - 1]))
 
     def loads_outline(self) -> list[tuple[str, str]]:
+        kind, force = ("line contact", "N/mm") if self.line else ("no structure", "N")
         return [
-            ("structure", f"{self.structure.shape}, no structure"),
-            ("load path", _in_words(self.load_path, "N")),
+            ("structure", f"{self.structure.shape}, {kind}"),
+            ("load path", _in_words(self.load_path, force)),
         ]
 
     def face_sides(self) -> tuple[float, float]:
-        return self.contact.size
+        along, across = self.size
+        return along, 1.0 if self.line else across
 
     def doubts(self) -> Iterator[str]:
         yield from super().doubts()
-        yield from _doubts(self, self.contact.size, line=False)
+        yield from _doubts(self)
 
 
-class LineBodiesWearCase(WearCase):
+class BodiesWearCase(TwoBodiesWearCase):
+    """Two bodies that wear over an area of both directions."""
+
+    about: ClassVar[str] = "a ball, flat or measured heights that wear under a cycle of loads"
+    line: ClassVar[bool] = False
+
+    title: Title = entry("one line", "Ball that wears on a flat")
+    structure: BodiesOfArea = entry("the bodies: no finite elements; body 2 has the form")
+    load_path: LoadPath = entry("of body 2 on body 1: a stroke, or legs or a file of a cycle")
+    contact: WearGrid = entry("half-space grid")
+
+
+class LineBodiesWearCase(TwoBodiesWearCase):
     """Two bodies that wear along a line, in plane strain: everything is per length of it."""
 
     about: ClassVar[str] = "a cylinder, flat or heights along a line that wear under such a cycle"
-    half_spaces: ClassVar[bool] = True
+    line: ClassVar[bool] = True
 
     title: Title = entry("one line", "Cylinder that wears on a flat")
-    structure: Annotated[
-        Cylinder | FlatRounded | FlatStrip | Heights, Field(discriminator="shape")
-    ] = entry("the bodies: no finite elements; body 2 has the form")
-    materials: BodyMaterials = entry("the two bodies in contact")
+    structure: BodiesOfLine = entry("the bodies: no finite elements; body 2 has the form")
     load_path: LineLoadPath = entry(
         "of body 2 on body 1, forces per length: a stroke, or legs or a file of a cycle"
     )
     contact: LineWearGrid = entry("half-plane grid")
-    wear: BodiesWear = entry("law, length of the run and step")
-
-    @classmethod
-    def suits(cls, source: Source) -> bool:
-        return touches_along_a_line(source, (HEIGHTS, FLAT))
-
-    @model_validator(mode="after")
-    def _can_run(self) -> Self:
-        _check(self, (self.contact.size, inf))
-        return self
-
-    def material(self, number: int) -> ElasticMaterial:
-        return elastic(getattr(self.materials, self.bodies[number - 1]))
-
-    def loads_outline(self) -> list[tuple[str, str]]:
-        return [
-            ("structure", f"{self.structure.shape}, line contact"),
-            ("load path", _in_words(self.load_path, "N/mm")),
-        ]
-
-    def face_sides(self) -> tuple[float, float]:
-        return self.contact.size, 1.0
-
-    def doubts(self) -> Iterator[str]:
-        yield from super().doubts()
-        yield from _doubts(self, (self.contact.size, self.contact.size), line=True)
 
 
-def _check(case: BodiesWearCase | LineBodiesWearCase, size: tuple[float, float]) -> None:
+def _check(case: TwoBodiesWearCase) -> None:
     """Refuse what does not fit together: grid, heights, motions, materials and loops."""
     if isinstance(case.structure, Heights):
         require_shape(case.structure.file, case.contact.grid)
     table, path = case.load_path.table(), case.load_path
     check_bulk_stress(table, case.materials)
-    _check_room(case, table, size)
+    _check_room(case, table)
     if isinstance(path, Stroke):
         return
     given = table.columns
@@ -344,15 +336,15 @@ def _check(case: BodiesWearCase | LineBodiesWearCase, size: tuple[float, float])
         )
 
 
-def _check_room(
-    case: BodiesWearCase | LineBodiesWearCase, table: LoadTable, size: tuple[float, float]
-) -> None:
-    """Refuse a stroke that is to be followed beyond the grid of so much ``size`` [mm]."""
+def _check_room(case: TwoBodiesWearCase, table: LoadTable) -> None:
+    """Refuse a stroke that is to be followed beyond the grid."""
     reach = np.array([np.ptp(table[name]) for name in SHIFTS])
     stroke = float(np.hypot(*reach))
     if case.wear.motion == "neglect" or not stroke > 0.0:
         return
-    room = min(length * stroke / part for length, part in zip(size, reach, strict=True) if part > 0)
+    room = min(
+        length * stroke / part for length, part in zip(case.size, reach, strict=True) if part > 0
+    )
     if stroke >= room:
         key = "load_path.stroke" if isinstance(case.load_path, Stroke) else "load_path"
         raise disagreement(
@@ -371,18 +363,20 @@ def _in_words(path: LoadPath | LineLoadPath, force: str) -> str:
     return f"{', '.join(path.ranges())} in {steps}"
 
 
-def _doubts(
-    case: BodiesWearCase | LineBodiesWearCase, sides: tuple[float, float], line: bool
-) -> Iterator[str]:
-    """About a load and a stroke against the contact that they make, and heights of a file."""
+def _doubts(case: TwoBodiesWearCase) -> Iterator[str]:
+    """About loads and a stroke against the contact that they make, and heights of a file."""
     bodies = case.materials.body_1, case.materials.body_2
     table, simple = case.load_path.table(), isinstance(case.load_path, Stroke)
+    sides = (case.size[0], case.size[0]) if case.line else case.size
     load = max(table.columns["P"]) if "P" in table.columns else 0.0
-    found = unworn_contact(case.structure, bodies, load, line) if load > 0.0 else None
+    found = unworn_contact(case.structure, bodies, load, case.line) if load > 0.0 else None
     if found is not None:
         width, pressure = found
         stroke = float(np.linalg.norm([np.ptp(table[name]) for name in SHIFTS]))
-        yield from pressed(f"load_path{'.P' if simple else ''}", pressure, case.yields)
+        yield from about_pressure(f"load_path{'.P' if simple else ''}", pressure, bodies)
+        yield from about_grid(width, sides, case.contact.grid)
         yield from long_stroke(f"load_path{'.stroke' if simple else ''}", stroke, width)
+    unit = "N/mm" if case.line else "N"
+    yield from about_shear("load_path", table, case.friction.coefficient, unit)
     if isinstance(case.structure, Heights):
         yield from heights("structure.file", read_heights(case.structure.file), sides)

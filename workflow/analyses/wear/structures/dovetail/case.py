@@ -328,6 +328,14 @@ class DovetailCase(FiniteElementCase):
         width, length = self.face_sides()
         pressure = self._pull / (2.0 * width * length * cos(self.structure.flank_angle))
         yield from pressed("load_path", pressure, self.yields)
+        # One of the flanks carries nothing where the pull acts outside of both.
+        arm, moment = 0.5 * self.structure.neck_width, abs(self.load_path.aerodynamic_moment)
+        if moment > arm * self._pull:
+            yield (
+                f"load_path.aerodynamic_moment: {plain(moment, 'N*mm')} would lift the "
+                f"blade off a flank: more than the pull of {plain(self._pull, 'N')} on half of "
+                f"the neck, {plain(arm, 'mm')}"
+            )
 
     @property
     def cores(self) -> int:

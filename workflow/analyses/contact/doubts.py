@@ -1,0 +1,60 @@
+"""Doubts about two bodies under loads: what presses and shears them, and the grid they are on."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from sa_solver.types import Array
+from workflow.analyses.contact.load_table import LoadTable
+from workflow.case.doubts import pressed
+from workflow.case.plain import plain
+from workflow.case.sections import ElasticBody
+
+# Shear below this share of what friction carries is hardly meant to do anything.
+HARDLY = 1e-3
+# Cells across a contact below which the grid does not see it at all.
+FEWEST = 2.0
+# Rounding of forces that are meant to reach the limit of friction.
+ROUNDING = 1e-9
+
+
+def about_pressure(
+    path: str, pressure: float, bodies: Sequence[ElasticBody | str]
+) -> Iterator[str]:
+    """About the largest pressure [MPa] that loads bring about, against what the bodies bear."""
+    elastic = [body for body in bodies if isinstance(body, ElasticBody)]
+    limits = [getattr(body, "yield_stress", None) for body in elastic]
+    yield from pressed(path, pressure, limits, [body.elastic().young for body in elastic])
+
+
+def about_grid(width: float, sides: Sequence[float], cells: Sequence[int]) -> Iterator[str]:
+    """About a grid that an unworn contact of such a width [mm] does not fit."""
+    shown = f"the contact is about {plain(width, 'mm', 3)} wide"
+    if width > min(sides):
+        yield f"contact.size: {plain(min(sides), 'mm')}, but {shown}: take a larger one"
+    pitch = max(side / count for side, count in zip(sides, cells, strict=False) if count > 1)
+    if width < FEWEST * pitch:
+        yield f"contact.size: cells of {plain(pitch, 'mm', 3)}, but {shown}: take a smaller one"
+
+
+def about_shear(path: str, table: LoadTable, friction: float, unit: str) -> Iterator[str]:
+    """About tangential forces against what friction carries, where P is imposed."""
+    forces = {"Qx", "Qy"} & table.columns.keys()
+    if not forces or "P" not in table.columns or friction == 0.0:
+        return
+    shear: Array = np.hypot(table["Qx"], table["Qy"])
+    carried = friction * table["P"]
+    largest = int(np.argmax(shear - carried))
+    names = " and ".join(sorted(forces))
+    if shear[largest] > (1.0 + ROUNDING) * carried[largest]:
+        yield (
+            f"{path}: {names} of {plain(float(shear[largest]), unit, 3)}, where friction carries "
+            f"{plain(float(carried[largest]), unit, 3)}: the run would end there"
+        )
+    elif 0.0 < shear.max() < HARDLY * carried.max():
+        yield (
+            f"{path}: {names} up to {plain(float(shear.max()), unit, 3)}, where friction carries "
+            f"{plain(float(carried.max()), unit, 3)}: is the unit right?"
+        )

@@ -1,0 +1,47 @@
+"""A doubt about masses, springs and frequencies of a rig: units that do not fit each other."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from sa_solver.types import Array
+from workflow.analyses.rig.structure import FrictionRig, Rig
+from workflow.case.sections import Section
+
+# Of a force at one frequency: so many times away from every mode it hardly is meant to be.
+AWAY = 30.0
+# In the place of a stiffness that nobody gives [N/mm].
+RIGID = 1e12
+
+
+def about_modes(
+    path: str, span: tuple[float, float], structure: Section, stiffness: float = RIGID
+) -> Iterator[str]:
+    """About a ``span`` [Hz] in which a rig has no mode, be its joint of a stiffness open or stuck.
+
+    Between both every mode moves as the joint slips. A reduced body is not looked at.
+    """
+    if not isinstance(structure, Rig | FrictionRig):
+        return
+    opened, stuck = (modes(structure, held) for held in (0.0, stiffness))
+    low, high = span
+    if not ((opened <= high) & (stuck >= low)).any():
+        shown = (", ".join(f"{f:.3g}" for f in frequencies) for frequencies in (opened, stuck))
+        free, held = shown
+        yield (
+            f"{path}: no mode of the rig is near: they are at {free} Hz with an open joint, at "
+            f"{held} Hz with a stuck one; are masses, springs and stiffness in the units meant?"
+        )
+
+
+def modes(structure: Rig | FrictionRig, stiffness: float) -> Array:
+    """Natural frequencies [Hz] of the masses in a row, the last held by a stiffness [N/mm]."""
+    masses, springs = np.array(structure.masses), np.array(structure.springs)
+    matrix = np.diag(springs + np.append(springs[1:], stiffness))
+    matrix -= np.diag(springs[1:], 1) + np.diag(springs[1:], -1)
+    scale = 1.0 / np.sqrt(masses)
+    squares = np.linalg.eigvalsh(scale[:, None] * matrix * scale)
+    frequencies: Array = np.sqrt(np.maximum(squares, 0.0)) / (2.0 * np.pi)
+    return frequencies
