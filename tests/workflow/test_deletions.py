@@ -83,6 +83,14 @@ def test_an_example_is_that_of_the_entry(override: str, words: str) -> None:
     assert words in str(refusal.value)
 
 
+def test_what_is_wrong_in_a_list_is_told_alone() -> None:
+    """Not that it is too short without it, too."""
+    with pytest.raises(CaseError) as refusal:
+        parse_case(template("vibration"), "case.yaml", ["forces=[nix]"])
+    assert str(refusal.value).startswith("--set forces=[nix]: forces.0: 'nix': not a number with")
+    assert "\n" not in str(refusal.value)
+
+
 @pytest.mark.parametrize(
     ("kind", "key", "words"),
     [

@@ -7,8 +7,12 @@ import pytest
 from ruamel.yaml import YAML
 
 from tests.conftest import CASES
+from tests.marks import slow
 from tests.workflow.commands import invoke
-from workflow.kinds import about, kinds, template
+from tests.workflow.mutants import Mutants, sources
+from workflow.case.source import Source
+from workflow.errors import CaseError
+from workflow.kinds import about, kinds, parse_case, template
 from workflow.sweep.template import sweep_template
 
 FILES = sorted([*CASES.glob("*.yaml"), *CASES.glob("sweeps/*.yaml")])
@@ -92,6 +96,11 @@ def test_templates_are_valid(validator, kind):
         ("line", "size: 2 mm", "size: [2 mm, 2 mm]"),
         ("rig", "kind: harmonic", "kind: hammer"),
         ("vibration", "forces: [10 N, 40 N]", "forces: 10 N"),
+        ("dovetail", "end_radius: 150 mm", "# end_radius: 150 mm"),
+        ("dovetail", "slot_length: 60 mm", "slot_length: -60 mm"),
+        ("bodies", "  legs:", "  # legs:"),
+        ("joint", "  cycles: 1080000.0", "  # cycles: 1080000.0"),
+        ("specimens", "  cycles: 300000.0", "  # cycles: 300000.0"),
         ("sweep", "design: grid", "design: all"),
         ("sweep", "values: [0.3, 0.4, 0.5]", "value: 0.3"),
     ],
@@ -100,6 +109,45 @@ def test_wrong_files_are_not(validator, kind, old, new):
     text = sweep_template() if kind == "sweep" else template(kind)
     assert old in text
     assert not validator.is_valid(plain(text.replace(old, new, 1)))
+
+
+@pytest.mark.parametrize("none", ["contacts", "supports", "loads"])
+def test_what_must_be_there_is_not_empty(validator, none):
+    case = plain(template("mesh"))
+    case["structure"][none] = []
+    assert not validator.is_valid(case)
+
+
+def test_what_stands_for_nothing_is_valid(validator):
+    """As the loader has it: an entry of nothing is one that is not given."""
+    case = plain(template("dovetail"))
+    case["structure"] |= {"dimension": 2, "end_width": None}
+    del case["structure"]["end_radius"]
+    assert validator.is_valid(case)
+
+
+# Mutants whose data the schema is asked about, too: those that keep the case apart from their text.
+MUTANTS = 60
+
+
+@pytest.mark.parametrize("block", [0, *map(slow, range(1, 40))])
+def test_whatever_the_loader_takes_is_valid(validator, block, folders):
+    """The schema may know less than the loader, never more."""
+    mutants, wrong = Mutants(sources()), []
+    name = str(folders["resultants"] / "mutant.yaml")
+    for number in range(block * MUTANTS, (block + 1) * MUTANTS):
+        mutant = mutants[number]
+        if mutant.overrides:
+            continue
+        try:
+            text = mutant.text.decode()
+            parse_case(text, name)
+            data = json.loads(json.dumps(Source(name, text).data))
+        except (CaseError, UnicodeDecodeError, ValueError):
+            continue
+        if not validator.is_valid(data):
+            wrong.append(f"{number}: {mutant.told}")
+    assert not wrong
 
 
 @pytest.mark.parametrize(

@@ -487,4 +487,5 @@ def test_template_lacks_its_file(tmp_path):
 
 def test_lists_hold_something(blocks):
     for name in ("contacts", "supports", "loads"):
-        assert f"structure.{name}=[]: none; allowed: one" in refused(blocks, f"structure.{name}=[]")
+        line = refused(blocks, f"structure.{name}=[]")
+        assert f"structure.{name}=[]: a list of 0: too short; allowed: a list of at least 1" in line

@@ -41,6 +41,7 @@ class Explanation:
 
     def lines(self, errors: Sequence[ErrorDetails]) -> list[str]:
         """The lines of text about ``errors``, in the order of the file; of many, the first."""
+        errors = [details for details in errors if not _only_follows(details)]
         by_line = sorted(errors, key=lambda details: self.source.where(self._path(details))[0])
         errors, left = by_line[:MOST_LINES], len(by_line[MOST_LINES:])
         unknown = [
@@ -177,6 +178,14 @@ class Explanation:
             path.append(key)
             node, tag_seen = _within(node, key), False
         return tuple(path)
+
+
+def _only_follows(details: ErrorDetails) -> bool:
+    """Whether a list is too short only by its items that are wrong, which are told."""
+    given = details["input"]
+    if details["type"] != "too_short" or not isinstance(given, list | tuple):
+        return False
+    return len(given) >= details.get("ctx", {})["min_length"]
 
 
 def _within(node: Any, key: str | int) -> Any:

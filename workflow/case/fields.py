@@ -167,7 +167,8 @@ class Quantity(Entry):
         }
         finite = {name: limit for name, limit in limits.items() if math.isfinite(limit)}
         number = {"type": "number", **finite}
-        return {"anyOf": [number, {"type": "string", "pattern": units.WITH_UNIT}]}
+        pattern = units.ABOVE_ZERO_WITH_UNIT if self.above >= 0.0 else units.WITH_UNIT
+        return {"anyOf": [number, {"type": "string", "pattern": pattern}]}
 
 
 @dataclass(frozen=True)

@@ -50,4 +50,4 @@ class _Generator(GenerateJsonSchema):
     def model_schema(self, schema: Any) -> dict[str, Any]:
         made = super().model_schema(schema)
         made.pop("title", None)
-        return made
+        return {**made, **schema["cls"].in_schema}

@@ -71,6 +71,24 @@ def disagreement(message: str, *keys: str) -> PydanticCustomError:
     return PydanticCustomError("disagreement", "{message}", {"message": message, "keys": keys})
 
 
+def one_of(*keys: str) -> dict[str, Any]:
+    """In a JSON schema: at least one of these keys is there."""
+    return {"anyOf": [{"required": [key]} for key in keys]}
+
+
+def together(*keys: str) -> dict[str, Any]:
+    """In a JSON schema: where one of these keys has a value the others are there."""
+    return {
+        "allOf": [
+            {
+                "if": {"properties": {key: {"not": {"type": "null"}}}, "required": [key]},
+                "then": {"required": [other for other in keys if other != key]},
+            }
+            for key in keys
+        ]
+    }
+
+
 class Section(BaseModel):
     """A section of a case: frozen, every key known, every number finite."""
 
@@ -82,6 +100,8 @@ class Section(BaseModel):
     known_by: ClassVar[frozenset[str]] = frozenset()
     # Those that it fills in here beside them.
     also_filled_in: ClassVar[tuple[str, ...]] = ()
+    # What a JSON schema says of it beside its entries: see ``one_of`` and ``together``.
+    in_schema: ClassVar[Mapping[str, Any]] = {}
     # Keys that who knows other kinds of case may try here, and what to say of them.
     refused: ClassVar[Mapping[str, str]] = {}
 

@@ -19,7 +19,10 @@ if TYPE_CHECKING:
 
 QUANTITY_PATTERN = r"^\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(\S.*?)?\s*$"
 # The same for editors, which know of a unit only that there is one.
-WITH_UNIT = r"^\s*[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?\s*(?:1\s*/\s*)?[A-Za-zµμ°%(].*$"
+ABOVE_ZERO_WITH_UNIT = (
+    r"^\s*\+?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?\s*(?:1\s*/\s*)?[A-Za-zµμ°%(].*$"
+)
+WITH_UNIT = ABOVE_ZERO_WITH_UNIT.replace(r"\+?", "[-+]?", 1)
 LONGEST_UNIT = 40  # no unit is longer; keeps pint from chewing on prose
 
 # Units that nearly every case is written in, by their size in root units and their dimension. Pint,

@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import Field, create_model, model_validator
 
 from workflow.case import units
 from workflow.case.fields import Entry, File, Whole, shown
 from workflow.case.loading import validated
-from workflow.case.sections import Section, Title, disagreement, entry
+from workflow.case.sections import Section, Title, disagreement, entry, one_of
 from workflow.case.source import Source, read_text
 from workflow.case.writing import scalar
 from workflow.errors import CaseError
@@ -203,6 +203,8 @@ Distribution = Annotated[Uniform | Normal | LogNormal, Field(discriminator="kind
 
 class Variation(Section):
     """What one entry of the case is given: exactly one of values, range and distribution."""
+
+    in_schema: ClassVar[Mapping[str, Any]] = one_of("values", "range", "distribution")
 
     values: tuple[AnyValue, ...] | None = entry(
         "list of them", [0.3, 0.4], default=None, min_length=1

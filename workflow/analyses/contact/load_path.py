@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from typing import Annotated, ClassVar, Generic, Self, TypeVar
+from collections.abc import Iterator, Mapping
+from typing import Annotated, Any, ClassVar, Generic, Self, TypeVar
 
 import numpy as np
 from pydantic import model_validator
@@ -12,7 +12,14 @@ from workflow.analyses.contact.load_table import LoadTable, conflict, ramps
 from workflow.case.fields import File, Quantity, Whole
 from workflow.case.input_files import InputFileError
 from workflow.case.plain import between, plain
-from workflow.case.sections import Section, disagreement, entry, quantities_of, sections_of
+from workflow.case.sections import (
+    Section,
+    disagreement,
+    entry,
+    one_of,
+    quantities_of,
+    sections_of,
+)
 from workflow.case.table_file import read_columns
 
 # Limits are wide: they catch a forgotten unit or a slipped exponent, not an unusual contact.
@@ -94,6 +101,7 @@ class LegsOrFile(Section, Generic[LegT]):
 
     # Whether the path leads back to where it begins, over and over.
     closed: ClassVar[bool] = False
+    in_schema: ClassVar[Mapping[str, Any]] = one_of("legs", "file")
 
     legs: tuple[LegT, ...] = entry("one after the other, from no load", default=())
     file: HistoryFile | None = entry(

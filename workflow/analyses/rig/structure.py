@@ -106,7 +106,7 @@ class ReducedBody(Section):
     body: Annotated[int, Whole(1, 2)] | None = entry(
         "of a specimens case: 1 below its pad, or 2 above", 2, default=None
     )
-    joints: tuple[JointPlaces, ...] = entry("where they are")
+    joints: tuple[JointPlaces, ...] = entry("where they are", min_length=1)
     masses: tuple[AddedMass, ...] = entry("added, moving in x, y and z", default=())
     springs: tuple[AddedSpring, ...] = entry("added", default=())
     damping_ratio: DampingRatio = entry("of every mode without the joints [1]", 0.001)
@@ -136,12 +136,6 @@ class ReducedBody(Section):
 
         with open_hdf5(self.file):
             return load_reduced(Path(self.file))
-
-    @model_validator(mode="after")
-    def _has_joints(self) -> ReducedBody:
-        if not self.joints:
-            raise disagreement("none; allowed: one or more", "joints")
-        return self
 
     @property
     def text(self) -> str:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 from pydantic import Field, model_validator
 
 from sa_solver.types import Material as ElasticMaterial
 from wear.laws import WearLaw
+from workflow.analyses.contact.doubts import about_pressure
 from workflow.analyses.wear.case.evolution import PositiveEnergy
 from workflow.analyses.wear.case.sections import (
     Cycles,
@@ -19,7 +20,6 @@ from workflow.analyses.wear.case.sections import (
     TwoMaterials,
 )
 from workflow.analyses.wear.case.worn_bodies import BodyWear, WornByArchard, wearing
-from workflow.case.doubts import pressed
 from workflow.case.fields import Quantity, Whole
 from workflow.case.plain import of_bodies, plain, shares
 from workflow.case.sections import (
@@ -33,6 +33,7 @@ from workflow.case.sections import (
     Tolerance,
     disagreement,
     entry,
+    one_of,
 )
 
 if TYPE_CHECKING:
@@ -163,6 +164,8 @@ class Reported(Section):
 class SpecimensWear(TwoBodies[BodyWear], Laws):
     """Wear of both specimens, node by node; ends by exactly one of cycles, energy."""
 
+    in_schema: ClassVar[Mapping[str, Any]] = one_of("cycles", "energy")
+
     cycles: Cycles | None = entry("under each normal force [1]", 3e5, default=None)
     energy: PositiveEnergy | None = entry(
         "instead of cycles: dissipated under each normal force [N*mm]", "1 kJ", default=None
@@ -255,9 +258,10 @@ class SpecimensCase(Case):
                 f"load_path.stroke: {plain(self.load_path.stroke, 'mm')}, longer than the pad, "
                 f"{plain(side, 'mm')}: is its unit right?"
             )
-        limits = [body.yield_stress for body in (self.materials.body_1, self.materials.body_2)]
+        bodies = self.materials.body_1, self.materials.body_2
         for index, force in enumerate(self.load_path.normal_forces):
-            yield from pressed(f"load_path.normal_forces.{index}", force / side**2, limits)
+            path = f"load_path.normal_forces.{index}"
+            yield from about_pressure(path, force / side**2, bodies)
 
     @model_validator(mode="after")
     def _reported_forces_run(self) -> SpecimensCase:

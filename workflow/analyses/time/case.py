@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from itertools import pairwise
-from typing import Annotated, ClassVar, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -26,6 +26,7 @@ from workflow.case.sections import (
     Title,
     disagreement,
     entry,
+    one_of,
 )
 
 StepError = Annotated[float, Quantity("1", above=0.0, at_most=0.1)]
@@ -40,6 +41,8 @@ class SingleJoint(Section):
 
 class Ageing(Section):
     """How long the joint is driven: by energy or by cycles."""
+
+    in_schema: ClassVar[Mapping[str, Any]] = one_of("energy", "cycles")
 
     energy: PositiveEnergy | None = entry(
         "instead of cycles: dissipated until the end [N*mm]", "2800 J", default=None
@@ -63,6 +66,7 @@ class SteadyAgeing(Ageing):
     """How long the joint is driven in steady states: by energy, by cycles, or not at all."""
 
     filled_in: ClassVar[bool] = False
+    in_schema: ClassVar[Mapping[str, Any]] = {}
 
 
 class Integration(Section):
@@ -101,6 +105,7 @@ class TimeCase(Case):
         "dissipated so far, ascending, at which the joint is looked at [N*mm]",
         ["0 J", "1 kJ"],
         default=(0.0,),
+        min_length=1,
     )
     output: OutputWithoutFields = entry(
         "files beside summary and results", default=OutputWithoutFields()
@@ -119,8 +124,6 @@ class TimeCase(Case):
 
     @model_validator(mode="after")
     def _energies_ascend(self) -> TimeCase:
-        if not self.energies:
-            raise disagreement("none; allowed: one or more", "energies")
         if any(after <= before for before, after in pairwise(self.energies)):
             raise disagreement("not ascending; allowed: each energy above the last", "energies")
         return self

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field, model_validator
 
+from workflow.analyses.rig.doubts import AWAY, about_modes
 from workflow.analyses.rig.excitation import DrivingForce, Frequency
 from workflow.analyses.rig.joint_sections import (
     FrictionContactJoint,
@@ -122,6 +124,11 @@ class VibrationWearCaseBase(VibrationCaseBase):
             ("forces", self.driving),
             ("resolution", self.resolved),
         ]
+
+    def doubts(self) -> Iterator[str]:
+        yield from super().doubts()
+        span = self.wear.frequency / AWAY, self.wear.frequency * AWAY
+        yield from about_modes("wear.frequency", span, self.structure)
 
     def _of_a_state(self, joint: Joint, mass: int | None = None) -> VibrationCase:
         """The vibration case with this joint, driven at the mass of this number."""

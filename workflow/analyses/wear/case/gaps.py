@@ -2,13 +2,22 @@
 
 from __future__ import annotations
 
-from typing import Annotated, ClassVar, Literal
+from collections.abc import Mapping
+from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import Field, model_validator
 
 from workflow.case.fields import File
 from workflow.case.input_files import InputFileError, read_heights
-from workflow.case.sections import Length, RoundingRadius, Section, disagreement, entry
+from workflow.case.sections import (
+    Length,
+    RoundingRadius,
+    Section,
+    disagreement,
+    entry,
+    one_of,
+    together,
+)
 
 # Share of a face's size that is rounding.
 ROUNDING = 1e-9
@@ -16,6 +25,8 @@ ROUNDING = 1e-9
 
 class RoundedGap(Section):
     """Flat, with rounded edges along x and rounded ends along y."""
+
+    in_schema: ClassVar[Mapping[str, Any]] = together("end_width", "end_radius")
 
     shape: Literal["rounded"] = entry("rounded, paraboloid or heights", "rounded")
     edge_width: Length = entry("of each rounded edge, inside the size along x [mm]", "1.5 mm")
@@ -54,6 +65,7 @@ class ParaboloidGap(Section):
     """Paraboloid x² / 2 Rx + y² / 2 Ry; straight along x or y where there is no radius."""
 
     also_filled_in: ClassVar[tuple[str, ...]] = ("radius_x", "radius_y")
+    in_schema: ClassVar[Mapping[str, Any]] = one_of("radius_x", "radius_y")
 
     shape: Literal["paraboloid"] = entry("rounded, paraboloid or heights", "paraboloid")
     radius_x: RoundingRadius | None = entry(

@@ -22,7 +22,7 @@ from workflow.analyses.wear.case.sections import (
 from workflow.case.doubts import pressed
 from workflow.case.fields import AUTO, Auto, OrAuto, Quantity, Whole
 from workflow.case.plain import plain, shares
-from workflow.case.sections import Length, RoundingRadius, Section, disagreement, entry
+from workflow.case.sections import Length, RoundingRadius, Section, disagreement, entry, together
 
 if TYPE_CHECKING:
     from fe_models.geometry.dovetail import Dovetail as Geometry
@@ -51,6 +51,8 @@ FlankNodes = Annotated[int, Whole(3, 2000)]
 
 class Dovetail(Section):
     """Blade root in a disk sector, in contact along two flanks (dovetail attachment)."""
+
+    in_schema: ClassVar[Mapping[str, Any]] = together("end_width", "end_radius")
 
     kind: Literal["dovetail"] = entry("what the structure is", "dovetail")
     dimension: Literal[2, 3] = entry(

@@ -116,16 +116,9 @@ class ImportedStructure(Section):
     )
     body_1: Name = entry("name in the file of the lower, fixed body", "disk")
     body_2: Name = entry("name in the file of the upper, moving body", "blade")
-    contacts: tuple[ContactPair, ...] = entry("faces that meet")
-    supports: tuple[Support, ...] = entry("what is held")
-    loads: tuple[Load, ...] = entry("what is applied")
-
-    @model_validator(mode="after")
-    def _has_some(self) -> ImportedStructure:
-        for name in ("contacts", "supports", "loads"):
-            if not getattr(self, name):
-                raise disagreement("none; allowed: one or more", name)
-        return self
+    contacts: tuple[ContactPair, ...] = entry("faces that meet", min_length=1)
+    supports: tuple[Support, ...] = entry("what is held", min_length=1)
+    loads: tuple[Load, ...] = entry("what is applied", min_length=1)
 
     @model_validator(mode="after")
     def _names_differ(self) -> ImportedStructure:
