@@ -276,7 +276,7 @@ class CoupledState:
 class Observer:
     """Looks on while a run goes; a subclass has those methods that it needs.
 
-    The example of :class:`CoupledWear` has one; those of `fretscale` write the log and the results.
+    The example of :class:`CoupledWear` has one; those of ``fretscale`` write log and results.
     """
 
     def stage(self, name: Stage) -> AbstractContextManager[object]:

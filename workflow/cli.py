@@ -339,7 +339,7 @@ def describe(file: Path, size: str | None) -> None:
 
 
 def _kinds() -> dict[str, str]:
-    """What `new` writes: each kind of case, and the file of a sweep, in a line of plain words."""
+    """What ``new`` writes: each kind of case, and the file of a sweep, in a line of plain words."""
     from workflow.kinds import about
     from workflow.sweep.template import ABOUT, SWEEP
 

@@ -3,6 +3,7 @@ limits of wear with closed forms.
 """
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -10,18 +11,15 @@ import pytest
 from sa_solver.contact import FrictionalContact
 from sa_solver.half_space import HalfSpace
 from sa_solver.types import Array, ElasticPair, Grid, LoadHistory, Material
+from tests.wear import contacts
+from tests.wear.contacts import BODY, FRICTION, PAIR, STEEL
 from wear.drive import Drive
 from wear.face_loads import CycleLoads
 from wear.full_cycle import march_cycle
-from wear.interface import InterfaceContact, InterfaceSettings
-from wear.laws import EnergyLaw
-from wear.link import CellNodes
-from wear.steppers import ImplicitStepper
+from wear.interface import InterfaceContact
 from wear.stepping import ContactFailure
 
-BODY, STEEL = Material(115e3, 0.29), Material(200e3, 0.3)
-PAIR = ElasticPair(BODY, BODY)
-RADIUS, FRICTION = 10.0, 0.5
+RADIUS = 10.0
 BALL = Grid.covering((0.8, 0.8), (20, 20))
 SPHERE = (BALL.x**2 + BALL.y**2) / (2.0 * RADIUS)
 
@@ -34,25 +32,9 @@ def loads_of(**columns: list[float]) -> LoadHistory:
     return LoadHistory(**given, sliding=np.zeros(count, dtype=bool))
 
 
-def interface(grid: Grid, gap: Array, drive: Drive, **settings) -> InterfaceContact:
-    return InterfaceContact(
-        InterfaceSettings(
-            **{
-                "name": "contact",
-                "grid": grid,
-                "gap": np.ascontiguousarray(np.broadcast_to(gap, grid.shape)),
-                "transfer": CellNodes(grid),
-                "pair": PAIR,
-                "laws": (EnergyLaw(1e-8), EnergyLaw(1e-8)),
-                "friction": lambda energy: FRICTION,
-                "stepper": ImplicitStepper(),
-                "drive": drive,
-                "follow": False,
-                "tolerance": 1e-8,
-            }
-            | settings
-        )
-    )
+def interface(gap: Array, drive: Drive, grid: Grid = BALL, **settings: Any) -> InterfaceContact:
+    """A contact whose motion wears it in place."""
+    return contacts.interface(grid, gap, drive, follow=False, tolerance=1e-8, **settings)
 
 
 # --- cycles ---------------------------------------------------------------------------------------
@@ -122,7 +104,7 @@ def test_a_held_approach_wears_until_nothing_is_pressed() -> None:
     motions[:, 0], motions[:, 1] = approach, [0.01, -0.01]
     drive = Drive((True, True, True, True, True, True), motions)
     slip = np.broadcast_to(np.array([0.02, -0.02])[:, None, None] * [[1.0], [0.0]], (2, 2, 400))
-    contact = interface(BALL, SPHERE, drive)
+    contact = interface(SPHERE, drive)
     history = CycleLoads(loads_of(P=[1.0, 1.0]), slip)
     state, first = contact.begin(history, 1e9)
     carried = [contact.carried(history.loads, first.pressure).P[0]]
@@ -151,7 +133,7 @@ def test_partial_slip_wears_a_cylinder_down_to_its_stick_zone() -> None:
     half = np.sqrt(4.0 * load * RADIUS / (np.pi * modulus))
     stick = half * np.sqrt(1.0 - shear / (FRICTION * load))
     loads = loads_of(P=[load, load], Qx=[shear, -shear])
-    contact = interface(grid, grid.x**2 / (2.0 * RADIUS), Drive.by_forces("held"), method="full")
+    contact = interface(grid.x**2 / (2.0 * RADIUS), Drive.by_forces("held"), grid, method="full")
     state, _ = contact.begin(CycleLoads(loads, np.zeros((2, 2, grid.shape[0]))), 1e7)
     for cycles in 3e4 * 2.0 ** np.arange(7):
         state, _ = contact.jump(state, cycles, cycles)
@@ -169,7 +151,7 @@ def test_partial_slip_wears_a_cylinder_down_to_its_stick_zone() -> None:
 def test_a_cycle_of_forces_wears_what_its_friction_dissipates() -> None:
     """V = 2 α E with both bodies, under P that changes and Q that turns."""
     loads = loads_of(P=[40.0, 60.0, 40.0], Qx=[12.0, 0.0, -12.0], Qy=[0.0, 15.0, -5.0])
-    contact = interface(BALL, SPHERE, Drive.by_forces("held"), method="full")
+    contact = interface(SPHERE, Drive.by_forces("held"), method="full")
     state, _ = contact.begin(CycleLoads(loads, np.zeros((3, 2, 400))), 1e4)
     for _ in range(2):
         state, _ = contact.jump(state, 5e3, 5e3)
@@ -180,7 +162,7 @@ def test_a_cycle_of_forces_wears_what_its_friction_dissipates() -> None:
 
 def test_more_shear_than_friction_carries_is_told() -> None:
     loads = loads_of(P=[40.0, 40.0], Qx=[21.0, -21.0])
-    contact = interface(BALL, SPHERE, Drive.by_forces("held"), method="full")
+    contact = interface(SPHERE, Drive.by_forces("held"), method="full")
     history = CycleLoads(loads, np.zeros((2, 2, 400)))
     with pytest.raises(ContactFailure, match="increment 1: friction cannot carry Qx = 21 N"):
         contact.begin(history, 1.0)

@@ -1,6 +1,7 @@
 """Contacts whose tilt is held: moments that hold it, worn shapes, an independent model."""
 
 from functools import cache
+from typing import Any
 
 import numpy as np
 import pytest
@@ -8,14 +9,14 @@ import pytest
 from sa_solver.half_space import HalfSpace
 from sa_solver.normal import NormalContact
 from sa_solver.partial_slip import partial_slip_curve
-from sa_solver.types import Array, ElasticPair, Grid, LoadHistory, Material, Tilt
+from sa_solver.types import Array, ElasticPair, Grid, LoadHistory, Tilt
 from tests.oracles.sliding_cylinder import wear_without_tilt
+from tests.wear import contacts
+from tests.wear.contacts import BODY, COEFFICIENT, FRICTION, PAIR, STEEL
 from wear.drive import Drive
 from wear.face_loads import CycleLoads
 from wear.full_cycle import march_cycle
-from wear.interface import InterfaceContact, InterfaceSettings
-from wear.laws import EnergyLaw
-from wear.link import CellNodes
+from wear.interface import InterfaceContact
 from wear.steppers import (
     ErrorControl,
     ExplicitStepper,
@@ -25,30 +26,12 @@ from wear.steppers import (
 )
 from wear.stepping import WearState
 
-BODY, STEEL = Material(115e3, 0.29), Material(200e3, 0.3)
-PAIR = ElasticPair(BODY, BODY)
-FRICTION, COEFFICIENT, RADIUS = 0.5, 1e-8, 6.0
-SOLVED = 1e-8
+RADIUS, SOLVED = 6.0, 1e-8
 
 
-def interface(grid: Grid, gap: Array, tilt: Tilt, **settings) -> InterfaceContact:
-    return InterfaceContact(
-        InterfaceSettings(
-            **{
-                "name": "contact",
-                "grid": grid,
-                "gap": np.ascontiguousarray(np.broadcast_to(gap, grid.shape)),
-                "transfer": CellNodes(grid),
-                "pair": PAIR,
-                "laws": (EnergyLaw(COEFFICIENT), EnergyLaw(COEFFICIENT)),
-                "friction": lambda energy: FRICTION,
-                "stepper": ImplicitStepper(),
-                "tolerance": 1e-10,
-                "drive": Drive.by_forces(tilt),
-            }
-            | settings
-        )
-    )
+def interface(grid: Grid, gap: Array, tilt: Tilt, **settings: Any) -> InterfaceContact:
+    drive = settings.pop("drive", Drive.by_forces(tilt))
+    return contacts.interface(grid, gap, drive, **settings)
 
 
 def reciprocating(

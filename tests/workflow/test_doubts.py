@@ -43,7 +43,7 @@ LEGS = "[{P: 50 kN, shift_x: 25 um}, {shift_x: -25 um}, {shift_x: 25 um}]"
 SLIPS = [
     # A unit forgotten, or another than was meant.
     ("dovetail", "materials.blade.young=210 MPa", "210 MPa; usual: 0.3 to 1300 GPa; 210 GPa meant"),
-    ("dovetail", "materials.blade.young=0.115", "115 kPa; usual"),
+    ("dovetail", "materials.blade.young=0.115", "0.115 MPa; usual"),
     ("dovetail", "materials.blade.poisson=0.03", "0.03; usual: 0.1 to 0.5; 0.3 meant?"),
     ("dovetail", "materials.disk.density=4.43e-9 kg/m^3", "4.43e-09 t/mm^3 meant?"),
     ("dovetail", "materials.disk.density=4.43 kg/m^3", "500 to 23000 kg/m^3; 4.43 g/cm^3 meant?"),
@@ -73,7 +73,7 @@ SLIPS = [
     ("dovetail", "contact.grid=[512, 16]", "175 times longer than wide"),
     ("bodies", "contact.grid=[512, 16]", "32 times longer than wide"),
     ("dovetail", "wear.step.cycles=1e6", "1e+06 cycles, of 300000 in all: one jump"),
-    ("dovetail", "structure.edge_radius=30 m", "edge_width 1.5 mm falls off by 0.0375 um"),
+    ("dovetail", "structure.edge_radius=30 m", "edge_width 1.5 mm falls off by 37.5 nm"),
     ("dovetail", "structure.neck_fillet=3 um", "3 um; usual: 0.05 to 100 mm; 3 mm meant?"),
     ("dovetail", "mesh.size=5 m", "5000 mm; usual: 0.05 to 100 mm"),
     ("dovetail", "load_path.aerodynamic_moment=30 kN*m", "would lift the blade off a flank"),
@@ -83,8 +83,8 @@ SLIPS = [
     ("bodies_wear", "contact.size=[1 um, 1 um]", "contact.size: 1 um, but the contact is about"),
     ("line", "structure.radius=10 m", "contact.size: 2 mm, but the contact is about"),
     ("bodies", "load_path={legs: [{P: 400 N}, {Qx: 15 kN}]}", "friction carries 160 N: the run"),
-    ("bodies", "load_path={legs: [{P: 400 N}, {Qx: 15 mN}]}", "Qx up to 0.015 N, where friction"),
-    ("bodies_wear", LIGHT, "Qx up to 0.001 N, where friction carries 20 N: is the unit right?"),
+    ("bodies", "load_path={legs: [{P: 400 N}, {Qx: 15 mN}]}", "Qx up to 15 mN, where friction"),
+    ("bodies_wear", LIGHT, "Qx up to 1 mN, where friction carries 20 N: is the unit right?"),
     # Rigs: springs, masses and forces, and the modes that they make.
     ("vibration", "structure.springs=[1.4 kN/um, 273 kN/um]", "273000 kN/mm; usual: 5e-05 to"),
     ("vibration", "structure.masses=[21.2 g, 1.2 g]", "frequencies: no mode of the rig is near"),

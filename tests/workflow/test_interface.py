@@ -1,8 +1,6 @@
 """``import fretscale``: cases from dictionaries, runs, and results as arrays and tables."""
 
 import builtins
-import doctest
-import importlib
 import os
 import shutil
 from pathlib import Path
@@ -12,10 +10,8 @@ import numpy as np
 import pytest
 
 from tests.conftest import CASES
-from tests.marks import slow
 from tests.workflow.interruptions import ctrl_c_after_jumps
 
-ROOT = CASES.parent
 SPHERE = CASES / "sphere_normal.yaml"
 SMALL = {"contact__grid": [32, 32], "output__paraview": False, "output__figures": False}
 # A ball that is pressed, and pushed to and fro.
@@ -40,15 +36,6 @@ def ball(tmp_path_factory):
 
 
 # --- cases ----------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(
-    "module", ["cases", "datasets", "results", slow("running"), slow("comparing")]
-)
-def test_the_examples_run(module, monkeypatch):
-    monkeypatch.chdir(ROOT)
-    failed, _ = doctest.testmod(importlib.import_module(f"workflow.interface.{module}"))
-    assert failed == 0
 
 
 def test_a_dictionary_says_what_a_file_says():

@@ -1,27 +1,15 @@
-"""Numbers in base units as one would say them: 115 GPa, 4430 kg/m^3, 50 um, 6000 rpm."""
+"""Numbers in base units as one would write them: 115 GPa, 4430 kg/m^3, 50 um, 6000 rpm."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import pi
 
+from workflow.case.readable import suited_unit
 from workflow.case.sections import Section, quantities_of
+from workflow.case.units import to_base
 
-# Units by the base unit that they are said for: the least number of base units to be said in them,
-# and the size of one, in base units, smallest first.
-SAID_IN: dict[str, tuple[tuple[float, float, str], ...]] = {
-    "mm": ((0.0, 1e-3, "um"), (0.1, 1.0, "mm"), (1e4, 1e3, "m")),
-    "MPa": ((0.0, 1e-3, "kPa"), (0.5, 1.0, "MPa"), (1e4, 1e3, "GPa")),
-    "N": ((0.0, 1.0, "N"), (1e4, 1e3, "kN")),
-    "N/mm": ((0.0, 1.0, "N/mm"), (1e4, 1e3, "kN/mm")),
-    "N*mm": ((0.0, 1.0, "N*mm"), (1e3, 1e3, "N*m")),
-    "t": ((0.0, 1e-6, "g"), (5e-5, 1e-3, "kg")),
-    "t/mm^3": ((0.0, 1e-12, "kg/m^3"),),
-    "1/MPa": ((0.0, 1e-12, "um^3/J"),),
-    "rad": ((0.0, pi / 180.0, "deg"),),
-    "rad/s": ((0.0, pi / 30.0, "rpm"),),
-    "s": ((0.0, 1e-6, "us"), (1e-3, 1e-3, "ms"), (1.0, 1.0, "s")),
-}
+# Moments are said in other units than energies, which have the same base unit: from so much on.
+MOMENT, SAID_FROM, SAID_IN = "N*mm", 1e3, "N*m"
 
 
 def plain(number: float, unit: str | None, digits: int = 6) -> str:
@@ -45,11 +33,11 @@ def said_in(number: float, unit: str | None) -> tuple[float, str]:
     """Size, in the base unit, and name of the unit that a number is said in."""
     if unit is None or unit == "1":
         return 1.0, ""
-    said = SAID_IN.get(unit, ((0.0, 1.0, unit),))
-    if number == 0.0 and unit in [name for _, _, name in said]:
-        return 1.0, unit
-    _, size, name = next(row for row in reversed(said) if row[0] <= abs(number))
-    return size, name
+    if unit == MOMENT:
+        name = SAID_IN if abs(number) >= SAID_FROM else unit
+    else:
+        name = suited_unit(number, unit)
+    return (1.0 if name == unit else to_base(f"1 {name}", unit)), name
 
 
 def entries(section: Section, left_out: Sequence[str] = ()) -> str:

@@ -10,7 +10,8 @@ from typing import NamedTuple
 
 from workflow.case.units import to_base
 
-# Units that a base unit may be shown in, each from so many of it on; the first from nothing on.
+# The units that a base unit may be shown or said in, each from so many of it on; the first from
+# nothing on.
 SHOWN: dict[str, tuple[tuple[str, float], ...]] = {
     "mm": (("nm", 0.0), ("um", 0.1), ("mm", 0.1), ("m", 10.0)),
     "mm^2": (("um^2", 0.0), ("mm^2", 1e-3)),

@@ -95,7 +95,7 @@ class ComparedResult(NamedTuple):
 
 
 class Comparison:
-    """Finished runs side by side, as `fretscale compare` has them; printed, they are its text.
+    """Finished runs side by side, as ``fretscale compare`` has them; printed, they are its text.
 
     ``names`` are those of the runs, ``results`` the main results of all,
     ``comparison["depth"]`` the one of that name, or of ``"flank, depth"``, and ``entries`` in words
@@ -136,7 +136,7 @@ class Comparison:
         raise KeyError(f"{name}: not there; allowed: {_listed(self.results)}")
 
     def pandas(self) -> pd.DataFrame:
-        """The table that `compare.csv` has, a row for each result, by what it is of and its name.
+        """The table that ``compare.csv`` has, a row for each result, by what it is of and its name.
 
         Values are in base units; errors and differences are relative. Raises :class:`UserError`
         without pandas.

@@ -116,7 +116,7 @@ class Results(Group):
 
     @property
     def main(self) -> list[MainResult]:
-        """The main results, as the report and `fretscale compare` have them."""
+        """The main results, as the report and ``fretscale compare`` have them."""
         told = analysis_of(self.case).quantities(self.case, self.summary)
         return [
             MainResult(q.group, q.name, required_number(self.summary, q.path), q.unit, q.error)

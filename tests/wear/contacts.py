@@ -1,0 +1,35 @@
+"""Contacts of like bodies that wear by energy: what several tests build, each with settings."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from sa_solver.types import Array, ElasticPair, Grid, Material
+from wear.drive import Drive
+from wear.interface import InterfaceContact, InterfaceSettings
+from wear.laws import EnergyLaw
+from wear.link import CellNodes
+from wear.steppers import ImplicitStepper
+
+BODY, STEEL = Material(115e3, 0.29), Material(200e3, 0.3)
+PAIR = ElasticPair(BODY, BODY)
+FRICTION, COEFFICIENT = 0.5, 1e-8
+
+
+def interface(grid: Grid, gap: Array, drive: Drive, **settings: Any) -> InterfaceContact:
+    """A contact over a gap that may be the same all along y, driven; the rest by its settings."""
+    usual: dict[str, Any] = {
+        "name": "contact",
+        "grid": grid,
+        "gap": np.ascontiguousarray(np.broadcast_to(gap, grid.shape)),
+        "transfer": CellNodes(grid),
+        "pair": PAIR,
+        "laws": (EnergyLaw(COEFFICIENT), EnergyLaw(COEFFICIENT)),
+        "friction": lambda energy: FRICTION,
+        "stepper": ImplicitStepper(),
+        "tolerance": 1e-10,
+        "drive": drive,
+    }
+    return InterfaceContact(InterfaceSettings(**usual | settings))
