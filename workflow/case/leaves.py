@@ -78,13 +78,13 @@ def _not_given(
     """Path, value and unit of all entries that are not ``given`` and have a value nevertheless."""
     for name, field in entries_of(type(section)).items():
         quantity, here = entry_of(field), given and name in section.model_fields_set
+        unit = quantity.unit if isinstance(quantity, Quantity) else None
         for place, item in _items(getattr(section, name), f"{above}{name}"):
             if isinstance(item, Section):
                 if getattr(item, "wanted", True):  # else none of it is used
                     yield from _not_given(item, f"{place}.", here)
             elif not here and item != ():
-                single = isinstance(quantity, Quantity) and isinstance(item, float)
-                yield place, item, quantity.unit if single else None
+                yield place, item, unit if isinstance(item, float) else None
 
 
 def _items(value: Any, path: str) -> Iterator[tuple[str, Any]]:

@@ -19,7 +19,7 @@ from contextlib import ExitStack
 from functools import partial
 from itertools import islice
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import h5py
 
@@ -28,9 +28,6 @@ from workflow.case.sections import Output
 from workflow.shell.analysis import Pictures
 from workflow.shell.folder import OutputFolder
 from workflow.shell.processes import side_by_side
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 
 def write_pictures(
@@ -87,12 +84,9 @@ def _write_share(
     vectors: dict[str, str] = {}
     if figures is not None:
         kept = vectors if keep else None
-        from workflow.pictures import style
-
-        with h5py.File(results) as file:
-            drawn = _drawn(pictures, contents, file, first, every)
-            for _ in style.each_written(drawn, figures, formats, kept):
-                yield
+        share = pictures, contents, results, figures, first, every, formats, kept
+        for _ in _each_written(*share):
+            yield
     if paraview is not None:
         write_paraview(pictures, contents, results, paraview)
         yield
@@ -128,20 +122,28 @@ def write_figures(
     ``every`` so many of them from the ``first`` on, so that several processes may share them. For
     ``formats`` and ``vectors`` see :func:`workflow.pictures.style.write_figures`.
     """
+    share = pictures, contents, results, folder, first, every, formats, vectors
+    return [path for paths in _each_written(*share) for path in paths]
+
+
+def _each_written(
+    pictures: Callable[[], Pictures],
+    contents: Any,
+    results: Path,
+    folder: Path,
+    first: int,
+    every: int,
+    formats: Sequence[str],
+    vectors: dict[str, str] | None,
+) -> Iterator[list[Path]]:
+    """As :func:`write_figures`: the paths of each figure once it is written."""
     # Plots take a second to load: where they are drawn.
     from workflow.pictures import style
 
-    with h5py.File(results) as file:
-        drawn = _drawn(pictures, contents, file, first, every)
-        return style.write_figures(drawn, folder, formats, vectors)
-
-
-def _drawn(
-    pictures: Callable[[], Pictures], contents: Any, file: h5py.File, first: int, every: int
-) -> Iterator[tuple[str, Callable[[], Figure]]]:
-    """``every`` so many of the figures from the ``first`` on, to be drawn of an open file."""
     chosen = islice(pictures().figures_of(contents).items(), first, None, every)
-    return ((name, partial(draw, file)) for name, draw in chosen)
+    with h5py.File(results) as file:
+        drawn = ((name, partial(draw, file)) for name, draw in chosen)
+        yield from style.each_written(drawn, folder, formats, vectors)
 
 
 def vector_figures(
