@@ -165,8 +165,16 @@ def test_example_is_a_sweep():
         ("+{distribution: {kind: uniform, from: 0, to: 1}}", 3, "allowed: design: sample"),
         ("+{distribution: {kind: weibull}}", 3, "kind: 'weibull': not known; allowed: uniform"),
         ("+{values: [0.5]}\nset: {friction.coefficient: 0.6}", 4, "varies as well"),
-        ("+{values: [0.5]}\ndesign: sample", 1, "samples: missing; allowed: with design: sample"),
-        ("+{values: [0.5]}\nsamples: 5", 4, "samples: not for design: grid"),
+        (
+            "+{values: [0.5]}\ndesign: sample",
+            1,
+            "samples: missing, the number of runs such as 50; allowed",
+        ),
+        (
+            "+{values: [0.5]}\nsamples: 5",
+            4,
+            "samples: not for design: grid, which it is unless said",
+        ),
         # Found in the case, told in the sweep.
         ("+{values: [0.5, -1]}", 3, "vary.friction.coefficient: -1: out of range; allowed"),
         ("+{values: [0.5 mm]}", 3, "unit 'mm' cannot be converted to a ratio"),

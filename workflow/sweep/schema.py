@@ -301,7 +301,10 @@ def _disagreements(sweep: Sweep) -> Iterator[str]:
     for name in varied.keys() & file.set.keys():
         yield f"{place(('set', name))[1]}: set.{name}: varies as well; allowed: one of them"
     if (file.design == "sample") != (file.samples is not None):
-        needed = "missing" if file.samples is None else f"not for design: {file.design}"
+        by_default = "" if "design" in file.model_fields_set else ", which it is unless said"
+        needed = f"not for design: {file.design}{by_default}"
+        if file.samples is None:
+            needed = "missing, the number of runs such as 50"
         yield f"{place(('samples',))[1]}: samples: {needed}; allowed: with design: sample"
     if file.design != "sample":
         for name, variation in varied.items():
