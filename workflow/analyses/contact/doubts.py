@@ -42,7 +42,7 @@ def about_grid(width: float, sides: Sequence[float], cells: Sequence[int]) -> It
 def about_shear(path: str, table: LoadTable, friction: float, unit: str) -> Iterator[str]:
     """About tangential forces against what friction carries, where P is imposed."""
     forces = {"Qx", "Qy"} & table.columns.keys()
-    if not forces or "P" not in table.columns or friction == 0.0:
+    if not forces or "P" not in table.columns:
         return
     shear: Array = np.hypot(table["Qx"], table["Qy"])
     carried = friction * table["P"]
