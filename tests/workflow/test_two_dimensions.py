@@ -379,7 +379,8 @@ def test_check_says_that_a_probe_decides(plane_path):
     told = invoke("check", plane_path, "--set", "fidelity=auto", "--set", "accuracy=4 %").stdout
     assert "2-D or 3-D and how fine, by probes: 4 %" in told
     fixed = invoke("check", plane_path).stdout
-    assert "fidelity" not in fixed
+    assert "by probes" not in fixed
+    assert "fidelity fixed" in fixed  # among what nobody has said
     assert "dovetail in 2-D, 40 nodes on a flank" in fixed
     assert "128 strips" in fixed
 
