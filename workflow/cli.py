@@ -418,7 +418,8 @@ def schema() -> None:
 
 def main() -> None:
     """Entry point of the command."""
-    from workflow.shell.streams import hold_standard_streams
+    from workflow.shell.streams import hold_standard_streams, spell_what_streams_lack
 
     hold_standard_streams()
+    spell_what_streams_lack()
     cli(prog_name="fretscale")

@@ -117,6 +117,26 @@ def test_a_program_needs_no_guard(how, tmp_path):
 
 
 @posix_only
+@pytest.mark.parametrize(
+    ("encoding", "shown"),
+    [
+        ("ascii", "stroke 36 um, -3 m^2 +- 1 %, 10^-7 -> \\u4e2d"),
+        ("latin-1", "stroke 36 µm, -3 m² ± 1 %, 10^-7 -> \\u4e2d"),
+        ("utf-8", "stroke 36 µm, −3 m² ± 1 %, 10⁻⁷ → 中"),
+    ],
+)
+def test_terminals_without_some_letters_have_them_spelled(encoding, shown):
+    code = (
+        "from workflow.shell.streams import spell_what_streams_lack; spell_what_streams_lack();"
+        "print('stroke 36 µm, −3 m² ± 1 %, 10⁻⁷ → 中')"
+    )
+    environment = {**os.environ, "PYTHONIOENCODING": encoding, "PYTHONUTF8": "0"}
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, env=environment, check=True
+    )
+    assert done.stdout.decode(encoding).strip() == shown
+
+
 def test_a_program_may_have_no_standard_streams(tmp_path):
     """Then the processes of a run have none either."""
     code = "from workflow.shell.streams import hold_standard_streams; hold_standard_streams()"
