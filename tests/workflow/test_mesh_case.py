@@ -13,6 +13,7 @@ from fe_models.structure import CLOSED
 from tests.marks import slow
 from tests.workflow.commands import invoke
 from tests.workflow.mesh_scenes import WEAR, refused, run, write_case
+from workflow.analyses.wear.quantities import main_results
 from workflow.analyses.wear.structure_stage import StructureStage
 from workflow.analyses.wear.structures.mesh.model import MeshModel
 from workflow.errors import MethodFailed
@@ -110,6 +111,12 @@ def test_parts_and_instances_run(blocks, tmp_path):
     assert peak["Qx"] == pytest.approx(-4.0, rel=1e-5)
     assert summary["structure"]["equilibrium_error"] < 1e-6
     assert summary["structure"]["closure"] <= CLOSED
+    found = main_results(load_case(blocks), summary)
+    groups = {quantity.group for quantity in found}
+    assert groups == {"foot", *summary["structure"]["nodes"]}  # bodies as their file names them
+    told = {quantity.name for quantity in found if quantity.group == "Foot-1"}
+    assert {"elements", "median element (longest edge)"} <= told
+    assert "largest von Mises stress on the free surface, unworn" in told
 
 
 def test_a_contact_may_be_called_as_a_body(blocks, tmp_path):

@@ -4,14 +4,18 @@ import json
 from pathlib import Path
 
 import h5py
+import numpy as np
 import pytest
 
+from sa_solver import LoadHistory
 from tests.marks import slow
 from tests.workflow.conftest import invoke
 from tests.workflow.scenes import BALL, RIG_OF_THESIS, ROLLER_LOADS, ROLLER_WEAR
 from tests.workflow.test_friction_rig import SPECIMENS
 from tests.workflow.test_kills import PADS_THAT_WEAR
 from tests.workflow.time_scenes import JOINT
+from workflow.analyses.wear.quantities import _left_by_mesh, _load_ranges
+from workflow.analyses.wear.worn_structure import load_ranges
 from workflow.case.units import to_base
 from workflow.kinds import ANALYSES, analysis_of, load_case
 from workflow.report.page import html
@@ -93,3 +97,22 @@ def test_main_results_are_numbers_in_the_units_of_the_results(tmp_path, name):
 
 def test_every_analysis_has_its_case_here():
     assert {analysis.name for analysis in ANALYSES} == set(CASES_OF)
+
+
+def test_loads_tell_their_ends_and_increments():
+    """Nothing acts along x at the increment of the largest P, where results are told."""
+    zero, sliding = np.zeros(4), np.zeros(4, dtype=bool)
+    force, across = np.array([4e3, 3e3, 3e3, 3e3]), np.array([0.0, -1e3, 0.0, 500.0])
+    ranges = load_ranges(LoadHistory(force, across, *[zero] * 6, sliding))
+    assert ranges["P"] == {"least": 3e3, "least_at": 2, "largest": 4e3, "largest_at": 1}
+    assert ranges["Qx"] == {"least": -1e3, "least_at": 2, "largest": 500.0, "largest_at": 4}
+    summary = {"per_length": False, "left": {"load_range": {"unworn": ranges, "worn": ranges}}}
+    found = {q.name: q for q in _load_ranges(summary, "left")}
+    assert {name.split()[3] for name in found} == {"Qx"}
+    assert found["least tangential force Qx in a cycle, unworn"].where == "increment 2"
+
+
+def test_a_stress_without_bound_has_no_error():
+    place = {"von_mises": 300.0, "error": 1.0}
+    assert _left_by_mesh({"at": place}, "at") == {"where": "grows as the mesh is refined"}
+    assert _left_by_mesh({"at": {**place, "error": 0.2}}, "at")["error"] == 0.2

@@ -19,7 +19,7 @@ class Quantity:
     estimated relative error, None where nobody knows, of which ``error_of`` says what it covers.
     ``everyday`` is the unit that people want to read, where there is only one. A ``budget`` is
     what the error is of, in words, and where the summary has its parts, None for unknown ones, and
-    their ``total``.
+    their ``total``. ``where`` in a run such a number is, as in increment 7, is told beside it.
     """
 
     group: str
@@ -30,6 +30,7 @@ class Quantity:
     error_of: str = ""
     everyday: str = ""
     budget: tuple[str, str] | None = None
+    where: str = ""
 
 
 @dataclass(frozen=True)

@@ -12,11 +12,17 @@ from workflow.analyses.wear.measures import interfaces
 from workflow.shell.analysis import Summary
 from workflow.shell.dataset import unit_in
 from workflow.shell.quantities import CurvesOf, Quantity
-from workflow.shell.summary import estimate, told
+from workflow.shell.summary import estimate, number_at, told
 
 # Estimated errors are totals of the error budget.
 BUDGET = "all parts of the error budget below"
 STRUCTURE = "structure"
+# Of elements, as gmsh's gamma.
+QUALITY = "inscribed over circumscribed radius, 1: regular"
+# Tangential forces below this share of the normal one are those of a mesh that is not symmetric.
+LITTLE = 0.01
+# And below this one rounding.
+ROUNDING = 1e-9
 # Fretting parameters: unit and name.
 PARAMETERS = {
     "cracking_parameter": ("N^2/mm^3", "Ruiz's cracking parameter"),
@@ -42,7 +48,7 @@ def main_results(case: WearCase, summary: Summary) -> list[Quantity]:
         for name in interfaces(summary)
         for quantity in (*_worn(case, summary, name), *_stressed(case, summary, name))
     ]
-    return told(summary, [*quantities, *_of_structure(case, summary)])
+    return told(summary, [*quantities, *_of_structure(summary)])
 
 
 def named(body: str) -> str:
@@ -69,16 +75,54 @@ def _worn(case: WearCase, summary: Summary, name: str) -> Iterator[Quantity]:
     for moment, of_pressure in pressures:
         path = f"{name}.peak_pressure.{moment}"
         yield of(f"largest pressure, {moment}", path, "MPa", **error[of_pressure])
+    yield of("contact width along x at peak load, unworn", f"{name}.contact_width.unworn", "mm")
+    path = f"{name}.elements_across"
+    yield of("elements across the contact at peak load, unworn", path, "1")
     yield of("contact area at peak load, worn", f"{name}.area", unit_in(line, "mm^2"))
     for load, text in (("P", "normal force P"), ("Qx", "tangential force Qx")):
         for moment in MOMENTS:
             path = f"{name}.peak_load.{moment}.{load}"
+            if not _is_there(summary, path, f"{name}.peak_load.{moment}.P"):
+                continue
             yield of(f"{text} at peak load, {moment}", path, unit_in(line, "N"))
+    yield from _load_ranges(summary, name)
     yield of("largest slip path in a cycle, unworn", f"{name}.slip_per_cycle", "mm")
     for wears in ("half_space", "nodes"):
         path = f"{name}.energy_per_cycle.{wears}"
         yield of("energy dissipated in a cycle, unworn", path, unit_in(line, "N mm"))
     yield of("energy dissipated by all cycles", f"{name}.energy", unit_in(line, "N mm"))
+
+
+def _is_there(summary: Summary, path: str, beside: str) -> bool:
+    """Whether a force is more than rounding beside another."""
+    force, other = (number_at(summary, place) for place in (path, beside))
+    return force is not None and abs(force) > ROUNDING * abs(other or 0.0)
+
+
+def _load_ranges(summary: Summary, name: str) -> Iterator[Quantity]:
+    """What tangential forces reach in a cycle, each with its increment."""
+    unit = unit_in(summary["per_length"], "N")
+    for moment in MOMENTS:
+        ranges = summary[name].get("load_range", {}).get(moment, {})
+        for load in ("Qx", "Qy"):
+            if not _acts(ranges, load):
+                continue
+            for end in ("least", "largest"):
+                yield Quantity(
+                    name,
+                    f"{end} tangential force {load} in a cycle, {moment}",
+                    f"{name}.load_range.{moment}.{load}.{end}",
+                    unit,
+                    where=f"increment {ranges[load][f'{end}_at']}",
+                )
+
+
+def _acts(ranges: Summary, load: str) -> bool:
+    """Whether a force is more than a little beside the normal one."""
+    if load not in ranges:
+        return False
+    reached = max(abs(ranges[load][end]) for end in ("least", "largest"))
+    return bool(reached > LITTLE * ranges["P"]["largest"])
 
 
 def _stressed(case: WearCase, summary: Summary, name: str) -> Iterator[Quantity]:
@@ -108,11 +152,24 @@ def _budgeted(summary: Summary, name: str, result: str) -> dict[str, Any]:
     return known | {"budget": (RESULTS[result], path)} if known else {}
 
 
-def _of_structure(case: WearCase, summary: Summary) -> Iterator[Quantity]:
-    """The largest stress off the contact faces, unworn and worn."""
-    for body in case.bodies:
+def _of_structure(summary: Summary) -> Iterator[Quantity]:
+    """Of every body the largest stress off the contact faces, and the elements it is told by."""
+    # By the names that a mesh file gives them.
+    for body in summary.get(STRUCTURE, {}).get("mesh", {}):
+        of, mesh = partial(Quantity, named(body)), f"{STRUCTURE}.mesh.{body}"
         for moment in MOMENTS:
             path = f"{STRUCTURE}.peak_stress.{moment}.{body}.notch"
-            known = estimate(summary, f"{path}.error", "what the mesh leaves of the stress")
-            text = f"largest von Mises stress on the free surface of {named(body)}, {moment}"
-            yield Quantity(STRUCTURE, text, f"{path}.von_mises", "MPa", **known)
+            text = f"largest von Mises stress on the free surface, {moment}"
+            yield of(text, f"{path}.von_mises", "MPa", **_left_by_mesh(summary, path))
+        yield of("elements", f"{mesh}.elements", "1")
+        for size in ("smallest", "median", "largest"):
+            yield of(f"{size} element (longest edge)", f"{mesh}.size.{size}", "mm")
+        yield of(f"worst element ({QUALITY})", f"{mesh}.worst_quality", "1")
+
+
+def _left_by_mesh(summary: Summary, path: str) -> dict[str, Any]:
+    """The error of a stress; none where it grows with every refinement."""
+    error = number_at(summary, f"{path}.error")
+    if error is not None and error >= 1.0:
+        return {"where": "grows as the mesh is refined"}
+    return estimate(summary, f"{path}.error", "what the mesh leaves of the stress")

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from sa_solver.normal import NormalContactError
-from sa_solver.types import Progress
+from sa_solver.types import Array, Progress
 from wear.coupled import KINETICS
 from wear.kinetics import LinearRegime
 from workflow.analyses.contact.datasets import LOADS, pressure_field, traction_fields
@@ -38,7 +38,12 @@ from workflow.analyses.wear.run_errors import warn_of_errors
 from workflow.analyses.wear.structure_stage import StructureStage
 from workflow.analyses.wear.uniformity import uniformities
 from workflow.analyses.wear.worn_faces import write_worn_faces
-from workflow.analyses.wear.worn_structure import WornStructure, resultants_at, worn_structure
+from workflow.analyses.wear.worn_structure import (
+    WornStructure,
+    load_ranges,
+    resultants_at,
+    worn_structure,
+)
 from workflow.shell.analysis import Run
 from workflow.shell.dataset import Dataset
 from workflow.shell.folder import OutputFolder
@@ -60,16 +65,18 @@ NOTHING = 1e-10
 class PeakHistory:
     """The contact at peak load after every jump, unworn first.
 
-    ``area`` in contact [mm²] and largest ``pressure`` [MPa].
+    ``area`` in contact [mm²], its ``width`` along x [mm] and largest ``pressure`` [MPa].
     """
 
     area: list[float]
+    width: list[float]
     pressure: list[float]
 
     def summary(self) -> dict[str, Any]:
-        """The first pressure, the last pressure and the last area."""
+        """The first and last pressure and width, and the last area."""
         pressures = {"unworn": self.pressure[0], "worn": self.pressure[-1]}
-        return {"peak_pressure": pressures, "area": self.area[-1]}
+        widths = {"unworn": self.width[0], "worn": self.width[-1]}
+        return {"peak_pressure": pressures, "contact_width": widths, "area": self.area[-1]}
 
 
 def write_output(outcome: Outcome, run: Run[WearCase]) -> None:
@@ -230,12 +237,12 @@ def _write_jumps(
     writer: ResultsWriter, outcome: Outcome, folder: OutputFolder
 ) -> dict[str, PeakHistory]:
     """Copy surfaces and contacts of all jumps; what they come to, by interface."""
-    recorded = {contact.stage.name: PeakHistory([], []) for contact in outcome.interfaces}
-    cell_areas = [contact.stage.grid.cell_area for contact in outcome.interfaces]
+    recorded = {contact.stage.name: PeakHistory([], [], []) for contact in outcome.interfaces}
+    grids = [contact.stage.grid for contact in outcome.interfaces]
     for jump in range(outcome.state.jump + 1):
         arrays, attributes = read_arrays(folder.jump(jump))
         cycles = attributes["cycles"]
-        for (name, peaks), cell_area in zip(recorded.items(), cell_areas, strict=True):
+        for (name, peaks), grid in zip(recorded.items(), grids, strict=True):
             surfaces, tractions = (
                 {field: arrays[f"{kind}/{name}/{field}"] for field in fields}
                 for kind, fields in JUMP_FIELDS.items()
@@ -244,9 +251,16 @@ def _write_jumps(
             heights, fields = surface_heights(**surfaces), traction_fields(**tractions)
             writer.put(f"surfaces/{place}", heights, On(f"grid/{name}"), cycles=cycles)
             writer.put(f"contact/{place}", fields, On(f"grid/{name}"), cycles=cycles)
-            peaks.area.append(np.count_nonzero(pressure > 0.0) * cell_area)
+            peaks.area.append(np.count_nonzero(pressure > 0.0) * grid.cell_area)
+            peaks.width.append(_extent(pressure) * grid.pitch[0])
             peaks.pressure.append(float(pressure.max()))
     return recorded
+
+
+def _extent(pressure: Array) -> int:
+    """Cells along x from the first to the last that is pressed."""
+    pressed = np.flatnonzero((pressure > 0.0).any(axis=1))
+    return int(np.ptp(pressed)) + 1 if pressed.size else 0
 
 
 def _write_kinetics(
@@ -281,7 +295,7 @@ def _summary(
         **({"structure": structure.summary(state)} if structure else {}),
         **{
             name: _interface_summary(outcome, contact)
-            | (structure.interface_summary(number) if structure else {})
+            | (structure.interface_summary(number, recorded[name].width[0]) if structure else {})
             | recorded[name].summary()
             | stress.get(name, {})
             | {"worn_area": contact.worn_area, "error": summary_of(budget[name])}
@@ -308,6 +322,7 @@ def _interface_summary(outcome: Outcome, contact: InterfaceOutcome) -> dict[str,
             when: resultants_at(carried, outcome.source.peak)
             for when, carried in contact.carried.items()
         },
+        "load_range": {when: load_ranges(loads) for when, loads in contact.carried.items()},
         **_tilt_summary(contact),
         "slip_per_cycle": contact.slip_per_cycle,
         "energy_per_cycle": {

@@ -11,6 +11,7 @@ import numpy as np
 from fe_models.cut_face import WholeStress, whole_components
 from fe_models.elasticity import maximum_principal, von_mises
 from fe_models.mesh import Body, Interface, MeshError, StructureMesh, write_msh
+from fe_models.mesh_quality import element_sizes, elements_across, radius_ratios
 from fe_models.nonlinear import NonlinearCheck
 from fe_models.remesh import form_of, formed_mesh, worn_mesh, worn_volume
 from fe_models.stress import CycleStress, PeakStress, StressField, SurfaceHistory
@@ -31,6 +32,7 @@ from workflow.shell.results import ResultsWriter
 from workflow.shell.store import replacing
 
 RESULTANTS = ("P", "Qx", "Qy", "Mx", "My", "Mz")
+FORCES = ("P", "Qx", "Qy")
 # What the summary has of a total Lagrangian check, beside the resultants.
 MEASURES = ("slip_change", "slide", "largest_strain", "largest_rotation", "face_rotation")
 
@@ -92,6 +94,9 @@ class WornStructure:
         return {
             "from_cache": stage.from_cache,
             "nodes": {body.name: int(body.mesh.nvertices) for body in bodies},
+            "mesh": {
+                body.name: _mesh_summary(body) for body in (stage.mesh.body_1, stage.mesh.body_2)
+            },
             "rigid_modes": stage.rigid_modes,
             "solutions": state.solutions,
             "iterations": unworn.iterations,
@@ -170,8 +175,8 @@ class WornStructure:
                 parts.append(f"{_change(unworn.peak, worn.peak)} {where}")
             yield f"{body.name}: von Mises stress up to {', '.join(parts)}"
 
-    def interface_summary(self, number: int) -> dict[str, Any]:
-        """Volumes in the mesh and resultants at peak load, unworn and worn."""
+    def interface_summary(self, number: int, width: float) -> dict[str, Any]:
+        """Volumes in the mesh and resultants, unworn and worn; ``width`` [mm] is of the contact."""
         stage, interface = self.stage, self.stage.mesh.interfaces[number]
         unworn, worn = stage.unworn()[number].loads, self.loads(number).loads
         before, after = stage.mesh, self.mesh
@@ -183,6 +188,11 @@ class WornStructure:
                 "unworn": resultants_at(unworn, stage.peak),
                 "worn": resultants_at(worn, stage.peak),
             },
+            "load_range": {"unworn": load_ranges(unworn), "worn": load_ranges(worn)},
+            # Where meshes do not match, the coarser one.
+            "elements_across": round(
+                min(elements_across(interface.face(k), width) for k in (1, 2)), 1
+            ),
         }
 
 
@@ -307,6 +317,32 @@ def _formed(meshes: dict[str, StructureMesh], reporter: Reporter) -> dict[str, S
 def resultants_at(loads: LoadHistory, increment: int) -> dict[str, float]:
     """Forces and moments of one increment."""
     return {name: float(getattr(loads, name)[increment]) for name in RESULTANTS}
+
+
+def load_ranges(loads: LoadHistory) -> dict[str, dict[str, float]]:
+    """The ends of what forces reach in a cycle, and their increments counted from 1."""
+    ranges = {}
+    for name in FORCES:
+        force = getattr(loads, name)
+        least, largest = int(np.argmin(force)), int(np.argmax(force))
+        ranges[name] = {
+            "least": float(force[least]),
+            "least_at": least + 1,
+            "largest": float(force[largest]),
+            "largest_at": largest + 1,
+        }
+    return ranges
+
+
+def _mesh_summary(body: Body) -> dict[str, Any]:
+    """How many elements, how large, and how far the worst is from a regular one."""
+    sizes = element_sizes(body.mesh)
+    ends = {"smallest": sizes.min(), "median": np.median(sizes), "largest": sizes.max()}
+    return {
+        "elements": len(sizes),
+        "size": {name: float(size) for name, size in ends.items()},
+        "worst_quality": float(radius_ratios(body.mesh).min()),
+    }
 
 
 def nonlinearity_sentence(check: NonlinearCheck) -> str:
