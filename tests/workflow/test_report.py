@@ -8,6 +8,7 @@ from types import NoneType
 
 import h5py
 import pytest
+from matplotlib.figure import Figure
 
 from tests.workflow.conftest import invoke, manifest_has_all
 from tests.workflow.scenes import BALL
@@ -18,12 +19,16 @@ from workflow.analyses.vibration.outcome import Contents as VibrationContents
 from workflow.analyses.vibration_wear.outcome import Contents as WornContents
 from workflow.analyses.wear.layout import Contents as WearContents
 from workflow.case.readable import percent, readable
+from workflow.case.typeset import exact_percent, given, number, typeset
 from workflow.errors import UserError
 from workflow.pictures.drawing import write_figures
+from workflow.pictures.panels import widen
+from workflow.report.run_page import _warnings
 from workflow.report.writing import write_report
 from workflow.runs import run as running
 from workflow.shell.folder import OutputFolder
 from workflow.shell.results import ResultsWriter, read_contents
+from workflow.shell.summary import counted_from_first
 
 TITLE = 'Ball <script>alert("1")</script> & a "flat"'
 EXPECT = """\
@@ -36,7 +41,7 @@ expect:
 CASE = BALL.replace("title: Ball", f"title: '{TITLE}'") + EXPECT
 QUIET = "output.paraview=false", "output.figures=false"
 # Elements that have no end.
-VOID = {"meta", "img"}
+VOID = {"meta", "img", "wbr"}
 
 
 class Page(HTMLParser):
@@ -215,12 +220,14 @@ READABLE = [
     ((1e-8, "1/MPa"), "10000 µm³/J"),
     ((115000.0, "MPa"), "115 GPa"),
     ((4.43e-9, "t/mm^3"), "4430 kg/m³"),
-    ((447326.6, "1"), "447327"),
+    ((447326.6, "1"), "447300"),
+    ((2180967.0, "1"), "2180967"),
     ((0.0309, "1", None, "%"), "3.09 %"),
     ((105000.0, "N/mm", None, "N/um"), "105 N/µm"),
     ((0.0, "mm", 0.1), "0 mm"),
     ((0.0, "N mm"), "0 J"),
-    ((3e-7, "1/(N*mm)"), "3·10⁻⁷ 1/(N·mm)"),
+    ((3e-7, "1/(N*mm)"), "0.3 1/kJ"),
+    ((3e-7, "1/mm"), "3·10⁻⁷ 1/mm"),
     ((99.97, "MPa", 3.0), "100 MPa"),
     ((float("nan"), "mm"), "not a number"),
     ((float("inf"), "1"), "infinite"),
@@ -235,3 +242,68 @@ def test_numbers_are_told_as_people_read_them(number, text):
 def test_shares_have_two_digits():
     told = [percent(share) for share in (0.0, 1e-9, 3.1e-4, 0.0123, 0.152, 2.0)]
     assert told == ["0 %", "< 0.01 %", "0.03 %", "1.2 %", "15 %", "200 %"]
+
+
+TYPESET = [
+    ("-3.5 um at [-1, 1], (-2)", "−3.5 µm at [−1, 1], (−2)"),
+    ("1e+06 N and 1.3e-05 mm^2", "10⁶ N and 1.3·10⁻⁵ mm²"),
+    ("26.9% of 1500 um^3/J", "26.9\N{NO-BREAK SPACE}% of 1500 µm³/J"),
+    ("body-2 of run_1e5 in 2019-11-05, 1-3", "body-2 of run_1e5 in 2019-11-05, 1-3"),
+    ("states.-1.P, exp(-rate E)", "states.-1.P, exp(-rate E)"),
+]
+
+
+@pytest.mark.parametrize(("text", "printed"), TYPESET, ids=[text for text, _ in TYPESET])
+def test_sentences_are_printed_with_signs_and_units(text, printed):
+    assert typeset(text) == printed
+
+
+def test_long_numbers_are_grouped_and_names_of_files_are_not():
+    assert [number(text) for text in ("2180967", "-12345.6 N", "2500 J", "mesh_20000")] == [
+        "2,180,967",
+        "−12,345.6 N",
+        "2500 J",
+        "mesh_20000",
+    ]
+    assert [given(text) for text in ("10000, -1e5", "20191105.csv", "40000 cycles")] == [
+        "10000, -1e5",
+        "20191105.csv",
+        "40,000 cycles",
+    ]
+    assert [exact_percent(share) for share in (1e-6, 0.02, 0.0)] == ["0.0001 %", "2.0 %", "0 %"]
+
+
+def test_expectations_are_named_by_the_results_they_are_of(drawn):
+    told = Page((drawn / "report.html").read_text("utf-8")).told["Expectations"]
+    assert "after the last increment: largest pressure" in told
+    assert counted_from_first({"a": [{"b": 1}, {"b": 2}]}, "a.-1.b") == "a.1.b"
+    assert counted_from_first({"a": [1]}, "a.-3.b") == "a.-3.b"
+
+
+def test_warnings_that_places_share_are_told_once():
+    shared = [f"the half-space under {force} N: too coarse by -1 um" for force in (17, 87)]
+    told = _warnings([*shared, "left: worn through", "nothing: of many words: here"])
+    assert told.count("too coarse by −1 µm") == 1
+    assert "the half-space under 17 N; the half-space under 87 N" in told
+    assert "<strong>left</strong>: worn through" in told
+
+
+def test_no_number_of_a_page_has_a_hyphen_for_minus(drawn):
+    page = Page((drawn / "report.html").read_text("utf-8"))
+    for heading in ("What was computed", "Results", "The case"):
+        assert not re.search(r"(?<![\w.\])-])-\d", page.told[heading])
+
+
+def test_an_axis_is_not_filled_by_noise():
+    axis = Figure().subplots()
+    axis.plot([0.0, 1.0], [5.0, 5.0 + 1e-9])
+    widen(axis, 0.1)
+    assert axis.get_ylim() == pytest.approx((4.95, 5.05))
+    axis.set_yscale("log")
+    axis.set_ylim(1.0, 1.0001)
+    widen(axis, 0.1)
+    low, high = axis.get_ylim()
+    assert (high / low, low * high) == pytest.approx((1.1, 1.0001))
+    axis.set_ylim(1.0, 3.0)
+    widen(axis, 0.1)
+    assert axis.get_ylim() == (1.0, 3.0)

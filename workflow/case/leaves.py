@@ -6,25 +6,30 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import PurePath
-from typing import Any
+from typing import Any, Literal, get_args, get_origin
 
 from pydantic import BaseModel
+from pydantic.fields import FieldInfo
 
 from workflow.case.fields import File, Quantity
 from workflow.case.plain import plain
-from workflow.case.readable import readable
-from workflow.case.sections import LAST, Case, Section, entries_of, entry_of
+from workflow.case.readable import everyday_unit, readable
+from workflow.case.sections import (
+    KINDS_ARE_NAMED_BY,
+    LAST,
+    Case,
+    Section,
+    entries_of,
+    entry_of,
+)
 from workflow.case.writing import scalar
 
-# In the description of an entry: its base unit.
-UNIT = re.compile(r"\s*\[[^\]]*\]")
+# At the end of the description of an entry: its base unit.
+UNIT = re.compile(r"\s*\[[^\]]*\]$")
 # In a path: which one of a list.
 NUMBERS = re.compile(r"\.\d+(?=\.|$)")
-# What is no energy or load though its unit is that of one, by a part of its name.
-EVERYDAY = {
-    "N*mm": (("moment", "N*m"), ("Mx", "N*mm"), ("My", "N*mm"), ("Mz", "N*mm")),
-    "N/mm": (("stiffness", "N/um"), ("springs", "N/um")),
-}
+# What a case gives has no error, and so all its digits.
+GIVEN = 0.0
 
 
 @dataclass(frozen=True)
@@ -52,11 +57,19 @@ def leaves_of(section: BaseModel, above: str = "") -> Iterator[Leaf]:
             if isinstance(item, Section):
                 yield from leaves_of(item, f"{place}.")
             else:
-                what = UNIT.sub("", field.description or "")
+                what = _what(type(section), name, field)
                 text = in_words(item, unit, name)
                 if isinstance(quantity, File):  # wherever it is
                     text = PurePath(text).name
                 yield Leaf(place, what, item, text, told)
+
+
+def _what(section: type[BaseModel], name: str, field: FieldInfo) -> str:
+    """What an entry is; of that which names the kind of a section, what this kind is."""
+    kinds = get_args(field.annotation) if get_origin(field.annotation) is Literal else ()
+    if name in KINDS_ARE_NAMED_BY and len(kinds) == 1:
+        return (section.__doc__ or "").partition("\n")[0].rstrip(".").replace("``", "")
+    return UNIT.sub("", field.description or "")
 
 
 def taken(case: Case) -> list[tuple[str, str]]:
@@ -105,9 +118,5 @@ def in_words(value: Any, unit: str | None, name: str = "") -> str:
     if isinstance(value, bool):
         return "yes" if value else "no"
     if isinstance(value, int | float):
-        return str(readable(value, unit or "1", everyday=_everyday(unit, name)))
+        return str(readable(value, unit or "1", GIVEN, everyday_unit(unit, name)))
     return str(value)
-
-
-def _everyday(unit: str | None, name: str) -> str:
-    return next((shown for part, shown in EVERYDAY.get(unit or "", ()) if part in name), "")

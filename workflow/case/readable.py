@@ -15,7 +15,7 @@ from workflow.case.units import to_base
 SHOWN: dict[str, tuple[tuple[str, float], ...]] = {
     "mm": (("nm", 0.0), ("um", 0.1), ("mm", 0.1), ("m", 10.0)),
     "mm^2": (("um^2", 0.0), ("mm^2", 1e-3)),
-    "mm^3": (("um^3", 0.0), ("mm^3", 1e-4)),
+    "mm^3": (("um^3", 0.0), ("mm^3", 1e-3)),
     "N": (("mN", 0.0), ("N", 0.1), ("kN", 1.0), ("MN", 1.0)),
     "N/mm": (("N/mm", 0.0), ("kN/mm", 10.0)),
     "N*mm": (("uJ", 0.0), ("mJ", 0.1), ("J", 1.0), ("kJ", 1.0), ("MJ", 1.0)),
@@ -28,9 +28,16 @@ SHOWN: dict[str, tuple[tuple[str, float], ...]] = {
     "rad": (("deg", 0.0),),
     "rad/s": (("rpm", 0.0),),
     "1/MPa": (("um^3/J", 0.0), ("mm^3/J", 1.0)),
+    "1/(N*mm)": (("1/kJ", 0.0), ("1/J", 1.0)),
 }
-# Digits where nothing is known of the error, of plain numbers, at least and at most.
-DIGITS, PLAIN_DIGITS, LEAST_DIGITS, MOST_DIGITS = 4, 6, 2, 6
+# What is read in a unit of its own though its base unit says otherwise, by a part of its name.
+EVERYDAY = {
+    "N*mm": (("moment", "N*m"), ("Mx", "N*mm"), ("My", "N*mm"), ("Mz", "N*mm")),
+    "N/mm": (("stiffness", "N/um"), ("springs", "N/um")),
+}
+# Digits where nothing is known of the error, at least and at most; counts up to so many have all.
+DIGITS, LEAST_DIGITS, MOST_DIGITS = 4, 2, 6
+LARGEST_COUNT = 1e10
 POWERS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
@@ -52,8 +59,12 @@ def readable(value: float, unit: str, error: float | None = None, everyday: str 
     if not math.isfinite(value):
         return Readable("not a number" if math.isnan(value) else "infinite", "")
     shown, factor = suited(value, unit, everyday)
-    text = _text(value / factor, error, DIGITS if shown else PLAIN_DIGITS)
-    return Readable(text, shown)
+    return Readable(_text(value / factor, error, whole=not shown), shown)
+
+
+def everyday_unit(unit: str | None, name: str) -> str:
+    """The unit in which a quantity of that name is always told, "" where there is none."""
+    return next((shown for part, shown in EVERYDAY.get(unit or "", ()) if part in name), "")
 
 
 def suited(value: float, unit: str, everyday: str = "") -> tuple[str, float]:
@@ -95,10 +106,13 @@ def suited_unit(value: float, unit: str) -> str:
     return fitting
 
 
-def _text(value: float, error: float | None, digits: int) -> str:
-    """Down to the first digit of the error."""
+def _text(value: float, error: float | None, whole: bool) -> str:
+    """Down to the first digit of the error; plain ``whole`` numbers are counts, with all digits."""
     if value == 0.0:
         return "0"
+    digits = DIGITS
+    if whole and value == round(value) and abs(value) < LARGEST_COUNT and not error:
+        return f"{value:.0f}"
     if error:
         # 2.83 ± 0.04 has three digits, 9.9 ± 0.1 two.
         last = math.floor(math.log10(abs(value) * error))

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 
 import h5py
 import numpy as np
 from matplotlib.figure import Figure
 
+from sa_solver.types import Array
 from workflow.case.readable import suited
+from workflow.case.typeset import minus
 from workflow.comparing.compared import Comparison
 from workflow.comparing.curves import Curve, curves_in
 from workflow.pictures.style import AMBER, BLACK, BLUE, GREEN, ORANGE, PURPLE, SKY
@@ -19,6 +21,8 @@ INCHES = 7.0, 4.6
 COLOURS = BLUE, ORANGE, GREEN, PURPLE, SKY, AMBER, BLACK
 STYLES = "-", "--", "-.", ":"
 # More curves than this in a panel cannot be told apart.
+# Times by which what curves reach may differ for both to be seen on one axis.
+FAR_APART = 50.0
 MOST = len(COLOURS) * len(STYLES)
 
 Curves = dict[str, dict[str, Curve]]
@@ -63,13 +67,28 @@ def _draw(title: str, curves: dict[str, Curve]) -> Figure:
             color=COLOURS[number % len(COLOURS)],
             label=name,
         )
-    if first.logarithmic:
-        axis.set_yscale("log")
+    if _far_apart([curve.x for curve in curves.values()]):
+        axis.set_xscale("log", nonpositive="mask")
+    if first.logarithmic or _far_apart([curve.y for curve in curves.values()]):
+        axis.set_yscale("log", nonpositive="mask")
+    for line in (axis.xaxis, axis.yaxis):
+        if line.get_scale() == "linear":
+            line.set_major_formatter(lambda number, _: minus(f"{number:,.6g}"))
     axis.set_title(title)
     axis.set_xlabel(_label(first.x_name, x_unit))
     axis.set_ylabel(_label(first.y_name, y_unit))
     axis.legend()
     return figure
+
+
+def _far_apart(values: Sequence[Array]) -> bool:
+    """Whether some reach so much less than others that they cannot be seen beside them.
+
+    Only what is nowhere below 0 can be shown by logarithms.
+    """
+    reached = [_largest(those) for those in values]
+    seen = min(reached) * FAR_APART >= max(reached) or min(reached) == 0.0
+    return not seen and all(np.nanmin(those) >= 0.0 for those in values)
 
 
 def _units(curve: Curve) -> tuple[str, str]:

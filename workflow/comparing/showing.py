@@ -15,10 +15,13 @@ from rich.console import Console
 from rich.table import Column, Table
 
 from workflow.case.readable import percent, readable
+from workflow.case.typeset import given
+from workflow.case.typeset import number as printed
 from workflow.comparing.compared import NOTHING, Comparison, Row
 from workflow.report.numbers import value_of
 from workflow.report.page import (
     Html,
+    code,
     contents_of,
     element,
     note,
@@ -162,13 +165,14 @@ def _runs(comparison: Comparison) -> Html:
         version = run.run.summary["versions"]["fretscale"]
         seconds = sum(run.run.summary["seconds"].values())
         rows.append([run.name, run.run.case.title, version, str(warnings), f"{seconds:.0f} s"])
-    return table(["run", "title", "fretscale", "warnings", "time"], rows, numbers=(3, 4))
+    head = ["run", "title", "fretscale", "warnings", "time"]
+    return table(head, rows, numbers=(3, 4), stacks=True)
 
 
 def _entries(comparison: Comparison) -> Html:
     if not comparison.entries:
         return element("p", "Nothing that results depend on.")
-    rows = [[element("code", path), *texts] for path, texts in comparison.entries.items()]
+    rows = [[code(path), *map(given, texts)] for path, texts in comparison.entries.items()]
     return table(["", *comparison.names], rows)
 
 
@@ -176,7 +180,7 @@ def _results(comparison: Comparison) -> Html:
     runs = range(len(comparison.runs))
     rows: list[list[object]] = []
     for group, those in groupby(comparison.rows, lambda row: row.first.group):
-        rows.append([group])
+        rows.append([printed(group)])
         rows += [[row.first.name, *(_cell(row, number) for number in runs)] for row in those]
     return table(["", *comparison.names], rows, numbers=range(1, len(comparison.runs) + 1))
 
@@ -185,7 +189,8 @@ def _cell(row: Row, number: int) -> object:
     quantity, value = row.quantities[number], row.values[number]
     if quantity is None or value is None:
         return NOTHING
-    apart = " ".join(_apart(row, number))
+    alike = row.difference(number) == 0.0
+    apart = "" if alike else " ".join(_apart(row, number))
     look = "bad" if row.beyond(number) else "error"
     told = element("div", element("span", apart, cls=look)) if apart else Html("")
     return element("div", value_of(replace(quantity, everyday=row.everyday), value), told)

@@ -6,6 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from workflow.case.readable import percent, readable
+from workflow.case.typeset import MINUS, number, unparted
 from workflow.report.page import Html, element, lines, note, table, unbroken
 from workflow.shell.quantities import Quantity
 from workflow.shell.summary import number_at, required_number
@@ -61,7 +62,11 @@ def _table(groups: Groups, summary: Mapping[str, Any], marks: Mapping[str, str])
         [name, *(_cell(named.get(name), summary, marks) for named in groups.values())]
         for name in names
     )
-    return table(["", *groups], rows, numbers=range(1, len(groups) + 1))
+    return table(
+        ["", *(unparted(number(group)) for group in groups)],
+        rows,
+        numbers=range(1, len(groups) + 1),
+    )
 
 
 def _cell(
@@ -75,12 +80,15 @@ def _cell(
 
 def value_of(quantity: Quantity, value: float, mark: str = "") -> Html:
     """A value with its unit and its estimated error, which may have a ``mark`` for a note."""
-    shown = unbroken(str(readable(value, quantity.unit, quantity.error, quantity.everyday)))
+    text = number(str(readable(value, quantity.unit, quantity.error, quantity.everyday)))
+    shown = unbroken(text)
+    if quantity.where:
+        shown = element("span", shown, " ", element("span", unbroken(quantity.where), cls="error"))
     if quantity.error is None or value == 0.0:
         return element("span", shown)
     error = unbroken(f"± {percent(quantity.error)}")
     noted = element("sup", mark) if mark else Html("")
-    return element("span", f"{shown} ", element("span", error, noted, cls="error"))
+    return element("span", shown, " ", element("span", error, noted, cls="error"))
 
 
 def _marks(quantities: Sequence[Quantity]) -> dict[str, str]:
@@ -137,10 +145,10 @@ def _parts(summary: Mapping[str, Any], path: str) -> Mapping[str, Any]:
     return parts
 
 
-def _part(parts: Mapping[str, Any], name: str) -> str:
+def _part(parts: Mapping[str, Any], name: str) -> object:
     if name not in parts:
         return "–"
     value = number_at(parts, name)
     if value is None:
         return "?"
-    return unbroken(f"{'−' if value < 0.0 else ''}{percent(abs(value))}")
+    return unbroken(f"{MINUS if value < 0.0 else ''}{percent(abs(value))}")

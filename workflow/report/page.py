@@ -68,27 +68,37 @@ def items(texts: Iterable[object]) -> Html:
 
 
 def table(
-    head: Sequence[object], rows: Iterable[Sequence[object]], numbers: Sequence[int] = ()
+    head: Sequence[object],
+    rows: Iterable[Sequence[object]],
+    numbers: Sequence[int] = (),
+    stacks: bool = False,
 ) -> Html:
     """A table, the first cell of a row being its heading; columns of ``numbers`` keep right.
 
-    Rows of one cell go over all columns. Wide tables scroll by themselves.
+    Rows of one cell go over all columns. Wide tables scroll by themselves, or, where there is
+    little room, ``stacks`` the cells of each row below each other.
     """
+    labels = [str(text) for text in head] if stacks else [""] * len(head)
     titles = element(
         "tr", *(_cell("th", text, n in numbers, scope="col") for n, text in enumerate(head))
     )
-    body = lines(_row(row, len(head), numbers) for row in rows)
+    body = lines(_row(row, labels, numbers) for row in rows)
     top = element("thead", titles) if any(head) else Html("")
-    return element("div", element("table", top, element("tbody", body)), cls="wide")
+    return element(
+        "div", element("table", top, element("tbody", body)), cls="stacks" if stacks else "wide"
+    )
 
 
-def _row(row: Sequence[object], columns: int, numbers: Sequence[int]) -> Html:
+def _row(row: Sequence[object], labels: Sequence[str], numbers: Sequence[int]) -> Html:
     if len(row) == 1:
         return element(
-            "tr", element("th", row[0], colspan=str(columns), scope="colgroup", cls="group")
+            "tr", element("th", row[0], colspan=str(len(labels)), scope="colgroup", cls="group")
         )
     first, *rest = row
-    others = (_cell("td", text, n in numbers) for n, text in enumerate(rest, 1))
+    others = (
+        _cell("td", text, n in numbers, **({"data-label": labels[n]} if labels[n] else {}))
+        for n, text in enumerate(rest, 1)
+    )
     return element("tr", _cell("th", first, 0 in numbers, scope="row"), *others)
 
 
@@ -96,9 +106,14 @@ def _cell(tag: str, text: object, number: bool, **attributes: str) -> Html:
     return element(tag, text, **attributes, **({"cls": "number"} if number else {}))
 
 
-def unbroken(text: str) -> str:
+def unbroken(text: str) -> Html:
     """A text that stays in one line: a number with its unit, say."""
-    return text.replace(" ", "\N{NO-BREAK SPACE}")
+    return element("span", text, cls="short")
+
+
+def code(path: str) -> Html:
+    """A name of a case or a summary, broken where its parts end if it must be."""
+    return element("code", Html(re.sub(r"([._])", r"\1<wbr>", escape(path))))
 
 
 def note(*inside: object) -> Html:

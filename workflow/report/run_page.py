@@ -2,21 +2,26 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import groupby
 from pathlib import PurePath
 from typing import Any
 
-from workflow.case.leaves import Leaf, in_words, leaves_of
-from workflow.case.readable import percent, pretty
+from workflow.case.leaves import GIVEN, Leaf, in_words, leaves_of
+from workflow.case.readable import percent, pretty, readable
+from workflow.case.typeset import exact_percent, given, number, typeset
 from workflow.kinds import analysis_of
 from workflow.report.numbers import error_budget, results
 from workflow.report.page import (
     Html,
+    code,
     contents_of,
     element,
     folded,
+    html,
     items,
+    lines,
     note,
     page,
     picture,
@@ -26,7 +31,8 @@ from workflow.report.page import (
 )
 from workflow.report.told import ToldRun
 from workflow.shell.expectations import Verdict, verdicts
-from workflow.shell.summary import QuantityError
+from workflow.shell.quantities import Quantity
+from workflow.shell.summary import QuantityError, counted_from_first
 
 # Sections of a case that are no part of what is computed, and those that most readers look for.
 APART = "title", "analysis", "output", "assumed", "expect", "reported"
@@ -34,8 +40,12 @@ LOOKED_FOR = (
     *("materials", "friction", "load_path", "wear", "joint", "evolution", "drive", "excitation"),
     *("energies", "ageing", "forces", "frequencies"),
 )
+# Results that are signs begin with these.
+SIGNS = "change.", "trend."
 # Letters of a value that stays in one line.
 SHORT = 20
+# Stages of less are not told [s].
+AT_ONCE = 0.05
 # Letters of a digest that tell files apart.
 DIGEST = 12
 
@@ -87,19 +97,20 @@ def _met(run: ToldRun) -> str:
 
 
 def _outline(run: ToldRun) -> Html:
-    return table(["", ""], [[name, text] for name, text in run.case.outline()])
+    return table(["", ""], [[name, typeset(text)] for name, text in run.case.outline()])
 
 
 def _warnings(warnings: Sequence[str]) -> Html:
     """Each in its own words; those that several places share once."""
     places: dict[str, list[str]] = {}
-    for warning in warnings:
-        place, colon, rest = warning.partition(": ")
-        if not colon or " " in place:
+    parts = [warning.partition(": ") for warning in warnings]
+    alike = Counter(rest for _, _, rest in parts)
+    for warning, (place, colon, rest) in zip(warnings, parts, strict=True):
+        if not colon or (" " in place and alike[rest] == 1):
             place, rest = "", warning
-        places.setdefault(rest, []).append(place)
+        places.setdefault(typeset(rest), []).append(typeset(place))
     told = (
-        element("span", element("strong", ", ".join(those)), ": ", rest) if any(those) else rest
+        element("span", element("strong", "; ".join(those)), ": ", rest) if any(those) else rest
         for rest, those in places.items()
     )
     return items(told) if places else Html("")
@@ -121,31 +132,45 @@ def _expectations(run: ToldRun) -> Html:
     found = _verdicts(run)
     if not found:
         return Html("")
-    names = {q.path: q for q in analysis_of(run.case).quantities(run.case, run.summary)}
+    quantities = analysis_of(run.case).quantities(run.case, run.summary)
+    names = {counted_from_first(run.summary, quantity.path): quantity for quantity in quantities}
     rows = []
     for entry, verdict in zip(run.case.expect, found, strict=True):
-        quantity = names.get(entry.quantity)
-        name = element("code", entry.quantity)
+        quantity = names.get(counted_from_first(run.summary, entry.quantity))
+        name = code(entry.quantity)
         if quantity is not None:
-            name = element("span", f"{quantity.group}: {quantity.name}")
+            name = element("span", f"{number(quantity.group)}: {quantity.name}")
         source = f"{entry.source} ({entry.kind.replace('_', ' ')})"
-        rows.append([name, *_verdict_cells(verdict), source])
+        rows.append([name, *_verdict_cells(verdict, quantity), source])
     head = ["", "expected", "computed", "off by", "allowed", "", "expected from"]
-    return table(head, rows, numbers=(1, 2, 3, 4))
+    signs = any(entry.quantity.startswith(SIGNS) for entry in run.case.expect)
+    told = note("Of a change or trend 1 is a rise, −1 a fall, and 0 neither.") if signs else ""
+    return lines([table(head, rows, numbers=(1, 2, 3, 4), stacks=True), html(told)])
 
 
-def _verdict_cells(verdict: Verdict | str) -> list[object]:
+def _verdict_cells(verdict: Verdict | str, quantity: Quantity | None) -> list[object]:
     if isinstance(verdict, str):
         return ["", "", "", "", element("span", verdict, cls="bad")]
-    tolerance, unit = verdict.entry.tolerance, verdict.unit
-    allowed = percent(tolerance) if verdict.expected else f"{tolerance:.1e}"
     met = (
         element("span", "met", cls="good") if verdict.met else element("span", "missed", cls="bad")
     )
-    values = verdict.expected, verdict.computed
-    shown = (f"{value:.6g} {pretty(unit)}".strip() for value in values)
-    error = percent(verdict.error) if verdict.expected else f"{verdict.error:.1e}"
-    return [*map(unbroken, (*shown, error, allowed)), met]
+    expected, computed = (
+        _as_expected(value, verdict.unit, quantity)
+        for value in (verdict.expected, verdict.computed)
+    )
+    tolerance = verdict.entry.tolerance
+    if verdict.expected:
+        errors = percent(verdict.error), exact_percent(tolerance)
+    else:  # of a value 0 in its unit
+        errors = f"{verdict.error:.2g}", f"{tolerance:.2g}"
+    return [*(unbroken(number(text)) for text in (expected, computed, *errors)), met]
+
+
+def _as_expected(value: float, unit: str, quantity: Quantity | None) -> str:
+    """In the unit of the expectation; bare numbers in that which suits the quantity, if any."""
+    if unit or quantity is None:
+        return f"{readable(value, '1', GIVEN).number} {pretty(unit)}".strip()
+    return str(readable(value, quantity.unit, GIVEN, quantity.everyday))
 
 
 def _figures(run: ToldRun) -> Iterator[Html]:
@@ -161,7 +186,7 @@ def _figures(run: ToldRun) -> Iterator[Html]:
 
 def _remarks(summary: Mapping[str, Any]) -> Html:
     """What an analysis explains in sentences."""
-    told = [f"{text[:1].upper()}{text[1:]}." for text in summary.get("explanation") or ()]
+    told = [typeset(f"{text[:1].upper()}{text[1:]}.") for text in summary.get("explanation") or ()]
     return items(told) if told else Html("")
 
 
@@ -182,7 +207,7 @@ def _case(run: ToldRun) -> Iterator[Html]:
             "p",
             "Not printed by the source of this case, and chosen by whoever wrote it (marked * "
             "above): ",
-            Html(", ".join(element("code", path) for path in assumed)),
+            Html(", ".join(map(code, assumed))),
             ".",
         )
 
@@ -200,9 +225,9 @@ def _entries(leaves: Sequence[Leaf], assumed: Sequence[str]) -> Html:
         for leaf in listed:
             below = leaf.path.partition(".")[2] or name
             star = "*" if any(f"{leaf.path}.".startswith(f"{path}.") for path in assumed) else ""
-            name_of = element("span", element("code", below), star)
-            rows.append([name_of, _kept_together(leaf.text), leaf.what])
-    return table(["", "", ""], rows)
+            name_of = element("span", code(below), star)
+            rows.append([name_of, _kept_together(given(leaf.text)), leaf.what])
+    return table(["", "", ""], rows, stacks=True)
 
 
 def _kept_together(text: str) -> object:
@@ -220,19 +245,17 @@ def _choice(summary: Mapping[str, Any]) -> Iterator[Html]:
         f"{percent(choice['accuracy'])}: estimated error {percent(choice['estimated_error'])}, "
         f"{'within' if choice['met'] else 'not within'} every share of it.",
     )
-    yield table(
-        ["", "chosen", "estimated to leave", "of", "why"],
+    rows = (
         [
-            [
-                element("code", decision["entry"]),
-                _chosen(decision["value"]),
-                *(_share(decision[key]) for key in ("error", "allowed")),
-                decision["why"],
-            ]
-            for decision in choice["decisions"]
-        ],
-        numbers=(2, 3),
+            code(decision["entry"]),
+            given(_chosen(decision["value"])),
+            *(_share(decision[key]) for key in ("error", "allowed")),
+            typeset(decision["why"]),
+        ]
+        for decision in choice["decisions"]
     )
+    head = ["", "chosen", "estimated to leave", "of", "why"]
+    yield table(head, rows, numbers=(2, 3), stacks=True)
 
 
 def _chosen(value: Any) -> str:
@@ -257,6 +280,6 @@ def _computing(run: ToldRun) -> Iterator[Html]:
 
 
 def _seconds(seconds: Mapping[str, float]) -> Html:
-    rows = [[name, f"{value:.1f} s"] for name, value in seconds.items()]
-    whole = [element("strong", "all"), element("strong", f"{sum(seconds.values()):.1f} s")]
+    rows = [[name, f"{value:,.1f} s"] for name, value in seconds.items() if value >= AT_ONCE]
+    whole = [element("strong", "all"), element("strong", f"{sum(seconds.values()):,.1f} s")]
     return table(["stage", "time"], [*rows, whole], numbers=(1,))

@@ -61,6 +61,21 @@ def required_number(summary: Mapping[str, Any], path: str) -> float:
     return float(node)
 
 
+def counted_from_first(summary: Mapping[str, Any], path: str) -> str:
+    """The path to the same number with the items of lists counted from the first: 4 for -1."""
+    node: Any = summary
+    keys = path.split(".")
+    for place, key in enumerate(keys):
+        try:
+            number = int(key) if isinstance(node, list) else key
+            node, whole = node[number], node
+            if isinstance(whole, list) and int(key) < 0:
+                keys[place] = str(len(whole) + int(key))
+        except (LookupError, TypeError, ValueError):
+            break
+    return ".".join(keys)
+
+
 def number_at(summary: Mapping[str, Any], path: str) -> float | None:
     """The number that a dotted path leads to; None where there is none."""
     try:
