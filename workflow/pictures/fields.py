@@ -26,6 +26,8 @@ MARGIN, PROFILE_MARGIN = 0.08, 0.15
 LONGER = 1.25
 # Maps at most so high, over their width, and so many of them lie below each other.
 FLAT, MOST_STACKED = 0.3, 8
+# Over the width, what a map's height is at least: along lower ones no numbers could be read.
+FLATTEST = 0.08
 # Around and between maps, for axes and colour bar; for titles, of several lines where maps are
 # beside each other; and the highest of a map [inches].
 BESIDE, BETWEEN, AROUND, HIGHEST = 2.6, 0.5, 1.3, 4.8
@@ -95,8 +97,8 @@ def is_upright(views: Sequence[View]) -> bool:
 def draw_maps(title: str, rows: Sequence[Sequence[Map]], label: str, note: str) -> Figure:
     """Maps on one colour scale and to scale, cut to where they are above 0; a row is of one face.
 
-    Their longer side is to the right; flat ones lie below each other. Those of nothing are left
-    out, if not all are.
+    Their longer side is to the right; flat ones lie below each other, and very flat ones are drawn
+    higher than they are. Those of nothing are left out, if not all are.
     """
     own = [view_of([shown.field for shown in row], row[0].grid) for row in rows]
     views = common_views(own)
@@ -106,7 +108,9 @@ def draw_maps(title: str, rows: Sequence[Sequence[Map]], label: str, note: str) 
     columns = min(len(rows[0]), len(panels))
     if max(_height(view, turned) for view in views) <= FLAT and len(panels) <= MOST_STACKED:
         columns = 1
-    heights = [_height(view, turned) for _, view in panels]
+    heights = [max(_height(view, turned), FLATTEST) for _, view in panels]
+    if min(_height(view, turned) for _, view in panels) < FLATTEST:
+        note = f"{note}; not to scale" if note else "not to scale"
     in_rows = [max(heights[first : first + columns]) for first in range(0, len(panels), columns)]
     figure, axes = scaled_panels(title, in_rows, columns)
     for axis in axes.flat[len(panels) :]:
@@ -146,7 +150,7 @@ def _height(view: View, turned: bool) -> float:
 def draw_map(
     axis: Axes, field: Array, grid: Grid, top: float, view: View, turned: bool = False
 ) -> Any:
-    """One field to scale, x to the right or, ``turned``, y; returns the image."""
+    """One field to scale unless very flat, x to the right or, ``turned``, y; returns the image."""
     half = 0.5 * grid.size[0], 0.5 * grid.size[1]
     values = np.ma.masked_less_equal(field, 0.0)
     right, up = (1, 0) if turned else (0, 1)
@@ -159,6 +163,7 @@ def draw_map(
         vmin=0.0,
         vmax=top,
         interpolation="nearest",
+        aspect="auto" if _height(view, turned) < FLATTEST else "equal",
     )
     axis.set(xlim=view[right], ylim=view[up])
     few = 3 if view.size[up] < FLAT * view.size[right] else TICKS

@@ -14,6 +14,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter, NullLocator
 
+from workflow.case.typeset import typeset
 from workflow.pictures.fitting import FittedLayout
 from workflow.pictures.style import COLOUR_MAP, LAST_SHADE
 
@@ -151,6 +152,20 @@ def legend_below(
         )
 
 
+def widen(axis: Axes, least: float) -> None:
+    """Let the y axis of a panel span ``least`` at least: smaller changes are not worth seeing.
+
+    On a logarithmic axis that is the share by which its ends differ.
+    """
+    low, high = axis.get_ylim()
+    if axis.get_yscale() == "log":
+        missing = ((1.0 + least) * low / high) ** 0.5
+        if missing > 1.0:
+            axis.set_ylim(low / missing, high * missing)
+    elif (missing := 0.5 * (least - (high - low))) > 0.0:
+        axis.set_ylim(low - missing, high + missing)
+
+
 def plain_ticks(line: Axis) -> None:
     """A few plain numbers along a logarithmic axis, whatever it spans; limits come first."""
     low, high = line.get_view_interval()
@@ -159,11 +174,11 @@ def plain_ticks(line: Axis) -> None:
         line.set_minor_formatter(NullFormatter())
     elif high > low * FEW_DECADES:
         line.set_minor_locator(LogLocator(subs=TICKS))
-        line.set_minor_formatter("{x:g}")
+        line.set_minor_formatter(lambda x, _: typeset(f"{x:g}"))
     else:
         line.set_major_locator(MaxNLocator(FEW_TICKS))
         line.set_minor_locator(NullLocator())
-    line.set_major_formatter("{x:g}")
+    line.set_major_formatter(lambda x, _: typeset(f"{x:g}"))
 
 
 def whole_ticks(line: Axis) -> None:

@@ -11,8 +11,11 @@ import numpy as np
 from matplotlib import rc_context
 from matplotlib.collections import Collection, QuadMesh
 from matplotlib.figure import Figure
+from matplotlib.legend import Legend
 from matplotlib.lines import Line2D
+from matplotlib.text import Text
 
+from workflow.case.typeset import minus, typeset
 from workflow.shell.store import replacing
 
 DOTS_PER_INCH = 100
@@ -107,6 +110,10 @@ def _lay_out(figure: Figure) -> None:
 
     What is dense is drawn as dots in vector graphics too, which would be large and slow to show.
     """
+    for text in _words(figure):
+        text.set_text(typeset(text.get_text()))
+    for text in _names_in_legends(figure):
+        text.set_text(minus(text.get_text()))
     engine = figure.get_layout_engine()
     if engine is not None:
         figure.set_dpi(DOTS_PER_INCH)
@@ -115,6 +122,22 @@ def _lay_out(figure: Figure) -> None:
     for artist in figure.findobj(lambda a: isinstance(a, Collection | Line2D)):
         if _vertices(artist) > DENSE:
             artist.set_rasterized(True)
+
+
+def _words(figure: Figure) -> Iterator[Text]:
+    """Titles and labels: what was made of numbers, with hyphens for minus."""
+    for part in (figure, *figure.subfigs):
+        yield from part.texts
+    for axis in figure.axes:
+        yield from (axis.title, axis._left_title, axis._right_title)  # type: ignore[attr-defined]
+        yield from (axis.xaxis.label, axis.yaxis.label, *axis.texts)
+
+
+def _names_in_legends(figure: Figure) -> Iterator[Text]:
+    """What legends call curves: numbers in them may be names, and stay."""
+    for legend in figure.findobj(lambda a: isinstance(a, Legend)):
+        assert isinstance(legend, Legend)
+        yield from legend.get_texts()
 
 
 def _vertices(artist: Any) -> int:

@@ -19,6 +19,7 @@ from workflow.pictures.panels import (
     panel_grid,
     plain_ticks,
     shaded,
+    widen,
 )
 from workflow.pictures.scales import PER_MICRON, TO_JOULES, TO_MICRONS
 from workflow.pictures.style import BLACK, BLUE, GREEN, HEADROOM, ORANGE, PURPLE
@@ -216,6 +217,10 @@ def _response_title(shown: list[tuple[str, Any, h5py.Group]]) -> str:
     )
 
 
+# Of a ring-down, what is less is noise: in the frequency [%], and in the damping, as a share.
+LEAST_SOFTENING, LEAST_DAMPING = 0.1, 0.1
+
+
 def ring_down(file: h5py.File, contents: Contents) -> Figure:
     """Frequency and damping of the first mode against its amplitude, and the motion itself."""
     shown = _states(file, contents, MOTION)
@@ -240,6 +245,8 @@ def ring_down(file: h5py.File, contents: Contents) -> Figure:
     for axis in (left, right):
         axis.set_xlabel(f"amplitude of {_seen(file)} [µm]")
         plain_ticks(axis.xaxis)
+    widen(left, LEAST_SOFTENING)
+    widen(right, LEAST_DAMPING)
     plain_ticks(right.yaxis)
     return figure
 

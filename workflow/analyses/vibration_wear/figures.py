@@ -55,6 +55,11 @@ MOTION: tuple[Curve, Curve] = (
     ("energy_per_cycle", 1.0, "energy per cycle [mJ]"),
 )
 DEPTH: Curve = ("depth", TO_MICRONS, "largest worn depth [µm]")
+# For titles: dataset, scale, unit and what it is.
+STUCK = "stuck", 1.0, "Hz", "First natural frequency, contact stuck"
+STIFFNESS = "stiffness", PER_MICRON, "N/µm", "Stiffness of the stuck contact"
+DEEPEST = "depth", TO_MICRONS, "µm", "Largest worn depth"
+LOOP_ENERGY = "energy_per_cycle", 1.0, "mJ", "Loop under the force that wears"
 ON_GRID = DEPTH, ("area", 1.0, "area in contact [mm²]")
 AT_NODES = DEPTH, ("touching", 1.0, "nodes in contact")
 
@@ -73,7 +78,7 @@ def frequency_response(file: h5py.File) -> Figure:
     """Amplitude of the last mass over the force, a panel per force, a curve per state."""
     forces = list(file.attrs["forces"])
     shown = spread(range(len(forces)), MOST_FORCES)
-    figure = new_figure(_title(file), 4.0 * len(shown) + 0.5)
+    figure = new_figure(_change(file, *STUCK), 4.0 * len(shown) + 0.5)
     panels = figure.subplots(len(shown), 1, sharex=True, squeeze=False)[:, 0]
     for axis, place in zip(panels, shown, strict=True):
         for state, colour in _states(file):
@@ -82,7 +87,7 @@ def frequency_response(file: h5py.File) -> Figure:
             label = f"{_cycles(state)}: {response.attrs['resonance']:.4g} Hz"
             axis.plot(response["frequency"][()], receptance, color=colour, label=label)
         axis.set(title=f"{forces[place]:g} N", ylabel="amplitude / force [µm/N]", yscale="log")
-        legend_beside(axis, "resonance")
+        legend_beside(axis, "cycles: resonance")
     panels[-1].set(xlabel="frequency [Hz]", xscale="log")
     for side in (panels[-1].xaxis, *(axis.yaxis for axis in panels)):
         plain_ticks(side)
@@ -94,7 +99,7 @@ def evolution(file: h5py.File, contents: Contents) -> Figure:
     history, forces = file[EVOLUTION], list(file.attrs["forces"])
     cycles = history["cycles"][()]
     place = np.append(BEFORE * cycles[1], cycles[1:])
-    figure = new_figure(_title(file), 9.0)
+    figure = new_figure(_change(file, *STIFFNESS), 9.0)
     (stiffness, frequency), (motion, depth) = figure.subplots(2, 2, sharex=True)
     stiffness.plot(place, PER_MICRON * history["stiffness"][()], "o-", color=BLUE)
     stiffness.set_ylabel("stiffness kt while the contact sticks [N/µm]")
@@ -107,7 +112,7 @@ def evolution(file: h5py.File, contents: Contents) -> Figure:
     legend_below(figure, [frequency], title="resonance")
     for axis, curves in ((motion, MOTION), (depth, AT_NODES if contents.at_nodes else ON_GRID)):
         _draw_pair(axis, place, history, curves)
-        axis.set(xlabel=f"cycles (unworn at {place[0]:g})", xscale="log")
+        axis.set(xlabel="cycles (first point: unworn)", xscale="log")
         plain_ticks(axis.xaxis)
     return figure
 
@@ -116,7 +121,7 @@ def scar(file: h5py.File) -> Figure:
     """Worn depth, pressure at rest and energy of a cycle, across the middle along x."""
     grid = grid_of(file["grid"])
     middle, along = grid.shape[1] // 2, grid.x[:, 0]
-    figure = new_figure(_title(file), 9.0)
+    figure = new_figure(_change(file, *DEEPEST), 9.0)
     depth, pressure, energy = figure.subplots(3, 1, sharex=True)
     for state, colour in _states(file):
         contact, label = state[CONTACT], _cycles(state)
@@ -136,7 +141,7 @@ def profile(file: h5py.File) -> Figure:
     """Gap, pressure at rest and energy of a cycle of nodes along the pad's middle and diagonal."""
     places = {name: file[PLACES][name][()] for name in ("x", "y", "area")}
     sections = _sections(places["x"], places["y"])
-    figure = new_figure(_title(file), 9.0)
+    figure = new_figure(_change(file, *DEEPEST), 9.0)
     panels = figure.subplots(3, len(sections), sharex="col", sharey="row", squeeze=False)
     for (along, nodes, label), column in zip(sections, panels.T, strict=True):
         for state, colour in _states(file):
@@ -169,7 +174,7 @@ def _sections(x: Array, y: Array) -> list[tuple[Array, Indices, str]]:
 
 def loops(file: h5py.File, contents: Contents) -> Figure:
     """Loops under the force that wears; of a half-space also that of the tangential problem."""
-    figure = new_figure(_title(file), 7.0)
+    figure = new_figure(_change(file, *LOOP_ENERGY), 7.0)
     axis = figure.subplots()
     for state, colour in _states(file):
         label = f"{_cycles(state)}: {state.attrs['energy_per_cycle']:.4g} mJ"
@@ -207,13 +212,14 @@ def _states(file: h5py.File) -> list[tuple[h5py.Group, Any]]:
 
 def _cycles(state: h5py.Group) -> str:
     cycles = float(state.attrs["cycles"])
-    return f"{cycles:g}" if cycles > 0.0 else "unworn"
+    return f"{cycles:,.0f}" if cycles > 0.0 else "unworn"
 
 
-def _title(file: h5py.File) -> str:
+def _change(file: h5py.File, name: str, scale: float, unit: str, what: str) -> str:
+    """What became of a number from the first state to the last, for a title."""
     history = file[EVOLUTION]
-    stiffness, stuck = PER_MICRON * history["stiffness"][()], history["stuck"][:, 0]
-    return (
-        f"kt {stiffness[0]:.4g} to {stiffness[-1]:.4g} N/µm and stuck {stuck[0]:.4g} to "
-        f"{stuck[-1]:.4g} Hz after {TO_JOULES * history['energy'][-1]:.4g} J"
-    )
+    cycles = history["cycles"][()]
+    values = scale * history[name][()].reshape(len(cycles), -1)[:, 0]
+    after = f"{cycles[-1]:,.0f} cycles, {TO_JOULES * history['energy'][-1]:.4g} J"
+    before = f"{values[0]:.4g} {unit} unworn, " if values[0] else ""
+    return f"{what}: {before}{values[-1]:.4g} {unit} after {after}"

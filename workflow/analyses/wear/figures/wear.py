@@ -55,6 +55,8 @@ BODY_STYLES: tuple[dict[str, Any], ...] = (
 
 # The rounding is many times deeper than young wear: heights are shown up to so many depths.
 HEIGHT_IN_DEPTHS = 2.0
+# And what they show below the lowest.
+BELOW = 0.15
 # Of the band of its uncertainty, which is curved.
 BAND_POINTS = 50
 # What a profile along x and one along y show; a line contact has no y.
@@ -179,7 +181,7 @@ def _edge_peak(file: h5py.File, contents: Contents) -> str:
     }
     name = max(peaks, key=lambda name: peaks[name])
     place = "" if contents.line else " at y = 0"
-    text = f"Edge peak on the {name}{place}: {peaks[name]:.0f} MPa"
+    text = f"Largest pressure on the {name}{place}: {peaks[name]:.0f} MPa"
     if name in contents.coarse:
         coarse = file["contact"][name]["coarse"]
         peak = middle(coarse["pressure"][()], 0).max()
@@ -208,7 +210,10 @@ def worn_profiles(file: h5py.File, contents: Contents) -> Figure:
     figure.suptitle(f"Depth worn off{place}, at most: {texts}", fontweight="bold")
     low, high = axes[0, 0].get_ylim()
     most = max(deepest.values())
-    axes[0, 0].set_ylim(low, min(high, HEIGHT_IN_DEPTHS * most) if most else high)
+    if most:
+        lowest = min(float(np.min(line.get_ydata())) for axis in axes[0] for line in axis.lines)
+        low, high = max(low, lowest - BELOW * most), min(high, HEIGHT_IN_DEPTHS * most)
+    axes[0, 0].set_ylim(low, high)
     axes[0, 0].set_xlim(_shown_span(file, contents, 0))
     axes[1, 0].invert_yaxis()
     label_rows(axes, ("height [µm]", "wear depth [µm]"))
