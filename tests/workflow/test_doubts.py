@@ -45,8 +45,8 @@ SLIPS = [
     ("dovetail", "materials.blade.young=210 MPa", "210 MPa; usual: 0.3 to 1300 GPa; 210 GPa meant"),
     ("dovetail", "materials.blade.young=0.115", "0.115 MPa; usual"),
     ("dovetail", "materials.blade.poisson=0.03", "0.03; usual: 0.1 to 0.5; 0.3 meant?"),
-    ("dovetail", "materials.disk.density=4.43e-9 kg/m^3", "4.43e-09 t/mm^3 meant?"),
-    ("dovetail", "materials.disk.density=4.43 kg/m^3", "500 to 23000 kg/m^3; 4.43 g/cm^3 meant?"),
+    ("dovetail", "materials.disk.density=4.43e-9 kg/m^3", "4.43e-09 t/mm³ meant?"),
+    ("dovetail", "materials.disk.density=4.43 kg/m^3", "500 to 23000 kg/m³; 4.43 g/cm³ meant?"),
     ("dovetail", "materials.disk.yield_stress=0.9 MPa", "0.9 GPa meant?"),
     ("dovetail", "friction.coefficient=1.5", "friction.coefficient: 1.5; usual: 0.02 to 1.2"),
     ("dovetail", "friction.coefficient=0.004", "0.04 meant?"),
@@ -54,10 +54,10 @@ SLIPS = [
     ("dovetail", "load_path.rotation_speed=6000 rad/s", "6000 rpm meant?"),
     ("dovetail", "load_path.airfoil_mass=0.8 t", "800 kg; usual: 0.005 to 100 kg; 0.8 kg meant?"),
     ("dovetail", "load_path.airfoil_mass=0.8 g", "0.8 kg meant?"),
-    ("dovetail", "wear.blade.coefficient=0.5 mm^3/J", "5e+08 um^3/J; usual: 1 to 1e+07 um^3/J"),
-    ("dovetail", "wear.blade.coefficient=1e-14", "0.01 um^3/J; usual"),
-    ("dovetail", "stress.life.depth=1.5 mm", "1.5 um meant?"),
-    ("bodies_wear", "load_path.stroke=50", "50 um meant?"),
+    ("dovetail", "wear.blade.coefficient=0.5 mm^3/J", "5e+08 µm³/J; usual: 1 to 1e+07 µm³/J"),
+    ("dovetail", "wear.blade.coefficient=1e-14", "0.01 µm³/J; usual"),
+    ("dovetail", "stress.life.depth=1.5 mm", "1.5 µm meant?"),
+    ("bodies_wear", "load_path.stroke=50", "50 µm meant?"),
     ("bodies_wear", "structure.radius=1 um", "1 mm meant?"),
     # Loads against what carries them.
     ("dovetail", "load_path.airfoil_mass=80 kg", "load_path: presses with"),
@@ -145,7 +145,7 @@ def test_modes_are_those_of_masses_in_a_row() -> None:
         assert 2.0 * np.pi * modes(rig, held) == pytest.approx(1e3 * expected, rel=1e-12)
 
 
-@pytest.mark.parametrize(("scale", "words"), [(1e3, "are they in um?"), (1e-3, "are they in m?")])
+@pytest.mark.parametrize(("scale", "words"), [(1e3, "are they in µm?"), (1e-3, "are they in m?")])
 def test_heights_in_another_unit_are_doubted(scale: float, words: str, tmp_path: Path) -> None:
     """A micrometre of roughness, and a paraboloid below it, on a face of a millimetre."""
     x = np.linspace(-0.5, 0.5, 16)
@@ -198,9 +198,9 @@ def test_a_check_tells_the_scene_and_doubts_and_still_is_right() -> None:
     assert told.exit_code == 0
     for words in (
         "6000 rpm, airfoil 0.8 kg at 400 mm: 126.3 kN",
-        "disk: young 115 GPa, poisson 0.29, yield stress 900 MPa, density 4430 kg/m^3",
-        "wear law   disk and blade: energy, coefficient 10000 um^3/J",
-        "cells of 85.94 um x 0.2344 mm",
+        "disk: young 115 GPa, poisson 0.29, yield stress 900 MPa, density 4430 kg/m³",
+        "wear law   disk and blade: energy, coefficient 10000 µm³/J",
+        "cells of 85.94 µm x 0.2344 mm",
         "\ndoubt: materials.blade.young: 210 MPa",
     ):
         assert words in told.stdout
@@ -210,14 +210,14 @@ def test_a_check_tells_the_scene_and_doubts_and_still_is_right() -> None:
     ("number", "unit", "said"),
     [
         (115e3, "MPa", "115 GPa"),
-        (4.43e-9, "t/mm^3", "4430 kg/m^3"),
-        (0.014, "mm", "14 um"),
+        (4.43e-9, "t/mm^3", "4430 kg/m³"),
+        (0.014, "mm", "14 µm"),
         (0.0, "mm", "0 mm"),
-        (0.0, "t/mm^3", "0 kg/m^3"),
-        (-30e3, "N*mm", "-30 N*m"),
+        (0.0, "t/mm^3", "0 kg/m³"),
+        (-30e3, "N*mm", "-30 N·m"),
         (628.318530718, "rad/s", "6000 rpm"),
         (0.25, "1", "0.25"),
-        (3.0, "mm/s^2", "3 mm/s^2"),
+        (3.0, "mm/s^2", "3 mm/s²"),
     ],
 )
 def test_numbers_are_said_in_plain_units(number: float, unit: str, said: str) -> None:

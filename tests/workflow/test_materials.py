@@ -69,7 +69,7 @@ def test_a_check_says_name_and_numbers(dovetail_path):
     outline = load_case(dovetail_path, ["materials.disk=100Cr6"]).outline()
     assert (
         "material",
-        "disk: 100Cr6, young 210 GPa, poisson 0.3, density 7830 kg/m^3",
+        "disk: 100Cr6, young 210 GPa, poisson 0.3, density 7830 kg/m³",
     ) in outline
 
 

@@ -99,7 +99,7 @@ def test_template_is_a_case(written):
     checked = command("check", written)
     assert checked.exit_code == 0
     assert "loads in 3-D from loads.csv, without slip" in checked.stdout
-    assert "early, P up to 50 kN, 11 x 60 mm, rounded" in checked.stdout
+    assert "early, P up to 50 kN, Qx -20 to 2 kN, 11 x 60 mm, rounded" in checked.stdout
 
 
 def uncommented(line: str) -> str:
@@ -346,7 +346,7 @@ def test_a_table_without_moments_holds_the_tilt(tmp_path):
 
     (tmp_path / "loads.csv").write_text("\n".join(map(",".join, rows)), encoding="utf-8")
     checked = command("check", case, overrides=overrides)
-    assert "heights, tilt held" in checked.stdout, checked.stderr
+    assert "heights of gap.npy, tilt held" in checked.stdout, checked.stderr
     held = run(case, tmp_path / "held", *overrides)["interface"]
     with h5py.File(tmp_path / "held" / "results.h5") as file:
         My = file["contact/interface/My_unworn"][()].tolist()

@@ -295,7 +295,10 @@ def test_a_case_is_written_as_it_was_read(tmp_path):
     assert isinstance(case, VibrationWearCase)
     assert parse_case(dump_case(case), str(tmp_path / "again.yaml")) == case
     rows = dict(case.outline())
-    assert rows["wear"] == "100 and 20000 cycles of 75 N at 100 Hz"
+    assert rows["worn by"] == "75 N at 100 Hz"
+    assert rows["states"].endswith("20,000 cycles")
+    assert rows["contact"] == "that of wear.yaml, pressed by 60 N"
+    assert {"shape", "material", "friction", "grid", "wear law"} <= rows.keys()
 
 
 # --- mistakes -----------------------------------------------------------------------------------

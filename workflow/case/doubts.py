@@ -100,10 +100,10 @@ USUAL = (
 # Units that a number may be meant in, the likeliest first, and their sizes in the base unit.
 MEANT: dict[str, tuple[tuple[str, float], ...]] = {
     "MPa": (("GPa", 1e3), ("Pa", 1e-6), ("kPa", 1e-3)),
-    "t/mm^3": (("kg/m^3", 1e-12), ("g/cm^3", 1e-9), ("t/mm^3", 1.0)),
+    "t/mm^3": (("kg/m³", 1e-12), ("g/cm³", 1e-9), ("t/mm³", 1.0)),
     "rad/s": (("rpm", pi / 30.0),),
     "t": (("kg", 1e-3),),
-    "mm": (("mm", 1.0), ("um", 1e-3), ("m", 1e3), ("nm", 1e-6)),
+    "mm": (("mm", 1.0), ("µm", 1e-3), ("m", 1e3), ("nm", 1e-6)),
     "N": (("N", 1.0), ("kN", 1e3)),
     "N/mm": (("N/um", 1e3), ("N/m", 1e-3), ("N/mm", 1.0), ("kN/mm", 1e3)),
     "Hz": (("kHz", 1e3), ("Hz", 1.0)),
@@ -234,7 +234,7 @@ def heights(path: str, values: Array, sides: tuple[float, float]) -> Iterator[st
     """A doubt about the heights of a file over a face with such sides [mm]."""
     reach = float(np.ptp(values))
     if reach > STEEP * min(sides):
-        other = "um"
+        other = "µm"
     elif 0.0 < reach < FINE:
         other = "m"
     else:

@@ -100,6 +100,12 @@ class CaseFile(File):
         return path
 
 
+def outline_of(file: str, model: type[AnyCase], rows: Mapping[str, str]) -> list[tuple[str, str]]:
+    """Rows of the outline of the case in a file that another case names, and what to call them."""
+    found = load_case(file, [model]).outline()
+    return [(rows[name], text) for name, text in found if name in rows]
+
+
 def _kind_of_case(source: Source, kinds: Sequence[type[AnyCase]]) -> type[AnyCase]:
     """The kind that the source means by its analysis and structure, whatever else is wrong."""
     for path in (("analysis",), ("structure", "kind")):

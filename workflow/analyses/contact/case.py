@@ -22,7 +22,7 @@ from workflow.case.doubts import heights, hertz, uneven_cells
 from workflow.case.fields import File, Quantity
 from workflow.case.input_files import InputFileError, read_heights
 from workflow.case.loading import word_at
-from workflow.case.plain import of_bodies, plain
+from workflow.case.plain import of_bodies, plain, shape_in_words
 from workflow.case.sections import (
     Case,
     ElasticBody,
@@ -56,6 +56,11 @@ class Bodies(Section):
 
     kind: Literal["bodies"] = entry("what the structure is", "bodies")
     shape: str  # each narrows it to its name
+
+    @property
+    def text(self) -> str:
+        """The shape in a few words."""
+        return shape_in_words(self)
 
     @abstractmethod
     def gap_on(self, grid: Grid) -> Array:
@@ -298,13 +303,13 @@ class BodiesCase(Case):
     def outline(self) -> list[tuple[str, str]]:
         table, grid = self.load_path.table(), self.contact.centred()
         (nx, ny), (dx, dy) = grid.shape, grid.pitch
-        kind = "no structure"
+        kind = "no finite elements"
         cells = f"{nx} x {ny} cells of {plain(dx, 'mm', 4)} x {plain(dy, 'mm', 4)}"
         if grid.line:
             kind, cells = "line contact", f"{nx} strips of {plain(dx, 'mm', 4)}"
         count = f"{len(table)} increment{'s' if len(table) > 1 else ''}"
         return [
-            ("structure", f"{self.structure.shape}, {kind}"),
+            ("structure", f"{self.structure.text}, {kind}"),
             ("load path", f"{count} of {', '.join(table.columns)}"),
             ("loads", ", ".join(self.load_path.ranges())),
             *of_bodies("material", self.materials),

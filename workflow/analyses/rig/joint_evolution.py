@@ -52,10 +52,10 @@ class Linear(Section):
 
 
 class Exponential(Section):
-    """final + (1 - final) [share exp(-rate E) + (1 - share) exp(-second_rate E)]."""
+    """final + (1 - final) (share exp(-rate E) + (1 - share) exp(-second_rate E))."""
 
     kind: Literal["exponential"] = entry(
-        "final + (1 - final) [share exp(-rate E) + (1 - share) exp(-second_rate E)]",
+        "final + (1 - final) (share exp(-rate E) + (1 - share) exp(-second_rate E))",
         "exponential",
     )
     final: Final = entry("in the end [1]", 0.72)
@@ -126,14 +126,12 @@ class JointEvolution(Section):
 
     @property
     def text(self) -> str:
-        """What changes, and how."""
-        given = {name: getattr(self, name) for name in type(self).model_fields}
-        laws = [
-            f"{name.replace('_', ' ')} {Path(law).name if isinstance(law, str) else law.kind}"
-            for name, law in given.items()
-            if law is not None
-        ]
-        return f"{', '.join(laws)},"
+        """What changes with the energy, and how, in a line."""
+        if self.file is not None:
+            return f"friction and stiffness of {Path(self.file).name}"
+        given = {name: getattr(self, name) for name in type(self).model_fields if name != "file"}
+        told = (f"{name.replace('_', ' ')} {f.kind}" for name, f in given.items() if f is not None)
+        return ", ".join(told) or "none"
 
     @property
     def is_empty(self) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -10,12 +11,15 @@ from pydantic import Field, model_validator
 from workflow.analyses.specimens.case import SpecimensCase
 from workflow.case.fields import Quantity, Whole
 from workflow.case.input_files import InputFileError, open_hdf5
-from workflow.case.loading import YAML, CaseFile
+from workflow.case.loading import YAML, CaseFile, outline_of
+from workflow.case.plain import shares
 from workflow.case.sections import Length, Section, Title, disagreement, entry
 
 if TYPE_CHECKING:
     from fe_models.reduction import ReducedModel
 
+# Rows of specimens that a rig tells, and what it calls them.
+OF_SPECIMENS = {"structure": "specimens", "material": "material", "wear law": "wear law"}
 Mass = Annotated[float, Quantity("t", above=0.0, at_most=1e3, range_text="above 0 to 1e6 kg")]
 Spring = Annotated[float, Quantity("N/mm", at_least=0.0, at_most=1e12, range_text="0 to 1e6 kN/um")]
 DampingRatio = Annotated[float, Quantity("1", at_least=0.0, below=1.0)]
@@ -47,9 +51,7 @@ class Rig(Section):
     @property
     def text(self) -> str:
         """The rig in a few words."""
-        masses = ", ".join(f"{1e3 * mass:g}" for mass in self.masses)
-        springs = ", ".join(f"{1e-3 * spring:g}" for spring in self.springs)
-        return f"rig of {masses} kg on springs of {springs} N/um"
+        return f"rig of {_on_springs(self.masses, self.springs)}"
 
 
 class Points(Section):
@@ -178,12 +180,25 @@ class FrictionRig(Section):
     @property
     def text(self) -> str:
         """The structure in a few words."""
-        masses = " and ".join(f"{1e3 * mass:g} kg" for mass in self.masses)
-        springs = " and ".join(f"{1e-3 * spring:g}" for spring in self.springs)
-        return (
-            f"specimens of {Path(self.specimens).name} in a rig of {masses} on springs of "
-            f"{springs} N/um"
-        )
+        rig = _on_springs(self.masses, self.springs)
+        return f"specimens of {Path(self.specimens).name} in a rig of {rig}"
+
+    def outline(self) -> list[tuple[str, str]]:
+        """Rows about the specimens."""
+        return outline_of(self.specimens, SpecimensCase, OF_SPECIMENS)
+
+
+def _on_springs(masses: Sequence[float], springs: Sequence[float]) -> str:
+    """Masses in a row, and the springs that hold them."""
+    stiff = ", ".join(f"{1e-3 * spring:.6g}" for spring in springs)
+    return f"{', '.join(f'{1e3 * mass:g}' for mass in masses)} kg on springs of {stiff} N/µm"
+
+
+def structure_outline(structure: Rig | ReducedBody | FrictionRig) -> list[tuple[str, str]]:
+    """What holds the joints, and the bodies that another case describes."""
+    damping = f"damping ratio {shares(structure.damping_ratio)}"
+    below = structure.outline() if isinstance(structure, FrictionRig) else []
+    return [("structure", f"{structure.text}, {damping}"), *below]
 
 
 def driven_place(structure: Section, mass: int | None) -> str:

@@ -21,7 +21,7 @@ from workflow.analyses.wear.case.sections import (
 )
 from workflow.analyses.wear.case.worn_bodies import BodyWear, WornByArchard, wearing
 from workflow.case.fields import Quantity, Whole
-from workflow.case.plain import of_bodies, plain, shares
+from workflow.case.plain import of_bodies, plain, shares, times
 from workflow.case.sections import (
     Case,
     Friction,
@@ -237,13 +237,17 @@ class SpecimensCase(Case):
             shape = f"radii {plain(form.along, 'mm')} and {plain(form.across, 'mm')}"
         forces = ", ".join(f"{force:g}" for force in self.load_path.normal_forces)
         nodes = (self.mesh.pad_elements + 1) ** 2
-        end = f"{wear.cycles:g} cycles" if wear.cycles else f"{1e-3 * (wear.energy or 0.0):g} J"
+        end = (
+            f"{times(wear.cycles)} cycles" if wear.cycles else f"{1e-3 * (wear.energy or 0.0):g} J"
+        )
         fraction, cycles = wear.step.fraction, wear.step.cycles
-        block = f"{shares(fraction)} of their limit" if cycles is None else f"{cycles:g} cycles"
+        block = (
+            f"{shares(fraction)} of their limit" if cycles is None else f"{times(cycles)} cycles"
+        )
         cells = " x ".join(map(str, self.contact.grid))
         return [
             ("structure", f"specimens, pad {pad:g} x {pad:g} mm of {nodes} nodes, {shape}"),
-            ("load path", f"{forces} N, stroke {plain(self.load_path.stroke, 'mm')}"),
+            ("load path", f"{forces} N in turn, stroke {plain(self.load_path.stroke, 'mm')}"),
             *of_bodies("material", self.materials),
             ("friction", f"{self.friction.coefficient:g}"),
             ("contact", f"reduced specimens; beside them {cells} cells on a half-space"),

@@ -13,11 +13,17 @@ from workflow.analyses.rig.doubts import AWAY, about_modes
 from workflow.analyses.rig.excitation import Drive, Excitation, Hammer, Harmonic, Recorded, Time
 from workflow.analyses.rig.joint_evolution import JointEvolution
 from workflow.analyses.rig.joint_sections import ContactLaw, FrictionContactJoint, Joint, JointLaw
-from workflow.analyses.rig.structure import ReducedBody, Rig, driven_place, refuse_missing_mass
+from workflow.analyses.rig.structure import (
+    ReducedBody,
+    Rig,
+    driven_place,
+    refuse_missing_mass,
+    structure_outline,
+)
 from workflow.analyses.wear.case.evolution import PositiveEnergy, TotalEnergy
 from workflow.analyses.wear.case.sections import Cycles
 from workflow.case.fields import Quantity
-from workflow.case.plain import entries, plain, shares
+from workflow.case.plain import entries, plain, times
 from workflow.case.sections import (
     Case,
     DottedPath,
@@ -223,10 +229,10 @@ class RigCase(TimeCase):
     def outline(self) -> list[tuple[str, str]]:
         structure = self.structure
         rows = [
-            ("structure", f"{structure.text}, damping ratio {shares(structure.damping_ratio)}"),
+            *structure_outline(structure),
             *joint_outline(self),
             ("excitation", excitation_outline(self)),
-            ("steps", f"of {plain(self.integration.step, 's')}"),
+            ("time steps", f"of {plain(self.integration.step, 's')}"),
         ]
         if self.ageing.wanted:
             rows.append(("ageing", ageing_outline(self.ageing)))
@@ -281,13 +287,12 @@ def check_within(energies: tuple[float, ...], ageing: Ageing) -> None:
 
 def joint_outline(case: TimeCase) -> list[tuple[str, str]]:
     """The joint, whether it evolves, and where it is looked at."""
-    evolves = "fixed" if case.evolution.is_empty else f"{case.evolution.text} with energy"
-    count = len(case.energies)
-    looked_at = f"looked at {count} energies" if count > 1 else "looked at one energy"
-    return [
-        ("joint", f"{case.joint.law}, {entries(case.joint)}"),
-        ("evolution", f"{evolves}, {looked_at}"),
-    ]
+    rows = [("joint", f"{case.joint.law}, {entries(case.joint)}")]
+    if not case.evolution.is_empty:
+        rows.append(("evolution", case.evolution.text))
+    if any(case.energies):
+        rows.append(("looked at", f"after {', '.join(map(joules, case.energies))} dissipated"))
+    return rows
 
 
 def excitation_outline(case: RigCase) -> str:
@@ -307,5 +312,5 @@ def excitation_outline(case: RigCase) -> str:
 def ageing_outline(ageing: Ageing) -> str:
     """The end of the ageing."""
     if ageing.cycles is not None:
-        return f"to {ageing.cycles:g} cycles"
+        return f"to {times(ageing.cycles)} cycles"
     return f"to {joules(ageing.energy or 0.0)}"

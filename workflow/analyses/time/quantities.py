@@ -63,7 +63,8 @@ def main_results(case: JointCase | RigCase, summary: Summary) -> list[Quantity]:
         for number in range(len(summary["states"]))
         for quantity in _of_state(number, _when(number, summary), summary)
     )
-    return told(summary, [*whole, *states])
+    rig = Quantity("rig without its joints", "first natural frequency", "free.0", "Hz")
+    return told(summary, [*whole, *states, rig])
 
 
 def _of_ageing(summary: Summary) -> dict[str, Any]:

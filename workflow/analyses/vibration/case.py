@@ -19,6 +19,7 @@ from workflow.analyses.rig.structure import (
     Rig,
     driven_place,
     refuse_missing_mass,
+    structure_outline,
 )
 from workflow.case.fields import Entry, Quantity, Whole
 from workflow.case.plain import entries, shares
@@ -205,13 +206,14 @@ class VibrationCaseBase(Case):
         forces = ", ".join(f"{force:g}" for force in self.forces)
         low, high = self.frequencies
         place = driven_place(self.structure, self._driven_mass)
-        return f"{forces} N on {place}, {low:g} to {high:g} Hz"
+        return f"{forces} N on {place}, at {low:g} to {high:g} Hz"
 
     @property
     def resolved(self) -> str:
-        """The resolution, for an outline."""
+        """How the motion is found, for an outline."""
         resolution, harmonics = self.resolution, self.harmonics
-        text = f"{len(harmonics)} harmonics to {harmonics[-1]}, {resolution.samples} samples"
+        text = f"harmonic balance, {len(harmonics)} harmonics to {harmonics[-1]}"
+        text += f", {resolution.samples} samples"
         if resolution.tolerance is not None:
             text += f", growing to a tolerance of {shares(resolution.tolerance)}"
         return text
@@ -246,7 +248,7 @@ class DrivenMass(VibrationCaseBase):
 
 
 class VibrationCase(DrivenMass):
-    """A structure with joints that stay as they are."""
+    """Steady vibration of a structure on friction joints that stay as they are."""
 
     about: ClassVar[str] = "the steady vibration of a rig with friction joints, over frequency"
 
@@ -329,9 +331,9 @@ class VibrationCase(DrivenMass):
     def outline(self) -> list[tuple[str, str]]:
         structure, joint = self.structure, self.joint
         return [
-            ("structure", f"{structure.text}, damping ratio {shares(structure.damping_ratio)}"),
+            *structure_outline(structure),
             ("joint", f"{joint.law}, {entries(joint)}"),
             ("forces", self.driving),
-            ("resolution", self.resolved),
+            ("method", self.resolved),
             *([] if self.loops is None else [("loops", self.loops.text)]),
         ]

@@ -17,16 +17,24 @@ from workflow.analyses.rig.joint_sections import (
     Joint,
     JointStiffness,
 )
-from workflow.analyses.rig.structure import FrictionRig, Rig
+from workflow.analyses.rig.structure import FrictionRig, Rig, structure_outline
 from workflow.analyses.vibration.case import DrivenMass, VibrationCase, VibrationCaseBase, wears
 from workflow.analyses.wear.case.sections import Cycles, PressingForce
 from workflow.analyses.wear.structures.bodies.case import BodiesWearCase, Reciprocation
 from workflow.case.fields import Quantity
-from workflow.case.loading import YAML, CaseFile
-from workflow.case.plain import entries, shares
+from workflow.case.loading import YAML, CaseFile, load_case, outline_of
+from workflow.case.plain import entries, plain, times
 from workflow.case.sections import Section, Title, disagreement, entry
 from workflow.case.source import Source
 
+# Rows of the contact's own case that are told, and what they are called.
+OF_CONTACT = {
+    "structure": "shape",
+    "material": "material",
+    "friction": "friction",
+    "contact": "grid",
+    "wear law": "wear law",
+}
 WearingFriction = Annotated[float, Quantity("1", above=0.0, at_most=10.0)]
 # Of the cases with wear, what a vibration case of one state has no use for.
 NOT_OF_A_STATE = ("assumed", "expect")
@@ -116,13 +124,12 @@ class VibrationWearCaseBase(VibrationCaseBase):
 
     def outline(self) -> list[tuple[str, str]]:
         structure, wear = self.structure, self.wear
-        *before, last = (f"{count:g}" for count in wear.cycles)
-        cycles = f"{', '.join(before)} and {last}" if before else last
         return [
-            ("structure", f"{structure.text}, damping ratio {shares(structure.damping_ratio)}"),
-            ("wear", f"{cycles} cycles of {wear.force:g} N at {wear.frequency:g} Hz"),
+            *structure_outline(structure),
+            ("worn by", f"{wear.force:g} N at {wear.frequency:g} Hz"),
+            ("states", f"unworn and after {'; '.join(map(times, wear.cycles))} cycles"),
             ("forces", self.driving),
-            ("resolution", self.resolved),
+            ("method", self.resolved),
         ]
 
     def doubts(self) -> Iterator[str]:
@@ -138,7 +145,7 @@ class VibrationWearCaseBase(VibrationCaseBase):
 
 
 class VibrationWearCase(VibrationWearCaseBase, DrivenMass):
-    """A row of masses on a half-space contact that it wears."""
+    """Steady vibration of a row of masses on a half-space contact, which it wears."""
 
     about: ClassVar[str] = "the steady vibration of a rig on a ball or flat that it wears"
 
@@ -153,11 +160,18 @@ class VibrationWearCase(VibrationWearCaseBase, DrivenMass):
         return self._of_a_state(joint, self.mass)
 
     def outline(self) -> list[tuple[str, str]]:
-        return [*super().outline(), ("contact", f"that of {Path(self.contact.file).name}")]
+        bodies = load_case(self.contact.file, [BodiesWearCase])
+        assert isinstance(bodies.load_path, Reciprocation)
+        pressed = f"pressed by {plain(bodies.load_path.P, 'N')}"
+        return [
+            *super().outline(),
+            ("contact", f"that of {Path(self.contact.file).name}, {pressed}"),
+            *outline_of(self.contact.file, BodiesWearCase, OF_CONTACT),
+        ]
 
 
 class FrictionRigWearCase(VibrationWearCaseBase):
-    """Two specimens in a rig that wear each other, node by node."""
+    """Steady vibration of two specimens in a rig, which wear each other node by node."""
 
     about: ClassVar[str] = "the steady vibration of a rig with two specimens that it wears"
 

@@ -8,6 +8,7 @@ from itertools import chain
 
 from workflow.analyses.vibration.quantities import of_response
 from workflow.analyses.vibration_wear.case import FrictionRigWearCase, VibrationWearCase
+from workflow.case.plain import times
 from workflow.shell.analysis import Summary
 from workflow.shell.quantities import CurvesOf, Quantity
 from workflow.shell.summary import estimate, told
@@ -56,7 +57,7 @@ def main_results(case: VibrationWearCase | FrictionRigWearCase, summary: Summary
 
 def _of_state(number: int, state: Summary, summary: Summary) -> Iterator[Quantity]:
     ends = number == len(summary["states"]) - 1
-    begun = f"after {state['cycles']:g} cycles" if state["cycles"] else "unworn"
+    begun = f"after {times(state['cycles'])} cycles" if state["cycles"] else "unworn"
     group = "at the end" if ends else begun
     place = f"states.{number}"
     of = partial(Quantity, group)

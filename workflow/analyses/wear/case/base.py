@@ -23,7 +23,7 @@ from workflow.analyses.wear.case.sections import (
 from workflow.analyses.wear.case.worn_bodies import Worn, wearing
 from workflow.case.doubts import idle_steps, uneven_cells
 from workflow.case.fields import shown
-from workflow.case.plain import entries, of_bodies, plain, shares
+from workflow.case.plain import entries, of_bodies, plain, shares, times
 from workflow.case.sections import Case, Section, Title, disagreement, entry
 
 # What the summary and the results call their own entries.
@@ -142,7 +142,7 @@ class WearCase(Case):
             ("friction", f"{self.friction.coefficient:g}{changes}"),
             ("contact", f"{cells}{f' of {of}' if of else ''}, {self.contact.method}"),
             *wearing({name: self.wear_of(n) for n, name in enumerate(self.bodies, 1)}),
-            ("wear", f"{wear.cycles:g} cycles, {steps}"),
+            ("wear", f"{times(wear.cycles)} cycles, {steps}"),
             *(
                 [("loops", f"{self.loops.axis}, {entries(self.loops)}")]
                 if self.loops.wanted

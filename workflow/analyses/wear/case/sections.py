@@ -16,7 +16,7 @@ from workflow.analyses.wear.case.worn_bodies import (
     with_laws,
 )
 from workflow.case.fields import Quantity, Whole
-from workflow.case.plain import plain, shares
+from workflow.case.plain import plain, shares, times
 from workflow.case.sections import (
     ElasticBody,
     FaceCells,
@@ -215,7 +215,7 @@ class Duration(Section):
         step = self.step
         if step.cycles is not None:
             jumps = ceil(self.cycles / step.cycles)
-            return f"{step.cycles:g} cycles each: {jumps} jumps"
+            return f"{times(step.cycles)} cycles each: {jumps} jumps"
         if step.depth is not None:
             return f"{plain(step.depth, 'mm')} deep each"
         if step.volume is not None:

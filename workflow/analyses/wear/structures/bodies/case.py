@@ -267,9 +267,9 @@ class TwoBodiesWearCase(WearCase):
         return elastic(getattr(self.materials, self.bodies[number - 1]))
 
     def loads_outline(self) -> list[tuple[str, str]]:
-        kind, force = ("line contact", "N/mm") if self.line else ("no structure", "N")
+        kind, force = ("line contact", "N/mm") if self.line else ("no finite elements", "N")
         return [
-            ("structure", f"{self.structure.shape}, {kind}"),
+            ("structure", f"{self.structure.text}, {kind}"),
             ("load path", _in_words(self.load_path, force)),
         ]
 

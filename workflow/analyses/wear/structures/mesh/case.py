@@ -13,7 +13,7 @@ from pydantic import model_validator
 
 from fe_models.mesh import Interface, MeshError, StructureMesh
 from workflow.analyses.wear.case.base import FiniteElementCase, check_interface_name
-from workflow.analyses.wear.case.gaps import Gap, GapShape, HeightsGap, check_gap
+from workflow.analyses.wear.case.gaps import Gap, HeightsGap, check_gap
 from workflow.analyses.wear.case.sections import (
     Density,
     Share,
@@ -34,7 +34,7 @@ from workflow.analyses.wear.structures.mesh.loads import (
 )
 from workflow.case.fields import AUTO, Auto, File, OrAuto, Whole
 from workflow.case.input_files import read_heights
-from workflow.case.plain import entries
+from workflow.case.plain import shape_in_words
 from workflow.case.sections import Length, Section, Title, disagreement, entry
 
 if TYPE_CHECKING:
@@ -263,19 +263,17 @@ class MeshCase(FiniteElementCase):
         structure, path = self.structure, self.load_path
         cycles = f", {len(path.mix)} cycles mixed" if path.mix else ""
         before = f", those before it in {path.cycle_from - 1} legs" if path.cycle_from > 1 else ""
-        mesh, gaps = structure.mesh(self.mesh.size), {c.name: c.gap for c in structure.contacts}
+        mesh = structure.mesh(self.mesh.size)
         bodies = [f"{b.name} of {b.mesh.nvertices} nodes" for b in (mesh.body_1, mesh.body_2)]
         return [
             ("structure", f"{Path(structure.file).name}: {' and '.join(bodies)}"),
             *(
-                ("face", _outline_of(interface, gaps[interface.name]))
-                for interface in mesh.interfaces
+                ("face", _outline_of(interface, pair.gap))
+                for interface, pair in zip(mesh.interfaces, structure.contacts, strict=True)
             ),
+            *(("held", f"{support.group}, {support.hold}") for support in structure.supports),
             ("load path", f"{self.increments_outline} in {len(self.legs)} legs{before}{cycles}"),
-            *(
-                ("load", f"{load.kind}: {entries(load, ('path', 'axis', 'through'))}")
-                for load in structure.loads
-            ),
+            *(("load", load.text) for load in structure.loads),
         ]
 
     @model_validator(mode="after")
@@ -436,21 +434,21 @@ def planes_of_symmetry(planes: Sequence[int]) -> str:
     return " and ".join(f"a plane of symmetry across {AXIS_NAMES[axis]}" for axis in planes)
 
 
-def _outline_of(interface: Interface, gap: GapShape | None) -> str:
-    """What a user should see of an interface before running it."""
+def _outline_of(interface: Interface, gap: Section | None) -> str:
+    """What a user should see of an interface, and of the gap given it, before running it."""
     meet = "meet node to node" if interface.projection is None else "do not match"
     area = f"{interface.nodal_areas.sum():.4g} {'mm' if interface.line else 'mm²'}"
     # Rounded, as planes of a mesh file are off by its last digits.
     low, high = (round(float(gap), 9) + 0.0 for gap in (interface.gap.min(), interface.gap.max()))
+    more = "" if gap is None else f" and {shape_in_words(gap)}"
     cut = ""
     if interface.planes:
         x, y = face_size(interface)
         whole = f"{x:.4g} mm" if interface.line else f"{x:.4g} x {y:.4g} mm"
         cut = f"; cut by {planes_of_symmetry(interface.planes)}, on a grid over the whole, {whole}"
-    beside = "" if gap is None else f" and {gap.shape} {entries(gap)}".rstrip()
     return (
         f"{interface.name}, {len(interface)} nodes that {meet}, {area}, gap of the meshes "
-        f"{low:.3g} to {high:.3g} mm{beside}{cut}"
+        f"{low:.3g} to {high:.3g} mm{more}{cut}"
     )
 
 

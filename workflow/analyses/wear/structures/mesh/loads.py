@@ -8,6 +8,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from workflow.case.fields import Quantity, Text
+from workflow.case.plain import entries
 from workflow.case.sections import Section, disagreement, entry
 
 if TYPE_CHECKING:
@@ -34,6 +35,18 @@ class _Load(Section):
     path: tuple[Factor, ...] = entry(
         "factor of the load at the end of each leg of load_path; from 0, linearly [1]", [1.0, 0.0]
     )
+
+    @property
+    def text(self) -> str:
+        """The load in a line: what, how much, where and in which legs."""
+        sizes = entries(self, ("path", "axis", "through"))
+        what = sizes if sizes.startswith(self.kind) else f"{self.kind}, {sizes}"
+        places = (
+            f"{word} {_in_brackets(getattr(self, name))}"
+            for name, word in (("group", "on"), ("axis", "about"), ("through", "through"))
+            if hasattr(self, name)
+        )
+        return f"{' '.join([what, *places])}, times {_in_brackets(self.path)} at the ends of legs"
 
 
 class PressureLoad(_Load):
@@ -135,3 +148,8 @@ Load = Annotated[
     PressureLoad | ForceLoad | DisplacementLoad | RotationLoad | AccelerationLoad,
     Field(discriminator="kind"),
 ]
+
+
+def _in_brackets(value: str | tuple[float, ...]) -> str:
+    """A name as it is, numbers in brackets."""
+    return value if isinstance(value, str) else f"({', '.join(f'{n:g}' for n in value)})"

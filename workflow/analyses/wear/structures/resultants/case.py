@@ -9,7 +9,7 @@ from typing import Annotated, ClassVar, Literal
 import numpy as np
 from pydantic import model_validator
 
-from sa_solver.types import Frame
+from sa_solver.types import Frame, LoadHistory
 from workflow.analyses.contact.case import BodyMaterial
 from workflow.analyses.wear.case.base import WearCase, check_interface_name
 from workflow.analyses.wear.case.gaps import Gap, GapShape, check_cells, check_gap
@@ -19,11 +19,13 @@ from workflow.analyses.wear.structures.resultants.imported import ImportedLoads
 from workflow.case.doubts import pressed, uneven_cells
 from workflow.case.fields import File, OrAlone, Quantity, shown, split_dataset
 from workflow.case.input_files import InputFileError
-from workflow.case.plain import plain
+from workflow.case.plain import between, plain, shape_in_words
 from workflow.case.sections import Length, Section, Title, disagreement, entry
 
 # How far x and normal may be from perpendicular: six printed digits.
 PERPENDICULAR = 1e-6
+# Tangential forces below this share of the normal one are rounding.
+NOTHING = 1e-9
 
 Place = Annotated[float, Quantity("mm", at_least=-1e6, at_most=1e6)]
 Direction = Annotated[float, Quantity("1", at_least=-1e6, at_most=1e6)]
@@ -228,8 +230,7 @@ class ResultantsCase(WearCase):
             *(
                 (
                     "face",
-                    f"{name}, P up to {plain(float(imported.loads.P.max()), unit)}, "
-                    f"{self._shape(name)}, "
+                    f"{name}, {_ranges(imported.loads, unit)}, {self._shape(name)}, "
                     f"tilt {imported.tilt}",
                 )
                 for name, imported in loads.items()
@@ -239,7 +240,7 @@ class ResultantsCase(WearCase):
     def _shape(self, name: str) -> str:
         size, gap = self.structure.size_of(name), self.structure.gap_of(name)
         sides = f"{size[0]:g} mm" if self.structure.line else f"{size[0]:g} x {size[1]:g} mm"
-        return f"{sides}, {'heights of the file' if gap is None else gap.shape}"
+        return f"{sides}, {'heights of the file' if gap is None else shape_in_words(gap)}"
 
     def doubts(self) -> Iterator[str]:
         yield from super().doubts()
@@ -323,3 +324,16 @@ class ResultantsCase(WearCase):
                 raise disagreement(str(error), key) from error
             except FaceError as error:
                 raise disagreement(f"{file}: {error}", key) from error
+
+
+def _ranges(loads: LoadHistory, unit: str) -> str:
+    """What P, and Qx and Qy where they act, reach in a cycle."""
+    low, high = float(loads.P.min()), float(loads.P.max())
+    told = [f"P {between(low, high, unit) if low else f'up to {plain(high, unit)}'}"]
+    if low == high:
+        told = [f"P {plain(high, unit)}"]
+    for name in ("Qx", "Qy"):
+        force = getattr(loads, name)
+        if np.abs(force).max() > NOTHING * loads.P.max():
+            told.append(f"{name} {between(force.min(), force.max(), unit)}")
+    return ", ".join(told)
