@@ -48,6 +48,11 @@ NOTHING_LEFT = 1e-3
 DECAYED = 0.9
 # Points of a ring-down that are kept: it is smooth.
 RING_DOWN_POINTS = 400
+# Why a ring-down has no damping, and what there is instead.
+TOO_SHORT = (
+    "the motion has faded before the filter that follows its first mode has settled, so neither "
+    "damping nor frequency over the amplitude is told; the frequency response is"
+)
 
 
 def run_hammer(
@@ -167,7 +172,7 @@ def _ring_down(
         return None
     amplitude = decay.amplitude / (2.0 * np.pi * decay.frequency) ** 2
     if amplitude[0] < NOTHING_LEFT * np.abs(rig.looked_at(motion.displacement)).max():
-        reporter.warn(f"no ring-down at {joules(energy)}: over before the filter has settled")
+        reporter.warn(f"no ring-down at {joules(energy)}: {TOO_SHORT}")
         return None
     kept = np.unique(np.linspace(0, len(amplitude) - 1, RING_DOWN_POINTS).astype(int))
     size = "amplitude of what is looked at, in its first mode"

@@ -181,7 +181,7 @@ def _edge_peak(file: h5py.File, contents: Contents) -> str:
     }
     name = max(peaks, key=lambda name: peaks[name])
     place = "" if contents.line else " at y = 0"
-    text = f"Largest pressure on the {name}{place}: {peaks[name]:.0f} MPa"
+    text = f"Pressure peak on {name}{place}: {peaks[name]:.0f} MPa"
     if name in contents.coarse:
         coarse = file["contact"][name]["coarse"]
         peak = middle(coarse["pressure"][()], 0).max()

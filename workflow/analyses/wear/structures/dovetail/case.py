@@ -88,6 +88,14 @@ class Dovetail(Section):
     skew: Skew = entry("slot direction against the rotor axis [rad]", "0 deg", default=0.0)
 
     @property
+    def flanks(self) -> str:
+        """Their sizes in a line."""
+        sizes = f"{plain(self.flank_length, 'mm')} flat at {plain(self.flank_angle, 'rad')}"
+        rounded = f"{plain(self.edge_width, 'mm')} with {plain(self.edge_radius, 'mm')}"
+        along = f", {plain(self.slot_length, 'mm')} long" if self.dimension == 3 else ""
+        return f"{sizes}, edges rounded over {rounded}{along}"
+
+    @property
     def face_width(self) -> float:
         """Flat and both rounded edges of a flank, across the slot [mm]."""
         return self.flank_length + 2.0 * self.edge_width
@@ -298,6 +306,7 @@ class DovetailCase(FiniteElementCase):
         peak = f", peak at {self.legs[0]}" if any(self.legs) else ""
         rows = [
             ("structure", f"dovetail in {self.structure.dimension}-D, {nodes} nodes on a flank"),
+            ("flanks", self.structure.flanks),
             ("load path", f"{self.increments_outline}{peak}{missions}"),
             ("peak load", ", ".join(self._peak_loads())),
         ]
