@@ -27,6 +27,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, fields
 from functools import cached_property
 from itertools import pairwise
+from threading import Lock
 from typing import Literal
 
 import numpy as np
@@ -51,15 +52,20 @@ def unseen(done: int, total: int) -> None:
 
 @dataclass
 class Tally:
-    """Tells ``progress`` of each of ``total`` things as it is done; called once for each."""
+    """Tells ``progress`` of each of ``total`` things as it is done; called once for each.
+
+    From any thread: ``progress`` is told by one at a time, in order.
+    """
 
     progress: Progress
     total: int
     done: int = 0
+    _lock: Lock = field(default_factory=Lock, init=False, repr=False, compare=False)
 
     def __call__(self) -> None:
-        self.done += 1
-        self.progress(self.done, self.total)
+        with self._lock:
+            self.done += 1
+            self.progress(self.done, self.total)
 
 
 Tilt = Literal["free", "held"]

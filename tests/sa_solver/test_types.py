@@ -1,9 +1,12 @@
-"""Pairs of materials and grids: known values, symmetries, refusals."""
+"""Pairs of materials, grids and tallies: known values, symmetries, refusals."""
+
+import sys
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
 
-from sa_solver.types import ElasticPair, Grid, Material
+from sa_solver.types import ElasticPair, Grid, Material, Tally
 
 RIGID = Material(np.inf, 0.3)
 STEEL = Material(200e3, 0.3)
@@ -100,3 +103,21 @@ def test_a_covering_grid_has_the_size_it_covers():
     assert not grid.line
     assert grid.x[0, 0] == pytest.approx(-1.5 + 0.5 * 3.0 / 8)
     assert grid.x.sum() == pytest.approx(0.0, abs=1e-14)
+
+
+@pytest.fixture
+def restless():
+    """Threads that take turns after every few instructions."""
+    interval = sys.getswitchinterval()
+    sys.setswitchinterval(1e-7)
+    yield
+    sys.setswitchinterval(interval)
+
+
+@pytest.mark.usefixtures("restless")
+def test_a_tally_counts_what_any_thread_has_done_in_order():
+    told, things, threads = [], 500, 4
+    done = Tally(lambda count, total: told.append((count, total)), things * threads)
+    with ThreadPoolExecutor(threads) as pool:
+        list(pool.map(lambda _: [done() for _ in range(things)], range(threads)))
+    assert told == [(count, things * threads) for count in range(1, things * threads + 1)]
