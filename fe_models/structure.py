@@ -13,10 +13,10 @@ from fe_models.joint import JointResolvent, JointStiffness, join, join_halves
 from fe_models.mesh import Face, Interface, StructureMesh
 from fe_models.supported_body import SupportedBody
 from sa_solver.increments import dissipated, in_rows, mean_of_ends
-from sa_solver.types import Array, LoadHistory, Progress, resultants, unseen
+from sa_solver.types import Array, LoadHistory, Progress, Tally, resultants, unseen
 
-# Bodies of a joint.
-BODIES = 2
+# Of a condensation: two of each body, and the joint of both.
+STEPS = 5
 # A face slides as a whole when nodes that stick carry less than this share of its load.
 STICKING_SHARE = 1e-2
 # Below this share of the cycle's largest P the resultants are the friction solver's remainder.
@@ -135,7 +135,7 @@ class Structure:
         """Stiffness and loads of the joint on its interface displacements.
 
         ``like`` is a joint that differs little from this one and lends it its ρ. ``progress`` is
-        told the bodies that are condensed.
+        told the steps of it that are done.
         """
         held_1, held_2 = self.body_1.held, self.body_2.held
         projection, held = self.projection, held_1.any() or held_2.any()
@@ -146,9 +146,11 @@ class Structure:
         if held:
             every = sp.identity(len(held_2), format="csr") if projection is None else projection
             projection = every[~held_2][:, ~held_1]
-        condensed_1 = self.body_1.condense()
-        progress(1, BODIES)
-        return join(condensed_1, self.body_2.condense(), projection, held_2, like)
+        done = Tally(progress, STEPS)
+        condensed_1, condensed_2 = (body.condense(done) for body in self.bodies)
+        joint = join(condensed_1, condensed_2, projection, held_2, like)
+        done()
+        return joint
 
     def _condense_halves(self, progress: Progress) -> JointStiffness | None:
         """As :meth:`condense`, by a mirror symmetry of both bodies; None if there is none."""
@@ -159,11 +161,15 @@ class Structure:
             on_1 = self.body_1.on_interface(mirrors[0])
             if on_1 is None or on_1 != self.body_2.on_interface(mirrors[1]):
                 continue
-            halves_1 = self.body_1.condense_halves(mirrors[0], on_1)
-            progress(1, BODIES)
-            halves_2 = None if halves_1 is None else self.body_2.condense_halves(mirrors[1], on_1)
-            if halves_1 is not None and halves_2 is not None:
-                return join_halves(halves_1, halves_2, on_1)
+            done = Tally(progress, STEPS)
+            halves_1 = self.body_1.condense_halves(mirrors[0], on_1, done)
+            if halves_1 is None:
+                continue
+            halves_2 = self.body_2.condense_halves(mirrors[1], on_1, done)
+            if halves_2 is not None:
+                joint = join_halves(halves_1, halves_2, on_1)
+                done()
+                return joint
         return None
 
     @property

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import cached_property
 
 import numpy as np
@@ -103,10 +103,15 @@ class SupportedBody:
             )
             self._springs = trace.springs(elastic, frames, self._free)
 
-    def condense(self) -> tuple[Array, Array]:
-        """Stiffness ``(k, k)`` and loads ``(k, cases)`` on the interface displacements not held."""
+    def condense(self, done: Callable[[], None] = lambda: None) -> tuple[Array, Array]:
+        """Stiffness ``(k, k)`` and loads ``(k, cases)`` on the interface displacements not held.
+
+        ``done`` is called with the stiffness of the body known, and with that of its interface.
+        """
         stiffness, loads = self._reduced()
+        done()
         model = reduce_body(stiffness, None, self._interface, loads=loads)
+        done()
         if self._springs is None:
             return model.static_stiffness, model.loads
         return self._springs.removed(model.static_stiffness, model.loads)
@@ -138,12 +143,12 @@ class SupportedBody:
         return mirror.restricted(self._interface)
 
     def condense_halves(
-        self, mirror: Mirror, on_interface: Mirror
+        self, mirror: Mirror, on_interface: Mirror, done: Callable[[], None] = lambda: None
     ) -> tuple[tuple[Array, Array], ...] | None:
         """As :meth:`condense`, but symmetric and antisymmetric displacements apart.
 
-        The coordinates are those of the bases of ``on_interface``, the mirror there. None if the
-        stiffness is not its own mirror image.
+        The coordinates are those of the bases of ``on_interface``, the mirror there. ``done`` is
+        called after each half. None if the stiffness is not its own mirror image.
         """
         stiffness, loads = self._reduced()
         stiffnesses = halves(stiffness, mirror)
@@ -162,6 +167,7 @@ class SupportedBody:
             if self._springs is not None:
                 half = self._springs.removed(*half, coordinates)
             condensed.append(half)
+            done()
         return tuple(condensed)
 
     def recover(

@@ -7,7 +7,7 @@ from scipy.spatial import cKDTree
 from fe_models.elasticity import von_mises
 from fe_models.mesh import Body
 from fe_models.remesh import element_volumes
-from fe_models.stress import PeakStress, StressField, cycle_stress
+from fe_models.stress import STEPS, PeakStress, StressField, cycle_stress
 from sa_solver.types import Frame
 from tests.fe_models.conftest import stress_state
 
@@ -134,7 +134,11 @@ def test_faces_move_over_a_cycle_as_the_bodies_do(structure, solved, symmetric, 
     """In every increment as far apart as given, and at peak load as all nodes of either body."""
     fields = solved(0.4, symmetric).fields()
     force, relative = fields["force"], fields["displacement"]
-    cycle = cycle_stress(structure, force, relative, symmetric.amplitudes(), PEAK, [0, PEAK])
+    amplitudes, steps = symmetric.amplitudes(), []
+    cycle = cycle_stress(
+        structure, force, relative, amplitudes, PEAK, [0, PEAK], lambda: steps.append(1)
+    )
+    assert len(steps) == STEPS
     start = 0
     for interface, (of_1, of_2) in zip(structure.mesh.interfaces, cycle.faces, strict=True):
         nodes = slice(start, start + len(interface))

@@ -1,11 +1,15 @@
 """A joint split by a mirror must be the joint, and what has no mirror must not be split."""
 
+from copy import copy
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import scipy.sparse as sp
 
 from fe_models.dovetail import dovetail_structure
 from fe_models.joint import join
+from fe_models.structure import STEPS
 from fe_models.symmetry import Mirror, SplitMatrix, halves, mirror_of_nodes, symmetric_product
 
 
@@ -27,6 +31,16 @@ def test_split_joint_is_the_whole_one(both):
     assert split.rigid_modes == whole.rigid_modes
     assert split.smallest == pytest.approx(whole.smallest, rel=1e-6)
     assert split.largest == pytest.approx(whole.largest, rel=1e-9)
+
+
+def test_a_condensation_tells_its_steps(structure):
+    """By halves or whole: as many, evenly."""
+    one_sided = copy(structure.body_1)
+    one_sided.mirror = lambda axis: None
+    for joined in (structure, replace(structure, body_1=one_sided)):
+        told = []
+        joined.condense(progress=lambda *counts, told=told: told.append(counts))
+        assert told == [(step, STEPS) for step in range(1, STEPS + 1)]
 
 
 def test_split_resolvent_is_the_whole_one(both):

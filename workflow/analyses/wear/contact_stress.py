@@ -8,7 +8,7 @@ at a slipping edge: sections begin, and maps lie, at the case's critical distanc
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -17,7 +17,7 @@ import numpy as np
 from fe_models.elasticity import von_mises
 from sa_solver.subsurface import COMPONENTS
 from sa_solver.ties import first_largest
-from sa_solver.types import Array, Material, Progress
+from sa_solver.types import Array, Material, Progress, Tally
 from wear.bulk_stress import BulkStress
 from wear.life import Ruiz, findley, ruiz, smith_watson_topper
 from wear.tractions import CycleTractions
@@ -188,13 +188,12 @@ def contact_stresses(
     """Stress under all ``contacts`` as the case asks for it.
 
     Each has what is known of an unworn and a worn cycle; ``peak`` is the increment of peak load.
+    ``progress`` is told the bodies that are done, unworn and worn.
     """
     unknown = [cycle.tractions.unknown for _, cycles in contacts for cycle in cycles]
     _report_stick(np.array(unknown), peak, reporter)
-    stresses = []
-    for number, contact in enumerate(contacts, 1):
-        stresses.append(_interface_stress(case, peak, *contact))
-        progress(number, len(contacts))
+    done = Tally(progress, len(contacts) * len(MOMENTS) * len(case.strained))
+    stresses = [_interface_stress(case, peak, *contact, done) for contact in contacts]
     for stress, (_, cycles) in zip(stresses, contacts, strict=True):
         if cycles[0].faces is None:
             reporter.log(f"{stress.name}: the stress under it is that of its tractions alone")
@@ -208,11 +207,12 @@ def _interface_stress(
     peak: int,
     stage: ContactStage,
     cycles: tuple[StressedCycle, StressedCycle],
+    done: Callable[[], None],
 ) -> InterfaceStress:
     planes = Planes(case.stress, stage.grid)
     bodies = [StressedBody(stage, case.material(n), n) for n in case.strained]
     moments = {
-        moment: _moment(case.stress, peak, planes, bodies, cycle)
+        moment: _moment(case.stress, peak, planes, bodies, cycle, done)
         for moment, cycle in zip(MOMENTS, cycles, strict=True)
     }
     convolutions = sum(body.convolutions for body in bodies)
@@ -225,6 +225,7 @@ def _moment(
     planes: Planes,
     bodies: Sequence[StressedBody],
     cycle: StressedCycle,
+    done: Callable[[], None],
 ) -> ContactMoment:
     known = cycle.tractions.unknown <= STUCK_SHARE
     bulks = [body.bulk(cycle) for body in bodies]
@@ -238,6 +239,7 @@ def _moment(
             told = cycle.tractions, known, bulk is not None
             maps = life_maps(settings.life, history, body.material, *told)
         stresses[body.number] = BodyStress(section, maps)
+        done()
     carried = tuple(filter(None, bulks))
     return ContactMoment(stresses, carried, np.flatnonzero(~known))
 

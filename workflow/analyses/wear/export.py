@@ -73,7 +73,7 @@ def export_resultants(case: WearCase, name: str, out: Path, force: bool) -> list
 
 def _write(case: WearCase, source: StructureStage, out: Path, reporter: Reporter) -> None:
     faces = meshed_faces(case, source, reporter)
-    with reporter.stage("condensation", "bodies") as told, source.heard(told):
+    with reporter.stage("condensation", "steps") as told, source.heard(told):
         source.prepare()
     with reporter.stage("structural friction", "increments") as told, source.heard(told):
         histories = {

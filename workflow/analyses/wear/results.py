@@ -89,7 +89,7 @@ def write_output(outcome: Outcome, run: Run[WearCase]) -> None:
         moves = case.output.paraview
         structure = worn_structure(source, stages, state, case.friction, moves, folder, reporter)
         structure.warn(case.accuracy, reporter)
-    with reporter.stage("stress under the contacts", "contacts") as told:
+    with reporter.stage("stress under the contacts", "steps") as told:
         stresses = _stresses(outcome, structure, reporter, told)
     budget = error_budget(outcome, reporter)
     with reporter.stage("results"):

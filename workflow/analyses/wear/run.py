@@ -74,7 +74,7 @@ def _compute(run: Run[WearCase]) -> Outcome:
     source = structure_of(case).source(case)
     faces = meshed_faces(case, source, reporter)
     with contact_workers(case, faces if _worn_apart(case, source) else ()) as workers:
-        with reporter.stage("condensation", "bodies") as told, _heard(source, told):
+        with reporter.stage("condensation", "steps") as told, _heard(source, told):
             source.prepare()
         with reporter.stage("structural friction", "increments") as told, _heard(source, told):
             unworn = source.unworn()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -367,17 +367,22 @@ class StructureStage:
         return peak
 
     def stress(
-        self, mesh: StructureMesh, solution: CycleSolution, shown: Sequence[int] = ()
+        self,
+        mesh: StructureMesh,
+        solution: CycleSolution,
+        shown: Sequence[int] = (),
+        done: Callable[[], None] = lambda: None,
     ) -> CycleStress:
         """Stress of both bodies on the unworn or the worn mesh: at peak load, and those ``shown``.
 
-        Of the increments that are shown it is that of the surface.
+        Of the increments that are shown it is that of the surface. For ``done`` see
+        :func:`fe_models.stress.cycle_stress`.
         """
         worn = mesh is not self.mesh
         structure = self._prestressed(self.model.structure(mesh)) if worn else self.structure
         fields = solution.fields()
         force, relative = fields["force"], fields["displacement"]
-        return cycle_stress(structure, force, relative, self._amplitudes, self.peak, shown)
+        return cycle_stress(structure, force, relative, self._amplitudes, self.peak, shown, done)
 
     def _gap(self, depths: list[Array]) -> Array:
         pairs = zip(self.mesh.interfaces, depths, strict=True)

@@ -14,9 +14,9 @@ from fe_models.mesh import Body, Interface, MeshError, StructureMesh, write_msh
 from fe_models.mesh_quality import element_sizes, elements_across, radius_ratios
 from fe_models.nonlinear import NonlinearCheck
 from fe_models.remesh import form_of, formed_mesh, worn_mesh, worn_volume
-from fe_models.stress import CycleStress, PeakStress, StressField, SurfaceHistory
+from fe_models.stress import STEPS, CycleStress, PeakStress, StressField, SurfaceHistory
 from fe_models.structure import CycleSolution, InterfaceHistory
-from sa_solver.types import Array, LoadHistory
+from sa_solver.types import Array, LoadHistory, Tally
 from wear.coupled import CoupledState
 from workflow.analyses.wear.budget.parts import ResultError
 from workflow.analyses.wear.budget.report import datasets_of, summary_of
@@ -279,11 +279,11 @@ def worn_structure(
         written = _formed({"unworn": stage.mesh, "worn": mesh}, reporter)
         with replacing(folder.reserve("worn.msh", "the mesh with the worn faces")) as partial:
             write_msh(partial, written["worn"])
-    with reporter.stage("stress", "states") as told:
+    with reporter.stage("stress", "steps") as told:
+        done = Tally(told, 2 * STEPS)
         shown = shown_increments(len(cycle.fields()["force"]), stage.peak) if moves else []
-        unworn = stage.stress(stage.mesh, stage.unworn_cycle, shown)
-        told(1, 2)
-        stresses = {"unworn": unworn, "worn": stage.stress(mesh, cycle, shown)}
+        states = {"unworn": (stage.mesh, stage.unworn_cycle), "worn": (mesh, cycle)}
+        stresses = {moment: stage.stress(*of, shown, done) for moment, of in states.items()}
     return WornStructure(stage, mesh, cycle, stresses, written, shown)
 
 
