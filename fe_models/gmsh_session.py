@@ -8,6 +8,10 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any, Literal
 
+# Signals that gmsh's libraries give back to the system, which ends the process at each: a pipe that
+# nobody reads any more, a terminal that is closed in spite of `nohup`, a batch system.
+GIVEN_BACK = ("SIGPIPE", "SIGHUP", "SIGQUIT", "SIGTERM")
+
 
 @contextmanager
 def gmsh_model(name: str) -> Iterator[Any]:
@@ -16,9 +20,7 @@ def gmsh_model(name: str) -> Iterator[Any]:
 
     # Signals stay with Python, so that Ctrl-C during meshing ends the run tidily.
     gmsh.initialize(interruptible=False)
-    # Its libraries let the system end a process that writes to another one that has gone.
-    if hasattr(signal, "SIGPIPE") and threading.current_thread() is threading.main_thread():
-        signal.signal(signal.SIGPIPE, signal.SIG_IGN)
+    _take_signals()
     try:
         gmsh.option.setNumber("General.Terminal", 0)
         # One thread: the same mesh, node for node, on every machine.
@@ -27,6 +29,16 @@ def gmsh_model(name: str) -> Iterator[Any]:
         yield gmsh
     finally:
         gmsh.finalize()
+
+
+def _take_signals() -> None:
+    """Handle signals as before, as far as Python knows how; only its main thread may say so."""
+    if threading.current_thread() is not threading.main_thread():
+        return
+    for name in GIVEN_BACK:
+        number = getattr(signal, name, None)
+        if number is not None and (handler := signal.getsignal(number)) is not None:
+            signal.signal(number, handler)
 
 
 def grow_from(

@@ -1,0 +1,31 @@
+"""A gmsh model leaves the process as it was."""
+
+import os
+import signal
+
+import pytest
+
+from fe_models.gmsh_session import GIVEN_BACK, gmsh_model
+
+NUMBERS = [getattr(signal, name) for name in GIVEN_BACK if hasattr(signal, name)]
+
+
+@pytest.fixture(params=[signal.SIG_IGN, lambda number, frame: heard.append(number)])
+def handler(request):
+    """What a program does at signals: nothing, as after `nohup`, or what it wants."""
+    before = {number: signal.signal(number, request.param) for number in NUMBERS}
+    yield request.param
+    for number, was in before.items():
+        signal.signal(number, was)
+
+
+heard = []
+
+
+@pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
+def test_signals_stay_with_whoever_handled_them(handler):
+    heard.clear()
+    with gmsh_model("nothing"):
+        for number in NUMBERS:
+            os.kill(os.getpid(), number)
+    assert heard == ([] if handler is signal.SIG_IGN else NUMBERS)
