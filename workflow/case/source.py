@@ -94,18 +94,8 @@ class Source:
         if len(path) > DEEPEST:
             raise CaseError(f"{label}: {TOO_MUCH}; allowed: up to {DEEPEST} keys")
         value = _Reading(label).plain(parse_yaml(text, label), (), 1)
-        node: Any = self.data
-        for place, key in enumerate(path[:-1]):
-            if isinstance(node, dict):
-                inner = node.get(str(key))
-                if inner is None:
-                    node[str(key)] = {}
-                elif isinstance(inner, str) and path[:place] in SHORT:
-                    node[str(key)] = {SHORT[path[:place]]: inner}
-            node = child(node, key)
-        if isinstance(node, dict):
-            node[str(path[-1])] = value
-        elif child(node, path[-1]) is not None:
+        path, node = self._section_of(path, written)
+        if isinstance(node, dict) or child(node, path[-1]) is not None:
             node[path[-1]] = value
         else:
             raise CaseError(f"{label}: no such entry; allowed: keys joined by dots")
@@ -113,6 +103,26 @@ class Source:
         self._lines = {p: line for p, line in self._lines.items() if p[: len(path)] != path}
         self._overrides = {p: o for p, o in self._overrides.items() if p[: len(path)] != path}
         self._overrides[path] = written
+
+    def _section_of(self, path: KeyPath, written: str) -> tuple[KeyPath, Any]:
+        """The section or list of an entry, made where there is none, and the path as it is there.
+
+        Numbers of a path are places in lists, and words elsewhere.
+        """
+        node: Any = self.data
+        walked: KeyPath = ()
+        for key in path[:-1]:
+            walked = *walked, str(key) if isinstance(node, dict) else key
+            if isinstance(node, dict):
+                inner = node.get(str(key))
+                if inner is None:
+                    node[str(key)] = {}
+                    self._overrides[walked] = written
+                elif isinstance(inner, str) and walked[:-1] in SHORT:
+                    node[str(key)] = {SHORT[walked[:-1]]: inner}
+            node = child(node, key)
+        last = path[-1]
+        return (*walked, str(last) if isinstance(node, dict) else last), node
 
 
 class _Reading:
