@@ -8,7 +8,7 @@ import pytest
 from tests.marks import slow
 from tests.workflow.commands import command
 from workflow.kinds import analysis_of, load_case
-from workflow.shell.forecast import Forecast, in_words
+from workflow.shell.forecast import FEW, Forecast, about, in_words
 from workflow.shell.reporter import Reporter
 from workflow.shell.run_time import RunTime
 
@@ -70,6 +70,7 @@ def test_what_an_earlier_run_left_tells_nothing_of_the_rest(clock: Clock) -> Non
 )
 def test_times_are_told_as_roughly_as_they_are_known(seconds: float, told: str) -> None:
     assert in_words(seconds) == told
+    assert about(seconds) == (told if told == FEW else f"about {told}")
 
 
 def test_a_forecast_is_told_once_and_again_where_it_changes(clock: Clock, tmp_path: Path) -> None:

@@ -84,6 +84,32 @@ def test_a_row_is_no_longer_than_the_terminal(terminal: Callable[[], str], tmp_p
     assert "…" in terminal()
 
 
+def test_a_narrow_terminal_tells_how_far_it_is_and_no_more(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of 40 columns a bar and a forecast would leave no room for it."""
+    shown = io.StringIO()
+    narrow = Console(file=shown, force_terminal=True, width=40, highlight=False)
+    monkeypatch.setattr(screen, "console", lambda: narrow)
+    monkeypatch.setattr(screen, "BRIEF", -1.0)
+    rows = screen.Screen(on=True)
+    with rows.row("condensation") as row:
+        row.show(0.4, "2 of 5 steps", "about 20 min more")
+        rows._rows.refresh()
+    rows.close()
+    (line,) = {line for line in shown.getvalue().splitlines() if "2 of 5 steps" in line}
+    assert "condensation" in line
+
+
+def test_a_terminal_that_only_prints_is_told_by_lines(
+    terminal: Callable[[], str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("TERM", "dumb")
+    assert not screen.Screen(on=True).on
+    monkeypatch.setenv("TERM", "xterm")
+    assert screen.Screen(on=True).on
+
+
 def test_where_there_is_no_terminal_a_line_now_and_then(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -63,6 +63,12 @@ def in_words(seconds: float) -> str:
     return f"{_round(seconds / DAY)} days"
 
 
+def about(seconds: float) -> str:
+    """The same as part of a sentence: about 12 min, but not about a few seconds."""
+    told = in_words(seconds)
+    return told if told == FEW else f"about {told}"
+
+
 def _round(number: float) -> str:
     """Two digits, of small numbers one."""
     return f"{max(number, 1.0):.0f}" if number < 20.0 else f"{5.0 * round(number / 5.0):.0f}"

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TypeVar
 
 from sa_solver.types import Progress
-from workflow.shell.forecast import Forecast, in_words
+from workflow.shell.forecast import Forecast, about
 from workflow.shell.run_time import RunTime
 from workflow.shell.screen import Loudness, Row, Screen, console
 from workflow.shell.store import check_regular
@@ -57,7 +57,7 @@ class _Stage:
         self._looked = now
         self._forecast.reach(done / max(total, 1))
         at, left = f"{done} of {total} {self._of}".rstrip(), self._forecast.left
-        told = "" if left is None else f"about {in_words(left)} more"
+        told = "" if left is None else f"{about(left)} more"
         self._row.show(self._forecast.share, at, told)
         if self._say and now - self._said > LINE:
             self._said = now
@@ -198,7 +198,7 @@ class Reporter:
             course.row.show(course.forecast.share, at, "")
             return
         to_go = self._blended(course.forecast.left, course.forecast.share) + self._after
-        told = f"about {in_words(to_go)} to go"
+        told = f"{about(to_go)} to go"
         course.row.show(course.forecast.share, at, told)
         whole, before = self.spent + to_go, course.told
         least = FIRST_STEP if course.forecast.steps == 1 else FIRST_WORK

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from workflow.shell.forecast import in_words
+from workflow.shell.forecast import about
 
 # Python, libraries and compiled laws to load [s]; figures of an analysis.
 START, FIGURES = 3.0, 3.0
@@ -42,7 +42,7 @@ class RunTime:
     @property
     def text(self) -> str:
         """As it is told."""
-        return f"about {in_words(self.seconds)}, within a factor of five"
+        return f"{about(self.seconds)}, within a factor of five"
 
 
 def solves(count: float, cells: int, convolutions: float) -> float:

@@ -1,6 +1,6 @@
 """What goes on, live at the foot of a terminal: a row for each thing that is being done.
 
-Where stderr is no terminal there is nothing to see of it.
+Where stderr is no terminal, or one that only prints, there is nothing to see of it.
 """
 
 from __future__ import annotations
@@ -17,6 +17,8 @@ from rich.table import Column
 # Seconds before a row is worth being looked at.
 BRIEF = 0.3
 BAR_WIDTH = 20
+# Columns of a terminal below which words have no room beside a bar.
+NARROW = 60
 
 
 class Loudness(IntEnum):
@@ -63,9 +65,10 @@ class Screen:
     """The rows of a run; nothing is shown if it is not ``on``."""
 
     def __init__(self, on: bool) -> None:
-        self._rows = _Rows(*_columns(), console=console(), transient=True, expand=True)
+        columns = _columns(console().width)
+        self._rows = _Rows(*columns, console=console(), transient=True, expand=True)
         self._between = self._rows.add_task("working", total=None, at="", left="")
-        self._on = on and console().is_terminal
+        self._on = on and console().is_terminal and not console().is_dumb_terminal
         if self._on:
             self._rows.start()
 
@@ -90,13 +93,11 @@ class Screen:
             self._rows.stop()
 
 
-def _columns() -> tuple[ProgressColumn, ...]:
-    """Name, bar, seconds, how far, how long; what is too long for the terminal is cut."""
+def _columns(width: int) -> tuple[ProgressColumn, ...]:
+    """Name, bar, seconds, how far, how long; what is too long for so wide a terminal is cut."""
     cut = Column(ratio=1, no_wrap=True, overflow="ellipsis")
-    return (
-        TextColumn("{task.description}", markup=False),
-        BarColumn(BAR_WIDTH),
-        TimeElapsedColumn(),
-        TextColumn("{task.fields[at]}", markup=False, table_column=cut),
-        TextColumn("{task.fields[left]}", markup=False),
-    )
+    name, seconds = TextColumn("{task.description}", markup=False), TimeElapsedColumn()
+    at = TextColumn("{task.fields[at]}", markup=False, table_column=cut)
+    if width < NARROW:
+        return name, seconds, at
+    return name, BarColumn(BAR_WIDTH), seconds, at, TextColumn("{task.fields[left]}", markup=False)
