@@ -125,7 +125,7 @@ def read_bodies(path: Path, size: float | None = None) -> ImportedMesh:
 def _grouped(path: Path, size: float | None) -> GroupedMesh:
     suffix = path.suffix.lower()
     if not path.is_file():
-        raise MeshError(f"{path}: no such file")
+        raise MeshError(f"{path}: {'not a file' if path.exists() else 'no such file'}")
     if suffix in EXPORTABLE:
         raise MeshError(
             f"{path}: {EXPORTABLE[suffix]}'s {suffix} is not read; export it as .inp, .msh, .vtu "

@@ -7,6 +7,7 @@ import socket
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -115,6 +116,14 @@ def test_a_number_that_another_process_has_by_now_is_not_believed(out):
     left_by(out, socket.gethostname())
     with locked(out) as gone:
         assert gone.startswith("process 1 on ")
+
+
+@pytest.mark.skipif(not Path("/proc/self").exists(), reason="a file system of Linux")
+def test_where_no_folder_can_be_made_one_line_says_so(ball):
+    """/proc says that what is to be made is not there, which another process's removal says too."""
+    ending = invoke("run", ball, "--out", "/proc/out")
+    assert ending.exit_code == 2
+    assert ending.stderr == "fretscale: /proc/out: No such file or directory\n"
 
 
 @posix_only

@@ -27,6 +27,9 @@ if sys.platform != "win32":
 LOCK = ".fretscale.lock"
 # Seconds between two looks at a lock that another process has.
 LOOK = 0.2
+# How often another process may remove a folder just as this one makes it. Some file systems, as
+# /proc, say each time that what is to be made is not there.
+MOST_REMOVED = 1000
 # A link is not followed: what it leads to is not ours.
 FLAGS = os.O_RDWR | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0)
 
@@ -75,18 +78,18 @@ def _is_folder(root: Path) -> bool:
 
 def _opened(path: Path, patience: float) -> tuple[int, bool]:
     """The lock file, open, and whether the system says that no other process has it."""
-    end = time.monotonic() + patience
+    end, removed = time.monotonic() + patience, 0
     while True:
         # Its last holder may remove the folder, left empty, between any two of these steps.
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
             check_regular(path)
             file = os.open(path, FLAGS, 0o666)
-        except FileNotFoundError:
-            continue
-        except FileExistsError:
-            if not _is_folder(path.parent) and path.parent.is_symlink():
-                raise  # to nowhere
+        except (FileNotFoundError, FileExistsError) as error:
+            to_nowhere = not _is_folder(path.parent) and path.parent.is_symlink()
+            removed += 1
+            if to_nowhere or removed > MOST_REMOVED:
+                raise OSError(error.errno, error.strerror, str(path.parent)) from error
             continue
         try:
             if sys.platform != "win32":
