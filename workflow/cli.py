@@ -273,7 +273,7 @@ def check(case: str, overrides: tuple[str, ...]) -> None:
 
 def _fitted(line: str, indent: int) -> str:
     """A line as wide as the terminal, what is more below it; where there is none, as it is."""
-    if not sys.stdout.isatty():
+    if sys.stdout is None or not sys.stdout.isatty():
         return line
     width = shutil.get_terminal_size().columns
     return "\n".join(textwrap.wrap(line, width, subsequent_indent=indent * " "))
@@ -418,8 +418,15 @@ def schema() -> None:
 
 def main() -> None:
     """Entry point of the command."""
+    from workflow.shell.signals import end_tidily, hear_no_more
     from workflow.shell.streams import hold_standard_streams, spell_what_streams_lack
 
     hold_standard_streams()
     spell_what_streams_lack()
-    cli(prog_name="fretscale")
+    end_tidily()
+    try:
+        cli(prog_name="fretscale")
+    except KeyboardInterrupt:  # pressed again while the first one was told
+        sys.exit(errors.INTERRUPTED)
+    finally:
+        hear_no_more()

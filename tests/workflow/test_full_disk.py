@@ -213,13 +213,25 @@ def test_nothing_is_said_where_nothing_can_be(ball, tmp_path):
 
 @posix_only
 @pytest.mark.parametrize("arguments", [["schema"], ["--help"]])
-def test_a_pipe_that_nobody_reads_is_one_line(arguments):
+def test_who_stops_reading_has_had_enough(arguments):
+    """As `head` does: nothing is wrong that anybody has to be told."""
     read, write = os.pipe()
     os.close(read)
     ending = command(*arguments, stdout=write)
     os.close(write)
     assert ending.returncode == 3
-    assert ending.stderr == "fretscale: output: Broken pipe\n"
+    assert ending.stderr == ""
+
+
+@posix_only
+@pytest.mark.parametrize("arguments", [["check"], ["new"], ["materials"], ["schema"], ["--help"]])
+def test_output_that_nobody_wants_is_left_out(arguments, ball):
+    """With >&- there is no stdout at all."""
+    closed = f"import os; os.close(1); {COMMAND}"
+    if arguments == ["check"]:
+        arguments = ["check", ball]
+    ending = command(*arguments, code=closed)
+    assert (ending.returncode, ending.stderr) == (0, "")
 
 
 @pytest.mark.slow

@@ -234,6 +234,23 @@ def refuse(*_):
     raise KeyboardInterrupt
 
 
+@pytest.mark.parametrize(
+    ("place", "told"),
+    [
+        ("workflow.shell.folder.OutputFolder.claim", "has nothing yet; start again with"),
+        ("workflow.runs.run.provenance_of", "keeps what is done; go on with `fretscale resume"),
+    ],
+)
+def test_ctrl_c_before_anything_is_computed_names_the_folder(
+    start, monkeypatch, tmp_path, place, told
+):
+    monkeypatch.setattr(place, refuse)
+    run = start(tmp_path / "out")
+    assert run.ending.exit_code == 130
+    (*_, line) = run.ending.stderr.splitlines()
+    assert line.startswith(f"fretscale: interrupted: {run.folder} {told}")
+
+
 @pytest.mark.slow
 def test_interruption_after_the_last_jump_writes_the_output(start, resume, monkeypatch, tmp_path):
     quick = "wear.cycles=1e4", "contact.grid=[16, 24]"

@@ -70,6 +70,10 @@ class Process:
         """Ctrl-C: the whole group gets it."""
         os.killpg(self._process.pid, signal.SIGINT)
 
+    def terminate(self) -> None:
+        """What batch systems do first: only the command gets it."""
+        self._process.terminate()
+
     def finish(self) -> tuple[int, str]:
         """Exit code and everything on stderr."""
         _, text = self._process.communicate(timeout=PATIENCE)
@@ -199,24 +203,25 @@ main()
     assert_equal_after(resume, folder, reference)
 
 
-def interrupt(small_path, folder, began):
-    """Ctrl-C as soon as the run has begun what ``began`` looks for: one line, and all gone."""
+def interrupt(small_path, folder, began, stop=Process.interrupt):
+    """Stopped as soon as the run has begun what ``began`` looks for: one line, and all gone."""
     process = Process(*command(small_path, folder))
     assert wait_until(lambda: began(process), PATIENCE)
     below = process.descendants()
-    process.interrupt()
+    stop(process)
     code, text = process.finish()
     assert code == 130, text
     lines = [line for line in text.splitlines() if line.strip()]
-    assert lines[-1].startswith("fretscale: interrupted")
+    assert lines[-1].startswith(f"fretscale: interrupted: {folder} keeps what is done; go on with")
     # Before it only what the run itself had said: no traceback, nothing of the workers.
     assert [line for line in lines[:-1] if not line.startswith(("run: ", "warning: "))] == []
     assert wait_until(lambda: not any(map(alive, below)), 10.0)
 
 
 @posix_only
-def test_ctrl_c_while_workers_start_ends_in_one_line(small_path, tmp_path):
-    interrupt(small_path, tmp_path / "out", lambda process: len(process.descendants()) >= 2)
+@pytest.mark.parametrize("stop", [Process.interrupt, Process.terminate])
+def test_ctrl_c_while_workers_start_ends_in_one_line(small_path, tmp_path, stop):
+    interrupt(small_path, tmp_path / "out", lambda process: len(process.descendants()) >= 2, stop)
 
 
 @posix_only

@@ -86,6 +86,8 @@ def _ending(error: Exception) -> tuple[str, int]:
         return f"out of memory: {error}".rstrip(": "), errors.OutOfMemory.exit_code
     if isinstance(error, FretscaleError):
         return str(error), errors.exit_code(error)
+    if isinstance(error, BrokenPipeError) and error.filename is None:
+        return "", errors.NotWritten.exit_code  # as `head` leaves it: who reads has had enough
     if isinstance(error, OSError) and error.errno in errors.UNWRITTEN:
         written = f"output: {error.strerror}"
         if error.filename is not None:

@@ -133,11 +133,14 @@ def _working(
 ) -> Iterator[str]:
     """Hold the folder of a run (see :func:`workflow.shell.lock.locked`).
 
-    Raises NotWritten where the disk is full, with what goes on from there.
+    Raises NotWritten where the disk is full, and KeyboardInterrupt when it is stopped, with what
+    goes on from there.
     """
     try:
         with locked(out, patience, take_over) as gone:
             yield gone
+    except KeyboardInterrupt as stop:
+        raise KeyboardInterrupt(_stopped(analysis_of(case), OutputFolder(out))) from stop
     except OSError as error:
         if error.errno not in UNWRITTEN:
             raise
@@ -249,11 +252,8 @@ def _run(
             draw=draw,
             report=report,
         )
-        try:
-            with telling(reporter):
-                analysis.run(run)
-        except KeyboardInterrupt as stop:
-            raise KeyboardInterrupt(_stopped(analysis, folder)) from stop
+        with telling(reporter):
+            analysis.run(run)
         for line in first_look(folder.root, drawn):
             reporter.say(line)
 
@@ -270,6 +270,8 @@ def _announce(case: Case, expected: RunTime, resume: bool, reporter: Reporter) -
 def _stopped(analysis: Analysis, folder: OutputFolder) -> str:
     """What a run that got Ctrl-C has left, and the command that goes on."""
     out = folder.root
+    if not folder.case.exists():
+        return f"{out} has nothing yet; start again with the same command"
     if folder.summary.exists():
         return f"{out} is finished but for what is removed by `{folder.resume_command}`"
     if not analysis.resumable:
