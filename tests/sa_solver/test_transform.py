@@ -1,5 +1,8 @@
 """Transforms of zero-padded fields: FFTW, numpy and direct circular convolution agree."""
 
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 
@@ -111,3 +114,21 @@ def test_a_filter_leaves_its_input_and_earlier_output_alone():
     filter_.apply(fields[1])
     assert np.array_equal(fields, given)
     assert np.array_equal(output, kept)
+
+
+@pytest.mark.parametrize("before", ["", "from fe_models.pardiso import library; library()"])
+def test_a_transform_is_that_of_fftw_whatever_is_loaded_before_it(before):
+    """MKL's functions of the same names round otherwise."""
+    shape, padded = (100, 30), (256, 64)
+    code = f"""{before}
+import sys
+import numpy as np
+from sa_solver.transform import Transform
+transform = Transform({shape}, {padded})
+transform.forward(np.random.default_rng(0).standard_normal({shape}), 0)
+sys.stdout.buffer.write(transform.spectra[0].tobytes())
+"""
+    told = subprocess.run([sys.executable, "-c", code], capture_output=True, check=True).stdout
+    transform = Transform(shape, padded)
+    transform.forward(np.random.default_rng(0).standard_normal(shape), 0)
+    assert told == transform.spectra[0].tobytes()
