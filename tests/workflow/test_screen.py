@@ -17,6 +17,7 @@ from workflow.commands.group import LISTED
 from workflow.runs.first_look import first_look
 from workflow.shell import screen
 from workflow.shell.reporter import LINE, Reporter
+from workflow.shell.run_time import RunTime
 from workflow.shell.screen import Loudness
 
 
@@ -71,6 +72,17 @@ def test_a_stage_shows_how_far_it_is(
     (row,) = {line for line in terminal().splitlines() if "1 of 2 bodies" in line}
     assert "condensation" in row
     assert "more" in row
+
+
+def test_a_long_part_is_forecast_before_any_of_it_is_done(
+    terminal: Callable[[], str], tmp_path: Path
+) -> None:
+    """5 min of wear are expected and 1 min after it, which takes longer as all did before it."""
+    reporter = Reporter(tmp_path / "log", expected=RunTime(course=300.0, after=60.0))
+    with reporter.course("wear"):
+        reporter._screen._rows.refresh()
+    reporter.close()
+    assert "about 6 min to go" in terminal()
 
 
 def test_a_row_is_no_longer_than_the_terminal(terminal: Callable[[], str], tmp_path: Path) -> None:

@@ -141,6 +141,8 @@ class Reporter:
         with self._screen.row(name) as row:
             self._after = self._expected.after * max(1.0, self.spent / self._expected.begun)
             self._course = _Course(name, row, Forecast())
+            if (expected := self._expected.course) > 0.0:
+                row.show(0.0, "", f"{about(expected + self._after)} to go")
             try:
                 yield
             finally:

@@ -13,6 +13,7 @@ from workflow.analyses.wear.case.base import FiniteElementCase, WearCase
 from workflow.analyses.wear.choice import report_choice
 from workflow.analyses.wear.contact_stage import gap_on
 from workflow.analyses.wear.load_source import ContactFace
+from workflow.analyses.wear.recording import heard_stage
 from workflow.analyses.wear.run import meshed_faces
 from workflow.analyses.wear.structure_stage import StructureStage
 from workflow.analyses.wear.structures import resultants, structure_of
@@ -73,9 +74,9 @@ def export_resultants(case: WearCase, name: str, out: Path, force: bool) -> list
 
 def _write(case: WearCase, source: StructureStage, out: Path, reporter: Reporter) -> None:
     faces = meshed_faces(case, source, reporter)
-    with reporter.stage("condensation", "steps") as told, source.heard(told):
+    with heard_stage(reporter, source, "condensation", "steps"):
         source.prepare()
-    with reporter.stage("structural friction", "increments") as told, source.heard(told):
+    with heard_stage(reporter, source, "structural friction", "increments"):
         histories = {
             history.interface.name: _numbered(source, history) for history in source.unworn()
         }

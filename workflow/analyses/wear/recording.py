@@ -5,7 +5,8 @@ The coupled loop (:mod:`wear.coupled`) knows nothing of them.
 
 from __future__ import annotations
 
-from contextlib import AbstractContextManager
+from collections.abc import Iterator
+from contextlib import AbstractContextManager, ExitStack, contextmanager
 from dataclasses import dataclass
 
 from sa_solver.types import Array
@@ -15,10 +16,25 @@ from workflow.analyses.wear.case.base import WearCase
 from workflow.analyses.wear.contact_loops import kept_loops, loops_due
 from workflow.analyses.wear.contact_stage import ContactStage
 from workflow.analyses.wear.contact_workers import StagedContacts
+from workflow.analyses.wear.load_source import LoadSource
+from workflow.analyses.wear.structure_stage import StructureStage
 from workflow.analyses.wear.warnings import warn_of_growth, warn_of_instability
 from workflow.case.plain import counted
 from workflow.shell.analysis import Run
+from workflow.shell.reporter import Reporter
 from workflow.shell.store import write_arrays
+
+
+@contextmanager
+def heard_stage(reporter: Reporter, source: LoadSource, name: str, of: str) -> Iterator[None]:
+    """A stage in which a structure of ours tells how many ``of`` its things are done.
+
+    Of other sources nothing takes long.
+    """
+    with reporter.stage(name, of) as told, ExitStack() as stack:
+        if isinstance(source, StructureStage):
+            stack.enter_context(source.heard(told))
+        yield
 
 
 @dataclass(frozen=True)
@@ -27,8 +43,11 @@ class RunLog(Observer):
 
     run: Run[WearCase]
     stages: list[ContactStage]
+    source: LoadSource
 
     def stage(self, name: Stage) -> AbstractContextManager[object]:
+        if name == "structural friction":
+            return heard_stage(self.run.reporter, self.source, name, "increments")
         return self.run.reporter.stage(name)
 
     def jumping(self, state: CoupledState, cycles: float) -> None:

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from contextlib import AbstractContextManager, nullcontext
 
 from fe_models.mesh import MeshError
 from sa_solver.normal import NormalContactError
-from sa_solver.types import Progress
 from wear.coupled import CoupledSettings, CoupledState, CoupledWear, JumpSize, Stop
 from wear.face_loads import FaceLoads
 from wear.interface import FirstContact, MotionError
@@ -25,7 +23,7 @@ from workflow.analyses.wear.contact_workers import (
 from workflow.analyses.wear.load_source import ContactFace, LoadSource
 from workflow.analyses.wear.nodal_contacts import NodalContacts
 from workflow.analyses.wear.outcome import InterfaceOutcome, Outcome
-from workflow.analyses.wear.recording import Recorder, RunLog
+from workflow.analyses.wear.recording import Recorder, RunLog, heard_stage
 from workflow.analyses.wear.results import write_output
 from workflow.analyses.wear.structure_stage import StructureStage
 from workflow.analyses.wear.structures import structure_of
@@ -74,9 +72,9 @@ def _compute(run: Run[WearCase]) -> Outcome:
     source = structure_of(case).source(case)
     faces = meshed_faces(case, source, reporter)
     with contact_workers(case, faces if _worn_apart(case, source) else ()) as workers:
-        with reporter.stage("condensation", "steps") as told, _heard(source, told):
+        with heard_stage(reporter, source, "condensation", "steps"):
             source.prepare()
-        with reporter.stage("structural friction", "increments") as told, _heard(source, told):
+        with heard_stage(reporter, source, "structural friction", "increments"):
             unworn = source.unworn()
         if isinstance(source, StructureStage):
             _check_structure(case, source, reporter)
@@ -95,11 +93,6 @@ def _compute(run: Run[WearCase]) -> Outcome:
         for number, column in enumerate(zip(*columns, strict=True))
     ]
     return Outcome(case, source, state, interfaces)
-
-
-def _heard(source: LoadSource, progress: Progress) -> AbstractContextManager[None]:
-    """A structure of ours tells how far it is; of other sources nothing takes long."""
-    return source.heard(progress) if isinstance(source, StructureStage) else nullcontext()
 
 
 def _contacts(
@@ -132,7 +125,7 @@ def _march(
     case, reporter, settings = run.case, run.reporter, coupled_settings(run.case)
     jumps = list(run.kept.jumps) if run.kept else []
     recorder = Recorder(run, settings, source.peak, contacts, jumps)
-    loop = CoupledWear(settings, source, contacts, (RunLog(run, contacts.stages), recorder))
+    loop = CoupledWear(settings, source, contacts, (RunLog(run, contacts.stages, source), recorder))
     state, first = loop.begin(unworn)
     warn_of_contact(case, source.peak, contacts.stages, state, first, reporter)
     end = contacts.restored(kept) if kept else state

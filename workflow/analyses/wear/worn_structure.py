@@ -23,6 +23,7 @@ from workflow.analyses.wear.budget.report import datasets_of, summary_of
 from workflow.analyses.wear.case.evolution import EvolvingFriction
 from workflow.analyses.wear.contact_stage import ContactStage
 from workflow.analyses.wear.datasets import put_face
+from workflow.analyses.wear.recording import heard_stage
 from workflow.analyses.wear.structure_stage import StructureStage
 from workflow.analyses.wear.structures.resultants.writing import put_closure
 from workflow.shell.dataset import Dataset
@@ -266,7 +267,7 @@ def worn_structure(
     If it ``moves``, both bodies are told over the increments too.
     """
     pairs = list(zip(contacts, state.interfaces, strict=True))
-    with reporter.stage("structural friction", "increments") as told, stage.heard(told):
+    with heard_stage(reporter, stage, "structural friction", "increments"):
         cycle = stage.worn_cycle(
             [contact.nodal_depth(interface) for contact, interface in pairs],
             None
