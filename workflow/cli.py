@@ -193,6 +193,7 @@ def chart(
     """
     from workflow.chart import accuracy_of, chart_case
     from workflow.chart.report import show, write_chart
+    from workflow.runs.first_look import look_at
     from workflow.shell.lock import locked
 
     with _repeatable(out), locked(out) as gone:
@@ -207,9 +208,11 @@ def chart(
             accuracy=accuracy_of(accuracy),
             loudness=_loudness(loudness),
         )
-        write_chart(charted, out)
+        told = write_chart(charted, out)
     if loudness != "QUIET":
         show(charted)
+        for line in look_at(out, told):
+            click.echo(line)
     return errors.DONE if charted.complete else errors.MethodFailed.exit_code
 
 

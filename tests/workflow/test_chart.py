@@ -202,7 +202,8 @@ def test_sentences_say_when_nothing_is_enough():
 
 @pytest.mark.slow
 def test_files_of_a_chart(tmp_path: Path):
-    write_chart(charted(0.1), tmp_path)
+    told = write_chart(charted(0.1), tmp_path)
+    assert told["figure"] == tmp_path / "figures/chart_all.png"
     lines = (tmp_path / "chart.csv").read_text("utf-8").splitlines()
     assert len(lines) == 6
     assert lines[0].startswith("axis,branch,rung,settings,own,folder,depth,volume,error")

@@ -120,7 +120,9 @@ def test_grids_of_a_sphere_go_to_hertz_at_second_order(
     assert errors[chosen] <= 1e-3
     assert chosen == 0 or errors[chosen - 1] > 1e-3
     assert all(rung["cost"]["convolutions"] > 0 for rung in grid["rungs"])
-    assert (tmp_path / "out" / "figures" / "chart_grid.png").exists()
+    figure = tmp_path / "out" / "figures" / "chart_grid.png"
+    assert figure.exists()
+    assert f"  figure    {figure}" in result.stdout.splitlines()[-2:]
     rows = list(csv.DictReader((tmp_path / "out" / "chart.csv").open(encoding="utf-8")))
     assert [row["rung"] for row in rows] == names
     assert float(rows[-1]["error"]) == pytest.approx(errors[-1])

@@ -21,15 +21,18 @@ from workflow.shell.versions import versions
 FILE_WIDTH = 120
 
 
-def write_chart(chart: Chart, out: Path) -> None:
-    """Write ``chart.csv``, ``figures`` and, last, ``summary.json``."""
+def write_chart(chart: Chart, out: Path) -> dict[str, Path]:
+    """Write ``chart.csv``, ``figures`` and, last, ``summary.json``; what of it tells most."""
     from workflow.chart.figures import write_chart_figures
 
     folder = OutputFolder(out, KIND)
-    _write_table(chart, folder.reserve("chart.csv", "errors and costs of every rung"))
+    table = folder.reserve("chart.csv", "errors and costs of every rung")
+    _write_table(chart, table)
     with folder.filling("figures", "errors against costs") as figures:
-        write_chart_figures(chart, figures)
+        drawn = write_chart_figures(chart, figures)
     folder.write_summary(_summary(chart))
+    # The last one is of all axes.
+    return {"figure": drawn[-1], "table": table} if drawn else {"table": table}
 
 
 # --- what to choose -----------------------------------------------------------------------------

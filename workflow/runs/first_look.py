@@ -1,8 +1,8 @@
-"""Where to look first in the folder of a finished run."""
+"""Where to look first in the folder of a finished run, or of many."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 from workflow.pictures.view import first_file
@@ -22,9 +22,13 @@ def first_look(root: Path, drawn: Sequence[str]) -> Iterator[str]:
         else None,
         "ParaView": _paraview(root),
     }
-    there = {name: path for name, path in found.items() if path is not None}
-    yield f"done: {root}" + ("; look first at" if there else "")
-    for name, path in there.items():
+    yield from look_at(root, {name: path for name, path in found.items() if path is not None})
+
+
+def look_at(root: Path, places: Mapping[str, Path | str]) -> Iterator[str]:
+    """Lines with the folder of what is done, and the ``places`` there that tell most by name."""
+    yield f"done: {root}" + ("; look first at" if places else "")
+    for name, path in places.items():
         yield f"  {name:<8}  {path}"
 
 
