@@ -51,6 +51,7 @@ extensions = [
     "sphinx_copybutton",
     "case_reference",
     "gallery_page",
+    "library_reference",
 ]
 exclude_patterns = ["_build", "**.ipynb_checkpoints"]
 nitpicky = True
@@ -69,7 +70,11 @@ nb_execution_timeout = 240
 nb_merge_streams = True
 nb_render_markdown_format = "myst"
 
-autodoc_typehints = "none"
+autodoc_typehints = "signature"
+autodoc_type_aliases = {name: name for name in ("Array", "Indices", "Mask")}
+python_maximum_signature_line_length = 88
+python_use_unqualified_type_names = True
+toc_object_entries_show_parents = "hide"
 autodoc_member_order = "bysource"
 
 html_theme = "furo"

@@ -40,7 +40,7 @@ class MatchError(MeshError):
 class Body:
     """One meshed body: tetrahedra, or triangles in the plane (X, Z) for plane strain.
 
-    Its named boundaries are those of the mesh.
+    ``name`` is its own, ``mesh`` scikit-fem's [mm]; its named boundaries are those of the mesh.
 
     Examples
     --------
@@ -111,6 +111,7 @@ class Body:
 class Face:
     """A contact face: ``coordinates`` ``(n, 2)`` of its nodes in the frame [mm] and their facets.
 
+    It is called ``name`` and lies in ``frame``.
     ``facets`` are triangles ``(m, 3)``, or segments ``(m, 2)`` of a line contact, whose nodes have
     y = 0. Fields on it are linear between nodes. Forces of nodes are pressures times areas and
     displacements those of the nodes, unless it is ``weighted``: then they are integrals of a linear
@@ -194,6 +195,7 @@ class Interface(Face):
 
     @property
     def nodal_areas(self) -> Array:
+        """What is in contact of the area of each node ``(n,)`` [mm²]; in a line contact [mm]."""
         return self.facet_shares if self.areas is None else self.areas
 
     def face(self, number: int) -> Face:
@@ -206,7 +208,7 @@ class Interface(Face):
 
 @dataclass(frozen=True)
 class StructureMesh:
-    """Body 1 and body 2, and the interfaces between them.
+    """``body_1``, the fixed one, ``body_2`` and the ``interfaces`` between them.
 
     Examples
     --------

@@ -85,7 +85,9 @@ class CycleSolution:
 
 @dataclass(frozen=True)
 class Structure:
-    """Body 1 is held by its supports, body 2 by contact and what supports it has.
+    """Two bodies of a ``mesh``, both supported and loaded.
+
+    ``body_1`` is held by its supports, ``body_2`` by contact and what supports it has.
 
     Examples
     --------

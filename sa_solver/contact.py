@@ -170,10 +170,12 @@ class FrictionalContact:
     # -- similar bodies -----------------------------------------------------------------------
     @cached_property
     def normal(self) -> NormalContact:
+        """The solver of its pressure, where the bodies are alike."""
         return NormalContact(self.half_space)
 
     @cached_property
     def tangential(self) -> TangentialContact:
+        """The solver of its shear, where the bodies are alike."""
         return TangentialContact(self.half_space)
 
     def _press(

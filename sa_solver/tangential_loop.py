@@ -161,7 +161,7 @@ class TangentialLoop:
 
     @property
     def friction(self) -> float:
-        """max |Q| / P: µ where the contact slides, else what is mobilised of it."""
+        """``max |Q| / P``: µ where the contact slides, else what is mobilised of it."""
         return float(np.abs(self.cycle[1]).max()) / self.P
 
     @property

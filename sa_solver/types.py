@@ -77,7 +77,7 @@ unloaded and unworn, whatever moments that takes."""
 class Material:
     """Isotropic linear elastic material.
 
-    ``young`` and ``yield_stress`` in MPa, ``density`` in t/mm³.
+    ``young`` and ``yield_stress`` in MPa, ``density`` in t/mm³, ``poisson`` is Poisson's ratio.
 
     Examples
     --------
@@ -109,9 +109,10 @@ class Material:
 class ElasticPair:
     """Two half-spaces in contact, as the compliances that their relative displacement depends on.
 
-    All in 1/MPa: ``normal`` Σ (1-ν)/G, ``shear`` Σ 1/G, ``poisson`` Σ ν/G and ``coupling``
-    ½ [(1-2ν2)/G2 - (1-2ν1)/G1], exactly 0 for identical materials. An infinite Young's modulus is
-    a rigid body; both rigid are not an elastic pair (InputError).
+    ``body_1`` is the lower, fixed one, ``body_2`` the upper. All compliances in 1/MPa: ``normal``
+    Σ (1-ν)/G, ``shear`` Σ 1/G, ``poisson`` Σ ν/G and ``coupling`` ½ [(1-2ν2)/G2 - (1-2ν1)/G1],
+    exactly 0 for identical materials. An infinite Young's modulus is a rigid body; both rigid are
+    not an elastic pair (InputError).
 
     Examples
     --------
@@ -142,18 +143,22 @@ class ElasticPair:
 
     @property
     def normal(self) -> float:
+        """Σ (1-ν)/G [1/MPa]: of pressure on the normal displacement."""
         return sum((1.0 - m.poisson) / m.shear_modulus for m in (self.body_1, self.body_2))
 
     @property
     def shear(self) -> float:
+        """Σ 1/G [1/MPa]: of shear on the displacement along it."""
         return sum(1.0 / m.shear_modulus for m in (self.body_1, self.body_2))
 
     @property
     def poisson(self) -> float:
+        """Σ ν/G [1/MPa]: what Poisson's ratio makes of shear."""
         return sum(m.poisson / m.shear_modulus for m in (self.body_1, self.body_2))
 
     @property
     def coupling(self) -> float:
+        """½ [(1-2ν2)/G2 - (1-2ν1)/G1] [1/MPa]: of pressure and shear on each other."""
         first, second = (
             (1.0 - 2.0 * m.poisson) / m.shear_modulus for m in (self.body_1, self.body_2)
         )

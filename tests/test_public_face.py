@@ -1,8 +1,10 @@
 """What the library shows of itself, and what it needs to be installed."""
 
 import ast
+import dataclasses
 import doctest
 import importlib
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -105,6 +107,17 @@ def test_examples_of_functions_and_classes_run(name, monkeypatch):
         example = doctest.DocTestParser().get_doctest(value.__doc__, {}, public, None, None)
         assert example.examples, f"{name}.{public} has no example"
         assert doctest.DocTestRunner().run(example).failed == 0
+
+
+@pytest.mark.parametrize("name", FACES)
+def test_texts_of_public_classes_speak_of_every_field(name):
+    """The pages show a signature and this text: shapes and units are nowhere else."""
+    for public, value in _public_objects(name).items():
+        fields = dataclasses.fields(value) if dataclasses.is_dataclass(value) else ()
+        text = " ".join(base.__doc__ or "" for base in value.__mro__) if fields else ""
+        quoted = " ".join(text.split("``")[1::2])
+        silent = {field.name for field in fields} - set(re.findall(r"\w+", quoted))
+        assert not silent, f"{name}.{public} says nothing of {', '.join(sorted(silent))}"
 
 
 @pytest.mark.parametrize("package", ["sa_solver", "wear", "fe_models", "workflow"])

@@ -94,6 +94,7 @@ class Stop:
 class CoupledSettings:
     """How far a run of so many ``cycles`` goes, in which jumps, and when loads are solved again.
 
+    ``jump`` bounds how far it goes at once, ``stop`` how far in all.
     ``resultants`` constant: never; every: after each jump; drift: where the probe has changed by
     more than the share ``drift`` (:func:`sa_solver.types.resultant_change`), or where as much is to
     be expected of slips and energies, as wear has moved the load over a face (:data:`RESPONSE`).
@@ -150,7 +151,7 @@ class LoadSource(Protocol):
 
 @dataclass(frozen=True)
 class ConstantLoads:
-    """A source of loads that wear does not change: one ``histories`` per contact.
+    """A source of loads that wear does not change: one of ``histories`` per contact.
 
     Examples
     --------
@@ -230,11 +231,11 @@ class Contacts:
 class CoupledState:
     """Everything that a run needs to go on.
 
-    ``cycles`` ``(j,)`` are those at the end of every jump so far, the unworn state included;
-    ``kinetics`` ``(j, interfaces, 5)`` has the columns :data:`KINETICS`; ``solved_resultants``
-    ``(interfaces, 6)`` is the probe at the last solution of the source; ``drift`` ``(j,)`` the
-    drift found after each jump; ``solutions`` counts the solutions, ``spent`` what the contacts
-    have taken.
+    ``interfaces`` are the states of the contacts; ``cycles`` ``(j,)`` those at the end of every
+    jump so far, the unworn state included; ``kinetics`` ``(j, interfaces, 5)`` has the columns
+    :data:`KINETICS`; ``solved_resultants`` ``(interfaces, 6)`` is the probe at the last solution of
+    the source; ``drift`` ``(j,)`` the drift found after each jump; ``solutions`` counts the
+    solutions, ``spent`` what the contacts have taken.
     """
 
     interfaces: tuple[InterfaceState, ...]
@@ -298,7 +299,9 @@ class Observer:
 
 @dataclass(frozen=True)
 class CoupledWear:
-    """A run of the coupled loop. Its methods raise what ``source`` and ``contacts`` raise.
+    """A run of the coupled loop: loads of a ``source`` wear ``contacts``, as ``settings`` say.
+
+    Its ``observers`` are told of every jump. Its methods raise what source and contacts raise.
 
     Examples
     --------

@@ -13,7 +13,7 @@ from sa_solver.types import Array
 
 @dataclass(frozen=True)
 class EnergyTable:
-    """A factor against cumulative energy: linear between points, constant beyond its ends.
+    """A ``factor`` against cumulative energy: linear between points, constant beyond its ends.
 
     ``energy`` ascends [N mm, or N/mm where it is per area]. Below ``threshold`` the factor is 0:
     with a constant factor the worn volume is V = α (ΣEd - Ed_th) (Fouvry et al., Wear 255, 2003).

@@ -27,7 +27,11 @@ class FaceLoads(Protocol):
 
 @dataclass(frozen=True)
 class CycleLoads:
-    """The same as plain data.
+    """What one contact face of ``n`` nodes carries over the ``t`` increments of a closed cycle.
+
+    ``loads`` are its resultants, ``slip`` ``(t, 2, n)`` [mm] that of its nodes in each increment;
+    where they are known ``force`` ``(t, 3, n)`` [N] on body 2 and ``displacement`` ``(t, 3, n)``
+    [mm] of body 2 relative to body 1 since both were unloaded.
 
     Examples
     --------

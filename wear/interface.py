@@ -55,6 +55,10 @@ class MotionError(InputError):
 class InterfaceSettings:
     """One interface and how it wears.
 
+    It is called ``name``, of an elastic ``pair`` of bodies, and computed on ``grid``; ``transfer``
+    leads from the nodes of the loads there (:class:`wear.CellNodes` where these are the cells), and
+    ``stepper`` says in which steps it wears.
+
     ``gap`` ``(nx, ny)`` [mm] is that of the unloaded, unworn bodies, ``laws`` those of body 1 and
     body 2, and ``friction`` gives Coulomb's coefficient after so much dissipated energy [N mm].
     Slips are those of the loads, or with ``method`` full the half-space's own; there ``gross_slip``

@@ -49,7 +49,7 @@ class LinearRegime:
         """How far from ``extrapolate`` the quantity may be at ``cycles``, one-sided.
 
         With the mean rate holding in the middle N0 of the regime, and the rate going on to change
-        by ``trend`` per cycle,
+        by ``trend`` per cycle::
 
             U(N) = |trend| ∫ (N' - N0) dN' + scatter (N - N_last),  N' from N_last to N.
 

@@ -128,7 +128,7 @@ class EnergyAmplitudeLaw:
 
 @dataclass(frozen=True)
 class EvolvingLaw:
-    """Any law, times a factor that changes with cumulative energy.
+    """Any ``law``, times a ``factor`` that changes with cumulative energy.
 
     ``scope`` local: with the energy per area of this body's own surface [N/mm]; global: with that
     of the whole contact [N mm]. During a step it is the exact mean between its two ends.

@@ -414,8 +414,9 @@ ContactAt = Callable[[WearState], WearingContact]
 
 @dataclass(frozen=True)
 class ImplicitStepper(ComparingStepper[WearState, WearingContact]):
-    """Implicit Euler.
+    """Implicit Euler, in steps that ``control`` chooses, or as long as asked for without one.
 
+    Steps of given length may go ``alone``: no companion tells their error then.
     Where surfaces move over each other the last step is of second order: long ones of first order
     wear edges at which pressure peaks, up to twice as high as what is left of it by short ones.
     """
@@ -433,7 +434,10 @@ class ImplicitStepper(ComparingStepper[WearState, WearingContact]):
 
 @dataclass(frozen=True)
 class SecondOrderStepper(ComparingStepper[WearState, WearingContact]):
-    """Second order in the step, also where slip changes with wear."""
+    """Second order in the step, also where slip changes with wear.
+
+    ``control`` and ``alone`` are those of :class:`ImplicitStepper`.
+    """
 
     def _advance(
         self, state: WearState, cycles: float, contact: WearingContact, at: ContactAt, last: bool

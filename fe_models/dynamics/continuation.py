@@ -57,7 +57,8 @@ class ContinuationControl:
 
     ``first``, ``least`` and ``most`` sizes; ``iterations`` of Newton's method that are wanted, and
     ``max_iterations``, after which a step is halved; ``max_angle`` [degrees] by which the tangent
-    may turn in one step; ``max_points`` on one curve. Each new λ is told to ``watch``.
+    may turn in one step; ``max_points`` on one curve; ``tolerance`` of Newton's method.
+    Each new λ is told to ``watch``.
 
     Examples
     --------

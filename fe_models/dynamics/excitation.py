@@ -53,7 +53,7 @@ class ConstantForce(ExcitationForce):
 
 @dataclass(frozen=True)
 class HarmonicForce(ExcitationForce):
-    """``amplitude`` sin(2π ``frequency`` t + ``phase``) [N, Hz].
+    """``amplitude`` sin(2π ``frequency`` t + ``phase``) [N, Hz], along ``shape`` ``(n,)``.
 
     With a ``ramp`` [s] it grows from zero at t = 0 as (1 - cos(π t / ramp)) / 2. Raises
     :class:`ExcitationError` for a frequency that is not above zero or a negative ramp.
@@ -92,6 +92,7 @@ class HarmonicForce(ExcitationForce):
 class HammerBlow(ExcitationForce):
     """Half a sine of height ``peak`` [N] from ``start`` on for ``duration`` [s].
 
+    It acts along ``shape`` ``(n,)``, as :func:`fe_models.dynamics.unit_force` gives it.
     Raises :class:`ExcitationError` for a duration that is not above zero.
 
     Examples
@@ -124,6 +125,7 @@ class HammerBlow(ExcitationForce):
 class RecordedForce(ExcitationForce):
     """Samples ``force`` ``(s,)`` [N] at ``times`` ``(s,)`` [s]: linear between, constant beyond.
 
+    It acts along ``shape`` ``(n,)``.
     Raises :class:`ExcitationError` for no or unequal samples, for values that are not finite, or
     for times that do not ascend.
 
@@ -158,7 +160,7 @@ class RecordedForce(ExcitationForce):
 
 @dataclass(frozen=True)
 class CombinedForces:
-    """The sum of one or more forces.
+    """The sum of one or more ``forces``.
 
     Examples
     --------

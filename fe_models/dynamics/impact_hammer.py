@@ -79,7 +79,7 @@ def frequency_response(
 
     Examples
     --------
-    The receptance of a rig from the record of a blow, at 100 Hz 1 / |k - m ω² + i c ω|:
+    The receptance of a rig from the record of a blow, at 100 Hz ``1 / |k - m ω² + i c ω|``:
 
     >>> import numpy as np
     >>> from fe_models.dynamics import *

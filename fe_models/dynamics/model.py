@@ -10,7 +10,7 @@ from sa_solver.types import Array
 
 @dataclass(frozen=True)
 class DynamicModel:
-    """Matrices ``(n, n)`` of the structure without joints, in t, N s/mm and N/mm.
+    """``mass``, ``damping`` and ``stiffness`` ``(n, n)`` without joints, in t, N s/mm and N/mm.
 
     ``connection`` ``(j d, n)`` is B: it takes displacements of the structure to those of its ``j``
     joints of ``d`` directions, one joint after the other. ``names`` ``(n,)`` are those of the

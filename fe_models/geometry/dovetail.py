@@ -50,7 +50,9 @@ class Dovetail:
     part at the two slot ends (radius ``end_radius``), inside ``slot_length``; without them it is
     straight to the ends. ``rim_radius`` is the radius of the top of the flanks; ``lug_height`` the
     disk above it, ``disk_height`` below it; ``root_depth`` the blade below the flanks,
-    ``slot_clearance`` the play under the root.
+    ``slot_clearance`` the play under the root. The blade's neck is ``neck_width`` wide, its shank
+    ``shank_height`` high; ``neck_fillet`` and ``slot_fillet`` are radii. The slots of ``blades``
+    blades lie at ``skew`` to the axis of rotation.
 
     Examples
     --------

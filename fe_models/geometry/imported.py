@@ -31,7 +31,7 @@ EXPORTABLE = {
 
 @dataclass(frozen=True)
 class ImportedMesh:
-    """Bodies by name, each with its own nodes and named boundaries.
+    """``bodies`` by name, each with its own nodes and named boundaries.
 
     ``node_numbers`` ``(n,)`` are the file's own numbers of each body's vertices; ``points`` the
     vertices in each named node set of the file that has any on that body.

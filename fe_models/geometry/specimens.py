@@ -44,7 +44,7 @@ BOX_MARGIN = 1e-5
 
 @dataclass(frozen=True)
 class Specimen:
-    """Dimensions of one specimen [mm]; both are alike.
+    """Dimensions of one specimen [mm], a cylinder of ``diameter`` and ``length``; both are alike.
 
     ``strip_width`` is the width of the flat strip and the side of the pad; the chamfers fall
     ``chamfer_depth`` from the strip's edge to the cylinder's side (not printed: assumed).

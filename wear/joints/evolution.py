@@ -188,7 +188,9 @@ class TabulatedEvolution:
 class JointEvolution:
     """Which parameters of a joint law follow which function of the joint's energy.
 
-    A function multiplies the initial value; a table replaces it. Those of None stay. No parameter
+    Functions of ``stiffness``, ``residual_stiffness``, ``friction`` and ``normal_load`` take the
+    energy dissipated so far [N mm]. A function multiplies the initial value; a table replaces it.
+    Those of None stay. No parameter
     falls below 0: what is worn to nothing stays so.
 
     Examples

@@ -14,6 +14,7 @@ from wear.joints.parameters import Parameter, require, require_not_negative
 class UniformIwan(MasingLaw):
     """Limits spread evenly from nothing (Iwan 1966; Li 2020).
 
+    ``stiffness`` K [N/mm], ``friction`` µ, ``normal_load`` N [N], ``residual_stiffness`` kr [N/mm].
     First loaded, T = (K + kr) d - (K d)² / (4 µN) up to d = 2 µN/K, where the last slider slips,
     and µN + kr d beyond. (Li prints 2 µN/(K + kr), at which the curve would jump.)
 
@@ -38,6 +39,7 @@ class UniformIwan(MasingLaw):
 class FourParameterIwan(MasingLaw):
     """Limits spread by a power law, and a rest that slips at once (Segalman 2005).
 
+    ``stiffness`` K [N/mm], ``friction`` µ, ``normal_load`` N [N], ``residual_stiffness`` kr [N/mm].
     ``chi`` χ > -1: the loop of a small amplitude A loses energy as A^(χ+3). ``beta`` β >= 0:
     stiffness of the sliders that slip together, last of all, over that of the others. Segalman's
     F_S is µN and his K_T is ``stiffness``; the last slip at φ = µN (1 + β) / (K (β + (χ+1)/(χ+2))).

@@ -69,7 +69,7 @@ class SettledCycle:
 
 @dataclass(frozen=True)
 class PeriodicMarch:
-    """A joint law over whole periods.
+    """A joint ``law`` over whole periods.
 
     ``threads`` march that many shares of the joints at once.
 

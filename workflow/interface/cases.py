@@ -64,9 +64,9 @@ def load_case(case: AnyCase, /, **overrides: Any) -> Case:
 class Check:
     """What a case would run.
 
-    ``memory`` is the upper estimate of what it needs [bytes], ``seconds`` the order of magnitude of
-    its time [s], ``outline`` what would run in rows of name and text, ``doubts`` what looks like a
-    slip.
+    ``title`` is its own, ``memory`` the upper estimate of what it needs [bytes], ``seconds`` the
+    order of magnitude of its time [s], ``outline`` what would run in rows of name and text,
+    ``doubts`` what looks like a slip.
 
     Examples
     --------
