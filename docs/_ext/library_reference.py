@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING, Any
 
 import fretscale
 from docutils import nodes
+from sphinx.util.inspect import TypeAliasForwardRef
 
 if TYPE_CHECKING:
     from sphinx.application import Sphinx
@@ -46,6 +47,8 @@ NAMELESS = re.compile(r"<[^<>]*(?:<[^<>]*>[^<>]*)*>")
 
 def setup(app: Sphinx) -> dict[str, bool]:
     """Write the pages before Sphinx looks for sources, and help it with their signatures."""
+    # Names of `autodoc_type_aliases` within other types are shown by this.
+    TypeAliasForwardRef.__repr__ = lambda self: self.name
     app.connect("builder-inited", lambda app: write_pages(Path(app.srcdir) / "reference"))
     app.connect("autodoc-process-signature", as_written)
     app.connect("autodoc-process-docstring", with_links)
@@ -198,6 +201,8 @@ def as_written(
     """The signature with annotations and defaults as they are in the source."""
     if what not in ("class", "function", "method") or not callable(value):
         return None
+    if getattr(value, "_is_protocol", False):
+        return "", ""  # nobody makes one
     found, module = inspect.signature(value), value.__module__
     parameters = list(found.parameters.values())
     if what == "method" and parameters and parameters[0].name in ("self", "cls"):
