@@ -49,6 +49,7 @@ docs-gallery: $(DOCUMENTABLE)
 docs-figures: $(DOCUMENTABLE)
 	@echo 'fretscale: the runs and charts that theory and README show: about an hour of one core.'
 	PATH=$(CURDIR)/$(BIN):$$PATH $(BIN)/python docs/draw_figures.py out/figures
+	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python docs/method_charts.py
 
 bench: $(TESTABLE)
 	$(PIP) -e '.[test,bench]'

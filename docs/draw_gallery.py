@@ -19,6 +19,7 @@ ROOT = Path(__file__).parent.parent
 GALLERY = ROOT / "docs" / "gallery"
 WIDTH = 900
 COLOURS = 48, 32, 24, 16  # the first that are small enough
+KMEANS = 3  # rounds that bring colours of few dots back: lines and marks
 LARGEST = 60_000  # bytes
 
 
@@ -40,7 +41,7 @@ def store(picture: Path, small: Path) -> None:
         height = round(image.height * WIDTH / image.width)
         scaled = image.convert("RGB").resize((WIDTH, height), Image.Resampling.LANCZOS)
     for colours in COLOURS:
-        scaled.quantize(colours, dither=Image.Dither.NONE).save(small, optimize=True)
+        scaled.quantize(colours, kmeans=KMEANS, dither=Image.Dither.NONE).save(small, optimize=True)
         if small.stat().st_size < LARGEST:
             return
 

@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator
 
-from workflow.chart.ladder import Judged, Ladder
+from workflow.chart.ladder import ROUNDING, Judged, Ladder
 from workflow.chart.run import Chart
 from workflow.pictures.panels import legend_below, new_figure
 from workflow.pictures.style import BLACK, BLUE, GREEN, ORANGE, PURPLE, write_figures
@@ -34,6 +34,8 @@ MOST_QUANTITIES = 4
 DEEPEST = 1e-3
 # Smallest error drawn where nothing but references ran.
 SMALLEST = 1e-12
+# Room for the name of the dearest rung, over the width of what is drawn.
+LAST_NAME = 0.25
 
 
 def write_chart_figures(chart: Chart, folder: Path) -> list[Path]:
@@ -105,7 +107,7 @@ def _bottom(ladders: Sequence[Ladder]) -> float:
     """Where what has no error is drawn: below every error and floor."""
     errors = [rung.error for ladder in ladders for rung in ladder.rungs]
     seen = [*errors, *(ladder.floor for ladder in ladders)]
-    return min((error for error in seen if 0.0 < error < inf), default=SMALLEST * MARGIN) / MARGIN
+    return min((error for error in seen if ROUNDING < error < inf), default=SMALLEST) / MARGIN
 
 
 def _top(ladders: Sequence[Ladder], accuracy: float) -> float:
@@ -211,9 +213,8 @@ def _finish(axis: Axes, cost: str, accuracy: float, ends: tuple[float, float]) -
     """Scales and labels; ``ends`` are the lowest and the highest error shown."""
     axis.axhline(accuracy, color=BLACK, lw=1.0, ls="--", label=f"required: {100 * accuracy:g} %")
     axis.set(xlabel=COSTS[cost], xscale="log", yscale="log", ylim=(ends[0] / 1.6, ends[1]))
-    # Room for the name of the dearest rung.
     low, high = axis.get_xlim()
-    high *= (high / low) ** 0.18
+    high *= (high / low) ** LAST_NAME
     axis.set_xlim(low, high)
     axis.xaxis.set_major_locator(LogLocator(subs=(1, 2, 3, 5, 7) if high < 20 * low else (1, 3)))
     axis.xaxis.set_major_formatter("{x:g}")

@@ -1,0 +1,268 @@
+"""Charts of methods that are only a part of a run, from structures to fretting parameters.
+
+    python docs/method_charts.py [CHART ...]
+
+`make docs-figures` draws them too. Every rung is computed here, in seconds of the processor on one
+thread: what else the machine does is not in them. They are drawn as `fretscale chart` draws whole
+runs.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from functools import partial
+from itertools import pairwise
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any, TypeVar
+
+import numpy as np
+from draw_gallery import ROOT, store
+
+from fe_models import FrettingConditions
+from sa_solver import (
+    ContactLoad,
+    ContactLoadPath,
+    ElasticPair,
+    FrictionalContact,
+    Grid,
+    HalfSpace,
+    Material,
+    march_history,
+)
+from sa_solver.history import ACCURACY
+from sa_solver.types import Array
+from wear import findley
+from wear.life import PlaneSearch
+from workflow.analyses.specimens.model import SpecimensModel
+from workflow.analyses.wear.structure_stage import StructureStage
+from workflow.analyses.wear.structures.dovetail.model import DovetailModel
+from workflow.chart.axes import Axis, Rung
+from workflow.chart.costs import Cost
+from workflow.chart.figures import axis_figure
+from workflow.chart.frontier import efficient
+from workflow.chart.ladder import Judged, Ladder, Point, judge
+from workflow.kinds import load_case
+from workflow.pictures.style import write_figures
+
+Result = TypeVar("Result")
+
+REQUIRED = 0.01
+# Of each order, the one taken by default last; its finest mesh is what all are held against.
+NODES = {1: (11, 21, 40, 79, 157, 313), 2: (11, 21, 40, 79, 157, 313)}
+ELEMENTS = {1: (6, 10, 14, 20), 2: (6, 10, 14, 20)}
+DEFAULT_ORDER = 2
+# Increments of each leg, those of the reference, and what `contact.accuracy` may ask for.
+INCREMENTS, FINEST = (1, 2, 4, 8, 16, 32, 64), 256
+ACCURACIES = (0.1, 0.05, ACCURACY, 0.01, 0.005)
+# Of a search for the worst plane, by its refinements.
+PLANES, HISTORIES = {0: (10, 30, 100, 300, 1000), 6: (10, 30, 100, 300)}, 300
+
+
+# --- structure ----------------------------------------------------------------------------------
+
+
+def structure() -> Ladder:
+    """The unworn cycle of the dovetail's section, on meshes of both orders."""
+    axis = Axis("structure", "nodes across a flank of the dovetail's section", _nothing, order=2.0)
+    return judge(axis, _meshes("dovetail_2d", "nodes", NODES, 40, _mission), {}, {})
+
+
+def _mission(case: Any) -> dict[str, float]:
+    stage = StructureStage(DovetailModel(case))
+    history = stage.unworn()[0]
+    place = history.interface.coordinates[:, 0]
+    order, pressure = np.argsort(place), history.pressure[stage.peak]
+    return {
+        "energy of a cycle": history.loads.mean_energy,
+        "pressure in the middle": float(np.interp(0.0, place[order], pressure[order])),
+        "largest slip": float(np.abs(history.slip[:, 0]).sum(axis=0).max()),
+    }
+
+
+# --- specimens ----------------------------------------------------------------------------------
+
+
+def specimens() -> Ladder:
+    """The curved specimens, unworn under 250 N, on meshes of both orders."""
+    axis = Axis("specimens", "elements across the pad", _nothing, order=2.0)
+    return judge(axis, _meshes("specimens_curved", "elements", ELEMENTS, 10, _cycle), {}, {})
+
+
+def _cycle(case: Any) -> dict[str, float]:
+    model, load = SpecimensModel(case), case.load_path
+    conditions = FrettingConditions(load.normal_forces[-1], load.stroke, case.friction.coefficient)
+    cycle = model.pair.fretting_cycle(model.face.gap, conditions)
+    return {
+        "approach": cycle.normal.approach,
+        "stuck stiffness": cycle.stick_stiffness,
+        "energy of a cycle": cycle.energy,
+        "lowest frequency": float(model.reduction.frequencies[0][1][0]),
+    }
+
+
+# --- load histories -----------------------------------------------------------------------------
+
+
+def history() -> Ladder:
+    """A cylinder on a rigid flat, pressed, sheared by half of what friction bears, and back.
+
+    Errors are those of the shear at the ends of the legs, summed over the cells, over µP.
+    """
+    grid = Grid.strips(1.2, 256)
+    half_space = HalfSpace(grid, ElasticPair(Material(np.inf, 0.3), Material(115e3, 0.29)))
+    contact, height = FrictionalContact(half_space, friction=0.5), grid.x**2 / 100.0
+    corners = np.zeros((4, 6))
+    corners[1:, 0], corners[2:, 1] = 400.0, (100.0, -100.0)
+
+    def in_increments(count: int) -> Array:
+        state, ends = contact.apart(height), []
+        for before, after in pairwise(corners):
+            for share in np.arange(1, count + 1) / count:
+                load = ContactLoad((1.0 - share) * before + share * after)
+                state = contact.advance(state, height, load)
+            ends.append(state.shear)
+        return np.array(ends)
+
+    def to_accuracy(accuracy: float) -> Array:
+        path = ContactLoadPath(corners[1:])
+        marched = march_history(half_space, height, path, friction=0.5, accuracy=accuracy)
+        return np.array([state.shear for state in marched.states])
+
+    # Steps are of first order: two references tell what is left of it.
+    exact = 2.0 * in_increments(FINEST) - in_increments(FINEST // 2)
+
+    def error(shear: Array) -> float:
+        apart = np.abs(shear - exact).sum(axis=(1, 2, 3)) * grid.cell_area
+        return float(apart.max() / (0.5 * corners[1, 0]))
+
+    rungs = []
+    for count in INCREMENTS:
+        rung = Rung(f"as given, {count} a leg", (), 1.0 / count, "as given")
+        rungs.append(_judged(rung, False, partial(in_increments, count), error))
+    for accuracy in ACCURACIES:
+        branch = "split to contact.accuracy"
+        rung = Rung(f"{branch}, {100 * accuracy:g} %", (), accuracy, branch)
+        rungs.append(_judged(rung, accuracy == ACCURACY, partial(to_accuracy, accuracy), error))
+    axis = Axis("history", "increments of unlike bodies, pressed and sheared", _nothing, order=1.0)
+    return _ladder(axis, rungs)
+
+
+# --- fretting parameters ------------------------------------------------------------------------
+
+
+def planes() -> Ladder:
+    """Findley's parameter of random histories of 8 states, lost in the worst hundredth of them."""
+    stress = 100.0 * np.random.default_rng(1).standard_normal((8, 6, HISTORIES))
+
+    def search(planes: int, refinements: int) -> Array:
+        return findley(stress, 0.3, PlaneSearch(planes, refinements)).value
+
+    exact = search(4000, 12)
+
+    def error(value: Array) -> float:
+        return float(np.quantile(1.0 - value / exact, 0.99))
+
+    rungs = []
+    for refinements, counts in PLANES.items():
+        for count in counts:
+            branch = f"refined {refinements} times" if refinements else "a lattice alone"
+            rung = Rung(f"{branch}, {count} planes", (), count**-0.5, branch)
+            own = PlaneSearch(count, refinements) == PlaneSearch()
+            rungs.append(_judged(rung, own, partial(search, count, refinements), error))
+    axis = Axis("planes", f"search for the worst plane, {HISTORIES} histories", _nothing, order=2.0)
+    return _ladder(axis, rungs)
+
+
+# --- all ----------------------------------------------------------------------------------------
+
+CHARTS: Mapping[str, tuple[Callable[[], Ladder], float]] = {
+    "structure": (structure, REQUIRED),
+    "specimens": (specimens, REQUIRED),
+    "history": (history, ACCURACY),
+    "planes": (planes, REQUIRED),
+}
+
+
+def _nothing(case: Any) -> Any:
+    """An axis of no case."""
+    return iter(())
+
+
+def _judged(
+    rung: Rung, own: bool, work: Callable[[], Result], error: Callable[[Result], float]
+) -> Judged:
+    """A rung whose error is known."""
+    result, seconds = _timed(work)
+    point, wrong = Point(rung, own, "", {}, Cost(seconds, 0, 0)), error(result)
+    return Judged(point, wrong, "", wrong, False, False, False)
+
+
+def _ladder(axis: Axis, rungs: list[Judged]) -> Ladder:
+    """Such rungs, the efficient ones marked."""
+    flags = efficient([rung.point.cost.seconds for rung in rungs], [rung.error for rung in rungs])
+    marked = [replace(rung, by_seconds=flag) for rung, flag in zip(rungs, flags, strict=True)]
+    return Ladder(axis, tuple(marked), {}, {})
+
+
+def _meshes(
+    name: str,
+    what: str,
+    meshes: Mapping[int, tuple[int, ...]],
+    default: int,
+    measured: Callable[[Any], dict[str, float]],
+) -> list[Point]:
+    """A case on each of the meshes; ``default`` nodes or elements are its own."""
+    points: list[Point] = []
+    measured(_on_mesh(name, 1, min(meshes[1]) / default))  # compiles what is to be compiled
+    for order, counts in meshes.items():
+        for count in counts:
+            values, seconds = _timed(partial(measured, _on_mesh(name, order, count / default)))
+            rung = Rung(f"order {order}, {count} {what}", (), 1.0 / count, f"order {order}")
+            own = (order, count) == (DEFAULT_ORDER, default)
+            points.append(Point(rung, own, "", values, Cost(seconds, 0, 0)))
+    return points
+
+
+def _on_mesh(name: str, order: int, finer: float) -> Any:
+    """A case whose elements are so much finer."""
+    case: Any = load_case(ROOT / "cases" / f"{name}.yaml")
+    mesh = case.mesh.model_dump(exclude_none=True) | {
+        "order": order,
+        "size": case.mesh.size / finer,
+    }
+    for entry in ("flank_nodes", "pad_elements"):
+        if entry in mesh:
+            mesh[entry] = (finer * np.array(mesh[entry])).round().astype(int).tolist()
+    return load_case(ROOT / "cases" / f"{name}.yaml", [f"mesh={json.dumps(mesh)}"])
+
+
+def _timed(work: Callable[[], Result]) -> tuple[Result, float]:
+    """What comes out, in how many seconds of the processor; nothing is in the cache."""
+    with TemporaryDirectory() as cache:
+        os.environ["FRETSCALE_CACHE"] = cache
+        began = time.process_time()
+        return work(), time.process_time() - began
+
+
+def main(names: list[str]) -> None:
+    """Store the charts named, of all if none is."""
+    for name in names or CHARTS:
+        chart, required = CHARTS[name]
+        ladder = chart()
+        for rung in ladder.rungs:
+            error, seconds = f"{100 * rung.error:.2g} %", f"{rung.point.cost.seconds:.2f} s"
+            print(f"{rung.name}: {error} {rung.worst}, {seconds}")  # noqa: T201
+        with TemporaryDirectory() as folder:
+            draw = partial(axis_figure, ladder, required)
+            (picture,) = write_figures([(f"chart_{name}", draw)], Path(folder))
+            store(picture, ROOT / "docs" / "figures" / picture.name)
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])
