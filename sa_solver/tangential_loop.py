@@ -59,7 +59,7 @@ class LoopFailure(ConvergenceError):
 
 @dataclass(frozen=True)
 class LoopPath:
-    """What is imposed: normal load ``P`` [N], then ±``amplitude`` of a motion or a force.
+    """What is imposed: normal load ``P`` [N], then a motion or a force to and fro.
 
     ``amplitude`` is a motion [mm] or, with ``by`` ``force``, a force [N], along ``axis``. Each
     branch has ``increments`` of equal size. ``moments`` (Mx, My) [N mm] are imposed with P; None

@@ -11,7 +11,7 @@ import dataclasses
 import inspect
 import re
 from collections.abc import Iterator, Sequence
-from functools import cache, cached_property
+from functools import cache, cached_property, partial
 from importlib import import_module
 from pathlib import Path
 from pkgutil import walk_packages
@@ -51,7 +51,10 @@ def setup(app: Sphinx) -> dict[str, bool]:
     TypeAliasForwardRef.__repr__ = lambda self: self.name
     app.connect("builder-inited", lambda app: write_pages(Path(app.srcdir) / "reference"))
     app.connect("autodoc-process-signature", as_written)
+    held: dict[str, list[str]] = {}
+    app.connect("autodoc-process-docstring", partial(as_it_stands, held), priority=100)
     app.connect("autodoc-process-docstring", with_links)
+    app.connect("autodoc-process-docstring", partial(put_back, held), priority=900)
     app.connect("missing-reference", name_of_ours)
     return {"parallel_read_safe": True, "parallel_write_safe": True}
 
@@ -257,6 +260,43 @@ def _documented() -> dict[type, str]:
                 if isinstance(value, type):
                     found[value] = f"{package.__name__}.{name}"
     return found
+
+
+def as_it_stands(
+    held: dict[str, list[str]],
+    app: Sphinx,
+    what: str,
+    name: str,
+    value: Any,
+    options: Any,
+    lines: list[str],
+) -> None:
+    """What is set apart after a colon keeps its lines, and what precedes a colon is no type.
+
+    For the latter, texts of properties are held back from napoleon, which takes it for one.
+    """
+    for number, pair in enumerate(zip(lines, lines[2:], strict=False)):
+        line, following = pair
+        apart = line.endswith(":") and not line.endswith("::") and not lines[number + 1]
+        indent = len(following) - len(following.lstrip())
+        if apart and indent > len(line) - len(line.lstrip()):
+            lines[number] = f"{line}:"
+    if what == "property":
+        held[name] = list(lines)
+
+
+def put_back(
+    held: dict[str, list[str]],
+    app: Sphinx,
+    what: str,
+    name: str,
+    value: Any,
+    options: Any,
+    lines: list[str],
+) -> None:
+    """The text of a property as it was."""
+    if name in held:
+        lines[:] = held.pop(name)
 
 
 def with_links(

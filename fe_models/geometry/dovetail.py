@@ -197,7 +197,7 @@ class Dovetail:
         """Mesh both bodies: ``flank_nodes`` across and along each flank, ``size`` [mm] far away.
 
         ``notch`` is the number of elements round a full circle of a fillet.
-        In two ``dimension``s it is the section in the middle of the slot, which must not be skewed;
+        With ``dimension`` 2 it is the section in the middle of the slot, which must not be skewed;
         nodes along the flank then count for nothing. The disk is body 1, the blade body 2.
         Boundaries: ``intrados`` (X > 0) and ``extrados`` on both; ``inner``, ``sides`` of the disk;
         ``root_bottom``, ``shank_top`` of the blade.

@@ -364,7 +364,7 @@ def _through(values: Array, domain: tuple[float, float]) -> Chebyshev:
 
 
 def steady_stroke(law: UniaxialLaw, evolution: JointEvolution, amplitude: float) -> EnergyPerCycle:
-    """Energy per cycle of one joint between ±``amplitude`` [mm], from its law's closed form.
+    """Energy per cycle of one joint to and fro by ``amplitude`` [mm], in closed form.
 
     Examples
     --------
