@@ -71,7 +71,7 @@ nb_merge_streams = True
 nb_render_markdown_format = "myst"
 
 autodoc_typehints = "signature"
-autodoc_type_aliases = {name: name for name in ("Array", "Indices", "Mask")}
+autodoc_type_aliases = {name: name for name in ("Array", "Flags", "Indices", "Mask", "Parameter")}
 python_maximum_signature_line_length = 88
 python_use_unqualified_type_names = True
 toc_object_entries_show_parents = "hide"

@@ -3,7 +3,7 @@
     python docs/draw_figures.py RUNS [FIGURE ...]
 
 Each has its command beside it, which takes up to half an hour; runs that are finished below RUNS
-are taken as they are.
+are taken, and their figures drawn anew.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-from draw_gallery import ROOT, store
+from draw_gallery import ROOT, store, store_anew
 
 # The figure of the run that is taken, and the command.
 FIGURES = {
@@ -38,7 +38,11 @@ def main(runs: Path, names: list[str]) -> None:
         if not (runs / name / "summary.json").exists():
             arguments = ["fretscale", *shlex.split(command), "--out", str((runs / name).resolve())]
             subprocess.run(arguments, check=True, cwd=ROOT)
-        store(runs / name / "figures" / f"{figure}.png", ROOT / "docs" / "figures" / f"{name}.png")
+        small = ROOT / "docs" / "figures" / f"{name}.png"
+        if command.startswith("run "):
+            store_anew(runs / name, figure, small)
+        else:
+            store(runs / name / "figures" / f"{figure}.png", small)
 
 
 if __name__ == "__main__":
