@@ -285,16 +285,9 @@ def as_it_stands(
         held[name] = list(lines)
 
 
-def put_back(
-    held: dict[str, list[str]],
-    app: Sphinx,
-    what: str,
-    name: str,
-    value: Any,
-    options: Any,
-    lines: list[str],
-) -> None:
-    """The text of a property as it was."""
+def put_back(held: dict[str, list[str]], *told: Any) -> None:
+    """The text of a property as it was; ``told`` is what an extension is told of a text."""
+    _, _, name, _, _, lines = told
     if name in held:
         lines[:] = held.pop(name)
 
