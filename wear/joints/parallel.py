@@ -69,10 +69,10 @@ class ParallelSliders:
         held = np.where(cycle.states == STICK, stiffness, 0.0).sum(axis=1)
         return SlidersCycle(
             force=cycle.force.sum(axis=0, keepdims=True),
-            jacobian=cycle.jacobian.sum(axis=0, keepdims=True),
             samples=cycle.samples.sum(axis=1, keepdims=True),
             states=np.where(held < 0.5 * stiffness.sum(), SLIP, STICK)[:, None],
-            dissipated=cycle.dissipated.sum(keepdims=True),
             change=cycle.change.max(keepdims=True),
+            differentiate=lambda: cycle.jacobian.sum(axis=0, keepdims=True),
+            dissipate=lambda: cycle.dissipated.sum(keepdims=True),
             by_slider=cycle.dissipated,
         )

@@ -20,7 +20,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 
@@ -30,7 +30,11 @@ from wear.joints.friction_contact import FrictionContact
 from wear.joints.jenkins import Jenkins
 from wear.joints.masing import MasingLaw
 from wear.joints.parameters import JointError
-from wear.joints.periodic_contact import settle_contacts
+from wear.joints.periodic_contact import (
+    differentiate_contacts,
+    energies_of_contacts,
+    settle_contacts,
+)
 from wear.joints.periodic_sliders import (
     BOUC_WEN,
     JENKINS,
@@ -45,6 +49,9 @@ STICK, SLIP, SEPARATED = 0, 1, 2
 """States of a joint at a sample. A spread or smooth joint slips where less than half of the
 stiffness that it may lose is left."""
 
+# Joints along one direction have derivatives and energies from their march.
+CONTACT_DIRECTIONS = FrictionContact.directions
+
 SettlingKernel = Callable[[Period, DrivenJoints], None]
 
 
@@ -57,14 +64,25 @@ class SettledCycle:
     ``STICK``, ``SLIP`` and ``SEPARATED`` each, ``dissipated`` ``(j,)`` [N mm] is lost per period.
     ``change`` ``(j,)`` is by how much the force at the first sample still differed after the last
     period, over the largest force.
+
+    What is dear is found when it is asked for: ``differentiate`` and ``dissipate`` tell the
+    derivative and the energies.
     """
 
     force: Array
-    jacobian: Array
     samples: Array
     states: np.ndarray
-    dissipated: Array
     change: Array
+    differentiate: Callable[[], Array]
+    dissipate: Callable[[], Array]
+
+    @cached_property
+    def jacobian(self) -> Array:
+        return self.differentiate()
+
+    @cached_property
+    def dissipated(self) -> Array:
+        return self.dissipate()
 
 
 @dataclass(frozen=True)
@@ -116,7 +134,9 @@ class PeriodicMarch:
         force, states = np.empty_like(path), np.empty(path.shape[:2], np.int8)
         jacobian = np.empty((joints, size, directions, size, directions))
         lost, change = np.empty((2, joints))
-        driven = DrivenJoints(parameters, path, before, force, states, jacobian, lost, change)
+        driven = DrivenJoints(
+            parameters, path, before, force, states, jacobian, lost, change, np.empty((joints, 4))
+        )
         if directions == 1:
             driven = driven._replace(
                 path=path[..., 0],
@@ -126,12 +146,25 @@ class PeriodicMarch:
             )
         period = Period(basis, weights, lead, differences(basis))
 
-        def work(share: slice) -> None:
-            kernel(period, DrivenJoints(*(part[share] for part in driven)))
+        def march(kernel: SettlingKernel) -> None:
+            self._in_shares(
+                joints,
+                lambda share: kernel(period, DrivenJoints(*(part[share] for part in driven))),
+            )
 
-        self._in_shares(joints, work)
+        def written(by: SettlingKernel, result: Array) -> Array:
+            if directions == CONTACT_DIRECTIONS:
+                march(by)
+            return result
+
+        march(kernel)
         return SettledCycle(
-            weights @ force, jacobian, force.transpose(1, 0, 2), states.T, lost, change
+            weights @ force,
+            force.transpose(1, 0, 2),
+            states.T,
+            change,
+            partial(written, differentiate_contacts, jacobian),
+            partial(written, energies_of_contacts, lost),
         )
 
     @cached_property

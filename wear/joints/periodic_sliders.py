@@ -69,7 +69,8 @@ class DrivenJoints(NamedTuple):
 
     ``parameters`` ``(j, k)`` of the law, displacements ``path`` ``(j, t, d)`` in the period and
     ``before`` ``(j, p, d)`` on the way to it [mm], the last of which is the first of ``path``.
-    The others are written: see :class:`wear.joints.periodic.SettledCycle`.
+    The others are written: see :class:`wear.joints.periodic.SettledCycle`; ``settled`` ``(j, 4)``
+    is what contacts in three dimensions need to go on.
     """
 
     parameters: Array
@@ -80,6 +81,7 @@ class DrivenJoints(NamedTuple):
     jacobian: Array
     dissipated: Array
     change: Array
+    settled: Array
 
 
 @compiled(nogil=True, error_model="numpy")

@@ -1,0 +1,397 @@
+"""One increment of a friction contact, compiled: forces, derivatives and energy.
+
+What is solved here, and how, is in :mod:`wear.joints.friction_contact`.
+"""
+
+from __future__ import annotations
+
+from math import ceil, exp, expm1, log, sqrt
+from typing import NamedTuple
+
+import numpy as np
+
+from sa_solver.types import Array
+from wear.joints.compiled import compiled
+
+LONGEST = 300.0  # L: nothing is left of the angle long before, and exp(-2 L) is still a number
+LAST = 1e-9  # of the limit at which a lift-off is taken to be over: its square is below rounding
+CLOSE = 0.03  # of (b - a)/(b + a): below it the logarithmic mean is a series
+TERMS = 5  # of this series: CLOSE**(2 TERMS) is below rounding
+NEGLIGIBLE = 36.0  # exponent: exp(-36) is rounding
+ROUNDING = 1e-16  # of a fraction of an increment
+PANEL = 0.8  # of the exponent per panel: six points leave 1e-14 of tanh there
+SLOPES, ENERGY = 1, 2  # what is wanted of an increment beside its force: bits
+PANELS = 1000  # more than any finite path asks for: a diverged one must still come to an end
+NODES, WEIGHTS = (0.5 * rule for rule in np.polynomial.legendre.leggauss(6))
+NODES = NODES + 0.5
+
+
+class ForcePath(NamedTuple):
+    """A straight path in contact, in terms of forces [N].
+
+    Force of the tangential spring at its start (within the circle there), ``pull`` that the path
+    would add if the slider held, and the limit µ f at its two ends.
+    """
+
+    force_x: float
+    force_y: float
+    pull_x: float
+    pull_y: float
+    start: float
+    end: float
+
+
+class Slip(NamedTuple):
+    """The part of a path on which the slider slips, after the fraction ``held``.
+
+    ``limit`` and direction of the force where slip begins, size and direction of the pull;
+    ``toward`` 1 + cos ψ, ``away`` 1 - cos ψ and ``sine`` sin ψ of the angle from pull to force
+    there; ``rate`` dL/d|k|, ``length`` L over the slip and ``decay`` exp(-L).
+    """
+
+    held: float
+    limit: float
+    force_x: float
+    force_y: float
+    pull: float
+    pull_x: float
+    pull_y: float
+    toward: float
+    away: float
+    sine: float
+    rate: float
+    length: float
+    decay: float
+
+
+@compiled(error_model="numpy")
+def _length(x: float, y: float) -> float:
+    """Of a vector; hypot takes several times as long, for numbers whose squares are none."""
+    return sqrt(x * x + y * y)
+
+
+@compiled(error_model="numpy")
+def _held(path: ForcePath) -> float:
+    """Fraction of a path on which the slider holds: first root of |t0 + k s| = R(s), or 1."""
+    (x, y), (px, py), limit = path[:2], path[2:4], path.start
+    if (x + px) ** 2 + (y + py) ** 2 < path.end * path.end:
+        return 1.0  # by far the most frequent case: a chord within a cone stays there
+    change = path.end - limit
+    pull, force = _length(px, py), _length(x, y)
+    square = (pull - change) * (pull + change)
+    half_slope = x * px + y * py - limit * change
+    constant = min((force - limit) * (force + limit), 0.0)
+    if -constant < ROUNDING * half_slope:
+        return 0.0  # it slips already
+    # half_slope² - square constant, without the products that cancel when the limit vanishes
+    drift, cross = _length(limit * px - change * x, limit * py - change * y), abs(x * py - y * px)
+    root = sqrt(max((drift - cross) * (drift + cross), 0.0))
+    if half_slope > 0.0:
+        return min(-constant / (half_slope + root), 1.0)
+    if square > 0.0:
+        return min((root - half_slope) / square, 1.0)
+    return 1.0  # the circle grows at least as fast as the force
+
+
+@compiled(error_model="numpy")
+def _inverse_mean(a: float, b: float) -> float:
+    """ln(b/a)/(b - a): the mean of 1/R over a limit that changes linearly from a to b."""
+    x = (b - a) / (a + b)
+    if abs(x) > CLOSE:
+        return log(b / a) / (b - a)
+    total = 0.0
+    for j in range(TERMS, -1, -1):
+        total = total * x * x + 1.0 / (2 * j + 1)
+    return 2.0 * total / (a + b)
+
+
+@compiled(error_model="numpy")
+def _inverse_mean_slopes(a: float, b: float) -> tuple[float, float]:
+    """Derivatives of :func:`_inverse_mean` with respect to a and b."""
+    x, mean = (b - a) / (a + b), _inverse_mean(a, b)
+    if abs(x) > CLOSE:
+        return (mean - 1.0 / a) / (b - a), (1.0 / b - mean) / (b - a)
+    slope = 0.0
+    for j in range(TERMS, 0, -1):
+        slope = slope * x * x + 2 * j / (2 * j + 1)
+    slope *= 4.0 * x / (a + b) ** 3
+    return -mean / (a + b) - b * slope, -mean / (a + b) + a * slope
+
+
+@compiled(error_model="numpy")
+def _slip(path: ForcePath, held: float) -> Slip:
+    """Slip that begins at the fraction ``held`` of a path and lasts to its end."""
+    limit = path.start + held * (path.end - path.start)
+    x, y = path.force_x + held * path.pull_x, path.force_y + held * path.pull_y
+    force, pull = _length(x, y), _length(path.pull_x, path.pull_y)
+    # Without a pull the force keeps its direction; without a force it takes that of the pull.
+    px, py = (path.pull_x / pull, path.pull_y / pull) if pull > 0.0 else (x / force, y / force)
+    ex, ey = (x / force, y / force) if limit > 0.0 and force > 0.0 else (px, py)
+    cosine, sine = ex * px + ey * py, px * ey - py * ex
+    # From the sine where the cosine cancels: a force against the pull turns by this remainder.
+    if cosine > 0.0:
+        toward = 1.0 + cosine
+        away = sine * sine / toward
+    else:
+        away = 1.0 - cosine
+        toward = sine * sine / away
+    rate, length = 0.0, LONGEST
+    if limit > 0.0:
+        rate = (1.0 - held) * _inverse_mean(limit, path.end)
+        length = pull * rate
+    decay = exp(-min(length, LONGEST))
+    return Slip(held, limit, ex, ey, pull, px, py, toward, away, sine, rate, length, decay)
+
+
+@compiled(error_model="numpy")
+def _direction(slip: Slip) -> tuple[float, float]:
+    """Direction of the force at the end of a slip."""
+    away = slip.away * slip.decay * slip.decay
+    cosine = (slip.toward - away) / (slip.toward + away)
+    sine = 2.0 * slip.sine * slip.decay / (slip.toward + away)
+    x = cosine * slip.pull_x - sine * slip.pull_y
+    y = cosine * slip.pull_y + sine * slip.pull_x
+    return x, y
+
+
+@compiled(error_model="numpy")
+def _turning(path: ForcePath, slip: Slip) -> tuple[float, float, float, float, float, float]:
+    """Derivative of the angle of the force at the end of a slip.
+
+    With respect to the six numbers of the path, in the order force, limit at the start, pull,
+    limit at the end. With ψ' ~ sin ψ, ∂ψ1/∂ψ0 = sin ψ1/sin ψ0 and ∂ψ1/∂L = -sin ψ1.
+    """
+    decay = slip.decay
+    over = slip.toward + slip.away * decay * decay
+    memory, sine = 2.0 * decay / over, 2.0 * slip.sine * decay / over
+    # 1 - memory, per |k|: how far the force follows when the pull turns
+    following = -expm1(-slip.length) / slip.pull if slip.pull > 0.0 else slip.rate
+    following *= (slip.toward - slip.away * decay) / over
+    along = sine * slip.rate
+    if slip.limit > 0.0:
+        memory /= slip.limit
+        at_start, at_end = _inverse_mean_slopes(slip.limit, path.end)
+    else:
+        memory, at_start, at_end = 0.0, 0.0, 0.0
+    left = 1.0 - slip.held
+    shorter = sine * slip.pull * left
+    return (
+        -memory * slip.force_y,
+        memory * slip.force_x,
+        -shorter * at_start * left,
+        -memory * slip.held * slip.force_y - following * slip.pull_y - along * slip.pull_x,
+        memory * slip.held * slip.force_x + following * slip.pull_x - along * slip.pull_y,
+        -shorter * (at_start * slip.held + at_end),
+    )
+
+
+@compiled(error_model="numpy")
+def _lost_in_slip(path: ForcePath, slip: Slip) -> float:
+    """kt times the energy lost in a slip, ∫ R (k·e - R') ds [N²].
+
+    As if the force had the direction of the pull, less ∫ R |k| (1 - cos ψ) ds, over the share η of
+    L: then R = R0 (R1/R0)^η, and 1 - cos ψ is rational in exp(-2 L η).
+    """
+    left = 1.0 - slip.held
+    straight = 0.5 * (slip.limit + path.end) * (slip.pull - path.end + path.start) * left
+    if slip.away == 0.0 or slip.length == 0.0 or straight <= 0.0:
+        return max(straight, 0.0)
+    growth, decay = 2.0 * log(path.end / slip.limit), 2.0 * slip.length
+    # What is left of the integral at η is at most R0² (1 - cos ψ0)/(1 + cos ψ0) exp((growth -
+    # decay) η): it ends where that is negligible, for a force along the pull before it begins.
+    most = slip.limit * slip.limit * slip.away / slip.toward
+    exponent = NEGLIGIBLE + log(most / straight)
+    if exponent <= 0.0:
+        return straight
+    share = exponent / (decay - growth)
+    if not 0.0 < share < 1.0:
+        share = 1.0
+    asked = share * max(abs(growth), decay) / PANEL
+    panels = ceil(asked) if asked < PANELS else PANELS
+    width, turned = share / panels, 0.0
+    for panel in range(panels):
+        for node in range(NODES.size):
+            at = (panel + NODES[node]) * width
+            away = slip.away * exp(-decay * at)
+            turned += WEIGHTS[node] * exp(growth * at) * 2.0 * away / (slip.toward + away)
+    turned *= width * slip.length * slip.limit * slip.limit
+    return max(straight - turned, 0.0)
+
+
+@compiled(error_model="numpy")
+def _follow(path: ForcePath, jacobian: Array, wanted: int) -> tuple[float, float, float]:
+    """Tangential force at the end of a path in contact, and kt times the energy lost.
+
+    Its derivative is written into ``jacobian[:2]``, in the order of :func:`_turning`; what is not
+    ``wanted`` is left out, as in :func:`advance_contact`.
+    """
+    held = _held(path)
+    if held == 1.0:
+        if wanted & SLOPES:
+            jacobian[0, 0] = jacobian[0, 3] = jacobian[1, 1] = jacobian[1, 4] = 1.0
+        return path.force_x + path.pull_x, path.force_y + path.pull_y, 0.0
+    slip = _slip(path, held)
+    x, y = _direction(slip)
+    if wanted & SLOPES:
+        for column, turning in enumerate(_turning(path, slip)):
+            jacobian[0, column] = -path.end * y * turning
+            jacobian[1, column] = path.end * x * turning
+        jacobian[0, 5] += x
+        jacobian[1, 5] += y
+    lost = _lost_in_slip(path, slip) if wanted & ENERGY else 0.0
+    return path.end * x, path.end * y, lost
+
+
+@compiled(error_model="numpy")
+def _lost_in_lift_off(path: ForcePath, contact: float) -> float:
+    """kt times the energy lost on a path that lifts off after the fraction ``contact``."""
+    share = contact * (1.0 - LAST)
+    last = ForcePath(
+        path.force_x,
+        path.force_y,
+        share * path.pull_x,
+        share * path.pull_y,
+        path.start,
+        LAST * path.start,
+    )
+    held = _held(last)
+    return _lost_in_slip(last, _slip(last, held)) if held < 1.0 else 0.0
+
+
+@compiled(error_model="numpy")
+def _pulled_back(x: float, y: float, limit: float, jacobian: Array) -> None:
+    """Chain the derivative with that of the return of a force (x, y) onto the circle."""
+    force = _length(x, y)
+    x, y, shrink = x / force, y / force, limit / force
+    for row in range(2):
+        radial = jacobian[row, 0] * x + jacobian[row, 1] * y
+        across = shrink * (jacobian[row, 1] * x - jacobian[row, 0] * y)
+        jacobian[row, 0], jacobian[row, 1] = -across * y, across * x
+        jacobian[row, 2] += radial
+
+
+@compiled(error_model="numpy")
+def _in_displacements(stiffness: float, limit_slope: float, jacobian: Array) -> None:
+    """Chain the derivative from forces and limits to elongation, approach and increment."""
+    for row in range(2):
+        for column in (0, 1, 3, 4):
+            jacobian[row, column] *= stiffness
+        jacobian[row, 2] = limit_slope * (jacobian[row, 2] + jacobian[row, 5])
+        jacobian[row, 5] *= limit_slope
+
+
+@compiled(error_model="numpy")
+def _touching(entry: float, pull_x: float, pull_y: float, change: float, jacobian: Array) -> None:
+    """Chain the derivative with that of the touch after the fraction ``entry`` of an increment.
+
+    The pull is that of the whole increment, ``change`` that of the limit µ f, negative before the
+    touch. The force forgets what it was before.
+    """
+    for row in range(2):
+        missed = (jacobian[row, 3] * pull_x + jacobian[row, 4] * pull_y) / change
+        jacobian[row, 0] = jacobian[row, 1] = 0.0
+        jacobian[row, 2] = missed * (1.0 - entry)
+        jacobian[row, 3] *= 1.0 - entry
+        jacobian[row, 4] *= 1.0 - entry
+        jacobian[row, 5] += missed * entry
+
+
+@compiled(error_model="numpy")
+def _touched(path: ForcePath) -> ForcePath:
+    """The part of a path that is in contact at its end, from a force within the circle.
+
+    The limit may be negative at its start: no contact there. A force outside the circle (the limit
+    has shrunk since) slips back onto it.
+    """
+    start, x, y = max(path.start, 0.0), path.force_x, path.force_y
+    force = _length(x, y)
+    if force > start:
+        x, y = x * start / force, y * start / force
+    entry = 0.0 if path.start > 0.0 else path.start / (path.start - path.end)
+    left = 1.0 - entry
+    return ForcePath(x, y, left * path.pull_x, left * path.pull_y, start, path.end)
+
+
+@compiled(error_model="numpy")
+def advance_force(path: ForcePath) -> tuple[float, float]:
+    """Tangential force at the end of an increment: of :func:`advance_contact` the cheapest part."""
+    if path.end <= 0.0:
+        return 0.0, 0.0
+    contact = _touched(path)
+    held = _held(contact)
+    if held == 1.0:
+        return contact.force_x + contact.pull_x, contact.force_y + contact.pull_y
+    x, y = _direction(_slip(contact, held))
+    return path.end * x, path.end * y
+
+
+@compiled(error_model="numpy")
+def _tangential(path: ForcePath, jacobian: Array, wanted: int) -> tuple[float, float, float]:
+    """Tangential force at the end of an increment, and kt times the energy lost.
+
+    The limits of ``path`` may be negative here: no contact.
+    """
+    start = max(path.start, 0.0)
+    force = _length(path.force_x, path.force_y)
+    lost = 0.5 * (force - start) * (force + start) if force > start else 0.0
+    if path.end <= 0.0:
+        if start > 0.0 and wanted & ENERGY:
+            contact = _touched(path)
+            lost += _lost_in_lift_off(contact, start / (start - path.end))
+        return 0.0, 0.0, lost
+    contact = _touched(path)
+    end_x, end_y, slipped = _follow(contact, jacobian, wanted)
+    if not wanted & SLOPES:
+        return end_x, end_y, lost + slipped
+    if path.start <= 0.0:
+        entry = path.start / (path.start - path.end)
+        _touching(entry, path.pull_x, path.pull_y, path.end - path.start, jacobian)
+    elif force > start:
+        _pulled_back(path.force_x, path.force_y, start, jacobian)
+    return end_x, end_y, lost + slipped
+
+
+@compiled(error_model="numpy")
+def advance_contact(
+    parameters: Array,
+    start: Array,
+    increment: Array,
+    force: Array,
+    end: Array,
+    jacobian: Array,
+    wanted: int = SLOPES | ENERGY,
+) -> float:
+    """Advance one joint by an increment of displacement ``(3,)``; return the energy it loses.
+
+    For compiled loops: allocates nothing. ``parameters`` ``(5,)`` is a row of those of
+    :class:`wear.joints.friction_contact.FrictionContact`, ``start`` ``(3,)`` a state. Written are
+    the ``force`` ``(3,)`` and state ``end`` ``(3,)``, which may be ``start``, at the end of the
+    increment, and ``jacobian`` ``(3, 6)``, the derivative of that force with respect to the state
+    at the start (the first three columns) and to the increment (the others). The state follows the
+    force: its derivative is that of the tangential force divided by kt, and of z + dz. Without
+    ``SLOPES`` among what is ``wanted`` it is not written, without ``ENERGY`` the energy means
+    nothing.
+    """
+    stiffness, normal_stiffness, friction = parameters[0], parameters[1], parameters[2]
+    before = parameters[3] + normal_stiffness * (start[2] - parameters[4])
+    approach = start[2] + increment[2]
+    after = parameters[3] + normal_stiffness * (approach - parameters[4])
+    path = ForcePath(
+        stiffness * start[0],
+        stiffness * start[1],
+        stiffness * increment[0],
+        stiffness * increment[1],
+        friction * before,
+        friction * after,
+    )
+    if wanted & SLOPES:
+        jacobian[:] = 0.0
+    force[0], force[1], lost = _tangential(path, jacobian, wanted)
+    force[2] = max(after, 0.0)
+    if wanted & SLOPES:
+        _in_displacements(stiffness, friction * normal_stiffness, jacobian)
+        if after > 0.0:
+            jacobian[2, 2] = jacobian[2, 5] = normal_stiffness
+    end[0], end[1], end[2] = force[0] / stiffness, force[1] / stiffness, approach
+    energy: float = lost / stiffness
+    return energy
