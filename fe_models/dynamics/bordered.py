@@ -22,6 +22,11 @@ from sa_solver.types import Array
 GMRES_TOLERANCE = 1e-6
 # Krylov vectors of GMRES. If it needs more, the matrix is solved directly.
 MAX_VECTORS = 150
+# Preconditioned solutions of what earlier ones leave, at most, and the share of it that each may
+# leave: more of them would not help.
+MAX_REFINED, LOOSEST_REFINED = 4, 0.1
+# Share of what is wanted that they are asked for: what is left is measured differently.
+BELOW = 0.3
 
 
 class LinearMap(Protocol):
@@ -41,6 +46,10 @@ class Preconditioned(Protocol):
         """The inverse of the other one times a vector ``(n,)``."""
         ...
 
+    def preconditioned(self, vector: Array) -> Array:
+        """That inverse times the matrix times a vector; cheaper than both, nearly the same."""
+        ...
+
 
 def solve_alone(
     jacobian: Array | LinearMap, rhs: Array, tolerance: float = GMRES_TOLERANCE
@@ -54,8 +63,8 @@ def solve_alone(
         return _Factors(jacobian).solve(rhs)
     if rhs.ndim == 2:
         return np.stack([solve_alone(jacobian, side, tolerance) for side in rhs.T], axis=1)
-    preconditioner = jacobian.precondition if isinstance(jacobian, Preconditioned) else None
-    solution = _iteratively(lambda vector: jacobian @ vector, preconditioner, rhs, tolerance)
+    alike = jacobian if isinstance(jacobian, Preconditioned) else None
+    solution = _iteratively(jacobian, alike, rhs, tolerance)
     return _Factors(jacobian.assembled()).solve(rhs) if solution is None else solution
 
 
@@ -98,8 +107,17 @@ class Bordered:
 
         The border is eliminated with it, and a pivot that is not 0.
         """
-        upper = self._inner_preconditioned(vector[:-1])
-        last = (vector[-1] - self._row[:-1] @ upper) / self._pivot
+        return self._border_undone(self._inner_preconditioned(vector[:-1]), float(vector[-1]))
+
+    def preconditioned(self, vector: Array) -> Array:
+        """That inverse times the matrix times a vector."""
+        inner = self.inner
+        assert isinstance(inner, Preconditioned)
+        upper = inner.preconditioned(vector[:-1]) + vector[-1] * self._preconditioned_column
+        return self._border_undone(upper, float(self._row @ vector))
+
+    def _border_undone(self, upper: Array, last: float) -> Array:
+        last = (last - float(self._row[:-1] @ upper)) / self._pivot
         return np.append(upper - last * self._preconditioned_column, last)
 
     def solve(self, rhs: Array, tolerance: float = GMRES_TOLERANCE) -> Array:
@@ -108,8 +126,8 @@ class Bordered:
         As :func:`solve_alone`.
         """
         if not self._direct:
-            preconditioner = self.precondition if isinstance(self.inner, Preconditioned) else None
-            solution = _iteratively(self.__matmul__, preconditioner, rhs, tolerance)
+            alike = isinstance(self.inner, Preconditioned)
+            solution = _iteratively(self, self if alike else None, rhs, tolerance)
             if solution is not None:
                 return solution
             self._direct = True
@@ -163,21 +181,27 @@ class _Factors:
 
 
 def _iteratively(
-    times: Callable[[Array], Array],
-    preconditioner: Callable[[Array], Array] | None,
-    rhs: Array,
-    tolerance: float,
+    matrix: LinearMap, alike: Preconditioned | None, rhs: Array, tolerance: float
 ) -> Array | None:
-    """Solution by GMRES, preconditioned from the right if it can be; None if it does not converge.
+    """Solution by GMRES, preconditioned from the left if it can be; None if it does not converge.
 
+    What a preconditioned solution leaves is seen with the matrix itself, and solved for again.
     Where preconditioning loses too many digits, as of joints that stick for ones that slide near a
     resonance of either, products alone are tried.
     """
-    if preconditioner is not None:
-        preconditioned = _gmres(lambda vector: times(preconditioner(vector)), rhs, tolerance)
-        if preconditioned is not None:
-            return preconditioner(preconditioned)
-    return _gmres(times, rhs, tolerance)
+    if alike is not None:
+        solution, left = np.zeros_like(rhs), rhs
+        enough = tolerance * float(np.linalg.norm(rhs))
+        for _ in range(MAX_REFINED):
+            share = min(BELOW * enough / float(np.linalg.norm(left) or 1.0), LOOSEST_REFINED)
+            part = _gmres(alike.preconditioned, alike.precondition(left), share)
+            if part is None:
+                break
+            solution = solution + part
+            left = rhs - matrix @ solution
+            if np.linalg.norm(left) <= enough:
+                return solution
+    return _gmres(lambda vector: matrix @ vector, rhs, tolerance)
 
 
 def _gmres(times: Callable[[Array], Array], rhs: Array, tolerance: float) -> Array | None:

@@ -82,14 +82,15 @@ class Balance:
     """The equations at one motion: what is left of them ``(n,)``, and derivatives when asked for.
 
     ``over`` is what varies, frequency or force; ``steady`` the structure at this frequency,
-    ``motion`` ``(k, n)`` that of its modes, ``cycle`` what the joints do, ``size`` the norm of the
-    terms that balance.
+    ``on_modes`` ``(k, n)`` the forces on its modes, ``vibration`` ``(k, n)`` their motion without
+    the mean, ``cycle`` what the joints do, ``size`` the norm of the terms that balance.
     """
 
     problem: HarmonicBalance
     over: str
     steady: SteadyMotion
-    motion: ComplexArray
+    on_modes: ComplexArray
+    vibration: ComplexArray
     cycle: Cycle
     residual: Array
     size: float
@@ -97,6 +98,11 @@ class Balance:
     @cached_property
     def relative(self) -> float:
         return relative_norm(self.residual, self.size)
+
+    @cached_property
+    def motion(self) -> ComplexArray:
+        """That of the modes ``(k, n)``."""
+        return self.steady.respond(self.on_modes)
 
     @cached_property
     def jacobian(self) -> Array | LinearMap:
@@ -113,8 +119,8 @@ class Balance:
         problem, steady = self.problem, self.steady
         if self.over == "force":
             return -problem.transfer.at_joints(steady.respond(problem.wave))
-        forces = steady.stiffness_slope(self.motion) * (2.0 * np.pi * problem.orders[:, None])
-        return problem.transfer.at_joints(steady.respond(forces))
+        forces = steady.stiffness_slope(self.vibration) * (2.0 * np.pi * problem.orders[:, None])
+        return problem.transfer.at_joints(steady.vibrate(forces))
 
 
 class HarmonicBalance:
@@ -196,7 +202,7 @@ class HarmonicBalance:
         """Unknowns taken from another motion, or those of the structure at rest under its load."""
         if start is None:
             unknowns = self.transfer.shaped(np.zeros(self.size))
-            if self.resolution.harmonics[0] == 0:
+            if self.transfer.mean:
                 unknowns[:, 0] = self.rest.displacement
             return unknowns.ravel()
         return self.resolution.adopt(start.coefficients, start.resolution).ravel()
@@ -331,11 +337,24 @@ class HarmonicBalance:
             coefficients, resolution.basis, resolution.weights, resolution.lead
         )
         steady = self.receptance.at(2.0 * np.pi * frequency * self.orders)
-        by_joints = self.transfer.on_modes(cycle.force, unknowns)
-        motion = steady.respond(self._constant + force * self.wave - by_joints)
-        response = self.transfer.at_joints(motion)
+        on_modes = self._constant + force * self.wave
+        on_modes -= self.transfer.on_modes(cycle.force, unknowns)
+        vibration = steady.vibrate(on_modes)
+        response = self.transfer.response(vibration, -cycle.force, -unknowns)
+        if self.transfer.mean:
+            constant, growing = self._mean_by_load
+            self.transfer.shaped(response)[:, 0] += constant + force * growing
         size = self._size(coefficients, response, cycle)
-        return Balance(self, over, steady, motion, cycle, unknowns - response, size)
+        residual = unknowns - response
+        return Balance(self, over, steady, on_modes, vibration, cycle, residual, size)
+
+    @cached_property
+    def _mean_by_load(self) -> Array:
+        """Mean displacement ``(2, j, d)`` of the joints by the load alone, constant and growing."""
+        rest = self.receptance.respond_at_rest
+        loads = np.stack([self._constant[0].real, self.wave[0].real])
+        means = np.stack([rest(load) for load in loads]) @ self.receptance.at_joints.T
+        return means.reshape(2, self.transfer.joints, -1)
 
     def _size(self, coefficients: Array, response: Array, cycle: Cycle) -> float:
         """Norm of the terms that balance.
@@ -347,7 +366,7 @@ class HarmonicBalance:
         first = int(self.transfer.held > 0.0)
         size = np.linalg.norm(coefficients[:, first:])
         size += np.linalg.norm(self.transfer.shaped(response)[:, first:])
-        if self.resolution.harmonics[0] == 0:
+        if self.transfer.mean:
             flexibility = self.receptance.static_flexibility
             size += np.linalg.norm(flexibility @ cycle.force[:, 0].ravel())
             size += np.linalg.norm(self.rest.loaded)

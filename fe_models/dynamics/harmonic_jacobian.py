@@ -17,7 +17,11 @@ from numba import njit
 from fe_models.dynamics.harmonics import ComplexArray, Resolution, by_function, by_joint
 from fe_models.dynamics.joint_rest import Rest
 from fe_models.dynamics.receptance import Receptance, SteadyMotion
+from fe_models.dynamics.static_residual import ResidualReceptance
 from sa_solver.types import Array
+
+# Share of the largest derivative below which one that differs from that at rest is rounding.
+SAME = 1e-9
 
 
 @dataclass(frozen=True)
@@ -38,38 +42,53 @@ class HarmonicTransfer:
         """Coefficients of all joints."""
         return self.joints * self.resolution.size * self.directions
 
+    @property
+    def mean(self) -> bool:
+        """Whether harmonic 0 is one of the motion."""
+        return self.resolution.harmonics[0] == 0
+
     @cached_property
     def held(self) -> float:
         """κ [N/mm], 0 where it is not needed."""
-        return self.receptance.held if self.resolution.harmonics[0] == 0 else 0.0
+        return self.receptance.held if self.mean else 0.0
 
     def shaped(self, unknowns: Array) -> Array:
         """Coefficients ``(j, m, d)`` from all in a row."""
         return unknowns.reshape(self.joints, self.resolution.size, self.directions)
 
-    def on_modes(
-        self, force: Array, unknowns: Array, structure: Receptance | None = None
-    ) -> ComplexArray:
+    def on_modes(self, force: Array, unknowns: Array) -> ComplexArray:
         """Forces on the modes ``(k, n)``, of the opposite sign, by joints' ``force`` ``(j, m, d)``.
 
-        It is their ``unknowns`` by which they are held at harmonic 0. The modes are those of this
-        structure, or of another one.
+        It is their ``unknowns`` by which they are held at harmonic 0.
         """
-        structure, rows = structure or self.receptance, by_function(force)
+        rows = by_function(force)
         if self.held:
             # Of a single joint the rows are a view of the given force, which stays as it is.
             rows = rows.copy()
-            rows[0] -= self.held * self.shaped(unknowns)[:, 0].ravel()
-        return self.resolution.combined(rows @ structure.at_joints)
+            rows[0] -= self._holding(unknowns)
+        return self.resolution.combined(rows @ self.receptance.at_joints)
 
-    def at_joints(self, motion: ComplexArray, structure: Receptance | None = None) -> Array:
-        """Coefficients ``(j m d,)`` of the joints' displacements, of a motion of the modes.
-
-        The modes are those of this structure, or of another one.
-        """
-        structure = structure or self.receptance
-        rows = self.resolution.separated(motion) @ structure.at_joints.T
+    def at_joints(self, motion: ComplexArray) -> Array:
+        """Coefficients ``(j m d,)`` of the joints' displacements, of a motion of the modes."""
+        rows = self.resolution.separated(motion) @ self.receptance.at_joints.T
         return by_joint(rows, self.directions).ravel()
+
+    def response(self, vibration: ComplexArray, force: Array, unknowns: Array) -> Array:
+        """:meth:`at_joints` of a motion without its mean, and what the joints' forces do to that.
+
+        ``vibration`` ``(k, n)`` is 0 at harmonic 0; the others as of :meth:`on_modes`.
+        """
+        response = self.at_joints(vibration)
+        if self.mean:
+            mean = self.receptance.static_flexibility @ (
+                force[:, 0].ravel() - self._holding(unknowns)
+            )
+            self.shaped(response)[:, 0] += mean.reshape(-1, self.directions)
+        return response
+
+    def _holding(self, unknowns: Array) -> Array:
+        """Forces ``(j d,)`` of the springs that hold the joints at harmonic 0."""
+        return self.held * self.shaped(unknowns)[:, 0].ravel()
 
 
 @dataclass(frozen=True)
@@ -90,24 +109,59 @@ class HarmonicJacobian:
         size = self.slopes.shape[1] * self.slopes.shape[2]
         columns = vector.reshape(joints, size, 1)
         force = (self.slopes.reshape(joints, size, size) @ columns).reshape(self.slopes.shape[:3])
-        return vector + self._answer(self.steady, force, vector)
+        motion = self.steady.vibrate(self.transfer.on_modes(force, vector))
+        return vector + self.transfer.response(motion, force, vector)
 
     def precondition(self, vector: Array) -> Array:
-        """The inverse with the joints' stiffness D at rest, for J, times a vector.
+        """The inverse P of the matrix with the joints' stiffness D at rest, for J, times a vector.
 
-        (1 + R (D - κ))⁻¹ = 1 - R' (D - κ), with receptances R' of the structure stiffened by D.
+        P = (1 + R (D - κ))⁻¹ = 1 - R' (D - κ), with receptances R' of the structure stiffened by D.
+        Where D does not hold it, springs κ' do: then D + κ' at harmonic 0. Of R' the high modes
+        answer as at rest.
         """
         shaped = vector.reshape(self.slopes.shape[:3])
-        return vector - self._answer(self._stiffened, shaped @ self.rest.tangents, vector)
+        force = shaped @ self.rest.tangents
+        if self.transfer.mean:
+            held = self.rest.stiffened.held - self.transfer.held
+            force[:, 0] += held * shaped[:, 0]
+        response = self._everywhere.respond(by_function(force))
+        return vector - by_joint(response, self.transfer.directions).ravel()
+
+    def preconditioned(self, vector: Array) -> Array:
+        """P times the matrix times a vector: P (1 + R (J - κ)) = 1 + R' (J - D), in one step.
+
+        Only joints that do not do as at rest have a part in it.
+        """
+        joints, excess, receptance = self._differing
+        shaped = vector.reshape(self.slopes.shape[:3])
+        force = (excess @ shaped[joints].reshape(*excess.shape[:2], 1)).reshape(
+            -1, *shaped.shape[1:]
+        )
+        response = receptance.respond(by_function(force))
+        return vector + by_joint(response, self.transfer.directions).ravel()
 
     @cached_property
-    def _stiffened(self) -> SteadyMotion:
-        return self.rest.stiffened.at(self.steady.angular)
+    def _differing(self) -> tuple[np.ndarray, Array, ResidualReceptance]:
+        """Joints ``(a,)`` whose J is not D, their J - D ``(a, m d, m d)``, and R' of these."""
+        joints, size, directions = self.slopes.shape[:3]
+        excess, functions = self.slopes.copy(), np.arange(size)
+        # The axes of the two functions come first: (m, j, d, d).
+        excess[:, functions, :, functions] -= self.rest.tangents
+        if self.transfer.mean:
+            excess[:, 0, :, 0] -= self.rest.stiffened.held * np.eye(directions)
+        excess = excess.reshape(joints, size * directions, size * directions)
+        each = np.abs(excess).max(axis=(1, 2))
+        differing = np.flatnonzero(each > SAME * np.abs(self.slopes).max())
+        places = (differing[:, None] * directions + np.arange(directions)).ravel()
+        return differing, excess[differing], self._residual(places)
 
-    def _answer(self, steady: SteadyMotion, force: Array, vector: Array) -> Array:
-        transfer, structure = self.transfer, steady.structure
-        motion = steady.respond(transfer.on_modes(force, vector, structure))
-        return transfer.at_joints(motion, structure)
+    @cached_property
+    def _everywhere(self) -> ResidualReceptance:
+        return self._residual(slice(None))
+
+    def _residual(self, some: np.ndarray | slice) -> ResidualReceptance:
+        resolution = self.transfer.resolution
+        return ResidualReceptance(self.rest.stiffened, resolution, self.steady.angular, some)
 
     def assembled(self) -> Array:
         """The matrix ``(n, n)``."""

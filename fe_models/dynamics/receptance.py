@@ -58,9 +58,15 @@ class SteadyMotion:
 
     def respond(self, force: ComplexArray) -> ComplexArray:
         """Displacements under forces; held at ω = 0."""
-        moving, response = self._moving, np.empty(force.shape, dtype=complex)
-        if moving:
+        response = self.vibrate(force)
+        if self._moving:
             response[0] = self.structure.respond_at_rest(force[0].real)
+        return response
+
+    def vibrate(self, force: ComplexArray) -> ComplexArray:
+        """:meth:`respond` without what constant forces do: 0 at ω = 0."""
+        moving, response = self._moving, np.empty(force.shape, dtype=complex)
+        response[:moving] = 0.0
         if not self._mixed:
             np.multiply(force[moving:], self._flexibility, out=response[moving:])
         else:
@@ -126,6 +132,8 @@ class Receptance:
         self.static_flexibility = self.at_joints @ sl.cho_solve(
             self.static_factors, self.at_joints.T
         )
+        # The last one asked for: along a branch it hardly changes.
+        self._residuals: dict[int, Array] = {}
 
     def at(self, angular: Array) -> SteadyMotion:
         """The structure at ``k`` frequencies [rad/s]."""
@@ -137,6 +145,14 @@ class Receptance:
             return np.asarray(force / self.squares)
         # Of every product with a Jacobian: numbers that are not finite are found in what it leaves.
         return np.asarray(sl.cho_solve(self.static_factors, force, check_finite=False))
+
+    def residual_flexibility(self, count: int) -> Array:
+        """Displacements of joints by constant forces on joints ``(j d, j d)``, by all modes but so
+        many of the lowest."""
+        if count not in self._residuals:
+            high = self.at_joints[:, count:]
+            self._residuals = {count: (high / self.squares[count:]) @ high.T}
+        return self._residuals[count]
 
     def _holding_stiffness(self) -> float:
         """κ, a share of what the structure opposes to its joints where it strains."""

@@ -43,6 +43,7 @@ POINT, NODE = 1.0, 500.0
 RESPONSE = {5: 300.0, 15: 1800.0}
 # Of that response [N, Hz].
 CONTACTS_FORCE, CONTACTS_SPAN = 10.0, (50.0, 500.0)
+SLIDING_FORCE, SLIDING_SPAN = 90.0, (20.0, 500.0)
 # The rig of the thesis, [t, N/mm], and its joint.
 MODEL = two_mass_rig((21.152e-3, 1.189e-3), (1.3469e3, 273e3), 0.001)
 KT, MU, LOAD = 45e3, 0.88, 60.0
@@ -136,6 +137,19 @@ def test_response_of_the_contacts(
     record[f"121 contacts, {odd} odd harmonics: seconds of a response"] = seconds
     record[f"121 contacts, {odd} odd harmonics: points"] = len(branch.solutions)
     assert seconds <= RESPONSE[odd]
+
+
+@pytest.mark.slow
+def test_response_of_sliding_contacts(contacts: HarmonicBalance, record: dict[str, float]) -> None:
+    """The same under a force that slides all contacts, through the peak at 39 Hz."""
+    problem = contacts.refined(Resolution((0, *range(1, 10, 2)), SAMPLES))
+    begin = time.process_time()
+    branch = along_frequency(problem, SLIDING_FORCE, SLIDING_SPAN, control=STEPS)
+    seconds = time.process_time() - begin
+    assert branch.message == ""
+    record["121 contacts, sliding: processor seconds of a response"] = seconds
+    record["121 contacts, sliding: points"] = len(branch.solutions)
+    assert seconds <= RESPONSE[5]
 
 
 def by_pyharm(folder: Path) -> dict[str, Any]:

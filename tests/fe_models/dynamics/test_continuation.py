@@ -75,6 +75,9 @@ class LikeAnother(Products):
     def precondition(self, vector):
         return self._inverse @ vector
 
+    def preconditioned(self, vector):
+        return self._inverse @ (self @ vector)
+
 
 # λ = u³ - 3 u + 5, with folds at u = ∓1, λ = 7 and 3.
 S_CURVE = scalar(

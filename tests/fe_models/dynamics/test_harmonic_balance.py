@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -17,6 +18,7 @@ from fe_models.dynamics.harmonics import HarmonicBalanceError, Resolution
 from fe_models.dynamics.receptance import Receptance, ReceptanceError
 from fe_models.dynamics.resolution_error import resolution_error
 from fe_models.dynamics.rig import Link, lumped_rig, natural_frequencies, unit_force
+from fe_models.dynamics.static_residual import AT_REST, ResidualReceptance, modes_that_move
 from tests.fe_models.dynamics.harmonic_rigs import (
     EXACT,
     KT,
@@ -80,6 +82,26 @@ def test_receptances_are_the_inverse_of_the_dynamic_stiffness(damping):
         np.testing.assert_allclose(motion[place], inverse @ load, rtol=EXACT)
         wanted = model.connection @ inverse @ model.connection.T
         np.testing.assert_allclose(between[place], wanted, rtol=EXACT)
+
+
+def test_modes_far_above_the_forces_answer_as_at_rest():
+    """A chain of 40 masses, its few lowest modes slow: all others miss (ω/ω_n)² of their part."""
+    names = [f"m{place}" for place in range(40)]
+    springs = {Link(name): 1e5 * 1.4**place for place, name in enumerate(names)}
+    springs |= {Link(one, other): 1e6 for one, other in pairwise(names)}
+    model = lumped_rig(
+        dict.fromkeys(names, 1e-3), springs, [[Link("m0")], [Link("m7")], [Link("m39")]], 0.02
+    )
+    receptance, resolution = Receptance(model), Resolution((0, 1, 3), 16)
+    angular = np.array([0.0, 100.0, 300.0])
+    moving = modes_that_move(receptance, angular[-1])
+    assert 0 < moving < len(names)
+    force = np.random.default_rng(3).standard_normal((resolution.size, 2))
+    some = np.array([0, 2])
+    answer = ResidualReceptance(receptance, resolution, angular, some).respond(force)
+    between = receptance.at(angular).between_joints()[:, :, some]
+    wanted = resolution.separated((between @ resolution.combined(force)[:, :, None])[:, :, 0])
+    np.testing.assert_allclose(answer, wanted, atol=AT_REST**-2 * np.abs(wanted).max())
 
 
 def test_a_structure_that_nothing_holds_is_refused():
@@ -175,6 +197,14 @@ def test_stuck_joints_are_preconditioned_by_their_stiffness(free):
     products = HarmonicJacobian(problem.transfer, problem.rest, at.steady, at.cycle.jacobian)
     vector = np.random.default_rng(8).standard_normal(problem.size)
     np.testing.assert_allclose(products.precondition(products @ vector), vector, atol=1e-9)
+    # In one step, also where joints do something else.
+    moved = motion.coefficients.copy()
+    moved[:, 1:] *= 100.0
+    at = problem.evaluate(moved.ravel(), 30.0, 0.1, "frequency")
+    products = HarmonicJacobian(problem.transfer, problem.rest, at.steady, at.cycle.jacobian)
+    wanted = products.precondition(products @ vector)
+    np.testing.assert_allclose(products.preconditioned(vector), wanted, atol=1e-9)
+    assert np.abs(wanted - vector).max() > 1e-3
 
 
 def test_a_solution_keeps_no_derivatives():
