@@ -340,8 +340,9 @@ class HarmonicBalance:
         on_modes = self._constant + force * self.wave
         on_modes -= self.transfer.on_modes(cycle.force, unknowns)
         vibration = steady.vibrate(on_modes)
-        response = self.transfer.response(vibration, -cycle.force, -unknowns)
+        response = self.transfer.at_joints(vibration)
         if self.transfer.mean:
+            response -= self.transfer.mean_response(cycle.force, unknowns)
             constant, growing = self._mean_by_load
             self.transfer.shaped(response)[:, 0] += constant + force * growing
         size = self._size(coefficients, response, cycle)

@@ -73,17 +73,14 @@ class HarmonicTransfer:
         rows = self.resolution.separated(motion) @ self.receptance.at_joints.T
         return by_joint(rows, self.directions).ravel()
 
-    def response(self, vibration: ComplexArray, force: Array, unknowns: Array) -> Array:
-        """:meth:`at_joints` of a motion without its mean, and what the joints' forces do to that.
+    def mean_response(self, force: Array, unknowns: Array) -> Array:
+        """Coefficients ``(j m d,)`` of the mean displacement by the mean of forces on joints.
 
-        ``vibration`` ``(k, n)`` is 0 at harmonic 0; the others as of :meth:`on_modes`.
+        The forces are ``force`` ``(j, m, d)`` less those by which the ``unknowns`` are held.
         """
-        response = self.at_joints(vibration)
-        if self.mean:
-            mean = self.receptance.static_flexibility @ (
-                force[:, 0].ravel() - self._holding(unknowns)
-            )
-            self.shaped(response)[:, 0] += mean.reshape(-1, self.directions)
+        response = np.zeros(self.size)
+        mean = self.receptance.static_flexibility @ (force[:, 0].ravel() - self._holding(unknowns))
+        self.shaped(response)[:, 0] = mean.reshape(-1, self.directions)
         return response
 
     def _holding(self, unknowns: Array) -> Array:
@@ -110,7 +107,10 @@ class HarmonicJacobian:
         columns = vector.reshape(joints, size, 1)
         force = (self.slopes.reshape(joints, size, size) @ columns).reshape(self.slopes.shape[:3])
         motion = self.steady.vibrate(self.transfer.on_modes(force, vector))
-        return vector + self.transfer.response(motion, force, vector)
+        response = vector + self.transfer.at_joints(motion)
+        if self.transfer.mean:
+            response += self.transfer.mean_response(force, vector)
+        return response
 
     def precondition(self, vector: Array) -> Array:
         """The inverse P of the matrix with the joints' stiffness D at rest, for J, times a vector.
