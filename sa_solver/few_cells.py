@@ -12,7 +12,6 @@ quadratic programmes).
 from __future__ import annotations
 
 import numpy as np
-import scipy.optimize
 from numpy.typing import NDArray
 
 from sa_solver.normal_problem import Iterate, NormalProblem
@@ -63,6 +62,9 @@ def _rigid_contact(problem: NormalProblem) -> tuple[Cells, Array] | None:
     shapes = modes.fields().reshape(len(modes.free), -1)
     columns = problem.height.shape[1]
     points = [0, columns - 1, height.size - columns, height.size - 1]
+    # Rarely needed, and slow to import: where it is used.
+    import scipy.optimize
+
     scale, target = float(np.ptp(height)) or 1.0, problem.target / problem.target[0]
     for _ in range(CUTS):
         programme = scipy.optimize.linprog(

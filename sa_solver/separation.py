@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-import scipy.optimize
 
 from sa_solver.rigid_modes import NormalModes
 from sa_solver.types import Array
@@ -26,6 +25,9 @@ def separating_tilt(height: Array, modes: NormalModes) -> Array | None:
         return np.zeros(len(modes.free))
     if not modes.free:
         return None
+    # Rarely needed, and slow to import: where it is used.
+    import scipy.optimize
+
     shapes = modes.fields().reshape(len(modes.free), -1)
     heights, touching = height.ravel(), TOUCHING * float(np.ptp(height))
     columns = height.shape[1]

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from sa_solver.fftw import load_pyfftw
 from sa_solver.types import Array
 
 Spectra = NDArray[np.complex128]
@@ -26,23 +27,20 @@ multiple of a memory page that the pass along columns takes 1.6 to 2 times as lo
 
 @cache
 def _fftw() -> Any:
-    """pyfftw, which takes a second to load, on the functions of FFTW.
+    """pyfftw on the functions of FFTW.
 
     MKL has functions of the same names. Where it is used first, as for finite elements or by a
     numpy that is built on it, the linker would give pyfftw those, and results would be rounded
     otherwise than where it is not, as with a structure that comes from the cache.
     """
     if not hasattr(os, "RTLD_DEEPBIND"):
-        import pyfftw
-
-        return pyfftw
+        return load_pyfftw()
     flags = sys.getdlopenflags()
     sys.setdlopenflags(flags | os.RTLD_DEEPBIND)
     try:
-        import pyfftw
+        return load_pyfftw()
     finally:
         sys.setdlopenflags(flags)
-    return pyfftw
 
 
 class Transform:

@@ -6,7 +6,6 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from scipy.integrate import trapezoid
 
 from sa_solver.contact_state import ContactState
 from sa_solver.history import History
@@ -134,7 +133,7 @@ def loop_summary(
     if history.method == "full":
         stretching = [np.sum(state.traction[0] * grid.x) * grid.cell_area for state in states]
         strains = strain[history.indices[first : last + 1]]
-        work = trapezoid(forces, motions, axis=0).sum() - trapezoid(stretching, strains)
+        work = np.trapezoid(forces, motions, axis=0).sum() - np.trapezoid(stretching, strains)
         loop["area"] = float(work)
     return loop
 
