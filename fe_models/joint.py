@@ -16,6 +16,7 @@ left out of S and N, and so is their w, which no force acts on: supports carry i
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 import scipy.linalg as sl
@@ -23,11 +24,13 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.sparse.linalg import LinearOperator, eigsh
 
-from fe_models.symmetry import Mirror, SplitMatrix
+from fe_models.symmetry import Mirror, SplitMatrix, symmetric_product
 from sa_solver.types import Array
 
 # Eigenvalues below this share of the largest are rigid motions; elastic ones start near 1e-3.
 RIGID_LIMIT = 1e-7
+# Residual of eigenvectors over their eigenvalue: eigenvalues are exact to its square.
+RITZ_RESIDUAL = 1e-9
 # Share of the largest eigenvalue that makes the singular joint invertible for the Lanczos search.
 SPECTRUM_SHIFT = 1e-5
 
@@ -158,7 +161,7 @@ def _joined(
         carried = coupling @ projection
     factor = sl.cholesky(stiffness_1 + carried, lower=True, overwrite_a=True)
     # S_2 N C⁻¹ NᵀS_2 = XᵀX with X = L⁻¹ NᵀS_2: half the work of solving with both factors.
-    half = sl.solve_triangular(factor, coupling, lower=True)
+    half = sl.solve_triangular(factor, coupling, lower=True, check_finite=False)
     stiffness = stiffness_2 - half.T @ half
     loads = half.T @ sl.solve_triangular(factor, loads_1 + transferred, lower=True) - loads_2
     return stiffness, loads
@@ -176,16 +179,22 @@ def _shifted_inverse(stiffness: Array, rho: float) -> Array:
 def _spectrum(stiffness: Array) -> tuple[int, float, float]:
     """Number of zero eigenvalues, smallest other one and largest one, by Lanczos iterations."""
     start = np.random.default_rng(0).standard_normal(len(stiffness))
-    (largest,) = eigsh(stiffness, 1, v0=start, return_eigenvectors=False)
+    extreme = partial(eigsh, v0=start, tol=RITZ_RESIDUAL, return_eigenvectors=False)
+    product = LinearOperator(
+        stiffness.shape, matvec=lambda v: symmetric_product(stiffness, v), dtype=np.float64
+    )
+    (largest,) = extreme(product, 1)
     shift = SPECTRUM_SHIFT * largest
     shifted = stiffness.copy()
     shifted[np.diag_indices_from(shifted)] += shift
     factors = sl.cho_factor(shifted, lower=True, overwrite_a=True)
     inverse = LinearOperator(
-        stiffness.shape, matvec=lambda v: sl.cho_solve(factors, v), dtype=np.float64
+        stiffness.shape,
+        matvec=lambda v: sl.cho_solve(factors, v, check_finite=False),
+        dtype=np.float64,
     )
     # A free body has at most six rigid motions: the seventh eigenvalue is elastic.
     count = min(7, len(stiffness) - 1)
-    lowest = 1.0 / eigsh(inverse, count, v0=start, return_eigenvectors=False) - shift
+    lowest = 1.0 / extreme(inverse, count) - shift
     elastic = lowest[lowest > RIGID_LIMIT * largest]
     return len(lowest) - len(elastic), float(elastic.min()), float(largest)
