@@ -317,15 +317,20 @@ def interface_nodes(
 
 def _interface_displacements(
     rows: sp.csr_matrix, frames: Array
-) -> tuple[NDArray[np.bool_], Indices, list[Array]]:
+) -> tuple[NDArray[np.bool_], Indices, Sequence[Array] | Array]:
     """Which displacements in the frames are held, and what the others are, from their rows of T.
 
-    The others of a node are a square matrix times as many free displacements: that list of
-    matrices, and all these free displacements one node after the other. Raises ValueError if an
-    interface node has a displacement that is neither free nor zero.
+    The others of a node are a square matrix times as many free displacements: those matrices, and
+    all these free displacements one node after the other. Raises ValueError if an interface node
+    has a displacement that is neither free nor zero.
     """
     d = frames.shape[1]
     counts = np.diff(rows.indptr).reshape(-1, d)
+    if np.all(counts == 1) and np.all(rows.data == 1.0):
+        own = rows.indices.astype(np.int64)
+        if len(np.unique(own)) == len(own) and np.all(np.diff(own.reshape(-1, d)) > 0):
+            # Nothing holds or ties them, as on most faces.
+            return np.zeros(len(own), bool), own, frames
     held, used, blocks = [], [], []
     for node, frame in enumerate(frames):
         entries = slice(rows.indptr[d * node], rows.indptr[d * (node + 1)])
@@ -356,9 +361,17 @@ def _rotation(size: int, interface: Indices, blocks: Sequence[Array] | Array) ->
     ``interface`` are those of all the nodes, one after the other; frames are such blocks.
     """
     others = np.setdiff1d(np.arange(size), interface)
-    by_node = np.split(interface, np.cumsum([len(block) for block in blocks])[:-1])
-    rows = np.concatenate([np.repeat(dofs, len(dofs)) for dofs in by_node] + [others])
-    columns = np.concatenate([np.tile(dofs, len(dofs)) for dofs in by_node] + [others])
-    inverses = [np.linalg.inv(block).ravel() for block in blocks]
+    if isinstance(blocks, np.ndarray):
+        # All of one size, and at once.
+        by_node = interface.reshape(len(blocks), -1)
+        rows = [np.repeat(by_node, by_node.shape[1], axis=1).ravel()]
+        columns = [np.tile(by_node, by_node.shape[1]).ravel()]
+        inverses = [np.linalg.inv(blocks).ravel()]
+    else:
+        nodes = np.split(interface, np.cumsum([len(block) for block in blocks])[:-1])
+        rows = [np.repeat(dofs, len(dofs)) for dofs in nodes]
+        columns = [np.tile(dofs, len(dofs)) for dofs in nodes]
+        inverses = [np.linalg.inv(block).ravel() for block in blocks]
     values = np.concatenate([*inverses, np.ones(len(others))])
-    return sp.csr_matrix((values, (rows, columns)), shape=(size, size))
+    places = np.concatenate([*rows, others]), np.concatenate([*columns, others])
+    return sp.csr_matrix((values, places), shape=(size, size))
