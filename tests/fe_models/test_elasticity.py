@@ -10,7 +10,9 @@ from fe_models.elasticity import ElasticBody, maximum_principal, von_mises
 from fe_models.linear_solver import factorise
 from fe_models.mesh import Body
 from fe_models.remesh import element_volumes
+from fe_models.supported_body import _rotation
 from sa_solver.types import Material
+from tests.fe_models.monolithic import whole_stiffness
 
 ORDERS = [1, 2]
 SIZE = (1.0, 2.0, 3.0)
@@ -38,6 +40,25 @@ def test_stiffness_is_symmetric_and_positive(irregular):
     assert np.abs(stiffness - stiffness.T).max() < 1e-13 * scale
     vectors = np.random.default_rng(0).standard_normal((stiffness.shape[0], 20))
     assert np.all(np.einsum("an,an->n", vectors, stiffness @ vectors) > 0.0)
+
+
+def test_stiffness_is_that_of_the_vector_form(irregular):
+    expected = whole_stiffness(irregular.body.mesh, irregular.material, irregular.order)
+    assert np.abs(irregular.stiffness - expected).max() < 1e-13 * np.abs(expected).max()
+
+
+def test_nodes_of_a_boundary_are_those_of_its_facets_and_edges(irregular):
+    mesh, boundary = irregular.body.mesh, next(iter(irregular.body.mesh.boundaries))
+    element = (ElementTetP1, ElementTetP2)[irregular.order - 1]()
+    expected = Basis(mesh, element).get_dofs(boundary).all()
+    np.testing.assert_array_equal(irregular.boundary_nodes(boundary), np.sort(expected))
+
+
+def test_frames_are_put_in_one_by_one_or_at_once():
+    frames = np.linalg.qr(np.random.default_rng(0).standard_normal((4, 3, 3)))[0]
+    places = np.random.default_rng(1).permutation(20)[:12]
+    one_by_one, at_once = (_rotation(20, places, f).toarray() for f in (list(frames), frames))
+    np.testing.assert_allclose(at_once, one_by_one, atol=1e-15)
 
 
 def test_rigid_motions_take_no_force(irregular):
