@@ -181,6 +181,8 @@ class TangentialContact:
         forces = np.array([(Qx, Qy, Mz)[k] for k in modes.free])
         if not limit.any():
             return self._without_contact(forces, free, imposed)
+        if not (offset.any() or imposed.any() or forces[list(free)].any()):
+            return self._at_rest(limit > 0.0, imposed)
         window, level = self._box(limit)
         problem = self._problem(window, level, limit, offset, forces, imposed, free)
         before = level.half_space.count
@@ -294,13 +296,17 @@ class TangentialContact:
         """Bodies apart: no shear, and no slip either."""
         if forces[list(free)].any():
             raise FrictionLimitError(0.0, UNCARRIED)
+        return self._at_rest(np.zeros(self.grid.shape, dtype=bool), imposed)
+
+    def _at_rest(self, sticking: Mask, imposed: Array) -> TangentialState:
+        """Neither shear nor slip: the solution where nothing shears the bodies."""
         zero = np.zeros((2, *self.grid.shape))
         motions = np.append(imposed, 0.0)
         return TangentialState(
             shear=zero,
             slip=zero.copy(),
             displacement=zero.copy(),
-            sticking=np.zeros(self.grid.shape, dtype=bool),
+            sticking=sticking,
             shift_x=float(motions[0]),
             shift_y=float(motions[1]),
             twist=float(motions[2]),

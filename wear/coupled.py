@@ -299,9 +299,8 @@ class Observer:
 
 @dataclass(frozen=True)
 class CoupledWear:
-    """A run of the coupled loop: loads of a ``source`` wear ``contacts``, as ``settings`` say.
-
-    Its ``observers`` are told of every jump. Its methods raise what source and contacts raise.
+    """The coupled loop: loads of a ``source`` wear ``contacts`` as ``settings`` say, watched by
+    ``observers``. Its methods raise what source and contacts raise.
 
     Examples
     --------

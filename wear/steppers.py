@@ -416,7 +416,7 @@ ContactAt = Callable[[WearState], WearingContact]
 class ImplicitStepper(ComparingStepper[WearState, WearingContact]):
     """Implicit Euler, in steps that ``control`` chooses, or as long as asked for without one.
 
-    Steps of given length may go ``alone``: no companion tells their error then.
+    These may go ``alone``: no companion tells their error then.
     Where surfaces move over each other the last step is of second order: long ones of first order
     wear edges at which pressure peaks, up to twice as high as what is left of it by short ones.
     """
@@ -434,10 +434,7 @@ class ImplicitStepper(ComparingStepper[WearState, WearingContact]):
 
 @dataclass(frozen=True)
 class SecondOrderStepper(ComparingStepper[WearState, WearingContact]):
-    """Second order in the step, also where slip changes with wear.
-
-    ``control`` and ``alone`` are those of :class:`ImplicitStepper`.
-    """
+    """Second order, also where slip changes with wear; fields as in :class:`ImplicitStepper`."""
 
     def _advance(
         self, state: WearState, cycles: float, contact: WearingContact, at: ContactAt, last: bool

@@ -73,7 +73,7 @@ def test_check_says_what_would_run(dovetail_path):
     assert "128 x 256 cells" in result.stdout
     assert "22 increments" in result.stdout
     assert "implicit steps, for an error of 1 % of the depth" in result.stdout
-    assert len(rows) < 12
+    assert len(rows) < 13
 
 
 def test_check_refuses_what_the_memory_cannot_hold_as_run_does(dovetail_path):

@@ -345,7 +345,8 @@ def test_a_case_is_written_as_it_was_read_and_outlined(text, tmp_path):
     (tmp_path / "case.yaml").write_text(text, encoding="utf-8")
     checked = invoke("check", tmp_path / "case.yaml")
     assert checked.exit_code == 0, checked.output
-    assert "10 cycles of 75 N at 100 Hz" in checked.output
+    assert "worn by    75 N at 100 Hz" in checked.output
+    assert "unworn and after 10 cycles" in checked.output
 
 
 @pytest.mark.parametrize(
