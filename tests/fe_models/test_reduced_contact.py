@@ -186,8 +186,9 @@ class TestPair:
         pressed = pair.normal(curved, 87.0)
         curve = pair.virgin_curve(pressed, np.linspace(0.0, 0.5 * STROKE, 200), FRICTION)
         assert curve.converged
-        small = pair.tangential(pressed, 1e-9, FRICTION)
-        assert small.force == pytest.approx(1e-9 * curve.stick_stiffness, rel=SOLVER)
+        # Less would drown in the limit, of which the force is what is left.
+        small = pair.tangential(pressed, 1e-6, FRICTION)
+        assert small.force == pytest.approx(1e-6 * curve.stick_stiffness, rel=SOLVER)
         assert curve.friction == pytest.approx(FRICTION, rel=SOLVER)
         slopes = np.diff(curve.force) / np.diff(curve.displacement)
         assert np.all(np.diff(slopes) < 1e-6 * curve.stick_stiffness)
