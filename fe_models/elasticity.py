@@ -17,6 +17,7 @@ from skfem import (
     FacetBasis,
     LinearForm,
 )
+from skfem.helpers import grad
 
 from fe_models.mesh import Body, in_space
 from sa_solver.subsurface_influence import INDICES
@@ -85,42 +86,27 @@ class ElasticBody:
     def stiffness(self) -> sp.csr_matrix:
         """Stiffness matrix ``(size, size)`` [N/mm].
 
-        Built from ∫ ∂a φi ∂b φj, summed over the elements that have both nodes: many times faster
-        than scikit-fem's vector form.
+        Built from the scalar forms ∫ ∂a φi ∂b φj, which do not depend on the material: ten times
+        faster than the vector form.
         """
-        d, count = self.dimension, len(self.nodes)
-        nodes = self.element_nodes.T.astype(np.int64)
-        pairs = (nodes[:, :, None] * count + nodes[:, None, :]).ravel()
-        order = np.argsort(pairs, kind="stable")
-        pairs = pairs[order]
-        first = np.flatnonzero(np.diff(pairs, prepend=-1))
-        slopes, weights = self._slopes()
-        forms = np.empty((d, d, len(first)))
-        for a in range(d):
-            weighted = slopes[a] * weights[:, None, :]
-            for b in range(d):
-                products = weighted @ slopes[b].swapaxes(1, 2)
-                np.add.reduceat(products.ravel()[order], first, out=forms[a, b])
+        forms = {
+            (a, b): BilinearForm(lambda u, v, w, a=a, b=b: grad(v)[a] * grad(u)[b])
+            .assemble(self._basis)
+            .tocsr()
+            for a in range(self.dimension)
+            for b in range(a, self.dimension)
+        }
+        forms |= {(b, a): form.T.tocsr() for (a, b), form in forms.items() if a != b}
+        laplace = sum(forms[a, a] for a in range(self.dimension))
         lame, shear = self.material.lame, self.material.shear_modulus
-        blocks = lame * forms + shear * forms.swapaxes(0, 1)
-        laplace = sum(forms[a, a] for a in range(d))
-        for a in range(d):
-            blocks[a, a] += shear * laplace
-        rows, columns = np.divmod(pairs[first], count)
-        pointers = np.searchsorted(rows, np.arange(count + 1))
-        data = np.ascontiguousarray(blocks.transpose(2, 0, 1))
-        return sp.bsr_matrix((data, columns, pointers), (self.size, self.size)).tocsr()
-
-    def _slopes(self) -> tuple[Array, Array]:
-        """Derivatives of the elements' functions ``(dimension, elements, functions, points)``.
-
-        And the weights of the points, ``(elements, points)``.
-        """
-        slopes, weights = [function[0].grad for function in self._basis.basis], self._basis.dx
-        if self.order == 1:
-            # The same all over an element.
-            slopes, weights = [s[..., :1] for s in slopes], weights.sum(axis=1, keepdims=True)
-        return np.stack(slopes, axis=2), weights
+        stiffness = sp.csr_matrix((self.size, self.size))
+        for (a, b), form in forms.items():
+            block = lame * form + shear * form.T
+            if a == b:
+                block += shear * laplace
+            place = sp.csr_matrix(([1.0], ([a], [b])), shape=(self.dimension,) * 2)
+            stiffness += sp.kron(block, place, format="csr")
+        return stiffness
 
     @cached_property
     def mass(self) -> sp.csr_matrix:

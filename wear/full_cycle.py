@@ -86,7 +86,8 @@ def _closed_cycle(
         for t, (height, load, start) in enumerate(increments, first):
             state = _advance(contact, state, height, load, start, t)
             states.append(state)
-        starts = [solved.as_start for solved in states]
+        # Not shear: where bodies stick it would keep what the last search left of slip.
+        starts = [replace(solved.as_start, shear=None) for solved in states]
         limit = contact.friction * max(float(s.pressure.max()) for s in states)
         change = float(np.abs(state.shear - begun.shear).max())
         if apart or (passed > 1 and change <= CLOSED * limit):

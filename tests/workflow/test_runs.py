@@ -380,7 +380,7 @@ def test_workers_that_have_all_gone_are_told_and_given_up(wear, tmp_path, impati
         wait_until((out / "one/jumps/00005.h5").exists)
         cluster.scale(0)
 
-    job = Job("one", wear, (MANY,))
+    job = Job("one", wear, (MANY, "wear.cycles=1e5"))
     with distributed.LocalCluster(**options) as cluster, ThreadPoolExecutor() as beside:
         gone = beside.submit(leave)
         with pytest.raises(MethodFailed, match=r"no worker for .*, 1 of 1 runs not known to have"):
