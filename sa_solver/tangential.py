@@ -15,18 +15,20 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sa_solver.disk_gradient import gradients_on_disks
-from sa_solver.disk_newton import DiskSolution, newton_on_disks
 from sa_solver.errors import ContactProblemError
 from sa_solver.friction_limit import largest_share
 from sa_solver.half_space import HalfSpace
 from sa_solver.rigid_modes import PlanarModes, Window
-from sa_solver.tangential_levels import ShearLevel
 from sa_solver.tangential_problem import TangentialProblem, squared
 from sa_solver.types import Array, Mask
+
+if TYPE_CHECKING:
+    from sa_solver.disk_newton import DiskSolution
+    from sa_solver.tangential_levels import ShearLevel
 
 TOLERANCE = 1e-8
 """Default bound on every residual of :class:`TangentialResiduals`."""
@@ -183,6 +185,10 @@ class TangentialContact:
             return self._without_contact(forces, free, imposed)
         if not (offset.any() or imposed.any() or forces[list(free)].any()):
             return self._at_rest(limit > 0.0, imposed)
+        # With them comes the compiler, a fifth of a second to import: where something shears.
+        from sa_solver.disk_gradient import gradients_on_disks
+        from sa_solver.disk_newton import newton_on_disks
+
         window, level = self._box(limit)
         problem = self._problem(window, level, limit, offset, forces, imposed, free)
         before = level.half_space.count
@@ -205,6 +211,8 @@ class TangentialContact:
     # -- steps of solve -----------------------------------------------------------------------
     def _box(self, limit: Array) -> tuple[Window, ShearLevel]:
         """A box of cells around the pressed ones, and its operators."""
+        from sa_solver.tangential_levels import ShearLevel
+
         window = []
         for axis, size in enumerate(self.grid.shape):
             pressed = np.flatnonzero(limit.any(axis=1 - axis))
