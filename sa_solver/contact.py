@@ -189,7 +189,7 @@ class FrictionalContact:
         if self.grid.line:
             Mx = tilt_x = None
         if start is None and before.pressure.any():
-            start = NormalStart(before.pressure, before.displacement[2])
+            start = before.pressed
         return self.normal.solve(
             height,
             P,

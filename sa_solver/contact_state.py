@@ -101,8 +101,11 @@ class ContactState:
         return self.traction[:2]
 
     @property
+    def pressed(self) -> NormalStart:
+        """To begin from in the search for pressures near this one's."""
+        return NormalStart(self.pressure, self.displacement[2])
+
+    @property
     def as_start(self) -> ContactStart:
         """To begin from in the search for a state near this one."""
-        return ContactStart(
-            NormalStart(self.pressure, self.displacement[2]), self.shear, self.start
-        )
+        return ContactStart(self.pressed, self.shear, self.start)

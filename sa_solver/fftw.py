@@ -1,8 +1,9 @@
-"""pyFFTW without its interfaces to numpy, scipy and dask, which load ten times as long as it."""
+"""pyFFTW: on the functions of FFTW, and without its interfaces."""
 
 from __future__ import annotations
 
 import importlib
+import os
 import sys
 from types import ModuleType
 from typing import Any
@@ -20,11 +21,21 @@ class _Later(ModuleType):
 
 
 def load_pyfftw() -> Any:
-    """The module ``pyfftw``, whose interfaces are loaded when they are first asked for."""
+    """The module ``pyfftw``, bound to its own FFTW; its interfaces are loaded when asked for.
+
+    MKL has functions of the same names. Where it is used first, as for finite elements or by a
+    numpy that is built on it, the linker would give pyfftw those, and results would be rounded
+    otherwise than where it is not, as with a structure that comes from the cache.
+
+    The interfaces to numpy, scipy and dask load ten times as long as the rest.
+    """
     if "pyfftw" in sys.modules:
         return sys.modules["pyfftw"]
+    flags = sys.getdlopenflags()
     sys.modules[INTERFACES] = _Later(INTERFACES)
+    sys.setdlopenflags(flags | getattr(os, "RTLD_DEEPBIND", 0))
     try:
         return importlib.import_module("pyfftw")
     finally:
+        sys.setdlopenflags(flags)
         del sys.modules[INTERFACES]

@@ -5,11 +5,8 @@ The DFT is unnormalised forwards and carries ``1/N`` backwards.
 
 from __future__ import annotations
 
-import os
-import sys
 from collections.abc import Callable, Sequence
-from functools import cache, partial
-from typing import Any
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,24 +20,6 @@ Multiplication = Callable[[Spectra], None]
 SPARE_COLUMNS = 4
 """Unused complex numbers after each row of a spectrum: rows of 2ⁿ + 1 of them lie so close to a
 multiple of a memory page that the pass along columns takes 1.6 to 2 times as long from 1024 up."""
-
-
-@cache
-def _fftw() -> Any:
-    """pyfftw on the functions of FFTW.
-
-    MKL has functions of the same names. Where it is used first, as for finite elements or by a
-    numpy that is built on it, the linker would give pyfftw those, and results would be rounded
-    otherwise than where it is not, as with a structure that comes from the cache.
-    """
-    if not hasattr(os, "RTLD_DEEPBIND"):
-        return load_pyfftw()
-    flags = sys.getdlopenflags()
-    sys.setdlopenflags(flags | os.RTLD_DEEPBIND)
-    try:
-        return load_pyfftw()
-    finally:
-        sys.setdlopenflags(flags)
 
 
 class Transform:
@@ -57,7 +36,7 @@ class Transform:
         self, shape: tuple[int, int], padded: tuple[int, int], components: int = 1
     ) -> None:
         """Plan for fields of ``shape`` ``(nx, ny)``."""
-        pyfftw = _fftw()
+        pyfftw = load_pyfftw()
         forwards = partial(pyfftw.FFTW, flags=("FFTW_ESTIMATE", "FFTW_DESTROY_INPUT"))
         backwards = partial(forwards, direction="FFTW_BACKWARD")
         self.shape, self.padded = shape, padded

@@ -19,7 +19,7 @@ from sa_solver.contact import FrictionalContact
 from sa_solver.contact_state import ContactState
 from sa_solver.errors import InputError
 from sa_solver.half_space import HalfSpace
-from sa_solver.normal import NormalContact, NormalStart
+from sa_solver.normal import NormalContact
 from sa_solver.rigid_modes import NORMAL
 from sa_solver.ties import first_largest
 from sa_solver.types import Array, ElasticPair, Grid, LoadHistory
@@ -220,8 +220,8 @@ class InterfaceContact:
         loaded = self._loaded(state)
         if self.pair.similar:
             # Unlike bodies are pressed otherwise while friction holds them.
-            solved = [NormalStart(end.pressure, end.displacement[2]) for end in loaded.cycle]
-            state = replace(state, starts=dict(enumerate(solved)))
+            solved = {increment: end.pressed for increment, end in enumerate(loaded.cycle)}
+            state = replace(state, starts=solved)
         result = loaded.contact.cycle(state, np.flatnonzero(history.loads.P > 0.0).tolist())
         depth_rate, volume_rate = result.per_cycle(self.grid.cell_area)
         starts = {t: pressed.start for t, pressed in result.states.items()}
