@@ -9,11 +9,13 @@ import pytest
 
 from sa_solver.types import Grid
 from tests.marks import slow
+from tests.workflow.figure_checks import problems
 from workflow.analyses.wear.measures import profile_difference
 from workflow.case.writing import dump_case
 from workflow.chart import Chart, accuracy_of
 from workflow.chart.axes import AXES, Axis, Rung, axes_of
 from workflow.chart.costs import Cost, costs, stage_seconds
+from workflow.chart.figures import axis_figure
 from workflow.chart.frontier import Option, cheapest, efficient
 from workflow.chart.ladder import Ladder, Point, judge
 from workflow.chart.report import combination, sentences, write_chart
@@ -224,6 +226,28 @@ def test_figures_of_odd_ladders(tmp_path: Path):
     assert (tmp_path / "figures" / "chart_grid.png").exists()
     assert sentences(chart)[1] == "method: nothing ran"
     assert json.loads((tmp_path / "summary.json").read_text("utf-8"))["together"] is None
+
+
+def test_names_of_a_crowded_chart_leave_each_other_room():
+    """Those of the case as written and the efficient ones come first; it is on no one's line."""
+    crowd = [(f"rung {k:02}", 1.0 + k, 0.2 + 0.01 * (k % 7), 9.0 + k) for k in range(20)]
+    alone, finer, finest = (
+        ("own", None, 0.05, 30.0),
+        ("finer", 0.1, 1e-3, 90.0),
+        ("0", 0.05, 0, 300),
+    )
+    points = [
+        point(name, step, {"depth": 1.0 + error}, seconds)
+        for name, step, error, seconds in (alone, *crowd, finer, finest)
+    ]
+    ladder = judge(GRID, points, {}, {})
+    figure = axis_figure(ladder, 0.01)
+    assert not problems(figure)
+    for axis in figure.axes:
+        names = {text.get_text() for text in axis.texts}
+        assert {"own", *(rung.name for rung in ladder.rungs if rung.by_seconds)} <= names
+        assert len(names) < 23
+        assert 30.0 * (1.0 if axis is figure.axes[0] else 10.0) not in axis.lines[0].get_xdata()
 
 
 # --- measures -----------------------------------------------------------------------------------

@@ -291,7 +291,8 @@ def _harmonics(case: Case) -> Iterator[Rung]:
     for count in ODD_HARMONICS:
         fine = max(samples, SAMPLES_PER_HARMONIC * count)
         resolution = f"resolution={{harmonics: {count}, samples: {fine}}}"
-        yield Rung(f"{count} odd harmonics", (resolution,), 1.0 / count)
+        name = "1 harmonic" if count == 1 else f"{count} odd harmonics"
+        yield Rung(name, (resolution,), 1.0 / count)
 
 
 def _samples(case: Case) -> Iterator[Rung]:

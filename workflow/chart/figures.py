@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator
 
 from workflow.chart.ladder import ROUNDING, Judged, Ladder
+from workflow.chart.names import Place, name_marks
 from workflow.chart.run import Chart
 from workflow.pictures.panels import legend_below, new_figure
 from workflow.pictures.style import BLACK, BLUE, GREEN, ORANGE, PURPLE, write_figures
@@ -24,8 +25,6 @@ LEGEND_COLUMNS = 4
 LEGEND_SIZE = 10
 # Errors and costs that nothing else bounds are drawn this far from the next point.
 MARGIN = 3.0
-# Names that still find room beside their marks.
-MOST_NAMES = 12
 # Rungs whose costs and errors agree to so many decimals of their logarithm are at one place.
 PLACE = 2
 # Quantities that are drawn one by one: more would hide the rungs.
@@ -57,13 +56,13 @@ def axis_figure(ladder: Ladder, accuracy: float) -> Figure:
     title = f"{ladder.axis.name}: {ladder.axis.what}; for {100 * accuracy:g} % {ending}"
     figure = new_figure(title, HEIGHT)
     bottom = _bottom([ladder])
-    for axis, cost in _panels(figure, [ladder]):
+    panels = _panels(figure, [ladder])
+    for axis, cost in panels:
         branches = list(dict.fromkeys(rung.point.rung.branch for rung in ladder.rungs))
         for number, branch in enumerate(branches):
             rungs = [rung for rung in ladder.rungs if rung.point.rung.branch == branch]
             label = branch if len(branches) > 1 else ""
             _draw_line(axis, rungs, cost, bottom, number, label or None)
-        _name_rungs(axis, _named(ladder.rungs, cost), cost, bottom)
         _draw_baseline(axis, [rung for rung in ladder.rungs if rung.point.baseline], cost, bottom)
         _draw_frontier(axis, ladder.rungs, cost, bottom)
         _draw_floor(axis, ladder)
@@ -71,6 +70,10 @@ def axis_figure(ladder: Ladder, accuracy: float) -> Figure:
             _draw_quantities(axis, ladder, cost)
         _finish(axis, cost, accuracy, (bottom, _top([ladder], accuracy)))
     _label(figure)
+    figure.draw_without_rendering()
+    for axis, cost in panels:
+        marks = [_place(rung, cost, bottom) for rung in ladder.rungs]
+        name_marks(axis, _names(ladder.rungs, cost, bottom), marks)
     return figure
 
 
@@ -116,7 +119,7 @@ def _top(ladders: Sequence[Ladder], accuracy: float) -> float:
     return MARGIN * max([accuracy, *errors])
 
 
-def _place(rung: Judged, cost: str, bottom: float) -> tuple[float, float]:
+def _place(rung: Judged, cost: str, bottom: float) -> Place:
     """Cost and error of a rung in the figure."""
     spent = float(getattr(rung.point.cost, cost))
     return max(spent, 1e-2), max(rung.error, bottom)
@@ -130,8 +133,12 @@ def _draw_line(
         return
     colour, marker = COLOURS[number % len(COLOURS)], MARKERS[number % len(MARKERS)]
     places = [_place(rung, cost, bottom) for rung in rungs]
-    joined = [place for rung, place in zip(rungs, places, strict=True) if rung.error > 0.0]
-    if joined and any(rung.point.rung.step is not None for rung in rungs):
+    joined = [
+        place
+        for rung, place in zip(rungs, places, strict=True)
+        if rung.error > 0.0 and rung.point.rung.step is not None
+    ]
+    if joined:
         axis.plot(*zip(*joined, strict=True), "-", color=colour, alpha=0.6, lw=1.2)
     for rung, place in zip(rungs, places, strict=True):
         hollow = rung.unresolved or rung.error == 0.0
@@ -142,29 +149,23 @@ def _draw_line(
         axis.plot([], [], f"-{marker}", color=colour, ms=8, label=label)
 
 
-def _named(rungs: Sequence[Judged], cost: str) -> list[Judged]:
-    """Rungs whose names are written: all, or of many the efficient ones and those that begin."""
-    if len(rungs) <= MOST_NAMES:
-        return list(rungs)
-    first = {rung.point.rung.branch: rung.name for rung in reversed(rungs)}
-    kept = {*first.values(), *(rung.name for rung in _frontier(rungs, cost))}
-    return [rung for rung in rungs if rung.name in kept or rung.point.baseline]
+def _names(rungs: Sequence[Judged], cost: str, bottom: float) -> list[tuple[str, Place]]:
+    """Names of marks and their places, the case's own and the efficient ones first.
 
-
-def _name_rungs(axis: Axes, rungs: Sequence[Judged], cost: str, bottom: float) -> None:
-    """Names beside the marks; those of one place are named together."""
-    together: dict[tuple[float, ...], list[Judged]] = {}
-    for rung in rungs:
-        place = _place(rung, cost, bottom)
-        rounded = tuple(round(log10(coordinate), PLACE) for coordinate in place)
-        together.setdefault(rounded, []).append(rung)
-    for number, group in enumerate(together.values()):
+    Marks of one place are named together.
+    """
+    frontier = _frontier(rungs, cost)
+    first = sorted(rungs, key=lambda rung: (not rung.point.baseline, rung not in frontier))
+    together: dict[Place, list[Judged]] = {}
+    for rung in first:
+        x, y = _place(rung, cost, bottom)
+        together.setdefault((round(log10(x), PLACE), round(log10(y), PLACE)), []).append(rung)
+    named = []
+    for group in together.values():
         names = [rung.name.removeprefix(f"{rung.point.rung.branch}, ") for rung in group]
-        text = names[0] if len(names) == 1 else f"{names[0]} to {names[-1]}"
-        # Neighbours may be alike in cost and error: names go above and below in turn.
-        shift = (8, 6) if number % 2 == 0 else (8, -14)
-        place = _place(group[0], cost, bottom)
-        axis.annotate(text, place, shift, textcoords="offset points", fontsize=9)
+        text = names[0] if len(names) == 1 else f"{names[0]} and {names[-1]}"
+        named.append((text, _place(group[0], cost, bottom)))
+    return named
 
 
 def _draw_baseline(axis: Axes, rungs: Sequence[Judged], cost: str, bottom: float) -> None:
