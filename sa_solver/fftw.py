@@ -39,3 +39,18 @@ def load_pyfftw() -> Any:
     finally:
         sys.setdlopenflags(flags)
         del sys.modules[INTERFACES]
+
+
+def plan(before: Any, after: Any, axis: int, backward: bool = False) -> Any:
+    """FFTW's plan of DFTs along an ``axis`` of ``before`` into ``after``, unnormalised.
+
+    It is estimated, not measured: measuring picks another algorithm, and with it another rounding,
+    from one run to the next. What is in ``before`` may be lost.
+    """
+    return load_pyfftw().FFTW(
+        before,
+        after,
+        axes=(axis,),
+        direction="FFTW_BACKWARD" if backward else "FFTW_FORWARD",
+        flags=("FFTW_ESTIMATE", "FFTW_DESTROY_INPUT"),
+    )

@@ -11,6 +11,15 @@ from numba import njit
 
 
 @njit(cache=True, nogil=True)
+def multiply_spectrum(spectrum, symbol):  # type: ignore[no-untyped-def]
+    """Multiply a spectrum ``(mx, m)`` by a real symbol of that shape."""
+    for line in range(len(spectrum)):
+        for n in range(spectrum.shape[1]):
+            s, z = symbol[line, n], spectrum[line, n]
+            spectrum[line, n] = complex(s * z.real, s * z.imag)
+
+
+@njit(cache=True, nogil=True)
 def multiply_spectra(spectra, symbols, places, turned_inputs, turned_outputs):  # type: ignore[no-untyped-def]
     """Replace the first spectra ``(k, mx, m)`` by sums of them times real symbols ``(s, mx, m)``.
 
@@ -39,6 +48,65 @@ def multiply_spectra(spectra, symbols, places, turned_inputs, turned_outputs):  
                 for n in range(length):
                     z = spectra[i, line, n]
                     spectra[i, line, n] = complex(-z.imag, z.real)
+
+
+@njit(cache=True, nogil=True)
+def split_in_two(spectrum, turns):  # type: ignore[no-untyped-def]
+    """Turn the upper half of ``(2 m, k)`` rows into the lower one times ``turns[1]`` ``(m,)``."""
+    half, columns = len(spectrum) // 2, spectrum.shape[1]
+    for n in range(half):
+        c, s = turns[1, n].real, turns[1, n].imag
+        for j in range(columns):
+            a = spectrum[n, j]
+            spectrum[half + n, j] = complex(a.real * c - a.imag * s, a.real * s + a.imag * c)
+
+
+@njit(cache=True, nogil=True)
+def join_two(spectrum, turns):  # type: ignore[no-untyped-def]
+    """Add the upper half of ``(2 m, k)`` rows, times ``turns[1]`` conjugate, to the lower one."""
+    half, columns = len(spectrum) // 2, spectrum.shape[1]
+    for n in range(half):
+        c, s = turns[1, n].real, turns[1, n].imag
+        for j in range(columns):
+            a, b = spectrum[n, j], spectrum[half + n, j]
+            spectrum[n, j] = complex(
+                a.real + (b.real * c + b.imag * s), a.imag + (b.imag * c - b.real * s)
+            )
+
+
+@njit(cache=True, nogil=True)
+def split_in_four(spectrum, turns):  # type: ignore[no-untyped-def]
+    """Of rows ``(4 m, k)``, a and b the first two quarters: (a + (-i)^r b) ``turns[r]`` in each."""
+    quarter, columns = len(spectrum) // 4, spectrum.shape[1]
+    for n in range(quarter):
+        c, s = turns[:, n].real, turns[:, n].imag
+        for j in range(columns):
+            a, b = spectrum[n, j], spectrum[quarter + n, j]
+            spectrum[n, j] = a + b
+            x, y = a.real + b.imag, a.imag - b.real
+            spectrum[quarter + n, j] = complex(x * c[1] - y * s[1], x * s[1] + y * c[1])
+            x, y = a.real - b.real, a.imag - b.imag
+            spectrum[2 * quarter + n, j] = complex(x * c[2] - y * s[2], x * s[2] + y * c[2])
+            x, y = a.real - b.imag, a.imag + b.real
+            spectrum[3 * quarter + n, j] = complex(x * c[3] - y * s[3], x * s[3] + y * c[3])
+
+
+@njit(cache=True, nogil=True)
+def join_four(spectrum, turns):  # type: ignore[no-untyped-def]
+    """Sum the quarters z_r times ``turns[r]`` conjugate into a, and i^r times them into b."""
+    quarter, columns = len(spectrum) // 4, spectrum.shape[1]
+    for n in range(quarter):
+        c, s = turns[:, n].real, turns[:, n].imag
+        for j in range(columns):
+            z0, z1 = spectrum[n, j], spectrum[quarter + n, j]
+            z2, z3 = spectrum[2 * quarter + n, j], spectrum[3 * quarter + n, j]
+            x1, y1 = z1.real * c[1] + z1.imag * s[1], z1.imag * c[1] - z1.real * s[1]
+            x2, y2 = z2.real * c[2] + z2.imag * s[2], z2.imag * c[2] - z2.real * s[2]
+            x3, y3 = z3.real * c[3] + z3.imag * s[3], z3.imag * c[3] - z3.real * s[3]
+            spectrum[n, j] = complex((z0.real + x2) + (x1 + x3), (z0.imag + y2) + (y1 + y3))
+            spectrum[quarter + n, j] = complex(
+                (z0.real - x2) - (y1 - y3), (z0.imag - y2) + (x1 - x3)
+            )
 
 
 @njit(cache=True, nogil=True)

@@ -6,13 +6,13 @@ The DFT is unnormalised forwards and carries ``1/N`` backwards.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
-from sa_solver.fftw import load_pyfftw
-from sa_solver.types import Array
+from sa_solver.fftw import load_pyfftw, plan
+from sa_solver.pruned import LARGE, PrunedColumns
+from sa_solver.types import Array, Indices
 
 Spectra = NDArray[np.complex128]
 Multiplication = Callable[[Spectra], None]
@@ -26,52 +26,37 @@ class Transform:
     """Real DFT of ``(nx, ny)`` fields zero-padded to ``padded``, and back, planned once with FFTW.
 
     ``spectra`` ``(k, mx, my//2 + 1)`` holds one of each component; a backward transform uses its
-    component's up.
-
-    Plans are estimated, not measured: measuring picks another algorithm, and with it another
-    rounding, from one run to the next. Rows of padding are zero, so their pass along y is skipped.
+    component's up. Row ``i`` of them has the frequency ``order[i]`` along x. Rows of padding are
+    zero, so their pass along y is skipped.
     """
 
     def __init__(
         self, shape: tuple[int, int], padded: tuple[int, int], components: int = 1
     ) -> None:
         """Plan for fields of ``shape`` ``(nx, ny)``."""
-        pyfftw = load_pyfftw()
-        forwards = partial(pyfftw.FFTW, flags=("FFTW_ESTIMATE", "FFTW_DESTROY_INPUT"))
-        backwards = partial(forwards, direction="FFTW_BACKWARD")
+        fftw = load_pyfftw()
         self.shape, self.padded = shape, padded
         rows, columns = shape[0], padded[1] // 2 + 1
-        self._field = pyfftw.zeros_aligned((rows, padded[1]), dtype=np.float64)
+        self._field = fftw.zeros_aligned((rows, padded[1]), dtype=np.float64)
         stored = (components, padded[0], columns + SPARE_COLUMNS)
-        self.spectra: Spectra = pyfftw.zeros_aligned(stored, dtype=np.complex128)[:, :, :columns]
-        self._forward, self._backward = [], []
-        for spectrum in self.spectra:
-            along_x, along_y = {"axes": (0,)}, {"axes": (1,)}
-            filled = spectrum[:rows]
-            self._forward.append(
-                (forwards(self._field, filled, **along_y), forwards(spectrum, spectrum, **along_x))
-            )
-            self._backward.append(
-                (
-                    backwards(spectrum, spectrum, **along_x),
-                    backwards(filled, self._field, **along_y),
-                )
-            )
+        self.spectra: Spectra = fftw.zeros_aligned(stored, dtype=np.complex128)[:, :, :columns]
+        self._columns = [PrunedColumns(spectrum, rows) for spectrum in self.spectra]
+        self._forward = [plan(self._field, filled, 1) for filled in self.spectra[:, :rows]]
+        self._backward = [plan(filled, self._field, 1, True) for filled in self.spectra[:, :rows]]
+        self.order = self._columns[0].order
 
     def forward(self, field: Array, component: int) -> None:
         """Transform ``field`` ``(nx, ny)`` into the spectrum of ``component``."""
-        rows, columns = self.shape
+        columns = self.shape[1]
         self._field[:, :columns] = field
         self._field[:, columns:] = 0.0
-        along_y, along_x = self._forward[component]
-        along_y.execute()
-        self.spectra[component][rows:] = 0.0
-        along_x.execute()
+        self._forward[component].execute()
+        self._columns[component].forward()
 
     def backward(self, component: int, out: Array) -> None:
         """The first ``(nx, ny)`` values of the field whose spectrum ``component`` holds."""
-        for pass_ in self._backward[component]:
-            pass_.execute()
+        self._columns[component].backward()
+        self._backward[component].execute()
         # execute() leaves the inverse transform unnormalised.
         size = self.padded[0] * self.padded[1]
         np.multiply(self._field[:, : self.shape[1]], 1.0 / size, out=out)
@@ -95,7 +80,11 @@ class SpectralFilter:
         self._transform = transform
         self._outputs = len(symbols)
         single = len(symbols) == len(symbols[0]) == 1 and not any(imaginary)
-        self._multiply = _by_one(symbols[0][0]) if single else _by_several(symbols, imaginary)
+        self._multiply = (
+            _by_one(symbols[0][0][transform.order])
+            if single
+            else _by_several(symbols, transform.order, imaginary)
+        )
 
     def apply(self, fields: Array) -> Array:
         """Outputs ``(r, nx, ny)`` from inputs ``(c, nx, ny)``."""
@@ -111,6 +100,10 @@ class SpectralFilter:
 
 def _by_one(symbol: Array) -> Multiplication:
     """Multiplies a spectrum by one symbol."""
+    if symbol.size >= LARGE:
+        from sa_solver.kernels import multiply_spectrum
+
+        return lambda spectra: multiply_spectrum(spectra[0], symbol)
     # As pairs of reals: numpy would make a real factor complex first.
     pairs = np.repeat(symbol, 2, axis=1)
 
@@ -122,9 +115,11 @@ def _by_one(symbol: Array) -> Multiplication:
 
 
 def _by_several(
-    symbols: Sequence[Sequence[Array]], imaginary: tuple[Sequence[int], Sequence[int]]
+    symbols: Sequence[Sequence[Array]],
+    order: Indices,
+    imaginary: tuple[Sequence[int], Sequence[int]],
 ) -> Multiplication:
-    """Replaces the inputs among spectra by the outputs."""
+    """Replaces the inputs among spectra, whose rows have an ``order``, by the outputs."""
     # A fifth of a second to import: where it is used.
     from sa_solver.kernels import multiply_spectra
 
@@ -134,7 +129,8 @@ def _by_several(
     places = np.array(
         [[place.setdefault(id(symbol), len(place)) for symbol in row] for row in rows]
     )
-    stacked = np.stack(list({id(symbol): symbol for row in rows for symbol in row}.values()))
+    different = {id(symbol): symbol for row in rows for symbol in row}.values()
+    stacked = np.stack([symbol[order] for symbol in different])
     turned_outputs, turned_inputs = np.zeros(places.shape[0], bool), np.zeros(places.shape[1], bool)
     turned_inputs[list(imaginary[0])] = turned_outputs[list(imaginary[1])] = True
 
