@@ -92,8 +92,9 @@ class WholeFace(Face):
         other = self.part.face(number)
         if other is self.part:
             return self
-        coordinates, facets, *_ = _mirrored(other, self.part.planes)
-        return replace(other, coordinates=coordinates, facets=facets)
+        coordinates, facets, nodes, *_ = _mirrored(other, self.part.planes)
+        surface = other.surface and other.surface.mirrored(nodes, len(facets))
+        return replace(other, coordinates=coordinates, facets=facets, surface=surface)
 
     def components(self, part: Array) -> Array:
         """Components along x, y and maybe z ``(..., c, N)`` of those of the part's nodes."""
@@ -106,8 +107,11 @@ def whole_face(interface: Interface) -> Face:
         return interface
     coordinates, facets, nodes, signs, sides = _mirrored(interface, interface.planes)
     name, frame, weighted = interface.name, interface.frame, interface.weighted
+    surface = interface.surface and interface.surface.mirrored(nodes, len(facets))
     return WholeFace(
-        name, frame, coordinates, facets, interface, nodes, signs, sides, weighted=weighted
+        *(name, frame, coordinates, facets, interface, nodes, signs, sides),
+        weighted=weighted,
+        surface=surface,
     )
 
 

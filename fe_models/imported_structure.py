@@ -11,6 +11,7 @@ import scipy.sparse as sp
 from scipy.spatial import cKDTree
 
 from fe_models.constraints import Constraints
+from fe_models.curved_face import EDGES, Surface
 from fe_models.cut_face import cut_interface
 from fe_models.elasticity import ElasticBody
 from fe_models.geometry.imported import ImportedMesh
@@ -21,7 +22,7 @@ from fe_models.structure import Structure
 from fe_models.supported_body import SupportedBody, interface_nodes
 from fe_models.trace import LinearTrace
 from sa_solver.ties import first_largest
-from sa_solver.types import Array, Indices, Material
+from sa_solver.types import Array, Frame, Indices, Material
 
 AXIS_NAMES = "xyz"
 # Displacements that differ by this share of themselves are the same: the rest is rounding.
@@ -146,7 +147,11 @@ def imported_mesh(
         try:
             interface = matched_interface(pair.name, body_1, body_2, pair.name, frame)
         except MatchError:
-            interface = mortar_interface(pair.name, *faces, frame)
+            surfaces = (
+                _surface(imported, body_1, pair.face_1, frame),
+                _surface(imported, body_2, pair.face_2, frame),
+            )
+            interface = mortar_interface(pair.name, *faces, frame, surfaces)
         interfaces.append(interface)
     bodies = body_1, body_2
     held = [_held(imported, ElasticBody(body, ANY), supports).transformation() for body in bodies]
@@ -248,6 +253,18 @@ def _with_interfaces(
     pairs = zip(names, faces, strict=True)
     named = {name: contact_facets(imported, body, face) for name, face in pairs}
     return Body(body.name, body.mesh.with_boundaries(named))
+
+
+def _surface(imported: ImportedMesh, body: Body, boundary: str, frame: Frame) -> Surface:
+    """What the face on a boundary is a mesh of, in a frame."""
+    facets, midsides = body.facets(boundary), None
+    if body.name in imported.midsides:
+        edges = facets[:, EDGES[facets.shape[1]]]
+        found = imported.midsides[body.name].at(edges.reshape(-1, 2))
+        midsides = frame.coordinates(found).reshape(*edges.shape[:2], 3)
+    nodes = body.vertices(boundary)
+    points = frame.coordinates(body.points[nodes])
+    return Surface.of(points, np.searchsorted(nodes, facets), midsides)
 
 
 def _check_held(structure: Structure) -> None:

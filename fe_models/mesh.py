@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from fe_models.curved_face import Surface
 from fe_models.gmsh_session import gmsh_model
 from sa_solver.errors import InputError
 from sa_solver.types import Array, Frame, Indices
@@ -116,6 +117,8 @@ class Face:
     y = 0. Fields on it are linear between nodes. Forces of nodes are pressures times areas and
     displacements those of the nodes, unless it is ``weighted``: then they are integrals of a linear
     traction, ∫ φ_i t dA, and values of the linear field next to the displacement (least squares).
+
+    ``surface`` is what it is a mesh of, if that is known (:mod:`fe_models.curved_face`).
     """
 
     name: str
@@ -123,6 +126,7 @@ class Face:
     coordinates: Array
     facets: Indices
     weighted: bool = field(default=False, kw_only=True)
+    surface: Surface | None = field(default=None, kw_only=True)
 
     def __len__(self) -> int:
         return len(self.coordinates)

@@ -28,8 +28,9 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from fe_models.curved_face import TURNED, Surface, bulge_of
 from fe_models.mesh import Body, Face, Interface, MeshError
-from sa_solver.types import Array, Frame, Indices
+from sa_solver.types import Array, Frame, Indices, Mask
 
 # Share of a facet's area below which an overlap is rounding: neighbours that only share an edge.
 ROUNDING_AREA = 1e-12
@@ -64,13 +65,18 @@ class Mortar:
 
 
 def mortar_projection(
-    slave_points: Array, slave_facets: Indices, master_points: Array, master_facets: Indices
+    slave_points: Array,
+    slave_facets: Indices,
+    master_points: Array,
+    master_facets: Indices,
+    surfaces: tuple[Surface, Surface] | None = None,
 ) -> Mortar:
     """Tie two faces that lie on each other, seen along z.
 
     Points ``(n, 3)`` are in the interface frame [mm]; facets are triangles ``(m, 3)``, or segments
-    ``(m, 2)`` in the plane y = 0. Raises :class:`MeshError` if the faces miss each other, have
-    facets edge-on, or fold over themselves.
+    ``(m, 2)`` in the plane y = 0; ``surfaces`` are what both are meshes of, which the gap knows.
+    Raises :class:`MeshError` if the faces miss each other, have facets edge-on, or fold over
+    themselves.
     """
     slave, master = _Projected(slave_points, slave_facets), _Projected(master_points, master_facets)
     overlap = _overlap(slave, master)
@@ -82,13 +88,21 @@ def mortar_projection(
     projection = (sp.diags(scale) @ _coupling(slave, master, overlap, dual)).tocsr()
     projection.eliminate_zeros()
     gap = np.where(kept, slave_points[:, 2] - projection @ master_points[:, 2], np.inf)
+    if surfaces is not None:
+        gap += scale * _between(slave, master, overlap, dual, surfaces)
     return Mortar(projection, areas, covered, gap, kept)
 
 
 def mortar_interface(
-    name: str, body_1: Body, boundary_1: str, body_2: Body, boundary_2: str, frame: Frame
+    name: str,
+    body_1: Body,
+    boundary_1: str,
+    body_2: Body,
+    boundary_2: str,
+    frame: Frame,
+    surfaces: tuple[Surface, Surface] | None = None,
 ) -> Interface:
-    """Interface of two faces with meshes of their own.
+    """Interface of two faces with meshes of their own, of ``surfaces`` 1 and 2 if they are known.
 
     Its nodes are those of body 2 that body 1 covers, its facets those with such nodes alone; a node
     without a facet is left out. Raises :class:`MeshError` as :func:`mortar_projection` does, and if
@@ -96,8 +110,11 @@ def mortar_interface(
     """
     nodes_1, points_1, facets_1 = _face(body_1, boundary_1, frame)
     nodes_2, points_2, facets_2 = _face(body_2, boundary_2, frame)
-    mortar = mortar_projection(points_2, facets_2, points_1, facets_1)
-    facets = facets_2[mortar.kept[facets_2].all(axis=1)]
+    surface_1, surface_2 = surfaces or (None, None)
+    turned = surfaces and (surfaces[1], surfaces[0])
+    mortar = mortar_projection(points_2, facets_2, points_1, facets_1, turned)
+    whole: Mask = np.all(mortar.kept[facets_2], axis=1)
+    facets = facets_2[whole]
     if not len(facets):
         raise MeshError(
             f"the faces of interface {name} share less than a facet of {boundary_2}: refine it"
@@ -112,8 +129,9 @@ def mortar_interface(
         nodes_2=nodes_2[kept],
         gap=mortar.gap[kept],
         projection=mortar.projection[kept],
-        face_1=Face(name, frame, points_1[:, :2], facets_1),
+        face_1=Face(name, frame, points_1[:, :2], facets_1, surface=surface_1),
         areas=mortar.areas[kept],
+        surface=surface_2 and surface_2.part(kept, whole),
     )
 
 
@@ -169,6 +187,7 @@ class _Projected:
             )
         # Corners anticlockwise, segments from left to right.
         clockwise = determinants < 0.0
+        self.clockwise = clockwise
         self.facets = facets.copy()
         self.facets[clockwise] = facets[clockwise][:, ::-1]
         self.corners[clockwise] = self.corners[clockwise][:, ::-1]
@@ -324,6 +343,27 @@ def _coupling(
     columns = np.broadcast_to(master.facets[overlap.master][:, None, :], values.shape)
     places = rows.ravel(), columns.ravel()
     return sp.csr_matrix((values.ravel(), places), shape=(slave.nodes, master.nodes))
+
+
+def _between(
+    slave: _Projected,
+    master: _Projected,
+    overlap: _Overlap,
+    dual: Array,
+    surfaces: tuple[Surface, Surface],
+) -> Array:
+    """∫ψ times what bulges of the slave and the master add to their distance ``(n,)`` [mm³]."""
+    added = np.zeros(len(overlap.points))
+    for side, facet, given, sign in (
+        (slave, overlap.slave, surfaces[0].bulges, 1.0),
+        (master, overlap.master, surfaces[1].bulges, -1.0),
+    ):
+        turned = np.where(side.clockwise[:, None], given[:, TURNED[given.shape[1]]], given)
+        added += sign * bulge_of(side.shapes(facet, overlap.points), turned[facet])
+    values = (overlap.weights * added)[:, None] * dual
+    total = np.zeros(slave.nodes)
+    np.add.at(total, slave.facets[overlap.slave], values)
+    return total
 
 
 def _face(body: Body, boundary: str, frame: Frame) -> tuple[Indices, Array, Indices]:

@@ -76,7 +76,12 @@ class FaceTransfer:
         within = np.all((middles >= region[0]) & (middles <= region[1]), axis=1)
         near = corners[within] if within.any() else corners
         spacing: Array = np.median(np.ptp(near, axis=1), axis=0)
-        return 0.5 * spacing if self.face.weighted else spacing
+        return spacing / self.per_facet
+
+    @property
+    def per_facet(self) -> int:
+        """Of these distances along a facet: 2 with midsides."""
+        return 2 if self.face.weighted else 1
 
     @cached_property
     def places(self) -> Array:

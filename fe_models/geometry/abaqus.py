@@ -31,6 +31,7 @@ from fe_models.geometry.grouped import (
     FACES,
     Blocks,
     GroupedMesh,
+    midsides_of,
     nodes_of,
     piece_blocks,
     pieces,
@@ -113,15 +114,28 @@ class _Flattened:
             scope.placing(np.array(list(scope.nodes.values())).reshape(-1, 3))
             for scope in self.scopes
         ]
+        together = np.concatenate(points)
         return GroupedMesh(
-            points=np.concatenate(points),
+            points=together,
             numbers=np.concatenate(
                 [np.array(list(scope.nodes), dtype=np.int64) for scope in self.scopes]
             ),
             bodies=self.bodies(),
             surfaces=self.surfaces(),
             node_sets=self.node_sets(),
+            midsides=midsides_of(together, self._second_order()),
         )
+
+    def _second_order(self) -> Blocks:
+        """Elements that have nodes on their edges, with these."""
+        by_shape: dict[str, list[list[int]]] = {}
+        for scope in self.scopes:
+            for element in scope.elements.values():
+                if element.midsides:
+                    nodes = *element.nodes, *element.midsides
+                    rows = self._node_rows(scope, nodes, element.place)
+                    by_shape.setdefault(element.shape, []).append(rows)
+        return [(shape, np.array(cells)) for shape, cells in by_shape.items()]
 
     def bodies(self) -> dict[str, Blocks]:
         return {scope.name: self.blocks(scope, scope.elements) for scope in self.scopes}

@@ -85,10 +85,11 @@ class Names(Generic[_Value]):
 
 @dataclass(frozen=True)
 class Element:
-    """Shape, corner nodes and place of an element."""
+    """Shape, corner nodes, nodes on its edges, of second order, and place of an element."""
 
     shape: str
     nodes: tuple[int, ...]
+    midsides: tuple[int, ...]
     place: SourceLine
 
 
@@ -255,7 +256,9 @@ class Model:
         for place, (number, *nodes) in _element_rows(card, count):
             if number in scope.elements:
                 raise MeshError(f"{place}: element {number} is defined twice")
-            scope.elements[number] = Element(shape, tuple(nodes[:corners]), place)
+            scope.elements[number] = Element(
+                shape, tuple(nodes[:corners]), tuple(nodes[corners:]), place
+            )
             numbers.append(number)
         if name := card.parameters.get("ELSET"):
             if name not in scope.element_sets:

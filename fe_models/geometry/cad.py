@@ -52,6 +52,7 @@ def read_cad(path: Path, size: float) -> GroupedMesh:
             raise MeshError(f"{path}: has no solids; allowed: closed solids, not loose faces")
         try:
             gmsh.model.mesh.generate(3)
+            gmsh.model.mesh.setOrder(2)  # midsides on the surfaces, which facets leave
         except Exception as error:
             raise MeshError(
                 f"{path}: gmsh cannot mesh it at size {size:g} mm: {first_line(error)}; take a "

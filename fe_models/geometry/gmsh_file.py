@@ -8,7 +8,14 @@ from typing import Any
 
 import numpy as np
 
-from fe_models.geometry.grouped import Blocks, GroupedMesh, nodes_of, split_blocks
+from fe_models.geometry.grouped import (
+    CORNERS,
+    Blocks,
+    GroupedMesh,
+    midsides_of,
+    nodes_of,
+    split_blocks,
+)
 from fe_models.gmsh_session import gmsh_model
 from fe_models.mesh import MeshError
 from sa_solver.types import Array, Indices
@@ -62,6 +69,7 @@ def grouped_entities(gmsh: Any, groups: list[EntityGroup]) -> GroupedMesh:
     )
     _refuse_ungrouped(model, top, groups)
     named: list[dict[str, Blocks]] = [{}, {}, {}, {}]
+    points, second = np.asarray(coordinates).reshape(-1, 3)[order], []
     for group in groups:
         if group.name in named[group.dimension]:
             raise MeshError(
@@ -69,9 +77,13 @@ def grouped_entities(gmsh: Any, groups: list[EntityGroup]) -> GroupedMesh:
             )
         blocks = _blocks(model, group, numbers[order])
         if blocks:
-            named[group.dimension][group.name] = blocks
+            named[group.dimension][group.name] = [
+                (shape, cells[:, : CORNERS[shape]]) for shape, cells in blocks
+            ]
+        if group.dimension == top - 1:
+            second += blocks
     return GroupedMesh(
-        points=np.asarray(coordinates).reshape(-1, 3)[order],
+        points=points,
         numbers=numbers[order],
         bodies=named[top],
         surfaces=named[top - 1] if top > 0 else {},
@@ -80,6 +92,7 @@ def grouped_entities(gmsh: Any, groups: list[EntityGroup]) -> GroupedMesh:
             for lower in named[: max(top - 1, 0)]
             for name, blocks in lower.items()
         },
+        midsides=midsides_of(points, second),
     )
 
 
@@ -127,18 +140,18 @@ def _refuse_ungrouped(model: Any, top: int, groups: list[EntityGroup]) -> None:
 
 
 def _blocks(model: Any, group: EntityGroup, numbers: Indices) -> Blocks:
-    """Elements of a group; their nodes are rows of the sorted ``numbers``."""
+    """Elements of a group with all their nodes, which are rows of the sorted ``numbers``."""
     blocks = []
     for entity in group.entities:
         types, _, nodes = model.mesh.getElements(group.dimension, entity)
         for kind, tags in zip(types, nodes, strict=True):
-            name, _, _, count, _, corners = model.mesh.getElementProperties(kind)
+            name, _, _, count, _, _ = model.mesh.getElementProperties(kind)
             shape = SHAPES.get(name.split()[0])
             if shape is None:
                 raise MeshError(
                     f"group {group.name} has elements {name}; allowed: {', '.join(SHAPES)}"
                 )
-            cells = np.asarray(tags, dtype=np.int64).reshape(-1, count)[:, :corners]
+            cells = np.asarray(tags, dtype=np.int64).reshape(-1, count)
             blocks.append((shape, np.searchsorted(numbers, cells)))
     return blocks
 

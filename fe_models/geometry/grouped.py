@@ -6,10 +6,14 @@ diagonals of the quadrilaterals between them, whatever they are split from.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
+from fe_models.curved_face import Midsides
+from fe_models.mesh import MeshError
 from sa_solver.types import Array, Indices
 
 # Corner nodes of every shape that is read, and its dimension.
@@ -36,6 +40,9 @@ FACES: dict[str, tuple[tuple[int, ...], ...]] = {
     ),
 }  # fmt: skip
 
+# Midside nodes are this share of their edge off its middle at most; a quarter where cracks begin.
+MIDDLE = 0.3
+
 # Elements of one shape and their corner nodes ``(m, corners)``, as rows of the file's points.
 Blocks = list[tuple[str, Indices]]
 
@@ -45,7 +52,8 @@ class GroupedMesh:
     """Nodes and named groups of a file; nothing of it is checked.
 
     ``points`` ``(n, 3)`` [mm] and ``numbers`` ``(n,)``, the file's own node numbers; per name the
-    elements of a body, the facets of a surface and the rows of a node set.
+    elements of a body, the facets of a surface and the rows of a node set. ``midsides`` are the
+    points in the middle of edges that elements of second order have.
     """
 
     points: Array
@@ -53,6 +61,50 @@ class GroupedMesh:
     bodies: dict[str, Blocks]
     surfaces: dict[str, Blocks]
     node_sets: dict[str, Indices]
+    midsides: Midsides | None = None
+
+
+def midsides_of(points: Array, blocks: Iterable[tuple[str, Indices]]) -> Midsides | None:
+    """Midsides of elements ``(m, nodes)`` of second order by shape; None where all are of first.
+
+    Programs list midside nodes in different orders, all elements of a shape alike: they are given
+    to the edges whose middles they are nearest to. Quadrilaterals have one in their middle too,
+    on both diagonals, since they are split along one: where the eight nodes of their edges put it.
+    """
+    from scipy.optimize import linear_sum_assignment
+
+    edges, middles = [], []
+    for shape, cells in blocks:
+        corners, pairs = CORNERS[shape], _edges(shape)
+        if cells.shape[1] < corners + len(pairs) or not len(pairs):
+            continue
+        chords = 0.5 * (points[cells[:, pairs[:, 0]]] + points[cells[:, pairs[:, 1]]])
+        given = points[cells[:, corners : corners + len(pairs)]]
+        apart = np.linalg.norm(given[:, None] - chords[:, :, None], axis=3).mean(axis=0)
+        order = linear_sum_assignment(apart)[1]
+        lengths = np.linalg.norm(np.diff(points[cells[:, pairs]], axis=2), axis=3)
+        if np.any(apart[np.arange(len(order)), order] > MIDDLE * lengths.mean(axis=(0, 2))):
+            raise MeshError(f"midside nodes of {shape} elements are not in the middle of its edges")
+        given = given[:, order]
+        edges.append(cells[:, pairs].reshape(-1, 2))
+        middles.append(given.reshape(-1, 3))
+        place = {tuple(sorted(pair)): k for k, pair in enumerate(pairs.tolist())}
+        for face in FACES[shape] if DIMENSION[shape] == 3 else (tuple(range(corners)),):
+            if len(face) != 4:
+                continue
+            around = [place[tuple(sorted(pair))] for pair in pairwise([*face, face[0]])]
+            middle = 0.5 * given[:, around].sum(axis=1) - 0.25 * points[cells[:, face]].sum(axis=1)
+            for diagonal in (face[0::2], face[1::2]):
+                edges.append(cells[:, diagonal])
+                middles.append(middle)
+    return Midsides(np.concatenate(edges), np.concatenate(middles)) if edges else None
+
+
+def _edges(shape: str) -> Indices:
+    """Corners of the edges of a shape, ``(k, 2)``."""
+    rings = FACES[shape] if DIMENSION[shape] > 1 else ((0, 1),) * (shape == "line")
+    pairs = {tuple(sorted(pair)) for ring in rings for pair in pairwise([*ring, ring[0]])}
+    return np.array(sorted(pairs), dtype=np.int64).reshape(-1, 2)
 
 
 def simplices(shape: str, cells: Indices) -> Indices:

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 
+from fe_models.curved_face import Midsides
 from fe_models.geometry.abaqus import read_abaqus
 from fe_models.geometry.apart import read_apart
 from fe_models.geometry.cad import BEGINNINGS, read_cad
@@ -14,7 +15,7 @@ from fe_models.geometry.checked import checked_body, vector
 from fe_models.geometry.gmsh_file import read_msh
 from fe_models.geometry.grouped import DIMENSION, Blocks, GroupedMesh, nodes_of, split_blocks
 from fe_models.geometry.meshio_file import read_meshio
-from fe_models.mesh import Body, MeshError
+from fe_models.mesh import Body, MeshError, in_space
 from fe_models.remesh import element_volumes
 from sa_solver.types import Array, Indices
 
@@ -34,7 +35,8 @@ class ImportedMesh:
     """``bodies`` by name, each with its own nodes and named boundaries.
 
     ``node_numbers`` ``(n,)`` are the file's own numbers of each body's vertices; ``points`` the
-    vertices in each named node set of the file that has any on that body.
+    vertices in each named node set of the file that has any on that body. ``midsides`` are points
+    of its surface in the middle of edges, of bodies for which the file has them.
 
     Examples
     --------
@@ -62,6 +64,7 @@ class ImportedMesh:
     bodies: dict[str, Body]
     node_numbers: dict[str, Indices]
     points: dict[str, dict[str, Indices]]
+    midsides: dict[str, Midsides] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -82,8 +85,9 @@ def read_bodies(path: Path, size: float | None = None) -> ImportedMesh:
 
     Reads gmsh's ``.msh`` (:func:`read_msh`), Abaqus ``.inp`` (:func:`read_abaqus`), ``.step``,
     ``.stp`` and ``.brep`` (:func:`read_cad`) and what meshio reads (:func:`read_meshio`); lengths
-    are taken as mm. Midside nodes are dropped, which straightens curved elements; quadrilaterals,
-    pyramids, wedges and hexahedra are split into triangles or tetrahedra. A plane mesh keeps the
+    are taken as mm. Elements are straight between their corners, whatever nodes they have on
+    their edges: these tell the form of contact faces. Quadrilaterals, pyramids, wedges and
+    hexahedra are split into triangles or tetrahedra. A plane mesh keeps the
     two coordinates that vary, in their order, as X and Z; whether its elements are of plane strain
     or stress is not read.
 
@@ -207,14 +211,15 @@ def patch(body: Body, boundary: str) -> Patch:
 
 def _separated(grouped: GroupedMesh) -> ImportedMesh:
     """Give every body its own nodes, boundaries and node sets."""
-    coordinates = _coordinates(grouped)
+    axes = _axes(grouped)
+    coordinates = grouped.points[:, axes]
     cells = {name: split_blocks(blocks) for name, blocks in grouped.bodies.items()}
     owner = _owners(cells, len(coordinates))
     names = list(cells)
     surfaces = {
         name: _facets(name, blocks, owner) for name, blocks in grouped.surfaces.items() if blocks
     }
-    bodies, numbers, points = {}, {}, {}
+    bodies, numbers, points, midsides = {}, {}, {}, {}
     for number, name in enumerate(names):
         used = np.flatnonzero(owner == number)
         vertex = np.full(len(owner), -1)
@@ -231,11 +236,16 @@ def _separated(grouped: GroupedMesh) -> ImportedMesh:
             for points_name, rows in grouped.node_sets.items()
             if np.any(owner[rows] == number)
         }
-    return ImportedMesh(bodies, numbers, points)
+        if grouped.midsides is not None:
+            edges = grouped.midsides.edges
+            inside = np.all(owner[edges] == number, axis=1)
+            places = in_space(grouped.midsides.points[inside][:, axes])
+            midsides[name] = Midsides(vertex[edges[inside]], places)
+    return ImportedMesh(bodies, numbers, points, midsides)
 
 
-def _coordinates(grouped: GroupedMesh) -> Array:
-    """Coordinates of all nodes: three, or the two of a plane mesh that vary."""
+def _axes(grouped: GroupedMesh) -> Indices:
+    """Coordinates that count: three, or the two of a plane mesh that vary."""
     dimensions = {DIMENSION[shape] for blocks in grouped.bodies.values() for shape, _ in blocks}
     if dimensions not in ({2}, {3}):
         raise MeshError(
@@ -247,7 +257,7 @@ def _coordinates(grouped: GroupedMesh) -> Array:
     if not np.all(np.isfinite(grouped.points[used])):
         raise MeshError("has nodes whose coordinates are no numbers")
     if dimensions == {3}:
-        return grouped.points
+        return np.arange(3)
     extent = np.ptp(grouped.points[used], axis=0)
     varying = np.flatnonzero(extent > PLANE * extent.max())
     if len(varying) != 2:
@@ -255,7 +265,7 @@ def _coordinates(grouped: GroupedMesh) -> Array:
             "has surface elements only, and they are not in one plane x, y or z = constant; "
             "allowed: a plane mesh in such a plane, or solid elements"
         )
-    return grouped.points[:, varying]
+    return varying
 
 
 def _owners(cells: dict[str, Indices], count: int) -> Indices:

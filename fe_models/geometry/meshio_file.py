@@ -11,7 +11,14 @@ from typing import Any
 
 import numpy as np
 
-from fe_models.geometry.grouped import CORNERS, DIMENSION, Blocks, GroupedMesh, piece_blocks
+from fe_models.geometry.grouped import (
+    CORNERS,
+    DIMENSION,
+    Blocks,
+    GroupedMesh,
+    midsides_of,
+    piece_blocks,
+)
 from fe_models.mesh import MeshError
 from sa_solver.types import Indices
 
@@ -34,11 +41,9 @@ def read_meshio(path: Path) -> GroupedMesh:
     """
     mesh = _read(path)
     shapes = [_shape(path, block.type) for block in mesh.cells]
-    cells = [
-        np.asarray(block.data, dtype=np.int64)[:, : CORNERS[shape]]
-        for block, shape in zip(mesh.cells, shapes, strict=True)
-    ]
-    _refuse_missing(path, len(mesh.points), [*cells, *map(np.asarray, mesh.point_sets.values())])
+    full = [np.asarray(block.data, dtype=np.int64) for block in mesh.cells]
+    cells = [nodes[:, : CORNERS[shape]] for nodes, shape in zip(full, shapes, strict=True)]
+    _refuse_missing(path, len(mesh.points), [*full, *map(np.asarray, mesh.point_sets.values())])
     members = _members(path, mesh, [DIMENSION[shape] for shape in shapes])
     top = max((DIMENSION[shape] for shape in shapes), default=0)
     named: list[dict[str, Blocks]] = [{}, {}, {}, {}]
@@ -63,6 +68,7 @@ def read_meshio(path: Path) -> GroupedMesh:
         bodies=named[top],
         surfaces=named[top - 1] if top > 0 else {},
         node_sets=_node_sets(mesh, named[: max(top - 1, 0)]),
+        midsides=midsides_of(points, zip(shapes, full, strict=True)),
     )
 
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from fe_models.structure import CLOSED
+import numpy as np
+
+from fe_models.structure import CLOSED, InterfaceHistory
 from wear.coupled import CoupledState
 from wear.interface import FirstContact
 from workflow.analyses.wear.case.base import WearCase
@@ -11,11 +13,14 @@ from workflow.analyses.wear.link_report import report_link
 from workflow.analyses.wear.structure_stage import StructureStage
 from workflow.analyses.wear.structures import structure_of
 from workflow.analyses.wear.structures.resultants.source import ResultantsSource
+from workflow.case.plain import counted
 from workflow.shell.few_cells import check_cells
 from workflow.shell.reporter import Reporter
 
 # Forces and moments on body 2 left out of balance, relative: the friction solver leaves 1e-7.
 OUT_OF_BALANCE = 1e-3
+# Nodes across a contact that carry its load, at least, for slips that are more than the mesh's.
+FEWEST_NODES = 4
 # Energies of structure and half-space over a cycle that differ by more indicate different slips.
 ENERGIES_APART = 0.25
 
@@ -41,6 +46,24 @@ def warn_of_structure(stage: StructureStage, reporter: Reporter) -> None:
             reporter.warn(f"{name} is open all the time: it does not wear")
         elif P[stage.peak] <= 0.0:
             reporter.warn(f"{name} is open at peak load: its pressure and stress there are none")
+        else:
+            _warn_of_few_nodes(history, stage, reporter)
+
+
+def _warn_of_few_nodes(
+    history: InterfaceHistory, stage: StructureStage, reporter: Reporter
+) -> None:
+    """A contact on so few nodes that the structure hardly knows its size."""
+    face = history.interface
+    pressed = int(np.count_nonzero(history.force[stage.peak, 2] > 0.0))
+    least = FEWEST_NODES if face.line else FEWEST_NODES**2
+    if pressed < min(least, len(face)):
+        size = np.median(np.sqrt(face.facet_sizes) if not face.line else face.facet_sizes)
+        reporter.warn(
+            f"{face.name}: {counted(pressed, 'node')} of its mesh, {size:.2g} mm apart, "
+            f"{'carries' if pressed == 1 else 'carry'} the peak load, where {least} tell a contact "
+            f"from a point: its slip and tilt are the mesh's; {stage.model.finer}"
+        )
 
 
 def warn_of_file(source: ResultantsSource, reporter: Reporter) -> None:

@@ -34,7 +34,7 @@ from workflow.analyses.wear.structures.mesh.loads import (
 )
 from workflow.case.fields import AUTO, Auto, File, OrAuto, Whole
 from workflow.case.input_files import read_heights
-from workflow.case.plain import shape_in_words
+from workflow.case.plain import counted, shape_in_words
 from workflow.case.sections import Length, Section, Title, disagreement, entry
 
 if TYPE_CHECKING:
@@ -448,8 +448,26 @@ def _outline_of(interface: Interface, gap: Section | None) -> str:
         cut = f"; cut by {planes_of_symmetry(interface.planes)}, on a grid over the whole, {whole}"
     return (
         f"{interface.name}, {len(interface)} nodes that {meet}, {area}, gap of the meshes "
-        f"{low:.3g} to {high:.3g} mm{more}{cut}"
+        f"{low:.3g} to {high:.3g} mm{_curved(interface)}{more}{cut}"
     )
+
+
+def _curved(interface: Interface) -> str:
+    """How far the surfaces are off the facets of their meshes, and how that is known."""
+    parts = []
+    for number in (1, 2):
+        surface = interface.face(number).surface
+        bulge = 0.0 if surface is None else float(np.abs(surface.bulges).max(initial=0.0))
+        if surface is None or round(bulge, 9) == 0.0 == surface.straight:
+            continue
+        how = (
+            f"fitted through nodes, to {1e3 * surface.error:.2g} µm"
+            if surface.fitted
+            else ("by nodes on edges")
+        )
+        bent = f", {counted(surface.straight, 'edge')} left straight" * (surface.straight > 0)
+        parts.append(f"body {number} up to {1e3 * bulge:.3g} µm off its facets ({how}{bent})")
+    return f", {' and '.join(parts)}" if parts else ""
 
 
 @contextmanager

@@ -9,7 +9,8 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial import cKDTree
 
-from fe_models.cut_face import whole_face, whole_values
+from fe_models.curved_face import EDGES, Surface
+from fe_models.cut_face import whole_face
 from fe_models.imported_structure import imported_softening, imported_structure
 from fe_models.mesh import Face, Interface, StructureMesh
 from fe_models.relinearised import Softening
@@ -26,9 +27,6 @@ from workflow.analyses.wear.structures.mesh.case import (
 )
 from workflow.analyses.wear.structures.mesh.loads import RotationLoad
 from workflow.shell.reporter import Reporter
-
-# A point is still on a facet when it is off by this share of it: edges belong to both sides.
-INSIDE = 1e-9
 
 
 class MeshModel:
@@ -127,10 +125,8 @@ class MeshModel:
 
     def contact_face(self, interface: Interface) -> ContactFace:
         size, extra = face_size(interface), self._case_gap(interface)
-        (meshed,) = (i for i in self._meshed.interfaces if i.name == interface.name)
         face = whole_face(interface)
-        gap = _MeshGap(face, whole_values(meshed, meshed.gap), extra)
-        return ContactFace(face, size, gap, _coarse(face, size))
+        return ContactFace(face, size, _MeshGap(face, extra), _coarse(face, size))
 
     def node_numbers(self, body: int) -> Indices:
         structure = self._case.structure
@@ -157,57 +153,34 @@ class MeshModel:
 
 
 class _MeshGap:
-    """Gap of the meshed faces, ``(n,)`` at nodes and linear between; the bodies part beyond them.
+    """Gap of the surfaces that were meshed; the bodies part beyond the ends of their faces.
 
     ``extra`` is a gap that the case gives beside it.
     """
 
-    def __init__(self, face: Face, gap: Array, extra: GapFunction | None) -> None:
-        self._face, self._gap, self._extra = face, gap, extra
+    def __init__(self, face: Face, extra: GapFunction | None) -> None:
+        self._face, self._extra = face, extra
 
     def __call__(self, x: Array, y: Array) -> Array:
         """Gap ``(nx, ny)`` [mm] at ``x`` ``(nx, 1)`` and ``y`` ``(1, ny)``."""
-        gap = _extended(self._face, self._gap, x, y)
+        gap = _parting(self._face, x, y)
         if (other := self._face.face(1)) is not self._face:
-            # The last facets of body 2 may hang over the end of body 1.
-            gap += _extended(other, np.zeros(len(other)), x, y)
+            gap -= _parting(other, x, y, sign=-1.0)
         return gap if self._extra is None else gap + self._extra(x, y)
 
 
-def _extended(face: Face, values: Array, x: Array, y: Array) -> Array:
-    """Values ``(n,)`` at a face's nodes, linear between them; larger and larger beyond it."""
-    found = (_on_segments if face.line else _on_triangles)(face, values, x, y)
-    outside = np.isnan(found)
+def _parting(face: Face, x: Array, y: Array, sign: float = 1.0) -> Array:
+    """Height of a face, of nodes that meet 0; beyond it farther and farther towards ``sign``."""
+    surface = face.surface
+    if surface is None:
+        edges = len(EDGES[face.facets.shape[1]])
+        surface = Surface(np.zeros(len(face)), np.zeros((len(face.facets), edges)))
+    height = surface.over(face.coordinates, face.facets, x, y)
+    outside = np.isnan(height)
     points = np.stack(np.broadcast_arrays(x, y), axis=-1)[outside]
     distance, nearest = cKDTree(face.coordinates).query(points)
-    found[outside] = values[nearest] + PARTING_SLOPE * distance
-    return found
-
-
-def _on_segments(face: Face, values: Array, x: Array, y: Array) -> Array:
-    found = np.full((x.size, y.size), np.nan)
-    for segment in face.facets:
-        start, end = face.coordinates[segment, 0]
-        share = (x.ravel() - start) / (end - start)
-        met = (share >= -INSIDE) & (share <= 1.0 + INSIDE)
-        ends = values[segment]
-        found[met, 0] = ends[0] + share[met] * (ends[1] - ends[0])
-    return found
-
-
-def _on_triangles(face: Face, values: Array, x: Array, y: Array) -> Array:
-    found = np.full((x.size, y.size), np.nan)
-    for triangle in face.facets:
-        corners = face.coordinates[triangle]
-        low, high = corners.min(axis=0), corners.max(axis=0)
-        i = slice(*np.searchsorted(x.ravel(), (low[0], high[0])))
-        j = slice(*np.searchsorted(y.ravel(), (low[1], high[1])))
-        arms = np.stack(np.broadcast_arrays(x[i] - corners[0, 0], y[:, j] - corners[0, 1]))
-        shares = np.einsum("ab,bij->aij", np.linalg.inv((corners[1:] - corners[0]).T), arms)
-        shares = np.concatenate([1.0 - shares.sum(axis=0, keepdims=True), shares])
-        met = np.all(shares >= -INSIDE, axis=0)
-        found[i, j][met] = np.einsum("a,an->n", values[triangle], shares[:, met])
-    return found
+    height[outside] = surface.heights[nearest] + sign * PARTING_SLOPE * distance
+    return height
 
 
 def _coarse(face: Face, size: tuple[float, float]) -> tuple[int, int]:
