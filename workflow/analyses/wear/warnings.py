@@ -20,7 +20,7 @@ from workflow.shell.reporter import Reporter
 # Forces and moments on body 2 left out of balance, relative: the friction solver leaves 1e-7.
 OUT_OF_BALANCE = 1e-3
 # Nodes across a contact that carry its load, at least, for slips that are more than the mesh's.
-FEWEST_NODES = 4
+FEWEST_NODES = 5
 # Energies of structure and half-space over a cycle that differ by more indicate different slips.
 ENERGIES_APART = 0.25
 
@@ -58,11 +58,11 @@ def _warn_of_few_nodes(
     pressed = int(np.count_nonzero(history.force[stage.peak, 2] > 0.0))
     least = FEWEST_NODES if face.line else FEWEST_NODES**2
     if pressed < min(least, len(face)):
-        size = np.median(np.sqrt(face.facet_sizes) if not face.line else face.facet_sizes)
+        size = np.median(face.facet_sizes if face.line else np.sqrt(2.0 * face.facet_sizes))
         reporter.warn(
-            f"{face.name}: {counted(pressed, 'node')} of its mesh, {size:.2g} mm apart, "
-            f"{'carries' if pressed == 1 else 'carry'} the peak load, where {least} tell a contact "
-            f"from a point: its slip and tilt are the mesh's; {stage.model.finer}"
+            f"{face.name}: the peak load is carried by {counted(pressed, 'node')} of a mesh of "
+            f"{size:.2g} mm, where {least} tell a contact from a point: its slip and tilt are the "
+            f"mesh's; {stage.model.finer}"
         )
 
 

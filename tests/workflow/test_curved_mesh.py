@@ -1,0 +1,173 @@
+"""A cylinder and a ball that are meshed, pressed on a plane: Hertz, whatever the file is."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from fe_models.geometry.imported import patch, read_bodies
+from fe_models.gmsh_session import gmsh_model
+from sa_solver.reference.hertz import HertzCylinder, HertzSphere
+from sa_solver.types import ElasticPair, Material
+from tests.workflow.commands import invoke
+from tests.workflow.mesh_scenes import WEAR, run, write_case
+from workflow.analyses.wear.structures.mesh.case import MeshCase
+from workflow.kinds import load_case
+
+pytestmark = [pytest.mark.usefixtures("reads_here")]
+
+RADIUS, FORCE = 30.0, 250.0
+SIZE = {2: 0.35, 3: 0.5}
+STEEL = Material(200e3, 0.3)
+MODULUS = ElasticPair(STEEL, STEEL).contact_modulus
+PEAK = {
+    2: HertzCylinder(FORCE, RADIUS, MODULUS).peak_pressure,
+    3: HertzSphere(FORCE, RADIUS, MODULUS).peak_pressure,
+}
+GRID = {2: (512, 1), 3: (128, 128)}
+
+
+def bodies(gmsh, dimension):
+    """A block and a segment of a cylinder or a cap of a ball on it: two tags."""
+    occ = gmsh.model.occ
+    if dimension == 2:
+        block, disk = (
+            occ.addRectangle(-15, -12, 0, 30, 12),
+            occ.addDisk(0, RADIUS, 0, RADIUS, RADIUS),
+        )
+        cut = occ.addRectangle(-6, -1, 0, 12, 11)
+    else:
+        block, disk = occ.addBox(-4, -4, -3, 8, 8, 3), occ.addSphere(0, 0, RADIUS, RADIUS)
+        cut = occ.addCylinder(0, 0, -1, 0, 0, 4, 3)
+    ((_, foot),) = occ.intersect([(dimension, disk)], [(dimension, cut)])[0]
+    occ.synchronize()
+    return block, foot
+
+
+def sides(gmsh, dimension, body):
+    """Boundaries of a body with the height of their centre."""
+    up = 1 if dimension == 2 else 2
+    return {
+        tag: gmsh.model.occ.getCenterOfMass(dim, tag)[up]
+        for dim, tag in gmsh.model.getBoundary([(dimension, body)], oriented=False)
+    }
+
+
+def meshed(path: Path, dimension: int, order: int) -> dict[str, str]:
+    """Write both bodies as a mesh, or for order 0 as CAD; the names of bodies and faces."""
+    with gmsh_model("bodies") as gmsh:
+        block, foot = bodies(gmsh, dimension)
+        below, above = sides(gmsh, dimension, block), sides(gmsh, dimension, foot)
+        faces = {
+            "base": min(below, key=below.__getitem__),
+            "seat": max(below, key=below.__getitem__),
+            "sole": min(above, key=above.__getitem__),
+            "head": max(above, key=above.__getitem__),
+        }
+        if order == 0:
+            gmsh.write(str(path))
+        else:
+            for name, tag in (("block", block), ("foot", foot)):
+                gmsh.model.addPhysicalGroup(dimension, [tag], name=name)
+            for name, tag in faces.items():
+                gmsh.model.addPhysicalGroup(dimension - 1, [tag], name=name)
+            field = gmsh.model.mesh.field
+            field.add("Box", 1)
+            near = {
+                "VIn": SIZE[dimension],
+                "VOut": 2.0 if dimension == 2 else SIZE[3],
+                "Thickness": 6.0,
+            }
+            near |= {"XMin": -2.5, "XMax": 2.5, "YMin": -2.0, "YMax": 2.0}
+            for entry, value in near.items():
+                field.setNumber(1, entry, value)
+            field.setAsBackgroundMesh(1)
+            for option in ("ExtendFromBoundary", "FromPoints"):
+                gmsh.option.setNumber(f"Mesh.MeshSize{option}", 0)
+            gmsh.model.mesh.generate(dimension)
+            gmsh.model.mesh.setOrder(order)
+            gmsh.write(str(path))
+    if order == 0:
+        return named_by_cad(path)
+    return {name: name for name in ("block", "foot", "base", "seat", "sole", "head")}
+
+
+def named_by_cad(path: Path) -> dict[str, str]:
+    """Solids and faces of a CAD file, by where they are."""
+    names = {"block": "solid_1", "foot": "solid_2"}
+    for solid, low, high in (("solid_1", "base", "seat"), ("solid_2", "sole", "head")):
+        body = read_bodies(path, SIZE[3]).bodies[solid]
+        heights = {name: patch(body, name).centroid[2] for name in body.mesh.boundaries or {}}
+        names |= {low: min(heights, key=heights.get), high: max(heights, key=heights.get)}
+    return names
+
+
+def pressed(folder: Path, dimension: int, order: int) -> Path:
+    """The case of a foot that is pressed and moved to and fro, too little to slide."""
+    file = folder / ("bodies.msh" if order else "bodies.step")
+    names = meshed(file, dimension, order)
+    structure = {
+        "file": file.name,
+        "body_1": names["block"],
+        "body_2": names["foot"],
+        "contacts": [
+            {"name": "sole", "face_1": names["seat"], "face_2": names["sole"], "x": [1, 0, 0]}
+        ],
+        "supports": [{"group": names["base"], "hold": "all"}],
+        "loads": [
+            {"kind": "force", "group": names["head"], "force": [0, 0, -FORCE], "path": [1, 1, 1]},
+            {
+                "kind": "displacement",
+                "group": names["head"],
+                "displacement": ["1 um", 0, 0],
+                "path": [0, 1, -1],
+            },
+        ],
+    }
+    return write_case(
+        folder / "case.yaml",
+        structure,
+        {"increments": [2, 2, 2], "cycle_from": 2, "peak_leg": 2},
+        grid=GRID[dimension],
+        wear=WEAR | {"cycles": 1.0, "step": {"kind": "explicit", "cycles": 1.0}},
+        error_budget="known",
+        **({"mesh": {"size": SIZE[3]}} if order == 0 else {}),
+    )
+
+
+@pytest.mark.parametrize(
+    ("dimension", "order"),
+    [
+        (2, 1),
+        (2, 2),
+        pytest.param(3, 1, marks=pytest.mark.slow),
+        pytest.param(3, 2, marks=pytest.mark.slow),
+        pytest.param(3, 0, marks=pytest.mark.slow),
+    ],
+)
+def test_hertz_of_a_mesh_that_is_coarser_than_the_contact(tmp_path, dimension: int, order: int):
+    """Facets alone would give 955 MPa where Hertz has 540, and more where one of them is hit.
+
+    So few nodes are told, by number and name.
+    """
+    case = pressed(tmp_path, dimension, order)
+    summary = run(case, tmp_path / "out")
+    assert summary["sole"]["peak_pressure"]["unworn"] == pytest.approx(PEAK[dimension], rel=0.015)
+    told = [line for line in summary["warnings"] if line.startswith("sole: ")]
+    assert any("the peak load is carried by" in line for line in told), told
+
+
+def test_a_check_says_how_a_face_is_curved(tmp_path):
+    """Outer facets are 2 mm long, 17 µm off their circle."""
+    case = pressed(tmp_path, 2, 1)
+    said = invoke("check", case).output
+    assert "body 2 up to" in said
+    assert "off its facets (fitted through nodes, to" in said
+    loaded = load_case(case)
+    assert isinstance(loaded, MeshCase)
+    (sole,) = loaded.structure.mesh(None).interfaces
+    surface = sole.surface
+    assert surface is not None
+    lengths = np.abs(np.diff(sole.coordinates[sole.facets, 0], axis=1))[:, 0]
+    exact = -(lengths**2) / (8.0 * RADIUS)
+    np.testing.assert_allclose(surface.bulges[:, 0], exact, rtol=0.05)
