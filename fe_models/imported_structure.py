@@ -33,12 +33,19 @@ ANY = Material(1.0, 0.0)
 
 @dataclass(frozen=True)
 class ContactPair:
-    """``face_1`` of body 1 meets ``face_2`` of body 2; their frame's x is near ``x_direction``."""
+    """``face_1`` of body 1 meets ``face_2`` of body 2; their frame's x is near ``x_direction``.
+
+    Each is one boundary or several, seams included, that are one face together.
+    """
 
     name: str
-    face_1: str
-    face_2: str
+    face_1: Sequence[str]
+    face_2: Sequence[str]
     x_direction: Array
+
+    def boundary(self, number: int) -> str:
+        """What the face of body ``number``, 1 or 2, is called."""
+        return " + ".join((self.face_1, self.face_2)[number - 1])
 
 
 @dataclass(frozen=True)
@@ -137,19 +144,18 @@ def imported_mesh(
     Raises :class:`MeshError` for names that are not in the file or faces that do not meet.
     """
     body_1, body_2 = (named_body(imported, name) for name in names)
-    interface_names = [pair.name for pair in pairs]
-    body_1 = _with_interfaces(imported, body_1, [pair.face_1 for pair in pairs], interface_names)
-    body_2 = _with_interfaces(imported, body_2, [pair.face_2 for pair in pairs], interface_names)
+    body_1 = _with_interfaces(imported, body_1, pairs, 1)
+    body_2 = _with_interfaces(imported, body_2, pairs, 2)
     interfaces = []
     for pair in pairs:
-        faces = (body_1, pair.face_1, body_2, pair.face_2)
+        faces = (body_1, pair.boundary(1), body_2, pair.boundary(2))
         frame, _ = frame_of_faces(*faces, pair.x_direction)
         try:
             interface = matched_interface(pair.name, body_1, body_2, pair.name, frame)
         except MatchError:
             surfaces = (
-                _surface(imported, body_1, pair.face_1, frame),
-                _surface(imported, body_2, pair.face_2, frame),
+                _surface(imported, body_1, pair.name, frame),
+                _surface(imported, body_2, pair.name, frame),
             )
             interface = mortar_interface(pair.name, *faces, frame, surfaces)
         interfaces.append(interface)
@@ -247,11 +253,17 @@ def check_load(imported: ImportedMesh, bodies: tuple[Body, Body], load: AppliedL
 
 
 def _with_interfaces(
-    imported: ImportedMesh, body: Body, faces: Sequence[str], names: Sequence[str]
+    imported: ImportedMesh, body: Body, pairs: Sequence[ContactPair], number: int
 ) -> Body:
-    """The body with its contact faces as boundaries of the interfaces' names as well."""
-    pairs = zip(names, faces, strict=True)
-    named = {name: contact_facets(imported, body, face) for name, face in pairs}
+    """The body with its contact faces as boundaries of the interfaces' names as well.
+
+    Those of several boundaries go by all of their names together, too.
+    """
+    named: dict[str, Indices] = {}
+    for pair in pairs:
+        names = (pair.face_1, pair.face_2)[number - 1]
+        facets = np.unique(np.concatenate([contact_facets(imported, body, name) for name in names]))
+        named |= {pair.name: facets, pair.boundary(number): facets}
     return Body(body.name, body.mesh.with_boundaries(named))
 
 

@@ -26,7 +26,7 @@ from tests.fe_models.conftest import stress_state
 from tests.mirrored_blocks import along, mirrored, with_faces
 
 STEEL = Material(200e3, 0.3, 7.8e-9)
-PAIR = ContactPair("foot", "top", "bottom", np.array([1.0, 0.0, 0.0]))
+PAIR = ContactPair("foot", ["top"], ["bottom"], np.array([1.0, 0.0, 0.0]))
 MU = 0.5
 
 
@@ -188,7 +188,7 @@ def lid_motion(joined, displacement):
 
 def test_contact_faces_that_share_nodes_are_refused():
     mesh = block_and_pad(False, False)
-    twice = [PAIR, ContactPair("again", "top", "bottom", np.array([1.0, 0.0, 0.0]))]
+    twice = [PAIR, ContactPair("again", ["top"], ["bottom"], np.array([1.0, 0.0, 0.0]))]
     interfaces = imported_mesh(mesh, ("lower", "upper"), twice)
     with pytest.raises(MeshError, match="foot and again share nodes of body lower"):
         imported_structure(interfaces, mesh, (STEEL, STEEL), [Support("base", "xyz")], PRESSED, 1)
@@ -217,7 +217,7 @@ def test_supports_that_cannot_be_are_refused(supports, wrong):
 
 
 def test_plane_askew_to_the_frame_is_refused():
-    askew = ContactPair("foot", "top", "bottom", np.array([1.0, 1.0, 0.0]))
+    askew = ContactPair("foot", ["top"], ["bottom"], np.array([1.0, 1.0, 0.0]))
     held = [Support("base", "xyz"), Support("plane", "y")]
     with pytest.raises(MeshError, match="no axis of the contact's frame"):
         built(block_and_pad(False, True), held, PRESSED, pair=askew)
@@ -439,3 +439,26 @@ def test_cycle_that_follows_goes_as_far():
     )
     third = joined.solve_cycle(joint, path, joined.gap(), MU, after=second)
     assert third.cycles == max(second.cycles - 1, 1)
+
+
+# --- faces in several parts -----------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("match", [True, False])
+def test_parts_of_a_face_are_one_face(match):
+    """Seams included: the interface is that of the whole."""
+    whole = block_and_pad(full=True, match=match)
+    lower, upper = (whole.bodies[name].mesh for name in ("lower", "upper"))
+    bottom = upper.boundaries["bottom"]
+    middles = upper.p[0][upper.facets[:, bottom]].mean(axis=0)
+    halves = {"left": bottom[middles < 0.0], "right": bottom[middles > 0.0]}
+    parted = imported(lower, upper.with_boundaries(halves))
+    pair = ContactPair("foot", ["top"], ["right", "left"], np.array([1.0, 0.0, 0.0]))
+    one, other = (
+        imported_mesh(mesh, ("lower", "upper"), [contact]).interfaces[0]
+        for mesh, contact in ((whole, PAIR), (parted, pair))
+    )
+    np.testing.assert_array_equal(one.nodes_2, other.nodes_2)
+    np.testing.assert_allclose(one.nodal_areas, other.nodal_areas, rtol=1e-12)
+    np.testing.assert_allclose(one.gap, other.gap, atol=1e-12)
+    np.testing.assert_allclose(one.frame.origin, other.frame.origin, atol=1e-12)

@@ -119,6 +119,37 @@ def test_parts_and_instances_run(blocks, tmp_path):
     assert "largest von Mises stress on the free surface, unworn" in told
 
 
+def test_a_face_in_two_parts(blocks, tmp_path):
+    """Named both, they are the whole; named one, a check doubts it; twice, or none, is refused."""
+    edit(
+        tmp_path / "blocks.inp",
+        "*Surface, type=ELEMENT, name=foot_low\n1, S1\n2, S1\n3, S1\n4, S1\n",
+        "*Surface, type=ELEMENT, name=low_a\n1, S1\n2, S1\n"
+        "*Surface, type=ELEMENT, name=low_b\n3, S1\n4, S1\n",
+    )
+    face = "structure.contacts.0.face_2="
+    said = invoke("check", blocks, "--set", f"{face}[low_a, low_b]").output
+    assert "its faces share" not in said
+    assert "1 mm² of 4 and 1 mm²" in said
+    assert "its faces share" not in invoke("check", blocks, "--set", f"{face}low_a").output
+    summary = run(blocks, tmp_path / "out", f"{face}[low_a, low_b]")
+    assert summary["foot"]["peak_load"]["unworn"]["P"] == pytest.approx(40.0, rel=1e-6)
+    assert "a boundary twice; allowed: each once" in refused(blocks, f"{face}[low_a, low_a]")
+    assert "none; allowed: a boundary, or several" in refused(blocks, f"{face}[]")
+    assert "no boundary low_c on body Foot-1" in refused(blocks, f"{face}[low_a, low_c]")
+
+
+def test_a_face_that_is_half_named_is_doubted(blocks, tmp_path):
+    """Of the lower cube's top one half: the foot overhangs it."""
+    edit(
+        tmp_path / "blocks.inp",
+        "*Surface, type=ELEMENT, name=base_high\n5, S2\n6, S2\n7, S2\n8, S2\n",
+        "*Surface, type=ELEMENT, name=base_high\n5, S2\n6, S2\n",
+    )
+    said = " ".join(invoke("check", blocks).output.split())
+    assert "foot: its faces share 0.5 mm² of 2 and 1; if one is in several parts" in said
+
+
 def test_a_contact_may_be_called_as_a_body(blocks, tmp_path):
     """Both have errors of their own."""
     edit(blocks, "name: foot", "name: Foot-1")

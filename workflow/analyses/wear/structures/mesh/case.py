@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 import numpy as np
 from pydantic import model_validator
 
-from fe_models.mesh import Interface, MeshError, StructureMesh
+from fe_models.mesh import MeshError, StructureMesh
 from workflow.analyses.wear.case.base import FiniteElementCase, check_interface_name
 from workflow.analyses.wear.case.gaps import Gap, HeightsGap, check_gap
 from workflow.analyses.wear.case.sections import (
@@ -23,6 +23,12 @@ from workflow.analyses.wear.case.sections import (
     check_rows,
     check_shares,
 )
+from workflow.analyses.wear.structures.mesh.faces import (
+    face_size,
+    hardly_met,
+    outline_of,
+    planes_of_symmetry,
+)
 from workflow.analyses.wear.structures.mesh.loads import (
     AccelerationLoad,
     Component,
@@ -32,9 +38,8 @@ from workflow.analyses.wear.structures.mesh.loads import (
     Name,
     RotationLoad,
 )
-from workflow.case.fields import AUTO, Auto, File, OrAuto, Whole
+from workflow.case.fields import AUTO, Auto, File, OrAlone, OrAuto, Whole
 from workflow.case.input_files import read_heights
-from workflow.case.plain import counted, shape_in_words
 from workflow.case.sections import Length, Section, Title, disagreement, entry
 
 if TYPE_CHECKING:
@@ -51,17 +56,19 @@ ENDINGS = (
 
 # Heights on both sides of a plane of symmetry may differ by this share of their range: files round.
 MIRRORED = 1e-6
-AXIS_NAMES = "xy"
 
 Stamp = tuple[int, int]
+
+
+Faces = Annotated[tuple[Name, ...], OrAlone()]
 
 
 class ContactPair(Section):
     """Two faces that meet; their meshes need not match."""
 
     name: Name = entry("of the interface in all results", "pad")
-    face_1: Name = entry("boundary of body 1", "disk_top")
-    face_2: Name = entry("boundary of body 2", "blade_foot")
+    face_1: Faces = entry("boundary of body 1, or several that are one face together", "disk_top")
+    face_2: Faces = entry("boundary of body 2, or several", "blade_foot")
     x: tuple[Component, Component, Component] = entry(
         "direction in which body 2 would slide under the load; x of the interface frame [1]",
         [1.0, 0.0, 0.0],
@@ -72,6 +79,16 @@ class ContactPair(Section):
     def _has_direction(self) -> ContactPair:
         if not any(self.x):
             raise disagreement("no direction; allowed: one that is not zero", "x")
+        return self
+
+    @model_validator(mode="after")
+    def _has_faces(self) -> ContactPair:
+        for key in ("face_1", "face_2"):
+            names = getattr(self, key)
+            if not names:
+                raise disagreement("none; allowed: a boundary, or several", key)
+            if len(set(names)) < len(names):
+                raise disagreement("a boundary twice; allowed: each once", key)
         return self
 
     def described(self) -> fe.ContactPair:
@@ -268,13 +285,21 @@ class MeshCase(FiniteElementCase):
         return [
             ("structure", f"{Path(structure.file).name}: {' and '.join(bodies)}"),
             *(
-                ("face", _outline_of(interface, pair.gap))
+                ("face", outline_of(mesh, interface, pair.gap))
                 for interface, pair in zip(mesh.interfaces, structure.contacts, strict=True)
             ),
             *(("held", f"{support.group}, {support.hold}") for support in structure.supports),
             ("load path", f"{self.increments_outline} in {len(self.legs)} legs{before}{cycles}"),
             *(("load", load.text) for load in structure.loads),
         ]
+
+    def doubts(self) -> Iterator[str]:
+        """Faces that hardly meet: one that is in two parts, of which one is named."""
+        yield from super().doubts()
+        mesh = self.structure.mesh(self.mesh.size)
+        for index, interface in enumerate(mesh.interfaces):
+            if doubt := hardly_met(mesh, interface):
+                yield f"structure.contacts.{index}: {doubt}"
 
     @model_validator(mode="after")
     def _size_is_for_cad(self) -> MeshCase:
@@ -355,7 +380,8 @@ class MeshCase(FiniteElementCase):
         for index, pair in enumerate(structure.contacts):
             for key, body in (("face_1", body_1), ("face_2", body_2)):
                 with _pointing_at(f"structure.contacts.{index}.{key}"):
-                    contact_facets(imported, body, getattr(pair, key))
+                    for name in getattr(pair, key):
+                        contact_facets(imported, body, name)
         for index, support in enumerate(structure.supports):
             with _pointing_at(f"structure.supports.{index}.group"):
                 check_support(imported, (body_1, body_2), support.described())
@@ -405,15 +431,6 @@ class MeshCase(FiniteElementCase):
             )
 
 
-def face_size(face: Interface) -> tuple[float, float]:
-    """Extent of a face along x and y about its origin [mm]; of a line contact a slice of 1 mm.
-
-    Of one that planes of symmetry cut, whose origin they hold, the extent of the whole.
-    """
-    reach = 2.0 * np.abs(face.coordinates).max(axis=0)
-    return float(reach[0]), 1.0 if face.line else float(reach[1])
-
-
 def _check_mirrored(gap: Gap, planes: Sequence[int], key: str) -> None:
     """Refuse heights that are not their own image across the ``planes`` that cut their face."""
     if not isinstance(gap, HeightsGap):
@@ -427,47 +444,6 @@ def _check_mirrored(gap: Gap, planes: Sequence[int], key: str) -> None:
                 f"{apart:.3g} mm; allowed: heights that are, over the whole face, or a mesh of it",
                 key,
             )
-
-
-def planes_of_symmetry(planes: Sequence[int]) -> str:
-    """Those across some axes of a contact's frame, in words."""
-    return " and ".join(f"a plane of symmetry across {AXIS_NAMES[axis]}" for axis in planes)
-
-
-def _outline_of(interface: Interface, gap: Section | None) -> str:
-    """What a user should see of an interface, and of the gap given it, before running it."""
-    meet = "meet node to node" if interface.projection is None else "do not match"
-    area = f"{interface.nodal_areas.sum():.4g} {'mm' if interface.line else 'mm²'}"
-    # Rounded, as planes of a mesh file are off by its last digits.
-    low, high = (round(float(gap), 9) + 0.0 for gap in (interface.gap.min(), interface.gap.max()))
-    more = "" if gap is None else f" and {shape_in_words(gap)}"
-    cut = ""
-    if interface.planes:
-        x, y = face_size(interface)
-        whole = f"{x:.4g} mm" if interface.line else f"{x:.4g} x {y:.4g} mm"
-        cut = f"; cut by {planes_of_symmetry(interface.planes)}, on a grid over the whole, {whole}"
-    return (
-        f"{interface.name}, {len(interface)} nodes that {meet}, {area}, gap of the meshes "
-        f"{low:.3g} to {high:.3g} mm{_curved(interface)}{more}{cut}"
-    )
-
-
-def _curved(interface: Interface) -> str:
-    """How far the surfaces are off the facets of their meshes, and how that is known."""
-    parts = []
-    for number in (1, 2):
-        surface = interface.face(number).surface
-        bulge = 0.0 if surface is None else float(np.abs(surface.bulges).max(initial=0.0))
-        if surface is None or round(bulge, 9) == 0.0 == surface.straight:
-            continue
-        how = (
-            f"fitted through nodes, to {1e3 * surface.error:.2g} µm"
-            if surface.fitted
-            else ("by nodes on edges")
-        )
-        bent = f", {counted(surface.straight, 'edge')} left straight" * (surface.straight > 0)
-        parts.append(f"body {number} up to {1e3 * bulge:.3g} µm off its facets ({how}{bent})")
-    return f", {' and '.join(parts)}" if parts else ""
 
 
 @contextmanager

@@ -20,11 +20,8 @@ from sa_solver.types import Array, Grid, Indices
 from workflow.analyses.wear.gaps import GapFunction, gap_over
 from workflow.analyses.wear.load_source import ContactFace
 from workflow.analyses.wear.structure_stage import MissionLoads
-from workflow.analyses.wear.structures.mesh.case import (
-    MeshCase,
-    face_size,
-    planes_of_symmetry,
-)
+from workflow.analyses.wear.structures.mesh.case import MeshCase
+from workflow.analyses.wear.structures.mesh.faces import face_size, planes_of_symmetry
 from workflow.analyses.wear.structures.mesh.loads import RotationLoad
 from workflow.shell.reporter import Reporter
 

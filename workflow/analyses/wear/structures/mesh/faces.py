@@ -1,0 +1,98 @@
+"""What a user should see of the faces of a mesh that meet, before anything runs."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from fe_models.mesh import Interface, StructureMesh
+from workflow.case.plain import counted, shape_in_words
+from workflow.case.sections import Section
+
+AXIS_NAMES = "xy"
+# Faces are shared but for rounding; and usually the smaller one all but for so much.
+SHARED, WHOLE = 1e-6, 0.9
+
+
+def face_size(face: Interface) -> tuple[float, float]:
+    """Extent of a face along x and y about its origin [mm]; of a line contact a slice of 1 mm.
+
+    Of one that planes of symmetry cut, whose origin they hold, the extent of the whole.
+    """
+    reach = 2.0 * np.abs(face.coordinates).max(axis=0)
+    return float(reach[0]), 1.0 if face.line else float(reach[1])
+
+
+def planes_of_symmetry(planes: Sequence[int]) -> str:
+    """Those across some axes of a contact's frame, in words."""
+    return " and ".join(f"a plane of symmetry across {AXIS_NAMES[axis]}" for axis in planes)
+
+
+def outline_of(mesh: StructureMesh, interface: Interface, gap: Section | None) -> str:
+    """What a user should see of an interface, and of the gap given it, before running it."""
+    meet = "meet node to node" if interface.projection is None else "do not match"
+    area = f"{interface.nodal_areas.sum():.4g} {'mm' if interface.line else 'mm²'}"
+    # Rounded, as planes of a mesh file are off by its last digits.
+    low, high = (round(float(gap), 9) + 0.0 for gap in (interface.gap.min(), interface.gap.max()))
+    more = "" if gap is None else f" and {shape_in_words(gap)}"
+    cut = ""
+    if interface.planes:
+        x, y = face_size(interface)
+        whole = f"{x:.4g} mm" if interface.line else f"{x:.4g} x {y:.4g} mm"
+        cut = f"; cut by {planes_of_symmetry(interface.planes)}, on a grid over the whole, {whole}"
+    return (
+        f"{interface.name}, {len(interface)} nodes that {meet}, {area}{_beside(mesh, interface)}, "
+        f"gap of the meshes {low:.3g} to {high:.3g} mm{_curved(interface)}{more}{cut}"
+    )
+
+
+def _areas(mesh: StructureMesh, interface: Interface) -> tuple[float, float, float]:
+    """What both bodies share of an interface, and their whole faces [mm²]; lengths [mm] of a line.
+
+    Seen along the normal.
+    """
+    z = interface.frame.axes[2]
+    whole = [
+        float(np.abs(body.outward(interface.name) @ z).sum()) for body in (mesh.body_1, mesh.body_2)
+    ]
+    return float(interface.nodal_areas.sum()), whole[0], whole[1]
+
+
+def _beside(mesh: StructureMesh, interface: Interface) -> str:
+    """How much both faces have that is not shared."""
+    shared, *whole = _areas(mesh, interface)
+    if all(abs(area / shared - 1.0) < SHARED for area in whole):
+        return ""
+    unit = "mm" if interface.line else "mm²"
+    return f" of {whole[0]:.4g} and {whole[1]:.4g} {unit}"
+
+
+def _curved(interface: Interface) -> str:
+    """How far the surfaces are off the facets of their meshes, and how that is known."""
+    parts = []
+    for number in (1, 2):
+        surface = interface.face(number).surface
+        bulge = 0.0 if surface is None else float(np.abs(surface.bulges).max(initial=0.0))
+        if surface is None or round(bulge, 9) == 0.0 == surface.straight:
+            continue
+        how = (
+            f"fitted through nodes, to {1e3 * surface.error:.2g} µm"
+            if surface.fitted
+            else ("by nodes on edges")
+        )
+        bent = f", {counted(surface.straight, 'edge')} left straight" * (surface.straight > 0)
+        parts.append(f"body {number} up to {1e3 * bulge:.3g} µm off its facets ({how}{bent})")
+    return f", {' and '.join(parts)}" if parts else ""
+
+
+def hardly_met(mesh: StructureMesh, interface: Interface) -> str:
+    """A doubt about faces of which much is not shared; empty where there is none."""
+    shared, *whole = _areas(mesh, interface)
+    if shared >= WHOLE * min(whole):
+        return ""
+    unit = "mm" if interface.line else "mm²"
+    return (
+        f"{interface.name}: its faces share {shared:.4g} {unit} of {whole[0]:.4g} and "
+        f"{whole[1]:.4g}; if one is in several parts, name them all, as in face_2: [a, b]"
+    )
