@@ -10,6 +10,14 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.spatial import cKDTree
 
+from fe_models.applied_loads import (
+    AppliedLoad,
+    BoundaryForce,
+    Displacement,
+    Rotation,
+    boundary_of,
+    vector_of,
+)
 from fe_models.constraints import Constraints
 from fe_models.curved_face import EDGES, Surface
 from fe_models.cut_face import cut_interface
@@ -58,77 +66,6 @@ class Support:
 
     group: str
     hold: str
-
-
-@dataclass(frozen=True)
-class Pressure:
-    """Pressure [MPa] on a boundary, into the body."""
-
-    boundary: str
-    pressure: float
-
-    def forces(self, elastic: ElasticBody) -> Array:
-        """Nodal forces ``(size,)``."""
-        return self.pressure * elastic.pressure_load(self.boundary)
-
-
-@dataclass(frozen=True)
-class BoundaryForce:
-    """Force ``(3,)`` [N] on a boundary, spread evenly; per length in the plane [N/mm]."""
-
-    boundary: str
-    force: Array
-
-    def forces(self, elastic: ElasticBody) -> Array:
-        """Nodal forces ``(size,)``."""
-        area = elastic.boundary_integral(self.boundary, lambda x: np.ones_like(x[0]))
-        return elastic.traction_load(
-            self.boundary, lambda x: np.full_like(x[0], 1.0 / area), self.force
-        )
-
-
-@dataclass(frozen=True)
-class Displacement:
-    """Displacement ``(3,)`` [mm] imposed on a boundary along its own direction; free across it."""
-
-    boundary: str
-    displacement: Array
-
-
-@dataclass(frozen=True)
-class Rotation:
-    """Rotation of both bodies at ``speed`` [rad/s] about an axis ``(3,)`` through a point ``(3,)``.
-
-    Its forces go with the square of the speed.
-    """
-
-    axis: Array
-    through: Array
-    speed: float
-
-    @property
-    def direction(self) -> Array:
-        """Unit vector of the axis."""
-        return self.axis / np.linalg.norm(self.axis)
-
-    def forces(self, elastic: ElasticBody) -> Array:
-        """Nodal forces ``(size,)``."""
-        return self.speed**2 * elastic.centrifugal_load(self.direction, self.through)
-
-
-@dataclass(frozen=True)
-class Acceleration:
-    """Acceleration ``(3,)`` [mm/s²] of the frame of reference: bodies are pulled against it."""
-
-    acceleration: Array
-
-    def forces(self, elastic: ElasticBody) -> Array:
-        """Nodal forces ``(size,)``."""
-        pull = -elastic.material.density * self.acceleration
-        return elastic.body_load(lambda x: np.broadcast_to(pull[:, None, None], x.shape))
-
-
-AppliedLoad = Pressure | BoundaryForce | Displacement | Rotation | Acceleration
 
 
 def imported_mesh(
@@ -234,7 +171,7 @@ def check_support(imported: ImportedMesh, bodies: tuple[Body, Body], support: Su
 def check_load(imported: ImportedMesh, bodies: tuple[Body, Body], load: AppliedLoad) -> None:
     """Raise :class:`MeshError` if neither body has the boundary, or the plane not the direction."""
     boundaries, node_sets = _groups(imported, bodies)
-    group = _boundary(load)
+    group = boundary_of(load)
     if group is not None and group not in boundaries:
         wrong = (
             f"{group} is a node set, which has no area"
@@ -247,9 +184,13 @@ def check_load(imported: ImportedMesh, bodies: tuple[Body, Body], load: AppliedL
             f"{group} is a boundary of both bodies, and each would take all of the force; allowed: "
             "boundaries of one body"
         )
-    vector = _vector(load)
-    if vector is not None and bodies[0].mesh.dim() == 2 and vector[1] != 0.0:
+    if bodies[0].mesh.dim() == 3:
+        return
+    vector = vector_of(load)
+    if vector is not None and vector[1] != 0.0:
         raise MeshError("a load along y, across the plane; allowed: x and z")
+    if isinstance(load, BoundaryForce) and np.any(load.moment[[0, 2]]):
+        raise MeshError("a moment about x or z, which lie in the plane; allowed: about y")
 
 
 def _with_interfaces(
@@ -337,22 +278,6 @@ def _groups(imported: ImportedMesh, bodies: Sequence[Body]) -> tuple[set[str], s
     return boundaries, {name for body in bodies for name in imported.points[body.name]}
 
 
-def _boundary(load: AppliedLoad) -> str | None:
-    return getattr(load, "boundary", None)
-
-
-def _vector(load: AppliedLoad) -> Array | None:
-    """The direction of a load that has one."""
-    match load:
-        case BoundaryForce():
-            return load.force
-        case Displacement():
-            return load.displacement
-        case Acceleration():
-            return load.acceleration
-    return None
-
-
 def _supported(
     number: int,
     mesh: StructureMesh,
@@ -374,9 +299,9 @@ def _supported(
             if load.boundary in groups:
                 moved.append(load)
                 imposed[:, case] = _impose(constraints, elastic, load)
-        elif _boundary(load) is None or _boundary(load) in groups:
+        elif boundary_of(load) is None or boundary_of(load) in groups:
             forces[:, case] = load.forces(elastic)
-            loaded += [name for name in (_boundary(load),) if name is not None]
+            loaded += [name for name in (boundary_of(load),) if name is not None]
     _check_against_supports(loads, imposed, supported_motions @ imposed[free])
     _check_against_each_other(elastic, moved)
     _check_separate(mesh, number)
@@ -460,8 +385,8 @@ def _check_against_supports(loads: Sequence[AppliedLoad], imposed: Array, allowe
     for load, displacement, left in zip(loads, imposed.T, allowed.T, strict=True):
         if np.abs(left - displacement).max() > HELD_SHARE * np.abs(displacement).max():
             raise MeshError(
-                f"a displacement is imposed on {_boundary(load)} along what a support holds of its "
-                "nodes; hold them across it alone, such as xy for one along z"
+                f"a displacement is imposed on {boundary_of(load)} along what a support holds of "
+                "its nodes; hold them across it alone, such as xy for one along z"
             )
 
 

@@ -6,14 +6,13 @@ import numpy as np
 import pytest
 
 from fe_models import friction, structure
+from fe_models.applied_loads import BoundaryForce, Pressure
 from fe_models.cut_face import WholeStress, whole_face, whole_history, whole_resultants
 from fe_models.elasticity import ElasticBody
 from fe_models.friction import FrictionalJoint
 from fe_models.geometry.imported import ImportedMesh
 from fe_models.imported_structure import (
-    BoundaryForce,
     ContactPair,
-    Pressure,
     Support,
     imported_mesh,
     imported_structure,

@@ -5,15 +5,18 @@ import pytest
 from skfem import MeshTet, MeshTri
 
 from fe_models import friction, structure
-from fe_models.friction import FrictionalJoint
-from fe_models.geometry.imported import ImportedMesh
-from fe_models.imported_structure import (
+from fe_models.applied_loads import (
     Acceleration,
     BoundaryForce,
-    ContactPair,
     Displacement,
     Pressure,
     Rotation,
+)
+from fe_models.elasticity import ElasticBody
+from fe_models.friction import FrictionalJoint
+from fe_models.geometry.imported import ImportedMesh
+from fe_models.imported_structure import (
+    ContactPair,
     Support,
     imported_mesh,
     imported_structure,
@@ -28,6 +31,7 @@ from tests.mirrored_blocks import along, mirrored, with_faces
 STEEL = Material(200e3, 0.3, 7.8e-9)
 PAIR = ContactPair("foot", ["top"], ["bottom"], np.array([1.0, 0.0, 0.0]))
 MU = 0.5
+Y = np.array([0.0, 1.0, 0.0])
 
 
 def imported(lower, upper, points=None):
@@ -316,6 +320,18 @@ def test_force_is_spread_about_the_centroid():
     np.testing.assert_allclose(moment, 0.0, atol=1e-12)
 
 
+def test_force_at_a_point_and_moment_are_handed_on():
+    """On one side of a dome: the resultants of both about the point, exactly."""
+    at, force, moment = np.array([7.0, -3.0, 4.0]), np.array([5.0, -7.0, 11.0]), [20.0, 30.0, -40.0]
+    given = BoundaryForce("side", force, at, np.array(moment))
+    total, about, _, _ = resultants(given, at)
+    np.testing.assert_allclose(total, force, rtol=1e-12)
+    np.testing.assert_allclose(about, moment, rtol=1e-10)
+    dome, about, _, _ = resultants(BoundaryForce("dome", 0.0 * force, moment=np.array(moment)))
+    np.testing.assert_allclose(dome, 0.0, atol=1e-11)
+    np.testing.assert_allclose(about, moment, rtol=1e-10)
+
+
 def test_rotation_about_a_shifted_axis():
     """ρ V Ω² times the arm of the centre of mass, and no moment about the axis itself."""
     axis, through, speed = np.array([1.0, 2.0, 2.0]) / 3.0, np.array([5.0, -3.0, 7.0]), 600.0
@@ -341,6 +357,19 @@ def test_load_across_the_plane_is_refused():
             [Support("base", "xz")],
             [BoundaryForce("lid", np.array([0.0, 1.0, -1.0]))],
         )
+
+
+def test_moments_in_the_plane_are_about_y():
+    about_x = BoundaryForce("lid", np.zeros(3), moment=np.array([1.0, 5.0, 0.0]))
+    with pytest.raises(MeshError, match="a moment about x or z"):
+        built(plane_block_and_pad(True), [Support("base", "xz")], [about_x])
+    lid = MeshTri.init_tensor(along((-1, 1, 4)), along((0, 2, 3)))
+    body = Body("pad", lid.with_boundaries({"lid": lambda x: x[1] == 2.0}))
+    load = BoundaryForce("lid", np.array([3.0, 0.0, -4.0]), np.array([7.0, 0.0, 5.0]), 5.0 * Y)
+    forces = load.forces(ElasticBody(body, STEEL, 2)).reshape(-1, 2)
+    x, _, z = (ElasticBody(body, STEEL, 2).nodes - load.at).T
+    np.testing.assert_allclose(forces.sum(axis=0), [3.0, -4.0], rtol=1e-12)
+    assert z @ forces[:, 0] - x @ forces[:, 1] == pytest.approx(5.0, rel=1e-10)
 
 
 @pytest.mark.parametrize("order", [1, 2])

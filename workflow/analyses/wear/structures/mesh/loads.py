@@ -12,20 +12,23 @@ from workflow.case.plain import entries
 from workflow.case.sections import Section, disagreement, entry
 
 if TYPE_CHECKING:
-    from fe_models import imported_structure as fe
+    from fe_models import applied_loads as fe
 
 Name = Annotated[str, Text()]
 Factor = Annotated[float, Quantity("1", at_least=-1e6, at_most=1e6)]
 Coordinate = Annotated[float, Quantity("mm", at_least=-1e6, at_most=1e6)]
 Component = Annotated[float, Quantity("1", at_least=-1e6, at_most=1e6)]
 ForceComponent = Annotated[float, Quantity("N", at_least=-1e9, at_most=1e9)]
+MomentComponent = Annotated[float, Quantity("N mm", at_least=-1e12, at_most=1e12)]
 PressureValue = Annotated[float, Quantity("MPa", at_least=-1e5, at_most=1e5)]
 DisplacementComponent = Annotated[float, Quantity("mm", at_least=-1e3, at_most=1e3)]
 AngularSpeed = Annotated[float, Quantity("rad/s", above=0.0, at_most=1e5)]
 AccelerationComponent = Annotated[float, Quantity("mm/s^2", at_least=-1e12, at_most=1e12)]
 
 
-KINDS = "pressure, force, displacement, rotation or acceleration"
+# Entries that say where a load acts, and the word before each.
+PLACES = (("group", "on"), ("axis", "about"), ("through", "through"), ("at", "at"))
+KINDS = "pressure, force, moment, displacement, rotation or acceleration"
 
 
 class _Load(Section):
@@ -39,12 +42,12 @@ class _Load(Section):
     @property
     def text(self) -> str:
         """The load in a line: what, how much, where and in which legs."""
-        sizes = entries(self, ("path", "axis", "through"))
+        sizes = entries(self, ("path", "axis", "through", "at"))
         what = sizes if sizes.startswith(self.kind) else f"{self.kind}, {sizes}"
         places = (
             f"{word} {_in_brackets(getattr(self, name))}"
-            for name, word in (("group", "on"), ("axis", "about"), ("through", "through"))
-            if hasattr(self, name)
+            for name, word in PLACES
+            if getattr(self, name, None) is not None
         )
         return f"{' '.join([what, *places])}, times {_in_brackets(self.path)} at the ends of legs"
 
@@ -58,25 +61,49 @@ class PressureLoad(_Load):
 
     def described(self) -> fe.Pressure:
         """As the structure takes it."""
-        from fe_models.imported_structure import Pressure
+        from fe_models.applied_loads import Pressure
 
         return Pressure(self.group, self.pressure)
 
 
 class ForceLoad(_Load):
-    """Force on a boundary, spread evenly."""
+    """Force on a boundary: spread evenly, or as a point tied to it hands it on."""
 
     kind: Literal["force"] = entry(KINDS, "force")
     group: Name = entry("boundary", "blade_top")
     force: tuple[ForceComponent, ForceComponent, ForceComponent] = entry(
         "along the global axes; in the plane per length, N/mm [N]", [0.0, 0.0, "-1 kN"]
     )
+    at: tuple[Coordinate, Coordinate, Coordinate] | None = entry(
+        "the point it acts at, tied to the boundary, which stays free to deform; its centroid if "
+        "not given [mm]",
+        [0.0, 0.0, "50 mm"],
+        default=None,
+    )
 
     def described(self) -> fe.BoundaryForce:
         """As the structure takes it."""
-        from fe_models.imported_structure import BoundaryForce
+        from fe_models.applied_loads import BoundaryForce
 
-        return BoundaryForce(self.group, np.array(self.force))
+        at = None if self.at is None else np.array(self.at)
+        return BoundaryForce(self.group, np.array(self.force), at)
+
+
+class MomentLoad(_Load):
+    """Moment on a boundary, which stays free to deform."""
+
+    kind: Literal["moment"] = entry(KINDS, "moment")
+    group: Name = entry("boundary", "blade_top")
+    moment: tuple[MomentComponent, MomentComponent, MomentComponent] = entry(
+        "about the global axes; in the plane about y and per length, N [N mm]",
+        [0.0, "5 N m", 0.0],
+    )
+
+    def described(self) -> fe.BoundaryForce:
+        """As the structure takes it."""
+        from fe_models.applied_loads import BoundaryForce
+
+        return BoundaryForce(self.group, np.zeros(3), moment=np.array(self.moment))
 
 
 class DisplacementLoad(_Load):
@@ -99,7 +126,7 @@ class DisplacementLoad(_Load):
 
     def described(self) -> fe.Displacement:
         """As the structure takes it."""
-        from fe_models.imported_structure import Displacement
+        from fe_models.applied_loads import Displacement
 
         return Displacement(self.group, np.array(self.displacement))
 
@@ -124,7 +151,7 @@ class RotationLoad(_Load):
 
     def described(self) -> fe.Rotation:
         """As the structure takes it."""
-        from fe_models.imported_structure import Rotation
+        from fe_models.applied_loads import Rotation
 
         return Rotation(np.array(self.axis), np.array(self.through), self.speed)
 
@@ -139,13 +166,13 @@ class AccelerationLoad(_Load):
 
     def described(self) -> fe.Acceleration:
         """As the structure takes it."""
-        from fe_models.imported_structure import Acceleration
+        from fe_models.applied_loads import Acceleration
 
         return Acceleration(np.array(self.acceleration))
 
 
 Load = Annotated[
-    PressureLoad | ForceLoad | DisplacementLoad | RotationLoad | AccelerationLoad,
+    PressureLoad | ForceLoad | MomentLoad | DisplacementLoad | RotationLoad | AccelerationLoad,
     Field(discriminator="kind"),
 ]
 
