@@ -1,7 +1,9 @@
 """A cylinder and a ball that are meshed, pressed on a plane: Hertz, whatever the file is."""
 
+from itertools import pairwise
 from pathlib import Path
 
+import fretscale
 import numpy as np
 import pytest
 
@@ -31,17 +33,23 @@ def bodies(gmsh, dimension):
     """A block and a segment of a cylinder or a cap of a ball on it: two tags."""
     occ = gmsh.model.occ
     if dimension == 2:
-        block, disk = (
-            occ.addRectangle(-15, -12, 0, 30, 12),
-            occ.addDisk(0, RADIUS, 0, RADIUS, RADIUS),
-        )
-        cut = occ.addRectangle(-6, -1, 0, 12, 11)
+        block, foot = occ.addRectangle(-15, -12, 0, 30, 12), segment(occ)
     else:
         block, disk = occ.addBox(-4, -4, -3, 8, 8, 3), occ.addSphere(0, 0, RADIUS, RADIUS)
         cut = occ.addCylinder(0, 0, -1, 0, 0, 4, 3)
-    ((_, foot),) = occ.intersect([(dimension, disk)], [(dimension, cut)])[0]
+        ((_, foot),) = occ.intersect([(3, disk)], [(3, cut)])[0]
     occ.synchronize()
     return block, foot
+
+
+def segment(occ):
+    """12 x 10 mm, with an arc below; what touches ends before the corners."""
+    centre = occ.addPoint(0, RADIUS, 0)
+    ends = [occ.addPoint(x, RADIUS - np.sqrt(RADIUS**2 - x**2), 0) for x in (-6, -5, 5, 6)]
+    arcs = [occ.addCircleArc(start, centre, end) for start, end in pairwise(ends)]
+    top = [occ.addPoint(x, 10, 0) for x in (6, -6)]
+    lines = [occ.addLine(*pair) for pair in pairwise([ends[3], *top, ends[0]])]
+    return occ.addPlaneSurface([occ.addCurveLoop([*arcs, *lines])])
 
 
 def sides(gmsh, dimension, body):
@@ -71,6 +79,9 @@ def meshed(path: Path, dimension: int, order: int) -> dict[str, str]:
                 gmsh.model.addPhysicalGroup(dimension, [tag], name=name)
             for name, tag in faces.items():
                 gmsh.model.addPhysicalGroup(dimension - 1, [tag], name=name)
+            if dimension == 2:  # upright edges, at half of the height
+                upright = [tag for tag, z in above.items() if 5.0 < z < 6.0]
+                gmsh.model.addPhysicalGroup(1, upright, name="sides")
             field = gmsh.model.mesh.field
             field.add("Box", 1)
             near = {
@@ -171,3 +182,31 @@ def test_a_check_says_how_a_face_is_curved(tmp_path):
     lengths = np.abs(np.diff(sole.coordinates[sole.facets, 0], axis=1))[:, 0]
     exact = -(lengths**2) / (8.0 * RADIUS)
     np.testing.assert_allclose(surface.bulges[:, 0], exact, rtol=0.05)
+
+
+@pytest.mark.parametrize("method", ["normal", pytest.param("full", marks=pytest.mark.slow)])
+def test_scar_of_a_cylinder_that_slides(tmp_path, method: str):
+    """As that of the cylinder in closed form, worn over the stroke that is left of the bodies' own.
+
+    Its upright sides are moved by 20 µm to and fro; 3.3 of these are their elastic deformation.
+    """
+    case, cycles = pressed(tmp_path, 2, 2), 1e5
+    moved = "{kind: displacement, group: sides, displacement: [20 um, 0, 0], path: [0, 1, -1]}"
+    wear = f"wear.cycles={cycles}", "wear.step={kind: implicit}", f"contact.method={method}"
+    summary = run(case, tmp_path / "out", f"structure.loads.1={moved}", *wear)["sole"]
+    stroke = summary["energy_per_cycle"]["structure"] / (2.0 * 0.5 * FORCE)
+    assert 0.030 < stroke < 0.040
+    same = {
+        "title": "The cylinder itself",
+        "analysis": "wear",
+        "structure": {"kind": "bodies", "shape": "cylinder", "radius": RADIUS},
+        "materials": {f"body_{k}": {"young": STEEL.young, "poisson": 0.3} for k in (1, 2)},
+        "friction": {"coefficient": 0.5},
+        "load_path": {"P": FORCE, "stroke": stroke, "increments": 1},
+        "contact": {"grid": 512, "size": 4.0},
+        "wear": WEAR | {"cycles": cycles, "step": {"kind": "implicit"}},
+        "output": {"paraview": False, "figures": False},
+    }
+    alone = fretscale.run(same, tmp_path / "alone").summary["interface"]
+    for name in ("depth_1", "volume_1", "depth_2", "volume_2"):
+        assert summary[name] == pytest.approx(alone[name], rel=0.02), name
