@@ -138,16 +138,26 @@ def named_body(imported: ImportedMesh, name: str) -> Body:
 
 
 def contact_facets(imported: ImportedMesh, body: Body, boundary: str) -> Indices:
-    """Facets of a boundary of a body. Raises :class:`MeshError` if it is not on that body."""
-    boundaries = body.mesh.boundaries or {}
+    """Facets of a boundary of a body, or those that a node set has all vertices of.
+
+    Raises :class:`MeshError` if it is not on that body, or the nodes of a set are no face.
+    """
+    boundaries, node_sets = body.mesh.boundaries or {}, imported.points[body.name]
     if boundary in boundaries:
         return np.asarray(boundaries[boundary])
-    known = ", ".join(boundaries) or "none"
+    known = ", ".join([*boundaries, *node_sets]) or "none"
     others = [b.name for b in imported.bodies.values() if boundary in (b.mesh.boundaries or {})]
     if others:
         wrong = f"boundary {boundary} is on body {', '.join(others)}, not on {body.name}"
-    elif boundary in imported.points[body.name]:
-        wrong = f"{boundary} is a node set, which has no facets"
+    elif boundary in node_sets:
+        surface = body.mesh.boundary_facets()
+        facets = surface[np.isin(body.mesh.facets[:, surface], node_sets[boundary]).all(axis=0)]
+        left = len(np.setdiff1d(node_sets[boundary], body.mesh.facets[:, facets]))
+        if not left:
+            return np.asarray(facets)
+        wrong = (
+            f"{boundary} is a node set; {left} of its nodes are on no facet with all corners in it"
+        )
     else:
         wrong = f"no boundary {boundary} on body {body.name}"
     raise MeshError(f"{wrong}; allowed: {known}")

@@ -139,6 +139,21 @@ def test_a_face_in_two_parts(blocks, tmp_path):
     assert "no boundary low_c on body Foot-1" in refused(blocks, f"{face}[low_a, low_c]")
 
 
+def test_a_node_set_may_be_a_face(blocks, tmp_path):
+    """Its facets are those with all their corners in it; one with nodes elsewhere is none."""
+    surface = "*Surface, type=ELEMENT, name=foot_low\n1, S1\n2, S1\n3, S1\n4, S1\n"
+    nodes = "*Nset, nset=foot_low\n1, 2, 3, 4, 5, 6, 7, 8, 9\n"
+    whole = run(blocks, tmp_path / "whole")["foot"]
+    edit(tmp_path / "blocks.inp", surface, nodes)
+    by_nodes = run(blocks, tmp_path / "nodes")["foot"]
+    for name in ("depth_1", "volume_2", "energy"):
+        assert by_nodes[name] == pytest.approx(whole[name], rel=1e-9)
+    edit(tmp_path / "blocks.inp", "7, 8, 9\n", "7, 8, 9, 19\n")
+    line = refused(blocks)
+    assert "contacts.0.face_2: foot_low is a node set; 1 of its nodes are on no facet" in line
+    assert "allowed: foot_high, foot_cut, foot_low" in line
+
+
 def test_a_face_that_is_half_named_is_doubted(blocks, tmp_path):
     """Of the lower cube's top one half: the foot overhangs it."""
     edit(
