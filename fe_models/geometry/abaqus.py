@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -58,12 +59,14 @@ def read_abaqus(path: Path) -> GroupedMesh:
     model = Model(path)
     for card in cards(path):
         model.read(card)
-    if not model.parts:
-        if not model.flat.elements:
-            raise MeshError(f"{path}: has no elements")
-        return _Flat(model.flat).mesh()
-    _check_assembly(path, model)
-    return _Flattened([scope for _, scope in model.instances.items()], model.assembly).mesh()
+    if model.parts:
+        _check_assembly(path, model)
+        flattened = _Flattened([scope for _, scope in model.instances.items()], model.assembly)
+    elif model.flat.elements:
+        flattened = _Flat(model.flat)
+    else:
+        raise MeshError(f"{path}: has no elements")
+    return replace(flattened.mesh(), left=tuple(model.left))
 
 
 def _check_assembly(path: Path, model: Model) -> None:

@@ -51,6 +51,13 @@ REFUSED = (
          "USERELEMENT", "MATRIXINPUT"], MODIFIED)
 )  # fmt: skip
 
+# Keywords that say what a case says: they are not taken over.
+LEFT = frozenset(
+    ["BOUNDARY", "CLOAD", "DLOAD", "DSLOAD", "TEMPERATURE", "CONTACTPAIR", "CONTACT", "CLEARANCE",
+     "CONTACTINTERFERENCE", "FRICTION", "SURFACEBEHAVIOR", "ELASTIC", "DENSITY", "EXPANSION",
+     "AMPLITUDE", "INITIALCONDITIONS", "SPRING", "MASS"]
+)  # fmt: skip
+
 # Numbers of nodes or elements, or ranges of which those that exist are meant, by the instance they
 # belong to; those of the scope itself are under "".
 Members = dict[str, list[int | range]]
@@ -183,6 +190,7 @@ class Model:
         self.assembly = Scope("", SourceLine(path, 1))
         self.parts: Names[Scope] = Names()
         self.instances: Names[Scope] = Names()
+        self.left: list[str] = []
         self._scope = self.flat
         self._handlers: dict[str, Callable[[Card], None]] = {
             "PART": self._part,
@@ -204,6 +212,8 @@ class Model:
             raise MeshError(
                 f"{card.place}: *{card.keyword} is not supported: {REFUSED[card.keyword]}"
             )
+        if card.keyword in LEFT:
+            self.left.append(_told(card))
         if card.keyword in self._handlers:
             self._handlers[card.keyword](card)
 
@@ -313,6 +323,15 @@ class Model:
                 named = resolve(place, text, kind, scope, self.instances)
                 extend(members, {key or owner: numbers for key, numbers in named.items()})
         return members
+
+
+def _told(card: Card) -> str:
+    """A keyword in a line: where it stands, its parameters and its first data."""
+    given = card.parameters.items()
+    parameters = [f"{key.lower()}={value}" if value else key.lower() for key, value in given]
+    data = [", ".join(row.fields) for row in card.rows[:1]] + ["..."] * (len(card.rows) > 1)
+    head = ", ".join([f"*{card.keyword.lower()}", *parameters])
+    return f"{card.place.path.name}:{card.place.line}: {head}{': ' * bool(data)}{' '.join(data)}"
 
 
 def _range(place: SourceLine, fields: list[str]) -> range:

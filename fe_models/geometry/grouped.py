@@ -53,7 +53,8 @@ class GroupedMesh:
 
     ``points`` ``(n, 3)`` [mm] and ``numbers`` ``(n,)``, the file's own node numbers; per name the
     elements of a body, the facets of a surface and the rows of a node set. ``midsides`` are the
-    points in the middle of edges that elements of second order have.
+    points in the middle of edges that elements of second order have, ``left`` lines of the file
+    that say more than a mesh and are not taken over.
     """
 
     points: Array
@@ -62,6 +63,7 @@ class GroupedMesh:
     surfaces: dict[str, Blocks]
     node_sets: dict[str, Indices]
     midsides: Midsides | None = None
+    left: tuple[str, ...] = ()
 
 
 def midsides_of(points: Array, blocks: Iterable[tuple[str, Indices]]) -> Midsides | None:

@@ -36,7 +36,8 @@ class ImportedMesh:
 
     ``node_numbers`` ``(n,)`` are the file's own numbers of each body's vertices; ``points`` the
     vertices in each named node set of the file that has any on that body. ``midsides`` are points
-    of its surface in the middle of edges, of bodies for which the file has them.
+    of its surface in the middle of edges, of bodies for which the file has them; ``left`` lines of
+    the file that say more than a mesh and are not taken over.
 
     Examples
     --------
@@ -65,6 +66,7 @@ class ImportedMesh:
     node_numbers: dict[str, Indices]
     points: dict[str, dict[str, Indices]]
     midsides: dict[str, Midsides] = field(default_factory=dict)
+    left: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -193,7 +195,7 @@ def describe_bodies(imported: ImportedMesh) -> list[str]:
             lines.append(
                 f"  node set {points}: {len(vertices)} nodes, centroid {vector(centre)} mm"
             )
-    return lines
+    return lines + [f"not taken over: {line}" for line in imported.left]
 
 
 def patch(body: Body, boundary: str) -> Patch:
@@ -241,7 +243,7 @@ def _separated(grouped: GroupedMesh) -> ImportedMesh:
             inside = np.all(owner[edges] == number, axis=1)
             places = in_space(grouped.midsides.points[inside][:, axes])
             midsides[name] = Midsides(vertex[edges[inside]], places)
-    return ImportedMesh(bodies, numbers, points, midsides)
+    return ImportedMesh(bodies, numbers, points, midsides, grouped.left)
 
 
 def _axes(grouped: GroupedMesh) -> Indices:

@@ -119,6 +119,24 @@ def test_parts_and_instances_run(blocks, tmp_path):
     assert "largest von Mises stress on the free surface, unworn" in told
 
 
+def test_what_a_file_says_besides_is_named(blocks, tmp_path):
+    """Loads, supports and contact of the other program, by line; nothing where there is none."""
+    file = tmp_path / "blocks.inp"
+    assert "not taken over" not in invoke("check", blocks).output
+    assert "not taken over" not in invoke("describe", file).output
+    given = "*Boundary\nBase-1.low, 1, 3\n*Cload, amplitude=up\n5, 3, -100.\n6, 3, -50.\n"
+    given += "*Friction\n0.3\n"
+    line = 1 + edit(file, "*Static\n", f"*Static\n{given}").index("*Static")
+    told = invoke("describe", file).output.splitlines()[-3:]
+    assert told == [
+        f"not taken over: blocks.inp:{line + 1}: *boundary: Base-1.low, 1, 3",
+        f"not taken over: blocks.inp:{line + 3}: *cload, amplitude=up: 5, 3, -100. ...",
+        f"not taken over: blocks.inp:{line + 6}: *friction: 0.3",
+    ]
+    said = " ".join(invoke("check", blocks).output.split())
+    assert "3 keywords with loads, supports, contact or materials not taken over" in said
+
+
 def test_a_face_in_two_parts(blocks, tmp_path):
     """Named both, they are the whole; named one, a check doubts it; twice, or none, is refused."""
     edit(

@@ -40,6 +40,7 @@ from workflow.analyses.wear.structures.mesh.loads import (
 )
 from workflow.case.fields import AUTO, Auto, File, OrAlone, OrAuto, Whole
 from workflow.case.input_files import read_heights
+from workflow.case.plain import counted
 from workflow.case.sections import Length, Section, Title, disagreement, entry
 
 if TYPE_CHECKING:
@@ -296,6 +297,11 @@ class MeshCase(FiniteElementCase):
     def doubts(self) -> Iterator[str]:
         """Faces that hardly meet: one that is in two parts, of which one is named."""
         yield from super().doubts()
+        if left := self.structure.read(self.mesh.size).left:
+            yield (
+                f"structure.file: {counted(len(left), 'keyword')} with loads, supports, contact or "
+                f"materials not taken over, the first {left[0]}; all of them: fretscale describe"
+            )
         mesh = self.structure.mesh(self.mesh.size)
         for index, interface in enumerate(mesh.interfaces):
             if doubt := hardly_met(mesh, interface):
