@@ -111,25 +111,6 @@ def _chain(of_x: ForceSlopes, of_y: ForceSlopes, a: Kept) -> Kept:
 
 
 @compiled(nogil=True, error_model="numpy")
-def _carry(
-    slopes: ForceSlopes, limit_slope: float, start: Array, step: Array, before: Array, after: Array
-) -> None:
-    """Carry the derivative ``(2, 3, m)`` of the stretch along one increment: a row ``(3, m)``.
-
-    ``slopes`` are those of the force in its direction, and ``limit_slope`` µ kn/kt; ``start`` and
-    ``step`` ``(m,)`` the derivatives of a displacement before the increment and of its change.
-    """
-    kept_x, kept_y, by_x, by_y = slopes.force_x, slopes.force_y, slopes.pull_x, slopes.pull_y
-    # An approach before the increment moves both limits.
-    by_step, by_start = limit_slope * slopes.end, limit_slope * (slopes.start + slopes.end)
-    for c in range(step.size):
-        after[0, c] = kept_x * before[0, 0, c] + kept_y * before[1, 0, c] + by_x * step[c]
-        after[1, c] = kept_x * before[0, 1, c] + kept_y * before[1, 1, c] + by_y * step[c]
-        after[2, c] = kept_x * before[0, 2, c] + kept_y * before[1, 2, c]
-        after[2, c] += by_step * step[c] + by_start * start[c]
-
-
-@compiled(nogil=True, error_model="numpy")
 def _state_of(contact: Contact, x: float, y: float, normal: float) -> int:
     """0 stick, 1 slip, 2 separated."""
     if normal <= 0.0:
@@ -166,21 +147,6 @@ def _lead_in(contact: Contact, before: Array) -> Stretch:
     stretch, points = Stretch(0.0, 0.0), _from_rest(before)
     for i in range(len(before)):
         x, y = advance_force(_increment(contact, stretch, points, i, i + 1))
-        stretch = Stretch(x / contact.stiffness, y / contact.stiffness)
-    return stretch
-
-
-@compiled(nogil=True, error_model="numpy")
-def _carried_lead_in(contact: Contact, before: Array, lead: Array, derivative: Array) -> Stretch:
-    """:func:`_lead_in` with the derivative ``(2, 3, m)`` of the stretch, which is written."""
-    stretch, points, functions = Stretch(0.0, 0.0), _from_rest(before), _from_rest(lead)
-    limit_slope = contact.friction * contact.normal_stiffness / contact.stiffness
-    derivative[:] = 0.0
-    for i in range(len(lead)):
-        x, y, of_x, of_y = advance_slopes(_increment(contact, stretch, points, i, i + 1))
-        earlier, step = derivative.copy(), functions[i + 1] - functions[i]
-        _carry(of_x, limit_slope, functions[i], step, earlier, derivative[0])
-        _carry(of_y, limit_slope, functions[i], step, earlier, derivative[1])
         stretch = Stretch(x / contact.stiffness, y / contact.stiffness)
     return stretch
 
@@ -278,44 +244,84 @@ def _settle_contact(
 
 
 class Derivatives(NamedTuple):
-    """Room for derivatives of the stretch of a contact.
+    """Derivatives of the stretch of a contact on its way through ``n`` points.
 
-    ``gradient`` ``(t + 1, 2, 3, m)`` at all samples, the first one at the beginning of the period
-    and at its end, and what a period makes of a stretch at its beginning, ``kept`` ``(t + 1, 4)``
-    as :class:`Kept`.
+    ``functions`` ``(n, m)`` of time there, and their ``steps`` ``(n - 1, m)``; written are the
+    ``gradient`` ``(n, 2, 3, m)``, from that at the first point on, and what the way to each point
+    makes of a stretch at the first, ``kept`` ``(n, 4)`` as :class:`Kept`.
     """
 
+    functions: Array
+    steps: Array
     gradient: Array
     kept: Array
 
 
 @compiled(nogil=True, error_model="numpy")
-def _carried_round(
-    contact: Contact, stretch: Stretch, path: Array, period: Period, derivatives: Derivatives
+def _along(functions: Array) -> Derivatives:
+    """Room for derivatives through points with these functions of time."""
+    points, size = functions.shape
+    steps = functions[1:] - functions[:-1]
+    return Derivatives(functions, steps, np.zeros((points, 2, 3, size)), np.empty((points, 4)))
+
+
+@compiled(nogil=True, error_model="numpy")
+def _round_trip(points: Array) -> Array:
+    """Samples ``(t, ...)`` and the first of them again."""
+    closed = np.empty((len(points) + 1, points.shape[1]))
+    closed[:-1], closed[-1] = points, points[0]
+    return closed
+
+
+@compiled(nogil=True, error_model="numpy")
+def _carry(
+    of_x: ForceSlopes, of_y: ForceSlopes, limit_slope: float, derivatives: Derivatives, to: int
+) -> None:
+    """Carry the gradient along one increment, to a point from the one before.
+
+    ``limit_slope`` is µ kn/kt. An approach before the increment moves both limits.
+    """
+    functions, steps, gradient, _ = derivatives
+    x_by_start, y_by_start = of_x.start + of_x.end, of_y.start + of_y.end
+    for c in range(functions.shape[1]):
+        start, step = limit_slope * functions[to - 1, c], steps[to - 1, c]
+        pressed = limit_slope * step
+        x, y = gradient[to - 1, 0, 0, c], gradient[to - 1, 1, 0, c]
+        gradient[to, 0, 0, c] = of_x.force_x * x + of_x.force_y * y + of_x.pull_x * step
+        gradient[to, 1, 0, c] = of_y.force_x * x + of_y.force_y * y + of_y.pull_x * step
+        x, y = gradient[to - 1, 0, 1, c], gradient[to - 1, 1, 1, c]
+        gradient[to, 0, 1, c] = of_x.force_x * x + of_x.force_y * y + of_x.pull_y * step
+        gradient[to, 1, 1, c] = of_y.force_x * x + of_y.force_y * y + of_y.pull_y * step
+        x, y = gradient[to - 1, 0, 2, c], gradient[to - 1, 1, 2, c]
+        pressed_x, pressed_y = x_by_start * start, y_by_start * start
+        pressed_x, pressed_y = pressed_x + of_x.end * pressed, pressed_y + of_y.end * pressed
+        gradient[to, 0, 2, c] = of_x.force_x * x + of_x.force_y * y + pressed_x
+        gradient[to, 1, 2, c] = of_y.force_x * x + of_y.force_y * y + pressed_y
+
+
+@compiled(nogil=True, error_model="numpy")
+def _carried(
+    contact: Contact, stretch: Stretch, points: Array, derivatives: Derivatives
 ) -> tuple[Stretch, bool]:
-    """One period with the derivatives carried along; whether it sticks throughout."""
-    basis, steps, gradient = period.basis, period.steps, derivatives.gradient
-    samples, sticks, kept = len(basis), True, Kept(1.0, 0.0, 0.0, 1.0)
+    """Drive a contact through points with the derivatives carried along; whether it sticks."""
+    sticks, kept = True, Kept(1.0, 0.0, 0.0, 1.0)
     limit_slope = contact.friction * contact.normal_stiffness / contact.stiffness
-    for step in range(1, samples + 1):
-        at = step if step < samples else 0
-        x, y, of_x, of_y = advance_slopes(_increment(contact, stretch, path, step - 1, at))
+    for to in range(1, len(points)):
+        x, y, of_x, of_y = advance_slopes(_increment(contact, stretch, points, to - 1, to))
         stretch = Stretch(x / contact.stiffness, y / contact.stiffness)
-        before, after = gradient[step - 1], gradient[step]
-        _carry(of_x, limit_slope, basis[step - 1], steps[at], before, after[0])
-        _carry(of_y, limit_slope, basis[step - 1], steps[at], before, after[1])
+        _carry(of_x, of_y, limit_slope, derivatives, to)
         if not _sticks(of_x, of_y):
             sticks = False
             kept = _chain(of_x, of_y, kept)
         for entry, value in enumerate(kept):
-            derivatives.kept[step, entry] = value
+            derivatives.kept[to, entry] = value
     return stretch, sticks
 
 
 @compiled(nogil=True, error_model="numpy")
 def _repeat(derivatives: Derivatives) -> bool:
     """Make the gradient of 0 that of a period that repeats; whether it forgets enough for that."""
-    gradient, kept = derivatives
+    gradient, kept = derivatives.gradient, derivatives.kept
     xx, xy, yx, yy = kept[-1, 0], kept[-1, 1], kept[-1, 2], kept[-1, 3]
     a = Kept(xx, xy, yx, yy)
     if _left_to_change(a) < FORGETTING:
@@ -339,7 +345,7 @@ def _repeat(derivatives: Derivatives) -> bool:
 def _differentiate(
     contact: Contact,
     driven: tuple[Array, Array, Array],
-    period: Period,
+    way_in: Derivatives,
     derivatives: Derivatives,
 ) -> bool:
     """Gradient of the stretch in the period that repeats: whether it sticks throughout.
@@ -348,15 +354,17 @@ def _differentiate(
     how it began carries the derivative from there.
     """
     path, before, settled = driven
-    gradient, stretch = derivatives.gradient, Stretch(settled[0], settled[1])
+    points, gradient = _round_trip(path), derivatives.gradient
     gradient[0] = 0.0
-    _, sticks = _carried_round(contact, stretch, path, period, derivatives)
+    _, sticks = _carried(contact, Stretch(settled[0], settled[1]), points, derivatives)
     if _repeat(derivatives):
         return sticks
-    stretch = _carried_lead_in(contact, before, period.lead, gradient[0])
+    stretch, _ = _carried(contact, Stretch(0.0, 0.0), _from_rest(before), way_in)
+    gradient[-1] = way_in.gradient[-1]
     for _ in range(int(settled[2])):
-        stretch, sticks = _carried_round(contact, stretch, path, period, derivatives)
         gradient[0] = gradient[-1]
+        stretch, sticks = _carried(contact, stretch, points, derivatives)
+    gradient[0] = gradient[-1]
     return sticks
 
 
@@ -431,12 +439,11 @@ def settle_contacts(period: Period, joints: DrivenJoints) -> None:
 @compiled(nogil=True, error_model="numpy")
 def differentiate_contacts(period: Period, joints: DrivenJoints) -> None:
     """Write the derivatives of contacts that have settled."""
-    samples, size = period.basis.shape
     shares = np.dot(period.weights, period.basis)
     # The first sample comes at the end of a period.
     ended = np.empty_like(period.weights)
     ended[:, :-1], ended[:, -1] = period.weights[:, 1:], period.weights[:, 0]
-    derivatives = Derivatives(np.empty((samples + 1, 2, 3, size)), np.empty((samples + 1, 4)))
+    way_in, derivatives = _along(_from_rest(period.lead)), _along(_round_trip(period.basis))
     for j in range(len(joints.parameters)):
         contact, settled = contact_of(joints.parameters[j]), joints.settled[j]
         jacobian = joints.jacobian[j]
@@ -445,10 +452,11 @@ def differentiate_contacts(period: Period, joints: DrivenJoints) -> None:
             continue
         before, first, sticks = joints.before[j], derivatives.gradient[0], True
         if settled[3] == STUCK:
-            _carried_lead_in(contact, before, period.lead, first)
+            _carried(contact, Stretch(0.0, 0.0), _from_rest(before), way_in)
+            first[:] = way_in.gradient[-1]
         else:
             driven = joints.path[j], before, settled
-            sticks = _differentiate(contact, driven, period, derivatives)
+            sticks = _differentiate(contact, driven, way_in, derivatives)
         if sticks:
             _project_stuck(contact.stiffness, period, shares, first, jacobian)
         else:
