@@ -284,7 +284,7 @@ class HarmonicBalance:
             return shares
         force = neglected.weights @ cycle.samples.reshape(neglected.samples, -1)
         cosine, sine = neglected.places
-        for structure in (self.receptance, self.rest.stiffened):
+        for structure in (self.receptance, self.rest.stuck.stiffened):
             steady = structure.at(2.0 * np.pi * frequency * harmonics)
             motion = steady.respond(neglected.combined(force @ structure.at_joints))
             squares = np.square(neglected.separated(motion) @ structure.at_joints.T).sum(axis=1)

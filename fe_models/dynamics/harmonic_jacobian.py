@@ -15,12 +15,12 @@ import numpy as np
 from numba import njit
 
 from fe_models.dynamics.harmonics import ComplexArray, Resolution, by_function, by_joint
-from fe_models.dynamics.joint_rest import Rest
+from fe_models.dynamics.joint_rest import Rest, SpringJoints
 from fe_models.dynamics.receptance import Receptance, SteadyMotion
 from fe_models.dynamics.static_residual import ResidualReceptance
 from sa_solver.types import Array
 
-# Share of the largest derivative below which one that differs from that at rest is rounding.
+# Share of the largest derivative below which one that differs from a spring's is rounding.
 SAME = 1e-9
 
 
@@ -93,7 +93,7 @@ class HarmonicJacobian:
     """1 + R (J - κ): what it does to a vector, and its assembly.
 
     ``steady`` is the structure at the harmonics of a frequency, ``slopes`` ``(j, m, d, m, d)`` J,
-    and ``rest`` knows the joints' stiffness at rest.
+    and ``rest`` knows springs that are like the joints.
     """
 
     transfer: HarmonicTransfer
@@ -113,16 +113,16 @@ class HarmonicJacobian:
         return response
 
     def precondition(self, vector: Array) -> Array:
-        """The inverse P of the matrix with the joints' stiffness D at rest, for J, times a vector.
+        """The inverse P of the matrix with springs D like the joints, for J, times a vector.
 
         P = (1 + R (D - κ))⁻¹ = 1 - R' (D - κ), with receptances R' of the structure stiffened by D.
         Where D does not hold it, springs κ' do: then D + κ' at harmonic 0. Of R' the high modes
         answer as at rest.
         """
         shaped = vector.reshape(self.slopes.shape[:3])
-        force = shaped @ self.rest.tangents
+        force = shaped @ self._springs.tangents
         if self.transfer.mean:
-            held = self.rest.stiffened.held - self.transfer.held
+            held = self._springs.stiffened.held - self.transfer.held
             force[:, 0] += held * shaped[:, 0]
         response = self._everywhere.respond(by_function(force))
         return vector - by_joint(response, self.transfer.directions).ravel()
@@ -130,7 +130,7 @@ class HarmonicJacobian:
     def preconditioned(self, vector: Array) -> Array:
         """P times the matrix times a vector: P (1 + R (J - κ)) = 1 + R' (J - D), in one step.
 
-        Only joints that do not do as at rest have a part in it.
+        Only joints that do not do as these springs have a part in it.
         """
         joints, excess, receptance = self._differing
         shaped = vector.reshape(self.slopes.shape[:3])
@@ -141,14 +141,18 @@ class HarmonicJacobian:
         return vector + by_joint(response, self.transfer.directions).ravel()
 
     @cached_property
+    def _springs(self) -> SpringJoints:
+        return self.rest.springs_like(self.slopes)
+
+    @cached_property
     def _differing(self) -> tuple[np.ndarray, Array, ResidualReceptance]:
         """Joints ``(a,)`` whose J is not D, their J - D ``(a, m d, m d)``, and R' of these."""
         joints, size, directions = self.slopes.shape[:3]
         excess, functions = self.slopes.copy(), np.arange(size)
         # The axes of the two functions come first: (m, j, d, d).
-        excess[:, functions, :, functions] -= self.rest.tangents
+        excess[:, functions, :, functions] -= self._springs.tangents
         if self.transfer.mean:
-            excess[:, 0, :, 0] -= self.rest.stiffened.held * np.eye(directions)
+            excess[:, 0, :, 0] -= self._springs.stiffened.held * np.eye(directions)
         excess = excess.reshape(joints, size * directions, size * directions)
         each = np.abs(excess).max(axis=(1, 2))
         differing = np.flatnonzero(each > SAME * np.abs(self.slopes).max())
@@ -161,7 +165,7 @@ class HarmonicJacobian:
 
     def _residual(self, some: np.ndarray | slice) -> ResidualReceptance:
         resolution = self.transfer.resolution
-        return ResidualReceptance(self.rest.stiffened, resolution, self.steady.angular, some)
+        return ResidualReceptance(self._springs.stiffened, resolution, self.steady.angular, some)
 
     def assembled(self) -> Array:
         """The matrix ``(n, n)``."""
