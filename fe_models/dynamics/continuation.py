@@ -24,6 +24,7 @@ from fe_models.dynamics.newton import (
     NewtonSolution,
     iterate,
     linear_tolerance,
+    norm,
     solve,
 )
 from sa_solver.steps import COMPUTED, Steps
@@ -145,10 +146,10 @@ class Scaling:
     def adapt(self, point: CurvePoint) -> None:
         """Measure from this point on by the size it has."""
         vibration = point.unknowns if self.origin is None else point.unknowns - self.origin
-        norm = float(np.linalg.norm(vibration))
-        norm = norm if norm > self._rounding else 0.0
-        self._largest = max(self._largest, norm)
-        self.unknowns = max(norm, LEAST_SHARE * self._largest) or 1.0
+        size = norm(vibration)
+        size = size if size > self._rounding else 0.0
+        self._largest = max(self._largest, size)
+        self.unknowns = max(size, LEAST_SHARE * self._largest) or 1.0
         self.parameter = max(abs(point.parameter), LEAST_PARAMETER * self._farthest)
 
     def scaled(self, step: Array) -> Array:
@@ -170,7 +171,7 @@ class Scaling:
     def direction(self, point: CurvePoint) -> Array:
         """Direction ``(n + 1,)`` of the tangent in shares, of length 1."""
         shares = self.scaled(point.tangent)
-        return np.asarray(shares / np.linalg.norm(shares))
+        return np.asarray(shares / norm(shares))
 
 
 def first_point(
@@ -249,13 +250,13 @@ def _direction_beyond_corner(
     rhs[-1] = 1.0
     try:
         tangent, orientation = solve_bordered(
-            at.jacobian, scaling.column(at.slope), step / np.linalg.norm(step), rhs
+            at.jacobian, scaling.column(at.slope), step / norm(step), rhs
         )
     except np.linalg.LinAlgError:
         return None
     if orientation * point.orientation >= 0:
         return None
-    return np.asarray(-tangent[:, 0] / np.linalg.norm(tangent))
+    return np.asarray(-tangent[:, 0] / norm(tangent))
 
 
 def _correct(
@@ -266,7 +267,7 @@ def _correct(
     control: ContinuationControl,
 ) -> tuple[CurvePoint, L, Array] | None:
     """Newton's method across the tangent: the point, the equations there, its tangent in shares."""
-    along = step / np.linalg.norm(step)
+    along = step / norm(step)
     system: Bordered | None = None
 
     def system_of(at: L) -> Bordered:
@@ -308,7 +309,7 @@ def _tangent(system: Bordered, size: int) -> tuple[Array, int]:
     rhs = np.zeros(size)
     rhs[-1] = 1.0
     tangent = system.solve(rhs, TANGENT_TOLERANCE)
-    return tangent / np.linalg.norm(tangent), system.sign
+    return tangent / norm(tangent), system.sign
 
 
 def _adapted(step: float, iterations: int, angle: float, control: ContinuationControl) -> float:
@@ -430,7 +431,7 @@ def _refound(
     if across is None:
         return point
     way = scaling.scaled(across[0].coordinates - point.coordinates)
-    near = float(np.linalg.norm(way)) <= control.most
+    near = norm(way) <= control.most
     return _oriented(across[0], point.orientation) if near else point
 
 

@@ -32,7 +32,7 @@ from fe_models.dynamics.harmonics import (
 )
 from fe_models.dynamics.joint_rest import Rest
 from fe_models.dynamics.model import DynamicModel
-from fe_models.dynamics.newton import NewtonControl, NewtonSolution, relative_norm, solve
+from fe_models.dynamics.newton import NewtonControl, NewtonSolution, norm, relative_norm, solve
 from fe_models.dynamics.periodic_joints import Cycle, CycleRecord, PeriodicJoints
 from fe_models.dynamics.receptance import Receptance, SteadyMotion
 from sa_solver.types import Array
@@ -119,7 +119,8 @@ class Balance:
         problem, steady = self.problem, self.steady
         if self.over == "force":
             return -problem.transfer.at_joints(steady.respond(problem.wave))
-        forces = steady.stiffness_slope(self.vibration) * (2.0 * np.pi * problem.orders[:, None])
+        forces = steady.stiffness_slope(self.vibration)
+        forces *= problem.turning[:, None]
         return problem.transfer.at_joints(steady.vibrate(forces))
 
 
@@ -166,6 +167,8 @@ class HarmonicBalance:
         self.receptance = receptance or Receptance(model)
         self.transfer = HarmonicTransfer(resolution, self.receptance, joints.directions)
         self.orders = np.array(resolution.harmonics, dtype=float)
+        # 2π k: angular frequencies per Hz.
+        self.turning = 2.0 * np.pi * self.orders
         # Forces on the modes (k, n): those that grow with the force, and the others.
         self.wave = np.zeros((len(self.orders), len(model.mass)), dtype=complex)
         for harmonic, wave in load.waves.items():
@@ -282,16 +285,25 @@ class HarmonicBalance:
         shares = np.zeros(harmonics[-1] + 1)
         if vibration == 0.0:
             return shares
-        force = neglected.weights @ cycle.samples.reshape(neglected.samples, -1)
+        force = (neglected.weights @ cycle.samples.reshape(neglected.samples, -1)).reshape(
+            neglected.size, -1, self.joints.directions
+        )
         cosine, sine = neglected.places
-        for structure in (self.receptance, self.rest.stuck.stiffened):
-            steady = structure.at(2.0 * np.pi * frequency * harmonics)
-            motion = steady.respond(neglected.combined(force @ structure.at_joints))
-            squares = np.square(neglected.separated(motion) @ structure.at_joints.T).sum(axis=1)
+        for transfer in self._left_out_by:
+            steady = transfer.receptance.at(2.0 * np.pi * frequency * harmonics)
+            motion = steady.respond(transfer.modal(force.transpose(1, 0, 2)))
+            squares = np.square(transfer.shaped(transfer.at_joints(motion))).sum(axis=(0, 2))
             sizes = np.sqrt(squares[cosine] + np.where(sine < 0, 0.0, squares[sine]))
             shares[harmonics] = np.maximum(shares[harmonics], sizes)
         shares[list(self.resolution.harmonics)] = 0.0
         return shares / vibration
+
+    @cached_property
+    def _left_out_by(self) -> tuple[HarmonicTransfer, ...]:
+        """What harmonics left out do with joints free, and as stiff as at rest."""
+        structures = self.receptance, self.rest.stuck.stiffened
+        directions = self.joints.directions
+        return tuple(HarmonicTransfer(self._neglected, of, directions) for of in structures)
 
     @cached_property
     def rounding(self) -> float:
@@ -306,8 +318,8 @@ class HarmonicBalance:
 
     def vibration(self, coefficients: Array) -> float:
         """Norm of coefficients ``(j, m, d)`` without the mean [mm], 0 where it is rounding."""
-        norm = float(np.linalg.norm(self.vibrating(coefficients)))
-        return norm if norm > self.rounding else 0.0
+        size = norm(self.vibrating(coefficients))
+        return size if size > self.rounding else 0.0
 
     def refined(self, resolution: Resolution) -> HarmonicBalance:
         """The same problem at another resolution."""
@@ -336,7 +348,7 @@ class HarmonicBalance:
         cycle = self.joints.settle(
             coefficients, resolution.basis, resolution.weights, resolution.lead
         )
-        steady = self.receptance.at(2.0 * np.pi * frequency * self.orders)
+        steady = self.receptance.at(frequency * self.turning)
         on_modes = self._constant + force * self.wave
         on_modes -= self.transfer.on_modes(cycle.force, unknowns)
         vibration = steady.vibrate(on_modes)
@@ -365,13 +377,11 @@ class HarmonicBalance:
         hold it here, and does not count.
         """
         first = int(self.transfer.held > 0.0)
-        size = np.linalg.norm(coefficients[:, first:])
-        size += np.linalg.norm(self.transfer.shaped(response)[:, first:])
+        size = norm(coefficients[:, first:]) + norm(self.transfer.shaped(response)[:, first:])
         if self.transfer.mean:
             flexibility = self.receptance.static_flexibility
-            size += np.linalg.norm(flexibility @ cycle.force[:, 0].ravel())
-            size += np.linalg.norm(self.rest.loaded)
-        return float(size)
+            size += norm(flexibility @ cycle.force[:, 0].ravel()) + norm(self.rest.loaded)
+        return size
 
 
 @dataclass(frozen=True)

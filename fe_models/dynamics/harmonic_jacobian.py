@@ -22,6 +22,8 @@ from sa_solver.types import Array
 
 # Share of the largest derivative below which one that differs from a spring's is rounding.
 SAME = 1e-9
+# Products of harmonics, directions of joints and modes up to which calls cost more than loops.
+FEW = 4000
 
 
 @dataclass(frozen=True)
@@ -61,17 +63,30 @@ class HarmonicTransfer:
 
         It is their ``unknowns`` by which they are held at harmonic 0.
         """
-        rows = by_function(force)
         if self.held:
-            # Of a single joint the rows are a view of the given force, which stays as it is.
-            rows = rows.copy()
-            rows[0] -= self._holding(unknowns)
-        return self.resolution.combined(rows @ self.receptance.at_joints)
+            force = force.copy()
+            force[:, 0] -= self._holding(unknowns).reshape(-1, self.directions)
+        return self.modal(force)
+
+    def modal(self, force: Array) -> ComplexArray:
+        """Forces on the modes ``(k, n)`` by coefficients ``(j, m, d)`` of forces on the joints."""
+        if self._few:
+            return _few_on_modes(force, self.receptance.at_joints, *self.resolution.places)
+        return self.resolution.combined(by_function(force) @ self.receptance.at_joints)
 
     def at_joints(self, motion: ComplexArray) -> Array:
         """Coefficients ``(j m d,)`` of the joints' displacements, of a motion of the modes."""
+        if self._few:
+            few = np.empty((self.joints, self.resolution.size, self.directions))
+            _few_at_joints(motion, self.receptance.at_joints, *self.resolution.places, few)
+            return few.ravel()
         rows = self.resolution.separated(motion) @ self.receptance.at_joints.T
         return by_joint(rows, self.directions).ravel()
+
+    @cached_property
+    def _few(self) -> bool:
+        """Whether a compiled loop over all harmonics, joints and modes is the shortest."""
+        return len(self.resolution.harmonics) * self.receptance.at_joints.size <= FEW
 
     def mean_response(self, force: Array, unknowns: Array) -> Array:
         """Coefficients ``(j m d,)`` of the mean displacement by the mean of forces on joints.
@@ -175,6 +190,40 @@ class HarmonicJacobian:
         places = transfer.resolution.places
         _assemble(self.steady.between_joints(), slopes, transfer.held, *places, jacobian)
         return jacobian
+
+
+@njit(cache=True)
+def _few_on_modes(
+    force: Array, at_joints: Array, cosines: np.ndarray, sines: np.ndarray
+) -> ComplexArray:
+    """Amplitudes of forces on modes ``(k, n)`` by coefficients of joints' forces ``(j, m, d)``."""
+    joints, _, directions = force.shape
+    on_modes = np.zeros((len(cosines), at_joints.shape[1]), np.complex128)
+    for k in range(len(cosines)):
+        for joint in range(joints):
+            for direction in range(directions):
+                sine = force[joint, sines[k], direction] if sines[k] >= 0 else 0.0
+                amplitude = complex(force[joint, cosines[k], direction], -sine)
+                for mode in range(at_joints.shape[1]):
+                    on_modes[k, mode] += amplitude * at_joints[joint * directions + direction, mode]
+    return on_modes
+
+
+@njit(cache=True)
+def _few_at_joints(
+    motion: ComplexArray, at_joints: Array, cosines: np.ndarray, sines: np.ndarray, few: Array
+) -> None:
+    """Write the coefficients ``(j, m, d)`` of joints by the amplitudes of modes ``(k, n)``."""
+    joints, _, directions = few.shape
+    for k in range(len(cosines)):
+        for joint in range(joints):
+            for direction in range(directions):
+                amplitude = 0.0j
+                for mode in range(at_joints.shape[1]):
+                    amplitude += motion[k, mode] * at_joints[joint * directions + direction, mode]
+                few[joint, cosines[k], direction] = amplitude.real
+                if sines[k] >= 0:
+                    few[joint, sines[k], direction] = -amplitude.imag
 
 
 @njit(cache=True, nogil=True)

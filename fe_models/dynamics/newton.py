@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from math import isfinite, sqrt
 from typing import Generic, Protocol, TypeVar
 
 import numpy as np
@@ -36,12 +37,17 @@ class Linearisation(Protocol):
     def relative(self) -> float: ...
 
 
+def norm(values: Array) -> float:
+    """That of all values together; for few of them in a quarter of numpy's time."""
+    return sqrt(np.vdot(values, values))
+
+
 def relative_norm(residual: Array, size: float) -> float:
     """A residual's norm over ``size``: 0 if it vanishes, infinite if it is not a number."""
-    norm = float(np.linalg.norm(residual))
-    if not np.isfinite(norm):
+    left = norm(residual)
+    if not isfinite(left):
         return np.inf
-    return norm / size if norm > 0.0 else 0.0
+    return left / size if left > 0.0 else 0.0
 
 
 L = TypeVar("L", bound=Linearisation)
@@ -124,7 +130,7 @@ def iterate(
     at = equations_at(unknowns)
     least, waited = at.relative, 0
     for iteration in range(control.max_iterations):
-        if at.relative <= control.tolerance or not np.isfinite(at.relative):
+        if at.relative <= control.tolerance or not isfinite(at.relative):
             return NewtonSolution(unknowns, at, iteration, "")
         if waited == control.patience:
             return NewtonSolution(unknowns, at, iteration, "")
@@ -132,13 +138,13 @@ def iterate(
             correction = correction_of(at)
         except np.linalg.LinAlgError:
             return NewtonSolution(unknowns, at, iteration, "")
-        norm, whole = np.linalg.norm(at.residual), unknowns + correction
+        left, whole = norm(at.residual), unknowns + correction
         trial = whole_at = equations_at(whole)
         shortened = 0
-        while np.linalg.norm(trial.residual) >= norm and shortened < control.max_shortened:
+        while norm(trial.residual) >= left and shortened < control.max_shortened:
             shortened += 1
             trial = equations_at(unknowns + 0.5**shortened * correction)
-        if np.linalg.norm(trial.residual) < norm:
+        if norm(trial.residual) < left:
             unknowns, at = unknowns + 0.5**shortened * correction, trial
         else:
             unknowns, at = whole, whole_at

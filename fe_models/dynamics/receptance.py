@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import numpy as np
 import scipy.linalg as sl
+from numba import njit
 
 from fe_models.dynamics.harmonics import ComplexArray
 from fe_models.dynamics.model import DynamicModel
@@ -49,8 +50,7 @@ class SteadyMotion:
         # otherwise their flexibilities are numbers (k, n).
         self._mixed = damping.ndim == 2
         if not self._mixed:
-            turning = moving[:, None]
-            self._flexibility = 1.0 / (squares - turning * turning + 1j * (turning * damping))
+            self._flexibility = _flexibilities(moving, squares, damping)
         else:
             turning = moving[:, None, None]
             inertia = np.diag(squares) - turning * turning * np.eye(len(squares))
@@ -77,7 +77,7 @@ class SteadyMotion:
         """∂(K + iωC - ω²M)/∂ω x: forces that a motion needs more per rad/s."""
         damping = self.structure.damping
         damped = motion * damping if damping.ndim == 1 else motion @ damping.T
-        return np.asarray(1j * damped - 2.0 * self.angular[:, None] * motion)
+        return np.asarray(1j * damped - (2.0 * self.angular)[:, None] * motion)
 
     def between_joints(self) -> ComplexArray:
         """Displacements of joints by forces on joints ``(k, j d, j d)`` [mm/N]; held at ω = 0."""
@@ -94,6 +94,17 @@ class SteadyMotion:
         else:
             between[moving:] = at_joints @ np.linalg.solve(self._stiffness, at_joints.T)
         return between
+
+
+@njit(cache=True)
+def _flexibilities(angular: Array, squares: Array, damping: Array) -> ComplexArray:
+    """1 / (ω_n² - ω² + iω c_n) ``(k, n)``."""
+    flexibilities = np.empty((len(angular), len(squares)), np.complex128)
+    for k in range(len(angular)):
+        for n in range(len(squares)):
+            stiffness = complex(squares[n] - angular[k] * angular[k], angular[k] * damping[n])
+            flexibilities[k, n] = 1.0 / stiffness
+    return flexibilities
 
 
 class Receptance:

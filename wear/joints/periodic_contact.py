@@ -38,6 +38,7 @@ from wear.joints.periodic_sliders import (
     REPEATED,
     DrivenJoints,
     Period,
+    from_rest,
     relative_change,
 )
 
@@ -134,17 +135,9 @@ def _increment(contact: Contact, stretch: Stretch, path: Array, start: int, end:
 
 
 @compiled(nogil=True, error_model="numpy")
-def _from_rest(before: Array) -> Array:
-    """Points ``(p, ...)`` with rest before them."""
-    points = np.zeros((len(before) + 1, before.shape[1]))
-    points[1:] = before
-    return points
-
-
-@compiled(nogil=True, error_model="numpy")
 def _lead_in(contact: Contact, before: Array) -> Stretch:
     """Stretch at the first sample, to which a contact is driven from rest."""
-    stretch, points = Stretch(0.0, 0.0), _from_rest(before)
+    stretch, points = Stretch(0.0, 0.0), from_rest(before)
     for i in range(len(before)):
         x, y = advance_force(_increment(contact, stretch, points, i, i + 1))
         stretch = Stretch(x / contact.stiffness, y / contact.stiffness)
@@ -359,7 +352,7 @@ def _differentiate(
     _, sticks = _carried(contact, Stretch(settled[0], settled[1]), points, derivatives)
     if _repeat(derivatives):
         return sticks
-    stretch, _ = _carried(contact, Stretch(0.0, 0.0), _from_rest(before), way_in)
+    stretch, _ = _carried(contact, Stretch(0.0, 0.0), from_rest(before), way_in)
     gradient[-1] = way_in.gradient[-1]
     for _ in range(int(settled[2])):
         gradient[0] = gradient[-1]
@@ -391,11 +384,12 @@ def _project_stuck(
 
 
 @compiled(nogil=True, error_model="numpy")
-def _project(stiffness: float, ended: Array, gradient: Array, jacobian: Array) -> None:
-    """Tangential part of the derivative; ``ended`` ``(m, t)`` are weights with the first last."""
-    size = len(ended)
-    flat = gradient[1:].reshape(ended.shape[1], 6 * size)
-    slopes = np.dot(ended, flat).reshape(size, 2, 3, size)
+def _project(stiffness: float, weights: Array, gradient: Array, jacobian: Array) -> None:
+    """Tangential part of the derivative."""
+    size, samples = weights.shape
+    gradient[0] = gradient[-1]
+    flat = gradient[:-1].reshape(samples, 6 * size)
+    slopes = np.dot(weights, flat).reshape(size, 2, 3, size)
     jacobian[:, :2] = stiffness * slopes.transpose(0, 1, 3, 2)
 
 
@@ -440,10 +434,7 @@ def settle_contacts(period: Period, joints: DrivenJoints) -> None:
 def differentiate_contacts(period: Period, joints: DrivenJoints) -> None:
     """Write the derivatives of contacts that have settled."""
     shares = np.dot(period.weights, period.basis)
-    # The first sample comes at the end of a period.
-    ended = np.empty_like(period.weights)
-    ended[:, :-1], ended[:, -1] = period.weights[:, 1:], period.weights[:, 0]
-    way_in, derivatives = _along(_from_rest(period.lead)), _along(_round_trip(period.basis))
+    way_in, derivatives = _along(from_rest(period.lead)), _along(_round_trip(period.basis))
     for j in range(len(joints.parameters)):
         contact, settled = contact_of(joints.parameters[j]), joints.settled[j]
         jacobian = joints.jacobian[j]
@@ -452,7 +443,7 @@ def differentiate_contacts(period: Period, joints: DrivenJoints) -> None:
             continue
         before, first, sticks = joints.before[j], derivatives.gradient[0], True
         if settled[3] == STUCK:
-            _carried(contact, Stretch(0.0, 0.0), _from_rest(before), way_in)
+            _carried(contact, Stretch(0.0, 0.0), from_rest(before), way_in)
             first[:] = way_in.gradient[-1]
         else:
             driven = joints.path[j], before, settled
@@ -460,7 +451,7 @@ def differentiate_contacts(period: Period, joints: DrivenJoints) -> None:
         if sticks:
             _project_stuck(contact.stiffness, period, shares, first, jacobian)
         else:
-            _project(contact.stiffness, ended, derivatives.gradient, jacobian)
+            _project(contact.stiffness, period.weights, derivatives.gradient, jacobian)
         _project_normal(contact.normal_stiffness, period, shares, joints.states[j], jacobian)
 
 
