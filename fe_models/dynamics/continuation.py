@@ -24,9 +24,9 @@ from fe_models.dynamics.newton import (
     NewtonSolution,
     iterate,
     linear_tolerance,
-    norm,
     solve,
 )
+from fe_models.dynamics.sizes import norm
 from sa_solver.steps import COMPUTED, Steps
 from sa_solver.types import Array
 

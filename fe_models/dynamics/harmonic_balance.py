@@ -32,9 +32,10 @@ from fe_models.dynamics.harmonics import (
 )
 from fe_models.dynamics.joint_rest import Rest
 from fe_models.dynamics.model import DynamicModel
-from fe_models.dynamics.newton import NewtonControl, NewtonSolution, norm, relative_norm, solve
+from fe_models.dynamics.newton import NewtonControl, NewtonSolution, solve
 from fe_models.dynamics.periodic_joints import Cycle, CycleRecord, PeriodicJoints
 from fe_models.dynamics.receptance import Receptance, SteadyMotion
+from fe_models.dynamics.sizes import norm, relative_norm
 from sa_solver.types import Array
 
 # Unknowns up to which a matrix is assembled and factorised; beyond, products with it are cheaper.
@@ -265,7 +266,7 @@ class HarmonicBalance:
             force=force,
             resolution=self.resolution,
             coefficients=coefficients,
-            motion=at.motion @ self.receptance.at_points.T,
+            motion=self.receptance.displacement(at.motion),
             cycle=record,
             iterations=0,
             residual=at.relative,

@@ -162,17 +162,11 @@ class HarmonicJacobian:
     @cached_property
     def _differing(self) -> tuple[np.ndarray, Array, ResidualReceptance]:
         """Joints ``(a,)`` whose J is not D, their J - D ``(a, m d, m d)``, and R' of these."""
-        joints, size, directions = self.slopes.shape[:3]
-        excess, functions = self.slopes.copy(), np.arange(size)
-        # The axes of the two functions come first: (m, j, d, d).
-        excess[:, functions, :, functions] -= self._springs.tangents
-        if self.transfer.mean:
-            excess[:, 0, :, 0] -= self._springs.stiffened.held * np.eye(directions)
-        excess = excess.reshape(joints, size * directions, size * directions)
-        each = np.abs(excess).max(axis=(1, 2))
-        differing = np.flatnonzero(each > SAME * np.abs(self.slopes).max())
+        directions, springs = self.slopes.shape[2], self._springs
+        held = springs.stiffened.held if self.transfer.mean else 0.0
+        differing, excess = _excess(self.slopes, springs.tangents, held)
         places = (differing[:, None] * directions + np.arange(directions)).ravel()
-        return differing, excess[differing], self._residual(places)
+        return differing, excess, self._residual(places)
 
     @cached_property
     def _everywhere(self) -> ResidualReceptance:
@@ -190,6 +184,30 @@ class HarmonicJacobian:
         places = transfer.resolution.places
         _assemble(self.steady.between_joints(), slopes, transfer.held, *places, jacobian)
         return jacobian
+
+
+@njit(cache=True, nogil=True)
+def _excess(slopes: Array, tangents: Array, held: float) -> tuple[np.ndarray, Array]:
+    """Joints ``(a,)`` whose derivatives ``(j, m, d, m, d)`` are not those of springs, and by how
+    much ``(a, m d, m d)``; at harmonic 0 with springs that hold them."""
+    joints, size, directions = slopes.shape[:3]
+    differing, found = np.empty(joints, np.int64), 0
+    excess = np.empty((joints, size, directions, size, directions))
+    rounding = SAME * np.abs(slopes).max()
+    for joint in range(joints):
+        own = excess[found]
+        own[:] = slopes[joint]
+        for function in range(size):
+            for direction in range(directions):
+                for by in range(directions):
+                    own[function, direction, function, by] -= tangents[joint, direction, by]
+        for direction in range(directions):
+            own[0, direction, 0, direction] -= held
+        if np.abs(own).max() > rounding:
+            differing[found] = joint
+            found += 1
+    flat = excess[:found].reshape(found, size * directions, size * directions)
+    return differing[:found], flat
 
 
 @njit(cache=True)

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from math import isfinite, sqrt
+from math import isfinite
 from typing import Generic, Protocol, TypeVar
 
 import numpy as np
 
 from fe_models.dynamics.bordered import GMRES_TOLERANCE, LinearMap, solve_alone
+from fe_models.dynamics.sizes import norm
 from sa_solver.types import Array
 
 # Share of the residual that an iterative solver may leave. Newton's method squares a small relative
@@ -35,19 +36,6 @@ class Linearisation(Protocol):
     def size(self) -> float: ...
     @property
     def relative(self) -> float: ...
-
-
-def norm(values: Array) -> float:
-    """That of all values together; for few of them in a quarter of numpy's time."""
-    return sqrt(np.vdot(values, values))
-
-
-def relative_norm(residual: Array, size: float) -> float:
-    """A residual's norm over ``size``: 0 if it vanishes, infinite if it is not a number."""
-    left = norm(residual)
-    if not isfinite(left):
-        return np.inf
-    return left / size if left > 0.0 else 0.0
 
 
 L = TypeVar("L", bound=Linearisation)

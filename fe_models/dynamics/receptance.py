@@ -150,6 +150,12 @@ class Receptance:
         """The structure at ``k`` frequencies [rad/s]."""
         return SteadyMotion(self, angular)
 
+    def displacement(self, motion: ComplexArray) -> ComplexArray:
+        """That of the structure ``(k, n)`` by a motion of its modes."""
+        # Real shapes are not made complex for that: of many modes the dearer part.
+        at_points = self.at_points.T
+        return np.asarray(motion.real @ at_points + 1j * (motion.imag @ at_points))
+
     def respond_at_rest(self, force: Array) -> Array:
         """Displacements ``(n,)`` under constant forces ``(n,)``, held."""
         if not self.held:

@@ -17,6 +17,8 @@ LONGEST = 300.0  # L: nothing is left of the angle long before, and exp(-2 L) is
 LAST = 1e-9  # of the limit at which a lift-off is taken to be over: its square is below rounding
 CLOSE = 0.03  # of (b - a)/(b + a): below it the logarithmic mean is a series
 TERMS = 5  # of this series: CLOSE**(2 TERMS) is below rounding
+MEAN_SERIES = tuple(1.0 / (2 * j + 1) for j in range(TERMS, -1, -1))
+SLOPE_SERIES = tuple(2 * j / (2 * j + 1) for j in range(TERMS, 0, -1))
 NEGLIGIBLE = 1e-16  # of an energy: rounding
 FADING = 1.0  # exponent from which on powers of exp(-2 L η) are not lost in their difference
 TURNED = 0.1  # tan²(ψ/2) below which 1 - cos ψ is a series of its powers
@@ -118,9 +120,9 @@ def _inverse_mean(a: float, b: float) -> float:
     x = (b - a) / (a + b)
     if abs(x) > CLOSE:
         return log(b / a) / (b - a)
-    total = 0.0
-    for j in range(TERMS, -1, -1):
-        total = total * x * x + 1.0 / (2 * j + 1)
+    square, total = x * x, 0.0
+    for coefficient in MEAN_SERIES:
+        total = total * square + coefficient
     return 2.0 * total / (a + b)
 
 
@@ -130,9 +132,9 @@ def _inverse_mean_slopes(a: float, b: float) -> tuple[float, float]:
     x, mean = (b - a) / (a + b), _inverse_mean(a, b)
     if abs(x) > CLOSE:
         return (mean - 1.0 / a) / (b - a), (1.0 / b - mean) / (b - a)
-    slope = 0.0
-    for j in range(TERMS, 0, -1):
-        slope = slope * x * x + 2 * j / (2 * j + 1)
+    square, slope = x * x, 0.0
+    for coefficient in SLOPE_SERIES:
+        slope = slope * square + coefficient
     slope *= 4.0 * x / (a + b) ** 3
     return -mean / (a + b) - b * slope, -mean / (a + b) + a * slope
 
