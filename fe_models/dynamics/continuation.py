@@ -111,7 +111,9 @@ class CurvePoint:
     @property
     def coordinates(self) -> Array:
         """Unknowns and parameter ``(n + 1,)``."""
-        return np.append(self.unknowns, self.parameter)
+        coordinates = np.empty(len(self.unknowns) + 1)
+        coordinates[:-1], coordinates[-1] = self.unknowns, self.parameter
+        return coordinates
 
 
 @dataclass(frozen=True)
@@ -276,7 +278,8 @@ def _correct(
     def correction_of(at: L) -> Array:
         nonlocal system
         system = system_of(at)
-        rhs = np.append(at.residual / -scaling.unknowns, 0.0)
+        rhs = np.zeros(len(along))
+        np.divide(at.residual, -scaling.unknowns, out=rhs[:-1])
         return scaling.unscaled(system.solve(rhs, linear_tolerance(at)))
 
     last = iterate(

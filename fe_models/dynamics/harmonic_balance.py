@@ -199,8 +199,10 @@ class HarmonicBalance:
     ) -> HarmonicSolution:
         """The motion at a frequency [Hz] and a force, found from another motion or from rest."""
         solution = self.find(frequency, force, self.guess(start))
-        motion = self.describe(solution.unknowns, solution.at, frequency, force)
-        return replace(motion, iterations=solution.iterations, message=solution.message)
+        motion = self.describe(
+            solution.unknowns, solution.at, frequency, force, solution.iterations
+        )
+        return replace(motion, message=solution.message)
 
     def guess(self, start: HarmonicSolution | None) -> Array:
         """Unknowns taken from another motion, or those of the structure at rest under its load."""
@@ -257,9 +259,9 @@ class HarmonicBalance:
         return solve(self.by_frequency(force), curve.points[-1].unknowns, frequency, newton)
 
     def describe(
-        self, unknowns: Array, at: Balance, frequency: float, force: float
+        self, unknowns: Array, at: Balance, frequency: float, force: float, iterations: int = 0
     ) -> HarmonicSolution:
-        """The motion with these unknowns."""
+        """The motion with these unknowns, found in so many iterations."""
         coefficients, record = self.transfer.shaped(unknowns), CycleRecord.of(at.cycle)
         return HarmonicSolution(
             frequency=frequency,
@@ -268,7 +270,7 @@ class HarmonicBalance:
             coefficients=coefficients,
             motion=self.receptance.displacement(at.motion),
             cycle=record,
-            iterations=0,
+            iterations=iterations,
             residual=at.relative,
             shares=self.left_out(coefficients, record, frequency),
             error=None,
@@ -282,22 +284,25 @@ class HarmonicBalance:
         a harmonic may meet a mode of either.
         """
         neglected, vibration = self._neglected, self.vibration(coefficients)
-        harmonics = np.array(neglected.harmonics)
-        shares = np.zeros(harmonics[-1] + 1)
+        shares = np.zeros(neglected.harmonics[-1] + 1)
         if vibration == 0.0:
             return shares
         force = (neglected.weights @ cycle.samples.reshape(neglected.samples, -1)).reshape(
             neglected.size, -1, self.joints.directions
         )
-        cosine, sine = neglected.places
+        orders, sizes = self._orders_left_out, []
         for transfer in self._left_out_by:
-            steady = transfer.receptance.at(2.0 * np.pi * frequency * harmonics)
+            steady = transfer.receptance.at(2.0 * np.pi * frequency * orders)
             motion = steady.respond(transfer.modal(force.transpose(1, 0, 2)))
-            squares = np.square(transfer.shaped(transfer.at_joints(motion))).sum(axis=(0, 2))
-            sizes = np.sqrt(squares[cosine] + np.where(sine < 0, 0.0, squares[sine]))
-            shares[harmonics] = np.maximum(shares[harmonics], sizes)
+            sizes.append(neglected.sizes(transfer.shaped(transfer.at_joints(motion))))
+        shares[orders] = np.maximum(*sizes)
         shares[list(self.resolution.harmonics)] = 0.0
-        return shares / vibration
+        shares /= vibration
+        return shares
+
+    @cached_property
+    def _orders_left_out(self) -> np.ndarray:
+        return np.array(self._neglected.harmonics)
 
     @cached_property
     def _left_out_by(self) -> tuple[HarmonicTransfer, ...]:

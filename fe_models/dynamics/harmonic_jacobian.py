@@ -16,14 +16,12 @@ from numba import njit
 
 from fe_models.dynamics.harmonics import ComplexArray, Resolution, by_function, by_joint
 from fe_models.dynamics.joint_rest import Rest, SpringJoints
-from fe_models.dynamics.receptance import Receptance, SteadyMotion
+from fe_models.dynamics.receptance import FEW, Receptance, SteadyMotion
 from fe_models.dynamics.static_residual import ResidualReceptance
 from sa_solver.types import Array
 
 # Share of the largest derivative below which one that differs from a spring's is rounding.
 SAME = 1e-9
-# Products of harmonics, directions of joints and modes up to which calls cost more than loops.
-FEW = 4000
 
 
 @dataclass(frozen=True)

@@ -29,6 +29,8 @@ RIGID = 1e-13
 HELD = 1e-2
 # Damping between different modes, over the largest, below which there is none: rounding.
 DIAGONAL = 1e-10
+# Products of frequencies, directions of joints and modes up to which calls cost more than loops.
+FEW = 4000
 
 
 class ReceptanceError(InputError):
@@ -76,8 +78,9 @@ class SteadyMotion:
     def stiffness_slope(self, motion: ComplexArray) -> ComplexArray:
         """∂(K + iωC - ω²M)/∂ω x: forces that a motion needs more per rad/s."""
         damping = self.structure.damping
-        damped = motion * damping if damping.ndim == 1 else motion @ damping.T
-        return np.asarray(1j * damped - (2.0 * self.angular)[:, None] * motion)
+        if not self._mixed:
+            return _stiffness_slopes(motion, self.angular, damping)
+        return np.asarray(1j * (motion @ damping.T) - (2.0 * self.angular)[:, None] * motion)
 
     def between_joints(self) -> ComplexArray:
         """Displacements of joints by forces on joints ``(k, j d, j d)`` [mm/N]; held at ω = 0."""
@@ -87,6 +90,9 @@ class SteadyMotion:
         if moving:
             between[0] = self.structure.static_flexibility
         if not self._mixed:
+            if len(self._flexibility) * at_joints.size <= FEW:
+                _few_between_joints(self._flexibility, at_joints, between[moving:])
+                return between
             inverse = self._flexibility[:, None, :]
             # Two real products cost half of a complex one.
             between.real[moving:] = (at_joints * inverse.real) @ at_joints.T
@@ -94,6 +100,28 @@ class SteadyMotion:
         else:
             between[moving:] = at_joints @ np.linalg.solve(self._stiffness, at_joints.T)
         return between
+
+
+@njit(cache=True)
+def _few_between_joints(flexibility: ComplexArray, at_joints: Array, between: ComplexArray) -> None:
+    """Write what so many frequencies ``(k, n)`` make between joints ``(k, j d, j d)``."""
+    for k in range(len(flexibility)):
+        for to in range(len(at_joints)):
+            for by in range(len(at_joints)):
+                response = 0.0j
+                for n in range(at_joints.shape[1]):
+                    response += flexibility[k, n] * (at_joints[to, n] * at_joints[by, n])
+                between[k, to, by] = response
+
+
+@njit(cache=True)
+def _stiffness_slopes(motion: ComplexArray, angular: Array, damping: Array) -> ComplexArray:
+    """(i c_n - 2 ω) x ``(k, n)``."""
+    slopes = np.empty_like(motion)
+    for k in range(len(angular)):
+        for n in range(len(damping)):
+            slopes[k, n] = complex(-2.0 * angular[k], damping[n]) * motion[k, n]
+    return slopes
 
 
 @njit(cache=True)

@@ -89,11 +89,8 @@ def _step(
 def _causes(coarse: Resolution, richer: HarmonicBalance, at: Balance) -> tuple[Array, float]:
     """Norm of the residual of each harmonic left out, by its order, and of those that are not."""
     rows = richer.transfer.shaped(at.residual)
-    norms = np.linalg.norm(rows, axis=(0, 2))
-    cosine, sine = richer.resolution.places
     sizes = np.zeros(richer.resolution.harmonics[-1] + 1)
-    both = np.hypot(norms[cosine], np.where(sine < 0, 0.0, norms[sine]))
-    sizes[list(richer.resolution.harmonics)] = both
+    sizes[list(richer.resolution.harmonics)] = richer.resolution.sizes(rows)
     kept = list(coarse.harmonics)
     sampling = float(np.linalg.norm(sizes[kept]))
     sizes[kept] = 0.0

@@ -145,12 +145,20 @@ def _lead_in(contact: Contact, before: Array) -> Stretch:
 
 
 @compiled(nogil=True, error_model="numpy")
-def _plain_round(contact: Contact, stretch: Stretch, path: Array, record: ContactRecord) -> Stretch:
-    """One period: forces and states are written."""
+def _plain_round(
+    contact: Contact, stretch: Stretch, path: Array, record: ContactRecord, ended: Stretch
+) -> Stretch:
+    """One period: forces and states are written.
+
+    A contact that does bit for bit what is written of the period before, which ``ended`` there,
+    goes on as it did. Before the first period that is nothing: not a number.
+    """
     samples, force, states = len(path), record.force, record.states
     for step in range(1, samples + 1):
         at = step if step < samples else 0
         x, y = advance_force(_increment(contact, stretch, path, step - 1, at))
+        if x == force[at, 0] and y == force[at, 1]:
+            return ended
         stretch = Stretch(x / contact.stiffness, y / contact.stiffness)
         normal = max(pressing(contact, path[at, 2]), 0.0)
         force[at, 0], force[at, 1], force[at, 2] = x, y, normal
@@ -217,10 +225,11 @@ def _settle_contact(
     ``settled`` becomes the stretch ``(2,)`` at the start of the last period, and the number of it.
     """
     span = max(np.max(np.abs(path[:, 0])), np.max(np.abs(path[:, 1])))
-    change = 0.0
+    change, end = 0.0, stretch
+    record.force[:] = np.nan
     for number in range(MAX_PERIODS):
         settled[0], settled[1], settled[2] = stretch.x, stretch.y, number + 1.0
-        end = _plain_round(contact, stretch, path, record)
+        end = _plain_round(contact, stretch, path, record, end)
         x, y = end.x - stretch.x, end.y - stretch.y
         change = max(abs(x), abs(y))
         if change <= REPEATED * span:
