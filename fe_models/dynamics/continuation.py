@@ -12,6 +12,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
+from math import acos, degrees
 from typing import Generic, Protocol, TypeVar
 
 import numpy as np
@@ -230,7 +231,7 @@ def _try_steps(
         if corrected is not None:
             new, at, tangent = corrected
             cosine = min(max(float(tangent @ direction), -1.0), 1.0)
-            angle = float(np.degrees(np.arccos(cosine)))
+            angle = degrees(acos(cosine))
             smooth = angle <= control.max_angle
             same = new.orientation * point.orientation >= 0
             if (same and (smooth or step <= CORNER)) or (smooth and step <= CROSSING):

@@ -84,7 +84,8 @@ class Balance:
 
     ``over`` is what varies, frequency or force; ``steady`` the structure at this frequency,
     ``on_modes`` ``(k, n)`` the forces on its modes, ``vibration`` ``(k, n)`` their motion without
-    the mean, ``cycle`` what the joints do, ``size`` the norm of the terms that balance.
+    the mean, ``cycle`` what the joints do, ``size`` the norm of the terms that balance, and
+    ``relative`` what is left over it.
     """
 
     problem: HarmonicBalance
@@ -95,10 +96,7 @@ class Balance:
     cycle: Cycle
     residual: Array
     size: float
-
-    @cached_property
-    def relative(self) -> float:
-        return relative_norm(self.residual, self.size)
+    relative: float
 
     @cached_property
     def motion(self) -> ComplexArray:
@@ -365,7 +363,8 @@ class HarmonicBalance:
             self.transfer.shaped(response)[:, 0] += constant + force * growing
         size = self._size(coefficients, response, cycle)
         residual = unknowns - response
-        return Balance(self, over, steady, on_modes, vibration, cycle, residual, size)
+        relative = relative_norm(residual, size)
+        return Balance(self, over, steady, on_modes, vibration, cycle, residual, size, relative)
 
     @cached_property
     def _mean_by_load(self) -> Array:
@@ -382,12 +381,12 @@ class HarmonicBalance:
         only joints hold the structure, any mean displacement balances that of the springs that
         hold it here, and does not count.
         """
+        if not self.transfer.mean:
+            return norm(coefficients) + norm(response)
         first = int(self.transfer.held > 0.0)
         size = norm(coefficients[:, first:]) + norm(self.transfer.shaped(response)[:, first:])
-        if self.transfer.mean:
-            flexibility = self.receptance.static_flexibility
-            size += norm(flexibility @ cycle.force[:, 0].ravel()) + norm(self.rest.loaded)
-        return size
+        by_joints = self.receptance.static_flexibility @ cycle.force[:, 0].ravel()
+        return size + norm(by_joints) + norm(self.rest.loaded)
 
 
 @dataclass(frozen=True)

@@ -67,7 +67,10 @@ class SteadyMotion:
 
     def vibrate(self, force: ComplexArray) -> ComplexArray:
         """:meth:`respond` without what constant forces do: 0 at ω = 0."""
-        moving, response = self._moving, np.empty(force.shape, dtype=complex)
+        moving = self._moving
+        if not self._mixed and not moving:
+            return np.asarray(force * self._flexibility)
+        response = np.empty(force.shape, dtype=complex)
         response[:moving] = 0.0
         if not self._mixed:
             np.multiply(force[moving:], self._flexibility, out=response[moving:])
