@@ -12,6 +12,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
+from math import acos, degrees
 from typing import Generic, Protocol, TypeVar
 
 import numpy as np
@@ -26,6 +27,7 @@ from fe_models.dynamics.newton import (
     linear_tolerance,
     solve,
 )
+from fe_models.dynamics.sizes import norm
 from sa_solver.steps import COMPUTED, Steps
 from sa_solver.types import Array
 
@@ -110,7 +112,9 @@ class CurvePoint:
     @property
     def coordinates(self) -> Array:
         """Unknowns and parameter ``(n + 1,)``."""
-        return np.append(self.unknowns, self.parameter)
+        coordinates = np.empty(len(self.unknowns) + 1)
+        coordinates[:-1], coordinates[-1] = self.unknowns, self.parameter
+        return coordinates
 
 
 @dataclass(frozen=True)
@@ -145,10 +149,10 @@ class Scaling:
     def adapt(self, point: CurvePoint) -> None:
         """Measure from this point on by the size it has."""
         vibration = point.unknowns if self.origin is None else point.unknowns - self.origin
-        norm = float(np.linalg.norm(vibration))
-        norm = norm if norm > self._rounding else 0.0
-        self._largest = max(self._largest, norm)
-        self.unknowns = max(norm, LEAST_SHARE * self._largest) or 1.0
+        size = norm(vibration)
+        size = size if size > self._rounding else 0.0
+        self._largest = max(self._largest, size)
+        self.unknowns = max(size, LEAST_SHARE * self._largest) or 1.0
         self.parameter = max(abs(point.parameter), LEAST_PARAMETER * self._farthest)
 
     def scaled(self, step: Array) -> Array:
@@ -170,7 +174,7 @@ class Scaling:
     def direction(self, point: CurvePoint) -> Array:
         """Direction ``(n + 1,)`` of the tangent in shares, of length 1."""
         shares = self.scaled(point.tangent)
-        return np.asarray(shares / np.linalg.norm(shares))
+        return np.asarray(shares / norm(shares))
 
 
 def first_point(
@@ -227,7 +231,7 @@ def _try_steps(
         if corrected is not None:
             new, at, tangent = corrected
             cosine = min(max(float(tangent @ direction), -1.0), 1.0)
-            angle = float(np.degrees(np.arccos(cosine)))
+            angle = degrees(acos(cosine))
             smooth = angle <= control.max_angle
             same = new.orientation * point.orientation >= 0
             if (same and (smooth or step <= CORNER)) or (smooth and step <= CROSSING):
@@ -249,13 +253,13 @@ def _direction_beyond_corner(
     rhs[-1] = 1.0
     try:
         tangent, orientation = solve_bordered(
-            at.jacobian, scaling.column(at.slope), step / np.linalg.norm(step), rhs
+            at.jacobian, scaling.column(at.slope), step / norm(step), rhs
         )
     except np.linalg.LinAlgError:
         return None
     if orientation * point.orientation >= 0:
         return None
-    return np.asarray(-tangent[:, 0] / np.linalg.norm(tangent))
+    return np.asarray(-tangent[:, 0] / norm(tangent))
 
 
 def _correct(
@@ -266,7 +270,7 @@ def _correct(
     control: ContinuationControl,
 ) -> tuple[CurvePoint, L, Array] | None:
     """Newton's method across the tangent: the point, the equations there, its tangent in shares."""
-    along = step / np.linalg.norm(step)
+    along = step / norm(step)
     system: Bordered | None = None
 
     def system_of(at: L) -> Bordered:
@@ -275,7 +279,8 @@ def _correct(
     def correction_of(at: L) -> Array:
         nonlocal system
         system = system_of(at)
-        rhs = np.append(at.residual / -scaling.unknowns, 0.0)
+        rhs = np.zeros(len(along))
+        np.divide(at.residual, -scaling.unknowns, out=rhs[:-1])
         return scaling.unscaled(system.solve(rhs, linear_tolerance(at)))
 
     last = iterate(
@@ -308,7 +313,7 @@ def _tangent(system: Bordered, size: int) -> tuple[Array, int]:
     rhs = np.zeros(size)
     rhs[-1] = 1.0
     tangent = system.solve(rhs, TANGENT_TOLERANCE)
-    return tangent / np.linalg.norm(tangent), system.sign
+    return tangent / norm(tangent), system.sign
 
 
 def _adapted(step: float, iterations: int, angle: float, control: ContinuationControl) -> float:
@@ -430,7 +435,7 @@ def _refound(
     if across is None:
         return point
     way = scaling.scaled(across[0].coordinates - point.coordinates)
-    near = float(np.linalg.norm(way)) <= control.most
+    near = norm(way) <= control.most
     return _oriented(across[0], point.orientation) if near else point
 
 

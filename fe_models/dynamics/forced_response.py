@@ -190,12 +190,8 @@ class _Recorder:
 
     def describe(self, point: CurvePoint, at: Balance) -> HarmonicSolution:
         """The motion at a point, with its error if it is to be accurate."""
-        solution = replace(
-            self.problem.describe(
-                point.unknowns, at, *self._along.frequency_and_force(point.parameter)
-            ),
-            iterations=point.iterations,
-        )
+        frequency, force = self._along.frequency_and_force(point.parameter)
+        solution = self.problem.describe(point.unknowns, at, frequency, force, point.iterations)
         if self._accuracy is None:
             return solution
         return replace(solution, error=resolution_error(self.problem, solution))
@@ -205,7 +201,10 @@ class _Recorder:
         finer = finer_for(self.problem, description, self._accuracy)
         if finer is not None:
             return self._refine(finer)
-        self.solutions.append(replace(description, resolution=self.problem.resolution))
+        if description.resolution is not self.problem.resolution:
+            # One that was found in an earlier run: a resolution for all.
+            description = replace(description, resolution=self.problem.resolution)
+        self.solutions.append(description)
         return None
 
     def _refine(self, finer: Resolution) -> Refinement[Balance]:

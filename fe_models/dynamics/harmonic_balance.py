@@ -32,9 +32,10 @@ from fe_models.dynamics.harmonics import (
 )
 from fe_models.dynamics.joint_rest import Rest
 from fe_models.dynamics.model import DynamicModel
-from fe_models.dynamics.newton import NewtonControl, NewtonSolution, relative_norm, solve
+from fe_models.dynamics.newton import NewtonControl, NewtonSolution, solve
 from fe_models.dynamics.periodic_joints import Cycle, CycleRecord, PeriodicJoints
 from fe_models.dynamics.receptance import Receptance, SteadyMotion
+from fe_models.dynamics.sizes import norm, relative_norm
 from sa_solver.types import Array
 
 # Unknowns up to which a matrix is assembled and factorised; beyond, products with it are cheaper.
@@ -83,7 +84,8 @@ class Balance:
 
     ``over`` is what varies, frequency or force; ``steady`` the structure at this frequency,
     ``on_modes`` ``(k, n)`` the forces on its modes, ``vibration`` ``(k, n)`` their motion without
-    the mean, ``cycle`` what the joints do, ``size`` the norm of the terms that balance.
+    the mean, ``cycle`` what the joints do, ``size`` the norm of the terms that balance, and
+    ``relative`` what is left over it.
     """
 
     problem: HarmonicBalance
@@ -94,10 +96,7 @@ class Balance:
     cycle: Cycle
     residual: Array
     size: float
-
-    @cached_property
-    def relative(self) -> float:
-        return relative_norm(self.residual, self.size)
+    relative: float
 
     @cached_property
     def motion(self) -> ComplexArray:
@@ -119,7 +118,8 @@ class Balance:
         problem, steady = self.problem, self.steady
         if self.over == "force":
             return -problem.transfer.at_joints(steady.respond(problem.wave))
-        forces = steady.stiffness_slope(self.vibration) * (2.0 * np.pi * problem.orders[:, None])
+        forces = steady.stiffness_slope(self.vibration)
+        forces *= problem.turning[:, None]
         return problem.transfer.at_joints(steady.vibrate(forces))
 
 
@@ -166,6 +166,8 @@ class HarmonicBalance:
         self.receptance = receptance or Receptance(model)
         self.transfer = HarmonicTransfer(resolution, self.receptance, joints.directions)
         self.orders = np.array(resolution.harmonics, dtype=float)
+        # 2π k: angular frequencies per Hz.
+        self.turning = 2.0 * np.pi * self.orders
         # Forces on the modes (k, n): those that grow with the force, and the others.
         self.wave = np.zeros((len(self.orders), len(model.mass)), dtype=complex)
         for harmonic, wave in load.waves.items():
@@ -195,8 +197,10 @@ class HarmonicBalance:
     ) -> HarmonicSolution:
         """The motion at a frequency [Hz] and a force, found from another motion or from rest."""
         solution = self.find(frequency, force, self.guess(start))
-        motion = self.describe(solution.unknowns, solution.at, frequency, force)
-        return replace(motion, iterations=solution.iterations, message=solution.message)
+        motion = self.describe(
+            solution.unknowns, solution.at, frequency, force, solution.iterations
+        )
+        return replace(motion, message=solution.message)
 
     def guess(self, start: HarmonicSolution | None) -> Array:
         """Unknowns taken from another motion, or those of the structure at rest under its load."""
@@ -253,18 +257,18 @@ class HarmonicBalance:
         return solve(self.by_frequency(force), curve.points[-1].unknowns, frequency, newton)
 
     def describe(
-        self, unknowns: Array, at: Balance, frequency: float, force: float
+        self, unknowns: Array, at: Balance, frequency: float, force: float, iterations: int = 0
     ) -> HarmonicSolution:
-        """The motion with these unknowns."""
+        """The motion with these unknowns, found in so many iterations."""
         coefficients, record = self.transfer.shaped(unknowns), CycleRecord.of(at.cycle)
         return HarmonicSolution(
             frequency=frequency,
             force=force,
             resolution=self.resolution,
             coefficients=coefficients,
-            motion=at.motion @ self.receptance.at_points.T,
+            motion=self.receptance.displacement(at.motion),
             cycle=record,
-            iterations=0,
+            iterations=iterations,
             residual=at.relative,
             shares=self.left_out(coefficients, record, frequency),
             error=None,
@@ -278,20 +282,32 @@ class HarmonicBalance:
         a harmonic may meet a mode of either.
         """
         neglected, vibration = self._neglected, self.vibration(coefficients)
-        harmonics = np.array(neglected.harmonics)
-        shares = np.zeros(harmonics[-1] + 1)
+        shares = np.zeros(neglected.harmonics[-1] + 1)
         if vibration == 0.0:
             return shares
-        force = neglected.weights @ cycle.samples.reshape(neglected.samples, -1)
-        cosine, sine = neglected.places
-        for structure in (self.receptance, self.rest.stiffened):
-            steady = structure.at(2.0 * np.pi * frequency * harmonics)
-            motion = steady.respond(neglected.combined(force @ structure.at_joints))
-            squares = np.square(neglected.separated(motion) @ structure.at_joints.T).sum(axis=1)
-            sizes = np.sqrt(squares[cosine] + np.where(sine < 0, 0.0, squares[sine]))
-            shares[harmonics] = np.maximum(shares[harmonics], sizes)
+        force = (neglected.weights @ cycle.samples.reshape(neglected.samples, -1)).reshape(
+            neglected.size, -1, self.joints.directions
+        )
+        orders, sizes = self._orders_left_out, []
+        for transfer in self._left_out_by:
+            steady = transfer.receptance.at(2.0 * np.pi * frequency * orders)
+            motion = steady.respond(transfer.modal(force.transpose(1, 0, 2)))
+            sizes.append(neglected.sizes(transfer.shaped(transfer.at_joints(motion))))
+        shares[orders] = np.maximum(*sizes)
         shares[list(self.resolution.harmonics)] = 0.0
-        return shares / vibration
+        shares /= vibration
+        return shares
+
+    @cached_property
+    def _orders_left_out(self) -> np.ndarray:
+        return np.array(self._neglected.harmonics)
+
+    @cached_property
+    def _left_out_by(self) -> tuple[HarmonicTransfer, ...]:
+        """What harmonics left out do with joints free, and as stiff as at rest."""
+        structures = self.receptance, self.rest.stuck.stiffened
+        directions = self.joints.directions
+        return tuple(HarmonicTransfer(self._neglected, of, directions) for of in structures)
 
     @cached_property
     def rounding(self) -> float:
@@ -306,8 +322,8 @@ class HarmonicBalance:
 
     def vibration(self, coefficients: Array) -> float:
         """Norm of coefficients ``(j, m, d)`` without the mean [mm], 0 where it is rounding."""
-        norm = float(np.linalg.norm(self.vibrating(coefficients)))
-        return norm if norm > self.rounding else 0.0
+        size = norm(self.vibrating(coefficients))
+        return size if size > self.rounding else 0.0
 
     def refined(self, resolution: Resolution) -> HarmonicBalance:
         """The same problem at another resolution."""
@@ -336,7 +352,7 @@ class HarmonicBalance:
         cycle = self.joints.settle(
             coefficients, resolution.basis, resolution.weights, resolution.lead
         )
-        steady = self.receptance.at(2.0 * np.pi * frequency * self.orders)
+        steady = self.receptance.at(frequency * self.turning)
         on_modes = self._constant + force * self.wave
         on_modes -= self.transfer.on_modes(cycle.force, unknowns)
         vibration = steady.vibrate(on_modes)
@@ -347,7 +363,8 @@ class HarmonicBalance:
             self.transfer.shaped(response)[:, 0] += constant + force * growing
         size = self._size(coefficients, response, cycle)
         residual = unknowns - response
-        return Balance(self, over, steady, on_modes, vibration, cycle, residual, size)
+        relative = relative_norm(residual, size)
+        return Balance(self, over, steady, on_modes, vibration, cycle, residual, size, relative)
 
     @cached_property
     def _mean_by_load(self) -> Array:
@@ -364,14 +381,12 @@ class HarmonicBalance:
         only joints hold the structure, any mean displacement balances that of the springs that
         hold it here, and does not count.
         """
+        if not self.transfer.mean:
+            return norm(coefficients) + norm(response)
         first = int(self.transfer.held > 0.0)
-        size = np.linalg.norm(coefficients[:, first:])
-        size += np.linalg.norm(self.transfer.shaped(response)[:, first:])
-        if self.transfer.mean:
-            flexibility = self.receptance.static_flexibility
-            size += np.linalg.norm(flexibility @ cycle.force[:, 0].ravel())
-            size += np.linalg.norm(self.rest.loaded)
-        return float(size)
+        size = norm(coefficients[:, first:]) + norm(self.transfer.shaped(response)[:, first:])
+        by_joints = self.receptance.static_flexibility @ cycle.force[:, 0].ravel()
+        return size + norm(by_joints) + norm(self.rest.loaded)
 
 
 @dataclass(frozen=True)

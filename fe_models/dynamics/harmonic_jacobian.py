@@ -15,12 +15,12 @@ import numpy as np
 from numba import njit
 
 from fe_models.dynamics.harmonics import ComplexArray, Resolution, by_function, by_joint
-from fe_models.dynamics.joint_rest import Rest
-from fe_models.dynamics.receptance import Receptance, SteadyMotion
+from fe_models.dynamics.joint_rest import Rest, SpringJoints
+from fe_models.dynamics.receptance import FEW, Receptance, SteadyMotion
 from fe_models.dynamics.static_residual import ResidualReceptance
 from sa_solver.types import Array
 
-# Share of the largest derivative below which one that differs from that at rest is rounding.
+# Share of the largest derivative below which one that differs from a spring's is rounding.
 SAME = 1e-9
 
 
@@ -61,17 +61,30 @@ class HarmonicTransfer:
 
         It is their ``unknowns`` by which they are held at harmonic 0.
         """
-        rows = by_function(force)
         if self.held:
-            # Of a single joint the rows are a view of the given force, which stays as it is.
-            rows = rows.copy()
-            rows[0] -= self._holding(unknowns)
-        return self.resolution.combined(rows @ self.receptance.at_joints)
+            force = force.copy()
+            force[:, 0] -= self._holding(unknowns).reshape(-1, self.directions)
+        return self.modal(force)
+
+    def modal(self, force: Array) -> ComplexArray:
+        """Forces on the modes ``(k, n)`` by coefficients ``(j, m, d)`` of forces on the joints."""
+        if self._few:
+            return _few_on_modes(force, self.receptance.at_joints, *self.resolution.places)
+        return self.resolution.combined(by_function(force) @ self.receptance.at_joints)
 
     def at_joints(self, motion: ComplexArray) -> Array:
         """Coefficients ``(j m d,)`` of the joints' displacements, of a motion of the modes."""
+        if self._few:
+            few = np.empty((self.joints, self.resolution.size, self.directions))
+            _few_at_joints(motion, self.receptance.at_joints, *self.resolution.places, few)
+            return few.ravel()
         rows = self.resolution.separated(motion) @ self.receptance.at_joints.T
         return by_joint(rows, self.directions).ravel()
+
+    @cached_property
+    def _few(self) -> bool:
+        """Whether a compiled loop over all harmonics, joints and modes is the shortest."""
+        return len(self.resolution.harmonics) * self.receptance.at_joints.size <= FEW
 
     def mean_response(self, force: Array, unknowns: Array) -> Array:
         """Coefficients ``(j m d,)`` of the mean displacement by the mean of forces on joints.
@@ -93,7 +106,7 @@ class HarmonicJacobian:
     """1 + R (J - κ): what it does to a vector, and its assembly.
 
     ``steady`` is the structure at the harmonics of a frequency, ``slopes`` ``(j, m, d, m, d)`` J,
-    and ``rest`` knows the joints' stiffness at rest.
+    and ``rest`` knows springs that are like the joints.
     """
 
     transfer: HarmonicTransfer
@@ -113,16 +126,16 @@ class HarmonicJacobian:
         return response
 
     def precondition(self, vector: Array) -> Array:
-        """The inverse P of the matrix with the joints' stiffness D at rest, for J, times a vector.
+        """The inverse P of the matrix with springs D like the joints, for J, times a vector.
 
         P = (1 + R (D - κ))⁻¹ = 1 - R' (D - κ), with receptances R' of the structure stiffened by D.
         Where D does not hold it, springs κ' do: then D + κ' at harmonic 0. Of R' the high modes
         answer as at rest.
         """
         shaped = vector.reshape(self.slopes.shape[:3])
-        force = shaped @ self.rest.tangents
+        force = shaped @ self._springs.tangents
         if self.transfer.mean:
-            held = self.rest.stiffened.held - self.transfer.held
+            held = self._springs.stiffened.held - self.transfer.held
             force[:, 0] += held * shaped[:, 0]
         response = self._everywhere.respond(by_function(force))
         return vector - by_joint(response, self.transfer.directions).ravel()
@@ -130,7 +143,7 @@ class HarmonicJacobian:
     def preconditioned(self, vector: Array) -> Array:
         """P times the matrix times a vector: P (1 + R (J - κ)) = 1 + R' (J - D), in one step.
 
-        Only joints that do not do as at rest have a part in it.
+        Only joints that do not do as these springs have a part in it.
         """
         joints, excess, receptance = self._differing
         shaped = vector.reshape(self.slopes.shape[:3])
@@ -141,19 +154,17 @@ class HarmonicJacobian:
         return vector + by_joint(response, self.transfer.directions).ravel()
 
     @cached_property
+    def _springs(self) -> SpringJoints:
+        return self.rest.springs_like(self.slopes)
+
+    @cached_property
     def _differing(self) -> tuple[np.ndarray, Array, ResidualReceptance]:
         """Joints ``(a,)`` whose J is not D, their J - D ``(a, m d, m d)``, and R' of these."""
-        joints, size, directions = self.slopes.shape[:3]
-        excess, functions = self.slopes.copy(), np.arange(size)
-        # The axes of the two functions come first: (m, j, d, d).
-        excess[:, functions, :, functions] -= self.rest.tangents
-        if self.transfer.mean:
-            excess[:, 0, :, 0] -= self.rest.stiffened.held * np.eye(directions)
-        excess = excess.reshape(joints, size * directions, size * directions)
-        each = np.abs(excess).max(axis=(1, 2))
-        differing = np.flatnonzero(each > SAME * np.abs(self.slopes).max())
+        directions, springs = self.slopes.shape[2], self._springs
+        held = springs.stiffened.held if self.transfer.mean else 0.0
+        differing, excess = _excess(self.slopes, springs.tangents, held)
         places = (differing[:, None] * directions + np.arange(directions)).ravel()
-        return differing, excess[differing], self._residual(places)
+        return differing, excess, self._residual(places)
 
     @cached_property
     def _everywhere(self) -> ResidualReceptance:
@@ -161,7 +172,7 @@ class HarmonicJacobian:
 
     def _residual(self, some: np.ndarray | slice) -> ResidualReceptance:
         resolution = self.transfer.resolution
-        return ResidualReceptance(self.rest.stiffened, resolution, self.steady.angular, some)
+        return ResidualReceptance(self._springs.stiffened, resolution, self.steady.angular, some)
 
     def assembled(self) -> Array:
         """The matrix ``(n, n)``."""
@@ -171,6 +182,64 @@ class HarmonicJacobian:
         places = transfer.resolution.places
         _assemble(self.steady.between_joints(), slopes, transfer.held, *places, jacobian)
         return jacobian
+
+
+@njit(cache=True, nogil=True)
+def _excess(slopes: Array, tangents: Array, held: float) -> tuple[np.ndarray, Array]:
+    """Joints ``(a,)`` whose derivatives ``(j, m, d, m, d)`` are not those of springs, and by how
+    much ``(a, m d, m d)``; at harmonic 0 with springs that hold them."""
+    joints, size, directions = slopes.shape[:3]
+    differing, found = np.empty(joints, np.int64), 0
+    excess = np.empty((joints, size, directions, size, directions))
+    rounding = SAME * np.abs(slopes).max()
+    for joint in range(joints):
+        own = excess[found]
+        own[:] = slopes[joint]
+        for function in range(size):
+            for direction in range(directions):
+                for by in range(directions):
+                    own[function, direction, function, by] -= tangents[joint, direction, by]
+        for direction in range(directions):
+            own[0, direction, 0, direction] -= held
+        if np.abs(own).max() > rounding:
+            differing[found] = joint
+            found += 1
+    flat = excess[:found].reshape(found, size * directions, size * directions)
+    return differing[:found], flat
+
+
+@njit(cache=True)
+def _few_on_modes(
+    force: Array, at_joints: Array, cosines: np.ndarray, sines: np.ndarray
+) -> ComplexArray:
+    """Amplitudes of forces on modes ``(k, n)`` by coefficients of joints' forces ``(j, m, d)``."""
+    joints, _, directions = force.shape
+    on_modes = np.zeros((len(cosines), at_joints.shape[1]), np.complex128)
+    for k in range(len(cosines)):
+        for joint in range(joints):
+            for direction in range(directions):
+                sine = force[joint, sines[k], direction] if sines[k] >= 0 else 0.0
+                amplitude = complex(force[joint, cosines[k], direction], -sine)
+                for mode in range(at_joints.shape[1]):
+                    on_modes[k, mode] += amplitude * at_joints[joint * directions + direction, mode]
+    return on_modes
+
+
+@njit(cache=True)
+def _few_at_joints(
+    motion: ComplexArray, at_joints: Array, cosines: np.ndarray, sines: np.ndarray, few: Array
+) -> None:
+    """Write the coefficients ``(j, m, d)`` of joints by the amplitudes of modes ``(k, n)``."""
+    joints, _, directions = few.shape
+    for k in range(len(cosines)):
+        for joint in range(joints):
+            for direction in range(directions):
+                amplitude = 0.0j
+                for mode in range(at_joints.shape[1]):
+                    amplitude += motion[k, mode] * at_joints[joint * directions + direction, mode]
+                few[joint, cosines[k], direction] = amplitude.real
+                if sines[k] >= 0:
+                    few[joint, sines[k], direction] = -amplitude.imag
 
 
 @njit(cache=True, nogil=True)

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from numba import njit
 
 from sa_solver.errors import InputError
 from sa_solver.types import Array
@@ -136,6 +137,10 @@ class Resolution:
         """The inverse of :meth:`amplitudes`."""
         return by_joint(self.separated(amplitudes), directions)
 
+    def sizes(self, coefficients: Array) -> Array:
+        """Norm ``(k,)`` of each harmonic of coefficients ``(j, m, d)``."""
+        return _sizes(coefficients, *self.places)
+
     def adopt(self, coefficients: Array, other: Resolution) -> Array:
         """Coefficients ``(j, m, d)`` for these harmonics of those for others; 0 where it has none.
 
@@ -148,3 +153,17 @@ class Resolution:
                     source = there[other.harmonics.index(harmonic)]
                     adopted[:, place] = coefficients[:, source]
         return adopted
+
+
+@njit(cache=True)
+def _sizes(coefficients: Array, cosines: np.ndarray, sines: np.ndarray) -> Array:
+    """Norm ``(k,)`` of each harmonic; one without a sine is the mean."""
+    sizes = np.zeros(len(cosines))
+    for joint in range(len(coefficients)):
+        for k in range(len(cosines)):
+            for value in coefficients[joint, cosines[k]]:
+                sizes[k] += value * value
+            if sines[k] >= 0:
+                for value in coefficients[joint, sines[k]]:
+                    sizes[k] += value * value
+    return np.sqrt(sizes)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -20,6 +20,27 @@ TOLERANCE, MAX_ITERATIONS = 1e-12, 60
 SOFT = 1e-3
 # Of a period without motion.
 SMALL_SAMPLES = 8
+# Directions along a joint, at most.
+ALONG = 2
+# Of the stiffness that resists along joints at rest: below it they are nearer to sliding.
+HALF = 0.5
+
+
+@dataclass(frozen=True)
+class SpringJoints:
+    """A structure whose joints are springs of the symmetric ``tangents`` ``(j, d, d)`` [N/mm]."""
+
+    model: DynamicModel
+    tangents: Array
+
+    @cached_property
+    def stiffened(self) -> Receptance:
+        """The structure with these springs; damping between modes left out."""
+        connection = self.model.connection
+        by_joint = connection.reshape(*self.tangents.shape[:2], -1)
+        springs = (self.tangents @ by_joint).reshape(connection.shape)
+        stiffness = self.model.stiffness + connection.T @ springs
+        return Receptance(replace(self.model, stiffness=stiffness), mixed=False)
 
 
 class Rest:
@@ -69,8 +90,8 @@ class Rest:
         return displacement.reshape(self._shape)
 
     @cached_property
-    def tangents(self) -> Array:
-        """Symmetric stiffness ``(j, d, d)`` [N/mm] of the joints against small motions from rest.
+    def stuck(self) -> SpringJoints:
+        """As stiff as the joints are against small motions from rest.
 
         Not that of the way to rest, on which a joint may have touched last.
         """
@@ -81,15 +102,22 @@ class Rest:
             coefficients, mean_and_wave.basis, mean_and_wave.weights, mean_and_wave.lead
         )
         tangents = cycle.jacobian[:, 1, :, 1]
-        return np.asarray(0.5 * (tangents + tangents.transpose(0, 2, 1)))
+        return SpringJoints(self._model, 0.5 * (tangents + tangents.transpose(0, 2, 1)))
 
     @cached_property
-    def stiffened(self) -> Receptance:
-        """The structure with springs of these :attr:`tangents`; damping between modes left out."""
-        by_joint = self._model.connection.reshape(*self._shape, -1)
-        springs = (self.tangents @ by_joint).reshape(self._model.connection.shape)
-        stiffness = self._model.stiffness + self._model.connection.T @ springs
-        return Receptance(replace(self._model, stiffness=stiffness), mixed=False)
+    def sliding(self) -> SpringJoints:
+        """:attr:`stuck` without what resists along the joints: a third direction is normal."""
+        tangents, normal = np.zeros_like(self.stuck.tangents), slice(ALONG, None)
+        tangents[:, normal, normal] = self.stuck.tangents[:, normal, normal]
+        return SpringJoints(self._model, tangents)
+
+    def springs_like(self, slopes: Array) -> SpringJoints:
+        """Of the two whichever is nearer to joints of the derivatives ``(j, m, d, m, d)``."""
+        # By a function of the first wave; the very first may be the mean.
+        stuck, first, along = self.stuck.tangents, slopes[:, 1, :, 1], slice(ALONG)
+        held = np.vdot(stuck[:, along, along], first[:, along, along])
+        whole = np.vdot(stuck[:, along, along], stuck[:, along, along])
+        return self.sliding if held < HALF * whole else self.stuck
 
     def _settled(self, displacement: Array) -> Cycle:
         one = np.ones((1, 1))

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import numpy as np
 import scipy.linalg as sl
+from numba import njit
 
 from fe_models.dynamics.harmonics import ComplexArray
 from fe_models.dynamics.model import DynamicModel
@@ -28,6 +29,8 @@ RIGID = 1e-13
 HELD = 1e-2
 # Damping between different modes, over the largest, below which there is none: rounding.
 DIAGONAL = 1e-10
+# Products of frequencies, directions of joints and modes up to which calls cost more than loops.
+FEW = 4000
 
 
 class ReceptanceError(InputError):
@@ -49,8 +52,7 @@ class SteadyMotion:
         # otherwise their flexibilities are numbers (k, n).
         self._mixed = damping.ndim == 2
         if not self._mixed:
-            turning = moving[:, None]
-            self._flexibility = 1.0 / (squares - turning * turning + 1j * (turning * damping))
+            self._flexibility = _flexibilities(moving, squares, damping)
         else:
             turning = moving[:, None, None]
             inertia = np.diag(squares) - turning * turning * np.eye(len(squares))
@@ -65,7 +67,10 @@ class SteadyMotion:
 
     def vibrate(self, force: ComplexArray) -> ComplexArray:
         """:meth:`respond` without what constant forces do: 0 at ω = 0."""
-        moving, response = self._moving, np.empty(force.shape, dtype=complex)
+        moving = self._moving
+        if not self._mixed and not moving:
+            return np.asarray(force * self._flexibility)
+        response = np.empty(force.shape, dtype=complex)
         response[:moving] = 0.0
         if not self._mixed:
             np.multiply(force[moving:], self._flexibility, out=response[moving:])
@@ -76,8 +81,9 @@ class SteadyMotion:
     def stiffness_slope(self, motion: ComplexArray) -> ComplexArray:
         """∂(K + iωC - ω²M)/∂ω x: forces that a motion needs more per rad/s."""
         damping = self.structure.damping
-        damped = motion * damping if damping.ndim == 1 else motion @ damping.T
-        return np.asarray(1j * damped - 2.0 * self.angular[:, None] * motion)
+        if not self._mixed:
+            return _stiffness_slopes(motion, self.angular, damping)
+        return np.asarray(1j * (motion @ damping.T) - (2.0 * self.angular)[:, None] * motion)
 
     def between_joints(self) -> ComplexArray:
         """Displacements of joints by forces on joints ``(k, j d, j d)`` [mm/N]; held at ω = 0."""
@@ -87,6 +93,9 @@ class SteadyMotion:
         if moving:
             between[0] = self.structure.static_flexibility
         if not self._mixed:
+            if len(self._flexibility) * at_joints.size <= FEW:
+                _few_between_joints(self._flexibility, at_joints, between[moving:])
+                return between
             inverse = self._flexibility[:, None, :]
             # Two real products cost half of a complex one.
             between.real[moving:] = (at_joints * inverse.real) @ at_joints.T
@@ -94,6 +103,39 @@ class SteadyMotion:
         else:
             between[moving:] = at_joints @ np.linalg.solve(self._stiffness, at_joints.T)
         return between
+
+
+@njit(cache=True)
+def _few_between_joints(flexibility: ComplexArray, at_joints: Array, between: ComplexArray) -> None:
+    """Write what so many frequencies ``(k, n)`` make between joints ``(k, j d, j d)``."""
+    for k in range(len(flexibility)):
+        for to in range(len(at_joints)):
+            for by in range(len(at_joints)):
+                response = 0.0j
+                for n in range(at_joints.shape[1]):
+                    response += flexibility[k, n] * (at_joints[to, n] * at_joints[by, n])
+                between[k, to, by] = response
+
+
+@njit(cache=True)
+def _stiffness_slopes(motion: ComplexArray, angular: Array, damping: Array) -> ComplexArray:
+    """(i c_n - 2 ω) x ``(k, n)``."""
+    slopes = np.empty_like(motion)
+    for k in range(len(angular)):
+        for n in range(len(damping)):
+            slopes[k, n] = complex(-2.0 * angular[k], damping[n]) * motion[k, n]
+    return slopes
+
+
+@njit(cache=True)
+def _flexibilities(angular: Array, squares: Array, damping: Array) -> ComplexArray:
+    """1 / (ω_n² - ω² + iω c_n) ``(k, n)``."""
+    flexibilities = np.empty((len(angular), len(squares)), np.complex128)
+    for k in range(len(angular)):
+        for n in range(len(squares)):
+            stiffness = complex(squares[n] - angular[k] * angular[k], angular[k] * damping[n])
+            flexibilities[k, n] = 1.0 / stiffness
+    return flexibilities
 
 
 class Receptance:
@@ -138,6 +180,12 @@ class Receptance:
     def at(self, angular: Array) -> SteadyMotion:
         """The structure at ``k`` frequencies [rad/s]."""
         return SteadyMotion(self, angular)
+
+    def displacement(self, motion: ComplexArray) -> ComplexArray:
+        """That of the structure ``(k, n)`` by a motion of its modes."""
+        # Real shapes are not made complex for that: of many modes the dearer part.
+        at_points = self.at_points.T
+        return np.asarray(motion.real @ at_points + 1j * (motion.imag @ at_points))
 
     def respond_at_rest(self, force: Array) -> Array:
         """Displacements ``(n,)`` under constant forces ``(n,)``, held."""

@@ -64,7 +64,7 @@ def _energy_error(
     frequency = solution.frequency * (1.0 + share)
     nearest = richer.evaluate(unknowns, frequency, solution.force, "frequency")
     dissipated = float(nearest.cycle.dissipated.sum())
-    motion = nearest.motion @ richer.receptance.at_points.T
+    motion = richer.receptance.displacement(nearest.motion)
     damped = energy_damped(richer, motion, richer.resolution.harmonics, frequency)
     difference = abs(dissipated - float(solution.cycle.dissipated.sum()))
     return difference / (dissipated + damped) if difference > 0.0 else 0.0
@@ -89,11 +89,8 @@ def _step(
 def _causes(coarse: Resolution, richer: HarmonicBalance, at: Balance) -> tuple[Array, float]:
     """Norm of the residual of each harmonic left out, by its order, and of those that are not."""
     rows = richer.transfer.shaped(at.residual)
-    norms = np.linalg.norm(rows, axis=(0, 2))
-    cosine, sine = richer.resolution.places
     sizes = np.zeros(richer.resolution.harmonics[-1] + 1)
-    both = np.hypot(norms[cosine], np.where(sine < 0, 0.0, norms[sine]))
-    sizes[list(richer.resolution.harmonics)] = both
+    sizes[list(richer.resolution.harmonics)] = richer.resolution.sizes(rows)
     kept = list(coarse.harmonics)
     sampling = float(np.linalg.norm(sizes[kept]))
     sizes[kept] = 0.0

@@ -17,10 +17,14 @@ LONGEST = 300.0  # L: nothing is left of the angle long before, and exp(-2 L) is
 LAST = 1e-9  # of the limit at which a lift-off is taken to be over: its square is below rounding
 CLOSE = 0.03  # of (b - a)/(b + a): below it the logarithmic mean is a series
 TERMS = 5  # of this series: CLOSE**(2 TERMS) is below rounding
-NEGLIGIBLE = 36.0  # exponent: exp(-36) is rounding
+MEAN_SERIES = tuple(1.0 / (2 * j + 1) for j in range(TERMS, -1, -1))
+SLOPE_SERIES = tuple(2 * j / (2 * j + 1) for j in range(TERMS, 0, -1))
+NEGLIGIBLE = 1e-16  # of an energy: rounding
+FADING = 1.0  # exponent from which on powers of exp(-2 L η) are not lost in their difference
+TURNED = 0.1  # tan²(ψ/2) below which 1 - cos ψ is a series of its powers
+POWERS, POWER_BELOW = 16, 1e-16  # of them, at most, and the one that is rounding
 ROUNDING = 1e-16  # of a fraction of an increment
 PANEL = 0.8  # of the exponent per panel: six points leave 1e-14 of tanh there
-SLOPES, ENERGY = 1, 2  # what is wanted of an increment beside its force: bits
 PANELS = 1000  # more than any finite path asks for: a diverged one must still come to an end
 NODES, WEIGHTS = (0.5 * rule for rule in np.polynomial.legendre.leggauss(6))
 NODES = NODES + 0.5
@@ -39,6 +43,23 @@ class ForcePath(NamedTuple):
     pull_y: float
     start: float
     end: float
+
+
+class ForceSlopes(NamedTuple):
+    """Derivative of a force or an angle at the end of a path with respect to the path's numbers."""
+
+    force_x: float
+    force_y: float
+    pull_x: float
+    pull_y: float
+    start: float
+    end: float
+
+
+# A slider that holds, by both components, and a contact that is apart.
+HELD_X = ForceSlopes(1.0, 0.0, 1.0, 0.0, 0.0, 0.0)
+HELD_Y = ForceSlopes(0.0, 1.0, 0.0, 1.0, 0.0, 0.0)
+GONE = ForceSlopes(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 class Slip(NamedTuple):
@@ -99,9 +120,9 @@ def _inverse_mean(a: float, b: float) -> float:
     x = (b - a) / (a + b)
     if abs(x) > CLOSE:
         return log(b / a) / (b - a)
-    total = 0.0
-    for j in range(TERMS, -1, -1):
-        total = total * x * x + 1.0 / (2 * j + 1)
+    square, total = x * x, 0.0
+    for coefficient in MEAN_SERIES:
+        total = total * square + coefficient
     return 2.0 * total / (a + b)
 
 
@@ -111,9 +132,9 @@ def _inverse_mean_slopes(a: float, b: float) -> tuple[float, float]:
     x, mean = (b - a) / (a + b), _inverse_mean(a, b)
     if abs(x) > CLOSE:
         return (mean - 1.0 / a) / (b - a), (1.0 / b - mean) / (b - a)
-    slope = 0.0
-    for j in range(TERMS, 0, -1):
-        slope = slope * x * x + 2 * j / (2 * j + 1)
+    square, slope = x * x, 0.0
+    for coefficient in SLOPE_SERIES:
+        slope = slope * square + coefficient
     slope *= 4.0 * x / (a + b) ** 3
     return -mean / (a + b) - b * slope, -mean / (a + b) + a * slope
 
@@ -155,11 +176,10 @@ def _direction(slip: Slip) -> tuple[float, float]:
 
 
 @compiled(error_model="numpy")
-def _turning(path: ForcePath, slip: Slip) -> tuple[float, float, float, float, float, float]:
+def _turning(path: ForcePath, slip: Slip) -> ForceSlopes:
     """Derivative of the angle of the force at the end of a slip.
 
-    With respect to the six numbers of the path, in the order force, limit at the start, pull,
-    limit at the end. With ψ' ~ sin ψ, ∂ψ1/∂ψ0 = sin ψ1/sin ψ0 and ∂ψ1/∂L = -sin ψ1.
+    With ψ' ~ sin ψ, ∂ψ1/∂ψ0 = sin ψ1/sin ψ0 and ∂ψ1/∂L = -sin ψ1.
     """
     decay = slip.decay
     over = slip.toward + slip.away * decay * decay
@@ -175,12 +195,12 @@ def _turning(path: ForcePath, slip: Slip) -> tuple[float, float, float, float, f
         memory, at_start, at_end = 0.0, 0.0, 0.0
     left = 1.0 - slip.held
     shorter = sine * slip.pull * left
-    return (
+    return ForceSlopes(
         -memory * slip.force_y,
         memory * slip.force_x,
-        -shorter * at_start * left,
         -memory * slip.held * slip.force_y - following * slip.pull_y - along * slip.pull_x,
         memory * slip.held * slip.force_x + following * slip.pull_x - along * slip.pull_y,
+        -shorter * at_start * left,
         -shorter * (at_start * slip.held + at_end),
     )
 
@@ -196,16 +216,25 @@ def _lost_in_slip(path: ForcePath, slip: Slip) -> float:
     straight = 0.5 * (slip.limit + path.end) * (slip.pull - path.end + path.start) * left
     if slip.away == 0.0 or slip.length == 0.0 or straight <= 0.0:
         return max(straight, 0.0)
-    growth, decay = 2.0 * log(path.end / slip.limit), 2.0 * slip.length
-    # What is left of the integral at η is at most R0² (1 - cos ψ0)/(1 + cos ψ0) exp((growth -
-    # decay) η): it ends where that is negligible, for a force along the pull before it begins.
-    most = slip.limit * slip.limit * slip.away / slip.toward
-    exponent = NEGLIGIBLE + log(most / straight)
-    if exponent <= 0.0:
+    square, ratio = slip.limit * slip.limit, slip.away / slip.toward
+    if square * ratio <= NEGLIGIBLE * straight:
         return straight
-    share = exponent / (decay - growth)
-    if not 0.0 < share < 1.0:
-        share = 1.0
+    growth, decay = 2.0 * log(path.end / slip.limit), 2.0 * slip.length
+    # While the force turns, by a rule; then by the powers of exp(-2 L η).
+    turning = 1.0
+    if decay - growth > FADING:
+        turning = min(max(log(ratio / TURNED) / decay, 0.0), 1.0)
+    turned = 0.0
+    if turning > 0.0:
+        turned = _turned_by_rule(slip, growth, decay, turning)
+    if turning < 1.0:
+        turned += _turned_by_powers(ratio, growth, decay, turning)
+    return max(straight - turned * slip.length * square, 0.0)
+
+
+@compiled(error_model="numpy")
+def _turned_by_rule(slip: Slip, growth: float, decay: float, share: float) -> float:
+    """∫ exp(growth η) (1 - cos ψ) dη from 0 to a share, where tan²(ψ/2) decays by exp(-decay η)."""
     asked = share * max(abs(growth), decay) / PANEL
     panels = ceil(asked) if asked < PANELS else PANELS
     width, turned = share / panels, 0.0
@@ -214,32 +243,22 @@ def _lost_in_slip(path: ForcePath, slip: Slip) -> float:
             at = (panel + NODES[node]) * width
             away = slip.away * exp(-decay * at)
             turned += WEIGHTS[node] * exp(growth * at) * 2.0 * away / (slip.toward + away)
-    turned *= width * slip.length * slip.limit * slip.limit
-    return max(straight - turned, 0.0)
+    return turned * width
 
 
 @compiled(error_model="numpy")
-def _follow(path: ForcePath, jacobian: Array, wanted: int) -> tuple[float, float, float]:
-    """Tangential force at the end of a path in contact, and kt times the energy lost.
-
-    Its derivative is written into ``jacobian[:2]``, in the order of :func:`_turning`; what is not
-    ``wanted`` is left out, as in :func:`advance_contact`.
-    """
-    held = _held(path)
-    if held == 1.0:
-        if wanted & SLOPES:
-            jacobian[0, 0] = jacobian[0, 3] = jacobian[1, 1] = jacobian[1, 4] = 1.0
-        return path.force_x + path.pull_x, path.force_y + path.pull_y, 0.0
-    slip = _slip(path, held)
-    x, y = _direction(slip)
-    if wanted & SLOPES:
-        for column, turning in enumerate(_turning(path, slip)):
-            jacobian[0, column] = -path.end * y * turning
-            jacobian[1, column] = path.end * x * turning
-        jacobian[0, 5] += x
-        jacobian[1, 5] += y
-    lost = _lost_in_slip(path, slip) if wanted & ENERGY else 0.0
-    return path.end * x, path.end * y, lost
+def _turned_by_powers(ratio: float, growth: float, decay: float, share: float) -> float:
+    """The same from a share to 1, where tan²(ψ/2), at first ``ratio``, is below ``TURNED``."""
+    start, end = exp(growth * share), exp(growth)
+    power_start, power_end = ratio * exp(-decay * share), ratio * exp(-decay)
+    step_start, step_end = power_start, power_end
+    turned, sign = 0.0, 2.0
+    for order in range(1, POWERS + 1):
+        turned += sign * (start * power_start - end * power_end) / (order * decay - growth)
+        if power_start < POWER_BELOW:
+            break
+        power_start, power_end, sign = power_start * step_start, power_end * step_end, -sign
+    return turned
 
 
 @compiled(error_model="numpy")
@@ -259,41 +278,62 @@ def _lost_in_lift_off(path: ForcePath, contact: float) -> float:
 
 
 @compiled(error_model="numpy")
-def _pulled_back(x: float, y: float, limit: float, jacobian: Array) -> None:
+def _followed(path: ForcePath) -> tuple[float, float, ForceSlopes, ForceSlopes]:
+    """Tangential force at the end of a path in contact, and the derivatives of its components."""
+    held = _held(path)
+    if held == 1.0:
+        x, y = path.force_x + path.pull_x, path.force_y + path.pull_y
+        return x, y, HELD_X, HELD_Y
+    slip = _slip(path, held)
+    x, y = _direction(slip)
+    turning = _turning(path, slip)
+    of_x, of_y = _scaled(turning, -path.end * y, x), _scaled(turning, path.end * x, y)
+    return path.end * x, path.end * y, of_x, of_y
+
+
+@compiled(error_model="numpy")
+def _scaled(slopes: ForceSlopes, factor: float, added: float) -> ForceSlopes:
+    """Slopes times a factor, with something added for the limit at the end."""
+    return ForceSlopes(
+        factor * slopes.force_x,
+        factor * slopes.force_y,
+        factor * slopes.pull_x,
+        factor * slopes.pull_y,
+        factor * slopes.start,
+        factor * slopes.end + added,
+    )
+
+
+@compiled(error_model="numpy")
+def _pulled_back(x: float, y: float, limit: float, slopes: ForceSlopes) -> ForceSlopes:
     """Chain the derivative with that of the return of a force (x, y) onto the circle."""
     force = _length(x, y)
     x, y, shrink = x / force, y / force, limit / force
-    for row in range(2):
-        radial = jacobian[row, 0] * x + jacobian[row, 1] * y
-        across = shrink * (jacobian[row, 1] * x - jacobian[row, 0] * y)
-        jacobian[row, 0], jacobian[row, 1] = -across * y, across * x
-        jacobian[row, 2] += radial
+    radial = slopes.force_x * x + slopes.force_y * y
+    across = shrink * (slopes.force_y * x - slopes.force_x * y)
+    return ForceSlopes(
+        -across * y, across * x, slopes.pull_x, slopes.pull_y, slopes.start + radial, slopes.end
+    )
 
 
 @compiled(error_model="numpy")
-def _in_displacements(stiffness: float, limit_slope: float, jacobian: Array) -> None:
-    """Chain the derivative from forces and limits to elongation, approach and increment."""
-    for row in range(2):
-        for column in (0, 1, 3, 4):
-            jacobian[row, column] *= stiffness
-        jacobian[row, 2] = limit_slope * (jacobian[row, 2] + jacobian[row, 5])
-        jacobian[row, 5] *= limit_slope
+def _touching(path: ForcePath, slopes: ForceSlopes) -> ForceSlopes:
+    """Chain the derivative with that of the touch on a path whose limit is negative at its start.
 
-
-@compiled(error_model="numpy")
-def _touching(entry: float, pull_x: float, pull_y: float, change: float, jacobian: Array) -> None:
-    """Chain the derivative with that of the touch after the fraction ``entry`` of an increment.
-
-    The pull is that of the whole increment, ``change`` that of the limit µ f, negative before the
-    touch. The force forgets what it was before.
+    The force forgets what it was before.
     """
-    for row in range(2):
-        missed = (jacobian[row, 3] * pull_x + jacobian[row, 4] * pull_y) / change
-        jacobian[row, 0] = jacobian[row, 1] = 0.0
-        jacobian[row, 2] = missed * (1.0 - entry)
-        jacobian[row, 3] *= 1.0 - entry
-        jacobian[row, 4] *= 1.0 - entry
-        jacobian[row, 5] += missed * entry
+    change = path.end - path.start
+    entry = path.start / (path.start - path.end)
+    missed = (slopes.pull_x * path.pull_x + slopes.pull_y * path.pull_y) / change
+    left = 1.0 - entry
+    return ForceSlopes(
+        0.0,
+        0.0,
+        slopes.pull_x * left,
+        slopes.pull_y * left,
+        missed * left,
+        slopes.end + missed * entry,
+    )
 
 
 @compiled(error_model="numpy")
@@ -326,40 +366,76 @@ def advance_force(path: ForcePath) -> tuple[float, float]:
 
 
 @compiled(error_model="numpy")
-def _tangential(path: ForcePath, jacobian: Array, wanted: int) -> tuple[float, float, float]:
-    """Tangential force at the end of an increment, and kt times the energy lost.
+def advance_slopes(path: ForcePath) -> tuple[float, float, ForceSlopes, ForceSlopes]:
+    """:func:`advance_force` with the derivatives of its two components."""
+    if path.end <= 0.0:
+        return 0.0, 0.0, GONE, GONE
+    x, y, of_x, of_y = _followed(_touched(path))
+    if path.start <= 0.0:
+        return x, y, _touching(path, of_x), _touching(path, of_y)
+    before_x, before_y, start = path.force_x, path.force_y, path.start
+    if _length(before_x, before_y) > start:
+        of_x = _pulled_back(before_x, before_y, start, of_x)
+        of_y = _pulled_back(before_x, before_y, start, of_y)
+    return x, y, of_x, of_y
 
-    The limits of ``path`` may be negative here: no contact.
-    """
+
+@compiled(error_model="numpy")
+def energy_lost(path: ForcePath) -> float:
+    """kt times the energy lost in an increment; limits may be negative: no contact."""
     start = max(path.start, 0.0)
     force = _length(path.force_x, path.force_y)
     lost = 0.5 * (force - start) * (force + start) if force > start else 0.0
     if path.end <= 0.0:
-        if start > 0.0 and wanted & ENERGY:
-            contact = _touched(path)
-            lost += _lost_in_lift_off(contact, start / (start - path.end))
-        return 0.0, 0.0, lost
+        if start > 0.0:
+            lost += _lost_in_lift_off(_touched(path), start / (start - path.end))
+        return lost
     contact = _touched(path)
-    end_x, end_y, slipped = _follow(contact, jacobian, wanted)
-    if not wanted & SLOPES:
-        return end_x, end_y, lost + slipped
-    if path.start <= 0.0:
-        entry = path.start / (path.start - path.end)
-        _touching(entry, path.pull_x, path.pull_y, path.end - path.start, jacobian)
-    elif force > start:
-        _pulled_back(path.force_x, path.force_y, start, jacobian)
-    return end_x, end_y, lost + slipped
+    held = _held(contact)
+    return lost + _lost_in_slip(contact, _slip(contact, held)) if held < 1.0 else lost
+
+
+class Contact(NamedTuple):
+    """A row of the parameters of :class:`wear.joints.friction_contact.FrictionContact`."""
+
+    stiffness: float
+    normal_stiffness: float
+    friction: float
+    preload: float
+    gap: float
+
+
+@compiled(error_model="numpy")
+def contact_of(parameters: Array) -> Contact:
+    """The contact of a row of parameters ``(5,)``."""
+    return Contact(parameters[0], parameters[1], parameters[2], parameters[3], parameters[4])
+
+
+@compiled(error_model="numpy")
+def pressing(contact: Contact, approach: float) -> float:
+    """Normal force, negative where the contact is apart."""
+    return contact.preload + contact.normal_stiffness * (approach - contact.gap)
+
+
+@compiled(error_model="numpy")
+def path_of(
+    contact: Contact, x: float, y: float, step_x: float, step_y: float, start: float, end: float
+) -> ForcePath:
+    """The path of a contact of the stretch (x, y) [mm] between two approaches."""
+    stiffness, friction = contact.stiffness, contact.friction
+    return ForcePath(
+        stiffness * x,
+        stiffness * y,
+        stiffness * step_x,
+        stiffness * step_y,
+        friction * pressing(contact, start),
+        friction * pressing(contact, end),
+    )
 
 
 @compiled(error_model="numpy")
 def advance_contact(
-    parameters: Array,
-    start: Array,
-    increment: Array,
-    force: Array,
-    end: Array,
-    jacobian: Array,
-    wanted: int = SLOPES | ENERGY,
+    parameters: Array, start: Array, increment: Array, force: Array, end: Array, jacobian: Array
 ) -> float:
     """Advance one joint by an increment of displacement ``(3,)``; return the energy it loses.
 
@@ -368,30 +444,28 @@ def advance_contact(
     the ``force`` ``(3,)`` and state ``end`` ``(3,)``, which may be ``start``, at the end of the
     increment, and ``jacobian`` ``(3, 6)``, the derivative of that force with respect to the state
     at the start (the first three columns) and to the increment (the others). The state follows the
-    force: its derivative is that of the tangential force divided by kt, and of z + dz. Without
-    ``SLOPES`` among what is ``wanted`` it is not written, without ``ENERGY`` the energy means
-    nothing.
+    force: its derivative is that of the tangential force divided by kt, and of z + dz.
     """
-    stiffness, normal_stiffness, friction = parameters[0], parameters[1], parameters[2]
-    before = parameters[3] + normal_stiffness * (start[2] - parameters[4])
+    contact = contact_of(parameters)
     approach = start[2] + increment[2]
-    after = parameters[3] + normal_stiffness * (approach - parameters[4])
-    path = ForcePath(
-        stiffness * start[0],
-        stiffness * start[1],
-        stiffness * increment[0],
-        stiffness * increment[1],
-        friction * before,
-        friction * after,
-    )
-    if wanted & SLOPES:
-        jacobian[:] = 0.0
-    force[0], force[1], lost = _tangential(path, jacobian, wanted)
-    force[2] = max(after, 0.0)
-    if wanted & SLOPES:
-        _in_displacements(stiffness, friction * normal_stiffness, jacobian)
-        if after > 0.0:
-            jacobian[2, 2] = jacobian[2, 5] = normal_stiffness
-    end[0], end[1], end[2] = force[0] / stiffness, force[1] / stiffness, approach
-    energy: float = lost / stiffness
+    path = path_of(contact, start[0], start[1], increment[0], increment[1], start[2], approach)
+    x, y, of_x, of_y = advance_slopes(path)
+    energy: float = energy_lost(path) / contact.stiffness
+    after = pressing(contact, approach)
+    _in_displacements(contact, of_x, jacobian[0])
+    _in_displacements(contact, of_y, jacobian[1])
+    jacobian[2] = 0.0
+    if after > 0.0:
+        jacobian[2, 2] = jacobian[2, 5] = contact.normal_stiffness
+    force[0], force[1], force[2] = x, y, max(after, 0.0)
+    end[0], end[1], end[2] = x / contact.stiffness, y / contact.stiffness, approach
     return energy
+
+
+@compiled(error_model="numpy")
+def _in_displacements(contact: Contact, slopes: ForceSlopes, row: Array) -> None:
+    """Write the derivative ``(6,)`` by stretch, approach and increment."""
+    limit_slope = contact.friction * contact.normal_stiffness
+    row[0], row[1] = contact.stiffness * slopes.force_x, contact.stiffness * slopes.force_y
+    row[3], row[4] = contact.stiffness * slopes.pull_x, contact.stiffness * slopes.pull_y
+    row[2], row[5] = limit_slope * (slopes.start + slopes.end), limit_slope * slopes.end

@@ -21,6 +21,7 @@ from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cached_property, partial
+from typing import NamedTuple
 
 import numpy as np
 
@@ -40,7 +41,7 @@ from wear.joints.periodic_sliders import (
     JENKINS,
     DrivenJoints,
     Period,
-    differences,
+    differentiate_sliders,
     settle_curves,
     settle_sliders,
 )
@@ -49,10 +50,16 @@ STICK, SLIP, SEPARATED = 0, 1, 2
 """States of a joint at a sample. A spread or smooth joint slips where less than half of the
 stiffness that it may lose is left."""
 
-# Joints along one direction have derivatives and energies from their march.
-CONTACT_DIRECTIONS = FrictionContact.directions
-
 SettlingKernel = Callable[[Period, DrivenJoints], None]
+
+
+class Kernels(NamedTuple):
+    """Compiled marches of a law: until it repeats, for derivatives and energies, None where these
+    come with the first."""
+
+    settle: SettlingKernel
+    differentiate: SettlingKernel | None
+    dissipate: SettlingKernel | None
 
 
 @dataclass(frozen=True)
@@ -127,70 +134,68 @@ class PeriodicMarch:
         lead = basis[:1] if lead is None else lead
         self._require(coefficients, basis, weights, lead)
         joints, size, directions = coefficients.shape
-        kernel, parameters = self._kernel
+        kernels, parameters = self._kernels
         if len(parameters) < joints:
             parameters = np.repeat(parameters, joints, axis=0)
-        path, before = basis @ coefficients, lead @ coefficients
-        force, states = np.empty_like(path), np.empty(path.shape[:2], np.int8)
-        jacobian = np.empty((joints, size, directions, size, directions))
-        lost, change = np.empty((2, joints))
+        points, of_points = (joints, len(basis)), () if directions == 1 else (directions,)
+        force, states = np.empty(points + of_points), np.empty(points, np.int8)
+        jacobian = np.empty((joints, size, *of_points, size, *of_points))
+        lost, change, settled = np.empty(joints), np.empty(joints), np.empty((joints, 4))
+        path = (basis @ coefficients).reshape(force.shape)
+        before = (lead @ coefficients).reshape(joints, len(lead), *of_points)
         driven = DrivenJoints(
-            parameters, path, before, force, states, jacobian, lost, change, np.empty((joints, 4))
+            parameters, path, before, force, states, jacobian, lost, change, settled
         )
-        if directions == 1:
-            driven = driven._replace(
-                path=path[..., 0],
-                before=before[..., 0],
-                force=force[..., 0],
-                jacobian=jacobian[:, :, 0, :, 0],
-            )
-        period = Period(basis, weights, lead, differences(basis))
+        period = Period(basis, weights, lead)
 
-        def march(kernel: SettlingKernel) -> None:
-            self._in_shares(
-                joints,
-                lambda share: kernel(period, DrivenJoints(*(part[share] for part in driven))),
-            )
-
-        def written(by: SettlingKernel, result: Array) -> Array:
-            if directions == CONTACT_DIRECTIONS:
-                march(by)
+        def written(by: SettlingKernel | None, result: Array) -> Array:
+            if by is not None:
+                self._march(by, period, driven)
             return result
 
-        march(kernel)
+        self._march(kernels.settle, period, driven)
+        samples = force.reshape(joints, len(basis), directions)
+        slopes = jacobian.reshape(joints, size, directions, size, directions)
         return SettledCycle(
-            weights @ force,
-            force.transpose(1, 0, 2),
+            weights @ samples,
+            samples.transpose(1, 0, 2),
             states.T,
             change,
-            partial(written, differentiate_contacts, jacobian),
-            partial(written, energies_of_contacts, lost),
+            partial(written, kernels.differentiate, slopes),
+            partial(written, kernels.dissipate, lost),
         )
 
     @cached_property
-    def _kernel(self) -> tuple[SettlingKernel, Array]:
-        """The compiled march of the law, and its parameters ``(1 or j, p)``."""
+    def _kernels(self) -> tuple[Kernels, Array]:
+        """The compiled marches of the law, and its parameters ``(1 or j, p)``."""
         law = self.law
         if isinstance(law, FrictionContact):
-            return settle_contacts, law.parameters
+            contacts = Kernels(settle_contacts, differentiate_contacts, energies_of_contacts)
+            return contacts, law.parameters
         if isinstance(law, MasingLaw):
-            return settle_curves, law.parameters
+            return Kernels(settle_curves, None, None), law.parameters
+        sliders = Kernels(settle_sliders, differentiate_sliders, None)
         if isinstance(law, Jenkins):
-            return settle_sliders, np.insert(law.parameters, 0, JENKINS, axis=1)
+            return sliders, np.insert(law.parameters, 0, JENKINS, axis=1)
         parameters = np.insert(law.parameters, 0, BOUC_WEN, axis=1)
         # Of its stiffness the spring has what is not residual.
         parameters[:, 1] -= parameters[:, 2]
-        return settle_sliders, parameters
+        return sliders, parameters
 
-    def _in_shares(self, joints: int, work: Callable[[slice], None]) -> None:
-        """Do the work for all joints, in a share per thread."""
+    def _march(self, kernel: SettlingKernel, period: Period, driven: DrivenJoints) -> None:
+        """March all joints, in a share per thread."""
+        joints = len(driven.change)
         shares = min(self.threads, joints)
         if shares <= 1:
-            work(slice(0, joints))
+            kernel(period, driven)
             return
         ends = [joints * share // shares for share in range(shares + 1)]
+
+        def march(share: slice) -> None:
+            kernel(period, DrivenJoints(*(part[share] for part in driven)))
+
         with ThreadPoolExecutor(shares) as pool:
-            list(pool.map(work, map(slice, ends[:-1], ends[1:])))
+            list(pool.map(march, map(slice, ends[:-1], ends[1:])))
 
     def _require(self, coefficients: Array, basis: Array, weights: Array, lead: Array) -> None:
         joints, size, directions = coefficients.shape
@@ -203,6 +208,6 @@ class PeriodicMarch:
                 f"{size} coefficients with a basis {basis.shape}, weights {weights.shape} and "
                 f"lead {lead.shape}: they must be (t, {size}), ({size}, t) and (p, {size})"
             )
-        laws = len(self._kernel[1])
+        laws = len(self._kernels[1])
         if laws not in (1, joints):
             raise JointError(f"the law is that of {laws} joints, the coefficients of {joints}")

@@ -8,6 +8,8 @@ slip is so little that the contact would take thousands of periods.
 The derivative S of s with respect to the coefficients comes after that, along the period that
 repeats and only if it is asked for: what a period makes of 0, and (1 - A)⁻¹ of that at its
 beginning. So does the energy.
+
+Increments take and give numbers: rows of arrays, handed to functions, take four times as long.
 """
 
 from __future__ import annotations
@@ -19,11 +21,15 @@ import numpy as np
 from sa_solver.types import Array
 from wear.joints.compiled import compiled
 from wear.joints.friction_path import (
-    ENERGY,
-    SLOPES,
+    Contact,
     ForcePath,
-    advance_contact,
+    ForceSlopes,
     advance_force,
+    advance_slopes,
+    contact_of,
+    energy_lost,
+    path_of,
+    pressing,
 )
 from wear.joints.periodic_sliders import (
     FORGETTING,
@@ -32,7 +38,7 @@ from wear.joints.periodic_sliders import (
     REPEATED,
     DrivenJoints,
     Period,
-    PeriodRecord,
+    from_rest,
     relative_change,
 )
 
@@ -44,201 +50,160 @@ FORGOTTEN = 1e-18
 STUCK, MARCHED, APART = 0.0, 1.0, 2.0
 
 
-@compiled(nogil=True, error_model="numpy")
-def _to_the_limit(a: Array) -> tuple[float, float, float, float]:
-    """1 + A + A² + ... = (1 - A)⁻¹ by rows, A ``(2, 2)``; 1 where a period forgets nothing."""
-    p, q, r, s = 1.0 - a[0, 0], -a[0, 1], -a[1, 0], 1.0 - a[1, 1]
-    determinant = p * s - q * r
-    if determinant < FORGETTING:
-        return 1.0, 0.0, 0.0, 1.0
-    return s / determinant, -q / determinant, -r / determinant, p / determinant
+class Stretch(NamedTuple):
+    """That of the tangential spring [mm]."""
+
+    x: float
+    y: float
 
 
-@compiled(nogil=True, error_model="numpy")
-def _sticks(slopes: Array, stiffness: float) -> bool:
-    """Whether a contact keeps its stretch, and what is added to it."""
-    off = slopes[0, 1] != 0.0 or slopes[1, 0] != 0.0
-    return slopes[0, 0] == stiffness and slopes[1, 1] == stiffness and not off
+class Kept(NamedTuple):
+    """A, ``(2, 2)`` by rows: what a march makes of a small stretch."""
+
+    xx: float
+    xy: float
+    yx: float
+    yy: float
 
 
-@compiled(nogil=True, error_model="numpy")
-def _carry(
-    slopes: Array, scale: float, start: Array, step: Array, before: Array, after: Array
-) -> None:
-    """Carry the derivative ``(2, 3, m)`` of the stretch along one increment.
+class ContactRecord(NamedTuple):
+    """What is written of a contact in a period: ``force`` ``(t, 3)`` and ``states`` ``(t,)``."""
 
-    ``slopes`` ``(3, 6)`` are those of the forces by stretch, approach and increment, and ``scale``
-    1/kt; ``start`` and ``step`` ``(m,)`` the derivatives of a displacement before the increment and
-    of its change. ``after`` may be ``before``.
-    """
-    xx, xy, yx, yy = slopes[0, 0], slopes[0, 1], slopes[1, 0], slopes[1, 1]
-    xx, xy, yx, yy = xx * scale, xy * scale, yx * scale, yy * scale
-    for direction in range(3):
-        x_follows, y_follows = slopes[0, 3 + direction] * scale, slopes[1, 3 + direction] * scale
-        for c in range(step.size):
-            x, y = before[0, direction, c], before[1, direction, c]
-            after[0, direction, c] = xx * x + xy * y + x_follows * step[c]
-            after[1, direction, c] = yx * x + yy * y + y_follows * step[c]
-    x_follows, y_follows = slopes[0, 2] * scale, slopes[1, 2] * scale
-    for c in range(step.size):
-        after[0, 2, c] += x_follows * start[c]
-        after[1, 2, c] += y_follows * start[c]
-
-
-@compiled(nogil=True, error_model="numpy")
-def _chain(slopes: Array, stiffness: float, total: Array) -> None:
-    """Multiply the derivative ``(2, 2)`` of a stretch by that of one increment."""
-    for c in range(2):
-        x, y = total[0, c] / stiffness, total[1, c] / stiffness
-        total[0, c] = slopes[0, 0] * x + slopes[0, 1] * y
-        total[1, c] = slopes[1, 0] * x + slopes[1, 1] * y
-
-
-@compiled(nogil=True, error_model="numpy")
-def _state_of(joint: Array, force: Array) -> int:
-    """0 stick, 1 slip, 2 separated."""
-    if force[2] <= 0.0:
-        return 2
-    limit = joint[2] * force[2] * (1.0 - ON_CIRCLE)
-    return 1 if force[0] ** 2 + force[1] ** 2 >= limit * limit else 0
-
-
-class ContactMemory(NamedTuple):
-    """A contact on its path, changed in place.
-
-    ``state`` ``(3,)`` is that of the law; the others are room for an increment ``(3,)``, a force
-    ``(3,)`` and slopes ``(3, 6)``.
-    """
-
-    state: Array
-    increment: Array
     force: Array
-    slopes: Array
+    states: np.ndarray
 
 
 @compiled(nogil=True, error_model="numpy")
-def _new_memory() -> ContactMemory:
-    return ContactMemory(np.empty(3), np.empty(3), np.empty(3), np.empty((3, 6)))
+def _left_to_change(a: Kept) -> float:
+    """Determinant of 1 - A; 0 where a period forgets nothing."""
+    return (1.0 - a.xx) * (1.0 - a.yy) - a.xy * a.yx
 
 
 @compiled(nogil=True, error_model="numpy")
-def _move(joint: Array, memory: ContactMemory, start: Array, end: Array, wanted: int) -> float:
-    """One increment between displacements ``(3,)``; return the energy lost."""
-    for direction in range(2):
-        memory.increment[direction] = end[direction] - start[direction]
-    memory.increment[2] = end[2] - memory.state[2]
-    lost: float = advance_contact(
-        joint, memory.state, memory.increment, memory.force, memory.state, memory.slopes, wanted
+def _to_the_limit(a: Kept) -> Kept:
+    """1 + A + A² + ... = (1 - A)⁻¹; 1 where a period forgets nothing."""
+    determinant = _left_to_change(a)
+    if determinant < FORGETTING:
+        return Kept(1.0, 0.0, 0.0, 1.0)
+    return Kept(
+        (1.0 - a.yy) / determinant,
+        a.xy / determinant,
+        a.yx / determinant,
+        (1.0 - a.xx) / determinant,
     )
-    memory.state[2] = end[2]
-    return lost
 
 
 @compiled(nogil=True, error_model="numpy")
-def _pulled(joint: Array, stretch: Array, start: Array, end: Array) -> None:
-    """:func:`_move` without derivatives and energy: the stretch ``(2,)``."""
-    stiffness, preload, gap = joint[0], joint[3], joint[4]
-    path = ForcePath(
-        stiffness * stretch[0],
-        stiffness * stretch[1],
-        stiffness * (end[0] - start[0]),
-        stiffness * (end[1] - start[1]),
-        joint[2] * (preload + joint[1] * (start[2] - gap)),
-        joint[2] * (preload + joint[1] * (end[2] - gap)),
+def _sticks(of_x: ForceSlopes, of_y: ForceSlopes) -> bool:
+    """Whether a contact keeps its stretch, and what is added to it."""
+    off = of_x.force_y != 0.0 or of_y.force_x != 0.0
+    return of_x.force_x == 1.0 and of_y.force_y == 1.0 and not off
+
+
+@compiled(nogil=True, error_model="numpy")
+def _chain(of_x: ForceSlopes, of_y: ForceSlopes, a: Kept) -> Kept:
+    """A of a march and one increment more."""
+    return Kept(
+        of_x.force_x * a.xx + of_x.force_y * a.yx,
+        of_x.force_x * a.xy + of_x.force_y * a.yy,
+        of_y.force_x * a.xx + of_y.force_y * a.yx,
+        of_y.force_x * a.xy + of_y.force_y * a.yy,
     )
-    x, y = advance_force(path)
-    stretch[0], stretch[1] = x / stiffness, y / stiffness
 
 
 @compiled(nogil=True, error_model="numpy")
-def _lead_in(joint: Array, memory: ContactMemory, before: Array) -> None:
-    """Drive a contact from rest to the first sample."""
-    memory.state[:] = 0.0
-    here = np.zeros(3)
+def _state_of(contact: Contact, x: float, y: float, normal: float) -> int:
+    """0 stick, 1 slip, 2 separated."""
+    if normal <= 0.0:
+        return 2
+    limit = contact.friction * normal * (1.0 - ON_CIRCLE)
+    return 1 if x * x + y * y >= limit * limit else 0
+
+
+@compiled(nogil=True, error_model="numpy")
+def _increment(contact: Contact, stretch: Stretch, path: Array, start: int, end: int) -> ForcePath:
+    """That between two points of a path ``(t, 3)``."""
+    return path_of(
+        contact,
+        stretch.x,
+        stretch.y,
+        path[end, 0] - path[start, 0],
+        path[end, 1] - path[start, 1],
+        path[start, 2],
+        path[end, 2],
+    )
+
+
+@compiled(nogil=True, error_model="numpy")
+def _lead_in(contact: Contact, before: Array) -> Stretch:
+    """Stretch at the first sample, to which a contact is driven from rest."""
+    stretch, points = Stretch(0.0, 0.0), from_rest(before)
     for i in range(len(before)):
-        _pulled(joint, memory.state, here, before[i])
-        here = before[i]
-    memory.state[2] = here[2]
+        x, y = advance_force(_increment(contact, stretch, points, i, i + 1))
+        stretch = Stretch(x / contact.stiffness, y / contact.stiffness)
+    return stretch
 
 
 @compiled(nogil=True, error_model="numpy")
-def _carried_lead_in(
-    joint: Array, memory: ContactMemory, before: Array, lead: Array, derivative: Array
-) -> None:
-    """:func:`_lead_in` with the derivative ``(2, 3, m)`` of the stretch, which is written."""
-    memory.state[:], derivative[:] = 0.0, 0.0
-    here, start, step = np.zeros(3), np.zeros(lead.shape[1]), np.empty(lead.shape[1])
-    for i in range(len(lead)):
-        _move(joint, memory, here, before[i], SLOPES)
-        here = before[i]
-        step[:] = lead[i] - start
-        _carry(memory.slopes, 1.0 / joint[0], start, step, derivative, derivative)
-        start[:] = lead[i]
+def _plain_round(
+    contact: Contact, stretch: Stretch, path: Array, record: ContactRecord, ended: Stretch
+) -> Stretch:
+    """One period: forces and states are written.
 
-
-@compiled(nogil=True, error_model="numpy")
-def _plain_round(joint: Array, memory: ContactMemory, path: Array, record: PeriodRecord) -> None:
-    """One period: forces and states."""
-    samples, force = len(path), memory.force
+    A contact that does bit for bit what is written of the period before, which ``ended`` there,
+    goes on as it did. Before the first period that is nothing: not a number.
+    """
+    samples, force, states = len(path), record.force, record.states
     for step in range(1, samples + 1):
         at = step if step < samples else 0
-        _pulled(joint, memory.state, path[step - 1], path[at])
-        force[0], force[1] = joint[0] * memory.state[0], joint[0] * memory.state[1]
-        force[2] = max(joint[3] + joint[1] * (path[at, 2] - joint[4]), 0.0)
-        _record(joint, memory, at, record)
-    memory.state[2] = path[0, 2]
+        x, y = advance_force(_increment(contact, stretch, path, step - 1, at))
+        if x == force[at, 0] and y == force[at, 1]:
+            return ended
+        stretch = Stretch(x / contact.stiffness, y / contact.stiffness)
+        normal = max(pressing(contact, path[at, 2]), 0.0)
+        force[at, 0], force[at, 1], force[at, 2] = x, y, normal
+        states[at] = _state_of(contact, x, y, normal)
+    return stretch
 
 
 @compiled(nogil=True, error_model="numpy")
-def _chained_round(
-    joint: Array, memory: ContactMemory, path: Array, record: PeriodRecord, total: Array
-) -> None:
-    """:func:`_plain_round`; ``total`` ``(2, 2)`` becomes A."""
-    samples = len(path)
-    total[0, 0] = total[1, 1] = 1.0
-    total[0, 1] = total[1, 0] = 0.0
+def _chained_round(contact: Contact, stretch: Stretch, path: Array) -> Kept:
+    """A of one period."""
+    samples, kept = len(path), Kept(1.0, 0.0, 0.0, 1.0)
     for step in range(1, samples + 1):
         at = step if step < samples else 0
-        _move(joint, memory, path[step - 1], path[at], SLOPES)
-        if not _sticks(memory.slopes, joint[0]):
-            _chain(memory.slopes, joint[0], total)
-        _record(joint, memory, at, record)
+        x, y, of_x, of_y = advance_slopes(_increment(contact, stretch, path, step - 1, at))
+        stretch = Stretch(x / contact.stiffness, y / contact.stiffness)
+        if not _sticks(of_x, of_y):
+            kept = _chain(of_x, of_y, kept)
+    return kept
 
 
 @compiled(nogil=True, error_model="numpy")
-def _record(joint: Array, memory: ContactMemory, at: int, record: PeriodRecord) -> None:
-    """Write what a contact does at a sample."""
-    for direction in range(3):
-        record.force[at, direction] = memory.force[direction]
-    record.states[at] = _state_of(joint, memory.force)
-
-
-@compiled(nogil=True, error_model="numpy")
-def _unchanging(joint: Array, memory: ContactMemory, path: Array) -> int:
+def _unchanging(contact: Contact, stretch: Stretch, path: Array) -> int:
     """State in which a contact is all period long, 0 or 2 as :func:`_state_of`; -1 where it slips
     or changes it.
 
     Between samples that hold it holds: the force goes straight, within a limit that is linear.
     """
-    stiffness, normal_stiffness, preload, gap = joint[0], joint[1], joint[3], joint[4]
-    state = 0 if preload + normal_stiffness * (path[0, 2] - gap) > 0.0 else 2
+    stiffness = contact.stiffness
+    state = 0 if pressing(contact, path[0, 2]) > 0.0 else 2
     for t in range(len(path)):
-        normal = preload + normal_stiffness * (path[t, 2] - gap)
+        normal = pressing(contact, path[t, 2])
         if state == 2:
             if normal > 0.0:
                 return -1
             continue
-        x = stiffness * (memory.state[0] + (path[t, 0] - path[0, 0]))
-        y = stiffness * (memory.state[1] + (path[t, 1] - path[0, 1]))
-        limit = joint[2] * normal * (1.0 - ON_CIRCLE)
-        if normal <= 0.0 or x * x + y * y >= limit * limit:
+        x = stiffness * (stretch.x + (path[t, 0] - path[0, 0]))
+        y = stiffness * (stretch.y + (path[t, 1] - path[0, 1]))
+        if _state_of(contact, x, y, normal) != 0:
             return -1
     return state
 
 
 @compiled(nogil=True, error_model="numpy")
 def _write_unchanging(
-    joint: Array, memory: ContactMemory, path: Array, state: int, record: PeriodRecord
+    contact: Contact, stretch: Stretch, path: Array, state: int, record: ContactRecord
 ) -> None:
     """What a contact does that sticks or is apart all period long."""
     record.states[:] = state
@@ -246,86 +211,128 @@ def _write_unchanging(
         record.force[:] = 0.0
         return
     for t in range(len(path)):
-        for direction in range(2):
-            moved = path[t, direction] - path[0, direction]
-            record.force[t, direction] = joint[0] * (memory.state[direction] + moved)
-        record.force[t, 2] = joint[3] + joint[1] * (path[t, 2] - joint[4])
+        record.force[t, 0] = contact.stiffness * (stretch.x + (path[t, 0] - path[0, 0]))
+        record.force[t, 1] = contact.stiffness * (stretch.y + (path[t, 1] - path[0, 1]))
+        record.force[t, 2] = pressing(contact, path[t, 2])
 
 
 @compiled(nogil=True, error_model="numpy")
 def _settle_contact(
-    joint: Array, memory: ContactMemory, path: Array, settled: Array, record: PeriodRecord
+    contact: Contact, stretch: Stretch, path: Array, settled: Array, record: ContactRecord
 ) -> float:
     """March until the stretch repeats: change of force.
 
     ``settled`` becomes the stretch ``(2,)`` at the start of the last period, and the number of it.
     """
     span = max(np.max(np.abs(path[:, 0])), np.max(np.abs(path[:, 1])))
-    total, change = np.empty((2, 2)), 0.0
+    change, end = 0.0, stretch
+    record.force[:] = np.nan
     for number in range(MAX_PERIODS):
-        settled[0], settled[1], settled[2] = memory.state[0], memory.state[1], number + 1.0
-        plain = number < PLAIN_PERIODS
-        if plain:
-            _plain_round(joint, memory, path, record)
-        else:
-            _chained_round(joint, memory, path, record, total)
-        x, y = memory.state[0] - settled[0], memory.state[1] - settled[1]
+        settled[0], settled[1], settled[2] = stretch.x, stretch.y, number + 1.0
+        end = _plain_round(contact, stretch, path, record, end)
+        x, y = end.x - stretch.x, end.y - stretch.y
         change = max(abs(x), abs(y))
         if change <= REPEATED * span:
             break
-        if plain:
+        if number < PLAIN_PERIODS:
+            stretch = end
             continue
-        g, h, k, m = _to_the_limit(total)
-        memory.state[0], memory.state[1] = settled[0] + g * x + h * y, settled[1] + k * x + m * y
-    missing: float = joint[0] * change
+        share = _to_the_limit(_chained_round(contact, stretch, path))
+        stretch = Stretch(
+            stretch.x + share.xx * x + share.xy * y, stretch.y + share.yx * x + share.yy * y
+        )
+    missing: float = contact.stiffness * change
     return missing
 
 
 class Derivatives(NamedTuple):
-    """Room for derivatives of the stretch of a contact.
+    """Derivatives of the stretch of a contact on its way through ``n`` points.
 
-    ``first`` ``(2, 3, m)`` at the beginning of a period; at all samples what it makes of these,
-    ``gradient`` ``(t, 2, 3, m)``, and of a stretch there, ``kept`` ``(t, 2, 2)``.
+    ``functions`` ``(n, m)`` of time there, and their ``steps`` ``(n - 1, m)``; written are the
+    ``gradient`` ``(n, 2, 3, m)``, from that at the first point on, and what the way to each point
+    makes of a stretch at the first, ``kept`` ``(n, 4)`` as :class:`Kept`.
     """
 
-    first: Array
+    functions: Array
+    steps: Array
     gradient: Array
     kept: Array
 
 
 @compiled(nogil=True, error_model="numpy")
-def _carried_round(
-    joint: Array, memory: ContactMemory, path: Array, period: Period, derivatives: Derivatives
-) -> bool:
-    """One period with the derivatives carried along: whether it sticks throughout."""
-    basis, steps = period.basis, period.steps
-    samples = len(basis)
-    before, total, sticks = derivatives.first, np.eye(2), True
-    for step in range(1, samples + 1):
-        at = step if step < samples else 0
-        _move(joint, memory, path[step - 1], path[at], SLOPES)
-        after = derivatives.gradient[at]
-        _carry(memory.slopes, 1.0 / joint[0], basis[step - 1], steps[at], before, after)
-        if not _sticks(memory.slopes, joint[0]):
+def _along(functions: Array) -> Derivatives:
+    """Room for derivatives through points with these functions of time."""
+    points, size = functions.shape
+    steps = functions[1:] - functions[:-1]
+    return Derivatives(functions, steps, np.zeros((points, 2, 3, size)), np.empty((points, 4)))
+
+
+@compiled(nogil=True, error_model="numpy")
+def _round_trip(points: Array) -> Array:
+    """Samples ``(t, ...)`` and the first of them again."""
+    closed = np.empty((len(points) + 1, points.shape[1]))
+    closed[:-1], closed[-1] = points, points[0]
+    return closed
+
+
+@compiled(nogil=True, error_model="numpy")
+def _carry(
+    of_x: ForceSlopes, of_y: ForceSlopes, limit_slope: float, derivatives: Derivatives, to: int
+) -> None:
+    """Carry the gradient along one increment, to a point from the one before.
+
+    ``limit_slope`` is µ kn/kt. An approach before the increment moves both limits.
+    """
+    functions, steps, gradient, _ = derivatives
+    x_by_start, y_by_start = of_x.start + of_x.end, of_y.start + of_y.end
+    for c in range(functions.shape[1]):
+        start, step = limit_slope * functions[to - 1, c], steps[to - 1, c]
+        pressed = limit_slope * step
+        x, y = gradient[to - 1, 0, 0, c], gradient[to - 1, 1, 0, c]
+        gradient[to, 0, 0, c] = of_x.force_x * x + of_x.force_y * y + of_x.pull_x * step
+        gradient[to, 1, 0, c] = of_y.force_x * x + of_y.force_y * y + of_y.pull_x * step
+        x, y = gradient[to - 1, 0, 1, c], gradient[to - 1, 1, 1, c]
+        gradient[to, 0, 1, c] = of_x.force_x * x + of_x.force_y * y + of_x.pull_y * step
+        gradient[to, 1, 1, c] = of_y.force_x * x + of_y.force_y * y + of_y.pull_y * step
+        x, y = gradient[to - 1, 0, 2, c], gradient[to - 1, 1, 2, c]
+        pressed_x, pressed_y = x_by_start * start, y_by_start * start
+        pressed_x, pressed_y = pressed_x + of_x.end * pressed, pressed_y + of_y.end * pressed
+        gradient[to, 0, 2, c] = of_x.force_x * x + of_x.force_y * y + pressed_x
+        gradient[to, 1, 2, c] = of_y.force_x * x + of_y.force_y * y + pressed_y
+
+
+@compiled(nogil=True, error_model="numpy")
+def _carried(
+    contact: Contact, stretch: Stretch, points: Array, derivatives: Derivatives
+) -> tuple[Stretch, bool]:
+    """Drive a contact through points with the derivatives carried along; whether it sticks."""
+    sticks, kept = True, Kept(1.0, 0.0, 0.0, 1.0)
+    limit_slope = contact.friction * contact.normal_stiffness / contact.stiffness
+    for to in range(1, len(points)):
+        x, y, of_x, of_y = advance_slopes(_increment(contact, stretch, points, to - 1, to))
+        stretch = Stretch(x / contact.stiffness, y / contact.stiffness)
+        _carry(of_x, of_y, limit_slope, derivatives, to)
+        if not _sticks(of_x, of_y):
             sticks = False
-            _chain(memory.slopes, joint[0], total)
-        derivatives.kept[at] = total
-        before = after
-    return sticks
+            kept = _chain(of_x, of_y, kept)
+        for entry, value in enumerate(kept):
+            derivatives.kept[to, entry] = value
+    return stretch, sticks
 
 
 @compiled(nogil=True, error_model="numpy")
 def _repeat(derivatives: Derivatives) -> bool:
     """Make the gradient of 0 that of a period that repeats; whether it forgets enough for that."""
-    first, gradient, kept = derivatives
-    a = kept[0]
-    if (1.0 - a[0, 0]) * (1.0 - a[1, 1]) - a[0, 1] * a[1, 0] < FORGETTING:
+    gradient, kept = derivatives.gradient, derivatives.kept
+    xx, xy, yx, yy = kept[-1, 0], kept[-1, 1], kept[-1, 2], kept[-1, 3]
+    a = Kept(xx, xy, yx, yy)
+    if _left_to_change(a) < FORGETTING:
         return False
-    g, h, k, m = _to_the_limit(a)
-    first[0] = g * gradient[0, 0] + h * gradient[0, 1]
-    first[1] = k * gradient[0, 0] + m * gradient[0, 1]
-    for t in range(len(gradient)):
-        xx, xy, yx, yy = kept[t, 0, 0], kept[t, 0, 1], kept[t, 1, 0], kept[t, 1, 1]
+    share, first, last = _to_the_limit(a), gradient[0], gradient[-1].copy()
+    first[0] = share.xx * last[0] + share.xy * last[1]
+    first[1] = share.yx * last[0] + share.yy * last[1]
+    for t in range(1, len(gradient)):
+        xx, xy, yx, yy = kept[t, 0], kept[t, 1], kept[t, 2], kept[t, 3]
         if max(abs(xx), abs(xy), abs(yx), abs(yy)) < FORGOTTEN:
             continue
         for direction in range(3):
@@ -338,10 +345,9 @@ def _repeat(derivatives: Derivatives) -> bool:
 
 @compiled(nogil=True, error_model="numpy")
 def _differentiate(
-    joint: Array,
-    memory: ContactMemory,
+    contact: Contact,
     driven: tuple[Array, Array, Array],
-    period: Period,
+    way_in: Derivatives,
     derivatives: Derivatives,
 ) -> bool:
     """Gradient of the stretch in the period that repeats: whether it sticks throughout.
@@ -350,15 +356,17 @@ def _differentiate(
     how it began carries the derivative from there.
     """
     path, before, settled = driven
-    memory.state[0], memory.state[1], memory.state[2] = settled[0], settled[1], path[0, 2]
-    derivatives.first[:] = 0.0
-    sticks = _carried_round(joint, memory, path, period, derivatives)
+    points, gradient = _round_trip(path), derivatives.gradient
+    gradient[0] = 0.0
+    _, sticks = _carried(contact, Stretch(settled[0], settled[1]), points, derivatives)
     if _repeat(derivatives):
         return sticks
-    _carried_lead_in(joint, memory, before, period.lead, derivatives.first)
+    stretch, _ = _carried(contact, Stretch(0.0, 0.0), from_rest(before), way_in)
+    gradient[-1] = way_in.gradient[-1]
     for _ in range(int(settled[2])):
-        sticks = _carried_round(joint, memory, path, period, derivatives)
-        derivatives.first[:] = derivatives.gradient[0]
+        gradient[0] = gradient[-1]
+        stretch, sticks = _carried(contact, stretch, points, derivatives)
+    gradient[0] = gradient[-1]
     return sticks
 
 
@@ -387,8 +395,9 @@ def _project_stuck(
 @compiled(nogil=True, error_model="numpy")
 def _project(stiffness: float, weights: Array, gradient: Array, jacobian: Array) -> None:
     """Tangential part of the derivative."""
-    size = weights.shape[0]
-    flat = gradient.reshape(len(gradient), 6 * size)
+    size, samples = weights.shape
+    gradient[0] = gradient[-1]
+    flat = gradient[:-1].reshape(samples, 6 * size)
     slopes = np.dot(weights, flat).reshape(size, 2, 3, size)
     jacobian[:, :2] = stiffness * slopes.transpose(0, 1, 3, 2)
 
@@ -414,61 +423,58 @@ def settle_contacts(period: Period, joints: DrivenJoints) -> None:
     Neither derivatives nor energies are written. ``settled`` is what is needed for these: stretch
     at the first sample, number of periods, and what the contact does in them.
     """
-    memory, gradient = _new_memory(), np.empty((0, 2, 3, 0))
     for j in range(len(joints.parameters)):
-        joint, path, settled = joints.parameters[j], joints.path[j], joints.settled[j]
-        record = PeriodRecord(joints.force[j], joints.states[j], gradient)
-        _lead_in(joint, memory, joints.before[j])
+        contact, path, settled = contact_of(joints.parameters[j]), joints.path[j], joints.settled[j]
+        record = ContactRecord(joints.force[j], joints.states[j])
+        stretch = _lead_in(contact, joints.before[j])
         # Most contacts of a pad: in closed form.
-        state = _unchanging(joint, memory, path)
+        state = _unchanging(contact, stretch, path)
         missing = 0.0
         if state >= 0:
             settled[3] = state
-            _write_unchanging(joint, memory, path, state, record)
+            _write_unchanging(contact, stretch, path, state, record)
         else:
             settled[3] = MARCHED
-            missing = _settle_contact(joint, memory, path, settled, record)
+            missing = _settle_contact(contact, stretch, path, settled, record)
         joints.change[j] = relative_change(missing, record.force)
 
 
 @compiled(nogil=True, error_model="numpy")
 def differentiate_contacts(period: Period, joints: DrivenJoints) -> None:
     """Write the derivatives of contacts that have settled."""
-    samples, size = period.basis.shape
-    shares, memory = np.dot(period.weights, period.basis), _new_memory()
-    derivatives = Derivatives(
-        np.empty((2, 3, size)), np.empty((samples, 2, 3, size)), np.empty((samples, 2, 2))
-    )
+    shares = np.dot(period.weights, period.basis)
+    way_in, derivatives = _along(from_rest(period.lead)), _along(_round_trip(period.basis))
     for j in range(len(joints.parameters)):
-        joint, jacobian, settled = joints.parameters[j], joints.jacobian[j], joints.settled[j]
+        contact, settled = contact_of(joints.parameters[j]), joints.settled[j]
+        jacobian = joints.jacobian[j]
         if settled[3] == APART:
             jacobian[:] = 0.0
             continue
         before, first, sticks = joints.before[j], derivatives.gradient[0], True
         if settled[3] == STUCK:
-            _carried_lead_in(joint, memory, before, period.lead, derivatives.first)
-            first = derivatives.first
+            _carried(contact, Stretch(0.0, 0.0), from_rest(before), way_in)
+            first[:] = way_in.gradient[-1]
         else:
             driven = joints.path[j], before, settled
-            sticks = _differentiate(joint, memory, driven, period, derivatives)
+            sticks = _differentiate(contact, driven, way_in, derivatives)
         if sticks:
-            _project_stuck(joint[0], period, shares, first, jacobian)
+            _project_stuck(contact.stiffness, period, shares, first, jacobian)
         else:
-            _project(joint[0], period.weights, derivatives.gradient, jacobian)
-        _project_normal(joint[1], period, shares, joints.states[j], jacobian)
+            _project(contact.stiffness, period.weights, derivatives.gradient, jacobian)
+        _project_normal(contact.normal_stiffness, period, shares, joints.states[j], jacobian)
 
 
 @compiled(nogil=True, error_model="numpy")
 def energies_of_contacts(period: Period, joints: DrivenJoints) -> None:
     """Write the energies that contacts dissipate which have settled."""
-    memory = _new_memory()
     for j in range(len(joints.parameters)):
-        joint, path, settled = joints.parameters[j], joints.path[j], joints.settled[j]
-        lost = 0.0
+        contact, path, settled = contact_of(joints.parameters[j]), joints.path[j], joints.settled[j]
+        lost, stretch = 0.0, Stretch(settled[0], settled[1])
         if settled[3] == MARCHED:
-            memory.state[0], memory.state[1] = settled[0], settled[1]
-            memory.state[2] = path[0, 2]
             for step in range(len(path)):
                 at = (step + 1) % len(path)
-                lost += _move(joint, memory, path[step], path[at], ENERGY)
+                increment = _increment(contact, stretch, path, step, at)
+                x, y = advance_force(increment)
+                lost += energy_lost(increment) / contact.stiffness
+                stretch = Stretch(x / contact.stiffness, y / contact.stiffness)
         joints.dissipated[j] = lost

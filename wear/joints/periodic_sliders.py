@@ -1,9 +1,10 @@
 """Compiled marches of joints along one direction over a period; see :mod:`wear.joints.periodic`.
 
 Jenkins's and Bouc-Wen's joints remember one number, here the stretch z of a spring that gives the
-force K z + kr u, and carry its derivative with it. A joint of spread sliders remembers turning
-points, which are samples: the derivatives of displacement and force there are kept in a stack
-beside the one of the law itself.
+force K z + kr u. Its derivative comes after that, along the period that repeats and only if it is
+asked for, as that of contacts does. A joint of spread sliders remembers turning points, which are
+samples: the derivatives of displacement and force there are kept in a stack beside the one of the
+law itself.
 """
 
 from __future__ import annotations
@@ -26,10 +27,9 @@ JENKINS, BOUC_WEN = 0.0, 1.0
 # Periods after which a joint that still changes is given up. Newton's steps on the memory double
 # its digits in each: more mean that it has no attractor.
 MAX_PERIODS = 40
-# Memory repeats when it changes in a period by less than this share of the largest it can be, and
-# its derivative, which is of the order of 1, when it changes by less than this: ten to a thousand
-# times what rounding leaves of some thousand samples.
-REPEATED, DERIVATIVE_REPEATED = 1e-13, 1e-10
+# Memory repeats when it changes in a period by less than this share of the largest it can be: ten
+# to a thousand times what rounding leaves of some thousand samples.
+REPEATED = 1e-13
 # Periods before the first Newton step: a joint that slips on its way in, and never again, stays
 # where that has brought it.
 PLAIN_PERIODS = 2
@@ -44,24 +44,11 @@ CURVE_PERIODS = 2
 
 
 class Period(NamedTuple):
-    """Functions of time: ``basis`` ``(t, m)``, ``weights`` ``(m, t)`` and ``lead`` ``(p, m)``.
-
-    ``steps`` ``(t, m)`` are the :func:`differences` of the basis.
-    """
+    """Functions of time: ``basis`` ``(t, m)``, ``weights`` ``(m, t)`` and ``lead`` ``(p, m)``."""
 
     basis: Array
     weights: Array
     lead: Array
-    steps: Array
-
-
-class PeriodRecord(NamedTuple):
-    """What is written of a joint in a period: ``gradient`` ``(t, ..., m)`` of the stretch, and the
-    rest."""
-
-    force: Array
-    states: np.ndarray
-    gradient: Array
 
 
 class DrivenJoints(NamedTuple):
@@ -70,7 +57,7 @@ class DrivenJoints(NamedTuple):
     ``parameters`` ``(j, k)`` of the law, displacements ``path`` ``(j, t, d)`` in the period and
     ``before`` ``(j, p, d)`` on the way to it [mm], the last of which is the first of ``path``.
     The others are written: see :class:`wear.joints.periodic.SettledCycle`; ``settled`` ``(j, 4)``
-    is what contacts in three dimensions need to go on.
+    is what derivatives and energies need to go on.
     """
 
     parameters: Array
@@ -84,15 +71,31 @@ class DrivenJoints(NamedTuple):
     settled: Array
 
 
+class Slider(NamedTuple):
+    """A row of parameters without its residual stiffness."""
+
+    kind: float
+    spring: float
+    limit: float
+    exponent: float
+    gain: float
+
+
 @compiled(nogil=True, error_model="numpy")
-def _move(joint: Array, stretch: float, increment: float) -> tuple[float, float, float, float]:
+def _slider_of(joint: Array) -> Slider:
+    exponent, gain = (0.0, 0.0) if joint[0] == JENKINS else (joint[4], joint[5])
+    return Slider(joint[0], joint[1], joint[3], exponent, gain)
+
+
+@compiled(nogil=True, error_model="numpy")
+def _move(joint: Slider, stretch: float, increment: float) -> tuple[float, float, float, float]:
     """One increment: stretch at its end, derivatives by stretch and increment, energy lost."""
-    spring, limit = joint[1], joint[3]
-    if joint[0] == JENKINS:
+    spring, limit = joint.spring, joint.limit
+    if joint.kind == JENKINS:
         _, slope, _, end, lost = advance_jenkins(spring, 0.0, limit, 0.0, stretch, increment)
         held = 1.0 if slope > 0.0 else 0.0
         return end, held, held, lost
-    exponent, gain, pull = joint[4], joint[5], spring * abs(increment)
+    exponent, gain, pull = joint.exponent, joint.gain, spring * abs(increment)
     if limit <= NO_FRICTION * pull:
         return 0.0, 0.0, 0.0, 0.0
     xi = spring * stretch / limit
@@ -108,66 +111,53 @@ def _move(joint: Array, stretch: float, increment: float) -> tuple[float, float,
 
 
 @compiled(nogil=True, error_model="numpy")
-def _lead_in(joint: Array, before: Array, lead: Array, derivative: Array) -> float:
-    """Stretch at the first sample, to which it is driven from rest; ``derivative`` is written."""
+def _lead_in(joint: Slider, before: Array) -> float:
+    """Stretch at the first sample, to which it is driven from rest."""
     stretch, here = 0.0, 0.0
-    derivative[:] = 0.0
-    for i in range(len(lead)):
-        there = before[i]
-        stretch, kept, follows, _ = _move(joint, stretch, there - here)
-        for c in range(derivative.size):
-            change = lead[i, c] - (lead[i - 1, c] if i > 0 else 0.0)
-            derivative[c] = kept * derivative[c] + follows * change
+    for there in before:
+        stretch, _, _, _ = _move(joint, stretch, there - here)
         here = there
     return stretch
 
 
 @compiled(nogil=True, error_model="numpy")
 def _round(
-    joint: Array, stretch: float, path: Array, steps: Array, derivative: Array, record: PeriodRecord
+    joint: Slider, stretch: float, path: Array, force: Array, states: np.ndarray
 ) -> tuple[float, float, float]:
     """One period: stretch at its end, its derivative by that at the start, energy lost.
 
-    ``steps`` ``(t, m)`` are the differences of the basis from the sample before; forces that are
-    written are K z.
+    Forces that are written are K z.
     """
-    force, states, gradient = record
-    samples, size = steps.shape
-    total, lost = 1.0, 0.0
+    samples, total, lost = len(path), 1.0, 0.0
     for step in range(1, samples + 1):
         at = step if step < samples else 0
         stretch, kept, follows, loss = _move(joint, stretch, path[at] - path[step - 1])
         total *= kept
         lost += loss
-        for c in range(size):
-            derivative[c] = kept * derivative[c] + follows * steps[at, c]
-            gradient[at, c] = derivative[c]
-        force[at] = joint[1] * stretch
+        force[at] = joint.spring * stretch
         states[at] = 1 if follows < LEFT_IN_SLIP else 0
     return stretch, total, lost
 
 
 @compiled(nogil=True, error_model="numpy")
 def _settle_slider(
-    joint: Array, stretch: float, path: Array, steps: Array, derivative: Array, record: PeriodRecord
-) -> tuple[float, float]:
-    """March until stretch and derivative repeat: energy lost, last change of the stretch."""
-    before = np.empty_like(derivative)
-    repeated = REPEATED * min(joint[3] / joint[1], np.max(np.abs(path)))
-    lost, change = 0.0, 0.0
-    for period in range(MAX_PERIODS):
-        before[:] = derivative
-        end, total, lost = _round(joint, stretch, path, steps, derivative, record)
-        change = end - stretch
-        turned = np.max(np.abs(derivative - before))
-        if abs(change) <= repeated and turned <= DERIVATIVE_REPEATED:
+    joint: Slider, stretch: float, path: Array, force: Array, states: np.ndarray
+) -> tuple[float, int, float, float]:
+    """March until the stretch repeats: that at the start of the last period, the number of it,
+    energy lost, and last change of the stretch."""
+    repeated = REPEATED * min(joint.limit / joint.spring, np.max(np.abs(path)))
+    start, period, lost, change = stretch, 0, 0.0, 0.0
+    while period < MAX_PERIODS:
+        start, period = stretch, period + 1
+        end, total, lost = _round(joint, stretch, path, force, states)
+        change = end - start
+        if abs(change) <= repeated:
             break
         part = 1.0
-        if period >= PLAIN_PERIODS and 1.0 - total > FORGETTING:
+        if period > PLAIN_PERIODS and 1.0 - total > FORGETTING:
             part = 1.0 / (1.0 - total)
         stretch += part * change
-        derivative[:] = before + part * (derivative - before)
-    return lost, change
+    return start, period, lost, change
 
 
 @compiled(nogil=True, error_model="numpy")
@@ -178,32 +168,95 @@ def relative_change(change: float, force: Array) -> float:
 
 
 @compiled(nogil=True, error_model="numpy")
-def differences(basis: Array) -> Array:
-    """Differences ``(t, m)`` of a basis from the sample before, round the period."""
-    steps = np.empty_like(basis)
-    steps[0], steps[1:] = basis[0] - basis[-1], basis[1:] - basis[:-1]
-    return steps
+def settle_sliders(period: Period, joints: DrivenJoints) -> None:
+    """Settle Jenkins's and Bouc-Wen's joints; parameters begin with their kind.
+
+    Derivatives are not written. ``settled`` is what is needed for these: stretch at the first
+    sample and number of periods.
+    """
+    for j in range(len(joints.parameters)):
+        slider, path, force = _slider_of(joints.parameters[j]), joints.path[j], joints.force[j]
+        stretch, periods, lost, missing = _settle_slider(
+            slider, _lead_in(slider, joints.before[j]), path, force, joints.states[j]
+        )
+        joints.settled[j, 0], joints.settled[j, 1], joints.dissipated[j] = stretch, periods, lost
+        joints.change[j] = relative_change(slider.spring * missing, force)
+        residual = joints.parameters[j, 2]
+        for t in range(len(path)):
+            force[t] += residual * path[t]
 
 
 @compiled(nogil=True, error_model="numpy")
-def settle_sliders(period: Period, joints: DrivenJoints) -> None:
-    """Settle Jenkins's and Bouc-Wen's joints; parameters begin with their kind."""
+def _carried(
+    joint: Slider, stretch: float, path: Array, functions: Array, gradient: Array, kept: Array
+) -> float:
+    """Drive a slider through ``n`` points: its stretch at the last.
+
+    The ``gradient`` ``(n, m)`` of the stretch is written from that at the first point on, and
+    ``kept`` ``(n,)``, its derivative by the stretch there. ``functions`` of time are given for all
+    points, as the path is, or for all but the last, which then is the first again.
+    """
+    kept[0] = 1.0
+    for to in range(1, len(gradient)):
+        at = to if to < len(path) else 0
+        stretch, left, follows, _ = _move(joint, stretch, path[at] - path[to - 1])
+        kept[to] = left * kept[to - 1]
+        for c in range(functions.shape[1]):
+            step = functions[at, c] - functions[to - 1, c]
+            gradient[to, c] = left * gradient[to - 1, c] + follows * step
+    return stretch
+
+
+@compiled(nogil=True, error_model="numpy")
+def from_rest(rows: Array) -> Array:
+    """Rows with one of zeros before them."""
+    points = np.zeros((len(rows) + 1, *rows.shape[1:]))
+    points[1:] = rows
+    return points
+
+
+@compiled(nogil=True, error_model="numpy")
+def _repeat(gradient: Array, kept: Array) -> bool:
+    """Make the gradient of 0 that of a period that repeats; whether it forgets enough for that."""
+    if 1.0 - kept[-1] <= FORGETTING:
+        return False
+    first = gradient[-1] / (1.0 - kept[-1])
+    for t in range(len(kept)):
+        if kept[t] == 0.0:
+            break
+        for c in range(len(first)):
+            gradient[t, c] += kept[t] * first[c]
+    return True
+
+
+@compiled(nogil=True, error_model="numpy")
+def differentiate_sliders(period: Period, joints: DrivenJoints) -> None:
+    """Write the derivatives of joints that have settled.
+
+    A joint that forgets too little of how it began carries the derivative from there.
+    """
     samples, size = period.basis.shape
-    gradient, derivative = np.empty((samples, size)), np.empty(size)
+    way_in = from_rest(period.lead)
+    gradient, kept = np.empty((samples + 1, size)), np.empty(samples + 1)
+    entering, forgotten = np.zeros((len(way_in), size)), np.empty(len(way_in))
     # Needed for residual stiffness only: for one joint as much work as all the rest.
     beside = np.any(joints.parameters[:, 2] != 0.0)
     shares = np.dot(period.weights, period.basis) if beside else np.zeros((size, size))
     for j in range(len(joints.parameters)):
-        joint, path, force = joints.parameters[j], joints.path[j], joints.force[j]
-        record = PeriodRecord(force, joints.states[j], gradient)
-        stretch = _lead_in(joint, joints.before[j], period.lead, derivative)
-        joints.dissipated[j], missing = _settle_slider(
-            joint, stretch, path, period.steps, derivative, record
-        )
-        joints.change[j] = relative_change(joint[1] * missing, force)
-        force += joint[2] * path
-        slopes = np.dot(period.weights, gradient)
-        joints.jacobian[j] = joint[1] * slopes + joint[2] * shares
+        joint, slider, path = joints.parameters[j], _slider_of(joints.parameters[j]), joints.path[j]
+        gradient[0] = 0.0
+        _carried(slider, joints.settled[j, 0], path, period.basis, gradient, kept)
+        if not _repeat(gradient, kept):
+            before = from_rest(joints.before[j])
+            stretch = _carried(slider, 0.0, before, way_in, entering, forgotten)
+            gradient[-1] = entering[-1]
+            for _ in range(int(joints.settled[j, 1])):
+                gradient[0] = gradient[-1]
+                stretch = _carried(slider, stretch, path, period.basis, gradient, kept)
+        gradient[0] = gradient[-1]
+        joints.jacobian[j] = slider.spring * np.dot(period.weights, gradient[:-1])
+        if beside:
+            joints.jacobian[j] += joint[2] * shares
 
 
 class OpenLoops(NamedTuple):

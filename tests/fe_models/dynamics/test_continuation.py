@@ -9,7 +9,8 @@ import pytest
 
 from fe_models.dynamics.bordered import Bordered, Preconditioned, solve_alone, solve_bordered
 from fe_models.dynamics.continuation import ContinuationControl, Refinement, first_point, follow
-from fe_models.dynamics.newton import NewtonControl, relative_norm, solve
+from fe_models.dynamics.newton import NewtonControl, solve
+from fe_models.dynamics.sizes import relative_norm
 
 EXACT = 1e-9
 
