@@ -13,8 +13,7 @@ from click.testing import CliRunner, Result
 from workflow.analyses.wear import contact_workers
 from workflow.cli import cli
 from workflow.errors import Ending, one_line
-from workflow.pictures import drawing
-from workflow.runs import jobs
+from workflow.runs import jobs, run
 from workflow.runs.job import Job
 from workflow.runs.run import bring_to_end
 from workflow.shell import processes
@@ -68,10 +67,19 @@ def _workers(
     yield InThisProcess([make(sent(setting)) for setting in settings])
 
 
-def _one_by_one(
-    jobs: Sequence[tuple[Callable[..., Any], tuple[Any, ...]]], done: Callable[[], None]
-) -> list[Any]:
-    return [processes._last(do(*arguments), done) for do, arguments in jobs]
+class _BesideHere:
+    """Stands for the process beside a run: a job is done here, when its answer is asked for."""
+
+    def begin(
+        self,
+        function: Callable[..., Any],
+        arguments: tuple[Any, ...] = (),
+        done: Callable[[], None] = lambda: None,
+    ) -> Callable[[], Any]:
+        return lambda: processes._last(function(*arguments), done)
+
+    def close(self) -> None:
+        pass
 
 
 @contextmanager
@@ -79,7 +87,7 @@ def runs_here() -> Iterator[None]:
     """Contacts and pictures of a run are made in this process."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(contact_workers, "workers", _workers)
-        patch.setattr(drawing, "side_by_side", _one_by_one)
+        patch.setattr(run, "Beside", _BesideHere)
         yield
 
 

@@ -4,6 +4,9 @@ import os
 import re
 import shutil
 import sys
+import time
+from concurrent.futures import CancelledError
+from contextlib import closing
 from dataclasses import replace
 
 import h5py
@@ -18,6 +21,7 @@ from tests.workflow.interruptions import (
     posix_only,
 )
 from workflow.analyses.wear import contact_workers
+from workflow.errors import MethodFailed
 from workflow.shell import processes as workers
 from workflow.shell.store import read_arrays, write_arrays
 
@@ -295,8 +299,6 @@ def die(messages, answers, code):
 
 @pytest.mark.slow
 def test_worker_that_dies_is_one_line():
-    from workflow.errors import MethodFailed
-
     with workers._processes(die, [(9,)]) as processes, pytest.raises(MethodFailed, match="gone"):
         workers._answers(processes)
 
@@ -317,8 +319,6 @@ def test_what_processes_have_done_is_told_as_it_comes():
 @posix_only
 def test_worker_killed_before_its_first_word_is_one_line(monkeypatch):
     """It ends while it is told what to do: a large setting does not go into the pipe at once."""
-    from workflow.errors import MethodFailed
-
     monkeypatch.setattr(sys, "executable", "/bin/true")
     with pytest.raises(MethodFailed, match="a process of the run has gone"):
         workers.side_by_side([(len, (b"",)), (len, (bytes(1_000_000),))])
@@ -337,7 +337,29 @@ def test_worker_that_cannot_be_set_up_says_why(separate_processes):
 @posix_only
 def test_workers_are_born_deaf_to_ctrl_c():
     """From their first instruction: the terminal sends it to the session of the parent."""
-    ask = os.getsid, (0,)
-    with workers._processes(workers._do, [ask, ask]) as processes:
-        sessions = workers._answers(processes)
+    with closing(workers.Beside()) as one, closing(workers.Beside()) as other:
+        sessions = [process.begin(os.getsid, (0,))() for process in (one, other)]
     assert len({os.getsid(0), *sessions}) == 3
+
+
+def test_a_process_beside_does_one_job_after_the_other():
+    with closing(workers.Beside()) as beside:
+        failing, told = beside.begin(divmod, (1, 0)), []
+        counted, process = (
+            beside.begin(counting, (3,), lambda: told.append(1)),
+            beside.begin(os.getpid),
+        )
+        assert process() == beside.begin(os.getpid)() != os.getpid()
+        assert (counted(), len(told)) == (3, 3)
+        with pytest.raises(ZeroDivisionError):
+            failing()
+
+
+@posix_only
+def test_a_process_beside_ends_busy_or_not():
+    begun = time.perf_counter()
+    with closing(workers.Beside()) as beside:
+        answer = beside.begin(time.sleep, (600.0,))
+    with pytest.raises((MethodFailed, CancelledError)):
+        answer()
+    assert time.perf_counter() - begun < 60.0

@@ -27,7 +27,7 @@ from sa_solver.types import Progress, Tally, unseen
 from workflow.case.sections import Output
 from workflow.shell.analysis import Pictures
 from workflow.shell.folder import OutputFolder
-from workflow.shell.processes import side_by_side
+from workflow.shell.processes import Beside, side_by_side
 
 
 def write_pictures(
@@ -35,13 +35,13 @@ def write_pictures(
     folder: OutputFolder,
     pictures: Callable[[], Pictures],
     contents: Any,
-    processes: int,
+    team: Sequence[Beside] = (),
     progress: Progress = unseen,
 ) -> dict[str, str]:
     """Write the pictures of the results in a folder that a case asks for in its ``output``.
 
-    ``contents`` is what the results hold, as ``pictures`` are told it. So many ``processes`` share
-    them, this one among them, and tell ``progress`` what is done. Returns the figures as
+    ``contents`` is what the results hold, as ``pictures`` are told it. The processes of a ``team``
+    and this one share them, and tell ``progress`` what is done. Returns the figures as
     SVG texts by their names, in the order in which they are to be looked at, if they are to go into
     a report.
     """
@@ -53,7 +53,7 @@ def write_pictures(
         if formats:
             figures = stack.enter_context(folder.filling("figures", "figures of the results"))
         drawn = pictures, contents, folder.results, figures, formats, output.report
-        parts = processes if formats else 1
+        parts = 1 + len(team) if formats else 1
         # The last one has files for ParaView to write besides.
         beside = [None] * (parts - 1) + [paraview]
         order = tuple(pictures().figures_of(contents))
@@ -61,9 +61,17 @@ def write_pictures(
         shares = side_by_side(
             [(_write_share, (*drawn, also, part, parts)) for part, also in enumerate(beside)],
             Tally(progress, wanted + (paraview is not None)),
+            team,
         )
     vectors = {name: text for share in shares for name, text in share.items()}
     return {name: vectors[name] for name in order if name in vectors}
+
+
+def load_what_draws(pictures: Callable[[], Pictures]) -> None:
+    """Do beforehand what a process begins to draw with: a second and more of imports."""
+    from workflow.pictures import style  # noqa: F401
+
+    pictures()
 
 
 def _write_share(

@@ -13,7 +13,8 @@ import signal
 import subprocess
 import threading
 from collections.abc import Callable, Generator, Iterator, Sequence
-from contextlib import contextmanager
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import ExitStack, closing, contextmanager
 from queue import SimpleQueue
 from typing import IO, Any
 
@@ -96,46 +97,67 @@ def workers(make: Callable[[Any], Answering], settings: Sequence[Any]) -> Iterat
         yield Workers(processes)
 
 
+class Beside:
+    """A process of one thread that does jobs one after the other, while this one works.
+
+    It begins with the first job, and ends, busy or not, with :meth:`close`.
+    """
+
+    def __init__(self) -> None:
+        self._process: Process | None = None
+        self._asking = ThreadPoolExecutor(1)
+
+    def begin(
+        self,
+        function: Callable[..., Any],
+        arguments: tuple[Any, ...] = (),
+        done: Callable[[], None] = lambda: None,
+    ) -> Callable[[], Any]:
+        """Begin with a function; what is returned waits for its answer, and raises what it raised.
+
+        ``done`` is called, in another thread, whenever it yields, if it is a generator.
+        """
+        if self._process is None:
+            self._process = Process(one_thread=True)
+            self._process.tell(_do_each, ())
+        return self._asking.submit(_heard, self._process, (function, arguments), done).result
+
+    def close(self) -> None:
+        """End it."""
+        if self._process is not None:
+            self._process.end()
+        self._asking.shutdown(cancel_futures=True)
+
+
 def side_by_side(
     jobs: Sequence[tuple[Callable[..., Any], tuple[Any, ...]]],
     done: Callable[[], None] = lambda: None,
+    team: Sequence[Beside] = (),
 ) -> list[Any]:
     """Run functions, given with their arguments: the first one here, others in processes.
 
-    ``done`` is called whenever one of them yields, of those that are generators. Returns what each
-    of them returned. Raises what one of them raised.
+    Those of a ``team`` first. ``done`` is called whenever one of them yields, of those that are
+    generators. Returns what each of them returned. Raises what one of them raised.
     """
     (here, arguments), *others = jobs
-    with _processes(_do, others) as processes:
-        heard = [_Hearing(process, done) for process in processes]
+    with ExitStack() as stack:
+        new = [stack.enter_context(closing(Beside())) for _ in others[len(team) :]]
+        begun = [
+            process.begin(*other, done)
+            for process, other in zip([*team, *new], others, strict=False)
+        ]
         answer = _last(here(*arguments), done)
-        answers = [hearing.answer() for hearing in heard]
-    for other in answers:
-        if isinstance(other, Exception):
-            raise other
-    return [answer, *answers]
+        return [answer, *(answered() for answered in begun)]
 
 
-class _Hearing:
-    """Takes what a process says as it comes, also while this one works."""
-
-    def __init__(self, process: Process, done: Callable[[], None]) -> None:
-        self._process, self._done = process, done
-        self._answer: Any = None
-        self._thread = threading.Thread(target=self._listen, daemon=True)
-        self._thread.start()
-
-    def _listen(self) -> None:
-        try:
-            while isinstance(said := self._process.answer(), _Done):
-                self._done()
-            self._answer = said
-        except Exception as error:
-            self._answer = error
-
-    def answer(self) -> Any:
-        self._thread.join()
-        return self._answer
+def _heard(process: Process, job: tuple[Any, ...], done: Callable[[], None]) -> Any:
+    """What a process answers to a job."""
+    process.tell(*job)
+    while isinstance(said := process.answer(), _Done):
+        done()
+    if isinstance(said, Exception):
+        raise said
+    return said
 
 
 class _Done:
@@ -251,18 +273,16 @@ def _serve(
             _write(answers, _attempt(answering, (method, *arguments)))
 
 
-def _do(
-    messages: SimpleQueue[bytes],
-    answers: IO[bytes],
-    function: Callable[..., Any],
-    arguments: tuple[Any, ...],
-) -> None:
-    """Run a function and answer once, with what it returned or raised; tell when it yields."""
+def _do_each(messages: SimpleQueue[bytes], answers: IO[bytes]) -> None:
+    """Run one function after the other: answer with what it returned or raised, tell its yields."""
+    while True:
+        message = messages.get()
 
-    def run() -> Any:
-        return _last(function(*arguments), lambda: _write(answers, _Done()))
+        def run(message: bytes = message) -> Any:
+            function, arguments = pickle.loads(message)
+            return _last(function(*arguments), lambda: _write(answers, _Done()))
 
-    _write(answers, _attempt(run, ()))
+        _write(answers, _attempt(run, ()))
 
 
 def _attempt(function: Callable[..., Any], arguments: tuple[Any, ...]) -> Any:
