@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
 
+from sa_solver.threads import at_once
 from sa_solver.types import Array, Progress, unseen
 from workflow.analyses.wear.budget.companions import Companions
 from workflow.analyses.wear.budget.lives import LIFE_FAILURES, Worn
@@ -29,17 +31,18 @@ def error_budget(outcome: Outcome, reporter: Reporter, begun: Begun) -> dict[str
 
     ``begun`` are the lives of companions.
     """
-    with reporter.stage("error budget", "short lives") as told:
-        lives = begun(told)
-        return {
-            contact.stage.name: errors_of(
-                outcome.case,
-                contact,
-                outcome.source.peak,
-                {part: by_name[contact.stage.name] for part, by_name in lives.items()},
-            )
-            for contact in outcome.interfaces
-        }
+    with reporter.stage("error budget", "short lives") as progress:
+        lives = begun(progress)
+        names = [contact.stage.name for contact in outcome.interfaces]
+        probed = [{part: by_name[name] for part, by_name in lives.items()} for name in names]
+        # Each solves the last cycle again, on the surfaces of other steps.
+        errors = at_once(
+            [
+                partial(errors_of, outcome.case, contact, outcome.source.peak, told)
+                for contact, told in zip(outcome.interfaces, probed, strict=True)
+            ]
+        )
+        return dict(zip(names, errors, strict=True))
 
 
 def lives_of_companions(outcome: Outcome, reporter: Reporter, beside: Beside) -> Begun:
