@@ -13,6 +13,7 @@ from click.testing import CliRunner, Result
 from workflow.analyses.wear import contact_workers
 from workflow.cli import cli
 from workflow.errors import Ending, one_line
+from workflow.pictures import drawing
 from workflow.runs import jobs, run
 from workflow.runs.job import Job
 from workflow.runs.run import bring_to_end
@@ -70,16 +71,15 @@ def _workers(
 class _BesideHere:
     """Stands for the process beside a run: a job is done here, when its answer is asked for."""
 
-    def begin(
-        self,
-        function: Callable[..., Any],
-        arguments: tuple[Any, ...] = (),
-        done: Callable[[], None] = lambda: None,
-    ) -> Callable[[], Any]:
-        return lambda: processes._last(function(*arguments), done)
+    def begin(self, function: Callable[..., Any], *arguments: Any) -> Callable[[], Any]:
+        return lambda: function(*arguments)
 
     def close(self) -> None:
         pass
+
+
+def _in_order(tasks: Sequence[processes.Task], _: Any, done: Callable[[], None]) -> list[Any]:
+    return processes.share_out(tasks, done=done)
 
 
 @contextmanager
@@ -88,6 +88,7 @@ def runs_here() -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(contact_workers, "workers", _workers)
         patch.setattr(run, "Beside", _BesideHere)
+        patch.setattr(drawing, "share_out", _in_order)
         yield
 
 

@@ -22,6 +22,7 @@ from workflow.analyses.wear import contact_workers
 from workflow.analyses.wear import results as wear_results
 from workflow.analyses.wear.layout import Contents
 from workflow.kinds import kinds
+from workflow.pictures import drawing
 from workflow.runs import run as running
 from workflow.shell import processes
 from workflow.shell.folder import OutputFolder
@@ -366,6 +367,7 @@ def separate_processes(monkeypatch: pytest.MonkeyPatch) -> None:
     """Contacts and pictures have processes of their own, as where there is no test."""
     monkeypatch.setattr(contact_workers, "workers", processes.workers)
     monkeypatch.setattr(running, "Beside", processes.Beside)
+    monkeypatch.setattr(drawing, "share_out", processes.share_out)
 
 
 @pytest.fixture(scope="session")

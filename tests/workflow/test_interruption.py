@@ -303,25 +303,13 @@ def test_worker_that_dies_is_one_line():
         workers._answers(processes)
 
 
-def counting(to):
-    for _ in range(to):
-        yield
-    return to
-
-
-def test_what_processes_have_done_is_told_as_it_comes():
-    told = []
-    jobs = [(counting, (2,)), (counting, (3,)), (len, ("four",))]
-    assert workers.side_by_side(jobs, lambda: told.append(1)) == [2, 3, 4]
-    assert len(told) == 5
-
-
 @posix_only
 def test_worker_killed_before_its_first_word_is_one_line(monkeypatch):
     """It ends while it is told what to do: a large setting does not go into the pipe at once."""
     monkeypatch.setattr(sys, "executable", "/bin/true")
-    with pytest.raises(MethodFailed, match="a process of the run has gone"):
-        workers.side_by_side([(len, (b"",)), (len, (bytes(1_000_000),))])
+    gone = pytest.raises(MethodFailed, match="a process of the run has gone")
+    with closing(workers.Beside()) as beside, gone:
+        beside.begin(len, bytes(1_000_000))()
 
 
 @pytest.mark.slow
@@ -338,19 +326,14 @@ def test_worker_that_cannot_be_set_up_says_why(separate_processes):
 def test_workers_are_born_deaf_to_ctrl_c():
     """From their first instruction: the terminal sends it to the session of the parent."""
     with closing(workers.Beside()) as one, closing(workers.Beside()) as other:
-        sessions = [process.begin(os.getsid, (0,))() for process in (one, other)]
+        sessions = [process.begin(os.getsid, 0)() for process in (one, other)]
     assert len({os.getsid(0), *sessions}) == 3
 
 
 def test_a_process_beside_does_one_job_after_the_other():
     with closing(workers.Beside()) as beside:
-        failing, told = beside.begin(divmod, (1, 0)), []
-        counted, process = (
-            beside.begin(counting, (3,), lambda: told.append(1)),
-            beside.begin(os.getpid),
-        )
-        assert process() == beside.begin(os.getpid)() != os.getpid()
-        assert (counted(), len(told)) == (3, 3)
+        failing, *processes = beside.begin(divmod, 1, 0), *(beside.begin(os.getpid) for _ in "two")
+        assert len({process() for process in processes} | {os.getpid()}) == 2
         with pytest.raises(ZeroDivisionError):
             failing()
 
@@ -359,7 +342,24 @@ def test_a_process_beside_does_one_job_after_the_other():
 def test_a_process_beside_ends_busy_or_not():
     begun = time.perf_counter()
     with closing(workers.Beside()) as beside:
-        answer = beside.begin(time.sleep, (600.0,))
+        answer = beside.begin(time.sleep, 600.0)
     with pytest.raises((MethodFailed, CancelledError)):
         answer()
     assert time.perf_counter() - begun < 60.0
+
+
+def test_tasks_are_shared_with_a_process_beside():
+    told, tasks = [], [(time.sleep, (0.2,)), (abs, (-1,)), (abs, (-2,)), (os.getpid, ())]
+    with closing(workers.Beside()) as beside:
+        _, *numbers, process = workers.share_out(tasks, beside, lambda: told.append(1))
+    assert (numbers, len(told)) == ([1, 2], 4)
+    assert process != os.getpid()
+    assert workers.share_out(tasks)[-1] == os.getpid()
+
+
+@pytest.mark.parametrize("place", [0, -1])
+def test_what_a_task_raises_is_raised_here_and_there(place):
+    tasks = [(time.sleep, (0.05,)) for _ in range(4)]
+    tasks[place] = divmod, (1, 0)
+    with closing(workers.Beside()) as beside, pytest.raises(ZeroDivisionError):
+        workers.share_out(tasks, beside)

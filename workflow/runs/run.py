@@ -217,9 +217,9 @@ def _run(
         with reporter.stage("paraview and figures", "pictures") as told:
             if analysis.pictures is not None:
                 drawn.extend(analysis.pictures().figures_of(contents))
-                team = [beside] if analysis.draws_beside else []
+                helper = beside if analysis.draws_beside else None
                 figures.update(
-                    write_pictures(case.output, folder, analysis.pictures, contents, team, told)
+                    write_pictures(case.output, folder, analysis.pictures, contents, helper, told)
                 )
 
     def report(summary: Summary) -> None:
@@ -256,7 +256,7 @@ def _run(
             beside=beside,
         )
         if analysis.draws_beside and case.output.figure_formats:
-            beside.begin(load_what_draws, (analysis.pictures,))
+            beside.begin(load_what_draws, analysis.pictures)
         with telling(reporter):
             analysis.run(run)
         for line in first_look(folder.root, drawn):

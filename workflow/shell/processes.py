@@ -12,9 +12,10 @@ import pickle
 import signal
 import subprocess
 import threading
-from collections.abc import Callable, Generator, Iterator, Sequence
+from collections import deque
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import ExitStack, closing, contextmanager
+from contextlib import contextmanager
 from queue import SimpleQueue
 from typing import IO, Any
 
@@ -27,6 +28,9 @@ COMMAND = "from workflow.shell.processes import main; main()"
 # Bytes that say how long a message is.
 LENGTH = 8
 
+
+Task = tuple[Callable[..., Any], tuple[Any, ...]]
+"""A function that can be pickled, and its arguments."""
 
 Answering = Callable[..., Any]
 """What a worker is: given a method's name and its arguments, it answers."""
@@ -107,72 +111,70 @@ class Beside:
         self._process: Process | None = None
         self._asking = ThreadPoolExecutor(1)
 
-    def begin(
-        self,
-        function: Callable[..., Any],
-        arguments: tuple[Any, ...] = (),
-        done: Callable[[], None] = lambda: None,
-    ) -> Callable[[], Any]:
+    def begin(self, function: Callable[..., Any], *arguments: Any) -> Callable[[], Any]:
         """Begin with a function; what is returned waits for its answer, and raises what it raised.
 
-        ``done`` is called, in another thread, whenever it yields, if it is a generator.
+        Raises :class:`MethodFailed` if the process is gone.
         """
         if self._process is None:
             self._process = Process(one_thread=True)
             self._process.tell(_do_each, ())
-        return self._asking.submit(_heard, self._process, (function, arguments), done).result
+        return self._asking.submit(_asked, self._process, function, arguments).result
 
     def close(self) -> None:
         """End it."""
-        if self._process is not None:
-            self._process.end()
+        process, self._process = self._process, None
+        if process is not None:
+            process.end()
         self._asking.shutdown(cancel_futures=True)
 
 
-def side_by_side(
-    jobs: Sequence[tuple[Callable[..., Any], tuple[Any, ...]]],
-    done: Callable[[], None] = lambda: None,
-    team: Sequence[Beside] = (),
+def share_out(
+    tasks: Sequence[Task], beside: Beside | None = None, done: Callable[[], None] = lambda: None
 ) -> list[Any]:
-    """Run functions, given with their arguments: the first one here, others in processes.
+    """Do tasks, those from the beginning on here, those from the end on in a process ``beside``.
 
-    Those of a ``team`` first. ``done`` is called whenever one of them yields, of those that are
-    generators. Returns what each of them returned. Raises what one of them raised.
+    ``done`` is called whenever one is. Returns what each of them returned. Raises what one of them
+    raised; if that was one here, or Ctrl-C, the process beside ends as it is.
     """
-    (here, arguments), *others = jobs
-    with ExitStack() as stack:
-        new = [stack.enter_context(closing(Beside())) for _ in others[len(team) :]]
-        begun = [
-            process.begin(*other, done)
-            for process, other in zip([*team, *new], others, strict=False)
-        ]
-        answer = _last(here(*arguments), done)
-        return [answer, *(answered() for answered in begun)]
+    answers: list[Any] = [None] * len(tasks)
+    left = deque(range(len(tasks)))
 
+    def work(take: Callable[[], int], do: Callable[..., Any]) -> None:
+        while True:
+            try:
+                number = take()
+            except IndexError:
+                return
+            function, arguments = tasks[number]
+            answers[number] = do(function, *arguments)
+            done()
 
-def _heard(process: Process, job: tuple[Any, ...], done: Callable[[], None]) -> Any:
-    """What a process answers to a job."""
-    process.tell(*job)
-    while isinstance(said := process.answer(), _Done):
-        done()
-    if isinstance(said, Exception):
-        raise said
-    return said
+    def here() -> None:
+        work(left.popleft, lambda function, *arguments: function(*arguments))
 
-
-class _Done:
-    """What a process says whenever its function yields."""
-
-
-def _last(work: Any, done: Callable[[], None]) -> Any:
-    """What a generator returns, ``done`` called whenever it yields; anything else as it is."""
-    while isinstance(work, Generator):
+    if beside is None:
+        here()
+        return answers
+    with ThreadPoolExecutor(1) as pool:
+        there = pool.submit(work, left.pop, lambda *task: beside.begin(*task)())
         try:
-            next(work)
-        except StopIteration as end:
-            return end.value
-        done()
-    return work
+            here()
+        except BaseException:
+            left.clear()
+            beside.close()
+            raise
+        there.result()
+    return answers
+
+
+def _asked(process: Process, function: Callable[..., Any], arguments: tuple[Any, ...]) -> Any:
+    """What a process answers."""
+    process.tell(function, arguments)
+    answer = process.answer()
+    if isinstance(answer, Exception):
+        raise answer
+    return answer
 
 
 @contextmanager
@@ -274,15 +276,14 @@ def _serve(
 
 
 def _do_each(messages: SimpleQueue[bytes], answers: IO[bytes]) -> None:
-    """Run one function after the other: answer with what it returned or raised, tell its yields."""
+    """Run functions, one after the other, and answer with what each returned or raised."""
+
+    def run(message: bytes) -> Any:
+        function, arguments = pickle.loads(message)
+        return function(*arguments)
+
     while True:
-        message = messages.get()
-
-        def run(message: bytes = message) -> Any:
-            function, arguments = pickle.loads(message)
-            return _last(function(*arguments), lambda: _write(answers, _Done()))
-
-        _write(answers, _attempt(run, ()))
+        _write(answers, _attempt(run, (messages.get(),)))
 
 
 def _attempt(function: Callable[..., Any], arguments: tuple[Any, ...]) -> Any:

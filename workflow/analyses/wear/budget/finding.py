@@ -65,7 +65,7 @@ def lives_of_companions(outcome: Outcome, reporter: Reporter, beside: Beside) ->
     of = case, companions, source if companions.same else None, followed(outcome)
     if companions.same and not (source.line and isinstance(source, StructureStage)):
         return lambda progress: heard(_lived(*of, progress))
-    answer = beside.begin(_lived, of)
+    answer = beside.begin(_lived, *of)
     return lambda _: heard(answer())
 
 
