@@ -58,11 +58,13 @@ def write_pictures(
     return dict(zip(names, written, strict=False)) if output.report else {}
 
 
-def load_what_draws(pictures: Callable[[], Pictures]) -> None:
-    """Do beforehand what a process begins to draw with: a second and more of imports."""
+def load_what_draws(pictures: Callable[[], Pictures], output: Output) -> None:
+    """Do beforehand what a process begins to draw with: two seconds of imports."""
     from workflow.pictures import style  # noqa: F401
 
     pictures()
+    if output.paraview:
+        import pyvista  # noqa: F401
 
 
 def _write_figure(

@@ -256,7 +256,7 @@ def _run(
             beside=beside,
         )
         if analysis.draws_beside and case.output.figure_formats:
-            beside.begin(load_what_draws, analysis.pictures)
+            beside.begin(load_what_draws, analysis.pictures, case.output)
         with telling(reporter):
             analysis.run(run)
         for line in first_look(folder.root, drawn):
