@@ -14,6 +14,7 @@ from itertools import product
 
 import numpy as np
 
+from fe_models.blas_threads import one_thread
 from fe_models.joint import JointResolvent
 from fe_models.mesh import AXES, in_space
 from sa_solver.contact_law import coulomb
@@ -124,8 +125,9 @@ class FrictionalJoint:
         self, load: Array, gap: Array, previous: Array, starts: list[Array], floor: float
     ) -> FrictionState:
         """One increment, its residual relative to the load, which counts as ``floor`` at least."""
-        problem = _Problem(self._joint, self._friction, load, gap, previous)
-        return problem.solve(starts, max(float(np.linalg.norm(load)), floor))
+        with one_thread(self._joint.widest):
+            problem = _Problem(self._joint, self._friction, load, gap, previous)
+            return problem.solve(starts, max(float(np.linalg.norm(load)), floor))
 
 
 class _Problem:

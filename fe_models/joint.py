@@ -24,6 +24,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.sparse.linalg import LinearOperator, eigsh
 
+from fe_models.blas_threads import one_thread
 from fe_models.symmetry import Mirror, SplitMatrix, symmetric_product
 from sa_solver.types import Array
 
@@ -101,6 +102,13 @@ class JointResolvent:
     rho: float
     loads: Array
     rigid_modes: int
+
+    @property
+    def widest(self) -> int:
+        """Unknowns of the largest matrix that a product with the inverse takes."""
+        if isinstance(self.inverse, SplitMatrix):
+            return max(map(len, self.inverse.blocks))
+        return len(self.inverse)
 
     def normal_stiffness(self, nodes: int) -> Array:
         """H between the normal displacements of so many nodes ``(nodes, nodes)`` [N/mm]."""
@@ -183,7 +191,8 @@ def _spectrum(stiffness: Array) -> tuple[int, float, float]:
     product = LinearOperator(
         stiffness.shape, matvec=lambda v: symmetric_product(stiffness, v), dtype=np.float64
     )
-    (largest,) = extreme(product, 1)
+    with one_thread(len(stiffness)):
+        (largest,) = extreme(product, 1)
     shift = SPECTRUM_SHIFT * largest
     shifted = stiffness.copy()
     shifted[np.diag_indices_from(shifted)] += shift
@@ -195,6 +204,7 @@ def _spectrum(stiffness: Array) -> tuple[int, float, float]:
     )
     # A free body has at most six rigid motions: the seventh eigenvalue is elastic.
     count = min(7, len(stiffness) - 1)
-    lowest = 1.0 / extreme(inverse, count) - shift
+    with one_thread(len(stiffness)):
+        lowest = 1.0 / extreme(inverse, count) - shift
     elastic = lowest[lowest > RIGID_LIMIT * largest]
     return len(lowest) - len(elastic), float(elastic.min()), float(largest)

@@ -15,15 +15,20 @@ from skfem.helpers import dot, grad
 
 from fe_models.elasticity import ELEMENTS
 from fe_models.linear_solver import prepare
-from fe_models.mesh import MATCHING_TOLERANCE, Body, Interface, MeshError, StructureMesh
+from fe_models.mesh import (
+    MATCHING_TOLERANCE,
+    Body,
+    Interface,
+    MeshError,
+    StructureMesh,
+    numbered_as,
+)
 from sa_solver.types import Array
 
 # An element that keeps less than this share of its volume is too flat to trust its stress.
 SMALLEST_VOLUME_SHARE = 0.1
 # Boundaries beside a face follow its form over so many times its depth: no steeper than 1 in 5.
 FOLLOWING = 5.0
-# What a mesh of scikit-fem keeps, once asked for, of how its elements are connected.
-NUMBERED = frozenset({"_facets", "_t2f", "_f2t", "_edges", "_t2e", "_f2e"})
 
 
 def worn_mesh(mesh: StructureMesh, depths: list[tuple[Array, Array]]) -> StructureMesh:
@@ -132,9 +137,7 @@ def _followed(mesh: MeshTet | MeshTri, prescribed: Array) -> Array:
 
 def _moved(body: Body, displacement: Array) -> Body:
     mesh = replace(body.mesh, doflocs=body.mesh.p + displacement.T)
-    # Facets and edges hang on the elements alone; scikit-fem would number them again.
-    vars(mesh).update({name: vars(body.mesh)[name] for name in NUMBERED & vars(body.mesh).keys()})
-    return Body(body.name, mesh)
+    return Body(body.name, numbered_as(body.mesh, mesh))
 
 
 def _crushed(before: Body, after: Body) -> bool:

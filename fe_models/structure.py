@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from functools import partial
+from typing import TypeVar
 
 import numpy as np
 import scipy.sparse as sp
@@ -11,10 +13,17 @@ import scipy.sparse as sp
 from fe_models.friction import LOAD_FLOOR, FrictionalJoint, FrictionState
 from fe_models.joint import JointResolvent, JointStiffness, join, join_halves
 from fe_models.mesh import Face, Interface, StructureMesh
+from fe_models.pardiso import sharing
 from fe_models.supported_body import SupportedBody
 from sa_solver.increments import dissipated, in_rows, mean_of_ends
+from sa_solver.threads import at_once
 from sa_solver.types import Array, LoadHistory, Progress, Tally, resultants, unseen
 
+T = TypeVar("T")
+
+# Unknowns of both bodies up to which factors are found side by side: some 2 GB. Larger ones gain as
+# much from PARDISO's own threads, and each would count on all the memory that is free.
+MOST_AT_ONCE = 300_000
 # Of a condensation: two of each body, and the joint of both.
 STEPS = 5
 # A face slides as a whole when nodes that stick carry less than this share of its load.
@@ -149,7 +158,9 @@ class Structure:
             every = sp.identity(len(held_2), format="csr") if projection is None else projection
             projection = every[~held_2][:, ~held_1]
         done = Tally(progress, STEPS)
-        condensed_1, condensed_2 = (body.condense(done) for body in self.bodies)
+        condensed_1, condensed_2 = self.at_once(
+            *(partial(body.condense, done) for body in self.bodies)
+        )
         joint = join(condensed_1, condensed_2, projection, held_2, like)
         done()
         return joint
@@ -164,15 +175,21 @@ class Structure:
             if on_1 is None or on_1 != self.body_2.on_interface(mirrors[1]):
                 continue
             done = Tally(progress, STEPS)
-            halves_1 = self.body_1.condense_halves(mirrors[0], on_1, done)
-            if halves_1 is None:
-                continue
-            halves_2 = self.body_2.condense_halves(mirrors[1], on_1, done)
-            if halves_2 is not None:
+            halves_1, halves_2 = self.at_once(
+                partial(self.body_1.condense_halves, mirrors[0], on_1, done),
+                partial(self.body_2.condense_halves, mirrors[1], on_1, done),
+            )
+            if halves_1 is not None and halves_2 is not None:
                 joint = join_halves(halves_1, halves_2, on_1)
                 done()
                 return joint
         return None
+
+    def at_once(self, *jobs: Callable[[], T]) -> list[T]:
+        """What jobs give that each factorise such bodies: side by side if that surely fits."""
+        if sum(body.elastic.size for body in self.bodies) > MOST_AT_ONCE:
+            return [job() for job in jobs]
+        return at_once(sharing(jobs))
 
     @property
     def projection(self) -> sp.csr_matrix | None:

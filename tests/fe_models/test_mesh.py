@@ -5,6 +5,7 @@ from dataclasses import replace
 import meshio
 import numpy as np
 import pytest
+from skfem import MeshTet, MeshTri
 
 from fe_models.mesh import Body, MeshError, matched_interface, named_mesh, write_msh
 
@@ -79,3 +80,15 @@ def test_a_file_that_cannot_be_written_to_its_end_is_an_error(coarse_mesh, size,
             write_msh(tmp_path / "structure.msh", coarse_mesh)
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, before)
+
+
+@pytest.mark.parametrize("mesh", [MeshTet().refined(2), MeshTri().refined(3)])
+def test_facets_are_numbered_as_scikit_fem_numbers_them(mesh: MeshTet | MeshTri) -> None:
+    # In no order: a refined mesh has its vertices in one.
+    order = np.random.default_rng(0).permutation(mesh.nvertices)
+    points, cells = mesh.p.T[np.argsort(order)], order[mesh.t].T
+    ours = named_mesh(points, cells, {})
+    theirs = type(mesh)(ours.p, ours.t)
+    for name in ("facets", "t2f", "f2t"):
+        np.testing.assert_array_equal(getattr(ours, name), getattr(theirs, name), err_msg=name)
+        assert getattr(ours, name).dtype == getattr(theirs, name).dtype

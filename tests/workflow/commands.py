@@ -14,7 +14,7 @@ from workflow.analyses.wear import contact_workers
 from workflow.cli import cli
 from workflow.errors import Ending, one_line
 from workflow.pictures import drawing
-from workflow.runs import jobs
+from workflow.runs import jobs, run
 from workflow.runs.job import Job
 from workflow.runs.run import bring_to_end
 from workflow.shell import processes
@@ -68,10 +68,18 @@ def _workers(
     yield InThisProcess([make(sent(setting)) for setting in settings])
 
 
-def _one_by_one(
-    jobs: Sequence[tuple[Callable[..., Any], tuple[Any, ...]]], done: Callable[[], None]
-) -> list[Any]:
-    return [processes._last(do(*arguments), done) for do, arguments in jobs]
+class _BesideHere:
+    """Stands for the process beside a run: a job is done here, when its answer is asked for."""
+
+    def begin(self, function: Callable[..., Any], *arguments: Any) -> Callable[[], Any]:
+        return lambda: function(*arguments)
+
+    def close(self) -> None:
+        pass
+
+
+def _in_order(tasks: Sequence[processes.Task], _: Any, done: Callable[[], None]) -> list[Any]:
+    return processes.share_out(tasks, done=done)
 
 
 @contextmanager
@@ -79,7 +87,8 @@ def runs_here() -> Iterator[None]:
     """Contacts and pictures of a run are made in this process."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(contact_workers, "workers", _workers)
-        patch.setattr(drawing, "side_by_side", _one_by_one)
+        patch.setattr(run, "Beside", _BesideHere)
+        patch.setattr(drawing, "share_out", _in_order)
         yield
 
 

@@ -19,10 +19,11 @@ from tests.conftest import CASES
 from tests.workflow.case_leaves import BODY, CELLS
 from tests.workflow.commands import invoke, runs_here
 from workflow.analyses.wear import contact_workers
-from workflow.analyses.wear.budget import finding
+from workflow.analyses.wear import results as wear_results
 from workflow.analyses.wear.layout import Contents
 from workflow.kinds import kinds
 from workflow.pictures import drawing
+from workflow.runs import run as running
 from workflow.shell import processes
 from workflow.shell.folder import OutputFolder
 from workflow.shell.results import read_contents
@@ -357,7 +358,7 @@ def _without_companions() -> Iterator[None]:
     They are for test_error_budget.py.
     """
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(finding, "lives_of_companions", lambda *_: {})
+        patch.setattr(wear_results, "lives_of_companions", lambda *_: lambda _: {})
         yield
 
 
@@ -365,7 +366,8 @@ def _without_companions() -> Iterator[None]:
 def separate_processes(monkeypatch: pytest.MonkeyPatch) -> None:
     """Contacts and pictures have processes of their own, as where there is no test."""
     monkeypatch.setattr(contact_workers, "workers", processes.workers)
-    monkeypatch.setattr(drawing, "side_by_side", processes.side_by_side)
+    monkeypatch.setattr(running, "Beside", processes.Beside)
+    monkeypatch.setattr(drawing, "share_out", processes.share_out)
 
 
 @pytest.fixture(scope="session")

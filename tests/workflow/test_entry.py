@@ -89,10 +89,12 @@ def test_the_module_is_the_command(tmp_path):
 
 # --- processes of a run ---------------------------------------------------------------------------
 
-SIDE_BY_SIDE = """
+IN_A_PROCESS = """
 print("once")
-from workflow.shell.processes import side_by_side
-side_by_side([(len, ("",)), (print, ("in a process",))])
+from contextlib import closing
+from workflow.shell.processes import Beside
+with closing(Beside()) as beside:
+    beside.begin(print, "in a process")()
 """
 # Contacts have a process each, and so have figures.
 RUN = f"""
@@ -108,9 +110,9 @@ results = fretscale.run(
 @pytest.mark.parametrize("how", ["script", "stdin", "-c"])
 def test_a_program_needs_no_guard(how, tmp_path):
     """Which multiprocessing asks for; nor is the program run again in a process of ours."""
-    (tmp_path / "script.py").write_text(SIDE_BY_SIDE, encoding="utf-8")
-    arguments = {"script": ["script.py"], "stdin": ["-"], "-c": ["-c", SIDE_BY_SIDE]}[how]
-    ended = python(*arguments, cwd=tmp_path, stdin=SIDE_BY_SIDE if how == "stdin" else None)
+    (tmp_path / "script.py").write_text(IN_A_PROCESS, encoding="utf-8")
+    arguments = {"script": ["script.py"], "stdin": ["-"], "-c": ["-c", IN_A_PROCESS]}[how]
+    ended = python(*arguments, cwd=tmp_path, stdin=IN_A_PROCESS if how == "stdin" else None)
     assert ended.returncode == 0, ended.stderr
     assert ended.stdout == "once\n"
     assert ended.stderr == "in a process\n"
@@ -140,7 +142,7 @@ def test_terminals_without_some_letters_have_them_spelled(encoding, shown):
 def test_a_program_may_have_no_standard_streams(tmp_path):
     """Then the processes of a run have none either."""
     code = "from workflow.shell.streams import hold_standard_streams; hold_standard_streams()"
-    code += SIDE_BY_SIDE.replace('print("once")', "") + "open('done', 'w')"
+    code += IN_A_PROCESS.replace('print("once")', "") + "open('done', 'w')"
     python("-c", f"import os; [os.close(i) for i in range(3)]; {code}", cwd=tmp_path)
     assert (tmp_path / "done").exists()
 

@@ -12,6 +12,7 @@ import pytest
 from fe_models.mesh import MeshError
 from tests.workflow.commands import invoke
 from tests.workflow.mesh_scenes import settings
+from workflow.analyses.wear import results
 from workflow.analyses.wear.budget import companions as lives_of
 from workflow.analyses.wear.budget import finding, lives
 from workflow.analyses.wear.budget.companions import Companions
@@ -33,7 +34,7 @@ ALIVE = finding.lives_of_companions  # before the tests' runs do without
 
 @pytest.fixture(autouse=True)
 def _companions_live(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(finding, "lives_of_companions", ALIVE)
+    monkeypatch.setattr(results, "lives_of_companions", ALIVE)
 
 
 # --- parts ----------------------------------------------------------------------------------------

@@ -4,6 +4,9 @@ import os
 import re
 import shutil
 import sys
+import time
+from concurrent.futures import CancelledError
+from contextlib import closing
 from dataclasses import replace
 
 import h5py
@@ -18,6 +21,7 @@ from tests.workflow.interruptions import (
     posix_only,
 )
 from workflow.analyses.wear import contact_workers
+from workflow.errors import MethodFailed
 from workflow.shell import processes as workers
 from workflow.shell.store import read_arrays, write_arrays
 
@@ -295,33 +299,17 @@ def die(messages, answers, code):
 
 @pytest.mark.slow
 def test_worker_that_dies_is_one_line():
-    from workflow.errors import MethodFailed
-
     with workers._processes(die, [(9,)]) as processes, pytest.raises(MethodFailed, match="gone"):
         workers._answers(processes)
-
-
-def counting(to):
-    for _ in range(to):
-        yield
-    return to
-
-
-def test_what_processes_have_done_is_told_as_it_comes():
-    told = []
-    jobs = [(counting, (2,)), (counting, (3,)), (len, ("four",))]
-    assert workers.side_by_side(jobs, lambda: told.append(1)) == [2, 3, 4]
-    assert len(told) == 5
 
 
 @posix_only
 def test_worker_killed_before_its_first_word_is_one_line(monkeypatch):
     """It ends while it is told what to do: a large setting does not go into the pipe at once."""
-    from workflow.errors import MethodFailed
-
     monkeypatch.setattr(sys, "executable", "/bin/true")
-    with pytest.raises(MethodFailed, match="a process of the run has gone"):
-        workers.side_by_side([(len, (b"",)), (len, (bytes(1_000_000),))])
+    gone = pytest.raises(MethodFailed, match="a process of the run has gone")
+    with closing(workers.Beside()) as beside, gone:
+        beside.begin(len, bytes(1_000_000))()
 
 
 @pytest.mark.slow
@@ -337,7 +325,41 @@ def test_worker_that_cannot_be_set_up_says_why(separate_processes):
 @posix_only
 def test_workers_are_born_deaf_to_ctrl_c():
     """From their first instruction: the terminal sends it to the session of the parent."""
-    ask = os.getsid, (0,)
-    with workers._processes(workers._do, [ask, ask]) as processes:
-        sessions = workers._answers(processes)
+    with closing(workers.Beside()) as one, closing(workers.Beside()) as other:
+        sessions = [process.begin(os.getsid, 0)() for process in (one, other)]
     assert len({os.getsid(0), *sessions}) == 3
+
+
+def test_a_process_beside_does_one_job_after_the_other():
+    with closing(workers.Beside()) as beside:
+        failing, *processes = beside.begin(divmod, 1, 0), *(beside.begin(os.getpid) for _ in "two")
+        assert len({process() for process in processes} | {os.getpid()}) == 2
+        with pytest.raises(ZeroDivisionError):
+            failing()
+
+
+@posix_only
+def test_a_process_beside_ends_busy_or_not():
+    begun = time.perf_counter()
+    with closing(workers.Beside()) as beside:
+        answer = beside.begin(time.sleep, 600.0)
+    with pytest.raises((MethodFailed, CancelledError)):
+        answer()
+    assert time.perf_counter() - begun < 60.0
+
+
+def test_tasks_are_shared_with_a_process_beside():
+    told, tasks = [], [(time.sleep, (0.2,)), (abs, (-1,)), (abs, (-2,)), (os.getpid, ())]
+    with closing(workers.Beside()) as beside:
+        _, *numbers, process = workers.share_out(tasks, beside, lambda: told.append(1))
+    assert (numbers, len(told)) == ([1, 2], 4)
+    assert process != os.getpid()
+    assert workers.share_out(tasks)[-1] == os.getpid()
+
+
+@pytest.mark.parametrize("place", [0, -1])
+def test_what_a_task_raises_is_raised_here_and_there(place):
+    tasks = [(time.sleep, (0.05,)) for _ in range(4)]
+    tasks[place] = divmod, (1, 0)
+    with closing(workers.Beside()) as beside, pytest.raises(ZeroDivisionError):
+        workers.share_out(tasks, beside)

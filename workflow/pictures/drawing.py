@@ -14,10 +14,9 @@ left out, not drawn as NaN. Fields are single precision, which halves the files:
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from functools import partial
-from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -27,7 +26,7 @@ from sa_solver.types import Progress, Tally, unseen
 from workflow.case.sections import Output
 from workflow.shell.analysis import Pictures
 from workflow.shell.folder import OutputFolder
-from workflow.shell.processes import side_by_side
+from workflow.shell.processes import Beside, Task, share_out
 
 
 def write_pictures(
@@ -35,62 +34,52 @@ def write_pictures(
     folder: OutputFolder,
     pictures: Callable[[], Pictures],
     contents: Any,
-    processes: int,
+    beside: Beside | None = None,
     progress: Progress = unseen,
 ) -> dict[str, str]:
     """Write the pictures of the results in a folder that a case asks for in its ``output``.
 
-    ``contents`` is what the results hold, as ``pictures`` are told it. So many ``processes`` share
-    them, this one among them, and tell ``progress`` what is done. Returns the figures as
+    ``contents`` is what the results hold, as ``pictures`` are told it. A process ``beside`` this
+    one takes its share of the work, and ``progress`` is told what is done. Returns the figures as
     SVG texts by their names, in the order in which they are to be looked at, if they are to go into
     a report.
     """
-    formats = output.figure_formats
+    formats, told = output.figure_formats, (pictures, contents, folder.results)
+    names = tuple(pictures().figures_of(contents)) if formats else ()
     with ExitStack() as stack:
-        paraview = figures = None
-        if output.paraview:
-            paraview = stack.enter_context(folder.filling("paraview", "files for ParaView"))
+        tasks: list[Task] = []
         if formats:
             figures = stack.enter_context(folder.filling("figures", "figures of the results"))
-        drawn = pictures, contents, folder.results, figures, formats, output.report
-        parts = processes if formats else 1
-        # The last one has files for ParaView to write besides.
-        beside = [None] * (parts - 1) + [paraview]
-        order = tuple(pictures().figures_of(contents))
-        wanted = len(order) if formats else 0
-        shares = side_by_side(
-            [(_write_share, (*drawn, also, part, parts)) for part, also in enumerate(beside)],
-            Tally(progress, wanted + (paraview is not None)),
-        )
-    vectors = {name: text for share in shares for name, text in share.items()}
-    return {name: vectors[name] for name in order if name in vectors}
+            tasks += [(_write_figure, (*told, figures, n, formats, output.report)) for n in names]
+        if output.paraview:
+            paraview = stack.enter_context(folder.filling("paraview", "files for ParaView"))
+            tasks.append((write_paraview, (*told, paraview)))
+        written = share_out(tasks, beside, Tally(progress, len(tasks)))
+    return dict(zip(names, written, strict=False)) if output.report else {}
 
 
-def _write_share(
+def load_what_draws(pictures: Callable[[], Pictures], output: Output) -> None:
+    """Do beforehand what a process begins to draw with: two seconds of imports."""
+    from workflow.pictures import style  # noqa: F401
+
+    pictures()
+    if output.paraview:
+        import pyvista  # noqa: F401
+
+
+def _write_figure(
     pictures: Callable[[], Pictures],
     contents: Any,
     results: Path,
-    figures: Path | None,
+    folder: Path,
+    name: str,
     formats: Sequence[str],
     keep: bool,
-    paraview: Path | None,
-    first: int,
-    every: int,
-) -> Generator[None, None, dict[str, str]]:
-    """What one process draws, into the folders that there are; the figures to ``keep``, as SVG.
-
-    Yields after each figure, and after the files for ParaView.
-    """
+) -> str:
+    """One figure, which is returned as SVG if it is to ``keep``."""
     vectors: dict[str, str] = {}
-    if figures is not None:
-        kept = vectors if keep else None
-        share = pictures, contents, results, figures, first, every, formats, kept
-        for _ in _each_written(*share):
-            yield
-    if paraview is not None:
-        write_paraview(pictures, contents, results, paraview)
-        yield
-    return vectors
+    write_figures(pictures, contents, results, folder, [name], formats, vectors if keep else None)
+    return vectors.get(name, "")
 
 
 def write_paraview(
@@ -112,38 +101,22 @@ def write_figures(
     contents: Any,
     results: Path,
     folder: Path,
-    first: int = 0,
-    every: int = 1,
+    names: Sequence[str] | None = None,
     formats: Sequence[str] = ("png",),
     vectors: dict[str, str] | None = None,
 ) -> list[Path]:
     """Draw the figures of ``results`` (a ``results.h5``) as files; returns their paths.
 
-    ``every`` so many of them from the ``first`` on, so that several processes may share them. For
-    ``formats`` and ``vectors`` see :func:`workflow.pictures.style.write_figures`.
+    Those of some ``names``, all of them unless these are given. For ``formats`` and ``vectors`` see
+    :func:`workflow.pictures.style.write_figures`.
     """
-    share = pictures, contents, results, folder, first, every, formats, vectors
-    return [path for paths in _each_written(*share) for path in paths]
-
-
-def _each_written(
-    pictures: Callable[[], Pictures],
-    contents: Any,
-    results: Path,
-    folder: Path,
-    first: int,
-    every: int,
-    formats: Sequence[str],
-    vectors: dict[str, str] | None,
-) -> Iterator[list[Path]]:
-    """As :func:`write_figures`: the paths of each figure once it is written."""
     # Plots take a second to load: where they are drawn.
     from workflow.pictures import style
 
-    chosen = islice(pictures().figures_of(contents).items(), first, None, every)
+    figures = pictures().figures_of(contents)
     with h5py.File(results) as file:
-        drawn = ((name, partial(draw, file)) for name, draw in chosen)
-        yield from style.each_written(drawn, folder, formats, vectors)
+        drawn = [(name, partial(figures[name], file)) for name in names or figures]
+        return style.write_figures(drawn, folder, formats, vectors)
 
 
 def vector_figures(

@@ -9,8 +9,10 @@ from typing import Any
 
 import numpy as np
 from matplotlib import rc_context
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
 from matplotlib.collections import Collection, QuadMesh
-from matplotlib.figure import Figure
+from matplotlib.figure import Figure, FigureBase
 from matplotlib.legend import Legend
 from matplotlib.lines import Line2D
 from matplotlib.text import Text
@@ -67,20 +69,10 @@ def write_figures(
     Each appears under its name only when it is complete. ``vectors`` takes each as SVG text, by its
     name, if it is given.
     """
-    return [path for paths in each_written(figures, folder, formats, vectors) for path in paths]
-
-
-def each_written(
-    figures: Iterable[tuple[str, Callable[[], Figure]]],
-    folder: Path,
-    formats: Sequence[str],
-    vectors: dict[str, str] | None,
-) -> Iterator[list[Path]]:
-    """As :func:`write_figures`, which takes all: the paths of each figure once it is written."""
     if formats:
         folder.mkdir(parents=True, exist_ok=True)
+    written = []
     for name, draw in figures:
-        written = []
         with rc_context(STYLE):
             figure = draw()
             _lay_out(figure)
@@ -91,7 +83,7 @@ def each_written(
                 written.append(path)
             if vectors is not None:
                 vectors[name] = _as_svg(figure)
-        yield written
+    return written
 
 
 def _save(figure: Figure, target: Any, kind: str) -> None:
@@ -119,9 +111,20 @@ def _lay_out(figure: Figure) -> None:
         figure.set_dpi(DOTS_PER_INCH)
         engine.execute(figure)
         figure.set_layout_engine(None)
-    for artist in figure.findobj(lambda a: isinstance(a, Collection | Line2D)):
-        if _vertices(artist) > DENSE:
+    for artist in _artists(figure):
+        if isinstance(artist, Collection | Line2D) and _vertices(artist) > DENSE:
             artist.set_rasterized(True)
+
+
+def _artists(part: FigureBase | Axes) -> Iterator[Artist]:
+    """What a figure and its panels draw: not what ticks and legends are made of, which is little.
+
+    ``findobj`` looks through those too, and takes as long as a tenth of the drawing.
+    """
+    for artist in part.get_children():
+        yield artist
+        if isinstance(artist, FigureBase | Axes):
+            yield from _artists(artist)
 
 
 def _words(figure: Figure) -> Iterator[Text]:
@@ -135,9 +138,9 @@ def _words(figure: Figure) -> Iterator[Text]:
 
 def _names_in_legends(figure: Figure) -> Iterator[Text]:
     """What legends call curves: numbers in them may be names, and stay."""
-    for legend in figure.findobj(lambda a: isinstance(a, Legend)):
-        assert isinstance(legend, Legend)
-        yield from legend.get_texts()
+    for artist in _artists(figure):
+        if isinstance(artist, Legend):
+            yield from artist.get_texts()
 
 
 def _vertices(artist: Any) -> int:

@@ -13,7 +13,7 @@ from workflow.case.sections import Case
 from workflow.case.writing import dump_case
 from workflow.errors import UNWRITTEN, CaseError, NotWritten, UserError
 from workflow.kinds import analysis_of, kind_of, load_case
-from workflow.pictures.drawing import write_pictures
+from workflow.pictures.drawing import load_what_draws, write_pictures
 from workflow.report.told import ToldRun
 from workflow.report.writing import write_page
 from workflow.runs.first_look import first_look
@@ -24,6 +24,7 @@ from workflow.shell.checkpoint import Checkpoint
 from workflow.shell.folder import ASIDE, MANIFEST, OutputFolder
 from workflow.shell.forecast import in_words
 from workflow.shell.lock import locked
+from workflow.shell.processes import Beside
 from workflow.shell.reporter import SHORT_RUN, Reporter, telling
 from workflow.shell.run_time import RunTime
 from workflow.shell.screen import Loudness, Screen
@@ -216,11 +217,9 @@ def _run(
         with reporter.stage("paraview and figures", "pictures") as told:
             if analysis.pictures is not None:
                 drawn.extend(analysis.pictures().figures_of(contents))
-                processes = analysis.drawing_processes
+                helper = beside if analysis.draws_beside else None
                 figures.update(
-                    write_pictures(
-                        case.output, folder, analysis.pictures, contents, processes, told
-                    )
+                    write_pictures(case.output, folder, analysis.pictures, contents, helper, told)
                 )
 
     def report(summary: Summary) -> None:
@@ -230,7 +229,10 @@ def _run(
     figures: dict[str, str] = {}
     drawn: list[str] = []
     expected = analysis.run_time(case)
-    with closing(Reporter(folder.reserve_log(), resume, expected, loudness)) as reporter:
+    with (
+        closing(Reporter(folder.reserve_log(), resume, expected, loudness)) as reporter,
+        closing(Beside()) as beside,
+    ):
         for line in filter(None, told):
             reporter.say(line)
         if stays:
@@ -251,7 +253,10 @@ def _run(
             compute=compute,
             draw=draw,
             report=report,
+            beside=beside,
         )
+        if analysis.draws_beside and case.output.figure_formats:
+            beside.begin(load_what_draws, analysis.pictures, case.output)
         with telling(reporter):
             analysis.run(run)
         for line in first_look(folder.root, drawn):

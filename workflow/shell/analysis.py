@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from workflow.case.sections import Case
 from workflow.shell.memory import Memory
+from workflow.shell.processes import Beside
 from workflow.shell.run_time import RunTime
 
 if TYPE_CHECKING:
@@ -35,7 +36,8 @@ class Run(Generic[AnyCase]):
     where they stand as written. ``compute`` runs another case file into a folder, from where an
     earlier run there has got to; False if that was finished already. ``draw`` writes the pictures
     of the results that the case asks for, told what these hold. ``report`` puts the summary that
-    the run is to end with, and what was drawn, on a page for people.
+    the run is to end with, and what was drawn, on a page for people. ``beside`` is a process for
+    what need not wait, which draws at the end.
     """
 
     kind: str
@@ -49,6 +51,7 @@ class Run(Generic[AnyCase]):
     compute: Callable[[Path, Path], bool]
     draw: Callable[[Any], None]
     report: Callable[[Summary], None]
+    beside: Beside
 
 
 @dataclass(frozen=True)
@@ -108,7 +111,7 @@ class Analysis(Generic[AnyCase]):
     ``cases`` are its kinds of case by the names that ``fretscale new`` has for them; these say
     themselves how they are told apart, what they would run and on how many cores. ``memory`` is
     what a run needs before anything is meshed, ``run_time`` about how long it takes, ``pictures``
-    how its results are shown, drawn in so many ``drawing_processes``, that of the run among them.
+    how its results are shown; where it ``draws_beside``, two processes share them.
     ``resumable`` are runs that leave a checkpoint to go on from (:mod:`workflow.shell.checkpoint`),
     by their steps (:mod:`workflow.shell.steps`) or a state of their own.
     ``quantities`` are the main results, for all that show or compare runs, ``curves`` what is drawn
@@ -126,7 +129,7 @@ class Analysis(Generic[AnyCase]):
     quantities: Callable[[AnyCase, Summary], Sequence[Quantity]] = no_quantities
     curves: Sequence[CurvesOf] = ()
     pictures: Callable[[], Pictures] | None = None
-    drawing_processes: int = 1
+    draws_beside: bool = False
     resumable: bool = False
     choose: Callable[[AnyCase], tuple[AnyCase, dict[str, Any] | None]] = as_written
     comparison: Comparison[AnyCase] = Comparison()

@@ -12,7 +12,9 @@ import pickle
 import signal
 import subprocess
 import threading
-from collections.abc import Callable, Generator, Iterator, Sequence
+from collections import deque
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from queue import SimpleQueue
 from typing import IO, Any
@@ -26,6 +28,9 @@ COMMAND = "from workflow.shell.processes import main; main()"
 # Bytes that say how long a message is.
 LENGTH = 8
 
+
+Task = tuple[Callable[..., Any], tuple[Any, ...]]
+"""A function that can be pickled, and its arguments."""
 
 Answering = Callable[..., Any]
 """What a worker is: given a method's name and its arguments, it answers."""
@@ -96,61 +101,80 @@ def workers(make: Callable[[Any], Answering], settings: Sequence[Any]) -> Iterat
         yield Workers(processes)
 
 
-def side_by_side(
-    jobs: Sequence[tuple[Callable[..., Any], tuple[Any, ...]]],
-    done: Callable[[], None] = lambda: None,
-) -> list[Any]:
-    """Run functions, given with their arguments: the first one here, others in processes.
+class Beside:
+    """A process of one thread that does jobs one after the other, while this one works.
 
-    ``done`` is called whenever one of them yields, of those that are generators. Returns what each
-    of them returned. Raises what one of them raised.
+    It begins with the first job, and ends, busy or not, with :meth:`close`.
     """
-    (here, arguments), *others = jobs
-    with _processes(_do, others) as processes:
-        heard = [_Hearing(process, done) for process in processes]
-        answer = _last(here(*arguments), done)
-        answers = [hearing.answer() for hearing in heard]
-    for other in answers:
-        if isinstance(other, Exception):
-            raise other
-    return [answer, *answers]
+
+    def __init__(self) -> None:
+        self._process: Process | None = None
+        self._asking = ThreadPoolExecutor(1)
+
+    def begin(self, function: Callable[..., Any], *arguments: Any) -> Callable[[], Any]:
+        """Begin with a function; what is returned waits for its answer, and raises what it raised.
+
+        Raises :class:`MethodFailed` if the process is gone.
+        """
+        if self._process is None:
+            self._process = Process(one_thread=True)
+            self._process.tell(_do_each, ())
+        return self._asking.submit(_asked, self._process, function, arguments).result
+
+    def close(self) -> None:
+        """End it."""
+        process, self._process = self._process, None
+        if process is not None:
+            process.end()
+        self._asking.shutdown(cancel_futures=True)
 
 
-class _Hearing:
-    """Takes what a process says as it comes, also while this one works."""
+def share_out(
+    tasks: Sequence[Task], beside: Beside | None = None, done: Callable[[], None] = lambda: None
+) -> list[Any]:
+    """Do tasks, those from the beginning on here, those from the end on in a process ``beside``.
 
-    def __init__(self, process: Process, done: Callable[[], None]) -> None:
-        self._process, self._done = process, done
-        self._answer: Any = None
-        self._thread = threading.Thread(target=self._listen, daemon=True)
-        self._thread.start()
+    ``done`` is called whenever one is. Returns what each of them returned. Raises what one of them
+    raised; if that was one here, or Ctrl-C, the process beside ends as it is.
+    """
+    answers: list[Any] = [None] * len(tasks)
+    left = deque(range(len(tasks)))
 
-    def _listen(self) -> None:
+    def work(take: Callable[[], int], do: Callable[..., Any]) -> None:
+        while True:
+            try:
+                number = take()
+            except IndexError:
+                return
+            function, arguments = tasks[number]
+            answers[number] = do(function, *arguments)
+            done()
+
+    def here() -> None:
+        work(left.popleft, lambda function, *arguments: function(*arguments))
+
+    if beside is None:
+        here()
+        return answers
+    with ThreadPoolExecutor(1) as pool:
+        there = pool.submit(work, left.pop, lambda *task: beside.begin(*task)())
         try:
-            while isinstance(said := self._process.answer(), _Done):
-                self._done()
-            self._answer = said
-        except Exception as error:
-            self._answer = error
-
-    def answer(self) -> Any:
-        self._thread.join()
-        return self._answer
+            here()
+        except BaseException:
+            left.clear()
+            beside.close()
+            raise
+        there.result()
+    return answers
 
 
-class _Done:
-    """What a process says whenever its function yields."""
-
-
-def _last(work: Any, done: Callable[[], None]) -> Any:
-    """What a generator returns, ``done`` called whenever it yields; anything else as it is."""
-    while isinstance(work, Generator):
-        try:
-            next(work)
-        except StopIteration as end:
-            return end.value
-        done()
-    return work
+def _asked(process: Process, function: Callable[..., Any], arguments: tuple[Any, ...]) -> Any:
+    """What a process answers."""
+    process.tell(function, arguments)
+    answer = process.answer()
+    if isinstance(answer, Exception):
+        raise answer
+    return answer
 
 
 @contextmanager
@@ -251,18 +275,15 @@ def _serve(
             _write(answers, _attempt(answering, (method, *arguments)))
 
 
-def _do(
-    messages: SimpleQueue[bytes],
-    answers: IO[bytes],
-    function: Callable[..., Any],
-    arguments: tuple[Any, ...],
-) -> None:
-    """Run a function and answer once, with what it returned or raised; tell when it yields."""
+def _do_each(messages: SimpleQueue[bytes], answers: IO[bytes]) -> None:
+    """Run functions, one after the other, and answer with what each returned or raised."""
 
-    def run() -> Any:
-        return _last(function(*arguments), lambda: _write(answers, _Done()))
+    def run(message: bytes) -> Any:
+        function, arguments = pickle.loads(message)
+        return function(*arguments)
 
-    _write(answers, _attempt(run, ()))
+    while True:
+        _write(answers, _attempt(run, (messages.get(),)))
 
 
 def _attempt(function: Callable[..., Any], arguments: tuple[Any, ...]) -> Any:

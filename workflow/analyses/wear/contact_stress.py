@@ -10,12 +10,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, Literal
 
 import numpy as np
 
 from fe_models.elasticity import von_mises
 from sa_solver.subsurface import COMPONENTS
+from sa_solver.threads import at_once
 from sa_solver.ties import first_largest
 from sa_solver.types import Array, Material, Progress, Tally
 from wear.bulk_stress import BulkStress
@@ -193,7 +195,9 @@ def contact_stresses(
     unknown = [cycle.tractions.unknown for _, cycles in contacts for cycle in cycles]
     _report_stick(np.array(unknown), peak, reporter)
     done = Tally(progress, len(contacts) * len(MOMENTS) * len(case.strained))
-    stresses = [_interface_stress(case, peak, *contact, done) for contact in contacts]
+    stresses = at_once(
+        [partial(_interface_stress, case, peak, *contact, done) for contact in contacts]
+    )
     for stress, (_, cycles) in zip(stresses, contacts, strict=True):
         if cycles[0].faces is None:
             reporter.log(f"{stress.name}: the stress under it is that of its tractions alone")

@@ -14,7 +14,7 @@ from wear.coupled import KINETICS
 from wear.kinetics import LinearRegime
 from workflow.analyses.contact.datasets import LOADS, pressure_field, traction_fields
 from workflow.analyses.wear.body_stress import StressedCycle, with_known_shear
-from workflow.analyses.wear.budget.finding import error_budget
+from workflow.analyses.wear.budget.finding import error_budget, lives_of_companions
 from workflow.analyses.wear.budget.report import Budget, datasets_of, sentences, summary_of
 from workflow.analyses.wear.case.base import WearCase
 from workflow.analyses.wear.comparison import comparison_summary, write_comparison
@@ -83,6 +83,7 @@ def write_output(outcome: Outcome, run: Run[WearCase]) -> None:
     """Write all files of a finished run; the summary comes last and marks it as finished."""
     case, source, state = outcome.case, outcome.source, outcome.state
     folder, reporter = run.folder, run.reporter
+    lives = lives_of_companions(outcome, reporter, run.beside)
     stages = [contact.stage for contact in outcome.interfaces]
     structure = None
     if isinstance(source, StructureStage):
@@ -91,7 +92,7 @@ def write_output(outcome: Outcome, run: Run[WearCase]) -> None:
         structure.warn(case.accuracy, reporter)
     with reporter.stage("stress under the contacts", "steps") as told:
         stresses = _stresses(outcome, structure, reporter, told)
-    budget = error_budget(outcome, reporter)
+    budget = error_budget(outcome, reporter, lives)
     with reporter.stage("results"):
         recorded, contents = _write_results(outcome, structure, stresses, budget, run)
     run.draw(contents)

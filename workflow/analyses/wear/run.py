@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from fe_models.blas_threads import one_thread
 from fe_models.mesh import MeshError
 from sa_solver.normal import NormalContactError
 from wear.coupled import CoupledSettings, CoupledState, CoupledWear, JumpSize, Stop
@@ -50,7 +51,9 @@ def run_wear(run: Run[WearCase]) -> None:
     folder = run.folder
     report_choice(run.choice, run.reporter, again=run.resume)
     try:
-        write_output(_compute(run), run)
+        outcome = _compute(run)
+        with one_thread():
+            write_output(outcome, run)
     except (ContactFailure, NormalContactError, MethodFailed) as error:
         remedy = f"; the state is kept, see `{folder.resume_command}`"
         raise MethodFailed(f"{error}{remedy if folder.checkpoint.exists() else ''}") from error
@@ -74,19 +77,20 @@ def _compute(run: Run[WearCase]) -> Outcome:
     with contact_workers(case, faces if _worn_apart(case, source) else ()) as workers:
         with heard_stage(reporter, source, "condensation", "steps"):
             source.prepare()
-        with heard_stage(reporter, source, "structural friction", "increments"):
-            unworn = source.unworn()
-        if isinstance(source, StructureStage):
-            _check_structure(case, source, reporter)
-        if isinstance(source, ResultantsSource):
-            warn_of_file(source, reporter)
-        with reporter.stage("contact set-up"):
-            contacts = _contacts(case, source, faces, workers)
-        state, first = _march(run, source, contacts, unworn, kept)
-        worn: Sequence[CycleTractions | None] = contacts.each(None)
-        if case.stress.wanted:
-            with reporter.stage("stress under the contacts"):
-                worn = contacts.tractions(state.interfaces)
+        with one_thread():
+            with heard_stage(reporter, source, "structural friction", "increments"):
+                unworn = source.unworn()
+            if isinstance(source, StructureStage):
+                _check_structure(case, source, reporter)
+            if isinstance(source, ResultantsSource):
+                warn_of_file(source, reporter)
+            with reporter.stage("contact set-up"):
+                contacts = _contacts(case, source, faces, workers)
+            state, first = _march(run, source, contacts, unworn, kept)
+            worn: Sequence[CycleTractions | None] = contacts.each(None)
+            if case.stress.wanted:
+                with reporter.stage("stress under the contacts"):
+                    worn = contacts.tractions(state.interfaces)
     columns = contacts.stages, unworn, first, state.interfaces, worn
     interfaces = [
         InterfaceOutcome(*column, state.cycles, state.kinetics[:, number])

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Literal, Protocol, TypeVar
 
 import numpy as np
@@ -366,20 +366,35 @@ class StructureStage:
         peak: Array = self._amplitudes[self.peak]
         return peak
 
-    def stress(
+    def stresses(
         self,
-        mesh: StructureMesh,
-        solution: CycleSolution,
+        states: Mapping[str, tuple[StructureMesh, CycleSolution]],
         shown: Sequence[int] = (),
         done: Callable[[], None] = lambda: None,
-    ) -> CycleStress:
-        """Stress of both bodies on the unworn or the worn mesh: at peak load, and those ``shown``.
+    ) -> dict[str, CycleStress]:
+        """Stress of both bodies on unworn or worn meshes: at peak load, and in those ``shown``.
 
         Of the increments that are shown it is that of the surface. For ``done`` see
         :func:`fe_models.stress.cycle_stress`.
         """
-        worn = mesh is not self.mesh
-        structure = self._prestressed(self.model.structure(mesh)) if worn else self.structure
+        jobs = [
+            partial(self._stress, self._on(mesh), of, shown, done) for mesh, of in states.values()
+        ]
+        return dict(zip(states, self.structure.at_once(*jobs), strict=True))
+
+    def _on(self, mesh: StructureMesh) -> Structure:
+        """The structure on the unworn or the worn mesh."""
+        return (
+            self.structure if mesh is self.mesh else self._prestressed(self.model.structure(mesh))
+        )
+
+    def _stress(
+        self,
+        structure: Structure,
+        solution: CycleSolution,
+        shown: Sequence[int],
+        done: Callable[[], None],
+    ) -> CycleStress:
         fields = solution.fields()
         force, relative = fields["force"], fields["displacement"]
         return cycle_stress(structure, force, relative, self._amplitudes, self.peak, shown, done)

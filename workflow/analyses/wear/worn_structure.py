@@ -284,7 +284,7 @@ def worn_structure(
         done = Tally(told, 2 * STEPS)
         shown = shown_increments(len(cycle.fields()["force"]), stage.peak) if moves else []
         states = {"unworn": (stage.mesh, stage.unworn_cycle), "worn": (mesh, cycle)}
-        stresses = {moment: stage.stress(*of, shown, done) for moment, of in states.items()}
+        stresses = stage.stresses(states, shown, done)
     return WornStructure(stage, mesh, cycle, stresses, written, shown)
 
 

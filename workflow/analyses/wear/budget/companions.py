@@ -82,7 +82,7 @@ class Companions(Generic[AnyWearCase]):
 
     def errors(
         self,
-        source: LoadSource,
+        source: LoadSource | None,
         source_of: Callable[[AnyWearCase], LoadSource],
         followed: Array,
         failed: Callable[[str, Exception], None],
@@ -91,7 +91,8 @@ class Companions(Generic[AnyWearCase]):
         """Relative errors of what is worn and of pressures: by how much the run tells too much.
 
         What ``mesh``, ``grid`` and ``link`` leave, and under ``coupling`` loads that follow wear
-        after such shares of all cycles as ``followed`` has. ``source`` is that of the case itself.
+        after such shares of all cycles as ``followed`` has. ``source`` is that of the case itself,
+        not needed where another structure is in its place.
         Parts of which a life fails are left out and given to ``failed``; ``progress`` is told how
         many have been lived, that of ``own`` first. Raises :data:`LIFE_FAILURES` where that fails.
         """
@@ -106,12 +107,12 @@ class Companions(Generic[AnyWearCase]):
 
     def _parts(
         self,
-        source: LoadSource,
+        source: LoadSource | None,
         source_of: Callable[[AnyWearCase], LoadSource],
         followed: Array,
     ) -> dict[str, Callable[[], Worn]]:
         """What tells each part, once ``own`` has lived."""
-        shared = source if self.same else source_of(self.own)
+        shared = source if source is not None and self.same else source_of(self.own)
         # Where loads follow wear, what the mesh makes of it counts as well.
         follows = self.own.recoupling.resultants != "constant"
         kind: Literal["constant", "every"] = "every" if follows else "constant"

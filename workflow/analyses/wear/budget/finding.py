@@ -2,52 +2,92 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
 
+from sa_solver.threads import at_once
 from sa_solver.types import Array, Progress, unseen
 from workflow.analyses.wear.budget.companions import Companions
 from workflow.analyses.wear.budget.lives import LIFE_FAILURES, Worn
 from workflow.analyses.wear.budget.parts import Errors, errors_of
+from workflow.analyses.wear.case.base import WearCase
+from workflow.analyses.wear.load_source import LoadSource
 from workflow.analyses.wear.outcome import Outcome
+from workflow.analyses.wear.structure_stage import StructureStage
 from workflow.analyses.wear.structures import structure_of
+from workflow.shell.processes import Beside
 from workflow.shell.reporter import Reporter
 
 Lives = dict[str, Worn]  # by part
+Told = tuple[Lives, list[tuple[str, str]]]  # and the parts that failed, with why
+Begun = Callable[[Progress], Lives]
 
 
-def error_budget(outcome: Outcome, reporter: Reporter) -> dict[str, Errors]:
-    """Errors of the main results by interface, each by what leaves them."""
-    with reporter.stage("error budget", "short lives") as told:
-        lives = lives_of_companions(outcome, reporter, told)
-        return {
-            contact.stage.name: errors_of(
-                outcome.case,
-                contact,
-                outcome.source.peak,
-                {part: by_name[contact.stage.name] for part, by_name in lives.items()},
-            )
-            for contact in outcome.interfaces
-        }
+def error_budget(outcome: Outcome, reporter: Reporter, begun: Begun) -> dict[str, Errors]:
+    """Errors of the main results by interface, each by what leaves them.
+
+    ``begun`` are the lives of companions.
+    """
+    with reporter.stage("error budget", "short lives") as progress:
+        lives = begun(progress)
+        names = [contact.stage.name for contact in outcome.interfaces]
+        probed = [{part: by_name[name] for part, by_name in lives.items()} for name in names]
+        # Each solves the last cycle again, on the surfaces of other steps.
+        errors = at_once(
+            [
+                partial(errors_of, outcome.case, contact, outcome.source.peak, told)
+                for contact, told in zip(outcome.interfaces, probed, strict=True)
+            ]
+        )
+        return dict(zip(names, errors, strict=True))
 
 
-def lives_of_companions(outcome: Outcome, reporter: Reporter, progress: Progress = unseen) -> Lives:
-    """What companions tell; nothing where none are asked for, or of parts that fail."""
-    case = outcome.case
+def lives_of_companions(outcome: Outcome, reporter: Reporter, beside: Beside) -> Begun:
+    """What companions tell; nothing where none are asked for, or of parts that fail.
+
+    They begin to live at once, in a process beside this one, unless that would need a copy of a
+    large structure: then when they are asked.
+    """
+    case, source = outcome.case, outcome.source
     if case.error_budget == "known" or case.contact.method == "nodes":
-        return {}
-    structure, source = structure_of(case), outcome.source
-    companions: Companions[Any] = Companions.of(case, structure.finer(case), source.line)
+        return lambda _: {}
+    companions: Companions[Any] = Companions.of(case, structure_of(case).finer(case), source.line)
+
+    def heard(told: Told) -> Lives:
+        lives, failures = told
+        for part, error in failures:
+            reporter.log(f"error budget: {part} unknown, a short life failed: {error}")
+        return lives
+
+    of = case, companions, source if companions.same else None, followed(outcome)
+    if companions.same and not (source.line and isinstance(source, StructureStage)):
+        return lambda progress: heard(_lived(*of, progress))
+    answer = beside.begin(_lived, *of)
+    return lambda _: heard(answer())
+
+
+def _lived(
+    case: WearCase,
+    companions: Companions[Any],
+    source: LoadSource | None,
+    followed: Array,
+    progress: Progress = unseen,
+) -> Told:
+    """What companions tell of a case, whose own ``source`` those have that live on it."""
+    failures: list[tuple[str, str]] = []
 
     def failed(part: str, error: Exception) -> None:
-        reporter.log(f"error budget: {part} unknown, a short life failed: {error}")
+        failures.append((part, str(error)))
 
     try:
-        return companions.errors(source, structure.source, followed(outcome), failed, progress)
+        source_of = structure_of(case).source
+        return companions.errors(source, source_of, followed, failed, progress), failures
     except LIFE_FAILURES as error:
         failed("mesh, grid and coupling", error)
-        return {}
+        return {}, failures
 
 
 def followed(outcome: Outcome) -> Array:

@@ -1,0 +1,39 @@
+"""One thread of OpenBLAS for small matrices, and as many as before afterwards."""
+
+import numpy as np
+import pytest
+
+from fe_models import blas_threads
+from fe_models.blas_threads import SMALL, one_thread
+
+
+def _numbers() -> list[int]:
+    return [told() for _, told in blas_threads._openblas()]
+
+
+def test_one_thread_within_and_as_many_as_before_after():
+    before = _numbers()
+    if not before:
+        pytest.skip("NumPy and SciPy have no OpenBLAS of their own")
+    with one_thread(SMALL):
+        assert _numbers() == [1] * len(before)
+        with one_thread(), pytest.raises(np.linalg.LinAlgError):
+            np.linalg.inv(np.zeros((2, 2)))
+        assert _numbers() == [1] * len(before)
+    assert _numbers() == before
+
+
+def test_large_matrices_keep_all_threads():
+    before = _numbers()
+    with one_thread(SMALL + 1):
+        assert _numbers() == before
+
+
+def test_threads_are_set_and_told():
+    """That the calls do what their names say."""
+    for choose, told in blas_threads._openblas():
+        before = told()
+        choose(1)
+        assert told() == 1
+        choose(before)
+        assert told() == before

@@ -1,0 +1,47 @@
+"""Work in threads: as many as may work, answers in order, and what one of them raises."""
+
+import threading
+import time
+from functools import partial
+
+import pytest
+
+from sa_solver.threads import THREADS, at_once, threads
+
+
+def _after(seconds: float, value: int) -> int:
+    time.sleep(seconds)
+    return value
+
+
+def _fail() -> int:
+    raise ZeroDivisionError
+
+
+def test_answers_are_in_the_order_of_the_jobs(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv(THREADS, "2")
+    jobs = [partial(_after, 0.02 * (3 - n), n) for n in range(4)]
+    assert at_once(jobs) == [0, 1, 2, 3]
+
+
+def test_jobs_work_side_by_side_only_where_threads_may(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv(THREADS, "2")
+    assert threads() == 2
+    # Each waits for the other.
+    barrier = threading.Barrier(2, timeout=10.0)
+    assert sorted(at_once([barrier.wait, barrier.wait])) == [0, 1]
+    monkeypatch.setenv(THREADS, "1")
+    here = threading.get_ident()
+    assert at_once([threading.get_ident, threading.get_ident]) == [here, here]
+
+
+@pytest.mark.parametrize("allowed", ["1", "2"])
+def test_what_a_job_raises_is_raised_and_later_jobs_do_not_begin(
+    monkeypatch: pytest.MonkeyPatch, allowed: str
+) -> None:
+    monkeypatch.setenv(THREADS, allowed)
+    begun: list[int] = []
+    jobs = [_fail, *(partial(_after, 0.05, n) for n in range(2)), partial(begun.append, 1)]
+    with pytest.raises(ZeroDivisionError):
+        at_once(jobs)
+    assert begun == []
