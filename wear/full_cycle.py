@@ -7,7 +7,7 @@ imposed instead (:mod:`wear.drive`).
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -37,6 +37,7 @@ def march_cycle(
     drive: Drive | None = None,
     moved: Array | None = None,
     starts: Mapping[int, NormalStart] | None = None,
+    solved: Callable[[], None] = lambda: None,
 ) -> list[ContactState]:
     """States at the ends of the increments of one closed cycle, on surfaces that do not change.
 
@@ -47,7 +48,7 @@ def march_cycle(
     forces; without one all is forces. What the bodies' own deformation has ``moved``
     ``(t, 3, nx, ny)`` [mm] at the end of an increment lies along the surfaces in its first two
     components; the third is part of ``height``. ``starts`` are pressures near those of some
-    increments, by their number.
+    increments, by their number. ``solved`` is called after every increment, in every pass.
 
     Raises :class:`ContactFailure` where an increment does not converge, its load is more than the
     contact can carry, or the cycle does not repeat.
@@ -61,7 +62,8 @@ def march_cycle(
             pairs = zip(increments, moved[mission, :2], strict=True)
             increments = [replace(load, along=along) for load, along in pairs]
         begun = [ContactStart((starts or {}).get(t)) for t in range(mission.start, mission.stop)]
-        states += _closed_cycle(contact, heights[mission], increments, begun, mission.start)
+        first = mission.start
+        states += _closed_cycle(contact, heights[mission], increments, begun, first, solved)
     return states
 
 
@@ -71,6 +73,7 @@ def _closed_cycle(
     loads: list[ContactLoad],
     starts: list[ContactStart],
     first: int,
+    solved: Callable[[], None],
 ) -> list[ContactState]:
     """States of one closed cycle, whose first increment is number ``first`` of all."""
     # Bodies apart at the end are so at the beginning: what their surfaces have moved is the same.
@@ -86,8 +89,9 @@ def _closed_cycle(
         for t, (height, load, start) in enumerate(increments, first):
             state = _advance(contact, state, height, load, start, t)
             states.append(state)
+            solved()
         # Not shear: where bodies stick it would keep what the last search left of slip.
-        starts = [replace(solved.as_start, shear=None) for solved in states]
+        starts = [replace(ended.as_start, shear=None) for ended in states]
         limit = contact.friction * max(float(s.pressure.max()) for s in states)
         change = float(np.abs(state.shear - begun.shear).max())
         if apart or (passed > 1 and change <= CLOSED * limit):

@@ -201,6 +201,8 @@ class InterfaceContact:
         self._frictional: FrictionalContact | None = None
         self._spent = Spent()
         self._current: tuple[tuple[Array, ...], _Loaded] | None = None
+        # Called after each increment of a cycle of the half-space with its own friction.
+        self.solved: Callable[[], None] = lambda: None
 
     # -- wear ------------------------------------------------------------------------------------
     def begin(self, history: FaceLoads, cycles: float) -> tuple[InterfaceState, FirstContact]:
@@ -421,7 +423,7 @@ class InterfaceContact:
         gaps = np.stack([sliding.gap(state.surfaces, t) for t in range(len(state.loads))])
         contact = self.frictional(state.energy)
         drive, starts = self.settings.drive, state.starts
-        cycle = tuple(march_cycle(contact, gaps, state.loads, drive, moved, starts))
+        cycle = tuple(march_cycle(contact, gaps, state.loads, drive, moved, starts, self.solved))
         self._spent += Spent(len(cycle), sum(increment.convolutions for increment in cycle))
         return cycle
 

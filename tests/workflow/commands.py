@@ -50,10 +50,14 @@ def sent(message: Any) -> Any:
 class InThisProcess:
     """Stands for the workers of a run: they answer one after the other, here."""
 
-    def __init__(self, answering: list[Callable[..., Any]]) -> None:
-        self._answering = answering
+    def __init__(self, make: Callable[..., Callable[..., Any]], settings: Sequence[Any]) -> None:
+        self.done: Callable[[], None] = lambda: None
+        self._answering = [make(sent(setting), lambda: self.done()) for setting in settings]
 
-    def call(self, method: str, *arguments: Sequence[Any]) -> list[Any]:
+    def call(
+        self, method: str, *arguments: Sequence[Any], done: Callable[[], None] | None = None
+    ) -> list[Any]:
+        self.done = done or (lambda: None)
         shares = sent(list(zip(*arguments, strict=True)))
         return [
             sent(answer(method, *share))
@@ -63,9 +67,9 @@ class InThisProcess:
 
 @contextmanager
 def _workers(
-    make: Callable[[Any], Callable[..., Any]], settings: Sequence[Any]
+    make: Callable[..., Callable[..., Any]], settings: Sequence[Any]
 ) -> Iterator[InThisProcess]:
-    yield InThisProcess([make(sent(setting)) for setting in settings])
+    yield InThisProcess(make, settings)
 
 
 class _BesideHere:

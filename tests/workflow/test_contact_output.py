@@ -107,7 +107,7 @@ def outcome():
     forces = table["Qx"].tolist()
     states = [mindlin_state(forces[: k + 1]) for k in range(len(table))]
     height, strain = (GRID.x**2 + GRID.y**2) / 20.0, np.zeros(len(table))
-    return ContactOutcome(case, GRID, height, table, strain, history(states))
+    return ContactOutcome(case, GRID, height, table, strain, history(states), 40)
 
 
 @pytest.fixture(scope="module")
@@ -325,7 +325,8 @@ def test_line_has_no_maps_and_is_a_line(tmp_path):
     states = [state((pressure * k, 0 * pressure), [1.0, k, 0, 0, 0, 0], [0, k, 0, 0, 0, 0.0],
                     grid=grid, pressure=pressure) for k in (0.0, 0.5, -0.5)]  # fmt: skip
     table = case.load_path.table()
-    outcome = ContactOutcome(case, grid, grid.x**2, table, np.zeros(len(table)), history(states))
+    strain = np.zeros(len(table))
+    outcome = ContactOutcome(case, grid, grid.x**2, table, strain, history(states), 40)
     folder = OutputFolder(tmp_path / "out")
     folder.claim(case, force=False, resumable=False)
     write_contact_results(outcome, SimpleNamespace(kind="line", folder=folder))

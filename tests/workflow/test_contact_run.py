@@ -1,6 +1,7 @@
 """Contact cases from the command line: what they leave, how they fail, and what they reproduce."""
 
 import json
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -143,6 +144,12 @@ def test_unlike_bodies_pressed_in_one_increment_are_followed_or_warned_of(tmp_pa
     assert split["warnings"] == []
     assert split["history"]["parts"] > 4
     assert split["history"]["error"] <= 0.02
+    # Passes that were too coarse count too, though their states are not kept.
+    kept = [sum(state["convolutions"] for state in found["states"]) for found in summaries]
+    assert split["convolutions"] > 1.2 * kept[0]
+    logged = re.findall(r"(\d+) convolutions", (tmp_path / "auto" / "run.log").read_text())
+    assert split["convolutions"] == sum(map(int, logged[:-1])) == int(logged[-1])
+    assert given["convolutions"] > kept[1]
     assert "shear within" in done.output
     radii = [found["states"][0]["stick_radius"] for found in summaries]
     assert radii[1] < 0.7 * radii[0]

@@ -303,6 +303,29 @@ def test_worker_that_dies_is_one_line():
         workers._answers(processes)
 
 
+def stepwise(to, done):
+    """A worker that counts up to a number from where it was left, and says so."""
+    steps = iter(range(to))
+
+    def answer(method, count):
+        assert method == "count"
+        for _ in range(count):
+            next(steps)
+            done()
+        return count
+
+    return answer
+
+
+def test_workers_tell_what_they_have_done_before_they_answer():
+    told = []
+    with workers.workers(stepwise, [5, 3]) as team:
+        assert team.call("count", [2, 3], done=lambda: told.append(1)) == [2, 3]
+        assert len(told) == 5
+        assert team.call("count", [3, 0]) == [3, 0]
+    assert len(told) == 5
+
+
 @posix_only
 def test_worker_killed_before_its_first_word_is_one_line(monkeypatch):
     """It ends while it is told what to do: a large setting does not go into the pipe at once."""

@@ -367,7 +367,7 @@ class TestCase:
     def test_shipped_cases_are_checked(self, name):
         result = invoke("check", CASES / f"{name}.yaml")
         assert result.exit_code == 0
-        assert "pad 1 x 1 mm of 121 nodes" in result.stdout
+        assert "pads of 1 x 1 mm with 121 nodes" in result.stdout
 
     @pytest.mark.parametrize(
         ("override", "message"),

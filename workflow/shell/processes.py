@@ -35,6 +35,13 @@ Task = tuple[Callable[..., Any], tuple[Any, ...]]
 Answering = Callable[..., Any]
 """What a worker is: given a method's name and its arguments, it answers."""
 
+Done = Callable[[], None]
+"""Called whenever a part of longer work is done, from any thread."""
+
+
+def _unheard() -> None:
+    """Nobody wants to know."""
+
 
 class Process:
     """A process of ours, from the side of its parent; of ``one_thread`` if so."""
@@ -77,23 +84,24 @@ class Workers:
     def __init__(self, processes: list[Process]) -> None:
         self._processes = processes
 
-    def call(self, method: str, *arguments: Sequence[Any]) -> list[Any]:
+    def call(self, method: str, *arguments: Sequence[Any], done: Done = _unheard) -> list[Any]:
         """Call a method of every worker, each with its own share of the ``arguments``.
 
-        Raises what one of them raised, once all have answered; :class:`MethodFailed` if one is
-        gone.
+        ``done`` is called whenever one of them says that something is done. Raises what one of them
+        raised, once all have answered; :class:`MethodFailed` if one is gone.
         """
         shares = zip(*arguments, strict=True)
         for process, share in zip(self._processes, shares, strict=True):
             process.tell(method, share)
-        return _answers(self._processes)
+        return _answers(self._processes, done)
 
 
 @contextmanager
-def workers(make: Callable[[Any], Answering], settings: Sequence[Any]) -> Iterator[Workers]:
+def workers(make: Callable[[Any, Done], Answering], settings: Sequence[Any]) -> Iterator[Workers]:
     """Start a worker of one thread for each of the ``settings``, and end them all at the end.
 
-    What ``make`` makes of them lives in the worker.
+    What ``make`` makes of them lives in the worker; it says by the second argument of ``make`` that
+    something is done.
     """
     with _processes(
         _serve, [(make, setting) for setting in settings], one_thread=True
@@ -194,9 +202,41 @@ def _processes(
             process.end()
 
 
-def _answers(processes: list[Process]) -> list[Any]:
+class _Done:
+    """What a process says whenever a part of its work is done."""
+
+
+class _Hearing:
+    """Takes what a process says as it comes, whatever others say meanwhile."""
+
+    def __init__(self, process: Process, done: Done) -> None:
+        self._process, self._done = process, done
+        self._answer: Any = None
+        self._gone: Exception | None = None
+        # No thread of a pool: Ctrl-C does not wait for it.
+        self._thread = threading.Thread(target=self._listen, daemon=True)
+        self._thread.start()
+
+    def _listen(self) -> None:
+        try:
+            while isinstance(said := self._process.answer(), _Done):
+                self._done()
+            self._answer = said
+        except Exception as error:
+            self._gone = error
+
+    def answer(self) -> Any:
+        """Its answer, once it is there."""
+        self._thread.join()
+        if self._gone is not None:
+            raise self._gone
+        return self._answer
+
+
+def _answers(processes: list[Process], done: Done = _unheard) -> list[Any]:
     """An answer from every process; raises the first that is an exception."""
-    answers = [process.answer() for process in processes]
+    hearings = [_Hearing(process, done) for process in processes]
+    answers = [hearing.answer() for hearing in hearings]
     for answer in answers:
         if isinstance(answer, Exception):
             raise answer
@@ -262,11 +302,11 @@ def _listen(messages: SimpleQueue[bytes]) -> None:
 def _serve(
     messages: SimpleQueue[bytes],
     answers: IO[bytes],
-    make: Callable[[Any], Answering],
+    make: Callable[[Any, Done], Answering],
     settings: Any,
 ) -> None:
-    """Answer calls, one after the other."""
-    answering = _attempt(make, (settings,))
+    """Answer calls, one after the other, and tell what of them is done."""
+    answering = _attempt(make, (settings, lambda: _write(answers, _Done())))
     while True:
         method, arguments = pickle.loads(messages.get())
         if isinstance(answering, Exception):

@@ -40,7 +40,8 @@ class ContactOutcome:
     """Everything a contact run found.
 
     ``height`` ``(nx, ny)`` is the gap before loading [mm]; ``strain`` ``(n,)`` that of body 2 less
-    that of body 1 by bulk stress.
+    that of body 1 by bulk stress. ``convolutions`` are those of all solves, also of passes over the
+    path that were too coarse to be kept.
     """
 
     case: BodiesCase
@@ -49,6 +50,7 @@ class ContactOutcome:
     table: LoadTable
     strain: Array
     history: History
+    convolutions: int
 
 
 def write_contact_output(outcome: ContactOutcome, run: ContactRun) -> None:
@@ -122,7 +124,7 @@ def _summary(outcome: ContactOutcome) -> dict[str, Any]:
         },
         "states": state_summaries(grid, friction, history),
         "loop": loop_summary(grid, friction, outcome.table, history, outcome.strain),
-        "convolutions": sum(state.convolutions for state in history.states),
+        "convolutions": outcome.convolutions,
     }
 
 

@@ -49,12 +49,14 @@ def _march(
     height, half_space = case.structure.gap_on(grid), half_space_of(case, grid)
     strain = bulk_strain(table, bodies_of(case))
     passed: dict[int, ContactState] = {}
+    spent: list[int] = []
     with reporter.course("contact"), reporter.stage("contact"):
 
         def keep(row: int, state: ContactState, share: float) -> None:
             if row in passed:
                 passed.clear()  # the path is followed anew, in shorter increments
             passed[row] = state
+            spent.append(state.convolutions)
             reporter.reached(share, f"increment {row + 1} of {len(table)}")
             reporter.log(
                 f"increment {row + 1}: residual {state.residual:.1e}, "
@@ -82,7 +84,7 @@ def _march(
             last, row = history.states[-1], history.indices[-1] + 1
             message = f"increment {row} of {len(table)} did not converge: {last.message}"
             message = "" if last.converged else message
-    return ContactOutcome(case, grid, height, table, strain, history), message
+    return ContactOutcome(case, grid, height, table, strain, history, sum(spent)), message
 
 
 def _check_grid(outcome: ContactOutcome, reporter: Reporter) -> None:

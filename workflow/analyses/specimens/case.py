@@ -235,7 +235,8 @@ class SpecimensCase(Case):
         shape = "flat"
         if form is not None:
             shape = f"radii {plain(form.along, 'mm')} and {plain(form.across, 'mm')}"
-        forces = ", ".join(f"{force:g}" for force in self.load_path.normal_forces)
+        loads = self.load_path.normal_forces
+        forces, several = ", ".join(f"{force:g}" for force in loads), len(loads) > 1
         nodes = (self.mesh.pad_elements + 1) ** 2
         end = (
             f"{times(wear.cycles)} cycles" if wear.cycles else f"{1e-3 * (wear.energy or 0.0):g} J"
@@ -244,15 +245,15 @@ class SpecimensCase(Case):
         block = (
             f"{shares(fraction)} of their limit" if cycles is None else f"{times(cycles)} cycles"
         )
-        cells = " x ".join(map(str, self.contact.grid))
+        cells, stroke = " x ".join(map(str, self.contact.grid)), plain(self.load_path.stroke, "mm")
         return [
-            ("structure", f"specimens, pad {pad:g} x {pad:g} mm of {nodes} nodes, {shape}"),
-            ("load path", f"{forces} N in turn, stroke {plain(self.load_path.stroke, 'mm')}"),
+            ("structure", f"pads of {pad:g} x {pad:g} mm with {nodes} nodes, {shape}"),
+            ("load path", f"{forces} N{' in turn' * several}, stroke {stroke}"),
             *of_bodies("material", self.materials),
             ("friction", f"{self.friction.coefficient:g}"),
             ("contact", f"reduced specimens; beside them {cells} cells on a half-space"),
             *wearing({"body_1": wear.body_1, "body_2": wear.body_2}),
-            ("wear", f"{end} each, in cycle blocks of {block}"),
+            ("wear", f"{end}{' each' * several}, in cycle blocks of {block}"),
         ]
 
     def doubts(self) -> Iterator[str]:

@@ -166,6 +166,7 @@ def _blocks(
         else ExplicitStepper(cycles=step.cycles)
     )
     fretted = FrettedPair(model.pair, case.laws, conditions, steps)
+    reporter.doing(f"{conditions.force:g} N: the unworn cycle")
     states = wear_in_cycle_blocks(fretted, model.face.gap, stepper, partial(_to_go, case))
     for number, state in enumerate(states):
         _check(state, number, conditions, case)

@@ -195,11 +195,11 @@ def _loop(group: h5py.Group) -> tuple[Array, Array]:
 
 
 def _draw_pair(axis: Axes, place: Array, history: h5py.Group, curves: Sequence[Curve]) -> None:
-    """Two curves on one panel, each on its own scale."""
+    """Two curves on one panel, each on its own scale; where they lie on each other, both show."""
     right = axis.twinx()
-    sides = zip((axis, right), curves, (BLUE, ORANGE), strict=True)
-    for side, (name, scale, label), colour in sides:
-        side.plot(place, scale * history[name][()], "o-", color=colour)
+    sides = zip((axis, right), curves, (("o-", BLUE), ("s:", ORANGE)), strict=True)
+    for side, (name, scale, label), (line, colour) in sides:
+        side.plot(place, scale * history[name][()], line, color=colour, fillstyle="none")
         side.set_ylabel(label, color=colour)
     right.grid(visible=False)
     right.xaxis.set_visible(False)

@@ -2,19 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from contextlib import AbstractContextManager
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from functools import partial
 from typing import Any
 
+from sa_solver.types import Progress, Tally, unseen
 from wear.coupled import Contacts, CoupledState
-from wear.interface import InterfaceState
+from wear.face_loads import FaceLoads
+from wear.interface import FirstContact, InterfaceState
 from wear.tractions import ContactFields, CycleTractions
+from wear.worn import Spent
 from workflow.analyses.wear.case.base import WearCase
 from workflow.analyses.wear.contact_loops import WornLoop
 from workflow.analyses.wear.contact_stage import ContactStage
 from workflow.analyses.wear.load_source import ContactFace
-from workflow.shell.processes import Workers, workers
+from workflow.shell.processes import Done, Workers, workers
+
+# Increments with friction of the first jump over those of the first cycle, as far as that is known
+# beforehand: implicit steps march the cycle on the surfaces they lead to; later jumps, which know
+# what steps of twice the length leave, on those of these too.
+FIRST_JUMP = 2
 
 
 def contact_workers(
@@ -24,9 +32,11 @@ def contact_workers(
     return workers(partial(_worker, case), faces)
 
 
-def _worker(case: WearCase, face: ContactFace) -> Callable[..., Any]:
-    """What answers for one contact, made where it is to live."""
-    contacts = Contacts([ContactStage(case, face)])
+def _worker(case: WearCase, face: ContactFace, solved: Done) -> Callable[..., Any]:
+    """What answers for one contact, made where it is to live; ``solved`` is told of increments."""
+    stage = ContactStage(case, face)
+    stage.solved = solved
+    contacts = Contacts([stage])
 
     def answer(method: str, *arguments: Any) -> Any:
         (result,) = contacts.call(method, *([argument] for argument in arguments))
@@ -41,6 +51,10 @@ class StagedContacts(Contacts):
     def __init__(self, stages: list[ContactStage]) -> None:
         super().__init__(stages)
         self.stages = stages
+
+    def heard(self, progress: Progress) -> AbstractContextManager[object]:
+        """Within it ``progress`` is told of increments; here nothing takes long."""
+        return nullcontext()
 
     def restored(self, state: CoupledState) -> CoupledState:
         """A state that was kept on the disk, with what had not to be."""
@@ -68,7 +82,42 @@ class ContactProcesses(StagedContacts):
 
     def __init__(self, stages: list[ContactStage], team: Workers) -> None:
         super().__init__(stages)
-        self._team = team
+        self._team, self._expected = team, 1
+        self._progress: Progress = unseen
+
+    @contextmanager
+    def heard(self, progress: Progress) -> Iterator[None]:
+        """Within it ``progress`` is told of increments with friction, and how many to expect."""
+        self._progress = progress
+        try:
+            yield
+        finally:
+            self._progress = unseen
+
+    def begin(
+        self, histories: Sequence[FaceLoads], cycles: float
+    ) -> list[tuple[InterfaceState, FirstContact]]:
+        self._expected = sum(len(history.loads) for history in histories)
+        begun = self._counted("begin", histories, self.each(cycles))
+        self._expected *= FIRST_JUMP
+        return begun
+
+    def jump(
+        self, states: Sequence[InterfaceState], cycles: float, left: float
+    ) -> list[tuple[InterfaceState, Spent]]:
+        return self._counted("jump", states, self.each(cycles), self.each(left))
 
     def call(self, method: str, *arguments: Sequence[Any]) -> list[Any]:
         return self._team.call(method, *arguments)
+
+    def _counted(self, method: str, *arguments: Sequence[Any]) -> list[Any]:
+        """What they answer; the next jump is expected to take as many increments as this did."""
+        progress = self._progress
+
+        def told(done: int, expected: int) -> None:
+            progress(done, max(done, expected))
+
+        solved = Tally(told, self._expected)
+        answers = self._team.call(method, *arguments, done=solved)
+        self._expected = max(solved.done, 1)
+        return answers

@@ -6,7 +6,7 @@ The coupled loop (:mod:`wear.coupled`) knows nothing of them.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from contextlib import AbstractContextManager, ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 
 from sa_solver.types import Array
@@ -14,7 +14,6 @@ from wear.coupled import CoupledSettings, CoupledState, Observer, Stage
 from workflow.analyses.wear import checkpoint
 from workflow.analyses.wear.case.base import WearCase
 from workflow.analyses.wear.contact_loops import kept_loops, loops_due
-from workflow.analyses.wear.contact_stage import ContactStage
 from workflow.analyses.wear.contact_workers import StagedContacts
 from workflow.analyses.wear.load_source import LoadSource
 from workflow.analyses.wear.structure_stage import StructureStage
@@ -42,22 +41,26 @@ class RunLog(Observer):
     """Times the parts of the loop, and says how far it has got and what to beware of."""
 
     run: Run[WearCase]
-    stages: list[ContactStage]
+    contacts: StagedContacts
     source: LoadSource
 
-    def stage(self, name: Stage) -> AbstractContextManager[object]:
+    @contextmanager
+    def stage(self, name: Stage) -> Iterator[None]:
         if name == "structural friction":
-            return heard_stage(self.run.reporter, self.source, name, "increments")
-        return self.run.reporter.stage(name)
+            with heard_stage(self.run.reporter, self.source, name, "increments"):
+                yield
+            return
+        with self.run.reporter.stage(name, "increments") as told, self.contacts.heard(told):
+            yield
 
     def jumping(self, state: CoupledState, cycles: float) -> None:
         step = self.run.case.wear.step
         if step.kind == "explicit" and step.fraction is None:
-            warn_of_instability(self.stages, state, cycles, self.run.reporter)
+            warn_of_instability(self.contacts.stages, state, cycles, self.run.reporter)
 
     def jumped(self, before: CoupledState, after: CoupledState) -> None:
         if self.run.case.contact.method != "nodes":
-            warn_of_growth(self.stages, after, self.run.reporter)
+            warn_of_growth(self.contacts.stages, after, self.run.reporter)
         drift, spent = after.drift[-1], after.spent - before.spent
         if after.solutions > before.solutions:
             self.run.reporter.log(f"drift {drift:.2%}: loads computed again")

@@ -129,7 +129,7 @@ def _march(
     case, reporter, settings = run.case, run.reporter, coupled_settings(run.case)
     jumps = list(run.kept.jumps) if run.kept else []
     recorder = Recorder(run, settings, source.peak, contacts, jumps)
-    loop = CoupledWear(settings, source, contacts, (RunLog(run, contacts.stages, source), recorder))
+    loop = CoupledWear(settings, source, contacts, (RunLog(run, contacts, source), recorder))
     state, first = loop.begin(unworn)
     warn_of_contact(case, source.peak, contacts.stages, state, first, reporter)
     end = contacts.restored(kept) if kept else state
