@@ -90,7 +90,7 @@ def test_check_refuses_what_the_memory_cannot_hold_as_run_does(dovetail_path):
         ("dovetail", "implicit steps, for an error of 1 % of the depth"),
         ("mesh", "22 increments in 2 legs"),
         ("resultants", "loads in 3-D from loads.csv, without slip"),
-        ("specimens", "pad 1 x 1 mm of 121 nodes, flat"),
+        ("specimens", "pads of 1 x 1 mm with 121 nodes, flat"),
         ("bodies_wear", "50 N, stroke 20 µm in 8 increments"),
         ("line_wear", "50 N/mm, stroke 20 µm in 8 increments"),
         ("bodies", "128 x 128 cells of 7.812 µm x 7.812 µm, history auto"),
