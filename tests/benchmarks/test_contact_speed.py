@@ -36,7 +36,7 @@ WORN = 0.02
 # Allowed: convolutions cold and warm; iterations, and time over that of alike bodies.
 ROUGH, UNLIKE, RATIO = (60, 25), 110, 25.0
 # Of 2048 x 2048 cells: convolutions and memory [GB].
-LARGEST, LARGEST_MEMORY = 16, 6.0
+LARGEST, LARGEST_MEMORY = 20, 6.0
 FIRST = 0.6  # seconds of the first solve
 
 
@@ -137,17 +137,25 @@ def test_the_first_solve(record: dict[str, float]) -> None:
 
 
 def largest_grid() -> dict[str, float]:
-    """Convolutions, seconds and peak memory [GB] of a sphere on 2048²."""
+    """A sphere on 2048²: convolutions to 1e-6 and 1e-8, seconds of these, and peak memory [GB]."""
     half_space, height, load = sphere(2048, ALIKE)
+    contact = NormalContact(half_space)
+    rough = contact.solve(height, load, tolerance=1e-6)
     begin = time.process_time()
-    state = NormalContact(half_space).solve(height, load)
+    state = contact.solve(height, load)
     seconds = time.process_time() - begin
     memory = 1024e-9 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    return {"convolutions": state.convolutions, "seconds": seconds, "memory": memory}
+    return {
+        "rough": rough.convolutions,
+        "convolutions": state.convolutions,
+        "seconds": seconds,
+        "memory": memory,
+    }
 
 
 def test_a_large_grid(record: dict[str, float]) -> None:
     found = in_a_process("largest_grid")
+    record["normal contact, 2048², residual 1e-6: convolutions"] = found["rough"]
     record["normal contact, 2048²: convolutions"] = found["convolutions"]
     record["normal contact, 2048²: processor seconds"] = found["seconds"]
     record["normal contact, 2048²: memory of the process [GB]"] = found["memory"]

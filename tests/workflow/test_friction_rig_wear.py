@@ -262,7 +262,15 @@ def summary(ended):
     return json.loads(ended.summary.read_text(encoding="utf-8"))
 
 
-def test_wear_closes_the_pad_and_raises_its_resonances(summary):
+def stuck_slope(ended):
+    """Largest slope of the unworn loop, between neighbouring samples of which both have stuck."""
+    with h5py.File(ended.results) as file:
+        loop = file["worn/00000/loop"]
+        moved, pulled = (np.diff(loop[name][()]) for name in ("displacement", "force"))
+    return np.max(pulled / moved)
+
+
+def test_wear_closes_the_pad_and_raises_its_resonances(ended, summary):
     assert summary["warnings"] == []
     # 1500 µm³/J of both bodies.
     assert summary["volume_per_energy"] == pytest.approx(3e-9, rel=ROUNDING)
@@ -272,6 +280,8 @@ def test_wear_closes_the_pad_and_raises_its_resonances(summary):
     assert (first["cycles"], last["cycles"]) == (0.0, 5e5)
     assert last["stuck"][0] > 1.03 * first["stuck"][0]
     assert last["stiffness"] > first["stiffness"]
+    # Nothing wears yet: the stuck part of the loop has the slope of all that touches.
+    assert first["stiffness"] == pytest.approx(stuck_slope(ended), rel=0.02)
     # Under a small force the resonance is near the stuck one, and moves along with it.
     for state in (first, last):
         assert state["responses"][0]["resonance"] == pytest.approx(state["stuck"][0], rel=0.1)

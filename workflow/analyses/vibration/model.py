@@ -153,12 +153,28 @@ class VibrationModel:
         }
 
     def _limits(self, frequency: Array) -> Array:
-        """Amplitudes over force ``(2, f)`` [mm/N], joints free and stuck.
+        """Amplitudes over force ``(2, f)`` [mm/N], joints free and stuck."""
+        seen = self.rig.seen[-1] @ self.problem.receptance.at_points
+        moved, held, _ = self._moved(frequency)
+        return np.abs(np.array([moved @ seen, held @ seen]))
 
-        Stuck joints pull with k u, u = (1 + R k)⁻¹ u_free.
+    def stuck_slope(self, frequency: float) -> float:
+        """Slope [N/mm] of the loop of all joints together, had all that touch at rest stuck.
+
+        Their force along it over what opens between the targets, in a rig that has these; the part
+        in phase, where damping leaves another.
+        """
+        assert self.rig.stretch is not None
+        _, held, pulled = self._moved(np.array([frequency]))
+        along = pulled.reshape(self.rig.joints, self.rig.directions)[:, self.rig.along]
+        opened = held[0] @ (self.rig.stretch @ self.problem.receptance.at_points)
+        return float((along.sum() / opened).real)
+
+    def _moved(self, frequency: Array) -> tuple[Array, Array, Array]:
+        """Motion of all points under a force of 1 N ``(f, n)``, joints free, and stuck, and the
+        forces of these ``(f, m)``: k u, with u = (1 + R k)⁻¹ u_free.
         """
         receptance: Receptance = self.problem.receptance
-        seen = self.rig.seen[-1] @ receptance.at_points
         steady = receptance.at(2.0 * np.pi * frequency)
         force = self.rig.driven @ receptance.at_points
         moved = steady.respond(np.broadcast_to(force, (len(frequency), len(force))) + 0j)
@@ -166,8 +182,8 @@ class VibrationModel:
         free = moved @ receptance.at_joints.T
         coupled = np.eye(len(tangent)) + steady.between_joints() @ tangent
         stuck = np.linalg.solve(coupled, free[..., None])[..., 0]
-        held = moved - steady.respond(stuck @ tangent.T @ receptance.at_joints)
-        return np.abs(np.array([moved @ seen, held @ seen]))
+        pulled = stuck @ tangent.T
+        return moved, moved - steady.respond(pulled @ receptance.at_joints), pulled
 
 
 def _law(case: VibrationCase, rig: RigModel) -> Law:

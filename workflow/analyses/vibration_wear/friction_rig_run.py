@@ -79,7 +79,7 @@ def _worn_state(
     cycles, taken = reached
     loop = loop_of(cycle.model, cycle.motion, case.joint.normal_load)
     error, responses = responses_to_all(case, cycle.model, cycle.motion, reporter, steps)
-    depth, slope = state.surfaces.depth, loop.numbers["stiffness"]
+    depth = state.surfaces.depth
     numbers: dict[str, Any] = {
         "cycles": cycles,
         "steps": taken,
@@ -88,8 +88,8 @@ def _worn_state(
         "depth": float(depth.max()),
         "step_error": step_error(state, cycle.areas),
         "friction": float(np.max(cycle.law.friction)),
-        # None where no increment of the loop sticks.
-        "stiffness": np.nan if slope is None else slope,
+        # Not of the loop: nodes that hardly touch slip at once, and it may never stick as a whole.
+        "stiffness": cycle.model.stuck_slope(cycle.motion.frequency),
         "stroke": loop.numbers["stroke"],
         "energy_per_cycle": float(cycle.energy.sum()),
         "error": error,

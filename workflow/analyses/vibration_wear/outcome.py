@@ -84,7 +84,10 @@ class VibrationWearOutcome:
             "peak_pressure": ("MPa", "at rest"),
             "step_error": ("1", "that wear steps leave of depth or volume, the larger"),
             "friction": ("1", "coefficient"),
-            "stiffness": ("N/mm", "of the stuck contact; between targets, that of the loop"),
+            "stiffness": (
+                "N/mm",
+                "of all that touches, stuck; of pads between the targets",
+            ),
             "full_slip": ("mm", "motion of the joint from rest at which all of it slides"),
             "stroke": ("mm", "of the joint from end to end, under the force that wears"),
             "energy_per_cycle": ("N mm", "under the force that wears"),
