@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import AbstractContextManager, contextmanager, nullcontext
+from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager
 from functools import partial
 from typing import Any
 
-from sa_solver.types import Progress, Tally, unseen
+from sa_solver.types import Tally
 from wear.coupled import Contacts, CoupledState
 from wear.face_loads import FaceLoads
 from wear.interface import FirstContact, InterfaceState
@@ -16,6 +16,7 @@ from wear.worn import Spent
 from workflow.analyses.wear.case.base import WearCase
 from workflow.analyses.wear.contact_loops import WornLoop
 from workflow.analyses.wear.contact_stage import ContactStage
+from workflow.analyses.wear.heard import Heard
 from workflow.analyses.wear.load_source import ContactFace
 from workflow.shell.processes import Done, Workers, workers
 
@@ -45,16 +46,15 @@ def _worker(case: WearCase, face: ContactFace, solved: Done) -> Callable[..., An
     return answer
 
 
-class StagedContacts(Contacts):
-    """The contacts of all faces of a case, as ``stages`` describe them."""
+class StagedContacts(Heard, Contacts):
+    """The contacts of all faces of a case, as ``stages`` describe them.
+
+    Those in processes are heard: of increments with friction, and how many to expect.
+    """
 
     def __init__(self, stages: list[ContactStage]) -> None:
         super().__init__(stages)
         self.stages = stages
-
-    def heard(self, progress: Progress) -> AbstractContextManager[object]:
-        """Within it ``progress`` is told of increments; here nothing takes long."""
-        return nullcontext()
 
     def restored(self, state: CoupledState) -> CoupledState:
         """A state that was kept on the disk, with what had not to be."""
@@ -83,16 +83,6 @@ class ContactProcesses(StagedContacts):
     def __init__(self, stages: list[ContactStage], team: Workers) -> None:
         super().__init__(stages)
         self._team, self._expected = team, 1
-        self._progress: Progress = unseen
-
-    @contextmanager
-    def heard(self, progress: Progress) -> Iterator[None]:
-        """Within it ``progress`` is told of increments with friction, and how many to expect."""
-        self._progress = progress
-        try:
-            yield
-        finally:
-            self._progress = unseen
 
     def begin(
         self, histories: Sequence[FaceLoads], cycles: float

@@ -6,7 +6,7 @@ The coupled loop (:mod:`wear.coupled`) knows nothing of them.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import AbstractContextManager, ExitStack, contextmanager
 from dataclasses import dataclass
 
 from sa_solver.types import Array
@@ -15,8 +15,8 @@ from workflow.analyses.wear import checkpoint
 from workflow.analyses.wear.case.base import WearCase
 from workflow.analyses.wear.contact_loops import kept_loops, loops_due
 from workflow.analyses.wear.contact_workers import StagedContacts
+from workflow.analyses.wear.heard import Heard
 from workflow.analyses.wear.load_source import LoadSource
-from workflow.analyses.wear.structure_stage import StructureStage
 from workflow.analyses.wear.warnings import warn_of_growth, warn_of_instability
 from workflow.case.plain import counted
 from workflow.shell.analysis import Run
@@ -25,14 +25,14 @@ from workflow.shell.store import write_arrays
 
 
 @contextmanager
-def heard_stage(reporter: Reporter, source: LoadSource, name: str, of: str) -> Iterator[None]:
-    """A stage in which a structure of ours tells how many ``of`` its things are done.
+def heard_stage(reporter: Reporter, working: object, name: str, of: str) -> Iterator[None]:
+    """A stage in which what is ``working`` tells how many ``of`` its things are done.
 
-    Of other sources nothing takes long.
+    Of what cannot be heard, as other sources of loads, nothing takes long.
     """
     with reporter.stage(name, of) as told, ExitStack() as stack:
-        if isinstance(source, StructureStage):
-            stack.enter_context(source.heard(told))
+        if isinstance(working, Heard):
+            stack.enter_context(working.heard(told))
         yield
 
 
@@ -44,14 +44,9 @@ class RunLog(Observer):
     contacts: StagedContacts
     source: LoadSource
 
-    @contextmanager
-    def stage(self, name: Stage) -> Iterator[None]:
-        if name == "structural friction":
-            with heard_stage(self.run.reporter, self.source, name, "increments"):
-                yield
-            return
-        with self.run.reporter.stage(name, "increments") as told, self.contacts.heard(told):
-            yield
+    def stage(self, name: Stage) -> AbstractContextManager[object]:
+        working = self.source if name == "structural friction" else self.contacts
+        return heard_stage(self.run.reporter, working, name, "increments")
 
     def jumping(self, state: CoupledState, cycles: float) -> None:
         step = self.run.case.wear.step

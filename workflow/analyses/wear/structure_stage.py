@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from typing import Literal, Protocol, TypeVar
@@ -24,8 +23,9 @@ from fe_models.relinearised import (
 )
 from fe_models.stress import CycleStress, cycle_stress, deformation
 from fe_models.structure import CycleSolution, InterfaceHistory, Structure, mixed
-from sa_solver.types import Array, Indices, Progress, unseen
+from sa_solver.types import Array, Indices
 from workflow.analyses.wear.case.sections import Nonlinearity
+from workflow.analyses.wear.heard import Heard
 from workflow.analyses.wear.load_source import BODIES, ContactFace, UserFace
 from workflow.errors import MethodFailed
 from workflow.shell.cache import content_key, load_cycle, load_joint, save_cycle, save_joint
@@ -93,7 +93,7 @@ class StructureModel(Protocol):
         ...
 
 
-class StructureStage:
+class StructureStage(Heard):
     """Everything the run asks of the structure: a load source, and stress and worn mesh after it.
 
     Worn depths are nodal, ``(n,)`` per contact face, of both bodies together [mm]. Of a face that
@@ -109,16 +109,6 @@ class StructureStage:
         self.peak = model.peak
         self.from_cache = False
         self._worn: tuple[Array, CycleSolution] | None = None
-        self._progress: Progress = unseen
-
-    @contextmanager
-    def heard(self, progress: Progress) -> Iterator[None]:
-        """What is costly of it tells ``progress`` how far it is."""
-        self._progress = progress
-        try:
-            yield
-        finally:
-            self._progress = unseen
 
     @cached_property
     def mesh(self) -> StructureMesh:
