@@ -32,7 +32,6 @@ OF_CONTACT = {
     "structure": "shape",
     "material": "material",
     "friction": "friction",
-    "contact": "grid",
     "wear law": "wear law",
 }
 WearingFriction = Annotated[float, Quantity("1", above=0.0, at_most=10.0)]
@@ -166,6 +165,7 @@ class VibrationWearCase(VibrationWearCaseBase, DrivenMass):
         return [
             *super().outline(),
             ("contact", f"that of {Path(self.contact.file).name}, {pressed}"),
+            ("grid", f"{' x '.join(map(str, bodies.contact.grid))} cells"),
             *outline_of(self.contact.file, BodiesWearCase, OF_CONTACT),
         ]
 

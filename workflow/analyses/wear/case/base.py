@@ -140,7 +140,7 @@ class WearCase(Case):
             *self.loads_outline(),
             *of_bodies("material", self.materials),
             ("friction", f"{self.friction.coefficient:g}{changes}"),
-            ("contact", f"{cells}{f' of {of}' if of else ''}, {self.contact.method}"),
+            ("contact", f"{cells}{f' of {of}' if of else ''}, method {self.contact.method}"),
             *wearing({name: self.wear_of(n) for n, name in enumerate(self.bodies, 1)}),
             ("wear", f"{times(wear.cycles)} cycles, {steps}"),
             *(
