@@ -22,6 +22,7 @@ from wear.steppers import ExplicitStepper, HeunStepper, step_errors
 from workflow.analyses.vibration.model import VibrationModel
 from workflow.analyses.vibration_wear.case import FrictionRigWearCase
 from workflow.analyses.vibration_wear.pads import WearingPads
+from workflow.analyses.vibration_wear.quantities import main_results
 from workflow.case.writing import dump_case
 from workflow.kinds import parse_case
 from workflow.runs.run import run_case
@@ -285,6 +286,13 @@ def test_wear_closes_the_pad_and_raises_its_resonances(ended, summary):
     # Under a small force the resonance is near the stuck one, and moves along with it.
     for state in (first, last):
         assert state["responses"][0]["resonance"] == pytest.approx(state["stuck"][0], rel=0.1)
+
+
+def test_the_error_of_a_depth_is_that_of_its_steps_and_of_the_motion(tmp_path, summary):
+    (depth,) = (q for q in main_results(case_in(tmp_path), summary) if q.path == "states.1.depth")
+    state = summary["states"][1]
+    assert state["error"] > 0.0
+    assert depth.error == pytest.approx(state["step_error"] + state["error"], rel=ROUNDING)
 
 
 def test_results_hold_nodes_loops_and_responses(ended, summary):

@@ -5,15 +5,16 @@ from __future__ import annotations
 from collections.abc import Iterator
 from functools import partial
 from itertools import chain
+from typing import Any
 
 from workflow.analyses.vibration.quantities import of_response
 from workflow.analyses.vibration_wear.case import FrictionRigWearCase, VibrationWearCase
 from workflow.case.plain import times
 from workflow.shell.analysis import Summary
 from workflow.shell.quantities import CurvesOf, Quantity
-from workflow.shell.summary import estimate, told
+from workflow.shell.summary import number_at, told
 
-STEPS = "depth or volume, by the wear steps"
+WORN = "depth or volume, by the wear steps, and by harmonics and samples of the motion that wears"
 MOTION = "joints' vibration or energy lost, by harmonics and samples"
 # Of a state: unit, text, everyday unit.
 NUMBERS = {
@@ -28,11 +29,12 @@ NUMBERS = {
     "stroke": ("mm", "stroke under the force that wears", ""),
     "energy_per_cycle": ("N mm", "energy dissipated in a cycle", ""),
 }
+# Parts of the error of each, which add up, and what that is of.
 ERRORS = {
-    "depth": ("step_error", STEPS),
-    "volume": ("step_error", STEPS),
-    "stroke": ("error", MOTION),
-    "energy_per_cycle": ("error", MOTION),
+    "depth": (("step_error", "error"), WORN),
+    "volume": (("step_error", "error"), WORN),
+    "stroke": (("error",), MOTION),
+    "energy_per_cycle": (("error",), MOTION),
 }
 # What runs are compared by, beside the numbers.
 CURVES = (
@@ -62,9 +64,16 @@ def _of_state(number: int, state: Summary, summary: Summary) -> Iterator[Quantit
     place = f"states.{number}"
     of = partial(Quantity, group)
     for name, (unit, text, everyday) in NUMBERS.items():
-        error, what = ERRORS.get(name, ("", ""))
-        known = estimate(summary, f"{place}.{error}", what) if error else {}
+        known = _error(name, place, summary)
         yield of(text, f"{place}.{name}", unit, everyday=everyday, **known)
     for force, response in enumerate(state["responses"]):
         under = f"{group}, under {response['force']:g} N"
         yield from of_response(under, f"{place}.responses.{force}", summary)
+
+
+def _error(name: str, place: str, summary: Summary) -> dict[str, Any]:
+    """The error of a number of a state and what it is of; nothing where a part is not known."""
+    parts, what = ERRORS.get(name, ((), ""))
+    known = [number_at(summary, f"{place}.{part}") for part in parts]
+    errors = [abs(part) for part in known if part is not None]
+    return {"error": sum(errors), "error_of": what} if parts and len(errors) == len(parts) else {}
