@@ -1,0 +1,299 @@
+"""Figures and tables of `docs/cost.md`: what work costs by its size, up to the largest.
+
+    python docs/cost_charts.py [--draw] [CHART ...]
+
+`make docs-figures` draws them too. Every point is measured in a process of its own, in seconds of
+the processor on one thread (`docs/cost_works.py`); with ``--draw`` those measured before are drawn
+anew. Lines have their slope beside them: how cost grows with size, the power of the upper half of
+the points.
+"""
+
+from __future__ import annotations
+
+import csv
+import json
+import subprocess
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from math import ceil, inf
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import numpy as np
+from draw_gallery import ROOT, store
+from matplotlib.figure import Figure
+
+from sa_solver.types import Array
+from workflow.chart.figures import COLOURS, MARKERS
+from workflow.pictures.panels import legend_below, new_figure, plain_ticks, widen
+from workflow.pictures.style import write_figures
+from workflow.shell.processes import environment
+
+FIGURES = ROOT / "docs" / "figures"
+MEASURES = ("seconds", "count", "memory")
+# What stands on structures that are condensed before: memory that this takes would be in theirs.
+PREPARED = ("missions", "harmonics", "contacts")
+HEIGHT = 5.0
+# Lines from which on a legend has two columns; ends of an axis differ by this share at least.
+COLUMNS, LEAST_SPAN = 3, 3.0
+# Points that a slope is told of at least, and memory [GB] below which what libraries keep blurs it.
+FEWEST, LEAST_MEMORY = 3, 0.02
+# Columns of the table of the largest: seconds of the processor, and memory of the machine [GB].
+TIMES, MACHINE = {"10 s": 10.0, "1 min": 60.0, "10 min": 600.0}, 24.0
+# How far a slope is believed beyond the largest that was measured.
+FURTHER = 2.5
+
+
+@dataclass(frozen=True)
+class Line:
+    """A ``work`` of :mod:`cost_works`, what it is, and the sizes it is measured at.
+
+    It counts ``counted``; ``largest`` says what a size is in words.
+    """
+
+    work: str
+    name: str
+    sizes: Sequence[int]
+    counted: str
+    largest: Callable[[int], str]
+
+
+@dataclass(frozen=True)
+class CostChart:
+    """Works over the same kind of ``size``, in one figure."""
+
+    title: str
+    size: str
+    lines: Sequence[Line]
+
+
+Points = Mapping[str, Array]
+"""Sizes of a work, and each measure of it."""
+
+
+def _cells(size: int) -> str:
+    return f"{size}²"
+
+
+def _nodes(size: int) -> str:
+    return f"{size} nodes"
+
+
+def _harmonics(size: int) -> str:
+    return f"{size} odd harmonics"
+
+
+def _contacts(size: int) -> str:
+    return f"{size} contacts"
+
+
+CONVOLUTIONS = "convolutions"
+CHARTS: Mapping[str, CostChart] = {
+    "contact": CostChart(
+        "A sphere pressed, and sheared by three quarters of what friction carries",
+        "cells along each side",
+        (
+            Line("normal", "pressed", (64, 128, 256, 512, 1024, 2048, 4096), CONVOLUTIONS, _cells),
+            Line(
+                "friction", "pressed and sheared", (64, 128, 256, 512, 1024), CONVOLUTIONS, _cells
+            ),
+            Line("unlike", "unlike bodies, sheared", (64, 128, 256, 512), CONVOLUTIONS, _cells),
+        ),
+    ),
+    "structure": CostChart(
+        "The dovetail: condensed, and two missions of 22 increments with friction",
+        "nodes of both contact faces",
+        (
+            Line("condensation", "condensed", (10, 14, 20, 28, 39), "unknowns", _nodes),
+            Line("missions", "friction", (10, 14, 20, 28, 39), "iterations", _nodes),
+        ),
+    ),
+    "harmonics": CostChart(
+        "A response of the rig's 121 contacts by harmonic balance",
+        "odd harmonics, beside the mean",
+        (Line("harmonics", "121 contacts", (1, 2, 3, 5, 8, 15, 31), "points", _harmonics),),
+    ),
+    "contacts": CostChart(
+        "A response of the rig by harmonic balance, mean and five odd harmonics",
+        "contacts",
+        (Line("contacts", "five odd harmonics", (4, 6, 8, 10, 14), "points", _contacts),),
+    ),
+}
+
+
+# --- measuring ----------------------------------------------------------------------------------
+
+
+def measure(name: str) -> None:
+    """Measure all points of a chart, each as soon as it is known: what is cut off is kept."""
+    chart = CHARTS[name]
+    with TemporaryDirectory() as cache, environment({"FRETSCALE_CACHE": cache}):
+        rows: list[dict[str, Any]] = []
+        for line in chart.lines:
+            for size in line.sizes:
+                rows.append({"work": line.work, **_point(line.work, size)})
+                print(rows[-1])  # noqa: T201
+                _write(name, rows)
+
+
+def _point(work: str, size: int) -> dict[str, float]:
+    """One of them, in a process of its own."""
+    command = [sys.executable, str(ROOT / "docs" / "cost_works.py"), work, str(size)]
+    if work in PREPARED:
+        subprocess.run([*command, "--prepare"], check=True)
+    done = subprocess.run(command, check=True, stdout=subprocess.PIPE, text=True)
+    found: dict[str, float] = json.loads(done.stdout.splitlines()[-1])
+    return found
+
+
+# --- what is kept -------------------------------------------------------------------------------
+
+
+def stored(name: str, folder: Path = FIGURES) -> dict[str, Points]:
+    """The points of a chart that were measured last, by their work."""
+    with (folder / f"cost_{name}.csv").open(encoding="utf-8", newline="") as file:
+        rows = list(csv.DictReader(file))
+    chart, points = CHARTS[name], {}
+    for line in chart.lines:
+        own = [row for row in rows if row["work"] == line.name]
+        points[line.work] = {
+            measure: np.array([float(row[column]) for row in own])
+            for measure, column in _columns(chart).items()
+        }
+    return points
+
+
+def _columns(chart: CostChart) -> dict[str, str]:
+    """What each measure is called in the table."""
+    counted = " or ".join(dict.fromkeys(line.counted for line in chart.lines))
+    return {
+        "size": chart.size,
+        "seconds": "processor [s]",
+        "count": counted,
+        "memory": "memory [GB]",
+    }
+
+
+def _write(name: str, rows: Sequence[Mapping[str, Any]]) -> None:
+    chart = CHARTS[name]
+    names = {line.work: line.name for line in chart.lines}
+    with (FIGURES / f"cost_{name}.csv").open("w", encoding="utf-8", newline="") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(["work", *_columns(chart).values()])
+        for row in rows:
+            numbers = (f"{row[key]:.3g}" for key in ("seconds", "memory"))
+            seconds, memory = numbers
+            writer.writerow([names[row["work"]], row["size"], seconds, row["count"], memory])
+
+
+def slope(size: Array, cost: Array) -> float | None:
+    """The power by which a cost grows with size, of the upper half of its points."""
+    upper = max(FEWEST, ceil(len(size) / 2))
+    if len(size) < upper or cost[-upper:].min() <= 0.0:
+        return None
+    return float(np.polyfit(np.log(size[-upper:]), np.log(cost[-upper:]), 1)[0])
+
+
+# --- figures ------------------------------------------------------------------------------------
+
+
+def cost_figure(name: str) -> Figure:
+    """Each measure against size, both logarithmic, a line for each work."""
+    chart, points = CHARTS[name], stored(name)
+    figure = new_figure(chart.title, HEIGHT)
+    panels = figure.subplots(1, len(MEASURES), sharex=True)
+    for axis, measure in zip(panels, MEASURES, strict=True):
+        for number, line in enumerate(chart.lines):
+            size, cost = points[line.work]["size"], points[line.work][measure]
+            seen = _seen(measure, cost)
+            style = {"color": COLOURS[number], "marker": MARKERS[number]}
+            axis.plot(size[seen], cost[seen], label=_label(line, points[line.work]), **style)
+        axis.set(xlabel=chart.size, ylabel=_columns(chart)[measure], xscale="log", yscale="log")
+        widen(axis, LEAST_SPAN)
+        for side in (axis.xaxis, axis.yaxis):
+            plain_ticks(side)
+    legend_below(figure, panels, columns=1 if len(chart.lines) < COLUMNS else 2)
+    return figure
+
+
+def _seen(measure: str, cost: Array) -> Array:
+    """Which costs are large enough to be told."""
+    return np.asarray(cost > (LEAST_MEMORY if measure == "memory" else 0.0))
+
+
+def _label(line: Line, own: Points) -> str:
+    """Name of a line, and how its costs grow."""
+    grows = []
+    for measure, name in (("seconds", "time"), ("memory", "memory")):
+        seen = _seen(measure, own[measure])
+        power = slope(own["size"][seen], own[measure][seen])
+        if power is not None:
+            grows.append(f"{name} {power:.1f}")
+    powers = f"; powers of size: {', '.join(grows)}" if grows else ""
+    return f"{line.name} ({line.counted}){powers}"
+
+
+# --- how large ----------------------------------------------------------------------------------
+
+
+def limits() -> list[list[str]]:
+    """How large each work may be in some times, and in the memory of a machine.
+
+    Between what was measured by powers; up to two and a half times the largest by the slope of the
+    upper half, there it is said to be about so much; beyond that to be over the largest.
+    """
+    rows = [["work", *(f"in {time}" for time in TIMES), f"in {MACHINE:g} GB", "largest measured"]]
+    for name, chart in CHARTS.items():
+        points = stored(name)
+        for line in chart.lines:
+            own = points[line.work]
+            reached = [_reach(line, own, "seconds", most) for most in TIMES.values()]
+            memory = _reach(line, own, "memory", MACHINE)
+            last = f"{line.largest(int(own['size'][-1]))}: {own['seconds'][-1]:.3g} s"
+            held = f", {own['memory'][-1]:.2g} GB"
+            rows.append([f"{_of(name)}{line.name}", *reached, memory, last + held])
+    return rows
+
+
+def _of(name: str) -> str:
+    return {"contact": "contact, ", "structure": "structure, "}.get(name, f"vibration by {name}, ")
+
+
+def _reach(line: Line, own: Points, measure: str, most: float) -> str:
+    """The size whose cost is ``most``."""
+    seen = _seen(measure, own[measure])
+    size, cost = own["size"][seen], own[measure][seen]
+    power = slope(size, cost)
+    if cost[-1] >= most:
+        found = float(np.exp(np.interp(np.log(most), np.log(cost), np.log(size))))
+        return line.largest(_rounded(found))
+    further = inf if power is None else (most / cost[-1]) ** (1.0 / power)
+    if further > FURTHER:
+        return f"over {line.largest(int(size[-1]))}"
+    return f"about {line.largest(_rounded(further * size[-1]))}"
+
+
+def _rounded(size: float) -> int:
+    """Two digits."""
+    digits = max(0, len(str(int(size))) - 2)
+    return int(round(size, -digits))
+
+
+def main(arguments: list[str]) -> None:
+    """Store the charts named, of all if none is."""
+    names = [name for name in arguments if name != "--draw"] or list(CHARTS)
+    for name in names:
+        if "--draw" not in arguments:
+            measure(name)
+        with TemporaryDirectory() as folder:
+            (picture,) = write_figures([(f"cost_{name}", partial(cost_figure, name))], Path(folder))
+            store(picture, FIGURES / picture.name)
+    with (FIGURES / "cost_limits.csv").open("w", encoding="utf-8", newline="") as file:
+        csv.writer(file, lineterminator="\n").writerows(limits())
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])
