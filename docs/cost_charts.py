@@ -25,10 +25,11 @@ from typing import Any
 import numpy as np
 from draw_gallery import ROOT, store
 from matplotlib.figure import Figure
+from matplotlib.ticker import NullLocator
 
 from sa_solver.types import Array
 from workflow.chart.figures import COLOURS, MARKERS
-from workflow.pictures.panels import legend_below, new_figure, plain_ticks, widen
+from workflow.pictures.panels import legend_below, new_figure, plain_ticks, spread, widen
 from workflow.pictures.style import write_figures
 from workflow.shell.processes import environment
 
@@ -36,9 +37,9 @@ FIGURES = ROOT / "docs" / "figures"
 MEASURES = ("seconds", "count", "memory")
 # What stands on structures that are condensed before: memory that this takes would be in theirs.
 PREPARED = ("missions", "harmonics", "contacts")
-HEIGHT = 5.0
-# Lines from which on a legend has two columns; ends of an axis differ by this share at least.
-COLUMNS, LEAST_SPAN = 3, 3.0
+HEIGHT = 5.2
+# Sizes that have a number at the axis; its ends differ by this share at least.
+TICKS, LEAST_SPAN = 4, 3.0
 # Points that a slope is told of at least, and memory [GB] below which what libraries keep blurs it.
 FEWEST, LEAST_MEMORY = 3, 0.02
 # Columns of the table of the largest: seconds of the processor, and memory of the machine [GB].
@@ -213,9 +214,11 @@ def cost_figure(name: str) -> Figure:
             axis.plot(size[seen], cost[seen], label=_label(line, points[line.work]), **style)
         axis.set(xlabel=chart.size, ylabel=_columns(chart)[measure], xscale="log", yscale="log")
         widen(axis, LEAST_SPAN)
-        for side in (axis.xaxis, axis.yaxis):
-            plain_ticks(side)
-    legend_below(figure, panels, columns=1 if len(chart.lines) < COLUMNS else 2)
+        plain_ticks(axis.yaxis)
+        sizes = max((own["size"] for own in points.values()), key=len)
+        axis.set_xticks(spread(sizes, TICKS), labels=[f"{size:g}" for size in spread(sizes, TICKS)])
+        axis.xaxis.set_minor_locator(NullLocator())
+    legend_below(figure, panels, columns=1)
     return figure
 
 
