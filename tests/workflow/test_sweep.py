@@ -224,6 +224,14 @@ def test_a_scheduler_does_not_go_with_processes(tmp_path):
 
 # --- runs -----------------------------------------------------------------------------------------
 
+JOINT = """\
+title: A joint moved to and fro
+analysis: time
+structure: {kind: joint}
+joint: {law: jenkins, normal_load: 60 N, friction: 0.5, stiffness: 30 N/um}
+drive: {stroke: 14 um, frequency: 100 Hz}
+ageing: {cycles: 10}
+"""
 GRID = """\
 case: contact.yaml
 vary:
@@ -255,6 +263,17 @@ def test_a_failed_run_is_a_row_and_stops_nobody(done):
         assert float(row["convolutions"]) == summary["convolutions"]
     # No pictures of the runs, unless they are asked for.
     assert not list(out.glob("runs/*/figures"))
+
+
+def test_runs_of_which_nothing_is_drawn(tmp_path):
+    """Of a joint alone there is a table, and no figure: the sweep ends well all the same."""
+    (tmp_path / "joint.yaml").write_text(JOINT, encoding="utf-8")
+    path = tmp_path / "sweep.yaml"
+    path.write_text("case: joint.yaml\nvary:\n  joint.friction: {values: [0.4, 0.5]}\n", "utf-8")
+    result = sweep(path, tmp_path / "out")
+    assert result.exit_code == 0, result.stderr
+    assert [row["status"] for row in table(tmp_path / "out")] == ["done", "done"]
+    assert not (tmp_path / "out" / "figures").exists()
 
 
 def test_summary_tells_the_spread(done):

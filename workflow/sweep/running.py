@@ -69,7 +69,8 @@ def run_sweep(
             _write_summary(sweep, rows, folder)
             failed = sum(not row.done for row in rows)
             reporter.say(f"{len(rows) - failed} runs done, {failed} failed: {out / TABLE}")
-            if figures := sorted((out / FIGURES).iterdir()) if failed < len(rows) else []:
+            # Of what neither wears nor is a contact there are none, and no folder.
+            if figures := sorted((out / FIGURES).glob("*")) if failed < len(rows) else []:
                 reporter.say(f"  figure    {figures[0]}")
     return failed == 0
 
