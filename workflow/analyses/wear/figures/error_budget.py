@@ -67,5 +67,6 @@ def _draw(axis: Axes, group: h5py.Group) -> None:
 def _name(result: str, total: float, parts: Array) -> str:
     """A result with its error, and below what nobody knows of it."""
     unknown = [part for part, value in zip(PARTS, parts, strict=True) if np.isnan(value)]
-    text = f"{RESULTS[result]}: {total:.1f} %"
+    nothing = unknown and total == 0.0
+    text = f"{RESULTS[result]}: {'?' if nothing else f'{total:.1f} %'}"
     return f"{text}\n({', '.join(unknown)} unknown)" if unknown else text

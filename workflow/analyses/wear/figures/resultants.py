@@ -22,7 +22,7 @@ from workflow.pictures.panels import (
     panel_rows,
     whole_ticks,
 )
-from workflow.pictures.style import BLUE, GREEN, ORANGE
+from workflow.pictures.style import BLUE, GREEN, HEADROOM, ORANGE
 
 NO_SLIDING = "no face slides as a whole"
 # Of increments that slide as a whole, so many stretches are named in a title.
@@ -60,7 +60,9 @@ def resultants(file: h5py.File, contents: Contents) -> Figure:
         whole_ticks(column[-1].xaxis)
     energy_label = f"energy per\nincrement [mJ{per}]"
     label_rows(axes, (f"P [{unit}{per}]", f"Qx [{unit}{per}]", energy_label)[:rows])
-    axes[0, 0].set_ylim(bottom=0.0)
+    # A force that stays is no line on the border.
+    largest = max(axis.dataLim.y1 for axis in axes[0])
+    axes[0, 0].set_ylim(0.0, HEADROOM * largest if largest > 0.0 else None)
     legend_below(figure, axes[1:].flat)
     return figure
 
