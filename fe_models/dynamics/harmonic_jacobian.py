@@ -185,27 +185,35 @@ class HarmonicJacobian:
 
 
 @njit(cache=True, nogil=True)
+def _largest(slopes: Array, tangents: Array, held: float) -> tuple[float, float]:
+    """Largest derivative ``(m, d, m, d)`` of a joint, and largest difference from its springs'."""
+    largest = most = 0.0
+    for to, along, function, by in np.ndindex(slopes.shape):
+        slope = float(slopes[to, along, function, by])
+        spring = float(tangents[along, by]) if function == to else 0.0
+        if function == 0 and to == 0 and by == along:
+            spring += held
+        largest, most = max(largest, abs(slope)), max(most, abs(slope - spring))
+    return largest, most
+
+
+@njit(cache=True, nogil=True)
 def _excess(slopes: Array, tangents: Array, held: float) -> tuple[np.ndarray, Array]:
     """Joints ``(a,)`` whose derivatives ``(j, m, d, m, d)`` are not those of springs, and by how
     much ``(a, m d, m d)``; at harmonic 0 with springs that hold them."""
     joints, size, directions = slopes.shape[:3]
-    differing, found = np.empty(joints, np.int64), 0
-    excess = np.empty((joints, size, directions, size, directions))
-    rounding = SAME * np.abs(slopes).max()
+    # Derivatives of many harmonics are gigabytes: no copies but of what differs.
+    each = np.empty((joints, 2))
     for joint in range(joints):
-        own = excess[found]
-        own[:] = slopes[joint]
-        for function in range(size):
-            for direction in range(directions):
-                for by in range(directions):
-                    own[function, direction, function, by] -= tangents[joint, direction, by]
-        for direction in range(directions):
-            own[0, direction, 0, direction] -= held
-        if np.abs(own).max() > rounding:
-            differing[found] = joint
-            found += 1
-    flat = excess[:found].reshape(found, size * directions, size * directions)
-    return differing[:found], flat
+        each[joint] = _largest(slopes[joint], tangents[joint], held)
+    differing = np.flatnonzero(each[:, 1] > SAME * each[:, 0].max())
+    excess = slopes[differing]
+    for place in range(len(differing)):
+        for along in range(directions):
+            for function in range(size):
+                excess[place, function, along, function] -= tangents[differing[place], along]
+            excess[place, 0, along, 0, along] -= held
+    return differing, excess.reshape(len(differing), size * directions, size * directions)
 
 
 @njit(cache=True)
