@@ -8,7 +8,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from fe_models.dynamics import harmonic_balance
+from fe_models.dynamics import harmonic_balance, harmonic_jacobian, receptance
 from fe_models.dynamics.cycle_energy import energy_lost
 from fe_models.dynamics.excitation import HarmonicForce
 from fe_models.dynamics.forced_response import Accuracy, along_force, along_frequency
@@ -197,14 +197,35 @@ def test_stuck_joints_are_preconditioned_by_their_stiffness(free):
     products = HarmonicJacobian(problem.transfer, problem.rest, at.steady, at.cycle.jacobian)
     vector = np.random.default_rng(8).standard_normal(problem.size)
     np.testing.assert_allclose(products.precondition(products @ vector), vector, atol=1e-9)
-    # In one step, also where joints do something else.
-    moved = motion.coefficients.copy()
-    moved[:, 1:] *= 100.0
-    at = problem.evaluate(moved.ravel(), 30.0, 0.1, "frequency")
-    products = HarmonicJacobian(problem.transfer, problem.rest, at.steady, at.cycle.jacobian)
-    wanted = products.precondition(products @ vector)
-    np.testing.assert_allclose(products.preconditioned(vector), wanted, atol=1e-9)
-    assert np.abs(wanted - vector).max() > 1e-3
+    # In one step, also where joints do something else, and are nearer to sliding.
+    for factor in (100.0, 1e5):
+        moved = motion.coefficients.copy()
+        moved[:, 1:] *= factor
+        at = problem.evaluate(moved.ravel(), 30.0, 0.1, "frequency")
+        products = HarmonicJacobian(problem.transfer, problem.rest, at.steady, at.cycle.jacobian)
+        wanted = products.precondition(products @ vector)
+        np.testing.assert_allclose(products.preconditioned(vector), wanted, atol=1e-9)
+        assert np.abs(wanted - vector).max() > 1e-3
+    assert problem.rest.springs_like(at.cycle.jacobian) is problem.rest.sliding
+
+
+@pytest.mark.parametrize("harmonics", [(1, 3), (0, 1, 2)])
+def test_loops_over_few_modes_and_joints_are_the_products_of_many(monkeypatch, harmonics):
+    model = contact_rig()
+    held = harmonics[0] == 0
+    load = pressed(model, 8.0, 1.0) if held else PeriodicLoad({1: unit_force(model, "x")})
+    law = FrictionContact(300.0, 400.0, 0.5, normal_load=0.0 if held else 8.0)
+    found = []
+    for few in (harmonic_jacobian.FEW, -1):
+        monkeypatch.setattr(harmonic_jacobian, "FEW", few)
+        monkeypatch.setattr(receptance, "FEW", few)
+        problem = balance(model, PeriodicMarch(law), harmonics, 64, load)
+        unknowns = np.random.default_rng(5).standard_normal(problem.size) * 0.02
+        at = problem.evaluate(unknowns, 30.0, 2.0, "frequency")
+        shares = problem.describe(unknowns, at, 30.0, 2.0).shares
+        found.append((at.residual, at.slope, at.jacobian, shares))
+    for loops, products in zip(*found, strict=True):
+        np.testing.assert_allclose(loops, products, rtol=0.0, atol=1e-12 * np.abs(products).max())
 
 
 def test_a_solution_keeps_no_derivatives():

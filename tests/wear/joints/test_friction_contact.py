@@ -27,6 +27,8 @@ from tests.wear.joints.friction_paths import (
     split,
 )
 from wear.joints.friction_contact import FrictionContact, advance_contact
+from wear.joints.friction_path import ForcePath
+from wear.joints.friction_path import energy_lost as lost_on_path
 from wear.joints.parameters import JointError
 
 # --- what it reduces to -----------------------------------------------------------------------
@@ -406,3 +408,19 @@ def test_parameters_that_cannot_be_are_refused():
         law.respond(law.rest(2), np.zeros((2, 1)))
     with pytest.raises(JointError, match="2 joints"):
         law.respond(law.rest(3), np.zeros((3, 3)))
+
+
+@pytest.mark.parametrize("angle", [1e-6, 0.01, 0.5, 0.7, 1.5, 3.0, 3.14159])
+@pytest.mark.parametrize("pull", [1e-3, 0.3, 1.0, 5.0, 80.0])
+def test_energy_of_a_force_that_turns_under_a_constant_limit(angle, pull):
+    """R² ln(sin ψ0 / sin ψ1), where tan(ψ/2) falls by exp(-L)."""
+    path = ForcePath(2.0 * np.cos(angle), 2.0 * np.sin(angle), 2.0 * pull, 0.0, 2.0, 2.0)
+    before = np.tan(0.5 * angle)
+    # Inwards it holds first, until the chord leaves the circle: ψ becomes π - ψ.
+    held = min(max(-2.0 * np.cos(angle) / pull, 0.0), 1.0)
+    if held > 0.0:
+        before = 1.0 / before
+    length = pull * (1.0 - held)
+    after = before * np.exp(-length)
+    expected = 4.0 * (length + np.log1p(after**2) - np.log1p(before**2))
+    assert lost_on_path(path) == pytest.approx(expected, rel=1e-11, abs=1e-12)
