@@ -84,6 +84,7 @@ GIVEN = {
             displacement={"group": "blade_top", "displacement": [0.01, 0, 0]},
             rotation={"axis": [0, 1, 0], "through": [0, 0, 0], "speed": "6000 rpm"},
             acceleration={"acceleration": [0, 0, 9810]},
+            moment={"group": "blade_top", "moment": [0, 5, 0]},
         ),
         **wear("body_1", "body_2"),
     },

@@ -53,7 +53,8 @@ class Flank:
         case = load_case(PLANE, overrides)
         source = structure_of(case).source(case)
         assert isinstance(source, StructureStage)
-        stress = source.stress(source.mesh, source.unworn_cycle)
+        states = {"unworn": (source.mesh, source.unworn_cycle)}
+        stress = source.stresses(states)["unworn"]
         stage, loads = ContactStage(case, source.faces[0]), source.unworn()[0]
         given = stage.unworn_tractions(loads, stage.begin(loads, 1.0)[1])
         known = with_known_shear(stage, given, loads)
