@@ -72,6 +72,11 @@ class Surface:
     fitted: bool = False
 
     @classmethod
+    def flat(cls, nodes: int, facets: Indices) -> Surface:
+        """So many nodes in the plane of the frame, and facets that are straight."""
+        return cls(np.zeros(nodes), np.zeros(edges_of(facets).shape[:2]))
+
+    @classmethod
     def of(cls, points: Array, facets: Indices, midsides: Array | None) -> Surface:
         """From points ``(n, 3)`` in the frame, facets ``(m, corners)`` and maybe midsides.
 
@@ -99,33 +104,40 @@ class Surface:
         """
         height = np.full((x.size, y.size), np.nan)
         for facet, bulges in zip(facets, self.bulges, strict=True):
-            corners = coordinates[facet]
-            if len(facet) == 2:
-                shares = (x.reshape(-1, 1) - corners[0, 0]) / (corners[1, 0] - corners[0, 0])
-                found: Array = height[:, 0]
-            else:
-                low, high = corners.min(axis=0), corners.max(axis=0)
-                i = slice(*np.searchsorted(x.ravel(), (low[0], high[0])))
-                j = slice(*np.searchsorted(y.ravel(), (low[1], high[1])))
-                places = np.stack(np.broadcast_arrays(x.reshape(-1, 1)[i], y.reshape(1, -1)[:, j]))
-                shares = (np.moveaxis(places, 0, -1) - corners[0]) @ np.linalg.inv(
-                    corners[1:] - corners[0]
-                )
-                found = height[i, j]
-            shares = np.concatenate([1.0 - shares.sum(axis=-1, keepdims=True), shares], axis=-1)
+            window, shares = _shares(coordinates[facet], x.ravel(), y.ravel())
             met = np.all(shares >= -INSIDE, axis=-1)
-            found[met] = shares[met] @ self.heights[facet] + bulge_of(shares[met], bulges)
+            inside = shares[met]
+            height[window][met] = inside @ self.heights[facet] + bulge_of(inside, bulges)
         return height
+
+
+def edges_of(facets: Indices) -> Indices:
+    """Ends of the edges ``(m, edges, 2)`` of facets ``(m, corners)``."""
+    return np.asarray(facets[:, EDGES[facets.shape[1]]])
+
+
+def _shares(corners: Array, x: Array, y: Array) -> tuple[tuple[slice, slice], Array]:
+    """Cells about a facet, and their barycentric coordinates ``(..., corners)`` on it.
+
+    ``corners`` are ``(corners, 2)``; ``x`` ``(nx,)`` and ``y`` ``(ny,)`` rise.
+    """
+    if len(corners) == 2:
+        window = slice(None), slice(None)
+        others = ((x - corners[0, 0]) / (corners[1, 0] - corners[0, 0]))[:, None, None]
+    else:
+        low, high = corners.min(axis=0), corners.max(axis=0)
+        i = slice(*np.searchsorted(x, (low[0], high[0])))
+        j = slice(*np.searchsorted(y, (low[1], high[1])))
+        window = i, j
+        places = np.stack(np.meshgrid(x[i], y[j], indexing="ij"), axis=-1)
+        others = (places - corners[0]) @ np.linalg.inv(corners[1:] - corners[0])
+    return window, np.concatenate([1.0 - others.sum(axis=-1, keepdims=True), others], axis=-1)
 
 
 def bulge_of(shares: Array, bulges: Array) -> Array:
     """What bulges ``(..., edges)`` add at barycentric coordinates ``(..., corners)``."""
-    edges = EDGES[shares.shape[-1]]
-    return np.asarray(
-        sum(
-            4.0 * shares[..., a] * shares[..., b] * bulges[..., k] for k, (a, b) in enumerate(edges)
-        )
-    )
+    first, second = np.array(EDGES[shares.shape[-1]]).T
+    return np.asarray(4.0 * (shares[..., first] * shares[..., second] * bulges).sum(axis=-1))
 
 
 def _from_midsides(points: Array, facets: Indices, midsides: Array) -> Array:
@@ -142,7 +154,7 @@ def _from_midsides(points: Array, facets: Indices, midsides: Array) -> Array:
 
 def _shared(facets: Indices, values: Array) -> Array:
     """The mean over the facets beside each edge of ``values`` ``(m, edges)``."""
-    pairs = np.sort(facets[:, EDGES[facets.shape[1]]], axis=2).reshape(-1, 2)
+    pairs = np.sort(edges_of(facets), axis=2).reshape(-1, 2)
     _, edge, count = np.unique(pairs, axis=0, return_inverse=True, return_counts=True)
     total = np.bincount(edge.ravel(), values.ravel())
     return np.asarray((total / count)[edge.ravel()].reshape(values.shape))
@@ -151,21 +163,16 @@ def _shared(facets: Indices, values: Array) -> Array:
 def _fitted(points: Array, facets: Indices) -> Surface:
     """From quadratics through the heights of the vertices around."""
     curvature, left = _quadratics(points, facets)
-    pairs = facets[:, EDGES[facets.shape[1]]]
+    pairs = edges_of(facets)
     along = points[pairs[..., 1], :2] - points[pairs[..., 0], :2]
     bulges = -0.0625 * np.einsum("mea,meiab,meb->me", along, curvature[pairs], along)
     residual = left[pairs].max(axis=2)
     bent = residual > SMOOTH * np.abs(bulges)
     seen = bent & (residual > ROUNDING * np.linalg.norm(along, axis=2))
     kept = np.where(bent, 0.0, bulges)
+    straight = len(np.unique(np.sort(pairs[seen], axis=1), axis=0))
     error = float(residual.max(initial=0.0))
-    return Surface(points[:, 2], kept, error, _count(facets, seen), fitted=True)
-
-
-def _count(facets: Indices, chosen: Mask) -> int:
-    """Different edges among the ``chosen`` ``(m, edges)``."""
-    pairs = np.sort(facets[:, EDGES[facets.shape[1]]], axis=2)
-    return len(np.unique(pairs[chosen], axis=0))
+    return Surface(points[:, 2], kept, error, straight, fitted=True)
 
 
 def _quadratics(points: Array, facets: Indices) -> tuple[Array, Array]:

@@ -19,7 +19,7 @@ from fe_models.applied_loads import (
     vector_of,
 )
 from fe_models.constraints import Constraints
-from fe_models.curved_face import EDGES, Surface
+from fe_models.curved_face import Surface, edges_of
 from fe_models.cut_face import cut_interface
 from fe_models.elasticity import ElasticBody
 from fe_models.geometry.imported import ImportedMesh
@@ -51,9 +51,13 @@ class ContactPair:
     face_2: Sequence[str]
     x_direction: Array
 
+    def boundaries(self, number: int) -> Sequence[str]:
+        """Those that are the face of body ``number``, 1 or 2."""
+        return (self.face_1, self.face_2)[number - 1]
+
     def boundary(self, number: int) -> str:
-        """What the face of body ``number``, 1 or 2, is called."""
-        return " + ".join((self.face_1, self.face_2)[number - 1])
+        """What that face is called."""
+        return " + ".join(self.boundaries(number))
 
 
 @dataclass(frozen=True)
@@ -212,8 +216,8 @@ def _with_interfaces(
     """
     named: dict[str, Indices] = {}
     for pair in pairs:
-        names = (pair.face_1, pair.face_2)[number - 1]
-        facets = np.unique(np.concatenate([contact_facets(imported, body, name) for name in names]))
+        parts = [contact_facets(imported, body, name) for name in pair.boundaries(number)]
+        facets = np.unique(np.concatenate(parts))
         named |= {pair.name: facets, pair.boundary(number): facets}
     return Body(body.name, body.mesh.with_boundaries(named))
 
@@ -222,7 +226,7 @@ def _surface(imported: ImportedMesh, body: Body, boundary: str, frame: Frame) ->
     """What the face on a boundary is a mesh of, in a frame."""
     facets, midsides = body.facets(boundary), None
     if body.name in imported.midsides:
-        edges = facets[:, EDGES[facets.shape[1]]]
+        edges = edges_of(facets)
         found = imported.midsides[body.name].at(edges.reshape(-1, 2))
         midsides = frame.coordinates(found).reshape(*edges.shape[:2], 3)
     nodes = body.vertices(boundary)

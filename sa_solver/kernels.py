@@ -52,7 +52,7 @@ def multiply_spectra(spectra, symbols, places, turned_inputs, turned_outputs):  
 
 @njit(cache=True, nogil=True)
 def split_in_two(spectrum, turns):  # type: ignore[no-untyped-def]
-    """Turn the upper half of ``(2 m, k)`` rows into the lower one times ``turns[1]`` ``(m,)``."""
+    """Set the second half of rows ``(2 m, k)`` to the first times ``turns[1]`` ``(m,)``."""
     half, columns = len(spectrum) // 2, spectrum.shape[1]
     for n in range(half):
         c, s = turns[1, n].real, turns[1, n].imag
@@ -63,7 +63,7 @@ def split_in_two(spectrum, turns):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, nogil=True)
 def join_two(spectrum, turns):  # type: ignore[no-untyped-def]
-    """Add the upper half of ``(2 m, k)`` rows, times ``turns[1]`` conjugate, to the lower one."""
+    """Add the second half of rows ``(2 m, k)``, times ``turns[1]`` conjugate, to the first."""
     half, columns = len(spectrum) // 2, spectrum.shape[1]
     for n in range(half):
         c, s = turns[1, n].real, turns[1, n].imag

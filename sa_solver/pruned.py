@@ -19,7 +19,6 @@ from sa_solver.fftw import plan
 from sa_solver.types import Indices
 
 Spectrum = NDArray[np.complex128]
-Split = Callable[[Spectrum, Spectrum], None]
 
 PARTS = {256: 2, 512: 4, 1024: 4, 2048: 4, 4096: 4}
 """Parts of columns by their length. Other lengths gain nothing."""

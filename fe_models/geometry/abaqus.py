@@ -129,16 +129,11 @@ class _Flattened:
             midsides=midsides_of(together, self._second_order()),
         )
 
-    def _second_order(self) -> Blocks:
+    def _second_order(self) -> Iterator[tuple[str, Indices]]:
         """Elements that have nodes on their edges, with these."""
-        by_shape: dict[str, list[list[int]]] = {}
         for scope in self.scopes:
-            for element in scope.elements.values():
-                if element.midsides:
-                    nodes = *element.nodes, *element.midsides
-                    rows = self._node_rows(scope, nodes, element.place)
-                    by_shape.setdefault(element.shape, []).append(rows)
-        return [(shape, np.array(cells)) for shape, cells in by_shape.items()]
+            numbers = [n for n, element in scope.elements.items() if element.midsides]
+            yield from self.blocks(scope, numbers, midsides=True)
 
     def bodies(self) -> dict[str, Blocks]:
         return {scope.name: self.blocks(scope, scope.elements) for scope in self.scopes}
@@ -167,12 +162,13 @@ class _Flattened:
                 sets[name] = self._rows(name, scope, nodes)
         return sets
 
-    def blocks(self, scope: Scope, numbers: Iterable[int]) -> Blocks:
-        """Elements of a scope by shape."""
+    def blocks(self, scope: Scope, numbers: Iterable[int], midsides: bool = False) -> Blocks:
+        """Elements of a scope by shape: their corners, and their ``midsides`` if asked for."""
         by_shape: dict[str, list[list[int]]] = {}
         for number in numbers:
             element = scope.elements[number]
-            rows = self._node_rows(scope, element.nodes, element.place)
+            nodes = element.nodes + element.midsides * midsides
+            rows = self._node_rows(scope, nodes, element.place)
             by_shape.setdefault(element.shape, []).append(rows)
         return [(shape, np.array(cells)) for shape, cells in by_shape.items()]
 

@@ -73,13 +73,14 @@ def midsides_of(points: Array, blocks: Iterable[tuple[str, Indices]]) -> Midside
     to the edges whose middles they are nearest to. Quadrilaterals have one in their middle too,
     on both diagonals, since they are split along one: where the eight nodes of their edges put it.
     """
-    from scipy.optimize import linear_sum_assignment
-
     edges, middles = [], []
     for shape, cells in blocks:
         corners, pairs = CORNERS[shape], _edges(shape)
         if cells.shape[1] < corners + len(pairs) or not len(pairs):
             continue
+        # Takes a tenth of a second to load: where it is used.
+        from scipy.optimize import linear_sum_assignment
+
         chords = 0.5 * (points[cells[:, pairs[:, 0]]] + points[cells[:, pairs[:, 1]]])
         given = points[cells[:, corners : corners + len(pairs)]]
         apart = np.linalg.norm(given[:, None] - chords[:, :, None], axis=3).mean(axis=0)
@@ -91,9 +92,7 @@ def midsides_of(points: Array, blocks: Iterable[tuple[str, Indices]]) -> Midside
         edges.append(cells[:, pairs].reshape(-1, 2))
         middles.append(given.reshape(-1, 3))
         place = {tuple(sorted(pair)): k for k, pair in enumerate(pairs.tolist())}
-        for face in FACES[shape] if DIMENSION[shape] == 3 else (tuple(range(corners)),):
-            if len(face) != 4:
-                continue
+        for face in _quadrilaterals(shape):
             around = [place[tuple(sorted(pair))] for pair in pairwise([*face, face[0]])]
             middle = 0.5 * given[:, around].sum(axis=1) - 0.25 * points[cells[:, face]].sum(axis=1)
             for diagonal in (face[0::2], face[1::2]):
@@ -107,6 +106,12 @@ def _edges(shape: str) -> Indices:
     rings = FACES[shape] if DIMENSION[shape] > 1 else ((0, 1),) * (shape == "line")
     pairs = {tuple(sorted(pair)) for ring in rings for pair in pairwise([*ring, ring[0]])}
     return np.array(sorted(pairs), dtype=np.int64).reshape(-1, 2)
+
+
+def _quadrilaterals(shape: str) -> list[tuple[int, ...]]:
+    """Corners of the faces of a solid that have four, or those of a plane shape that has."""
+    faces = FACES[shape] if DIMENSION[shape] == 3 else (tuple(range(CORNERS[shape])),)
+    return [face for face in faces if len(face) == 4]
 
 
 def simplices(shape: str, cells: Indices) -> Indices:

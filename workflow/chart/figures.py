@@ -163,8 +163,7 @@ def _names(rungs: Sequence[Judged], cost: str, bottom: float) -> list[tuple[str,
     named = []
     for group in together.values():
         names = [rung.name.removeprefix(f"{rung.point.rung.branch}, ") for rung in group]
-        text = names[0] if len(names) == 1 else f"{names[0]} and {names[-1]}"
-        named.append((text, _place(group[0], cost, bottom)))
+        named.append((" and ".join(names), _place(group[0], cost, bottom)))
     return named
 
 

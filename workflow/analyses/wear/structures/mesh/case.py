@@ -295,7 +295,7 @@ class MeshCase(FiniteElementCase):
         ]
 
     def doubts(self) -> Iterator[str]:
-        """Faces that hardly meet: one that is in two parts, of which one is named."""
+        """What the file says besides its mesh; faces that hardly meet, as parts of a face do."""
         yield from super().doubts()
         if left := self.structure.read(self.mesh.size).left:
             yield (

@@ -32,7 +32,7 @@ def planes_of_symmetry(planes: Sequence[int]) -> str:
 def outline_of(mesh: StructureMesh, interface: Interface, gap: Section | None) -> str:
     """What a user should see of an interface, and of the gap given it, before running it."""
     meet = "meet node to node" if interface.projection is None else "do not match"
-    area = f"{interface.nodal_areas.sum():.4g} {'mm' if interface.line else 'mm²'}"
+    area = f"{interface.nodal_areas.sum():.4g} {_unit(interface)}"
     # Rounded, as planes of a mesh file are off by its last digits.
     low, high = (round(float(gap), 9) + 0.0 for gap in (interface.gap.min(), interface.gap.max()))
     more = "" if gap is None else f" and {shape_in_words(gap)}"
@@ -45,6 +45,11 @@ def outline_of(mesh: StructureMesh, interface: Interface, gap: Section | None) -
         f"{interface.name}, {len(interface)} nodes that {meet}, {area}{_beside(mesh, interface)}, "
         f"gap of the meshes {low:.3g} to {high:.3g} mm{_curved(interface)}{more}{cut}"
     )
+
+
+def _unit(interface: Interface) -> str:
+    """Of areas, or of lengths in a line contact."""
+    return "mm" if interface.line else "mm²"
 
 
 def _areas(mesh: StructureMesh, interface: Interface) -> tuple[float, float, float]:
@@ -64,8 +69,7 @@ def _beside(mesh: StructureMesh, interface: Interface) -> str:
     shared, *whole = _areas(mesh, interface)
     if all(abs(area / shared - 1.0) < SHARED for area in whole):
         return ""
-    unit = "mm" if interface.line else "mm²"
-    return f" of {whole[0]:.4g} and {whole[1]:.4g} {unit}"
+    return f" of {whole[0]:.4g} and {whole[1]:.4g} {_unit(interface)}"
 
 
 def _curved(interface: Interface) -> str:
@@ -76,11 +80,8 @@ def _curved(interface: Interface) -> str:
         bulge = 0.0 if surface is None else float(np.abs(surface.bulges).max(initial=0.0))
         if surface is None or round(bulge, 9) == 0.0 == surface.straight:
             continue
-        how = (
-            f"fitted through nodes, to {1e3 * surface.error:.2g} µm"
-            if surface.fitted
-            else ("by nodes on edges")
-        )
+        fit = f"fitted through nodes, to {1e3 * surface.error:.2g} µm"
+        how = fit if surface.fitted else "by nodes on edges"
         bent = f", {counted(surface.straight, 'edge')} left straight" * (surface.straight > 0)
         parts.append(f"body {number} up to {1e3 * bulge:.3g} µm off its facets ({how}{bent})")
     return f", {' and '.join(parts)}" if parts else ""
@@ -91,8 +92,7 @@ def hardly_met(mesh: StructureMesh, interface: Interface) -> str:
     shared, *whole = _areas(mesh, interface)
     if shared >= WHOLE * min(whole):
         return ""
-    unit = "mm" if interface.line else "mm²"
     return (
-        f"{interface.name}: its faces share {shared:.4g} {unit} of {whole[0]:.4g} and "
+        f"{interface.name}: its faces share {shared:.4g} {_unit(interface)} of {whole[0]:.4g} and "
         f"{whole[1]:.4g}; if one is in several parts, name them all, as in face_2: [a, b]"
     )

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial import cKDTree
 
-from fe_models.curved_face import EDGES, Surface
+from fe_models.curved_face import Surface
 from fe_models.cut_face import whole_face
 from fe_models.imported_structure import imported_softening, imported_structure
 from fe_models.mesh import Face, Interface, StructureMesh
@@ -168,10 +168,7 @@ class _MeshGap:
 
 def _parting(face: Face, x: Array, y: Array, sign: float = 1.0) -> Array:
     """Height of a face, of nodes that meet 0; beyond it farther and farther towards ``sign``."""
-    surface = face.surface
-    if surface is None:
-        edges = len(EDGES[face.facets.shape[1]])
-        surface = Surface(np.zeros(len(face)), np.zeros((len(face.facets), edges)))
+    surface = face.surface or Surface.flat(len(face), face.facets)
     height = surface.over(face.coordinates, face.facets, x, y)
     outside = np.isnan(height)
     points = np.stack(np.broadcast_arrays(x, y), axis=-1)[outside]
