@@ -217,9 +217,9 @@ def _run(
         with reporter.stage("paraview and figures", "pictures") as told:
             if analysis.pictures is not None:
                 drawn.extend(analysis.pictures().figures_of(contents))
-                helper = beside if analysis.draws_beside else None
+                sharing = beside if analysis.draws_beside else None
                 figures.update(
-                    write_pictures(case.output, folder, analysis.pictures, contents, helper, told)
+                    write_pictures(case.output, folder, analysis.pictures, contents, sharing, told)
                 )
 
     def report(summary: Summary) -> None:

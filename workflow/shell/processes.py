@@ -138,7 +138,7 @@ class Beside:
 
 
 def share_out(
-    tasks: Sequence[Task], beside: Beside | None = None, done: Callable[[], None] = lambda: None
+    tasks: Sequence[Task], beside: Beside | None = None, done: Done = _unheard
 ) -> list[Any]:
     """Do tasks, those from the beginning on here, those from the end on in a process ``beside``.
 
