@@ -106,7 +106,7 @@ def _sphere(cells: int, pair: ElasticPair) -> tuple[Any, HalfSpace, HertzSphere]
 def condensation(nodes: int) -> Sized:
     """The default dovetail with so many nodes across each flank; counts unknowns of its mesh."""
     stage = _dovetail(nodes)
-    bodies = stage.mesh.body_1, stage.mesh.body_2
+    bodies = stage.mesh.bodies
 
     def run() -> int:
         stage.prepare()

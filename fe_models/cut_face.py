@@ -30,14 +30,14 @@ PARITY = {0: (1.0, -1.0, 1.0, 1.0, -1.0, -1.0), 1: (1.0, 1.0, -1.0, -1.0, 1.0, -
 
 
 def cut_interface(
-    interface: Interface, bodies: tuple[Body, Body], supports: Sequence[sp.csr_matrix]
+    interface: Interface, bodies: Sequence[Body], supports: Sequence[sp.csr_matrix]
 ) -> Interface:
     """The interface with its planes of symmetry and its origin on them; as it is without any.
 
-    ``supports`` are what displacements ``(d n, ...)`` those of the vertices of either body are made
-    of. A plane across an axis of the frame is one where neither body goes beyond it, all their
-    vertices on it are held along its normal, and no others of body 2's face are. Where supports
-    hold that face in any other way, there is none.
+    ``bodies`` are the two that meet in it, and ``supports`` what displacements ``(d n, ...)`` those
+    of the vertices of either are made of. A plane across an axis of the frame is one where neither
+    body goes beyond it, all their vertices on it are held along its normal, and no others of body
+    2's face are. Where supports hold that face in any other way, there is none.
     """
     planes, origin = [], interface.frame.origin
     for axis in (0,) if interface.line else (0, 1):

@@ -63,8 +63,10 @@ def dovetail_structure(
 
     In the plane everything is per length of the slot, whose middle section it is.
     """
-    elastic_1 = ElasticBody(mesh.body_1, disk, order)
-    elastic_2 = ElasticBody(mesh.body_2, blade, order)
+    elastic_1, elastic_2 = (
+        ElasticBody(body, material, order)
+        for body, material in zip(mesh.bodies, (disk, blade), strict=True)
+    )
 
     held = Constraints(len(elastic_1.nodes), elastic_1.dimension)
     held.hold(elastic_1.boundary_nodes("inner"))
@@ -78,19 +80,17 @@ def dovetail_structure(
     loads_2 = _blade_loads(elastic_2, dovetail, mission)
 
     mesh = mesh.weighted(order)
-    nodes_1, frames_1 = interface_nodes(mesh.interfaces, 1, mesh.body_1)
-    nodes_2, frames_2 = interface_nodes(mesh.interfaces, 2, mesh.body_2)
-    trace_1, trace_2 = (
-        LinearTrace.of(elastic, {i.name: i.nodes(number) for i in mesh.interfaces})
-        for number, elastic in ((1, elastic_1), (2, elastic_2))
-    )
-    return Structure(
-        mesh=mesh,
-        body_1=SupportedBody(elastic_1, held, nodes_1, frames_1, loads_1, trace=trace_1),
-        body_2=SupportedBody(
-            elastic_2, guided, nodes_2, frames_2, loads_2, loaded=[TOP], trace=trace_2
-        ),
-    )
+    supported = []
+    for number, (elastic, constraints, loads, loaded) in enumerate(
+        ((elastic_1, held, loads_1, []), (elastic_2, guided, loads_2, [TOP]))
+    ):
+        faces = mesh.faces_of(number)
+        placed = interface_nodes(faces, elastic.body)
+        trace = LinearTrace.of(elastic, {i.name: i.nodes(side) for i, side in faces})
+        supported.append(
+            SupportedBody(elastic, constraints, *placed, loads, loaded=loaded, trace=trace)
+        )
+    return Structure(mesh, tuple(supported))
 
 
 def dovetail_softening(
@@ -100,7 +100,7 @@ def dovetail_softening(
 
     The airfoil is rigid and moves with the top of the shank.
     """
-    disk, blade = structure.body_1.elastic, structure.body_2.elastic
+    disk, blade = (body.elastic for body in structure.bodies)
     length = dovetail.slot_length if blade.dimension == 2 else 1.0
     centre = mission.airfoil_radius * dovetail.load_axis
     airfoil = CarriedMass(TOP, mission.airfoil_mass / length, centre)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations
 
 import numpy as np
@@ -25,9 +25,10 @@ from fe_models.elasticity import ElasticBody
 from fe_models.geometry.imported import ImportedMesh
 from fe_models.mesh import Body, MatchError, MeshError, StructureMesh, matched_interface
 from fe_models.mortar import frame_of_faces, mortar_interface
+from fe_models.rest import rigid_assemblies
 from fe_models.spin_softening import spin_softening
 from fe_models.structure import Structure
-from fe_models.supported_body import SupportedBody, interface_nodes
+from fe_models.supported_body import FREE_MOTION, SupportedBody, interface_nodes
 from fe_models.trace import LinearTrace
 from sa_solver.ties import first_largest
 from sa_solver.types import Array, Frame, Indices, Material
@@ -43,10 +44,12 @@ ANY = Material(1.0, 0.0)
 class ContactPair:
     """``face_1`` of body 1 meets ``face_2`` of body 2; their frame's x is near ``x_direction``.
 
-    Each is one boundary or several, seams included, that are one face together.
+    Each is one boundary or several, seams included, that are one face together. ``bodies`` are the
+    names of body 1 and body 2.
     """
 
     name: str
+    bodies: tuple[str, str]
     face_1: Sequence[str]
     face_2: Sequence[str]
     x_direction: Array
@@ -74,21 +77,24 @@ class Support:
 
 def imported_mesh(
     imported: ImportedMesh,
-    names: tuple[str, str],
+    names: Sequence[str],
     pairs: Sequence[ContactPair],
     supports: Sequence[Support] = (),
 ) -> StructureMesh:
-    """The two bodies of those names and the interfaces between them.
+    """The bodies of those names and the interfaces between them.
 
     The contact faces become boundaries named as their interface, whose nodes need not match;
     ``supports`` on them may be planes of symmetry (:mod:`fe_models.cut_face`).
     Raises :class:`MeshError` for names that are not in the file or faces that do not meet.
     """
-    body_1, body_2 = (named_body(imported, name) for name in names)
-    body_1 = _with_interfaces(imported, body_1, pairs, 1)
-    body_2 = _with_interfaces(imported, body_2, pairs, 2)
+    bodies = {name: _with_interfaces(imported, named_body(imported, name), pairs) for name in names}
+    held = {
+        name: _held(imported, ElasticBody(body, ANY), supports).transformation()
+        for name, body in bodies.items()
+    }
     interfaces = []
     for pair in pairs:
+        body_1, body_2 = meeting = [bodies[name] for name in pair.bodies]
         faces = (body_1, pair.boundary(1), body_2, pair.boundary(2))
         frame, _ = frame_of_faces(*faces, pair.x_direction)
         try:
@@ -99,38 +105,36 @@ def imported_mesh(
                 _surface(imported, body_2, pair.name, frame),
             )
             interface = mortar_interface(pair.name, *faces, frame, surfaces)
-        interfaces.append(interface)
-    bodies = body_1, body_2
-    held = [_held(imported, ElasticBody(body, ANY), supports).transformation() for body in bodies]
-    cut = (cut_interface(interface, bodies, held) for interface in interfaces)
-    return StructureMesh(body_1, body_2, tuple(cut))
+        one, two = (list(bodies).index(name) for name in pair.bodies)
+        cut = cut_interface(interface, meeting, [held[name] for name in pair.bodies])
+        interfaces.append(replace(cut, bodies=(one, two)))
+    return StructureMesh(tuple(bodies.values()), tuple(interfaces))
 
 
 def imported_structure(
     mesh: StructureMesh,
     imported: ImportedMesh,
-    materials: tuple[Material, Material],
+    materials: Sequence[Material],
     supports: Sequence[Support],
     loads: Sequence[AppliedLoad],
     order: int,
 ) -> Structure:
-    """Both bodies with their supports and a load case for each of the ``loads``.
+    """All bodies with their supports and a load case for each of the ``loads``.
 
-    Raises :class:`MeshError` for groups that neither body has, supports that let body 1 move as a
-    rigid body, and ones on a contact face that no plane of symmetry explains.
+    Raises :class:`MeshError` for groups that no body has, supports that let bodies move as rigid
+    ones though all faces stick, and ones on a contact face that no plane of symmetry explains.
     """
-    pair = mesh.body_1, mesh.body_2
     for support in supports:
-        check_support(imported, pair, support)
+        check_support(imported, mesh.bodies, support)
     for load in loads:
-        check_load(imported, pair, load)
+        check_load(imported, mesh.bodies, load)
     bodies = [
         _supported(number, mesh, imported, material, supports, loads, order)
-        for number, material in enumerate(materials, start=1)
+        for number, material in enumerate(materials)
     ]
-    structure = Structure(mesh.weighted(order), *bodies)
+    structure = Structure(mesh.weighted(order), tuple(bodies))
     _check_held(structure)
-    _check_rest(structure.body_1)
+    _check_rest(structure)
     return structure
 
 
@@ -167,13 +171,13 @@ def contact_facets(imported: ImportedMesh, body: Body, boundary: str) -> Indices
     raise MeshError(f"{wrong}; allowed: {known}")
 
 
-def check_support(imported: ImportedMesh, bodies: tuple[Body, Body], support: Support) -> None:
-    """Raise :class:`MeshError` if neither body has the group, or it cannot be held like that."""
+def check_support(imported: ImportedMesh, bodies: Sequence[Body], support: Support) -> None:
+    """Raise :class:`MeshError` if no body has the group, or it cannot be held like that."""
     boundaries, node_sets = _groups(imported, bodies)
     group, hold = support.group, support.hold
     if group not in boundaries | node_sets:
         raise MeshError(
-            f"no boundary or node set {group} on {bodies[0].name} or {bodies[1].name}; allowed: "
+            f"no boundary or node set {group} on {_any_of(bodies)}; allowed: "
             f"{', '.join(sorted(boundaries | node_sets)) or 'none'}"
         )
     if group not in boundaries and (hold == "normal" or hold.startswith("mean_")):
@@ -182,21 +186,22 @@ def check_support(imported: ImportedMesh, bodies: tuple[Body, Body], support: Su
         )
 
 
-def check_load(imported: ImportedMesh, bodies: tuple[Body, Body], load: AppliedLoad) -> None:
-    """Raise :class:`MeshError` if neither body has the boundary, or the plane not the direction."""
+def check_load(imported: ImportedMesh, bodies: Sequence[Body], load: AppliedLoad) -> None:
+    """Raise :class:`MeshError` if no body has the boundary, or the plane not the direction."""
     boundaries, node_sets = _groups(imported, bodies)
     group = boundary_of(load)
     if group is not None and group not in boundaries:
         wrong = (
             f"{group} is a node set, which has no area"
             if group in node_sets
-            else f"no boundary {group} on {bodies[0].name} or {bodies[1].name}"
+            else f"no boundary {group} on {_any_of(bodies)}"
         )
         raise MeshError(f"{wrong}; allowed: {', '.join(sorted(boundaries)) or 'none'}")
-    if isinstance(load, BoundaryForce) and all(group in _groups(imported, [b])[0] for b in bodies):
+    having = [body for body in bodies if group in _groups(imported, [body])[0]]
+    if isinstance(load, BoundaryForce) and len(having) > 1:
         raise MeshError(
-            f"{group} is a boundary of both bodies, and each would take all of the force; allowed: "
-            "boundaries of one body"
+            f"{group} is a boundary of {' and '.join(body.name for body in having)}, and each "
+            "would take all of the force; allowed: boundaries of one body"
         )
     if bodies[0].mesh.dim() == 3:
         return
@@ -207,18 +212,21 @@ def check_load(imported: ImportedMesh, bodies: tuple[Body, Body], load: AppliedL
         raise MeshError("a moment about x or z, which lie in the plane; allowed: about y")
 
 
-def _with_interfaces(
-    imported: ImportedMesh, body: Body, pairs: Sequence[ContactPair], number: int
-) -> Body:
+def _any_of(bodies: Sequence[Body]) -> str:
+    return " or ".join(body.name for body in bodies)
+
+
+def _with_interfaces(imported: ImportedMesh, body: Body, pairs: Sequence[ContactPair]) -> Body:
     """The body with its contact faces as boundaries of the interfaces' names as well.
 
     Those of several boundaries go by all of their names together, too.
     """
     named: dict[str, Indices] = {}
     for pair in pairs:
-        parts = [contact_facets(imported, body, name) for name in pair.boundaries(number)]
-        facets = np.unique(np.concatenate(parts))
-        named |= {pair.name: facets, pair.boundary(number): facets}
+        for number in (n for n, name in enumerate(pair.bodies, start=1) if name == body.name):
+            parts = [contact_facets(imported, body, name) for name in pair.boundaries(number)]
+            facets = np.unique(np.concatenate(parts))
+            named |= {pair.name: facets, pair.boundary(number): facets}
     return Body(body.name, body.mesh.with_boundaries(named))
 
 
@@ -239,15 +247,13 @@ def _check_held(structure: Structure) -> None:
 
     Meshes that do not match hold it at other nodes, at most a facet away.
     """
-    body_1, body_2 = structure.body_1, structure.body_2
-    d = body_1.elastic.dimension
-    name_1, name_2 = body_1.elastic.body.name, body_2.elastic.body.name
-    interfaces = structure.mesh.interfaces
+    d, interfaces = structure.dimension, structure.mesh.interfaces
     held_1, held_2 = (
-        np.split(body.held.reshape(-1, d), np.cumsum([len(i.nodes(k)) for i in interfaces])[:-1])
-        for k, body in enumerate(structure.bodies, start=1)
+        np.split(held.reshape(-1, d), np.cumsum([len(i.nodes(side)) for i in interfaces])[:-1])
+        for side, held in enumerate(structure.held, start=1)
     )
     for interface, one, two in zip(interfaces, held_1, held_2, strict=True):
+        name_1, name_2 = (structure.mesh.bodies[k].name for k in interface.bodies)
         if two[:, -1].any():
             raise MeshError(
                 f"nodes of {interface.name} on body {name_2} are held along the contact's normal: "
@@ -272,18 +278,24 @@ def _are_near(places: Array, points: Array, reach: float) -> bool:
     return len(places) > 0 and bool(cKDTree(places).query(points)[0].max() <= reach)
 
 
-def _check_rest(body: SupportedBody) -> None:
-    """Raise if a body can move as a rigid one."""
-    points = body.elastic.nodes
-    motions = body.free_motions(points.mean(axis=0), float(np.ptp(points, axis=0).max()))
-    if len(motions):
-        # Of several, how much of each axis is among them, whatever basis they have been given in.
-        motion = first_largest(np.sum(motions**2, axis=0))
-        freely = f"{'shift along' if motion < 3 else 'turn about'} {AXIS_NAMES[motion % 3]}"
-        raise MeshError(
-            f"the supports let body {body.elastic.body.name} {freely}, which must be held by them "
-            "alone; hold more, or let body 1 be the body that is held"
-        )
+def _check_rest(structure: Structure) -> None:
+    """Raise if bodies can move as rigid ones though all faces stick."""
+    motions = rigid_assemblies(structure)
+    if not len(motions):
+        return
+    # Of several, how much of each axis is among them, whatever basis they have been given in.
+    among = np.sum(motions**2, axis=0)
+    moving = [
+        body.elastic.body.name
+        for body, share in zip(structure.bodies, among.sum(axis=1), strict=True)
+        if share > FREE_MOTION * among.sum()
+    ]
+    motion = first_largest(among.sum(axis=0))
+    freely = f"{'shift along' if motion < 3 else 'turn about'} {AXIS_NAMES[motion % 3]}"
+    raise MeshError(
+        f"the supports let {' and '.join(moving)} {freely}, though all contacts stick; hold more, "
+        "or have a contact with what is held"
+    )
 
 
 def _groups(imported: ImportedMesh, bodies: Sequence[Body]) -> tuple[set[str], set[str]]:
@@ -301,7 +313,7 @@ def _supported(
     loads: Sequence[AppliedLoad],
     order: int,
 ) -> SupportedBody:
-    body = (mesh.body_1, mesh.body_2)[number - 1]
+    body = mesh.bodies[number]
     elastic = ElasticBody(body, material, order)
     constraints, groups = _held(imported, elastic, supports), _names(imported, body)
     free, supported_motions = constraints.free, constraints.transformation()
@@ -319,10 +331,11 @@ def _supported(
     _check_against_supports(loads, imposed, supported_motions @ imposed[free])
     _check_against_each_other(elastic, moved)
     _check_separate(mesh, number)
-    placed = interface_nodes(mesh.interfaces, number, body)
+    faces = mesh.faces_of(number)
+    placed = interface_nodes(faces, body)
     moving = imposed if imposed.any() else None
     try:
-        trace = LinearTrace.of(elastic, {i.name: i.nodes(number) for i in mesh.interfaces})
+        trace = LinearTrace.of(elastic, {i.name: i.nodes(side) for i, side in faces})
         supported = SupportedBody(elastic, constraints, *placed, forces, moving, loaded, trace)
     except ValueError as error:
         raise MeshError(f"body {body.name}: {error}") from error
@@ -334,13 +347,13 @@ def _supported(
 
 
 def _check_separate(mesh: StructureMesh, number: int) -> None:
-    """Raise if a node of body ``number`` is on two of its contact faces."""
-    for one, other in combinations(mesh.interfaces, 2):
-        if len(np.intersect1d(one.nodes(number), other.nodes(number))):
+    """Raise if a node of the body at a place ``number`` is on two of its contact faces."""
+    for (one, side), (other, other_side) in combinations(mesh.faces_of(number), 2):
+        if len(np.intersect1d(one.nodes(side), other.nodes(other_side))):
             raise MeshError(
                 f"contacts {one.name} and {other.name} share nodes of body "
-                f"{(mesh.body_1, mesh.body_2)[number - 1].name}; divide the face between them, or "
-                "make them one contact"
+                f"{mesh.bodies[number].name}; divide the face between them, or make them one "
+                "contact"
             )
 
 
@@ -426,8 +439,8 @@ def _check_against_each_other(elastic: ElasticBody, imposed: Sequence[Displaceme
 
 def imported_softening(
     structure: Structure, loads: Sequence[AppliedLoad], amplitudes: Array
-) -> tuple[sp.csr_matrix, sp.csr_matrix]:
-    """Spin softening of both bodies ``(size, size)`` [N/mm] at ``amplitudes`` of the loads."""
+) -> tuple[sp.csr_matrix, ...]:
+    """Spin softening of all bodies ``(size, size)`` [N/mm] at ``amplitudes`` of the loads."""
     softening = []
     for body in structure.bodies:
         total = sp.csr_matrix(body.elastic.stiffness.shape)
@@ -436,4 +449,4 @@ def imported_softening(
                 one = spin_softening(body.elastic, load.speed, axis=load.direction)
                 total = total + amplitude * one
         softening.append(total.tocsr())
-    return softening[0], softening[1]
+    return tuple(softening)

@@ -1,13 +1,17 @@
-"""The joint that two condensed bodies form.
+"""The joint that condensed bodies form.
 
-Each body is condensed onto its interface nodes, S u = r + f, with f the contact forces on it. With
-N the projection of body 1's displacements onto body 2's nodes, w = u_2 - N u_1 is the relative
-displacement and forces f on body 2 are -Nᵀf on body 1. Both bodies then form one joint
+Each body is condensed onto its interface nodes, S u = r + f, with f the contact forces on it. Of
+all bodies together S is block-diagonal; u_1 are the displacements of bodies 1 of the interfaces at
+their faces, u_2 those of bodies 2. With N the projection of u_1 onto the nodes of faces 2,
+w = u_2 - N u_1 is the relative displacement and forces f on bodies 2 are -Nᵀf on bodies 1. They
+form one joint
 
-    f = H w + f0,   H = S_2 - S_2 N C⁻¹ NᵀS_2,   f0 = S_2 N C⁻¹ (r_1 + Nᵀr_2) - r_2,
+    f = H w + f0,   H = S_22 - K C⁻¹ Kᵀ,   f0 = K C⁻¹ (r_1 + Nᵀr_2) - r_2,
+    K = S_21 + S_22 N,   C = S_11 + S_12 N + NᵀS_21 + NᵀS_22 N,
 
-with C = S_1 + NᵀS_2 N. N is the identity where the bodies meet node to node. H is symmetric; the
-rigid motions of a body that is held by contact alone are its null space.
+where C is the stiffness of all bodies with closed faces that stick, and S_21 that of bodies which
+are body 1 of one interface and body 2 of another. N is the identity where faces meet node to node.
+H is symmetric; the rigid motions of bodies that are held by contact alone are its null space.
 
 A plane of symmetry through a contact holds displacements u_1 and u_2 of its nodes at zero. They are
 left out of S and N, and so is their w, which no force acts on: supports carry it.
@@ -15,8 +19,10 @@ left out of S and N, and so is their w, which no force acts on: supports carry i
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 import scipy.linalg as sl
@@ -26,7 +32,7 @@ from scipy.sparse.linalg import LinearOperator, eigsh
 
 from fe_models.blas_threads import one_thread
 from fe_models.symmetry import Mirror, SplitMatrix, symmetric_product
-from sa_solver.types import Array
+from sa_solver.types import Array, Indices
 
 # Eigenvalues below this share of the largest are rigid motions; elastic ones start near 1e-3.
 RIGID_LIMIT = 1e-7
@@ -122,22 +128,24 @@ class JointResolvent:
 
 
 def join(
-    condensed_1: Condensed,
-    condensed_2: Condensed,
+    bodies: Sequence[Condensed],
     projection: sp.csr_matrix | None = None,
+    places: Sequence[Indices] | None = None,
     held: NDArray[np.bool_] | None = None,
     like: JointResolvent | None = None,
 ) -> JointStiffness:
-    """Join two condensed bodies; body 1 must be held, body 2 may float.
+    """Join condensed ``bodies``, which need not be held but where all faces stick.
 
-    ``projection`` ``(d n, d n_1)`` is N on displacements, None where the bodies meet node to node;
-    of those that ``held`` ``(d n,)`` marks neither it nor body 2 has rows. A joint that differs
-    little from ``like`` may take its ρ as extreme eigenvalues: the search for its own fails where
-    contact alone holds a body in a centrifugal field, which makes H slightly indefinite.
+    ``projection`` ``(d n, d n_1)`` is N on displacements, None where all faces meet node to node;
+    ``places`` ``(k,)`` are those of each body's displacements among u_1 followed by u_2, by default
+    of two bodies, the first below and the second above all faces. Of those that ``held`` ``(d n,)``
+    marks neither the projection nor u_2 has rows. A joint that differs little from ``like`` may
+    take its ρ as extreme eigenvalues: the search for its own fails where contact alone holds a body
+    in a centrifugal field, which makes H slightly indefinite.
     """
-    stiffness, loads = _joined(condensed_1, condensed_2, projection)
+    stiffness, loads = _joined(_faces(bodies, projection, places), projection)
     if like is None:
-        rigid_modes, smallest, largest = _spectrum(stiffness)
+        rigid_modes, smallest, largest = _spectrum(stiffness, len(bodies) - 1)
     else:
         rigid_modes, smallest, largest = like.rigid_modes, like.rho, like.rho
     return JointStiffness(stiffness, loads, rigid_modes, smallest, largest, held)
@@ -146,29 +154,67 @@ def join(
 def join_halves(
     halves_1: tuple[Condensed, ...], halves_2: tuple[Condensed, ...], mirror: Mirror
 ) -> JointStiffness:
-    """Join bodies that meet node to node, condensed in halves of the same ``mirror``."""
-    joined = [_joined(*pair, None) for pair in zip(halves_1, halves_2, strict=True)]
+    """Join two bodies that meet node to node, condensed in halves of the same ``mirror``."""
+    pairs = zip(halves_1, halves_2, strict=True)
+    joined = [_joined(_Faces(one, two, None), None) for one, two in pairs]
     (symmetric, symmetric_loads), (antisymmetric, antisymmetric_loads) = joined
-    counts, smallest, largest = zip(*(_spectrum(block) for block, _ in joined), strict=True)
+    counts, smallest, largest = zip(*(_spectrum(block, 1) for block, _ in joined), strict=True)
     loads = mirror.bases[0] @ symmetric_loads + mirror.bases[1] @ antisymmetric_loads
     stiffness = SplitMatrix(mirror, (symmetric, antisymmetric))
     return JointStiffness(stiffness, loads, sum(counts), min(smallest), max(largest))
 
 
-def _joined(
-    condensed_1: Condensed,
-    condensed_2: Condensed,
+class _Faces(NamedTuple):
+    """Stiffness and loads of all bodies at faces 1 and at faces 2, and S_21 if there is any."""
+
+    first: Condensed
+    second: Condensed
+    coupling: Array | None
+
+
+def _faces(
+    bodies: Sequence[Condensed],
     projection: sp.csr_matrix | None,
-) -> tuple[Array, Array]:
+    places: Sequence[Indices] | None,
+) -> _Faces:
+    """Faces 1 and faces 2 of ``bodies`` whose displacements are at ``places`` among all."""
+    every = sum(len(stiffness) for stiffness, _ in bodies)
+    if places is None or (
+        len(bodies) == 2 and np.array_equal(np.concatenate(places), np.arange(every))
+    ):
+        return _Faces(bodies[0], bodies[1], None)
+    count = every // 2 if projection is None else projection.shape[1]
+    cases = bodies[0][1].shape[1]
+    first = np.zeros((count, count)), np.zeros((count, cases))
+    second = np.zeros((every - count,) * 2), np.zeros((every - count, cases))
+    coupling = None
+    for (stiffness, loads), place in zip(bodies, places, strict=True):
+        one, two = np.flatnonzero(place < count), np.flatnonzero(place >= count)
+        for (matrix, forces), own, start in ((first, one, 0), (second, two, count)):
+            matrix[np.ix_(place[own] - start, place[own] - start)] = stiffness[np.ix_(own, own)]
+            forces[place[own] - start] = loads[own]
+        if len(one) and len(two):
+            coupling = np.zeros((every - count, count)) if coupling is None else coupling
+            coupling[np.ix_(place[two] - count, place[one])] = stiffness[np.ix_(two, one)]
+    return _Faces(first, second, coupling)
+
+
+def _joined(faces: _Faces, projection: sp.csr_matrix | None) -> tuple[Array, Array]:
     """H and f0 of the load cases."""
-    (stiffness_1, loads_1), (stiffness_2, loads_2) = condensed_1, condensed_2
+    (stiffness_1, loads_1), (stiffness_2, loads_2), between = faces
     if projection is None:
         coupling, carried, transferred = stiffness_2, stiffness_2, loads_2
+        if between is not None:
+            coupling, carried = coupling + between.T, carried + between.T + between
     else:
         coupling, transferred = projection.T @ stiffness_2, projection.T @ loads_2
+        if between is not None:
+            coupling = coupling + between.T
         carried = coupling @ projection
+        if between is not None:
+            carried = carried + projection.T @ between
     factor = sl.cholesky(stiffness_1 + carried, lower=True, overwrite_a=True)
-    # S_2 N C⁻¹ NᵀS_2 = XᵀX with X = L⁻¹ NᵀS_2: half the work of solving with both factors.
+    # K C⁻¹ Kᵀ = XᵀX with X = L⁻¹ Kᵀ: half the work of solving with both factors.
     half = sl.solve_triangular(factor, coupling, lower=True, check_finite=False)
     stiffness = stiffness_2 - half.T @ half
     loads = half.T @ sl.solve_triangular(factor, loads_1 + transferred, lower=True) - loads_2
@@ -184,8 +230,11 @@ def _shifted_inverse(stiffness: Array, rho: float) -> Array:
     return np.asarray(np.tril(inverse) + np.tril(inverse, -1).T)
 
 
-def _spectrum(stiffness: Array) -> tuple[int, float, float]:
-    """Number of zero eigenvalues, smallest other one and largest one, by Lanczos iterations."""
+def _spectrum(stiffness: Array, free: int) -> tuple[int, float, float]:
+    """Number of zero eigenvalues, smallest other one and largest one, by Lanczos iterations.
+
+    So many bodies may be ``free``.
+    """
     start = np.random.default_rng(0).standard_normal(len(stiffness))
     extreme = partial(eigsh, v0=start, tol=RITZ_RESIDUAL, return_eigenvectors=False)
     product = LinearOperator(
@@ -202,8 +251,8 @@ def _spectrum(stiffness: Array) -> tuple[int, float, float]:
         matvec=lambda v: sl.cho_solve(factors, v, check_finite=False),
         dtype=np.float64,
     )
-    # A free body has at most six rigid motions: the seventh eigenvalue is elastic.
-    count = min(7, len(stiffness) - 1)
+    # A free body has at most six rigid motions: the next eigenvalue is elastic.
+    count = min(6 * free + 1, len(stiffness) - 1)
     with one_thread(len(stiffness)):
         lowest = 1.0 / extreme(inverse, count) - shift
     elastic = lowest[lowest > RIGID_LIMIT * largest]

@@ -174,6 +174,8 @@ class Interface(Face):
     Planes of symmetry may cut it: ``planes`` are the axes of the frame that are normal to them, and
     the frame's origin is on them (:mod:`fe_models.cut_face`).
 
+    Its body 1 and body 2 are those of a :class:`StructureMesh` at the places ``bodies``, from 0.
+
     Examples
     --------
     Two cubes that meet node to node over 1 mm²:
@@ -198,6 +200,7 @@ class Interface(Face):
     face_1: Face | None = None
     areas: Array | None = None
     planes: tuple[int, ...] = ()
+    bodies: tuple[int, int] = (0, 1)
 
     @property
     def nodal_areas(self) -> Array:
@@ -214,7 +217,7 @@ class Interface(Face):
 
 @dataclass(frozen=True)
 class StructureMesh:
-    """``body_1``, the fixed one, ``body_2`` and the ``interfaces`` between them.
+    """``bodies`` and the ``interfaces`` between them, each of which names its two by their places.
 
     Examples
     --------
@@ -229,14 +232,18 @@ class StructureMesh:
     >>> upper, lower = Body("upper", mesh), Body("lower", mesh.mirrored((0.0, 0.0, 1.0)))
     >>> frame = Frame(np.zeros(3), np.eye(3))
     >>> face = matched_interface("joint", lower, upper, "contact", frame)
-    >>> cubes = StructureMesh(lower, upper, (face,))
+    >>> cubes = StructureMesh((lower, upper), (face,))
     >>> print(cubes.node_count(order=1), "nodes,", cubes.node_count(order=2), "with midsides")
     16 nodes, 52 with midsides
     """
 
-    body_1: Body
-    body_2: Body
+    bodies: tuple[Body, ...]
     interfaces: tuple[Interface, ...]
+
+    def faces_of(self, place: int) -> list[tuple[Interface, int]]:
+        """Contact faces of the body at a ``place``: interfaces, and which body of each it is."""
+        sides = (1, 2)
+        return [(i, s) for i in self.interfaces for s in sides if i.bodies[s - 1] == place]
 
     def weighted(self, order: int) -> StructureMesh:
         """With faces that are ``weighted`` where elements are of second order."""
@@ -251,9 +258,9 @@ class StructureMesh:
         return replace(self, interfaces=tuple(faces))
 
     def node_count(self, order: int) -> int:
-        """Nodes of both bodies, with elements of order 2 midsides included."""
+        """Nodes of all bodies, with elements of order 2 midsides included."""
         count = 0
-        for mesh in (self.body_1.mesh, self.body_2.mesh):
+        for mesh in (body.mesh for body in self.bodies):
             count += mesh.nvertices
             if order == 2:
                 count += mesh.nedges if mesh.dim() == 3 else mesh.nfacets
@@ -347,13 +354,13 @@ def matched_interface(
 
 
 def write_msh(path: Path, structure: StructureMesh) -> None:
-    """Write both bodies and all their named boundaries to one gmsh 4.1 file (text).
+    """Write all bodies and all their named boundaries to one gmsh 4.1 file (text).
 
     Raises OSError where the disk is full, which gmsh does not notice.
     """
     with gmsh_model("structure") as gmsh:
         offset = 0
-        for tag, body in enumerate((structure.body_1, structure.body_2), start=1):
+        for tag, body in enumerate(structure.bodies, start=1):
             dim = body.mesh.dim()
             gmsh.model.addDiscreteEntity(dim, tag)
             gmsh.model.addPhysicalGroup(dim, [tag], name=body.name)

@@ -19,13 +19,13 @@ import numpy as np
 
 from fe_models.friction import FrictionalJoint, FrictionState
 from fe_models.joint import JointResolvent
+from fe_models.motion import deformation
 from fe_models.relinearised import (
     Displacements,
     Softening,
     relinearised,
     turned_interface,
 )
-from fe_models.stress import deformation
 from fe_models.structure import Structure
 from fe_models.total_lagrangian import TotalLagrangian, rotation_angle
 from sa_solver.types import Array, resultant_change
@@ -170,10 +170,9 @@ def _remainder(
 
 def _turn(undeformed: Structure, framed: Structure, displacements: Displacements) -> float:
     """Largest angle from the frames of ``framed`` to body 1's displaced faces [rad]."""
-    body_1 = undeformed.mesh.body_1
     pairs = zip(undeformed.mesh.interfaces, framed.mesh.interfaces, strict=True)
     turns = [
-        turned_interface(face, body_1, displacements[0]).frame.axes @ other.frame.axes.T
+        turned_interface(face, undeformed.mesh, displacements).frame.axes @ other.frame.axes.T
         for face, other in pairs
     ]
     return float(rotation_angle(np.array(turns)).max())

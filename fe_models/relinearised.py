@@ -17,21 +17,21 @@ import scipy.sparse as sp
 
 from fe_models.friction import FrictionState
 from fe_models.joint import JointResolvent
-from fe_models.mesh import Body, Interface, StructureMesh
+from fe_models.mesh import Interface, StructureMesh
 from fe_models.rigid_motions import rigid_motions
 from fe_models.structure import Structure
 from fe_models.supported_body import SupportedBody, interface_nodes
 from fe_models.total_lagrangian import TotalLagrangian
 from sa_solver.types import Array, Frame
 
-# Displacements, or spin softening matrices, of body 1 and body 2.
-Displacements = tuple[Array, Array]
-Softening = tuple[sp.csr_matrix, sp.csr_matrix]
+# Displacements, or spin softening matrices, of each body.
+Displacements = tuple[Array, ...]
+Softening = tuple[sp.csr_matrix, ...]
 
 
 @dataclass(frozen=True)
 class PrestressedStructure(Structure):
-    """A structure with the stiffness that it has at one load.
+    """A structure of two bodies, the first of them held, with the stiffness it has at one load.
 
     ``displacements`` of both bodies are those of that load, ``share`` ``(cases,)`` how much of it
     an amplitude of each load case is.
@@ -49,7 +49,7 @@ class PrestressedStructure(Structure):
         in proportion to it.
         """
         joint = self.condense(like)
-        free = ~self.body_2.held
+        free = ~self.bodies[1].held
         full = np.asarray(joint.stiffness)
         stiffness = _deflated(full, self._rigid_motions()[free])
         relative = self._relative()[free]
@@ -63,10 +63,11 @@ class PrestressedStructure(Structure):
         The forces -K u of the one load, in proportion, as in :meth:`condense_path`. They balance as
         well as ``displacements`` are those of this structure.
         """
-        forces = -self.body_2.elastic.stiffness @ self.displacements[1]
-        body_2 = copy(self.body_2)
-        body_2.loads = self.body_2.loads + np.outer(forces, self.share)
-        plain = Structure(self.mesh, self.body_1, body_2)
+        body_1, body_2 = self.bodies
+        forces = -body_2.elastic.stiffness @ self.displacements[1]
+        loaded = copy(body_2)
+        loaded.loads = body_2.loads + np.outer(forces, self.share)
+        plain = Structure(self.mesh, (body_1, loaded))
         return plain.equilibrium_errors(states, amplitudes)
 
     def _relative(self) -> Array:
@@ -80,11 +81,12 @@ class PrestressedStructure(Structure):
 
     def _rigid_motions(self) -> Array:
         """Orthonormal motions ``(d n, k)`` of the interfaces that body 2's supports leave free."""
-        faces, axes = self.mesh.interfaces, self.mesh.body_2.axes
-        points = np.concatenate([self.mesh.body_2.points[face.nodes_2] for face in faces])
+        faces, body_2 = self.mesh.interfaces, self.mesh.bodies[1]
+        axes = body_2.axes
+        points = np.concatenate([body_2.points[face.nodes_2] for face in faces])
         middle = points.mean(axis=0)
         size = float(np.linalg.norm(np.ptp(points, axis=0)))
-        free = self.body_2.free_motions(middle, size)
+        free = self.bodies[1].free_motions(middle, size)
         moved = (free @ rigid_motions((points - middle) / size).T).reshape(len(free), *points.shape)
         ends = np.cumsum([len(face) for face in faces])[:-1]
         by_face = zip(faces, np.split(moved, ends, axis=1), strict=True)
@@ -121,10 +123,8 @@ def relinearised(
     in proportion, so that the unloaded structure stays unloaded. The interface frames are turned
     with body 1's faces. Raises ValueError if there is no load.
     """
-    body_1 = structure.mesh.body_1
-    interfaces = tuple(
-        turned_interface(i, body_1, displacements[0]) for i in structure.mesh.interfaces
-    )
+    mesh = structure.mesh
+    interfaces = tuple(turned_interface(i, mesh, displacements) for i in mesh.interfaces)
     share = _share(structure, amplitudes)
     changes = []
     for body, displacement, soft in zip(structure.bodies, displacements, softening, strict=True):
@@ -132,15 +132,19 @@ def relinearised(
         tangent = finite.tangent(displacement)
         offset = tangent @ displacement - finite.internal_force(displacement)
         changes.append((tangent - soft, body.loads + np.outer(offset, share)))
-    mesh = replace(structure.mesh, interfaces=interfaces)
+    mesh = replace(mesh, interfaces=interfaces)
     return _prestressed(structure, mesh, displacements, share, changes)
 
 
-def turned_interface(interface: Interface, body_1: Body, displacement: Array) -> Interface:
+def turned_interface(
+    interface: Interface, mesh: StructureMesh, displacements: Displacements
+) -> Interface:
     """The interface with its frame turned by the mean rotation of body 1's face."""
+    place = interface.bodies[0]
+    body_1, moved = mesh.bodies[place], displacements[place]
     axes = body_1.axes
     points = body_1.points[interface.nodes_1][:, axes]
-    nodal = displacement.reshape(-1, len(axes))[interface.nodes_1]
+    nodal = moved.reshape(-1, len(axes))[interface.nodes_1]
     rotation = np.eye(3)
     rotation[np.ix_(axes, axes)] = mean_rotation(
         points, points + nodal, interface.face(1).nodal_areas
@@ -199,11 +203,11 @@ def _prestressed(
     """Bodies supported as they are, with another stiffness, other loads and the mesh's frames."""
     bodies = []
     for number, (body, (stiffness, loads)) in enumerate(
-        zip(structure.bodies, changes, strict=True), start=1
+        zip(structure.bodies, changes, strict=True)
     ):
         elastic = copy(body.elastic)
         elastic.stiffness = stiffness
-        placed = interface_nodes(mesh.interfaces, number, elastic.body)
+        placed = interface_nodes(mesh.faces_of(number), elastic.body)
         given = body.constraints, *placed, loads, body.imposed, body.loaded, body.trace
         bodies.append(SupportedBody(elastic, *given))
-    return PrestressedStructure(mesh, bodies[0], bodies[1], displacements, share)
+    return PrestressedStructure(mesh, tuple(bodies), displacements, share)

@@ -5,6 +5,7 @@ Nodes of the faces move along the normal of the interface, the inside follows a 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from math import factorial
 
@@ -32,7 +33,7 @@ FOLLOWING = 5.0
 
 
 def worn_mesh(mesh: StructureMesh, depths: list[tuple[Array, Array]]) -> StructureMesh:
-    """Lower the faces of every interface by the nodal depths of body 1 and body 2 [mm].
+    """Lower the faces of every interface by the nodal depths of its body 1 and body 2 [mm].
 
     Each is ``(n,)`` at the nodes of that body's own face.
 
@@ -41,11 +42,14 @@ def worn_mesh(mesh: StructureMesh, depths: list[tuple[Array, Array]]) -> Structu
     crushed, when the depth is no longer small against the elements at the flank.
     """
     bodies = []
-    for number, body in enumerate((mesh.body_1, mesh.body_2), start=1):
+    by_name = dict(zip((i.name for i in mesh.interfaces), depths, strict=True))
+    for number, body in enumerate(mesh.bodies):
         prescribed = np.zeros_like(body.points)
-        for interface, pair in zip(mesh.interfaces, depths, strict=True):
-            inwards = {1: -1.0, 2: 1.0}[number] * interface.frame.axes[2]
-            prescribed[interface.nodes(number)] += np.outer(pair[number - 1], inwards)
+        for interface, side in mesh.faces_of(number):
+            inwards = {1: -1.0, 2: 1.0}[side] * interface.frame.axes[2]
+            prescribed[interface.nodes(side)] += np.outer(
+                by_name[interface.name][side - 1], inwards
+            )
         worn = _moved(body, _followed(body.mesh, prescribed[:, body.axes]))
         if _crushed(body, worn):
             raise MeshError(
@@ -53,43 +57,55 @@ def worn_mesh(mesh: StructureMesh, depths: list[tuple[Array, Array]]) -> Structu
                 "flank (mesh.flank_nodes) or stop at a smaller depth"
             )
         bodies.append(worn)
-    return StructureMesh(bodies[0], bodies[1], mesh.interfaces)
+    return replace(mesh, bodies=tuple(bodies))
 
 
-def form_of(mesh: StructureMesh) -> Array:
-    """Displacements ``(n, dim)`` of body 2's vertices that give it the form of its faces [mm].
+def form_of(mesh: StructureMesh) -> tuple[Array, ...]:
+    """Displacements ``(n, dim)`` of each body's vertices that give it the form of its faces [mm].
 
     What the gaps of the interfaces are wider than the meshed faces are apart, such as rounded
     edges: body 2 has it and body 1 is as it is meshed, as in :class:`wear.surfaces.Surfaces`. Where
     body 1 covers nothing of a face its form goes on as at the nearest node; boundaries beside it
     follow over a few times its depth, and stay farther away.
     """
-    body = mesh.body_2
-    points, form, faces = body.points, np.zeros_like(body.points), []
-    for interface in mesh.interfaces:
-        face, nodes, z = body.vertices(interface.name), interface.nodes_2, interface.frame.axes[2]
-        nearest = cKDTree(points[nodes]).query(points[face])[1]
-        form[face] += np.outer(_unmeshed_gap(mesh, interface)[nearest], z)
-        faces.append(face)
+    return tuple(_form_of_body(mesh, number) for number in range(len(mesh.bodies)))
+
+
+def _form_of_body(mesh: StructureMesh, number: int) -> Array:
+    body, faces = mesh.bodies[number], mesh.faces_of(number)
+    points, form, held = body.points, np.zeros_like(body.points), []
+    for interface, side in faces:
+        face, nodes, z = (
+            body.vertices(interface.name),
+            interface.nodes(side),
+            interface.frame.axes[2],
+        )
+        if side == 2:
+            nearest = cKDTree(points[nodes]).query(points[face])[1]
+            form[face] += np.outer(_unmeshed_gap(mesh, interface)[nearest], z)
+        held.append(face)
     reach = FOLLOWING * float(np.linalg.norm(form, axis=1).max())
     if reach == 0.0:
         return form[:, body.axes]
-    held = np.unique(np.concatenate(faces))
-    beside = np.setdiff1d(body.mesh.boundary_nodes(), held)
-    distance, nearest = cKDTree(points[held]).query(points[beside])
-    form[beside] = np.maximum(1.0 - distance / reach, 0.0)[:, None] * form[held[nearest]]
+    every = np.unique(np.concatenate(held))
+    beside = np.setdiff1d(body.mesh.boundary_nodes(), every)
+    distance, nearest = cKDTree(points[every]).query(points[beside])
+    form[beside] = np.maximum(1.0 - distance / reach, 0.0)[:, None] * form[every[nearest]]
     return _followed(body.mesh, form[:, body.axes])
 
 
-def formed_mesh(mesh: StructureMesh, form: Array) -> StructureMesh:
-    """The mesh with body 2 in its ``form``, of :func:`form_of` or 0 [mm].
+def formed_mesh(mesh: StructureMesh, form: Sequence[Array]) -> StructureMesh:
+    """The mesh with its bodies in their ``form``, of :func:`form_of` or 0 [mm].
 
     Raises :class:`MeshError` if that crushes an element.
     """
-    body_2 = _moved(mesh.body_2, form)
-    if _crushed(mesh.body_2, body_2):
-        raise MeshError(f"elements of the {body_2.name} are too small for the form of its faces")
-    return replace(mesh, body_2=body_2)
+    bodies = []
+    for body, moved in zip(mesh.bodies, form, strict=True):
+        formed = _moved(body, moved) if moved.any() else body
+        if _crushed(body, formed):
+            raise MeshError(f"elements of the {body.name} are too small for the form of its faces")
+        bodies.append(formed)
+    return replace(mesh, bodies=tuple(bodies))
 
 
 def worn_volume(before: Body, after: Body, interface: Interface, number: int) -> float:
@@ -113,7 +129,7 @@ def _unmeshed_gap(mesh: StructureMesh, interface: Interface) -> Array:
     """What of its gap ``(n,)`` [mm] the meshed faces of an interface do not have."""
     height_1, height_2 = (
         interface.frame.coordinates(body.points[interface.nodes(number)])[:, 2]
-        for number, body in enumerate((mesh.body_1, mesh.body_2), start=1)
+        for number, body in enumerate((mesh.bodies[k] for k in interface.bodies), start=1)
     )
     below = height_1 if interface.projection is None else interface.projection @ height_1
     form = interface.gap - (height_2 - below)

@@ -102,7 +102,7 @@ def reduced_specimens(
     (face,) = mesh.interfaces
     models = []
     for body, pad, material in zip(
-        (mesh.body_1, mesh.body_2), (face.nodes_1, face.nodes_2), materials, strict=True
+        mesh.bodies, (face.nodes_1, face.nodes_2), materials, strict=True
     ):
         target = NONE if target_distance is None else specimen.target(body, target_distance)
         full = specimen_matrices(specimen, body, pad, material, order, target)

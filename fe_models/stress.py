@@ -1,4 +1,4 @@
-"""Displacements and stresses of both bodies at a state of the joint, and over a cycle."""
+"""Stresses of all bodies at a state of the joint, and over a cycle."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ from fe_models.elasticity import (
     von_mises,
 )
 from fe_models.mesh import Body, in_space
+from fe_models.motion import structure_motion
 from fe_models.recovery import StressRecovery
 from fe_models.structure import Structure
 from sa_solver.ties import first_largest
@@ -29,8 +30,12 @@ ON_BORDER = 1e-9
 # order 2 three quarters) within a factor of two. Least 0.37 of the true error, where that is over
 # 0.5 %.
 MISSING = {1: 1.4, 2: 0.75}
-# Of the stress over a cycle: motion and stress of each body.
-STEPS = 4
+
+
+# Of the stress over a cycle: its motion, and the stress of each body.
+def steps(bodies: int) -> int:
+    """How many steps the stress of so many bodies over a cycle takes."""
+    return bodies + 1
 
 
 @dataclass(frozen=True)
@@ -88,19 +93,6 @@ class StressField:
         return turned(np.einsum("cin,in->cn", self.stress[:, corners.T], weights), frame)
 
 
-def deformation(
-    structure: Structure, force: Array, relative: Array, amplitudes: Array
-) -> tuple[Array, Array]:
-    """All displacements of body 1 and body 2, each ``(size,)`` [mm].
-
-    Body 1 carries the forces, body 2 follows it at the relative displacements. ``force`` ``(3, n)``
-    on body 2 and ``relative`` displacement ``(3, n)`` are over all interfaces, in their frames;
-    ``amplitudes`` those of the load cases.
-    """
-    every, forces, _, follows = _motion(structure, force[None], relative[None], amplitudes[None])
-    return every[:, 0], structure.body_2.recover(follows[:, 0], forces[:, 0], amplitudes)
-
-
 @dataclass(frozen=True)
 class SurfaceHistory:
     """What is seen of a body over some increments: its surface, or all of it in the plane.
@@ -117,13 +109,13 @@ class SurfaceHistory:
 
 @dataclass(frozen=True)
 class CycleStress:
-    """Both bodies over a cycle: their ``fields`` at one increment, and how their faces move.
+    """All bodies over a cycle: their ``fields`` at one increment, and how their faces move.
 
     ``faces`` are displacements ``(t, 3, n)`` [mm] of body 1 and body 2, by interface, in the frame
-    and at the nodes of that; ``surfaces`` both bodies in the increments that are shown, if any are.
+    and at the nodes of that; ``surfaces`` the bodies in the increments that are shown, if any are.
     """
 
-    fields: tuple[StressField, StressField]
+    fields: tuple[StressField, ...]
     faces: tuple[tuple[Array, Array], ...]
     surfaces: tuple[SurfaceHistory, ...]
 
@@ -140,53 +132,19 @@ def cycle_stress(
     """Stress in increment ``at`` and on the surface in those ``shown``; how the faces move in all.
 
     ``force`` ``(t, 3, n)``, ``relative`` ``(t, 3, n)`` and ``amplitudes`` ``(t, cases)`` as in
-    :func:`deformation`. ``done`` is called after each of ``STEPS`` steps.
+    :func:`fe_models.motion.deformation`. ``done`` is called after each of the :func:`steps`.
     """
-    every, forces, leads, follows = _motion(structure, force, relative, amplitudes)
-    done()
-
     # The first is that of the fields; all of them by one factorisation.
-    increments = [at, *shown]
-    moved = structure.body_2.recover(
-        follows[:, increments], forces[:, increments], amplitudes[increments].T
-    )
+    motion = structure_motion(structure, force, relative, amplitudes, [at, *shown])
     done()
-    displacements = every[:, increments], moved
-    dimension = structure.body_1.elastic.dimension
-    ends = np.cumsum([len(interface) for interface in structure.mesh.interfaces])[:-1]
-    faces_1, faces_2 = (
-        np.split(in_space(moved.T.reshape(len(force), -1, dimension)).swapaxes(1, 2), ends, axis=2)
-        for moved in (leads, follows)
-    )
     fields, surfaces = [], []
-    for body, displacement in zip(structure.bodies, displacements, strict=True):
+    for body, displacement in zip(structure.bodies, motion.displacements, strict=True):
         elastic, free = body.elastic, body.free_facets
         fields.append(stress_field(elastic, displacement[:, 0], free, body.nodes, body.clamped))
         if shown:
             surfaces.append(surface_history(elastic, displacement[:, 1:], free))
         done()
-    one, two = fields
-    faces = tuple(zip(faces_1, faces_2, strict=True))
-    return CycleStress((one, two), faces, tuple(surfaces))
-
-
-def _motion(
-    structure: Structure, force: Array, relative: Array, amplitudes: Array
-) -> tuple[Array, Array, Array, Array]:
-    """All displacements of body 1 ``(size, t)``, and what the interfaces do.
-
-    At their nodes ``(d n, t)``: forces on body 2, displacements of body 1 and of body 2.
-    """
-    axes = structure.mesh.body_1.axes
-    forces, gaps = (
-        field[:, axes, :].transpose(2, 1, 0).reshape(-1, len(force)) for field in (force, relative)
-    )
-    projection = structure.projection
-    on_body_1 = forces if projection is None else projection.T @ forces
-    every, leads = structure.body_1.respond(-on_body_1, amplitudes.T)
-    if projection is not None:
-        leads = projection @ leads
-    return every, forces, leads, leads + gaps
+    return CycleStress(tuple(fields), motion.faces, tuple(surfaces))
 
 
 def stress_field(

@@ -1,31 +1,30 @@
-"""Two supported bodies with their interfaces: condensation, contact history, equilibrium."""
+"""Supported bodies with their interfaces: condensation, contact history, equilibrium."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from functools import partial
+from functools import cached_property, partial
 from typing import TypeVar
 
 import numpy as np
 import scipy.sparse as sp
+from numpy.typing import NDArray
 
 from fe_models.friction import LOAD_FLOOR, FrictionalJoint, FrictionState
 from fe_models.joint import JointResolvent, JointStiffness, join, join_halves
-from fe_models.mesh import Face, Interface, StructureMesh
+from fe_models.mesh import Face, Interface, StructureMesh, in_space
 from fe_models.pardiso import sharing
 from fe_models.supported_body import SupportedBody
 from sa_solver.increments import dissipated, in_rows, mean_of_ends
 from sa_solver.threads import at_once
-from sa_solver.types import Array, LoadHistory, Progress, Tally, resultants, unseen
+from sa_solver.types import Array, Indices, LoadHistory, Progress, Tally, resultants, unseen
 
 T = TypeVar("T")
 
-# Unknowns of both bodies up to which factors are found side by side: some 2 GB. Larger ones gain as
+# Unknowns of all bodies up to which factors are found side by side: some 2 GB. Larger ones gain as
 # much from PARDISO's own threads, and each would count on all the memory that is free.
 MOST_AT_ONCE = 300_000
-# Of a condensation: two of each body, and the joint of both.
-STEPS = 5
 # A face slides as a whole when nodes that stick carry less than this share of its load.
 STICKING_SHARE = 1e-2
 # Below this share of the cycle's largest P the resultants are the friction solver's remainder.
@@ -71,7 +70,7 @@ class CycleSolution:
     ``states`` are the splitting's, by increment, and ``last_displacement`` ``(3, n)`` the one that
     the next cycle starts from. ``closure`` is the largest difference of contact forces between the
     last two of the ``cycles`` that were marched, relative to the largest force (0 if one was);
-    ``equilibrium`` ``(t,)`` the relative error of the balance of body 2.
+    ``equilibrium`` ``(t,)`` the relative error of the balance of a body that is free to move.
     """
 
     histories: tuple[InterfaceHistory, ...]
@@ -94,9 +93,9 @@ class CycleSolution:
 
 @dataclass(frozen=True)
 class Structure:
-    """Two bodies of a ``mesh``, both supported and loaded.
+    """The ``bodies`` of a ``mesh``, supported and loaded.
 
-    ``body_1`` is held by its supports, ``body_2`` by contact and what supports it has.
+    Supports hold them where all faces stick; contact alone may hold some of them.
 
     Examples
     --------
@@ -120,11 +119,11 @@ class Structure:
     >>> held, free = Constraints(len(lower.nodes), 2), Constraints(len(upper.nodes), 2)
     >>> held.hold(lower.boundary_nodes("end"))
     >>> nothing, pressed = np.zeros((lower.size, 1)), upper.pressure_load("end")[:, None]
-    >>> structure = Structure(
-    ...     StructureMesh(lower.body, upper.body, (face,)),
-    ...     SupportedBody(lower, held, *interface_nodes([face], 1, lower.body), nothing),
-    ...     SupportedBody(upper, free, *interface_nodes([face], 2, upper.body), pressed),
+    >>> bodies = (
+    ...     SupportedBody(lower, held, *interface_nodes([(face, 1)], lower.body), nothing),
+    ...     SupportedBody(upper, free, *interface_nodes([(face, 2)], upper.body), pressed),
     ... )
+    >>> structure = Structure(StructureMesh((lower.body, upper.body), (face,)), bodies)
     >>> joint = FrictionalJoint(structure.condense().resolvent(), friction=0.5)
     >>> cycle = structure.solve_cycle(joint, np.array([[5.0], [10.0]]), structure.gap(), 0.5)
     >>> print(cycle.histories[0].loads.P.round(4), "N/mm")
@@ -132,13 +131,40 @@ class Structure:
     """
 
     mesh: StructureMesh
-    body_1: SupportedBody
-    body_2: SupportedBody
+    bodies: tuple[SupportedBody, ...]
 
     @property
-    def bodies(self) -> tuple[SupportedBody, SupportedBody]:
-        """Body 1 and body 2."""
-        return self.body_1, self.body_2
+    def dimension(self) -> int:
+        """Of the bodies, 2 or 3."""
+        return self.bodies[0].elastic.dimension
+
+    @cached_property
+    def places(self) -> tuple[Indices, ...]:
+        """Where each body's interface displacements are among those of all faces.
+
+        These are displacements of faces 1, interface by interface, and then of faces 2.
+        """
+        d, sides = self.dimension, (1, 2)
+        order = [(i, side) for side in sides for i in range(len(self.mesh.interfaces))]
+        sizes = [d * len(self.mesh.interfaces[i].nodes(side)) for i, side in order]
+        ends = np.cumsum(sizes)
+        place = {
+            key: np.arange(end - n, end) for key, n, end in zip(order, sizes, ends, strict=True)
+        }
+        names = [interface.name for interface in self.mesh.interfaces]
+        return tuple(
+            np.concatenate([place[names.index(i.name), s] for i, s in self.mesh.faces_of(number)])
+            for number in range(len(self.bodies))
+        )
+
+    @cached_property
+    def held(self) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+        """Displacements of faces 1 and of faces 2 that supports hold at zero."""
+        held = np.zeros(sum(map(len, self.places)), bool)
+        for body, place in zip(self.bodies, self.places, strict=True):
+            held[place] = body.held
+        faces_1 = sum(len(interface.nodes_1) for interface in self.mesh.interfaces)
+        return held[: self.dimension * faces_1], held[self.dimension * faces_1 :]
 
     def condense(
         self, like: JointResolvent | None = None, progress: Progress = unseen
@@ -148,36 +174,42 @@ class Structure:
         ``like`` is a joint that differs little from this one and lends it its ρ. ``progress`` is
         told the steps of it that are done.
         """
-        held_1, held_2 = self.body_1.held, self.body_2.held
+        held_1, held_2 = self.held
         projection, held = self.projection, held_1.any() or held_2.any()
-        if like is None and projection is None and not held:
+        if like is None and projection is None and not held and len(self.bodies) == 2:
             halves = self._condense_halves(progress)
             if halves is not None:
                 return halves
         if held:
             every = sp.identity(len(held_2), format="csr") if projection is None else projection
             projection = every[~held_2][:, ~held_1]
-        done = Tally(progress, STEPS)
-        condensed_1, condensed_2 = self.at_once(
-            *(partial(body.condense, done) for body in self.bodies)
-        )
-        joint = join(condensed_1, condensed_2, projection, held_2, like)
+        done = self._steps(progress)
+        condensed = self.at_once(*(partial(body.condense, done) for body in self.bodies))
+        among_free = np.cumsum(~np.concatenate(self.held)) - 1
+        pairs = zip(self.bodies, self.places, strict=True)
+        places = [among_free[place[~body.held]] for body, place in pairs]
+        joint = join(condensed, projection, places, held_2, like)
         done()
         return joint
 
+    def _steps(self, progress: Progress) -> Tally:
+        """Steps of a condensation: two of each body, and the joint of all."""
+        return Tally(progress, 2 * len(self.bodies) + 1)
+
     def _condense_halves(self, progress: Progress) -> JointStiffness | None:
-        """As :meth:`condense`, by a mirror symmetry of both bodies; None if there is none."""
-        for axis in self.body_1.elastic.body.axes:
-            mirrors = self.body_1.mirror(axis), self.body_2.mirror(axis)
+        """As :meth:`condense`, by a mirror symmetry of two bodies; None if there is none."""
+        body_1, body_2 = self.bodies
+        for axis in body_1.elastic.body.axes:
+            mirrors = body_1.mirror(axis), body_2.mirror(axis)
             if mirrors[0] is None or mirrors[1] is None:
                 continue
-            on_1 = self.body_1.on_interface(mirrors[0])
-            if on_1 is None or on_1 != self.body_2.on_interface(mirrors[1]):
+            on_1 = body_1.on_interface(mirrors[0])
+            if on_1 is None or on_1 != body_2.on_interface(mirrors[1]):
                 continue
-            done = Tally(progress, STEPS)
+            done = self._steps(progress)
             halves_1, halves_2 = self.at_once(
-                partial(self.body_1.condense_halves, mirrors[0], on_1, done),
-                partial(self.body_2.condense_halves, mirrors[1], on_1, done),
+                partial(body_1.condense_halves, mirrors[0], on_1, done),
+                partial(body_2.condense_halves, mirrors[1], on_1, done),
             )
             if halves_1 is not None and halves_2 is not None:
                 joint = join_halves(halves_1, halves_2, on_1)
@@ -193,7 +225,7 @@ class Structure:
 
     @property
     def projection(self) -> sp.csr_matrix | None:
-        """Displacements of body 1's nodes to those at body 2's, in the interface frames.
+        """Displacements of faces 1 to those at the nodes of faces 2, in the interface frames.
 
         None where all interfaces meet node to node.
         """
@@ -201,7 +233,7 @@ class Structure:
         if all(i.projection is None for i in interfaces):
             return None
         blocks = [sp.identity(len(i)) if i.projection is None else i.projection for i in interfaces]
-        components = sp.identity(self.body_1.elastic.dimension)
+        components = sp.identity(self.dimension)
         return sp.kron(sp.block_diag(blocks), components, format="csr")
 
     @property
@@ -210,8 +242,8 @@ class Structure:
 
         A plane of symmetry holds some of them, a slice in plane strain all.
         """
-        held = self.body_2.held.reshape(-1, self.body_2.elastic.dimension)
-        shares = {i.name: float(held[nodes].mean(axis=0).max()) for i, nodes in self._shares()}
+        held = self.held[1].reshape(-1, self.dimension)
+        shares = {i.name: float(held[nodes].mean(axis=0).max()) for i, nodes in self.shares()}
         return {name: share for name, share in shares.items() if share > 0.0}
 
     def gap(self) -> Array:
@@ -280,7 +312,7 @@ class Structure:
         """Histories of the interfaces from the fields ``(t, components, n)`` over all of them."""
         histories = []
         nodal = np.broadcast_to(friction, force.shape[-1:])
-        for interface, nodes in self._shares():
+        for interface, nodes in self.shares():
             parts = force[..., nodes], displacement[..., nodes], slip[..., nodes]
             loads = load_history(interface, parts[0], parts[2], nodal[nodes])
             histories.append(InterfaceHistory(interface, loads, *parts))
@@ -291,35 +323,55 @@ class Structure:
         return np.array(
             [
                 resultants(state.force[:, nodes], *interface.coordinates.T)
-                for interface, nodes in self._shares()
+                for interface, nodes in self.shares()
             ]
         )
 
-    def equilibrium_errors(self, states: Sequence[FrictionState], amplitudes: Array) -> Array:
-        """Forces and moments on body 2 that neither contact nor supports balance, ``(t,)``.
+    def on_faces(self, force: Array) -> Array:
+        """Contact forces on the bodies at all faces, ``(places, t)``, from ``(t, 3, n)``."""
+        axes = self.mesh.bodies[0].axes
+        on_2 = np.asarray(force)[:, axes, :].transpose(2, 1, 0).reshape(-1, len(force))
+        projection = self.projection
+        on_1 = on_2 if projection is None else projection.T @ on_2
+        return np.concatenate([-on_1, on_2])
 
-        Relative to what is applied and what the nodes carry, or to ``LOAD_FLOOR`` of the largest of
-        all increments where there is hardly a load. Moments are taken about the middle of the
-        contacts and divided by their size.
+    def equilibrium_errors(self, states: Sequence[FrictionState], amplitudes: Array) -> Array:
+        """Forces and moments on a body that neither contacts nor supports balance, ``(t,)``.
+
+        Those of the body that is worst off, relative to what is applied to it and what its nodes
+        carry, or to ``LOAD_FLOOR`` of the largest of all increments where there is hardly a load.
+        Moments are taken about the middle of its contacts and divided by their size.
         """
-        points = np.concatenate([self.mesh.body_2.points[i.nodes_2] for i in self.mesh.interfaces])
+        forces = self.on_faces(np.stack([state.force for state in states]))
+        worst = np.zeros(len(states))
+        for number, place in enumerate(self.places):
+            np.maximum(worst, self._unbalanced(number, forces[place], amplitudes), out=worst)
+        return worst
+
+    def _unbalanced(self, number: int, forces: Array, amplitudes: Array) -> Array:
+        """The errors of one body under ``forces`` ``(d n, t)`` in the frames of its faces."""
+        body = self.bodies[number]
+        faces = self.mesh.faces_of(number)
+        points = np.concatenate([body.elastic.body.points[i.nodes(side)] for i, side in faces])
         middle = points.mean(axis=0)
         size = float(np.linalg.norm(np.ptp(points, axis=0)))
-        free = self.body_2.free_motions(middle, size)
-        errors, scales = np.empty((2, len(states)))
-        for t, state in enumerate(states):
-            forces = np.concatenate(
-                [i.frame.to_global(state.force[:, nodes].T) for i, nodes in self._shares()]
-            )
-            moments = np.cross(points - middle, forces).sum(axis=0)
-            applied = self.body_2.load_resultants(amplitudes[t], middle)
-            force, moment = applied + np.array([forces.sum(axis=0), moments])
+        free = body.free_motions(middle, size)
+        if not len(free):
+            return np.zeros(len(amplitudes))
+        ends = np.cumsum([len(i.nodes(side)) for i, side in faces])[:-1]
+        errors, scales = np.empty((2, len(amplitudes)))
+        for t, of_t in enumerate(in_space(forces.T.reshape(len(amplitudes), -1, self.dimension))):
+            parts = zip(faces, np.split(of_t, ends), strict=True)
+            acting = np.concatenate([i.frame.to_global(part) for (i, _), part in parts])
+            moments = np.cross(points - middle, acting).sum(axis=0)
+            applied = body.load_resultants(amplitudes[t], middle)
+            force, moment = applied + np.array([acting.sum(axis=0), moments])
             errors[t] = np.linalg.norm(free @ np.append(force, moment / size))
-            scales[t] = np.linalg.norm(applied[0]) + np.abs(state.force).sum()
+            scales[t] = np.linalg.norm(applied[0]) + np.abs(of_t).sum()
         floor = LOAD_FLOOR * scales.max()
         return errors / np.maximum(scales, floor) if floor > 0.0 else errors
 
-    def _shares(self) -> list[tuple[Interface, slice]]:
+    def shares(self) -> list[tuple[Interface, slice]]:
         """Every interface and its nodes' place among those of all of them."""
         ends = np.cumsum([len(i) for i in self.mesh.interfaces]).tolist()
         return [

@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from functools import cached_property
 
 import numpy as np
+import scipy.linalg as sl
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
@@ -190,26 +191,57 @@ class SupportedBody:
         rhs -= stiffness[inner][:, self._interface] @ interface_displacement
         displacement = np.empty((stiffness.shape[0], *rhs.shape[1:]))
         displacement[self._interface] = interface_displacement
-        solve = prepare(stiffness[inner][:, inner].tocsr(), self._soft_motions()[inner])
+        solve = prepare(stiffness[inner][:, inner].tocsr(), self._soft_motions[inner])
         displacement[inner] = solve(rhs)
         return self._all(displacement, amplitudes)
 
     def respond(self, interface_forces: Array, amplitudes: Array) -> tuple[Array, Array]:
-        """All displacements and the interface's, of a held body under interface forces.
+        """All displacements and the interface's under interface forces.
 
         ``interface_forces`` ``(d n, ...)`` and ``amplitudes`` ``(cases, ...)`` may have columns.
+        A body that supports leave free moves so far as the forces deform it, and by
+        :meth:`rigid_displacements` as contact alone says.
         """
         stiffness, loads = self._reduced()
         rhs = loads @ amplitudes
         forces = interface_forces[self._free]
         rhs[self._interface] += forces if self._springs is None else self._springs.on_ends(forces)
-        displacement = prepare(stiffness, self._soft_motions())(rhs)
+        rigid = self._rigid
+        if rigid.shape[1]:
+            # What the contact solver leaves of the balance goes into the body evenly, and nothing
+            # into the displacements that are held meanwhile.
+            rhs -= rigid @ (rigid.T @ rhs)
+            free = np.delete(np.arange(len(rhs)), _independent(rigid))
+            displacement = np.zeros_like(rhs)
+            displacement[free] = prepare(
+                stiffness[free][:, free].tocsr(), self._soft_motions[free]
+            )(rhs[free])
+        else:
+            displacement = prepare(stiffness, self._soft_motions)(rhs)
+        return self._all(displacement, amplitudes), self._on_interface(displacement, forces)
+
+    def rigid_displacements(self) -> tuple[Array, Array]:
+        """All displacements ``(d all, k)`` and the interface's of the motions left by supports."""
+        rigid = self._rigid
+        nothing = np.zeros((len(self._free), rigid.shape[1]))
+        return self._transformation @ rigid, self._on_interface(rigid, nothing)
+
+    def _on_interface(self, displacement: Array, forces: Array) -> Array:
+        """Interface displacements ``(d n, ...)`` of those that supports leave, under forces."""
         interface = np.zeros((len(self.held), *displacement.shape[1:]))
         moved = displacement[self._interface]
         if self._springs is not None:
             moved = self._springs.nodal(moved, forces)
         interface[self._free] = moved
-        return self._all(displacement, amplitudes), interface
+        return interface
+
+    @cached_property
+    def _rigid(self) -> Array:
+        """Orthonormal motions ``(free, k)`` that strain nothing."""
+        modes = sl.orth(self._soft_motions, rcond=FREE_MOTION)
+        energies, shapes = np.linalg.eigh(modes.T @ (self._stiffness @ modes))
+        stiff = float(np.median(self._stiffness.diagonal()))
+        return np.asarray(modes @ shapes[:, energies <= FREE_MOTION * stiff])
 
     def at_interface(self, displacement: Array) -> Array:
         """Interface displacements ``(d n,)`` of all displacements ``(d all,)``."""
@@ -236,6 +268,11 @@ class SupportedBody:
         loaded = [mesh.boundaries[name] for name in self.loaded]
         facets = np.setdiff1d(facets, np.concatenate(loaded) if loaded else [])
         return np.asarray(facets[~touched[mesh.facets[:, facets]].all(axis=0)], dtype=np.int64)
+
+    @property
+    def is_held(self) -> bool:
+        """Whether supports alone hold the body."""
+        return self._rigid.shape[1] == 0
 
     @property
     def clamped(self) -> Indices:
@@ -274,6 +311,7 @@ class SupportedBody:
         free[:, known] = vectors[:, : len(free)].T
         return free
 
+    @cached_property
     def _soft_motions(self) -> Array:
         """What is left of the rigid motions ``(free, k)``: motions of little energy."""
         elastic = self.elastic
@@ -305,14 +343,21 @@ class SupportedBody:
         return np.asarray((d * nodes[:, None] + np.arange(d)).ravel())
 
 
-def interface_nodes(
-    interfaces: Sequence[Interface], number: int, body: Body
-) -> tuple[Indices, Array]:
-    """Nodes ``(n,)`` of body ``number``, interface by interface, and their axes ``(n, d, d)``."""
+def interface_nodes(faces: Sequence[tuple[Interface, int]], body: Body) -> tuple[Indices, Array]:
+    """Nodes ``(n,)`` of a body's contact ``faces``, one after the other, and their axes.
+
+    The ``faces`` are those of :meth:`StructureMesh.faces_of`, the axes ``(n, d, d)``.
+    """
     axes = np.ix_(body.axes, body.axes)
-    nodes = [interface.nodes(number) for interface in interfaces]
-    frames = [np.tile(i.frame.axes[axes], (len(i.nodes(number)), 1, 1)) for i in interfaces]
+    nodes = [interface.nodes(side) for interface, side in faces]
+    frames = [np.tile(i.frame.axes[axes], (len(i.nodes(side)), 1, 1)) for i, side in faces]
     return np.concatenate(nodes), np.concatenate(frames)
+
+
+def _independent(motions: Array) -> Indices:
+    """Unknowns ``(k,)`` that hold ``motions`` ``(n, k)`` when they are held: far from singular."""
+    _, _, order = sl.qr(motions.T, mode="economic", pivoting=True)
+    return np.asarray(order[: motions.shape[1]])
 
 
 def _interface_displacements(

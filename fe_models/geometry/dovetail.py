@@ -220,7 +220,7 @@ class Dovetail:
             face = matched_interface(name, disk, blade, name, self.flank_frame(side))
             x, y = face.coordinates.T
             interfaces.append(replace(face, gap=self.flank_gap(x, y, side)))
-        return StructureMesh(disk, blade, tuple(interfaces))
+        return StructureMesh((disk, blade), tuple(interfaces))
 
     def blade_section(self) -> list[SectionCurve]:
         """Named curves round the right half of the blade; arcs are (start, centre, end)."""

@@ -114,7 +114,8 @@ class Specimen:
         body_2 = Body("specimen_2", replace(body_1.mesh, doflocs=turned @ body_1.mesh.p))
         frame = Frame(np.zeros(3), np.eye(3))
         face = matched_interface(CONTACT, body_1, body_2, CONTACT, frame)
-        return StructureMesh(body_1, body_2, (replace(face, gap=self.gap(*face.coordinates.T)),))
+        face = replace(face, gap=self.gap(*face.coordinates.T))
+        return StructureMesh((body_1, body_2), (face,))
 
     def ring(self, body: Body) -> Indices:
         """Vertices of the ring, ``(ring_nodes,)``, by angle from the X axis."""

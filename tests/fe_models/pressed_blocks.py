@@ -104,11 +104,11 @@ class Pressed:
         constraints = isostatic(self.elastic[0]), Constraints(self.count(1), dimension)
         self.bodies = []
         for k, elastic in enumerate(self.elastic):
-            placed = interface_nodes([self.interface], k + 1, elastic.body)
+            placed = interface_nodes([(self.interface, k + 1)], elastic.body)
             trace = LinearTrace.of(elastic, {contact[k]: placed[0]})
             load = boundary_load(elastic, stress, contact[k])[:, None]
             self.bodies.append(SupportedBody(elastic, constraints[k], *placed, load, trace=trace))
-        self.joint = join(*(body.condense() for body in self.bodies), self.projection)
+        self.joint = join([body.condense() for body in self.bodies], self.projection)
 
     def count(self, number):
         return len(self.elastic[number].nodes)

@@ -34,7 +34,7 @@ def meshed(bodies, supports, points=None, x=(1.0, 0.0, 0.0)):
     named = {body.name: body for body in bodies}
     numbers = {name: np.arange(body.mesh.nvertices) for name, body in named.items()}
     imported = ImportedMesh(named, numbers, {"block": {}, "pad": {}} | (points or {}))
-    pair = ContactPair("foot", ["top"], ["bottom"], np.array(x))
+    pair = ContactPair("foot", ("block", "pad"), ["top"], ["bottom"], np.array(x))
     return imported, imported_mesh(imported, ("block", "pad"), [pair], supports)
 
 

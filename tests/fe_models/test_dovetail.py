@@ -26,7 +26,9 @@ ANGLES = [35, *(slow(angle) for angle in (45, 55, 65))]
 def pull(structure, amplitudes):
     """Total force on the blade along the load axis at every increment [N]."""
     axis = np.array([0.0, 0.0, 1.0])
-    return np.array([structure.body_2.load_resultants(a, 0.0 * axis)[0] @ axis for a in amplitudes])
+    return np.array(
+        [structure.bodies[1].load_resultants(a, 0.0 * axis)[0] @ axis for a in amplitudes]
+    )
 
 
 def test_speed_rises_and_falls(mission):
@@ -41,9 +43,9 @@ def test_speed_rises_and_falls(mission):
 def test_blade_carries_its_mass_the_airfoil_and_the_moment(structure, mission):
     """F = Ω² (ρ V r + m R); the moment acts about the slot and along it."""
     amplitudes = mission.amplitudes()[PEAK]
-    mesh = structure.mesh.body_2.mesh
+    mesh = structure.mesh.bodies[1].mesh
     moments = mesh.p[:, mesh.t].mean(axis=1) @ np.abs(element_volumes(mesh))
-    force, moment = structure.body_2.load_resultants(amplitudes, np.zeros(3))
+    force, moment = structure.bodies[1].load_resultants(amplitudes, np.zeros(3))
     expected = amplitudes[0] * (4.43e-9 * moments[2] + 0.8e-3 * 400.0)
     assert force[2] == pytest.approx(expected, rel=1e-10)
     np.testing.assert_allclose(force[:2], 0.0, atol=1e-9 * expected)
@@ -180,7 +182,7 @@ def test_resultants_are_those_of_the_forces(structure, solved, mission):
     """Moments of the nodal forces about the face's centre, from cross products in space."""
     for history in solved(0.4, mission).histories:
         face = history.interface
-        at = structure.mesh.body_2.mesh.p[:, face.nodes_2].T - face.frame.origin
+        at = structure.mesh.bodies[1].mesh.p[:, face.nodes_2].T - face.frame.origin
         forces = face.frame.to_global(history.force[PEAK].T)
         moment = face.frame.components(np.cross(at, forces).sum(axis=0))
         force = face.frame.components(forces.sum(axis=0))
@@ -202,7 +204,7 @@ def test_equilibrium_error_sees_a_wrong_force(structure, joint, mission):
         states = [replace(state, force=force)]
         return structure.equilibrium_errors(states, amplitudes[PEAK : PEAK + 1])[0]
 
-    applied = np.linalg.norm(structure.body_2.load_resultants(amplitudes[PEAK], np.zeros(3))[0])
+    applied = np.linalg.norm(structure.bodies[1].load_resultants(amplitudes[PEAK], np.zeros(3))[0])
     scale = applied + np.abs(state.force).sum()
     assert error(state.force) < 1e-6
     assert error(1.01 * state.force) * scale == pytest.approx(0.01 * applied, rel=2e-2)

@@ -155,7 +155,7 @@ def test_cantilever(box):
 @pytest.mark.parametrize("order", ORDERS)
 def test_centrifugal_load_is_mass_times_radius(coarse_mesh, titanium, order):
     """Per ω²: ρ V r of the centre of mass, on every body."""
-    for body in (coarse_mesh.body_1, coarse_mesh.body_2):
+    for body in coarse_mesh.bodies:
         elastic = ElasticBody(body, titanium, order)
         volumes = np.abs(element_volumes(body.mesh))
         centroids = body.mesh.p[:, body.mesh.t].mean(axis=1)

@@ -119,7 +119,7 @@ class BlockOnPlate:
         ):
             constraints.average(*elastic.midsides("contact"))
             supported.append(SupportedBody(elastic, constraints, nodes, self.frames, loads))
-        return supported, join(*(body.condense() for body in supported))
+        return supported, join([body.condense() for body in supported])
 
     def monolith(self):
         parts = []
@@ -359,7 +359,7 @@ def small_dovetail(dovetail, titanium, mission):
 
 def whole_dovetail(mesh, material, mission):
     """Supports and loads written down again: a held disk, a blade kept in the slot by its mean."""
-    disk, blade = (ElasticBody(body, material, 1) for body in (mesh.body_1, mesh.body_2))
+    disk, blade = (ElasticBody(body, material, 1) for body in mesh.bodies)
     size_1, size_2 = 3 * len(disk.nodes), 3 * len(blade.nodes)
     inner = disk.boundary_nodes("inner")
     sides, normals = disk.boundary_normals("sides")
@@ -377,13 +377,13 @@ def whole_dovetail(mesh, material, mission):
         for name in ("nodes_1", "nodes_2")
     )
     part_1 = Part(
-        whole_stiffness(mesh.body_1.mesh, material, 1),
+        whole_stiffness(mesh.bodies[0].mesh, material, 1),
         supports.tocsr(),
         np.stack([spin, 0.0 * spin], axis=1),
         nodes_1,
     )
     part_2 = Part(
-        whole_stiffness(mesh.body_2.mesh, material, 1),
+        whole_stiffness(mesh.bodies[1].mesh, material, 1),
         mean_held(size_2, *blade.boundary_weights("root_bottom"), Y),
         np.stack([pull + blade.centrifugal_load(), bend], axis=1),
         nodes_2,

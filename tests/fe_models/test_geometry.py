@@ -28,7 +28,7 @@ def triangle_areas(mesh, boundary):
 def test_faces_match_node_to_node(joint_and_mesh):
     _, mesh = joint_and_mesh
     for face in mesh.interfaces:
-        apart = mesh.body_1.mesh.p[:, face.nodes_1] - mesh.body_2.mesh.p[:, face.nodes_2]
+        apart = mesh.bodies[0].mesh.p[:, face.nodes_1] - mesh.bodies[1].mesh.p[:, face.nodes_2]
         assert np.abs(apart).max() < 1e-9
         assert len(face) == len(np.unique(face.nodes_1)) == len(np.unique(face.nodes_2)) == 80
 
@@ -38,7 +38,9 @@ def test_faces_are_split_along_the_same_diagonals(joint_and_mesh):
     _, mesh = joint_and_mesh
     for face in mesh.interfaces:
         number = {int(node): k for k, node in enumerate(face.nodes_1)}
-        of_body_1 = [sorted(number[int(v)] for v in row) for row in mesh.body_1.facets(face.name)]
+        of_body_1 = [
+            sorted(number[int(v)] for v in row) for row in mesh.bodies[0].facets(face.name)
+        ]
         assert sorted(of_body_1) == sorted(np.sort(face.facets, axis=1).tolist())
 
 
@@ -50,7 +52,7 @@ def test_flanks_have_their_area(joint_and_mesh):
         edges = dovetail.flank_width * up, dovetail.slot_length * dovetail.slot_direction
         area = np.linalg.norm(np.cross(*edges))
         assert face.nodal_areas.sum() == pytest.approx(area, rel=1e-12)
-        for body in (mesh.body_1, mesh.body_2):
+        for body in mesh.bodies:
             assert triangle_areas(body.mesh, face.name).sum() == pytest.approx(area, rel=1e-12)
 
 
@@ -75,7 +77,7 @@ def test_normals_point_out_of_the_disk(joint_and_mesh):
     """The disk's material lies behind the face, the blade's in front of it."""
     _, mesh = joint_and_mesh
     for face in mesh.interfaces:
-        for body, sense in ((mesh.body_1, -1.0), (mesh.body_2, 1.0)):
+        for body, sense in ((mesh.bodies[0], -1.0), (mesh.bodies[1], 1.0)):
             facets = body.mesh.boundaries[face.name]
             inside = body.mesh.p[:, body.mesh.t[:, body.mesh.f2t[0, facets]]].mean(axis=1).T
             assert np.all(sense * face.frame.coordinates(inside)[:, 2] > 0.0)
@@ -92,22 +94,22 @@ def test_origin_is_the_centre_of_the_face(joint_and_mesh):
 
 def test_boundaries_are_named_and_planar(joint_and_mesh):
     dovetail, mesh = joint_and_mesh
-    assert set(mesh.body_1.mesh.boundaries) == DISK
-    assert set(mesh.body_2.mesh.boundaries) == BLADE
+    assert set(mesh.bodies[0].mesh.boundaries) == DISK
+    assert set(mesh.bodies[1].mesh.boundaries) == BLADE
     _, bottom = dovetail.flank_ends()
     heights = {
         "inner": dovetail.rim_radius - dovetail.disk_height,
         "root_bottom": bottom[1] - dovetail.root_depth,
         "shank_top": dovetail.rim_radius + dovetail.shank_height,
     }
-    for body in (mesh.body_1, mesh.body_2):
+    for body in mesh.bodies:
         for name in body.mesh.boundaries:
             assert len(body.facets(name)) > 0
             if name in heights:
                 at = body.mesh.p[2, body.vertices(name)]
                 np.testing.assert_allclose(at, heights[name], rtol=1e-12)
     for face in mesh.interfaces:
-        local = face.frame.coordinates(mesh.body_1.mesh.p[:, face.nodes_1].T)
+        local = face.frame.coordinates(mesh.bodies[0].mesh.p[:, face.nodes_1].T)
         np.testing.assert_allclose(local[:, 2], 0.0, atol=1e-9)
 
 
@@ -118,10 +120,10 @@ def test_boundaries_have_their_area(dovetail, coarse_mesh):
     side = (outer - inner) * np.hypot(1.0, tangent)
     _, bottom = dovetail.flank_ends()
     widths = [
-        (coarse_mesh.body_1, "inner", 2.0 * inner * tangent),
-        (coarse_mesh.body_1, "sides", 2.0 * side),
-        (coarse_mesh.body_2, "root_bottom", 2.0 * bottom[0]),
-        (coarse_mesh.body_2, "shank_top", dovetail.neck_width),
+        (coarse_mesh.bodies[0], "inner", 2.0 * inner * tangent),
+        (coarse_mesh.bodies[0], "sides", 2.0 * side),
+        (coarse_mesh.bodies[1], "root_bottom", 2.0 * bottom[0]),
+        (coarse_mesh.bodies[1], "shank_top", dovetail.neck_width),
     ]
     for body, name, width in widths:
         area = triangle_areas(body.mesh, name).sum()
@@ -129,14 +131,14 @@ def test_boundaries_have_their_area(dovetail, coarse_mesh):
 
 
 def test_sides_lie_on_the_sector_planes(dovetail, coarse_mesh):
-    x, _, z = coarse_mesh.body_1.mesh.p[:, coarse_mesh.body_1.vertices("sides")]
+    x, _, z = coarse_mesh.bodies[0].mesh.p[:, coarse_mesh.bodies[0].vertices("sides")]
     np.testing.assert_allclose(np.abs(x), z * np.tan(np.pi / dovetail.blades), rtol=1e-12)
 
 
 def test_mesh_is_its_own_mirror_image(joint_and_mesh):
     """Nodes and elements, about the middle of every section."""
     dovetail, mesh = joint_and_mesh
-    for body in (mesh.body_1, mesh.body_2):
+    for body in mesh.bodies:
         points = body.mesh.p.T
         mirrored = points.copy()
         mirrored[:, 0] = 2.0 * points[:, 1] * np.tan(dovetail.skew) - points[:, 0]
@@ -149,7 +151,7 @@ def test_mesh_is_its_own_mirror_image(joint_and_mesh):
 
 def test_no_element_is_flat(joint_and_mesh):
     _, mesh = joint_and_mesh
-    for body in (mesh.body_1, mesh.body_2):
+    for body in mesh.bodies:
         volumes = np.abs(element_volumes(body.mesh))
         edges = body.mesh.p[:, body.mesh.edges]
         longest = np.linalg.norm(edges[:, 0] - edges[:, 1], axis=0)[body.mesh.t2e].max(axis=0)

@@ -125,7 +125,7 @@ class HertzPair:
             supported.append(
                 SupportedBody(elastic, constraints, self.nodes, frames, load, trace=trace)
             )
-        joint = join(*(body.condense() for body in supported))
+        joint = join([body.condense() for body in supported])
         # Across the contact and, in each direction, about it.
         assert joint.rigid_modes == self.dimension
         square = np.sum(self.points[:, :2] ** 2, axis=1)

@@ -191,7 +191,7 @@ def test_written_structure_is_read_back(coarse_mesh, tmp_path):
     path = tmp_path / "structure.msh"
     write_msh(path, coarse_mesh)
     imported = read_bodies(path)
-    for body in (coarse_mesh.body_1, coarse_mesh.body_2):
+    for body in coarse_mesh.bodies:
         read = imported.bodies[body.name]
         np.testing.assert_allclose(read.mesh.p, body.mesh.p, rtol=1e-15, atol=1e-15)
         assert set(read.mesh.boundaries) == {f"{body.name}_{name}" for name in body.mesh.boundaries}

@@ -29,7 +29,8 @@ from tests.fe_models.conftest import stress_state
 from tests.mirrored_blocks import along, mirrored, with_faces
 
 STEEL = Material(200e3, 0.3, 7.8e-9)
-PAIR = ContactPair("foot", ["top"], ["bottom"], np.array([1.0, 0.0, 0.0]))
+BODIES = "lower", "upper"
+PAIR = ContactPair("foot", BODIES, ["top"], ["bottom"], np.array([1.0, 0.0, 0.0]))
 MU = 0.5
 Y = np.array([0.0, 1.0, 0.0])
 
@@ -41,7 +42,7 @@ def imported(lower, upper, points=None):
 
 
 def built(mesh, supports, loads, order=1, pair=PAIR):
-    interfaces = imported_mesh(mesh, ("lower", "upper"), [pair])
+    interfaces = imported_mesh(mesh, BODIES, [pair])
     return imported_structure(interfaces, mesh, (STEEL, STEEL), supports, loads, order)
 
 
@@ -99,8 +100,8 @@ def test_half_model_equals_the_full_one(order, match, precise):
         values = getattr(part.loads, name), getattr(whole.loads, name)
         np.testing.assert_allclose(2.0 * values[0], values[1], atol=1e-8 * scale)
     assert whole.loads.Edx.sum() > 1e-6 * work
-    places = half.mesh.body_2.points[part.interface.nodes_2]
-    there = full.mesh.body_2.points[whole.interface.nodes_2]
+    places = half.mesh.bodies[1].points[part.interface.nodes_2]
+    there = full.mesh.bodies[1].points[whole.interface.nodes_2]
     match_of = [int(np.argmin(np.linalg.norm(there - place, axis=1))) for place in places]
     twice = np.where(np.isclose(places[:, 1], 0.0), 2.0, 1.0)
     largest = whole.force.max()
@@ -113,9 +114,8 @@ def test_half_model_equals_the_full_one(order, match, precise):
         stress_state(s, h.force[1], h.displacement[1], a)
         for s, h, a in ((half, part, shares[1]), (full, whole, PATH[1]))
     ]
-    for body, mine, theirs in zip((1, 2), *fields, strict=True):
-        places = getattr(half.mesh, f"body_{body}").points
-        there = getattr(full.mesh, f"body_{body}").points
+    for body, mine, theirs in zip((0, 1), *fields, strict=True):
+        places, there = half.mesh.bodies[body].points, full.mesh.bodies[body].points
         twins = [int(np.argmin(np.linalg.norm(there - place, axis=1))) for place in places]
         largest = np.abs(theirs.displacement).max()
         np.testing.assert_allclose(
@@ -186,14 +186,14 @@ def test_slice_in_plane_strain(precise):
 
 def lid_motion(joined, displacement):
     """Mean displacement of body 2 at its top, along x and z."""
-    top = joined.mesh.body_2.points[:, 2] == 1.0
+    top = joined.mesh.bodies[1].points[:, 2] == 1.0
     return displacement[top][:, [0, 2]].mean(axis=0)
 
 
 def test_contact_faces_that_share_nodes_are_refused():
     mesh = block_and_pad(False, False)
-    twice = [PAIR, ContactPair("again", ["top"], ["bottom"], np.array([1.0, 0.0, 0.0]))]
-    interfaces = imported_mesh(mesh, ("lower", "upper"), twice)
+    twice = [PAIR, ContactPair("again", BODIES, ["top"], ["bottom"], np.array([1.0, 0.0, 0.0]))]
+    interfaces = imported_mesh(mesh, BODIES, twice)
     with pytest.raises(MeshError, match="foot and again share nodes of body lower"):
         imported_structure(interfaces, mesh, (STEEL, STEEL), [Support("base", "xyz")], PRESSED, 1)
 
@@ -207,7 +207,7 @@ def test_contact_faces_that_share_nodes_are_refused():
         ),
         ([Support("base", "xyz"), Support("bottom", "z")], "held along the contact's normal"),
         ([Support("base", "xyz"), Support("bottom", "mean_x")], "a mean over a boundary"),
-        ([Support("base", "xy")], "let body lower"),
+        ([Support("base", "xy")], "let lower and upper"),
         ([Support("base", "xyz"), Support("nowhere", "x")], "no boundary or node set nowhere"),
     ],
 )
@@ -221,7 +221,7 @@ def test_supports_that_cannot_be_are_refused(supports, wrong):
 
 
 def test_plane_askew_to_the_frame_is_refused():
-    askew = ContactPair("foot", ["top"], ["bottom"], np.array([1.0, 1.0, 0.0]))
+    askew = ContactPair("foot", BODIES, ["top"], ["bottom"], np.array([1.0, 1.0, 0.0]))
     held = [Support("base", "xyz"), Support("plane", "y")]
     with pytest.raises(MeshError, match="no axis of the contact's frame"):
         built(block_and_pad(False, True), held, PRESSED, pair=askew)
@@ -254,15 +254,15 @@ def test_displacements_add_up_on_one_boundary_only():
         built(mesh, [base], [along_x, Displacement("half", np.array([1e-3, 0.0, 0.0]))])
     down = Displacement("half", np.array([0.0, 0.0, -1e-3]))
     joined = built(mesh, [base], [along_x, along_x, down])
-    lid = joined.body_2.elastic.boundary_nodes("lid")
-    imposed = joined.body_2.imposed.sum(axis=1).reshape(-1, 3)[lid]
+    lid = joined.bodies[1].elastic.boundary_nodes("lid")
+    imposed = joined.bodies[1].imposed.sum(axis=1).reshape(-1, 3)[lid]
     np.testing.assert_allclose(imposed[:, 0], 2e-3, rtol=1e-12)
 
 
 def test_force_on_a_boundary_of_both_bodies_is_refused():
     """It would be applied twice."""
     push = BoundaryForce("plane", np.array([0.0, 0.0, -10.0]))
-    with pytest.raises(MeshError, match="plane is a boundary of both bodies"):
+    with pytest.raises(MeshError, match="plane is a boundary of lower and upper"):
         built(block_and_pad(False, True), [Support("base", "xyz")], [push])
 
 
@@ -299,7 +299,7 @@ def domed():
 def resultants(load, about=(0.0, 0.0, 0.0)):
     mesh = domed()
     joined = built(mesh, [Support("base", "xyz")], [load])
-    force, moment = joined.body_2.load_resultants(np.ones(1), np.array(about))
+    force, moment = joined.bodies[1].load_resultants(np.ones(1), np.array(about))
     upper = mesh.bodies["upper"].mesh
     volumes = np.abs(element_volumes(upper))
     centre = volumes @ upper.p[:, upper.t].mean(axis=1).T / volumes.sum()
@@ -482,9 +482,9 @@ def test_parts_of_a_face_are_one_face(match):
     middles = upper.p[0][upper.facets[:, bottom]].mean(axis=0)
     halves = {"left": bottom[middles < 0.0], "right": bottom[middles > 0.0]}
     parted = imported(lower, upper.with_boundaries(halves))
-    pair = ContactPair("foot", ["top"], ["right", "left"], np.array([1.0, 0.0, 0.0]))
+    pair = ContactPair("foot", BODIES, ["top"], ["right", "left"], np.array([1.0, 0.0, 0.0]))
     one, other = (
-        imported_mesh(mesh, ("lower", "upper"), [contact]).interfaces[0]
+        imported_mesh(mesh, BODIES, [contact]).interfaces[0]
         for mesh, contact in ((whole, PAIR), (parted, pair))
     )
     np.testing.assert_array_equal(one.nodes_2, other.nodes_2)

@@ -90,7 +90,7 @@ class Stacked:
         return nodes[np.lexsort((x, y))]
 
     def joined(self):
-        return join(*(body.condense() for body in self.bodies))
+        return join([body.condense() for body in self.bodies])
 
     def direct(self, relative, amplitudes):
         """Both bodies with u_2 = u_1 + w on the face as constraints of one dense system.
@@ -165,7 +165,7 @@ def test_projected_joint_is_the_direct_solution():
     rng = np.random.default_rng(0)
     first, second = condensed(rng, 18, 18), condensed(rng, 24, 18)
     projection = sp.random(24, 18, 0.3, "csr", random_state=rng)
-    joint = join(first, second, projection)
+    joint = join([first, second], projection)
     relative, amplitudes = rng.standard_normal(24), np.array([2.0, -3.0])
     n = projection.toarray()
     system = np.block(
@@ -185,7 +185,7 @@ def test_projected_joint_is_the_direct_solution():
 def test_identity_projects_as_none_does(stacked):
     pair = [body.condense() for body in stacked.bodies]
     identity = sp.identity(3 * len(stacked.nodes_2), format="csr")
-    plain, projected = join(*pair), join(*pair, identity)
+    plain, projected = join(pair), join(pair, identity)
     scale = np.abs(plain.stiffness).max()
     np.testing.assert_allclose(projected.stiffness, plain.stiffness, atol=1e-12 * scale)
     np.testing.assert_allclose(projected.loads, plain.loads, atol=1e-12 * np.abs(plain.loads).max())
@@ -251,7 +251,7 @@ def test_uniform_pressure_crosses_the_interface(box, order):
             press = elastic.traction_load("z1", lambda x: np.full_like(x[0], -pressure), normal)
             load[:, 0] = press
         bodies.append(SupportedBody(elastic, constraints, nodes, frames, load, trace=trace))
-    joint = join(*(body.condense() for body in bodies))
+    joint = join([body.condense() for body in bodies])
     force = joint.loads[:, 0].reshape(-1, 3)
     nodes, weights = box((2, 3, 3), (0.0, 0.0, 1.5), (2.0, 3.0, 4.0), TITANIUM, 1).boundary_weights(
         "z0"
@@ -278,10 +278,10 @@ def test_dovetail_has_five_rigid_modes(structure, joint):
     """Every motion of the blade but along the slot; H does not feel them."""
     assert joint.rigid_modes == 5
     along = np.array([0.0, 1.0, 0.0])
-    blade = structure.mesh.body_2
-    _, axes = interface_nodes(structure.mesh.interfaces, 2, blade)
+    blade = structure.mesh.bodies[1]
+    _, axes = interface_nodes(structure.mesh.faces_of(1), blade)
     at = np.concatenate([blade.points[face.nodes_2] for face in structure.mesh.interfaces])
-    free = structure.body_2.free_motions(np.zeros(3), 250.0)
+    free = structure.bodies[1].free_motions(np.zeros(3), 250.0)
     assert len(free) == 5
     for shift, turn in free.reshape(-1, 2, 3):
         motion = shift + np.cross(turn / 250.0, at)

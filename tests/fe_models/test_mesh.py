@@ -30,7 +30,7 @@ def test_faces_that_do_not_match_are_refused(dovetail, coarse_mesh):
     finer = dovetail.mesh((8, 12), 8.0)
     with pytest.raises(MeshError, match="80 and 96 nodes"):
         matched_interface(
-            "intrados", coarse_mesh.body_1, finer.body_2, "intrados", dovetail.flank_frame(1)
+            "intrados", coarse_mesh.bodies[0], finer.bodies[1], "intrados", dovetail.flank_frame(1)
         )
 
 
@@ -38,7 +38,11 @@ def test_shifted_face_is_refused(dovetail, coarse_mesh):
     shifted = replace(dovetail, neck_width=dovetail.neck_width + 1e-3).mesh((8, 10), 8.0)
     with pytest.raises(MeshError, match=r"0\.0005 mm apart"):
         matched_interface(
-            "intrados", coarse_mesh.body_1, shifted.body_2, "intrados", dovetail.flank_frame(1)
+            "intrados",
+            coarse_mesh.bodies[0],
+            shifted.bodies[1],
+            "intrados",
+            dovetail.flank_frame(1),
         )
 
 
@@ -55,7 +59,7 @@ def test_written_file_is_read_back(coarse_mesh, tmp_path):
     path = tmp_path / "structure.msh"
     write_msh(path, coarse_mesh)
     read = meshio.read(path)
-    bodies = (coarse_mesh.body_1, coarse_mesh.body_2)
+    bodies = coarse_mesh.bodies
     points = np.concatenate([body.mesh.p.T for body in bodies])
     np.testing.assert_allclose(read.points, points, rtol=1e-15, atol=1e-15)
     sizes = {name: len(read.get_cells_type("tetra")) for name in ("all",)}

@@ -217,13 +217,13 @@ def rub(elastics, held, face, load, friction):
         SupportedBody(
             elastics[k],
             supports[k],
-            *interface_nodes([face], k + 1, elastics[k].body),
+            *interface_nodes([(face, k + 1)], elastics[k].body),
             loads[k],
         )
         for k in range(2)
     ]
     projection = sp.kron(face.projection, sp.identity(LINE), format="csr")
-    joint = join(*(body.condense() for body in bodies), projection)
+    joint = join([body.condense() for body in bodies], projection)
     (state,) = FrictionalJoint(joint.resolvent(), friction).march(np.ones((1, 1)), face.gap)
     force, relative = (v[list(AXES[LINE])].T.ravel() for v in (state.force, state.displacement))
     _, at_1 = bodies[0].respond(-projection.T @ force, np.ones(1))
@@ -297,11 +297,11 @@ def test_dovetail_of_two_meshes_does_what_that_of_one_does(
     dovetail, coarse_mesh, titanium, mission, solved
 ):
     friction = 0.4
-    disk = dovetail.mesh((9, 12), 8.0).body_1
+    disk = dovetail.mesh((9, 12), 8.0).bodies[0]
     faces = []
     for interface in coarse_mesh.interfaces:
         name, frame = interface.name, interface.frame
-        face = mortar_interface(name, disk, name, coarse_mesh.body_2, name, frame)
+        face = mortar_interface(name, disk, name, coarse_mesh.bodies[1], name, frame)
         np.testing.assert_array_equal(face.nodes_2, interface.nodes_2)
         np.testing.assert_allclose(face.gap, 0.0, atol=1e-9)
         faces.append(replace(face, gap=interface.gap))

@@ -10,13 +10,13 @@ from scipy.spatial.transform import Rotation
 from fe_models import friction, nonlinear
 from fe_models.dovetail import dovetail_softening, dovetail_structure
 from fe_models.friction import FrictionalJoint
+from fe_models.motion import deformation
 from fe_models.nonlinear import check_nonlinearity, face_sizes, slip_change
 from fe_models.relinearised import (
     mean_rotation,
     relinearised,
     stress_stiffened,
 )
-from fe_models.stress import deformation
 from fe_models.structure import Structure
 from fe_models.supported_body import SupportedBody
 from fe_models.total_lagrangian import TotalLagrangian
@@ -110,7 +110,7 @@ def tangent(peak, check):
 
 def nodal_balance(peak, number, displacement):
     """Internal less external forces ``(n, 3)`` of a body, the contact's not among them."""
-    body = (peak.structure.body_1, peak.structure.body_2)[number - 1]
+    body = peak.structure.bodies[number - 1]
     force = TotalLagrangian(body.elastic).internal_force(displacement)
     force -= body.loads @ peak.amplitudes + peak.softening[number - 1] @ displacement
     return force.reshape(-1, 3)
@@ -130,7 +130,7 @@ def test_every_node_is_balanced(peak, check, tangent):
         # Body 2 takes the forces, body 1 their opposites.
         balances[1][face.nodes_2] -= face.frame.to_global(force.T)
         balances[0][face.nodes_1] += face.frame.to_global(force.T)
-    disk, blade = model.body_1.elastic, model.body_2.elastic
+    disk, blade = model.bodies[0].elastic, model.bodies[1].elastic
     supported = [disk.boundary_nodes(name) for name in ("inner", "sides")]
     inside = np.delete(balances[0], np.concatenate(supported), axis=0)
     np.testing.assert_allclose(inside, 0.0, atol=1e-5 * scale)
@@ -161,7 +161,7 @@ def test_load_in_gross_slip(coarse, dovetail, symmetric):
     """
     peak = Peak(*coarse, dovetail, symmetric)
     check = peak.check()
-    blade = peak.structure.body_2
+    blade = peak.structure.bodies[1]
     pull = blade.load_resultants(peak.amplitudes, np.zeros(3))[0][2]
     growth = (peak.softening[1] @ check.displacements[1]).reshape(-1, 3)[:, 2].sum() / pull
     theta = dovetail.flank_angle
@@ -227,7 +227,7 @@ def test_mission_of_a_prestressed_structure(kind, balance, peak, tangent, missio
     assert model.equilibrium_errors(states, path).max() < balance
     largest = np.abs(states[PEAK].force).max()
     assert np.abs(states[-1].force).max() < 1e-6 * largest
-    plain = Structure(model.mesh, model.body_1, model.body_2)
+    plain = Structure(model.mesh, model.bodies)
     assert plain.equilibrium_errors(states, path)[PEAK] > 1e-4
 
 
@@ -268,10 +268,10 @@ def test_half_the_load(peak, check, tangent, coarse, dovetail, mission):
 def test_order_and_units_of_load_cases_do_not_matter(peak):
     """What goes in proportion to the load follows the forces, not the numbers in front of them."""
     amplitudes, units = peak.amplitudes + np.array([0.0, 3e4]), np.array([1e-6, 1e3])
-    other = copy(peak.structure.body_1), copy(peak.structure.body_2)
+    other = tuple(map(copy, peak.structure.bodies))
     for body in other:
         body.loads = (body.loads / units)[:, ::-1]
-    swapped = Structure(peak.structure.mesh, *other)
+    swapped = Structure(peak.structure.mesh, other)
     one = relinearised(peak.structure, peak.deformed, amplitudes, peak.softening)
     two = relinearised(swapped, peak.deformed, (amplitudes * units)[::-1], peak.softening)
     np.testing.assert_allclose(two.share, (one.share / units)[::-1], rtol=1e-10)

@@ -154,16 +154,16 @@ def plane_cycle(dovetail, titanium):
 
 def pull(structure, amplitudes):
     """Pull on the blade at every increment [N/mm]."""
-    return np.array([structure.body_2.load_resultants(a, np.zeros(3))[0, 2] for a in amplitudes])
+    return np.array([structure.bodies[1].load_resultants(a, np.zeros(3))[0, 2] for a in amplitudes])
 
 
 @pytest.mark.slow
 def test_pull_is_that_of_the_whole_blade_per_length(dovetail, structure_of, plane_cycle, mission):
     """F = Ω² (ρ A Z + m R / L): a section carries its share of the airfoil and of the moment."""
     structure, _ = plane_cycle(mission)
-    per_length = structure.body_2.load_resultants(mission.amplitudes()[PEAK], np.zeros(3))
+    per_length = structure.bodies[1].load_resultants(mission.amplitudes()[PEAK], np.zeros(3))
     # Sections of the same size along the flank, whatever the mesh: fillets differ a little.
-    whole = structure_of()[0].body_2.load_resultants(mission.amplitudes()[PEAK], np.zeros(3))
+    whole = structure_of()[0].bodies[1].load_resultants(mission.amplitudes()[PEAK], np.zeros(3))
     assert dovetail.slot_length * per_length[0, 2] == pytest.approx(whole[0, 2], rel=1e-4)
     np.testing.assert_allclose(
         dovetail.slot_length * per_length[1], whole[1], atol=1e-9 * whole[0, 2]
@@ -174,7 +174,7 @@ def test_pull_is_that_of_the_whole_blade_per_length(dovetail, structure_of, plan
 def test_blade_is_in_balance(plane_cycle, mission, order):
     structure, cycle = plane_cycle(mission, order=order)
     # Two forces and a moment: the only motions that the plane leaves a free blade.
-    assert structure.body_2.free_motions(np.zeros(3), 250.0).shape == (3, 6)
+    assert structure.bodies[1].free_motions(np.zeros(3), 250.0).shape == (3, 6)
     assert cycle.equilibrium.max() < 1e-6
 
 

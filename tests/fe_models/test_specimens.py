@@ -41,7 +41,7 @@ def exact_volume(specimen):
 class TestGeometry:
     def test_volume_converges(self):
         errors = [
-            1.0 - volume(COARSE.mesh(size).body_1.mesh) / exact_volume(COARSE)
+            1.0 - volume(COARSE.mesh(size).bodies[0].mesh) / exact_volume(COARSE)
             for size in (2.0, 1.0)
         ]
         # A circle drawn as a polygon: second order in the size.
@@ -51,7 +51,7 @@ class TestGeometry:
         (face,) = pair.interfaces
         assert len(face) == 25
         np.testing.assert_allclose(
-            pair.body_1.points[face.nodes_1], pair.body_2.points[face.nodes_2], atol=1e-12
+            pair.bodies[0].points[face.nodes_1], pair.bodies[1].points[face.nodes_2], atol=1e-12
         )
         np.testing.assert_allclose(face.nodal_areas.sum(), 1.0, rtol=1e-12)
         np.testing.assert_allclose(np.abs(face.coordinates).max(axis=0), 0.5)
@@ -62,29 +62,29 @@ class TestGeometry:
     def test_both_pads_have_the_same_triangles(self, pair):
         (face,) = pair.interfaces
         of_body_2 = {tuple(sorted(face.nodes_1[triangle])) for triangle in face.facets}
-        assert of_body_2 == {tuple(sorted(t)) for t in pair.body_1.facets("contact")}
+        assert of_body_2 == {tuple(sorted(t)) for t in pair.bodies[0].facets("contact")}
 
     def test_bodies_are_on_their_sides_of_the_contact(self, pair):
-        assert pair.body_1.points[:, 2].max() == pytest.approx(0.0, abs=1e-12)
-        assert pair.body_2.points[:, 2].min() == pytest.approx(0.0, abs=1e-12)
-        assert np.ptp(pair.body_1.points[:, 2]) == pytest.approx(33.0)
+        assert pair.bodies[0].points[:, 2].max() == pytest.approx(0.0, abs=1e-12)
+        assert pair.bodies[1].points[:, 2].min() == pytest.approx(0.0, abs=1e-12)
+        assert np.ptp(pair.bodies[0].points[:, 2]) == pytest.approx(33.0)
 
     @pytest.mark.parametrize("mirror", [(-1.0, 1.0, 1.0), (1.0, -1.0, 1.0)])
     def test_mesh_is_its_mirror_image(self, pair, mirror):
-        points = pair.body_1.points
+        points = pair.bodies[0].points
         distance, image = cKDTree(points).query(points * mirror)
         assert distance.max() < 1e-12
-        tets = {tuple(sorted(tet)) for tet in pair.body_1.mesh.t.T}
+        tets = {tuple(sorted(tet)) for tet in pair.bodies[0].mesh.t.T}
         assert {tuple(sorted(image[list(tet)])) for tet in tets} == tets
 
     def test_strip_of_body_2_is_turned(self, pair):
-        for body, axis in ((pair.body_1, 1), (pair.body_2, 0)):
+        for body, axis in ((pair.bodies[0], 1), (pair.bodies[1], 0)):
             flat = body.points[np.abs(body.points[:, 2]) < 1e-12]
             assert np.abs(flat[:, axis]).max() == pytest.approx(0.5)
             assert np.abs(flat[:, 1 - axis]).max() == pytest.approx(4.0)
 
     def test_boundaries(self, pair):
-        for body, side in ((pair.body_1, -1.0), (pair.body_2, 1.0)):
+        for body, side in ((pair.bodies[0], -1.0), (pair.bodies[1], 1.0)):
             gripped = body.points[body.vertices("gripped")]
             np.testing.assert_allclose(gripped[:, 2], 33.0 * side)
             holder = body.points[body.vertices("holder")]
@@ -92,7 +92,7 @@ class TestGeometry:
             np.testing.assert_allclose(np.hypot(holder[:, 0], holder[:, 1]), 4.0)
 
     def test_rings(self, pair):
-        for body, side in ((pair.body_1, -1.0), (pair.body_2, 1.0)):
+        for body, side in ((pair.bodies[0], -1.0), (pair.bodies[1], 1.0)):
             x, y, z = body.points[COARSE.ring(body)].T
             angle = 2.0 * np.pi * np.arange(16) / 16
             np.testing.assert_allclose(x, 4.0 * np.cos(angle), atol=1e-9)
@@ -101,7 +101,7 @@ class TestGeometry:
 
     def test_ring_of_another_specimen(self, pair):
         with pytest.raises(MeshError, match="no nodes on the ring"):
-            Specimen(ring_distance=5.0).ring(pair.body_1)
+            Specimen(ring_distance=5.0).ring(pair.bodies[0])
 
     def test_crossed_strips_touch_like_a_sphere(self):
         specimen = Specimen(radii=(1000.0, 50.0))
@@ -135,7 +135,7 @@ class TestGeometry:
 
     def test_no_chamfer(self):
         bare = Specimen(pad_elements=4, chamfer_depth=0.0)
-        error = 1.0 - volume(bare.mesh(1.0).body_1.mesh) / exact_volume(bare)
+        error = 1.0 - volume(bare.mesh(1.0).bodies[0].mesh) / exact_volume(bare)
         assert 0.0 < error < 0.02
 
 
@@ -146,10 +146,16 @@ class TestModels:
         turn = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])
         (face,) = pair.interfaces
         points = np.concatenate(
-            [pair.body_2.points[face.nodes_2], pair.body_2.points[COARSE.ring(pair.body_2)]]
+            [
+                pair.bodies[1].points[face.nodes_2],
+                pair.bodies[1].points[COARSE.ring(pair.bodies[1])],
+            ]
         )
         kept = np.concatenate(
-            [pair.body_1.points[face.nodes_1], pair.body_1.points[COARSE.ring(pair.body_1)]]
+            [
+                pair.bodies[0].points[face.nodes_1],
+                pair.bodies[0].points[COARSE.ring(pair.bodies[0])],
+            ]
         )
         image = cKDTree(kept).query(points @ turn)[1]
         blocks = first.stiffness.reshape(len(kept), 3, len(kept), 3)[image][:, :, image]
@@ -160,7 +166,7 @@ class TestModels:
     @pytest.mark.parametrize("order", [1, slow(2)])
     def test_reduced_frequencies(self, pair, order):
         (face,) = pair.interfaces
-        full = specimen_matrices(COARSE, pair.body_1, face.nodes_1, STEEL, order)
+        full = specimen_matrices(COARSE, pair.bodies[0], face.nodes_1, STEEL, order)
         model = reduce_body(full.stiffness, full.mass, full.kept, 20)
         exact = free_frequencies(full.stiffness, full.mass, 12)
         reduced = free_frequencies(model.stiffness, model.mass, 12)
@@ -170,8 +176,8 @@ class TestModels:
     def test_tied_ring_moves_linearly(self, pair):
         """A displacement that is linear in each element is left as it is, the pad's trace too."""
         (face,) = pair.interfaces
-        full = specimen_matrices(COARSE, pair.body_1, face.nodes_1, STEEL)
-        elastic = ElasticBody(pair.body_1, STEEL, 2)
+        full = specimen_matrices(COARSE, pair.bodies[0], face.nodes_1, STEEL)
+        elastic = ElasticBody(pair.bodies[0], STEEL, 2)
         assert elastic.size - full.stiffness.shape[0] == 3 * (16 - len(face))
         rigid = np.tile(np.eye(3), (full.transformation.shape[1] // 3, 1))
         # The springs of the trace are stiff.
@@ -184,7 +190,7 @@ class TestModels:
         specimen = Specimen()
         mesh = specimen.mesh()
         nodes = mesh.interfaces[0].nodes_1
-        full = specimen_matrices(specimen, mesh.body_1, nodes, STEEL)
+        full = specimen_matrices(specimen, mesh.bodies[0], nodes, STEEL)
         exact = free_frequencies(full.stiffness, full.mass, 12)
         np.testing.assert_allclose(exact[6:], PRINTED, rtol=0.02)
         assert exact[:6].max() < 1e-5 * exact[6]

@@ -7,7 +7,7 @@ from scipy.spatial import cKDTree
 from fe_models.elasticity import von_mises
 from fe_models.mesh import Body
 from fe_models.remesh import element_volumes
-from fe_models.stress import STEPS, PeakStress, StressField, cycle_stress
+from fe_models.stress import PeakStress, StressField, cycle_stress, steps
 from sa_solver.types import Frame
 from tests.fe_models.conftest import stress_state
 
@@ -42,7 +42,7 @@ def test_contact_forces_are_recovered(structure, peak):
     """
     _, force, _, fields = peak
     amplitudes = peak[0]
-    bodies = (structure.body_1, structure.body_2)
+    bodies = structure.bodies
     supports = ({"inner", "sides"}, {"root_bottom"})
     for number, (body, field) in enumerate(zip(bodies, fields, strict=True)):
         elastic = body.elastic
@@ -76,19 +76,19 @@ def test_relative_displacements_are_those_given(structure, peak):
 def test_supports_hold(structure, peak):
     """The bore stays, the sides of the sector slide in their planes, the root stays on average."""
     _, _, _, (disk, blade) = peak
-    body = structure.body_1.elastic
+    body = structure.bodies[0].elastic
     np.testing.assert_allclose(disk.displacement[body.boundary_nodes("inner")], 0.0, atol=1e-15)
     nodes, normals = body.boundary_normals("sides")
     across = np.sum(disk.displacement[nodes] * normals, axis=1)
     np.testing.assert_allclose(across, 0.0, atol=1e-12)
-    nodes, weights = structure.body_2.elastic.boundary_weights("root_bottom")
+    nodes, weights = structure.bodies[1].elastic.boundary_weights("root_bottom")
     along = blade.displacement[nodes, 1]
     assert abs(weights @ along) < 1e-12 * weights.sum()
 
 
 def test_symmetric_load_gives_symmetric_stress(structure, peak):
     _, _, _, fields = peak
-    for body, field in zip((structure.mesh.body_1, structure.mesh.body_2), fields, strict=True):
+    for body, field in zip(structure.mesh.bodies, fields, strict=True):
         points = body.mesh.p.T
         _, image = cKDTree(points).query(points * [-1.0, 1.0, 1.0])
         for values in (field.von_mises, field.maximum_principal):
@@ -101,7 +101,7 @@ def test_symmetric_load_gives_symmetric_stress(structure, peak):
 def test_shank_carries_the_pull(structure, peak):
     """Virial of a body in equilibrium: ∫ σ = Σ r ⊗ f over the forces on it, for all components."""
     _, _, _, (_, blade) = peak
-    elastic = structure.body_2.elastic
+    elastic = structure.bodies[1].elastic
     stress = elastic.stress(blade.displacement.ravel())
     total = stress @ np.abs(element_volumes(elastic.body.mesh))
     forces = elastic.stiffness @ blade.displacement.ravel()
@@ -114,7 +114,7 @@ def test_shank_carries_the_pull(structure, peak):
 def test_neck_stress_is_pull_over_area(structure, dovetail, peak):
     """Mean of σ_zz over a slice of the shank far from fillet and top."""
     amplitudes, _, _, (_, blade) = peak
-    elastic = structure.body_2.elastic
+    elastic = structure.bodies[1].elastic
     mesh = elastic.body.mesh
     centre = mesh.p[:, mesh.t].mean(axis=1)
     volume = np.abs(element_volumes(mesh))
@@ -134,11 +134,11 @@ def test_faces_move_over_a_cycle_as_the_bodies_do(structure, solved, symmetric, 
     """In every increment as far apart as given, and at peak load as all nodes of either body."""
     fields = solved(0.4, symmetric).fields()
     force, relative = fields["force"], fields["displacement"]
-    amplitudes, steps = symmetric.amplitudes(), []
+    amplitudes, done = symmetric.amplitudes(), []
     cycle = cycle_stress(
-        structure, force, relative, amplitudes, PEAK, [0, PEAK], lambda: steps.append(1)
+        structure, force, relative, amplitudes, PEAK, [0, PEAK], lambda: done.append(1)
     )
-    assert len(steps) == STEPS
+    assert len(done) == steps(2)
     start = 0
     for interface, (of_1, of_2) in zip(structure.mesh.interfaces, cycle.faces, strict=True):
         nodes = slice(start, start + len(interface))
@@ -188,7 +188,7 @@ def test_stress_at_points_is_linear_and_turned(kind):
 
 def test_depth_of_elements_is_their_height_over_the_face(structure):
     """Three times its volume by the area of its face, of a tetrahedron."""
-    body, name = structure.mesh.body_1, structure.mesh.interfaces[0].name
+    body, name = structure.mesh.bodies[0], structure.mesh.interfaces[0].name
     areas = np.linalg.norm(body.outward(name), axis=1)
     cells = body.mesh.f2t[0, body.mesh.boundaries[name]]
     heights = 3.0 * np.abs(element_volumes(body.mesh))[cells] / areas

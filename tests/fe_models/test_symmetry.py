@@ -9,7 +9,6 @@ import scipy.sparse as sp
 
 from fe_models.dovetail import dovetail_structure
 from fe_models.joint import join
-from fe_models.structure import STEPS
 from fe_models.symmetry import Mirror, SplitMatrix, halves, mirror_of_nodes, symmetric_product
 
 
@@ -19,7 +18,7 @@ def both(request, structure, dovetail, titanium, mission):
     if request.param == 2:
         mesh = dovetail.mesh((10, 34), 10.0, dimension=2)
         structure = dovetail_structure(dovetail, mesh, titanium, titanium, mission, 2)
-    return structure.condense(), join(structure.body_1.condense(), structure.body_2.condense())
+    return structure.condense(), join([body.condense() for body in structure.bodies])
 
 
 def test_split_joint_is_the_whole_one(both):
@@ -35,12 +34,12 @@ def test_split_joint_is_the_whole_one(both):
 
 def test_a_condensation_tells_its_steps(structure):
     """By halves or whole: as many, evenly."""
-    one_sided = copy(structure.body_1)
+    one_sided = copy(structure.bodies[0])
     one_sided.mirror = lambda axis: None
-    for joined in (structure, replace(structure, body_1=one_sided)):
+    for joined in (structure, replace(structure, bodies=(one_sided, structure.bodies[1]))):
         told = []
         joined.condense(progress=lambda *counts, told=told: told.append(counts))
-        assert told == [(step, STEPS) for step in range(1, STEPS + 1)]
+        assert told == [(step, 5) for step in range(1, 5 + 1)]
 
 
 def test_split_resolvent_is_the_whole_one(both):
@@ -62,7 +61,7 @@ def test_symmetric_products_are_products(order):
 
 def test_a_body_that_is_stiffer_on_one_side_is_not_split(structure):
     """Nodes, supports and frames have a mirror, the stiffness has not."""
-    body = structure.body_1
+    body = structure.bodies[0]
     mirror = body.mirror(0)
     stiffness, _ = body._reduced()
     assert halves(stiffness, mirror) is not None

@@ -257,7 +257,7 @@ def test_constant_stress_crosses_a_stuck_contact(monkeypatch, dimension, order):
             SupportedBody(elastic, constraints, nodes, frames, load[:, None], trace=trace)
         )
         bodies.append(elastic)
-    joint = join(*(body.condense() for body in supported))
+    joint = join([body.condense() for body in supported])
     frictional = FrictionalJoint(joint.resolvent(), 0.5)
     (state,) = frictional.march(np.ones((1, 1)), np.zeros(len(nodes)))
     assert state.converged

@@ -56,7 +56,7 @@ class Blocks:
             fine = max(low, self.fine[0]), min(high, self.fine[1])
             z = sign * _graded((0.0, thick), (0.0, min(thick, layer[1])), size)
             blocks.append(_block(name, _graded((low, high), fine, size), np.sort(z)))
-        write_msh(folder / "blocks.msh", StructureMesh(*blocks, ()))
+        write_msh(folder / "blocks.msh", StructureMesh(blocks, ()))
         moved = any(load["kind"] == "displacement" for load in loads)
         supports = [{"group": "base_z0", "hold": self.hold}]
         supports += [] if self.hold == "all" else [{"group": "base_x0", "hold": "x"}]

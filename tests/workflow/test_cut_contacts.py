@@ -48,7 +48,7 @@ def stretched(planes):
 def write(folder, planes, load=pushed, match=True, gap=None, **changes):
     """The pad on its block, cut by ``planes``, pressed on and then under another load."""
     bodies, name = pad_on_block(planes, match), f"cut{len(planes)}"
-    write_msh(folder / f"{name}.msh", StructureMesh(*bodies, ()))
+    write_msh(folder / f"{name}.msh", StructureMesh(bodies, ()))
     cuts = [(body.name, "xy"[axis]) for axis in planes for body in bodies]
     gap = gap or {"shape": "paraboloid", "radius_x": 200.0, "radius_y": 300.0}
     contact = {"name": "foot", "face_1": "block_top", "face_2": "pad_bottom", "x": [1, 0, 0]}

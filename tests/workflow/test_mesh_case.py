@@ -470,7 +470,7 @@ def test_faces_that_look_the_same_way(blocks):
 
 def test_body_1_that_is_not_held(blocks):
     message = refused(blocks, "structure.supports.0.hold=xy")
-    assert "structure.supports: the supports let body Base-1 " in message
+    assert "structure.supports: the supports let Base-1 and Foot-1 " in message
 
 
 def test_node_sets_take_no_force_and_no_normal(blocks):

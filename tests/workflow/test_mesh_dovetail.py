@@ -20,7 +20,7 @@ def write_inp(path: Path, mesh) -> None:
     """Both bodies in a flat Abaqus file, with element sets and element surfaces."""
     nodes, cells, surfaces = ["*NODE"], [], []
     node, element = 1, 1
-    for body in (mesh.body_1, mesh.body_2):
+    for body in mesh.bodies:
         corners = body.mesh.t.T
         for number, (x, y, z) in enumerate(body.points.tolist(), node):
             nodes.append(f"{number}, {x!r}, {y!r}, {z!r}")

@@ -53,7 +53,7 @@ def test_its_displacements_are_those_of_both_specimens_and_the_masses(rig, bodie
 
 
 def test_targets_are_vertices_of_the_side_close_to_where_they_are_wanted(bodies, mesh):
-    for body, part, side in zip(bodies, (mesh.body_1, mesh.body_2), (-1.0, 1.0), strict=True):
+    for body, part, side in zip(bodies, mesh.bodies, (-1.0, 1.0), strict=True):
         target = body.places[body.names.index("target 1 x")]
         boundary = part.mesh.p[:, part.mesh.boundary_nodes()].T
         away = np.linalg.norm(boundary - [4.0, 0.0, side], axis=1)

@@ -122,7 +122,7 @@ class SpecimensModel:
         """Those of the finite elements; a specimen of the other's material has the other's."""
         if number == 2 and self._materials[0] == self._materials[1]:
             return known["full/1"]
-        body = (self.mesh.body_1, self.mesh.body_2)[number - 1]
+        body = self.mesh.bodies[number - 1]
         pad = self.face.nodes(number)
         material, order = self._materials[number - 1], self.case.mesh.order
         matrices = specimen_matrices(self.specimen, body, pad, material, order)

@@ -93,8 +93,10 @@ def _write(case: WearCase, source: StructureStage, out: Path, reporter: Reporter
 def _numbered(source: StructureStage, history: InterfaceHistory) -> InterfaceHistory:
     """The history with the user's own node numbers, where the mesh has them."""
     face = history.interface
-    numbers = source.model.node_numbers(1), source.model.node_numbers(2)
-    if not isinstance(face, Interface) or numbers[0] is None or numbers[1] is None:
+    if not isinstance(face, Interface):
+        return history
+    numbers = [source.model.node_numbers(place) for place in face.bodies]
+    if numbers[0] is None or numbers[1] is None:
         return history
     numbered = replace(face, nodes_1=numbers[0][face.nodes_1], nodes_2=numbers[1][face.nodes_2])
     return replace(history, interface=numbered)

@@ -14,6 +14,7 @@ from fe_models.cut_face import whole_history, whole_resultants
 from fe_models.friction import FrictionalJoint, FrictionState
 from fe_models.joint import JointResolvent
 from fe_models.mesh import Interface, StructureMesh
+from fe_models.motion import deformation
 from fe_models.nonlinear import NonlinearCheck, check_nonlinearity
 from fe_models.relinearised import (
     PrestressedStructure,
@@ -21,7 +22,7 @@ from fe_models.relinearised import (
     relinearised,
     stress_stiffened,
 )
-from fe_models.stress import CycleStress, cycle_stress, deformation
+from fe_models.stress import CycleStress, cycle_stress
 from fe_models.structure import CycleSolution, InterfaceHistory, Structure, mixed
 from sa_solver.types import Array, Indices
 from workflow.analyses.wear.case.sections import Nonlinearity
@@ -69,7 +70,7 @@ class StructureModel(Protocol):
     def finer(self) -> str: ...
 
     def softening(self, structure: Structure) -> Softening:
-        """Spin softening of both bodies at peak load."""
+        """Spin softening of all bodies at peak load."""
         ...
 
     def mesh(self) -> StructureMesh:
@@ -77,15 +78,18 @@ class StructureModel(Protocol):
         ...
 
     def structure(self, mesh: StructureMesh) -> Structure:
-        """Both bodies with supports and loads, on the mesh as it is or worn."""
+        """All bodies with supports and loads, on the mesh as it is or worn."""
         ...
 
     def contact_face(self, interface: Interface) -> ContactFace:
         """What the contact stage needs of an interface."""
         ...
 
-    def node_numbers(self, body: int) -> Indices | None:
-        """The user's numbers of the vertices of body 1 or 2; None where the mesh is ours."""
+    def node_numbers(self, place: int) -> Indices | None:
+        """The user's numbers of the vertices of the body at a place; None where the mesh is ours.
+
+        Places are those of the mesh's bodies.
+        """
         ...
 
     def warn(self, structure: Structure, reporter: Reporter) -> None:
@@ -159,7 +163,7 @@ class StructureStage(Heard):
 
     @cached_property
     def structure(self) -> Structure:
-        """Both bodies with supports and loads, unworn, as stiff as the case asks for."""
+        """All bodies with supports and loads, unworn, as stiff as the case asks for."""
         return self._prestressed(self._linear)
 
     def _prestressed(self, structure: Structure) -> Structure:
@@ -173,8 +177,8 @@ class StructureStage(Heard):
         return how[kind](structure, self._linear_peak, amplitudes, softening)
 
     @cached_property
-    def _linear_peak(self) -> tuple[Array, Array]:
-        """Displacements of both bodies of the linear structure at peak load."""
+    def _linear_peak(self) -> tuple[Array, ...]:
+        """Displacements of all bodies of the linear structure at peak load."""
         amplitudes = self._peak_amplitudes
         linear = FrictionalJoint(self._linear_resolvent, self.model.friction)
         (state,) = map(_converged, linear.march(amplitudes[None], self._linear.gap()))
@@ -200,7 +204,7 @@ class StructureStage(Heard):
         return check
 
     def node_count(self) -> int:
-        """Nodes of both bodies, midsides included."""
+        """Nodes of all bodies, midsides included."""
         return self.mesh.node_count(self.model.order)
 
     def interface_count(self) -> int:
@@ -306,8 +310,8 @@ class StructureStage(Heard):
         interface = self.mesh.interfaces[number]
         return tuple(
             UserFace(body, numbers[interface.nodes(body)], interface.frame)
-            for body in BODIES
-            if (numbers := self.model.node_numbers(body)) is not None
+            for body, place in zip(BODIES, interface.bodies, strict=True)
+            if (numbers := self.model.node_numbers(place)) is not None
         )
 
     def probe(self, depths: list[Array], friction: Sequence[float] | None = None) -> Array:
@@ -362,7 +366,7 @@ class StructureStage(Heard):
         shown: Sequence[int] = (),
         done: Callable[[], None] = lambda: None,
     ) -> dict[str, CycleStress]:
-        """Stress of both bodies on unworn or worn meshes: at peak load, and in those ``shown``.
+        """Stress of all bodies on unworn or worn meshes: at peak load, and in those ``shown``.
 
         Of the increments that are shown it is that of the surface. For ``done`` see
         :func:`fe_models.stress.cycle_stress`.

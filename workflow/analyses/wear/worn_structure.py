@@ -14,7 +14,7 @@ from fe_models.mesh import Body, Interface, MeshError, StructureMesh, write_msh
 from fe_models.mesh_quality import element_sizes, elements_across, radius_ratios
 from fe_models.nonlinear import NonlinearCheck
 from fe_models.remesh import form_of, formed_mesh, worn_mesh, worn_volume
-from fe_models.stress import STEPS, CycleStress, PeakStress, StressField, SurfaceHistory
+from fe_models.stress import CycleStress, PeakStress, StressField, SurfaceHistory, steps
 from fe_models.structure import CycleSolution, InterfaceHistory
 from sa_solver.types import Array, LoadHistory, Tally
 from wear.coupled import CoupledState
@@ -46,8 +46,8 @@ MOST_INCREMENTS = 48
 class WornStructure:
     """The structure before and after: ``cycle`` and ``mesh`` are the worn ones.
 
-    ``stresses`` are those of both bodies, unworn and worn; ``written`` the meshes as they are shown
-    then, with body 2 in the form of its faces. ``shown`` are the increments, counted from 0, of
+    ``stresses`` are those of all bodies, unworn and worn; ``written`` the meshes as they are shown
+    then, with bodies 2 in the form of their faces. ``shown`` are the increments, counted from 0, of
     which the stresses tell the surfaces.
     """
 
@@ -64,7 +64,9 @@ class WornStructure:
         """Motions of both bodies' faces under interface ``number``, and stress at peak load."""
         stress, interface = self.stresses[moment], self.stage.mesh.interfaces[number]
         one, two = (whole_components(interface, moved) for moved in stress.faces[number])
-        field_1, field_2 = (WholeStress(field, interface) for field in stress.fields)
+        field_1, field_2 = (
+            WholeStress(stress.fields[place], interface) for place in interface.bodies
+        )
         return (one, two), (field_1, field_2)
 
     def loads(self, number: int) -> InterfaceHistory:
@@ -72,17 +74,17 @@ class WornStructure:
         return self.stage.on_faces(self.cycle)[number]
 
     def write(self, writer: ResultsWriter, accuracy: float) -> None:
-        """Load histories of the worn faces, and both bodies unworn and worn."""
+        """Load histories of the worn faces, and all bodies unworn and worn."""
         for history in self.stage.on_faces(self.cycle):
             name = history.interface.name
             put_face(writer, f"structure_worn/{name}", history.interface, history)
             put_closure(writer, f"structure_worn/{name}", self.cycle)
             put_closure(writer, f"structure/{name}", self.stage.unworn_cycle)
         for moment, mesh in self.written.items():
-            bodies, stress = (mesh.body_1, mesh.body_2), self.stresses[moment]
-            for body, field in zip(bodies, stress.fields, strict=True):
+            stress = self.stresses[moment]
+            for body, field in zip(mesh.bodies, stress.fields, strict=True):
                 writer.put(f"bodies/{body.name}/{moment}", _body(body, field))
-            for body, surface in zip(bodies, stress.surfaces, strict=bool(self.shown)):
+            for body, surface in zip(mesh.bodies, stress.surfaces, strict=bool(self.shown)):
                 mission = _mission(body, surface, self.shown)
                 writer.put(f"bodies/{body.name}/{moment}/mission", mission)
         for name, errors in self._errors().items():
@@ -91,13 +93,11 @@ class WornStructure:
     def summary(self, state: CoupledState) -> dict[str, Any]:
         """What the solver says of itself, and the largest stresses."""
         stage, unworn = self.stage, self.stage.unworn_cycle
-        bodies = self.mesh.body_1, self.mesh.body_2
+        bodies = self.mesh.bodies
         return {
             "from_cache": stage.from_cache,
             "nodes": {body.name: int(body.mesh.nvertices) for body in bodies},
-            "mesh": {
-                body.name: _mesh_summary(body) for body in (stage.mesh.body_1, stage.mesh.body_2)
-            },
+            "mesh": {body.name: _mesh_summary(body) for body in stage.mesh.bodies},
             "rigid_modes": stage.rigid_modes,
             "solutions": state.solutions,
             "iterations": unworn.iterations,
@@ -123,7 +123,7 @@ class WornStructure:
 
     def warn(self, accuracy: float, reporter: Reporter) -> None:
         """Notches of whose stress the mesh leaves more than the ``accuracy``."""
-        bodies = self.mesh.body_1, self.mesh.body_2
+        bodies = self.mesh.bodies
         for body, *fields in zip(bodies, *self._fields, strict=True):
             notches = [field.notch for field in fields if field.notch is not None]
             worst = max(notches, key=lambda notch: notch.error, default=None)
@@ -135,8 +135,8 @@ class WornStructure:
                 )
 
     @property
-    def _fields(self) -> tuple[tuple[StressField, StressField], ...]:
-        """Of both bodies, unworn and worn."""
+    def _fields(self) -> tuple[tuple[StressField, ...], ...]:
+        """Of all bodies, unworn and worn."""
         return tuple(stress.fields for stress in self.stresses.values())
 
     def _why(self, peak: PeakStress, accuracy: float) -> str:
@@ -154,7 +154,7 @@ class WornStructure:
 
     def _errors(self) -> dict[str, dict[str, ResultError]]:
         """Of the largest stress off the contact faces, by body; beside a sharp corner not known."""
-        bodies = self.mesh.body_1, self.mesh.body_2
+        bodies = self.mesh.bodies
         errors = {}
         for body, *fields in zip(bodies, *self._fields, strict=True):
             left = [field.notch for field in fields if field.notch is not None]
@@ -164,7 +164,7 @@ class WornStructure:
 
     def sentences(self) -> Iterator[str]:
         """The largest stresses of each body, unworn and worn."""
-        bodies = self.mesh.body_1, self.mesh.body_2
+        bodies = self.mesh.bodies
         for body, unworn, worn in zip(bodies, *self._fields, strict=True):
             parts = []
             if unworn.notch is not None and worn.notch is not None:
@@ -180,11 +180,14 @@ class WornStructure:
         """Volumes in the mesh and resultants, unworn and worn; ``width`` [mm] is of the contact."""
         stage, interface = self.stage, self.stage.mesh.interfaces[number]
         unworn, worn = stage.unworn()[number].loads, self.loads(number).loads
-        before, after = stage.mesh, self.mesh
+        swept = [
+            worn_volume(stage.mesh.bodies[place], self.mesh.bodies[place], interface, side)
+            for side, place in enumerate(interface.bodies, start=1)
+        ]
         return {
             **({"mirrored_across": planes} if (planes := _mirrored_across(interface)) else {}),
-            "mesh_volume_1": worn_volume(before.body_1, after.body_1, interface, 1),
-            "mesh_volume_2": worn_volume(before.body_2, after.body_2, interface, 2),
+            "mesh_volume_1": swept[0],
+            "mesh_volume_2": swept[1],
             "peak_load": {
                 "unworn": resultants_at(unworn, stage.peak),
                 "worn": resultants_at(worn, stage.peak),
@@ -264,7 +267,7 @@ def worn_structure(
 ) -> WornStructure:
     """Solve the worn structure, put the worn shape into its mesh and write that.
 
-    If it ``moves``, both bodies are told over the increments too.
+    If it ``moves``, all bodies are told over the increments too.
     """
     pairs = list(zip(contacts, state.interfaces, strict=True))
     with heard_stage(reporter, stage, "structural friction", "increments"):
@@ -281,7 +284,7 @@ def worn_structure(
         with replacing(folder.reserve("worn.msh", "the mesh with the worn faces")) as partial:
             write_msh(partial, written["worn"])
     with reporter.stage("stress", "steps") as told:
-        done = Tally(told, 2 * STEPS)
+        done = Tally(told, 2 * steps(len(mesh.bodies)))
         shown = shown_increments(len(cycle.fields()["force"]), stage.peak) if moves else []
         states = {"unworn": (stage.mesh, stage.unworn_cycle), "worn": (mesh, cycle)}
         stresses = stage.stresses(states, shown, done)

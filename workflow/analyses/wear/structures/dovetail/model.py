@@ -77,7 +77,7 @@ class DovetailModel:
         widen = "widen structure.edge_width or structure.end_width"
         return ContactFace(interface, self.dovetail.flank_size(side), gap, nodes, widen)
 
-    def node_numbers(self, body: int) -> None:
+    def node_numbers(self, place: int) -> None:
         """Nobody but us knows the nodes."""
 
     def warn(self, structure: Structure, reporter: Reporter) -> None:

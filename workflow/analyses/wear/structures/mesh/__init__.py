@@ -30,7 +30,7 @@ def _extent(case: MeshCase) -> Extent:
     return Extent(
         cycles * sum(case.expected_legs),
         len(mesh.interfaces),
-        mesh.body_1.mesh.nvertices + mesh.body_2.mesh.nvertices,
+        mesh.node_count(1),
         sum(len(interface) for interface in mesh.interfaces),
         dissipating=DISSIPATING,
     )

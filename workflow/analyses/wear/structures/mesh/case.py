@@ -92,11 +92,11 @@ class ContactPair(Section):
                 raise disagreement("a boundary twice; allowed: each once", key)
         return self
 
-    def described(self) -> fe.ContactPair:
-        """As the structure takes it."""
+    def described(self, bodies: tuple[str, str]) -> fe.ContactPair:
+        """As the structure takes it, of body 1 and body 2."""
         from fe_models.imported_structure import ContactPair as Pair
 
-        return Pair(self.name, self.face_1, self.face_2, np.array(self.x))
+        return Pair(self.name, bodies, self.face_1, self.face_2, np.array(self.x))
 
 
 class Support(Section):
@@ -171,9 +171,9 @@ def _read(file: str, size: float | None, stamp: Stamp) -> ImportedMesh:
 def _joined(structure: ImportedStructure, size: float | None, stamp: Stamp) -> StructureMesh:
     from fe_models.imported_structure import imported_mesh
 
-    pairs = [pair.described() for pair in structure.contacts]
-    supports = [support.described() for support in structure.supports]
     bodies = structure.body_1, structure.body_2
+    pairs = [pair.described(bodies) for pair in structure.contacts]
+    supports = [support.described() for support in structure.supports]
     return imported_mesh(structure.read(size), bodies, pairs, supports)
 
 
@@ -282,7 +282,7 @@ class MeshCase(FiniteElementCase):
         cycles = f", {len(path.mix)} cycles mixed" if path.mix else ""
         before = f", those before it in {path.cycle_from - 1} legs" if path.cycle_from > 1 else ""
         mesh = structure.mesh(self.mesh.size)
-        bodies = [f"{b.name} of {b.mesh.nvertices} nodes" for b in (mesh.body_1, mesh.body_2)]
+        bodies = [f"{b.name} of {b.mesh.nvertices} nodes" for b in mesh.bodies]
         return [
             ("structure", f"{Path(structure.file).name}: {' and '.join(bodies)}"),
             *(
@@ -428,7 +428,7 @@ class MeshCase(FiniteElementCase):
             mesh = structure.mesh(self.mesh.size)
             made = imported_structure(mesh, imported, materials, supports, imposed, 1)
         slices = [name for name, share in made.held_faces.items() if share == 1.0]
-        if slices and made.body_1.elastic.dimension == 3:
+        if slices and made.dimension == 3:
             raise disagreement(
                 f"all nodes of {slices[0]} are held along it, as in a slice in plane strain, and "
                 "its half-space would be a strip as wide as the slice; allowed: the section as a "

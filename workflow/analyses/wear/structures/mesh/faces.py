@@ -58,9 +58,8 @@ def _areas(mesh: StructureMesh, interface: Interface) -> tuple[float, float, flo
     Seen along the normal.
     """
     z = interface.frame.axes[2]
-    whole = [
-        float(np.abs(body.outward(interface.name) @ z).sum()) for body in (mesh.body_1, mesh.body_2)
-    ]
+    bodies = (mesh.bodies[place] for place in interface.bodies)
+    whole = [float(np.abs(body.outward(interface.name) @ z).sum()) for body in bodies]
     return float(interface.nodal_areas.sum()), whole[0], whole[1]
 
 

@@ -125,10 +125,9 @@ class MeshModel:
         face = whole_face(interface)
         return ContactFace(face, size, _MeshGap(face, extra), _coarse(face, size))
 
-    def node_numbers(self, body: int) -> Indices:
-        structure = self._case.structure
-        name = {1: structure.body_1, 2: structure.body_2}[body]
-        return structure.read(self._case.mesh.size).node_numbers[name]
+    def node_numbers(self, place: int) -> Indices:
+        numbers = self._case.structure.read(self._case.mesh.size).node_numbers
+        return numbers[self._mesh.bodies[place].name]
 
     def warn(self, structure: Structure, reporter: Reporter) -> None:
         """What is told of contacts that planes of symmetry cut, and supports that are none."""
