@@ -70,7 +70,7 @@ class NonlinearCheck:
 def check_nonlinearity(
     structure: Structure,
     like: JointResolvent,
-    friction: float,
+    friction: float | Array,
     amplitudes: Array,
     gap: Array,
     softening: Softening,
@@ -128,7 +128,7 @@ def _newton(
     structure: Structure,
     linear: FrictionState,
     like: JointResolvent,
-    friction: float,
+    friction: float | Array,
     amplitudes: Array,
     gap: Array,
     softening: Softening,

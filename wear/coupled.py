@@ -9,7 +9,7 @@ records and progress, is up to :class:`Observer` s.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext
 from dataclasses import dataclass, replace
 from typing import Any, Literal, Protocol, TypeVar
@@ -98,8 +98,7 @@ class CoupledSettings:
     ``resultants`` constant: never; every: after each jump; drift: where the probe has changed by
     more than the share ``drift`` (:func:`sa_solver.types.resultant_change`), or where as much is to
     be expected of slips and energies, as wear has moved the load over a face (:data:`RESPONSE`).
-    ``friction`` gives the coefficient of a contact after so much dissipated energy [N mm], where
-    the source is to know of it; None: it keeps its own.
+    With ``friction`` evolving the source is told the coefficients that contacts have come to.
 
     Examples
     --------
@@ -116,7 +115,7 @@ class CoupledSettings:
     stop: Stop = Stop()
     resultants: Literal["constant", "drift", "every"] = "drift"
     drift: float = 0.02
-    friction: Callable[[float], float] | None = None
+    friction: Literal["constant", "evolving"] = "constant"
 
     def ended(self, state: CoupledState) -> bool:
         """Whether a run that has got to ``state`` is over."""
@@ -219,6 +218,10 @@ class Contacts:
 
     def moved(self, states: Sequence[InterfaceState]) -> list[float]:
         return [c.moved(state) for c, state in zip(self.contacts, states, strict=True)]
+
+    def friction(self, states: Sequence[InterfaceState]) -> list[float]:
+        pairs = zip(self.contacts, states, strict=True)
+        return [contact.settings.friction(state.energy) for contact, state in pairs]
 
     def nodal_depths(self, states: Sequence[InterfaceState]) -> list[Array]:
         return [c.nodal_depth(state) for c, state in zip(self.contacts, states, strict=True)]
@@ -466,8 +469,8 @@ class CoupledWear:
 
     def _friction(self, interfaces: Sequence[InterfaceState]) -> list[float] | None:
         """Coefficients of friction of the interfaces, where they change."""
-        friction = self.settings.friction
-        return None if friction is None else [friction(worn.energy) for worn in interfaces]
+        constant = self.settings.friction == "constant"
+        return None if constant else self.contacts.friction(interfaces)
 
 
 def _depth(kinetics: Array) -> float:

@@ -33,6 +33,12 @@ def counted(number: int, thing: str) -> str:
     return f"{number} {thing}" if number == 1 else f"{number} {thing}s"
 
 
+def listed(things: Sequence[str]) -> str:
+    """Several things in a sentence: a, b and c."""
+    *before, last = things
+    return f"{', '.join(before)} and {last}" if before else last
+
+
 def between(low: float, high: float, unit: str | None) -> str:
     """Two numbers in the unit of the larger one."""
     size, name = said_in(max(low, high, key=abs), unit)
@@ -90,14 +96,14 @@ def of_bodies(title: str, section: Section) -> list[tuple[str, str]]:
     """Rows of a ``title`` with the quantities of every body that a ``section`` has."""
     bodies = {name: getattr(section, name) for name in type(section).model_fields}
     texts = {
-        name: _of_body(body) if isinstance(body, Section) else body
+        name: told_of_body(body) if isinstance(body, Section) else body
         for name, body in bodies.items()
         if isinstance(body, Section | str)
     }
     return alike(title, {name: text for name, text in texts.items() if text})
 
 
-def _of_body(body: Section) -> str:
+def told_of_body(body: Section) -> str:
     """The quantities of a body, a known material with its name."""
     name = getattr(body, "material", None)
     return ", ".join(text for text in (name, entries(body)) if text)

@@ -80,7 +80,7 @@ def save_joint(key: str, joint: JointResolvent) -> None:
     _save(f"joint-{key}", arrays, {"rho": joint.rho, "rigid_modes": joint.rigid_modes})
 
 
-def load_cycle(key: str, structure: Structure, friction: float) -> CycleSolution | None:
+def load_cycle(key: str, structure: Structure, friction: float | Array) -> CycleSolution | None:
     """The solved cycle of that key on its structure, or None."""
     if (kept := _load(f"cycle-{key}")) is None:
         return None

@@ -21,7 +21,7 @@ from wear.steppers import (
     Stepper,
 )
 from wear.stepping import WearingContact, WearState
-from workflow.analyses.wear.case.base import WearCase
+from workflow.analyses.wear.case.base import ContactTerms, WearCase
 from workflow.analyses.wear.case.sections import ContactStress, Duration
 from workflow.analyses.wear.contact_loops import WornLoop, worn_loop
 from workflow.analyses.wear.load_source import ContactFace
@@ -43,7 +43,7 @@ class ContactStage(InterfaceContact):
     def __init__(
         self, case: WearCase, contact: ContactFace, stepper: WearStepper | None = None
     ) -> None:
-        grid = contact.grid(case.contact.grid)
+        grid = contact.grid(case.terms(contact.face.name).grid)
         _check_section(case.stress, grid)
         self._case, self._contact_face, self.face = case, contact, contact.face
         self.remedy, self.coarse_grid = contact.remedy, contact.grid(contact.coarse)
@@ -84,20 +84,20 @@ def _interface(
     case: WearCase, contact: ContactFace, transfer: FaceTransfer, stepper: WearStepper
 ) -> InterfaceSettings:
     """A face and how it wears, as the library takes it."""
-    grid, settings = transfer.grid, case.contact
+    grid, settings, terms = transfer.grid, case.contact, case.terms(contact.face.name)
     return InterfaceSettings(
         name=contact.face.name,
         grid=grid,
         gap=gap_on(contact, grid),
         transfer=transfer,
-        pair=ElasticPair(case.material(1), case.material(2)),
-        laws=(case.wear_of(1).described(), case.wear_of(2).described()),
-        friction=case.friction.at,
+        pair=ElasticPair(*terms.materials),
+        laws=(terms.laws[0].described(), terms.laws[1].described()),
+        friction=terms.friction.at,
         stepper=stepper,
         method="full" if settings.method == "full" else "normal",
         gross_slip=settings.gross_slip,
         drive=contact.drive,
-        follow=_follow(case),
+        follow=_follow(case, terms),
         link=settings.link,
         tolerance=settings.tolerance,
     )
@@ -109,10 +109,10 @@ def gap_on(contact: ContactFace, grid: Grid) -> Array:
     return np.ascontiguousarray(np.broadcast_to(gap, grid.shape))
 
 
-def _follow(case: WearCase) -> bool | None:
+def _follow(case: WearCase, terms: ContactTerms) -> bool | None:
     """Whether to follow surfaces that move over each other; None: where that counts."""
     follow = {"auto": None, "follow": True, "neglect": False}[case.wear.motion]
-    if follow is None and getattr(case.wear_of(1), "coefficient", None) == 0.0:
+    if follow is None and getattr(terms.laws[0], "coefficient", None) == 0.0:
         return False  # what does not wear looks the same everywhere
     return follow
 

@@ -24,7 +24,7 @@ from wear.bulk_stress import BulkStress
 from wear.life import Ruiz, findley, ruiz, smith_watson_topper
 from wear.tractions import CycleTractions
 from workflow.analyses.wear.body_stress import Planes, StressedBody, StressedCycle
-from workflow.analyses.wear.case.base import WearCase
+from workflow.analyses.wear.case.base import ContactTerms, WearCase
 from workflow.analyses.wear.case.sections import ContactStress, Life
 from workflow.analyses.wear.contact_stage import ContactStage
 from workflow.analyses.wear.layout import MOMENTS
@@ -80,6 +80,7 @@ class InterfaceStress:
 
     name: str
     case: WearCase
+    terms: ContactTerms
     planes: Planes
     moments: dict[str, ContactMoment]
     convolutions: int
@@ -121,7 +122,7 @@ class InterfaceStress:
         }
         attributes = {"axis": planes.settings.section, "at": planes.at, "components": COMPONENTS}
         attributes["bulk_stress"] = self.bulk
-        limits = {n: self.case.material(n).yield_stress for n in self.case.strained}
+        limits = {n: self.terms.materials[n - 1].yield_stress for n in self.terms.strained}
         attributes |= {f"yield_stress_{n}": y for n, y in limits.items() if np.isfinite(y)}
         writer.put(group, axes, **attributes)
         for moment, contact in self.moments.items():
@@ -157,7 +158,7 @@ class InterfaceStress:
 
     def _of_bodies(self, largest: Any) -> dict[str, Any]:
         numbers = {}
-        for number in self.case.strained:
+        for number in self.terms.strained:
             values = {m: largest(moment.bodies[number]) for m, moment in self.moments.items()}
             before, after = (values[moment]["value"] for moment in MOMENTS)
             name = self.case.bodies[number - 1]
@@ -194,7 +195,8 @@ def contact_stresses(
     """
     unknown = [cycle.tractions.unknown for _, cycles in contacts for cycle in cycles]
     _report_stick(np.array(unknown), peak, reporter)
-    done = Tally(progress, len(contacts) * len(MOMENTS) * len(case.strained))
+    strained = sum(len(case.terms(stage.name).strained) for stage, _ in contacts)
+    done = Tally(progress, len(MOMENTS) * strained)
     stresses = at_once(
         [partial(_interface_stress, case, peak, *contact, done) for contact in contacts]
     )
@@ -214,13 +216,14 @@ def _interface_stress(
     done: Callable[[], None],
 ) -> InterfaceStress:
     planes = Planes(case.stress, stage.grid)
-    bodies = [StressedBody(stage, case.material(n), n) for n in case.strained]
+    terms = case.terms(stage.name)
+    bodies = [StressedBody(stage, terms.materials[n - 1], n) for n in terms.strained]
     moments = {
         moment: _moment(case.stress, peak, planes, bodies, cycle, done)
         for moment, cycle in zip(MOMENTS, cycles, strict=True)
     }
     convolutions = sum(body.convolutions for body in bodies)
-    return InterfaceStress(stage.name, case, planes, moments, convolutions)
+    return InterfaceStress(stage.name, case, terms, planes, moments, convolutions)
 
 
 def _moment(

@@ -47,6 +47,12 @@ def export_resultants(case: WearCase, name: str, out: Path, force: bool) -> list
             f"{name}: structure.kind: {structure.name} has no finite elements "
             "to take loads from; allowed: a case with a structure of ours, such as dovetail"
         )
+    terms = case.every_terms
+    if any(other != terms[0] for other in terms[1:]):
+        raise UserError(
+            f"{name}: structure.contacts: contacts with materials, friction, wear or grids of "
+            "their own, which a case of resultants cannot have; allowed: all alike"
+        )
     structure.memory(case, 0, 0).check()
     case, choice = structure.choose(case)
     source = structure.source(case)
@@ -81,7 +87,8 @@ def _write(case: WearCase, source: StructureStage, out: Path, reporter: Reporter
             history.interface.name: _numbered(source, history) for history in source.unworn()
         }
     warn_of_structure(source, reporter)
-    heights = {face.face.name: gap_on(face, face.grid(case.contact.grid)) for face in faces}
+    grids = {face: face.grid(case.terms(face.face.name).grid) for face in faces}
+    heights = {face.face.name: gap_on(face, grid) for face, grid in grids.items()}
     loads = {name: history.loads for name, history in histories.items()}
     cycle = source.unworn_cycle
     reporter.say(f"loads: {marched(cycle)}")

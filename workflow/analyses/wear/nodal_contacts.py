@@ -46,7 +46,7 @@ class StructureCycle:
     """
 
     histories: Sequence[InterfaceHistory]
-    friction: float
+    friction: Array
     areas: Array
     stiffness: float
     start: None = None
@@ -157,7 +157,10 @@ class NodalContacts(StagedContacts):
         super().__init__(
             [NodalStage(case, face, self._cycles, number) for number, face in enumerate(faces)]
         )
-        self._laws, self._friction = self.stages[0].settings.laws, source.model.friction
+        self._laws = self.stages[0].settings.laws
+        self._friction = np.concatenate(
+            [np.full(len(stage.face), stage.settings.friction(0.0)) for stage in self.stages]
+        )
         meshed = source.mesh.interfaces
         self._gap = np.concatenate([whole_values(face, face.gap) for face in meshed])
         self._areas = np.concatenate([stage.face.nodal_areas for stage in self.stages])

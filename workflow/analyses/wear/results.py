@@ -88,7 +88,9 @@ def write_output(outcome: Outcome, run: Run[WearCase]) -> None:
     structure = None
     if isinstance(source, StructureStage):
         moves = case.output.paraview
-        structure = worn_structure(source, stages, state, case.friction, moves, folder, reporter)
+        structure = worn_structure(
+            source, stages, state, case.friction_evolves, moves, folder, reporter
+        )
         structure.warn(case.accuracy, reporter)
     with reporter.stage("stress under the contacts", "steps") as told:
         stresses = _stresses(outcome, structure, reporter, told)
@@ -164,6 +166,7 @@ def _write_results(
             drive = stage.settings.drive
             place, known = f"structure/{stage.name}", source.slip_known
             put_face(writer, place, stage.face, contact.unworn, drive, known)
+            writer.put(place, {}, friction=stage.settings.friction(0.0))
             if not nodes and _write_coarse(writer, contact, source.peak):
                 coarse.append(stage.name)
             dissipated = f"energy dissipated in each increment, {by} pressure"
@@ -196,7 +199,7 @@ def _write_results(
             sections=case.stress.section != "none",
             life=tuple(sorted(stress.name for stress in stresses if stress.mapped)),
             cracking=tuple(sorted(stress.name for stress in stresses if stress.cracking)),
-            strained=case.strained,
+            strained=case.every_terms[0].strained,
             worn=any(found.kinetics[-1, :2].max() > NOTHING for found in outcome.interfaces),
         )
         writer.put_contents(contents)

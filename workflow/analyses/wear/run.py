@@ -147,7 +147,7 @@ def _check_structure(case: WearCase, structure: StructureStage, reporter: Report
     """Warnings about the structure, and the check of its nonlinearity."""
     reporter.log(f"loads: {marched(structure.unworn_cycle)}")
     warn_of_structure(structure, reporter)
-    if case.friction.evolution and case.recoupling.resultants == "constant":
+    if case.friction_evolves and case.recoupling.resultants == "constant":
         reporter.warn(
             "friction.evolution: the structure keeps its first coefficient "
             "(coupling.resultants: constant)"
@@ -178,5 +178,5 @@ def coupled_settings(case: WearCase) -> CoupledSettings:
         stop=Stop(wear.stop.depth, wear.stop.volume),
         resultants=coupling.resultants,
         drift=coupling.drift,
-        friction=None if case.friction.evolution is None else case.friction.at,
+        friction="evolving" if case.friction_evolves else "constant",
     )

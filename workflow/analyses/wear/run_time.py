@@ -72,7 +72,8 @@ class Extent:
 def run_time(case: WearCase, extent: Extent) -> RunTime:
     """Of a wear case with a structure of this extent."""
     plane = getattr(case.structure, "dimension", 3) == 2 or case.contact.grid[1] == 1
-    cells = case.contact.grid[0] if plane else prod(case.contact.grid)
+    grids = [terms.grid[:1] if plane else terms.grid for terms in case.every_terms]
+    cells = sum(map(prod, grids)) // len(grids)
     at_once = min(extent.faces, os.cpu_count() or 1)
     shared = extent.faces / at_once
     steps, jumps = _steps(case, extent)

@@ -48,7 +48,8 @@ def memory(
     ``kept`` per cell of the grid are those of one contact at a time unless given.
     """
     dense = DENSE_MATRICES * (3 * interface_nodes) ** 2
-    return Memory(dense + prod(case.contact.grid) * kept, remedy, factor_bytes(nodes))
+    cells = max(prod(terms.grid) for terms in case.every_terms)
+    return Memory(dense + cells * kept, remedy, factor_bytes(nodes))
 
 
 @dataclass(frozen=True)

@@ -53,13 +53,13 @@ class StructureModel(Protocol):
 
     ``key`` is everything that its condensed joint depends on, ``missions`` are the closed cycles of
     its loads, one unless several are mixed; ``peak`` is the increment of peak load, counted from 0
-    over all missions, ``friction`` µ before any wear, ``order`` that of the elements; ``finer``
-    tells a user how to refine the mesh where stress is large.
+    over all missions, ``friction`` µ of every interface before any wear, or one for all, ``order``
+    that of the elements; ``finer`` tells a user how to refine the mesh where stress is large.
     """
 
     peak: int
     order: Literal[1, 2]
-    friction: float
+    friction: tuple[float, ...]
     nonlinearity: Nonlinearity
 
     @property
@@ -130,7 +130,7 @@ class StructureStage(Heard):
     @cached_property
     def joint(self) -> FrictionalJoint:
         """The condensed joint before any wear, from the cache when it is there."""
-        return FrictionalJoint(self._resolvent, self.model.friction)
+        return FrictionalJoint(self._resolvent, self._nodal_friction())
 
     @cached_property
     def _resolvent(self) -> JointResolvent:
@@ -180,7 +180,7 @@ class StructureStage(Heard):
     def _linear_peak(self) -> tuple[Array, ...]:
         """Displacements of all bodies of the linear structure at peak load."""
         amplitudes = self._peak_amplitudes
-        linear = FrictionalJoint(self._linear_resolvent, self.model.friction)
+        linear = FrictionalJoint(self._linear_resolvent, self._nodal_friction())
         (state,) = map(_converged, linear.march(amplitudes[None], self._linear.gap()))
         return deformation(self._linear, state.force, state.displacement, amplitudes)
 
@@ -191,7 +191,7 @@ class StructureStage(Heard):
         check = check_nonlinearity(
             linear,
             self._linear_resolvent,
-            self.model.friction,
+            self._nodal_friction(),
             self._peak_amplitudes,
             linear.gap(),
             self.model.softening(linear),
@@ -231,11 +231,11 @@ class StructureStage(Heard):
 
     def _unworn_mission(self, mission: MissionLoads) -> CycleSolution:
         """The closed cycle of one mission from rest, from the cache if it is there."""
-        friction = self.model.friction
+        friction = self._nodal_friction()
         loads = [path.tolist() for path in (mission.preload, mission.amplitudes)]
         stiffness = self.model.nonlinearity.stiffness
         at = None if stiffness == "linear" else self._peak_amplitudes.tolist()
-        key = content_key(*self.model.key, *loads, stiffness, at, friction)
+        key = content_key(*self.model.key, *loads, stiffness, at, self.model.friction)
         cycle = load_cycle(key, self.structure, friction)
         if cycle is None:
             cycle = self._cycle(mission, self._no_wear(), None, None)
@@ -338,10 +338,12 @@ class StructureStage(Heard):
         (state,) = map(_converged, joint.march(path, self._gap(depths), guess=guess))
         return state
 
-    def _nodal_friction(self, friction: Sequence[float] | None) -> float | Array:
-        """Coefficients of the interfaces at all nodes ``(n,)``; one for all before any wear."""
+    def _nodal_friction(self, friction: Sequence[float] | None = None) -> float | Array:
+        """Coefficients of the interfaces at all nodes ``(n,)``; one if all have the model's."""
         if friction is None:
-            return self.model.friction
+            friction = self.model.friction
+            if len(set(friction)) == 1:
+                return friction[0]
         return np.repeat(friction, [len(interface) for interface in self.mesh.interfaces])
 
     def _joint_of(self, friction: float | Array) -> FrictionalJoint:

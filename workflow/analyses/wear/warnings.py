@@ -17,7 +17,7 @@ from workflow.case.plain import counted
 from workflow.shell.few_cells import check_cells
 from workflow.shell.reporter import Reporter
 
-# Forces and moments on body 2 left out of balance, relative: the friction solver leaves 1e-7.
+# Forces and moments on a body left out of balance, relative: the friction solver leaves 1e-7.
 OUT_OF_BALANCE = 1e-3
 # Nodes across a contact that carry its load, at least, for slips that are more than the mesh's.
 FEWEST_NODES = 5
@@ -37,7 +37,7 @@ def warn_of_structure(stage: StructureStage, reporter: Reporter) -> None:
     imbalance = float(unworn.equilibrium.max())
     if imbalance > OUT_OF_BALANCE:
         reporter.warn(
-            f"forces and moments on body 2 are out of balance by {imbalance:.1e}: the stiffness of "
+            f"forces and moments on a body are out of balance by {imbalance:.1e}: the stiffness of "
             "peak load does not suit the other increments (nonlinearity.stiffness)"
         )
     for history in unworn.histories:
@@ -89,16 +89,18 @@ def warn_of_contact(
 
     Raises UserError where no cells are left of a contact.
     """
-    pair = stages[0].pair
-    if case.contact.method == "normal" and not pair.similar:
+    unlike = [stage.pair for stage in stages if not stage.pair.similar]
+    if case.contact.method == "normal" and unlike:
+        pair = max(unlike, key=lambda pair: abs(pair.dundurs_beta))
         linked = all(result.link.corrects for result in first)
         has = "has only as far as the mesh resolves it" if linked else "leaves out"
         reporter.warn(
             f"the materials differ (Dundurs' beta {pair.dundurs_beta:.2g}): shear then moves the "
             f"surfaces normally, which contact.method: normal {has}; use full"
         )
-    yield_stress = min(case.material(number).yield_stress for number in (1, 2))
     for stage, interface, result in zip(stages, state.interfaces, first, strict=True):
+        terms = case.terms(stage.name)
+        yield_stress = min(material.yield_stress for material in terms.materials)
         if case.contact.method != "nodes":
             report_link(stage.name, result.link, stage.grid.line, reporter)
         highest = result.pressure.max()
@@ -119,7 +121,8 @@ def warn_of_contact(
             )
         if result.touches_border:
             warn_of_border(stage, reporter)
-        check_cells(stage.name, case.contact, stage.grid, result.pressure[peak], reporter)
+        settings, pressure = case.contact_of(stage.name), result.pressure[peak]
+        check_cells(stage.name, settings, stage.grid, pressure, reporter)
         for line in structure_of(case).warnings(case, stage, float(interface.loads.P[peak])):
             reporter.warn(line)
 
@@ -152,7 +155,8 @@ def warn_of_worn_cells(
     for stage, interface in zip(stages, state.interfaces, strict=True):
         if peak in interface.starts:
             pressure = interface.starts[peak].pressure
-            check_cells(stage.name, case.contact, stage.grid, pressure, reporter, worn=True)
+            settings = case.contact_of(stage.name)
+            check_cells(stage.name, settings, stage.grid, pressure, reporter, worn=True)
 
 
 def warn_of_border(stage: ContactStage, reporter: Reporter) -> None:

@@ -20,7 +20,6 @@ from sa_solver.types import Array, LoadHistory, Tally
 from wear.coupled import CoupledState
 from workflow.analyses.wear.budget.parts import ResultError
 from workflow.analyses.wear.budget.report import datasets_of, summary_of
-from workflow.analyses.wear.case.evolution import EvolvingFriction
 from workflow.analyses.wear.contact_stage import ContactStage
 from workflow.analyses.wear.datasets import put_face
 from workflow.analyses.wear.recording import heard_stage
@@ -260,22 +259,23 @@ def worn_structure(
     stage: StructureStage,
     contacts: list[ContactStage],
     state: CoupledState,
-    friction: EvolvingFriction,
+    evolves: bool,
     moves: bool,
     folder: OutputFolder,
     reporter: Reporter,
 ) -> WornStructure:
     """Solve the worn structure, put the worn shape into its mesh and write that.
 
-    If it ``moves``, all bodies are told over the increments too.
+    If friction ``evolves``, it is what contacts have come to. If the structure ``moves``, all
+    bodies are told over the increments too.
     """
     pairs = list(zip(contacts, state.interfaces, strict=True))
     with heard_stage(reporter, stage, "structural friction", "increments"):
         cycle = stage.worn_cycle(
             [contact.nodal_depth(interface) for contact, interface in pairs],
-            None
-            if friction.evolution is None
-            else [friction.at(interface.energy) for _, interface in pairs],
+            [contact.settings.friction(interface.energy) for contact, interface in pairs]
+            if evolves
+            else None,
         )
     with reporter.stage("re-meshing"):
         depths = [contact.depths_of_bodies(interface) for contact, interface in pairs]

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from functools import cache
 from typing import TYPE_CHECKING, Generic, Literal
 
@@ -42,7 +42,8 @@ class Companions(Generic[AnyWearCase]):
 
     ``own`` has the ``same`` structure as that case, or a section in its place. ``finer`` is on a
     mesh of which ``mesh_share`` times the difference is the error of ``own``, ``regridded`` on
-    another contact grid, of which ``grid_share`` times the difference is the error of the case.
+    another contact grid, of which ``grid_share`` times the difference is the error of the case, and
+    ``finer_cells`` times that of contacts of these names, whose grids are their own.
     ``linked`` has its contacts linked to the nodes of the structure, which ``own`` has not. None
     where there is no such case. ``coupled`` has a structure, whose loads can follow wear.
     """
@@ -54,6 +55,7 @@ class Companions(Generic[AnyWearCase]):
     mesh_share: float = 1.0
     regridded: AnyWearCase | None = None
     grid_share: float = 0.0
+    finer_cells: Mapping[str, float] = field(default_factory=dict)
     linked: AnyWearCase | None = None
 
     @classmethod
@@ -66,7 +68,7 @@ class Companions(Generic[AnyWearCase]):
         across, along = case.contact.grid
         grid = (MOST_CELLS, along) if line else (_fewer(across), _fewer(along))
         settings = {"contact.grid": grid, "contact.method": "normal"}
-        own = shortened(case if section is None else section, settings)
+        own = shortened((case if section is None else section).on_one_grid(), settings)
         linked = own.contact.link == "corrected"
         other, share = (_strips if line else _cells)(grid, case.contact.grid)
         return cls(
@@ -77,6 +79,9 @@ class Companions(Generic[AnyWearCase]):
             mesh_share=1.0 if finer is None else finer.share,
             regridded=None if other is None else changed(own, {"contact.grid": other}),
             grid_share=share,
+            finer_cells={
+                name: (across / case.terms(name).grid[0]) ** ORDER for name in case.contact_names
+            },
             linked=None if linked else changed(own, {"contact.link": "corrected"}),
         )
 
@@ -130,7 +135,9 @@ class Companions(Generic[AnyWearCase]):
                 own, _worn(live(finer, source_of(finer), kind)), self.mesh_share
             )
         if (regridded := self.regridded) is not None:
-            parts["grid"] = lambda: _apart(apart(), _worn(live(regridded, shared)), self.grid_share)
+            parts["grid"] = lambda: self._of_grids(
+                _apart(apart(), _worn(live(regridded, shared)), self.grid_share)
+            )
         if (linked := self.linked) is not None:
             parts["link"] = lambda: _apart(apart(), _worn(live(linked, shared)), 1.0)
         if self.coupled and follows:
@@ -138,6 +145,13 @@ class Companions(Generic[AnyWearCase]):
         elif self.coupled:
             parts["coupling"] = lambda: self._followed(life, shared, followed)
         return parts
+
+    def _of_grids(self, errors: Worn) -> Worn:
+        """Errors of ``contact.grid`` as those of each contact's own."""
+        return {
+            name: {key: error * self.finer_cells.get(name, 1.0) for key, error in numbers.items()}
+            for name, numbers in errors.items()
+        }
 
     def _followed(self, life: Lived, source: LoadSource, followed: Array) -> Worn:
         """What would change of a ``life`` under unworn loads if these followed wear."""

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from math import ceil, isfinite, sqrt
-from typing import Any, ClassVar, Literal
+from typing import Any, ClassVar, Literal, Self
 
 from pydantic import model_validator
 
@@ -44,6 +45,22 @@ def check_interface_name(name: str, key: str) -> None:
             f"{', '.join(RESERVED)}",
             key,
         )
+
+
+@dataclass(frozen=True)
+class ContactTerms:
+    """What a contact of a case is: materials and laws of body 1 and body 2, friction and grid."""
+
+    materials: tuple[ElasticMaterial, ElasticMaterial]
+    laws: tuple[Worn, Worn]
+    friction: EvolvingFriction
+    grid: tuple[int, int]
+
+    @property
+    def strained(self) -> tuple[Literal[1, 2], ...]:
+        """Numbers of the bodies that have strains and stresses: of all but a rigid one."""
+        bodies: tuple[Literal[1, 2], ...] = (1, 2)
+        return tuple(n for n in bodies if isfinite(self.materials[n - 1].young))
 
 
 class WearCase(Case):
@@ -86,11 +103,37 @@ class WearCase(Case):
         material: ElasticMaterial = getattr(self.materials, self.bodies[number - 1]).elastic()
         return material
 
+    def terms(self, name: str) -> ContactTerms:
+        """What the contact of that name is; all are alike unless a structure says otherwise."""
+        return ContactTerms(
+            materials=(self.material(1), self.material(2)),
+            laws=(self.wear_of(1), self.wear_of(2)),
+            friction=self.friction,
+            grid=self.contact.grid,
+        )
+
     @property
-    def strained(self) -> tuple[Literal[1, 2], ...]:
-        """Numbers of the bodies that have strains and stresses: of all but a rigid one."""
-        bodies: tuple[Literal[1, 2], ...] = (1, 2)
-        return tuple(number for number in bodies if isfinite(self.material(number).young))
+    def contact_names(self) -> tuple[str, ...]:
+        """Of contacts as many as differ from each other; one stands for all that are alike."""
+        return ("",)
+
+    @property
+    def every_terms(self) -> list[ContactTerms]:
+        """Those of all :attr:`contact_names`."""
+        return [self.terms(name) for name in self.contact_names]
+
+    def contact_of(self, name: str) -> Contact:
+        """The section ``contact``, with the grid of the contact of that name."""
+        return self.contact.model_copy(update={"grid": self.terms(name).grid})
+
+    @property
+    def friction_evolves(self) -> bool:
+        """Whether friction of any contact changes as it wears."""
+        return any(terms.friction.evolution is not None for terms in self.every_terms)
+
+    def on_one_grid(self) -> Self:
+        """The case with all its contacts on ``contact.grid``."""
+        return self
 
     def wear_of(self, number: int) -> Worn:
         """Wear law of body ``number``, 1 or 2."""
@@ -104,14 +147,19 @@ class WearCase(Case):
             return self
         if not isinstance(self, FiniteElementCase):
             raise disagreement("nodes: nothing is meshed; allowed: normal, full", "contact.method")
-        evolutions = [getattr(self.wear_of(body), "evolution", None) for body in (1, 2)]
+        terms = self.every_terms
+        evolutions = [getattr(law, "evolution", None) for each in terms for law in each.laws]
         worn_by_all = any(e is not None and e.scope == "global" for e in evolutions)
         mixed = bool(getattr(getattr(self, "load_path", None), "mix", ()))
         wrong = {
             "wear.step.kind": (self.wear.step.kind != "second_order", "second_order"),
             "wear.motion": (self.wear.motion == "follow", "auto, neglect"),
             "wear": (worn_by_all, "evolution with scope: local"),
-            "friction.evolution": (self.friction.evolution is not None, "leave it out"),
+            "friction.evolution": (self.friction_evolves, "leave it out"),
+            "structure.contacts": (
+                len({each.laws for each in terms}) > 1,
+                "one wear law for all contacts, that of wear",
+            ),
             "load_path.mix": (mixed, "one mission"),
             "loops": (self.loops.wanted, "leave them out: they are those of a half-space"),
             "fidelity": (getattr(self, "fidelity", "fixed") != "fixed", "fixed"),

@@ -128,12 +128,12 @@ class Contact(Section):
     )
 
 
-def check_rows(contact: Contact, line: bool) -> None:
-    """Refuse a single row of cells where contacts are no lines."""
-    if contact.grid[1] == 1 and not line:
+def check_rows(grid: tuple[int, int], line: bool, key: str | None = None) -> None:
+    """Refuse, at ``key``, a single row of cells where a contact is no line."""
+    if grid[1] == 1 and not line:
         raise disagreement(
-            f"{contact.grid[0]}: of line contacts; allowed: [x, y], cells along both",
-            "contact.grid",
+            f"{grid[0]}: of line contacts; allowed: [x, y], cells along both",
+            key or "contact.grid",
         )
 
 

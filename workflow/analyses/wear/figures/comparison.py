@@ -145,7 +145,8 @@ def _largest_difference(file: h5py.File, contents: Contents) -> str:
     for interface in file["comparison"]:
         structure = file[f"structure/{interface}/load_history"]
         half_space = file[f"comparison/{interface}/load_history"]
-        limit = float(file.attrs["friction"]) * structure["P"][()]
+        friction = float(file[f"structure/{interface}"].attrs["friction"])
+        limit = friction * structure["P"][()]
         gap = np.hypot(
             half_space["Qx"][()] - structure["Qx"][()], half_space["Qy"][()] - structure["Qy"][()]
         )

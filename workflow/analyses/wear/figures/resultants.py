@@ -41,11 +41,11 @@ def resultants(file: h5py.File, contents: Contents) -> Figure:
     title = f"Resultants over {_cycles_shown(file, contents)}: {_who_slides(loads)}"
     largest = max(float(history["P"].max()) for history in loads.values())
     scale, unit = force_unit(largest)
-    friction = float(file.attrs["friction"])
+    friction = {name: float(file[f"structure/{name}"].attrs["friction"]) for name in names}
     energies = {name: _energies(file, contents, name, loads[name]) for name in names}
     known = [energy for pair in energies.values() for energy in pair if energy is not None]
     dissipated = max(float(energy.sum()) for energy in known)
-    rows = 2 + (dissipated > NOTHING * friction * largest)
+    rows = 2 + (dissipated > NOTHING * max(friction.values()) * largest)
     figure = new_figure(title, 3.2 * rows * blocks(len(names)))
     axes = panel_rows(figure, rows, len(names))
     for column, (name, history) in zip(axes.T, loads.items(), strict=True):
@@ -53,7 +53,7 @@ def resultants(file: h5py.File, contents: Contents) -> Figure:
         forces = {key: scale * history[key] for key in ("P", "Qx")}
         _draw_normal_force(column[0], increments, forces["P"], name, f"{unit}{per}")
         sliding = history["sliding"].astype(bool)
-        _draw_tangential_force(column[1], increments, forces, sliding, friction)
+        _draw_tangential_force(column[1], increments, forces, sliding, friction[name])
         for axis in column[2:]:
             _draw_energy(axis, increments, *energies[name], contents)
         column[-1].set_xlabel("increment")

@@ -364,7 +364,7 @@ class DovetailCase(FiniteElementCase):
 
     @model_validator(mode="after")
     def _grid_fits(self) -> DovetailCase:
-        check_rows(self.contact, line=self.structure.dimension == 2)
+        check_rows(self.contact.grid, line=self.structure.dimension == 2)
         return self
 
     @model_validator(mode="after")

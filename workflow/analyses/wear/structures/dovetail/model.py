@@ -30,7 +30,7 @@ class DovetailModel:
         self._missions = [Mission(**entries) for entries in case.load_path.missions()]
         heaviest = case.load_path.heaviest
         self._mission = self._missions[heaviest]
-        self.friction = case.friction.at(0.0)
+        self.friction: tuple[float, ...] = (case.friction.at(0.0),)
         self.peak = heaviest * sum(case.legs) + case.legs[0] - 1
         self.nonlinearity = case.nonlinearity
         self.order = case.mesh.order
@@ -83,9 +83,10 @@ class DovetailModel:
     def warn(self, structure: Structure, reporter: Reporter) -> None:
         """Self-locking joints."""
         slope = np.tan(self.dovetail.flank_angle)
-        if self.friction > slope:
+        (friction,) = self.friction
+        if friction > slope:
             reporter.warn(
-                f"friction.coefficient {self.friction:g} exceeds the tangent of the flank angle, "
+                f"friction.coefficient {friction:g} exceeds the tangent of the flank angle, "
                 f"{slope:.3g}: the joint locks itself and the blade does not come back when the "
                 "load falls"
             )

@@ -6,22 +6,31 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
 from pydantic import model_validator
 
 from fe_models.mesh import MeshError, StructureMesh
-from workflow.analyses.wear.case.base import FiniteElementCase, check_interface_name
+from workflow.analyses.wear.case.base import (
+    ContactTerms,
+    FiniteElementCase,
+    check_interface_name,
+)
 from workflow.analyses.wear.case.gaps import Gap, HeightsGap, check_gap
 from workflow.analyses.wear.case.sections import (
-    Density,
     Share,
-    Solid,
     TwoBodies,
     Wear,
     check_rows,
     check_shares,
+)
+from workflow.analyses.wear.structures.mesh.contacts import (
+    ContactPair,
+    MeshMaterial,
+    OtherBody,
+    Support,
+    own_terms,
 )
 from workflow.analyses.wear.structures.mesh.faces import (
     face_size,
@@ -31,20 +40,19 @@ from workflow.analyses.wear.structures.mesh.faces import (
 )
 from workflow.analyses.wear.structures.mesh.loads import (
     AccelerationLoad,
-    Component,
     DisplacementLoad,
     Factor,
     Load,
     Name,
     RotationLoad,
 )
-from workflow.case.fields import AUTO, Auto, File, OrAlone, OrAuto, Whole
+from workflow.case.changing import changed
+from workflow.case.fields import AUTO, Auto, File, OrAuto, Whole
 from workflow.case.input_files import read_heights
-from workflow.case.plain import counted
+from workflow.case.plain import counted, listed, told_of_body
 from workflow.case.sections import Length, Section, Title, disagreement, entry
 
 if TYPE_CHECKING:
-    from fe_models import imported_structure as fe
     from fe_models.geometry.imported import ImportedMesh
 
 # Files that hold shapes and no mesh.
@@ -59,61 +67,6 @@ ENDINGS = (
 MIRRORED = 1e-6
 
 Stamp = tuple[int, int]
-
-
-Faces = Annotated[tuple[Name, ...], OrAlone()]
-
-
-class ContactPair(Section):
-    """Two faces that meet; their meshes need not match."""
-
-    name: Name = entry("of the interface in all results", "pad")
-    face_1: Faces = entry("boundary of body 1, or several that are one face together", "disk_top")
-    face_2: Faces = entry("boundary of body 2, or several", "blade_foot")
-    x: tuple[Component, Component, Component] = entry(
-        "direction in which body 2 would slide under the load; x of the interface frame [1]",
-        [1.0, 0.0, 0.0],
-    )
-    gap: Gap | None = entry("of the unloaded bodies, beside that of their meshes", default=None)
-
-    @model_validator(mode="after")
-    def _has_direction(self) -> ContactPair:
-        if not any(self.x):
-            raise disagreement("no direction; allowed: one that is not zero", "x")
-        return self
-
-    @model_validator(mode="after")
-    def _has_faces(self) -> ContactPair:
-        for key in ("face_1", "face_2"):
-            names = getattr(self, key)
-            if not names:
-                raise disagreement("none; allowed: a boundary, or several", key)
-            if len(set(names)) < len(names):
-                raise disagreement("a boundary twice; allowed: each once", key)
-        return self
-
-    def described(self, bodies: tuple[str, str]) -> fe.ContactPair:
-        """As the structure takes it, of body 1 and body 2."""
-        from fe_models.imported_structure import ContactPair as Pair
-
-        return Pair(self.name, bodies, self.face_1, self.face_2, np.array(self.x))
-
-
-class Support(Section):
-    """Displacements held at a boundary or a node set, of whichever body has it."""
-
-    group: Name = entry("boundary or node set", "disk_base")
-    hold: Literal[
-        "all", "normal", "x", "y", "z", "xy", "xz", "yz", "mean_x", "mean_y", "mean_z"
-    ] = entry(
-        "all, normal, global axes such as xz, or mean_x: only the mean of a boundary along x", "all"
-    )
-
-    def described(self) -> fe.Support:
-        """As the structure takes it."""
-        from fe_models.imported_structure import Support as Held
-
-        return Held(self.group, "xyz" if self.hold == "all" else self.hold)
 
 
 class ImportedStructure(Section):
@@ -134,6 +87,7 @@ class ImportedStructure(Section):
     )
     body_1: Name = entry("name in the file of the lower, fixed body", "disk")
     body_2: Name = entry("name in the file of the upper, moving body", "blade")
+    other_bodies: tuple[OtherBody, ...] = entry("beside body 1 and body 2", default=())
     contacts: tuple[ContactPair, ...] = entry("faces that meet", min_length=1)
     supports: tuple[Support, ...] = entry("what is held", min_length=1)
     loads: tuple[Load, ...] = entry("what is applied", min_length=1)
@@ -147,14 +101,45 @@ class ImportedStructure(Section):
             check_interface_name(name, f"contacts.{index}.name")
         if self.body_1 == self.body_2:
             raise disagreement("the same body twice; allowed: two bodies", "body_2", "body_1")
+        for index, body in enumerate(self.other_bodies):
+            if body.name in self.names[: 2 + index]:
+                raise disagreement(
+                    f"{body.name} twice; allowed: each body once", f"other_bodies.{index}.name"
+                )
         return self
+
+    @model_validator(mode="after")
+    def _contacts_are_of_bodies(self) -> ImportedStructure:
+        for index, pair in enumerate(self.contacts):
+            for name in pair.bodies or ():
+                if name not in self.names:
+                    raise disagreement(
+                        f"no body {name}; allowed: {', '.join(self.names)}, or one more of "
+                        "structure.other_bodies",
+                        f"contacts.{index}.bodies",
+                    )
+        touched = {name for pair in self.contacts for name in self.bodies_of(pair)}
+        for index, body in enumerate(self.names):
+            if body not in touched:
+                key = f"other_bodies.{index - 2}.name" if index > 1 else f"body_{index + 1}"
+                raise disagreement(f"{body}: in no contact; allowed: bodies that touch others", key)
+        return self
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Of all bodies in the file, in the order of the mesh."""
+        return self.body_1, self.body_2, *(body.name for body in self.other_bodies)
+
+    def bodies_of(self, pair: ContactPair) -> tuple[str, str]:
+        """Names of body 1 and body 2 of a contact."""
+        return pair.bodies or (self.body_1, self.body_2)
 
     def read(self, size: float | None) -> ImportedMesh:
         """Everything in the file, read once, CAD by elements of a ``size``. Raises MeshError."""
         return _read(self.file, size, _stamp(self.file))
 
     def mesh(self, size: float | None) -> StructureMesh:
-        """The two bodies and their interfaces, made once. Raises MeshError."""
+        """The bodies and their interfaces, made once. Raises MeshError."""
         return _joined(self, size, _stamp(self.file))
 
 
@@ -171,10 +156,9 @@ def _read(file: str, size: float | None, stamp: Stamp) -> ImportedMesh:
 def _joined(structure: ImportedStructure, size: float | None, stamp: Stamp) -> StructureMesh:
     from fe_models.imported_structure import imported_mesh
 
-    bodies = structure.body_1, structure.body_2
-    pairs = [pair.described(bodies) for pair in structure.contacts]
+    pairs = [pair.described(structure.bodies_of(pair)) for pair in structure.contacts]
     supports = [support.described() for support in structure.supports]
-    return imported_mesh(structure.read(size), bodies, pairs, supports)
+    return imported_mesh(structure.read(size), structure.names, pairs, supports)
 
 
 def _stamp(file: str) -> Stamp:
@@ -235,18 +219,8 @@ class Elements(Section):
     order: Literal[1, 2] = entry("of the elements, 1 or 2", 1, default=1)
 
 
-class MeshMaterial(Solid):
-    """Isotropic linear elastic material, with a mass where that counts."""
-
-    density: Density | None = entry(
-        "mass per volume, for loads of rotation and acceleration [t/mm^3]",
-        "4430 kg/m^3",
-        default=None,
-    )
-
-
 class MeshMaterials(TwoBodies[MeshMaterial]):
-    """The two bodies in contact."""
+    """Body 1 and body 2."""
 
 
 class MeshCase(FiniteElementCase):
@@ -256,7 +230,7 @@ class MeshCase(FiniteElementCase):
 
     title: Title = entry("one line", "Two bodies of a mesh file")
     structure: ImportedStructure = entry("bodies, contacts, supports and loads, named by groups")
-    materials: MeshMaterials = entry("the two bodies in contact")
+    materials: MeshMaterials = entry("body 1 and body 2")
     load_path: Legs = entry("one cycle")
     mesh: Elements = entry("finite elements of the structure", default=Elements())
     wear: Wear = entry("law, length of the run and step")
@@ -284,11 +258,16 @@ class MeshCase(FiniteElementCase):
         mesh = structure.mesh(self.mesh.size)
         bodies = [f"{b.name} of {b.mesh.nvertices} nodes" for b in mesh.bodies]
         return [
-            ("structure", f"{Path(structure.file).name}: {' and '.join(bodies)}"),
+            ("structure", f"{Path(structure.file).name}: {listed(bodies)}"),
             *(
                 ("face", outline_of(mesh, interface, pair.gap))
                 for interface, pair in zip(mesh.interfaces, structure.contacts, strict=True)
             ),
+            *(
+                (f"material of {body.name}", told_of_body(body.material))
+                for body in structure.other_bodies
+            ),
+            *(("contact", text) for pair in structure.contacts if (text := own_terms(pair))),
             *(("held", f"{support.group}, {support.hold}") for support in structure.supports),
             ("load path", f"{self.increments_outline} in {len(self.legs)} legs{before}{cycles}"),
             *(("load", load.text) for load in structure.loads),
@@ -345,19 +324,61 @@ class MeshCase(FiniteElementCase):
         return self
 
     @model_validator(mode="after")
+    def _is_linear_with_others(self) -> MeshCase:
+        kinds = {"stiffness": self.nonlinearity.stiffness != "linear"}
+        kinds["check"] = self.nonlinearity.check
+        for key, wanted in kinds.items():
+            if wanted and self.structure.other_bodies:
+                raise disagreement(
+                    "known of two bodies, the first of them held; allowed: leave it out, or no "
+                    "structure.other_bodies",
+                    f"nonlinearity.{key}",
+                )
+        return self
+
+    @model_validator(mode="after")
     def _mass_is_known(self) -> MeshCase:
+        known = {name: body.density is not None for name, body in self.solids.items()}
         for load in self.structure.loads:
             if not isinstance(load, RotationLoad | AccelerationLoad):
                 continue
-            for body in ("body_1", "body_2"):
-                if getattr(self.materials, body).density is None:
+            for index, name in enumerate(known):
+                body = f"materials.body_{index + 1}"
+                if index > 1:
+                    body = f"structure.other_bodies.{index - 2}.material"
+                if not known[name]:
                     raise disagreement(
                         f"missing, and a load of {load.kind} acts on the mass; allowed: mass per "
                         "volume [t/mm^3], such as 4430 kg/m^3",
-                        f"materials.{body}.density",
-                        f"materials.{body}",
+                        f"{body}.density",
+                        body,
                     )
         return self
+
+    @property
+    def solids(self) -> dict[str, MeshMaterial]:
+        """Materials of all bodies by name, in the order of the mesh."""
+        structure, materials = self.structure, self.materials
+        of_two = {structure.body_1: materials.body_1, structure.body_2: materials.body_2}
+        return of_two | {body.name: body.material for body in structure.other_bodies}
+
+    def terms(self, name: str) -> ContactTerms:
+        (pair,) = (pair for pair in self.structure.contacts if pair.name == name)
+        bodies, wear = self.structure.bodies_of(pair), pair.wear or self.wear
+        return ContactTerms(
+            materials=(self.solids[bodies[0]].elastic(), self.solids[bodies[1]].elastic()),
+            laws=(wear.body_1, wear.body_2),
+            friction=pair.friction or self.friction,
+            grid=pair.grid or self.contact.grid,
+        )
+
+    @property
+    def contact_names(self) -> tuple[str, ...]:
+        return tuple(pair.name for pair in self.structure.contacts)
+
+    def on_one_grid(self) -> Self:
+        contacts = tuple(p.model_copy(update={"grid": None}) for p in self.structure.contacts)
+        return changed(self, {"structure.contacts": contacts})
 
     @model_validator(mode="after")
     def _fits_the_file(self) -> MeshCase:
@@ -379,22 +400,24 @@ class MeshCase(FiniteElementCase):
         )
 
         structure = self.structure
-        with _pointing_at("structure.body_1"):
-            body_1 = named_body(imported, structure.body_1)
-        with _pointing_at("structure.body_2"):
-            body_2 = named_body(imported, structure.body_2)
+        keys = "body_1", "body_2", *(f"other_bodies.{k}.name" for k in range(len(self.solids) - 2))
+        bodies = {}
+        for key, name in zip(keys, structure.names, strict=True):
+            with _pointing_at(f"structure.{key}"):
+                bodies[name] = named_body(imported, name)
         for index, pair in enumerate(structure.contacts):
-            for key, body in (("face_1", body_1), ("face_2", body_2)):
+            for key, body in zip(("face_1", "face_2"), structure.bodies_of(pair), strict=True):
                 with _pointing_at(f"structure.contacts.{index}.{key}"):
                     for name in getattr(pair, key):
-                        contact_facets(imported, body, name)
+                        contact_facets(imported, bodies[body], name)
+        every = list(bodies.values())
         for index, support in enumerate(structure.supports):
             with _pointing_at(f"structure.supports.{index}.group"):
-                check_support(imported, (body_1, body_2), support.described())
+                check_support(imported, every, support.described())
         for index, load in enumerate(structure.loads):
             suffix = ".group" if hasattr(load, "group") else ""
             with _pointing_at(f"structure.loads.{index}{suffix}"):
-                check_load(imported, (body_1, body_2), load.described())
+                check_load(imported, every, load.described())
 
     def _check_contacts(self) -> None:
         """Make the interfaces; where they cannot be, find the pair that is at fault."""
@@ -407,9 +430,10 @@ class MeshCase(FiniteElementCase):
                     structure.model_copy(update={"contacts": (pair,)}).mesh(size)
             raise
         for index, (pair, face) in enumerate(zip(structure.contacts, interfaces, strict=True)):
-            check_rows(self.contact, face.line)
+            grid = pair.grid or self.contact.grid
+            check_rows(grid, face.line, f"structure.contacts.{index}.grid" if pair.grid else None)
             if pair.gap is not None:
-                cells = self.contact.grid[0], 1 if face.line else self.contact.grid[1]
+                cells = grid[0], 1 if face.line else grid[1]
                 key = f"structure.contacts.{index}.gap"
                 check_gap(pair.gap, face_size(face), cells, face.line, key)
                 _check_mirrored(pair.gap, face.planes, key)
@@ -423,7 +447,7 @@ class MeshCase(FiniteElementCase):
         imposed = [
             load.described() for load in structure.loads if isinstance(load, DisplacementLoad)
         ]
-        materials = self.material(1), self.material(2)
+        materials = [material.elastic() for material in self.solids.values()]
         with _pointing_at("structure.supports"):
             mesh = structure.mesh(self.mesh.size)
             made = imported_structure(mesh, imported, materials, supports, imposed, 1)

@@ -31,7 +31,7 @@ class MeshModel:
 
     def __init__(self, case: MeshCase) -> None:
         self._case = case
-        self.friction = case.friction.at(0.0)
+        self.friction = tuple(terms.friction.at(0.0) for terms in case.every_terms)
         self.nonlinearity = case.nonlinearity
         self.order = case.mesh.order
         path = case.load_path
@@ -43,9 +43,13 @@ class MeshModel:
         structure = self._case.structure
         contents = Path(structure.file).read_bytes()
         loads = [load.model_dump(exclude={"path"}) for load in structure.loads]
-        described = structure.model_dump(exclude={"file", "loads"})
+        # What contacts are made of does not change how the bodies deform.
+        of_contacts = {"__all__": {"friction", "wear", "grid"}}
+        described = structure.model_dump(
+            exclude={"file": True, "loads": True, "contacts": of_contacts}
+        )
         gaps = [interface.gap.tobytes() for interface in self._mesh.interfaces]
-        materials = self._case.material(1), self._case.material(2)
+        materials = [solid.elastic() for solid in self._case.solids.values()]
         return contents, described, loads, gaps, self._case.mesh, materials
 
     @property
@@ -102,15 +106,16 @@ class MeshModel:
         (pair,) = (p for p in self._case.structure.contacts if p.name == interface.name)
         if pair.gap is None:
             return None
-        grid = Grid.over(face_size(interface), self._case.contact.grid, interface.line)
-        return gap_over(pair.gap, None, grid)
+        grid = self._case.terms(interface.name).grid
+        over = Grid.over(face_size(interface), grid, interface.line)
+        return gap_over(pair.gap, None, over)
 
     def structure(self, mesh: StructureMesh) -> Structure:
         case, described = self._case, self._case.structure
         return imported_structure(
             mesh,
             described.read(case.mesh.size),
-            (case.material(1), case.material(2)),
+            [solid.elastic() for solid in case.solids.values()],
             [support.described() for support in described.supports],
             [load.described() for load in described.loads],
             self.order,

@@ -254,7 +254,7 @@ class ResultantsCase(WearCase):
 
     @model_validator(mode="after")
     def _loads_can_be_used(self) -> ResultantsCase:
-        check_rows(self.contact, self.structure.line)
+        check_rows(self.contact.grid, self.structure.line)
         try:
             in_file = self.structure.read(self.friction.at(0.0))
         except InputFileError as error:
