@@ -73,12 +73,32 @@ def with_path(**loads):
     return {kind: {"kind": kind, "path": [1, 0], **load} for kind, load in loads.items()}
 
 
+BY_ENERGY = {"law": "energy", "body_1": ENERGY_BODY, "body_2": ENERGY_BODY}
+# A third body on the two of the template's mesh.
+BOLT = [{"name": "bolt", "material": {"young": "200 GPa", "poisson": 0.3, "density": 7.8e-9}}]
+BOLTED = [
+    {"name": "pad", "face_1": "disk_top", "face_2": "blade_foot", "x": [1, 0, 0]},
+    {
+        "name": "bolted",
+        "bodies": ["blade", "bolt"],
+        "face_1": "blade_top",
+        "face_2": "bolt_foot",
+        "x": [1, 0, 0],
+    },
+]
 # Sections that the templates do not have: kind of case, key of the section, its own kinds.
 GIVEN = {
     "dovetail": {"load_path.mix": {ALWAYS: [{"share": 1}]}, **wear("blade", "disk")},
     "mesh": {
         "load_path.mix": {ALWAYS: [{"share": 1, "factors": [1]}]},
         "structure.contacts.0.gap": GAPS,
+        "structure.contacts.0.friction": {ALWAYS: {"coefficient": 0.4}},
+        **{
+            f"structure.contacts.0.{section}": given
+            | ({ALWAYS: BY_ENERGY} if section == "wear" else {})
+            for section, given in laws({}, "body_1", "body_2").items()
+        },
+        "structure.other_bodies": {ALWAYS: BOLT},
         "structure.loads.0": with_path(
             force={"group": "blade_top", "force": [0, 0, -100]},
             displacement={"group": "blade_top", "displacement": [0.01, 0, 0]},
@@ -228,6 +248,8 @@ class Leaf:
             if self.key.startswith(f"{section}."):
                 chosen = [given[tag] for tag in (*self.tags, ALWAYS) if tag in given]
                 overrides += [f"{section}={value}" for value in chosen[:1]]
+        if self.key.startswith("structure.other_bodies."):
+            overrides.append(f"structure.contacts={BOLTED}")
         if "legs" in self.tags:
             overrides.append("contact.method=full")
         if "friction_contact" in self.tags:

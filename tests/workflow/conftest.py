@@ -98,6 +98,7 @@ def put_structure(file: h5py.File, name: str, load: float, cycles: float) -> Non
     shear = np.stack([-FRICTION * pressure, 0.0 * pressure], axis=1)
     fields = {"pressure": pressure, "shear": shear, "slip": 1e-4 * shear, "gap": rounding(x, y)}
     put(group, coordinates=np.stack([x, y], 1), facets=facets, **fields)
+    group.attrs["friction"] = FRICTION
     normal, ratio = 5e4 * load * level, np.clip(np.where(t <= PEAK, -1, (t - 14.5) / 4), -1, 1)
     zero, energy = np.zeros(INCREMENTS), 200.0 * load * level * (np.abs(ratio) >= 1)
     history = {"P": normal, "Qx": ratio * FRICTION * normal, "Qy": 0.01 * normal}
@@ -223,15 +224,16 @@ def results(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 LOADS = "P,Qx,Qy,Mx,My,Mz,Edx,Edy\n1,0,0,0,0,0,0,0\n"
 NODES = "node,X,Y,Z\n1,15,0,245\n2,14,0,246\n3,15,1,245\n"
-# Corner and size of the two boxes of the joint [mm], and the heights of their named faces.
+# Corner and size of the boxes of the joint [mm], and the heights of their named faces.
 BOXES: dict[str, tuple[tuple[float, ...], dict[str, float]]] = {
     "disk": ((-5, -5, -4, 10, 10, 4), {"disk_base": -4.0, "disk_top": 0.0}),
     "blade": ((-4, -4, 0, 8, 8, 4), {"blade_foot": 0.0, "blade_top": 4.0}),
+    "bolt": ((-2, -2, 4, 4, 4, 4), {"bolt_foot": 4.0, "bolt_top": 8.0}),
 }
 
 
 def write_joint(folder: Path) -> None:
-    """A small box on a larger one as ``joint.msh``, of few elements, and as ``joint.step``."""
+    """Ever smaller boxes on each other as ``joint.msh``, of few elements, and ``joint.step``."""
     with gmsh_model("joint") as gmsh:
         occ = gmsh.model.occ
         for body, (box, heights) in BOXES.items():

@@ -5,7 +5,7 @@ from typing import get_args
 
 import pytest
 
-from tests.workflow.case_leaves import CAD, CONTACT, INTERFACE, REDUCED
+from tests.workflow.case_leaves import BOLTED, CAD, CONTACT, INTERFACE, REDUCED
 from workflow.case.sections import KINDS_ARE_NAMED_BY, sections_of
 from workflow.errors import CaseError
 from workflow.kinds import about, kinds, parse_case, template
@@ -17,6 +17,10 @@ OPENED = re.compile(r"^( *)# (?:- )?([\w.]+):.*")
 NEEDS = {
     "wear.step.fraction": ["wear.step.kind=explicit"],
     "wear.reference_amplitude": ["wear.law=energy_amplitude"],
+    "structure.contacts.wear.reference_amplitude": [
+        "structure.contacts.0.wear.law=energy_amplitude"
+    ],
+    "structure.other_bodies": [f"structure.contacts={BOLTED}"],
     "load_path": ["contact.method=full"],
     "structure.body": ["structure.file=specimens.yaml"],
     "structure.interfaces.nodes": [f"structure.interfaces.0.frame={INTERFACE['frame']}"],

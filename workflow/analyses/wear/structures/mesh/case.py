@@ -264,7 +264,7 @@ class MeshCase(FiniteElementCase):
                 for interface, pair in zip(mesh.interfaces, structure.contacts, strict=True)
             ),
             *(
-                (f"material of {body.name}", told_of_body(body.material))
+                ("material", f"{body.name}: {told_of_body(body.material)}")
                 for body in structure.other_bodies
             ),
             *(("contact", text) for pair in structure.contacts if (text := own_terms(pair))),

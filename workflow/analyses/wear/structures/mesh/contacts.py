@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 
 import numpy as np
 from pydantic import model_validator
@@ -38,6 +38,12 @@ class OtherBody(Section):
     material: MeshMaterial = entry("of the body")
 
 
+class ContactFriction(EvolvingFriction):
+    """Friction of one contact."""
+
+    filled_in: ClassVar[bool] = False
+
+
 class ContactWear(Laws, TwoBodies[BodyWear]):
     """Laws of the two bodies of a contact."""
 
@@ -55,10 +61,10 @@ class ContactPair(Section):
     gap: Gap | None = entry("of the unloaded bodies, beside that of their meshes", default=None)
     bodies: tuple[Name, Name] | None = entry(
         "body 1 and body 2 of this contact; without it those of the structure",
-        ["plate", "bolt"],
+        ["disk", "blade"],
         default=None,
     )
-    friction: EvolvingFriction | None = entry(
+    friction: ContactFriction | None = entry(
         "of this contact; without it that of all", default=None
     )
     wear: ContactWear | None = entry(
@@ -109,7 +115,8 @@ def own_terms(pair: ContactPair) -> str:
         bodies = {"body_1": pair.wear.body_1, "body_2": pair.wear.body_2}
         parts += [f"{title} {text}" for title, text in wearing(bodies)]
     if pair.grid is not None:
-        parts.append(f"{pair.grid[0]} x {pair.grid[1]} cells")
+        line = pair.grid[1] == 1
+        parts.append(f"{pair.grid[0]} {'strips' if line else f'x {pair.grid[1]} cells'}")
     return f"{pair.name}: {', '.join(parts)}" if parts else ""
 
 
