@@ -87,8 +87,9 @@ def _write(case: WearCase, source: StructureStage, out: Path, reporter: Reporter
             history.interface.name: _numbered(source, history) for history in source.unworn()
         }
     warn_of_structure(source, reporter)
-    grids = {face: face.grid(case.terms(face.face.name).grid) for face in faces}
-    heights = {face.face.name: gap_on(face, grid) for face, grid in grids.items()}
+    # All contacts are alike, or they were refused.
+    cells = case.every_terms[0].grid
+    heights = {face.face.name: gap_on(face, face.grid(cells)) for face in faces}
     loads = {name: history.loads for name, history in histories.items()}
     cycle = source.unworn_cycle
     reporter.say(f"loads: {marched(cycle)}")
