@@ -29,15 +29,14 @@ from workflow.analyses.wear.structures.mesh.faces import (
     outline_of,
     planes_of_symmetry,
 )
+from workflow.analyses.wear.structures.mesh.load import Component, Factor, Name
 from workflow.analyses.wear.structures.mesh.loads import (
     AccelerationLoad,
-    Component,
     DisplacementLoad,
-    Factor,
     Load,
-    Name,
     RotationLoad,
 )
+from workflow.analyses.wear.structures.mesh.temperatures import Expansion, check_temperatures
 from workflow.case.fields import AUTO, Auto, File, OrAlone, OrAuto, Whole
 from workflow.case.input_files import read_heights
 from workflow.case.plain import counted
@@ -243,6 +242,9 @@ class MeshMaterial(Solid):
         "4430 kg/m^3",
         default=None,
     )
+    expansion: Expansion | None = entry(
+        "linear thermal, for loads of temperature [1/K]", "8.6e-6 1/K", default=None
+    )
 
 
 class MeshMaterials(TwoBodies[MeshMaterial]):
@@ -357,6 +359,16 @@ class MeshCase(FiniteElementCase):
                         f"materials.{body}.density",
                         f"materials.{body}",
                     )
+        return self
+
+    @model_validator(mode="after")
+    def _expansion_is_known(self) -> MeshCase:
+        structure, materials = self.structure, self.materials
+        named = {
+            "body_1": (structure.body_1, materials.body_1.expansion),
+            "body_2": (structure.body_2, materials.body_2.expansion),
+        }
+        check_temperatures(structure.loads, named, self.nonlinearity)
         return self
 
     @model_validator(mode="after")

@@ -42,7 +42,7 @@ class MeshModel:
     def key(self) -> tuple[object, ...]:
         structure = self._case.structure
         contents = Path(structure.file).read_bytes()
-        loads = [load.model_dump(exclude={"path"}) for load in structure.loads]
+        loads = [(load.model_dump(exclude={"path"}), load.contents) for load in structure.loads]
         described = structure.model_dump(exclude={"file", "loads"})
         gaps = [interface.gap.tobytes() for interface in self._mesh.interfaces]
         materials = self._case.material(1), self._case.material(2)
