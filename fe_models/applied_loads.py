@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from fe_models.elasticity import ElasticBody
+from fe_models.thermal import Temperature
 from sa_solver.types import Array
 
 # Second moments below this share of the largest are none: a boundary in the plane has no depth.
@@ -101,7 +102,7 @@ class Acceleration:
         return elastic.body_load(lambda x: np.broadcast_to(pull[:, None, None], x.shape))
 
 
-AppliedLoad = Pressure | BoundaryForce | Displacement | Rotation | Acceleration
+AppliedLoad = Pressure | BoundaryForce | Displacement | Rotation | Acceleration | Temperature
 
 
 def boundary_of(load: AppliedLoad) -> str | None:

@@ -144,6 +144,20 @@ class ElasticBody:
         load = LinearForm(lambda v, w: w.f * v).assemble(basis, f=size)
         return np.outer(load, direction[list(self.body.axes)]).ravel()
 
+    def thermal_load(self, strain: Array) -> Array:
+        """Forces ``(size,)`` of an expansion ``(vertices,)``, linear between these.
+
+        ∫ (3 λ + 2 G) θ div φ_i, in plane strain too (:mod:`fe_models.thermal`).
+        """
+        linear = self._basis.with_element(ELEMENTS[self.dimension, 1]())
+        pressure = 3.0 * self.material.lame + 2.0 * self.material.shear_modulus
+        held = linear.interpolate(pressure * strain)
+        forms = [
+            LinearForm(lambda v, w, a=a: w.held * grad(v)[a]).assemble(self._basis, held=held)
+            for a in range(self.dimension)
+        ]
+        return np.stack(forms, axis=1).ravel()
+
     def pressure_load(self, boundary: str) -> Array:
         """Forces ``(size,)`` of a pressure of 1 MPa on a named boundary, into the body."""
         return -_normal_integrals(self._facet_basis(boundary)).ravel()

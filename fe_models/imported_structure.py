@@ -29,6 +29,7 @@ from fe_models.rest import rigid_assemblies
 from fe_models.spin_softening import spin_softening
 from fe_models.structure import Structure
 from fe_models.supported_body import FREE_MOTION, SupportedBody, interface_nodes
+from fe_models.thermal import Temperature, check_temperature, thermal_strains
 from fe_models.trace import LinearTrace
 from sa_solver.ties import first_largest
 from sa_solver.types import Array, Frame, Indices, Material
@@ -188,6 +189,8 @@ def check_support(imported: ImportedMesh, bodies: Sequence[Body], support: Suppo
 
 def check_load(imported: ImportedMesh, bodies: Sequence[Body], load: AppliedLoad) -> None:
     """Raise :class:`MeshError` if no body has the boundary, or the plane not the direction."""
+    if isinstance(load, Temperature):
+        check_temperature(load, {body.name: imported.node_numbers[body.name] for body in bodies})
     boundaries, node_sets = _groups(imported, bodies)
     group = boundary_of(load)
     if group is not None and group not in boundaries:
@@ -319,12 +322,15 @@ def _supported(
     free, supported_motions = constraints.free, constraints.transformation()
     imposed = np.zeros((elastic.size, len(loads)))
     forces = np.zeros((elastic.size, len(loads)))
+    thermal = thermal_strains(loads, elastic, imported.node_numbers[body.name])
     moved, loaded = [], []
     for case, load in enumerate(loads):
         if isinstance(load, Displacement):
             if load.boundary in groups:
                 moved.append(load)
                 imposed[:, case] = _impose(constraints, elastic, load)
+        elif isinstance(load, Temperature):
+            forces[:, case] = elastic.thermal_load(thermal[:, case])
         elif boundary_of(load) is None or boundary_of(load) in groups:
             forces[:, case] = load.forces(elastic)
             loaded += [name for name in (boundary_of(load),) if name is not None]
@@ -336,7 +342,8 @@ def _supported(
     moving = imposed if imposed.any() else None
     try:
         trace = LinearTrace.of(elastic, {i.name: i.nodes(side) for i, side in faces})
-        supported = SupportedBody(elastic, constraints, *placed, forces, moving, loaded, trace)
+        given = *placed, forces, moving, loaded, trace, thermal
+        supported = SupportedBody(elastic, constraints, *given)
     except ValueError as error:
         raise MeshError(f"body {body.name}: {error}") from error
     if len(constraints.free) <= np.sum(~supported.held):

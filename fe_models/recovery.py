@@ -48,18 +48,22 @@ class StressRecovery:
         self._elastic = elastic
         self._free = free
 
-    def stress(self, displacement: Array) -> Array:
+    def stress(self, displacement: Array, thermal: Array | None = None) -> Array:
         """Cauchy stress of displacements ``(size,)`` at all vertices, ``(6, vertices)`` [MPa].
 
-        Ordered xx, yy, zz, xy, yz, zx of the global axes.
+        Ordered xx, yy, zz, xy, yz, zx of the global axes. Of the strain an expansion ``thermal``
+        ``(vertices,)`` makes no stress (:mod:`fe_models.thermal`).
         """
         patches, vertices = self._patches, np.arange(self._elastic.body.mesh.nvertices)
-        return self._of(displacement, vertices, patches, self._elastic.order + 1)
+        return self._of(displacement, vertices, patches, self._elastic.order + 1, thermal)
 
-    def histories(self, displacements: Array, vertices: Indices) -> Array:
+    def histories(
+        self, displacements: Array, vertices: Indices, thermal: Array | None = None
+    ) -> Array:
         """The same of several displacements ``(size, t)`` at some vertices, ``(t, 6, n)`` [MPa].
 
-        The fits are those of the vertices, whatever the displacements: all take them at once.
+        With expansions ``(vertices, t)`` of all vertices. The fits are those of the vertices,
+        whatever the displacements: all take them at once.
         """
         elastic, axes = self._elastic, list(self._elastic.body.axes)
         count, d = displacements.shape[1], self._elastic.dimension
@@ -68,10 +72,13 @@ class StressRecovery:
         slopes = _gradients(elastic.nodes[:, axes], values, vertices, nodes, elastic.order + 1)
         stress = np.empty((count, 6, len(vertices)))
         for t, slope in enumerate(slopes.reshape(count, d, d, -1)):
-            stress[t] = self._of_slopes(slope, vertices)
+            expansion = 0.0 if thermal is None else thermal[vertices, t]
+            stress[t] = self._of_slopes(slope, expansion, vertices)
         return stress
 
-    def alternatives(self, displacement: Array, vertices: Indices) -> Array:
+    def alternatives(
+        self, displacement: Array, vertices: Indices, thermal: Array | None = None
+    ) -> Array:
         """The same at a few ``vertices`` by other fits, ``(k, 6, vertices)``: what is uncertain.
 
         From patches that reach an element farther; of elements of order 1 also by a polynomial of
@@ -80,9 +87,9 @@ class StressRecovery:
         order, beside = self._elastic.order, self._elements_of_vertices
         reached = self._neighbours[vertices]
         near, wide = ((r @ beside).tocsr() for r in (reached, reached @ self._neighbours))
-        found = [self._of(displacement, vertices, wide, order + 1)]
+        found = [self._of(displacement, vertices, wide, order + 1, thermal)]
         if order == 1:
-            found.append(self._of(displacement, vertices, near, order))
+            found.append(self._of(displacement, vertices, near, order, thermal))
         return np.array(found)
 
     @cached_property
@@ -93,13 +100,19 @@ class StressRecovery:
         return np.setdiff1d(mesh.facets[:, self._free], touched)
 
     def _of(
-        self, displacement: Array, vertices: Indices, elements: sp.csr_matrix, degree: int
+        self,
+        displacement: Array,
+        vertices: Indices,
+        elements: sp.csr_matrix,
+        degree: int,
+        thermal: Array | None,
     ) -> Array:
         """By a polynomial of a ``degree`` on so many rows of ``elements`` around ``vertices``."""
         points = self._elastic.nodes[:, list(self._elastic.body.axes)]
         values = displacement.reshape(-1, self._elastic.dimension)
         nodes = self._nodes_near(elements)
-        return self._of_slopes(_gradients(points, values, vertices, nodes, degree), vertices)
+        slopes = _gradients(points, values, vertices, nodes, degree)
+        return self._of_slopes(slopes, 0.0 if thermal is None else thermal[vertices], vertices)
 
     def _nodes_near(self, elements: sp.csr_matrix) -> sp.csr_matrix:
         """Nodes of each row of ``elements``, in their order."""
@@ -107,12 +120,13 @@ class StressRecovery:
         nodes.sort_indices()
         return nodes
 
-    def _of_slopes(self, slopes: Array, vertices: Indices) -> Array:
-        """Stress ``(6, n)`` of derivatives ``(d, d, n)`` of the displacement."""
+    def _of_slopes(self, slopes: Array, thermal: Array | float, vertices: Indices) -> Array:
+        """Stress ``(6, n)`` of derivatives ``(d, d, n)`` of the displacement and expansions."""
         axes = self._elastic.body.axes
         gradient = np.zeros((3, 3, len(vertices)))
         gradient[np.ix_(axes, axes)] = slopes
-        return self._without_tractions(self._elastic.cauchy(gradient), vertices)
+        gradient -= thermal * np.eye(3)[:, :, None]
+        return self._without_tractions(self._elastic.cauchy(gradient), thermal, vertices)
 
     @cached_property
     def _elements_of_vertices(self) -> sp.csr_matrix:
@@ -142,12 +156,13 @@ class StressRecovery:
         wide = sp.diags(few.astype(float)) @ self._neighbours
         return (near + wide @ near).tocsr()
 
-    def _without_tractions(self, stress: Array, vertices: Indices) -> Array:
+    def _without_tractions(self, stress: Array, thermal: Array | float, vertices: Indices) -> Array:
         """P σ P with P along the surface, where nothing acts on it."""
         along = self._along_surface[vertices].transpose(1, 2, 0)
         tensor = np.einsum("abn,bcn,cdn->adn", along, tensors(stress), along)
         if self._elastic.dimension == 2:
             tensor[1, 1] = self._elastic.material.poisson * (tensor[0, 0] + tensor[2, 2])
+            tensor[1, 1] -= self._elastic.material.young * thermal
         return components(tensor)
 
     @cached_property

@@ -184,8 +184,10 @@ def _share(structure: Structure, amplitudes: Array) -> Array:
     """How much of the load at ``amplitudes`` an amplitude of each load case is, ``(cases,)``.
 
     The projection of the cases' nodal forces on those of that load: one at it, falling with it, and
-    whatever the order and the units of the cases.
+    whatever the order and the units of the cases. Raises ValueError for temperatures that change.
     """
+    if any(body.expands for body in structure.bodies):
+        raise ValueError("no temperature may change: its strains are those of linear structures")
     forces = np.concatenate([b.nodal_loads() for b in structure.bodies])
     load = forces @ amplitudes
     if not load.any():

@@ -19,6 +19,7 @@ from fe_models.mesh import Body, in_space
 from fe_models.motion import structure_motion
 from fe_models.recovery import StressRecovery
 from fe_models.structure import Structure
+from fe_models.thermal import thermal_gradient
 from sa_solver.ties import first_largest
 from sa_solver.types import Array, Frame, Indices
 
@@ -113,11 +114,14 @@ class CycleStress:
 
     ``faces`` are displacements ``(t, 3, n)`` [mm] of body 1 and body 2, by interface, in the frame
     and at the nodes of that; ``surfaces`` the bodies in the increments that are shown, if any are.
+    ``expansions`` ``(t, 2, n)`` are thermal strains of body 1 and body 2 there, and their slopes
+    along z of the frame [1/mm], None if no temperature changes.
     """
 
     fields: tuple[StressField, ...]
     faces: tuple[tuple[Array, Array], ...]
     surfaces: tuple[SurfaceHistory, ...]
+    expansions: tuple[tuple[Array, Array], ...] | None = None
 
 
 def cycle_stress(
@@ -135,22 +139,50 @@ def cycle_stress(
     :func:`fe_models.motion.deformation`. ``done`` is called after each of the :func:`steps`.
     """
     # The first is that of the fields; all of them by one factorisation.
-    motion = structure_motion(structure, force, relative, amplitudes, [at, *shown])
+    increments = [at, *shown]
+    motion = structure_motion(structure, force, relative, amplitudes, increments)
     done()
     fields, surfaces = [], []
     for body, displacement in zip(structure.bodies, motion.displacements, strict=True):
         elastic, free = body.elastic, body.free_facets
-        fields.append(stress_field(elastic, displacement[:, 0], free, body.nodes, body.clamped))
+        thermal = body.thermal_strain(amplitudes[increments].T)
+        seen = free, body.nodes, body.clamped
+        fields.append(stress_field(elastic, displacement[:, 0], *seen, thermal[:, 0]))
         if shown:
-            surfaces.append(surface_history(elastic, displacement[:, 1:], free))
+            surfaces.append(surface_history(elastic, displacement[:, 1:], free, thermal[:, 1:]))
         done()
-    return CycleStress(tuple(fields), motion.faces, tuple(surfaces))
+    heated = any(body.expands for body in structure.bodies)
+    expansions = _face_expansions(structure, amplitudes) if heated else None
+    return CycleStress(tuple(fields), motion.faces, tuple(surfaces), expansions)
+
+
+def _face_expansions(structure: Structure, amplitudes: Array) -> tuple[tuple[Array, Array], ...]:
+    """Of :class:`CycleStress`; where meshes do not match, projected to the nodes of body 2."""
+    strains = [body.thermal_strain(amplitudes.T) for body in structure.bodies]
+    found = []
+    for interface in structure.mesh.interfaces:
+        sides = []
+        for side, place in enumerate(interface.bodies, start=1):
+            nodes, elastic = interface.nodes(side), structure.bodies[place].elastic
+            slopes = thermal_gradient(elastic, strains[place], nodes)
+            along = np.einsum("a,ant->nt", interface.frame.axes[2], slopes)
+            nodal = np.stack([strains[place][nodes], along])
+            if side == 1 and interface.projection is not None:
+                nodal = np.stack([interface.projection @ values for values in nodal])
+            sides.append(nodal.transpose(2, 0, 1))
+        found.append((sides[0], sides[1]))
+    return tuple(found)
 
 
 def stress_field(
-    elastic: ElasticBody, displacement: Array, free: Indices, contact: Indices, clamped: Indices
+    elastic: ElasticBody,
+    displacement: Array,
+    free: Indices,
+    contact: Indices,
+    clamped: Indices,
+    thermal: Array | None = None,
 ) -> StressField:
-    """Stress of a body from its displacements ``(size,)``.
+    """Stress of a body from its displacements ``(size,)`` and expansions ``(vertices,)``.
 
     ``free`` are the facets on which nothing acts, ``contact`` the vertices of contact faces and
     ``clamped`` those that cannot move.
@@ -159,14 +191,14 @@ def stress_field(
     recovery = StressRecovery(elastic, free)
     clamped = np.intersect1d(clamped, elastic.body.mesh.facets[:, free])
     unbounded = recovery.beside(np.append(recovery.inward_edges, clamped))
-    stress = recovery.stress(displacement)
+    stress = recovery.stress(displacement, thermal)
     equivalent, principal = von_mises(stress), maximum_principal(stress)
 
     def largest(vertices: Indices) -> PeakStress:
         """The largest stress of some vertices."""
         at = vertices[[first_largest(values[vertices]) for values in (equivalent, principal)]]
         told = np.array([equivalent[at[0]], principal[at[1]]])
-        others = recovery.alternatives(displacement, at)
+        others = recovery.alternatives(displacement, at, thermal)
         apart = [(von_mises(s)[0] - told[0], maximum_principal(s)[1] - told[1]) for s in others]
         change = MISSING[elastic.order] * np.abs(apart).max(axis=0)
         # Under compression the largest principal stress is next to nothing.
@@ -187,10 +219,12 @@ def stress_field(
     )
 
 
-def surface_history(elastic: ElasticBody, displacements: Array, free: Indices) -> SurfaceHistory:
-    """The surface of a body with displacements ``(size, t)``; nothing acts on the facets ``free``.
+def surface_history(
+    elastic: ElasticBody, displacements: Array, free: Indices, thermal: Array | None = None
+) -> SurfaceHistory:
+    """The surface of a body with displacements ``(size, t)`` and expansions ``(vertices, t)``.
 
-    In the plane all of the body is seen.
+    Nothing acts on the facets ``free``. In the plane all of the body is seen.
     """
     mesh = elastic.body.mesh
     cells = mesh.t if elastic.dimension == 2 else mesh.facets[:, mesh.boundary_facets()]
@@ -200,7 +234,7 @@ def surface_history(elastic: ElasticBody, displacements: Array, free: Indices) -
         vertices=vertices,
         triangles=corners.reshape(cells.shape).T,
         displacement=np.array(in_space(nodal[:, vertices])),
-        stress=StressRecovery(elastic, free).histories(displacements, vertices),
+        stress=StressRecovery(elastic, free).histories(displacements, vertices, thermal),
     )
 
 

@@ -37,9 +37,10 @@ class SupportedBody:
     ``nodes`` ``(n,)`` are its interface vertices and ``frames`` ``(n, d, d)`` the axes at each, d
     the dimension; ``loads`` ``(d all, cases)`` its load cases, and ``imposed`` ``(d all, cases)``
     displacements that each imposes on nodes that ``constraints`` hold; ``loaded`` are boundaries
-    with tractions on them. ``held`` ``(d n,)`` marks the interface displacements that are held at
-    zero, as on a plane of symmetry. Raises ValueError if those of an interface node are constrained
-    in any other way.
+    with tractions on them, and ``thermal`` ``(vertices, cases)`` expansions of the vertices, whose
+    forces are among the loads. ``held`` ``(d n,)`` marks the interface displacements that are held
+    at zero, as on a plane of symmetry. Raises ValueError if those of an interface node are
+    constrained in any other way.
 
     Without ``trace`` the interface displacements are those of the vertices, which move the face
     linearly between them. With it, a face of second-order elements moves as these do, and the
@@ -77,8 +78,10 @@ class SupportedBody:
         imposed: Array | None = None,
         loaded: Sequence[str] = (),
         trace: LinearTrace | None = None,
+        thermal: Array | None = None,
     ) -> None:
         self.elastic = elastic
+        self._thermal = thermal
         self.loads = loads
         self.loaded = loaded
         self.nodes = nodes
@@ -288,6 +291,17 @@ class SupportedBody:
         forces[:, self.elastic.body.axes] = applied.reshape(-1, self.elastic.dimension)
         arms = self.elastic.nodes - about
         return np.array([forces.sum(axis=0), np.cross(arms, forces).sum(axis=0)])
+
+    def thermal_strain(self, amplitudes: Array) -> Array:
+        """Expansion of the vertices ``(vertices, ...)`` at ``amplitudes`` ``(cases, ...)``."""
+        if self._thermal is None:
+            return np.zeros((self.elastic.body.mesh.nvertices, *amplitudes.shape[1:]))
+        return np.asarray(self._thermal @ amplitudes)
+
+    @property
+    def expands(self) -> bool:
+        """Whether a load case heats the body, or cools it."""
+        return self._thermal is not None and bool(self._thermal.any())
 
     def nodal_loads(self) -> Array:
         """Forces ``(d all, cases)`` of load cases; of an imposed displacement the body's own."""

@@ -77,7 +77,8 @@ unloaded and unworn, whatever moments that takes."""
 class Material:
     """Isotropic linear elastic material.
 
-    ``young`` and ``yield_stress`` in MPa, ``density`` in t/mm³, ``poisson`` is Poisson's ratio.
+    ``young`` and ``yield_stress`` in MPa, ``density`` in t/mm³, ``poisson`` is Poisson's ratio and
+    ``expansion`` the coefficient of linear thermal expansion [1/K].
 
     Examples
     --------
@@ -93,6 +94,7 @@ class Material:
     poisson: float
     density: float = 0.0
     yield_stress: float = np.inf
+    expansion: float = 0.0
 
     @property
     def shear_modulus(self) -> float:

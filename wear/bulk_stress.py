@@ -17,6 +17,9 @@ leaves the face free of tractions, so that derivatives along the face are all th
 up to terms in z², by the plane stress of a free face, ∂r_a/∂z = -r_z,a there, and equilibrium. What
 is to be added is the stress of half-spaces under the tractions as they are on the fine grid.
 
+Where a temperature expands the body by θ, strains make stress less θ: from σ_xx and σ_yy go
+E θ/(1 - ν), with θ linear in z.
+
 The stress of elements would be wrong next to the face, where it changes within one of them:
 displacements of nodes are not.
 """
@@ -31,7 +34,7 @@ import numpy as np
 from sa_solver.half_space import HalfSpace
 from sa_solver.subsurface_influence import XX, XY, YY, YZ, ZX
 from sa_solver.types import Array, ElasticPair, Grid, LoadHistory, Material
-from wear.link import Link, Transfer, linked
+from wear.link import Link, Transfer, fitted_alike, linked
 
 RIGID = Material(np.inf, 0.0)
 
@@ -43,16 +46,20 @@ SIDE: dict[int, float] = {1: -1.0, 2: 1.0}
 class BulkStress:
     """That of one ``body`` and its ``material`` over a closed cycle.
 
-    ``rest`` is r of every increment, times the side of the face on which the body lies.
+    ``rest`` is r of every increment, times the side of the face on which the body lies. The first
+    component of ``expansion`` is θ on the face, the second its slope along z [1/mm]; None where no
+    temperature changes.
     """
 
     rest: Link
     material: Material
     body: Literal[1, 2]
+    expansion: Link | None = None
 
     def increment(self, t: int) -> BulkStress:
         """That of increment ``t`` alone."""
-        return replace(self, rest=self.rest.increment(t))
+        expansion = self.expansion and self.expansion.increment(t)
+        return replace(self, rest=self.rest.increment(t), expansion=expansion)
 
     def at(self, places: Array, depth: float | Array) -> Array:
         """Stress ``(t, 6, nx, ny)`` [MPa] at ``depth`` below ``places`` ``(2, nx, ny)`` [mm].
@@ -75,6 +82,15 @@ class BulkStress:
         stress[:, XY] = shear * (x[1] + y[0] - 2.0 * z * xy[2])
         stress[:, ZX] = -z * (plane * (xx[0] + poisson * xy[1]) + shear * (xy[1] + yy[0]))
         stress[:, YZ] = -z * (plane * (yy[1] + poisson * xy[0]) + shear * (xy[0] + xx[1]))
+        if self.expansion is not None:
+            held = self.material.young / (1.0 - poisson)
+            hot, by_x, by_y = (
+                held * self.expansion.derivative(places, orders)
+                for orders in ((0, 0), (1, 0), (0, 1))
+            )
+            stress[:, [XX, YY]] -= (hot[:, 0] + z * hot[:, 1])[:, None]
+            stress[:, ZX] += z * by_x[:, 0]
+            stress[:, YZ] += z * by_y[:, 0]
         return stress
 
 
@@ -87,13 +103,24 @@ class BodyFace:
         self.half_space = HalfSpace(grid, ElasticPair(*pair))
 
     def bulk_stress(
-        self, loads: LoadHistory, force: Array, displacement: Array
+        self,
+        loads: LoadHistory,
+        force: Array,
+        displacement: Array,
+        expansion: Array | None = None,
     ) -> BulkStress | None:
         """Of a solved cycle; a convolution for each of its loaded increments.
 
         ``force`` ``(t, 3, n)`` on body 2 [N] and the ``displacement`` ``(t, 3, n)`` of this body
-        [mm] are those at the nodes. None where too few nodes are near the contact.
+        [mm] are those at the nodes, ``expansion`` ``(t, 2, n)`` thermal strains there and their
+        slopes along z [1/mm], if there are any. None where too few nodes are near the contact.
         """
         moved = SIDE[self.body] * displacement
         rest = linked(self.half_space, self.face, loads, force, moved, shear=True)
-        return BulkStress(rest, self.material, self.body) if rest.corrects else None
+        if not rest.corrects:
+            return None
+        if expansion is None:
+            return BulkStress(rest, self.material, self.body)
+        nodal = np.pad(expansion, ((0, 0), (0, 1), (0, 0)))
+        thermal = fitted_alike(rest, self.face, nodal)
+        return BulkStress(rest, self.material, self.body, thermal)

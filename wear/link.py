@@ -311,21 +311,43 @@ def fitted(face: Transfer, defect: Array, deflection: Array, pressing: Array, pe
 
 def _fit(face: Transfer, defect: Array, deflection: Array, region: Array, peak: int) -> Link:
     """The link fitted over a region."""
-    inside = np.all((face.nodes >= region[0]) & (face.nodes <= region[1]), axis=1)
-    # No displacement is relative where nothing is opposite.
-    near = inside & (face.opposed > 0.0) & face.reached
+    near = _near(face, region)
     if near.sum() < FEWEST_NODES:
         return Link.none()
     degrees = _degrees(region, face.spacing(region))
-    basis = face.means(_products(face.nodes, region, degrees).T).T[near]
-    weights = np.sqrt(face.opposed[near])
-    given = (defect[..., near] * weights).reshape(-1, len(basis))
-    fit = np.linalg.lstsq(weights[:, None] * basis, given.T, rcond=LEAST_DETERMINED)[0].T
-    coefficients = np.array(fit).reshape(*defect.shape[:2], degrees[0] + 1, degrees[1] + 1)
+    coefficients, basis = _least_squares(face, defect, region, near, degrees)
     residual = np.zeros(len(near))
-    residual[near] = defect[peak, 2, near] - basis @ fit[3 * peak + 2]
+    residual[near] = defect[peak, 2, near] - basis @ coefficients[peak, 2].ravel()
     quality = _quality(face, near, defect[peak, 2], deflection[peak, 2], residual)
     return Link(coefficients, region, quality)
+
+
+def fitted_alike(link: Link, face: Transfer, nodal: Array) -> Link:
+    """Fields with ``nodal`` values ``(t, 3, n)``, fitted as a ``link`` that corrects was.
+
+    By polynomials of its degrees over its region; of their quality nothing is said.
+    """
+    near = _near(face, link.region)
+    given = face.means(nodal), link.region, near, link.degrees
+    return replace(link, coefficients=_least_squares(face, *given)[0], quality=np.zeros(3))
+
+
+def _near(face: Transfer, region: Array) -> Mask:
+    """Nodes ``(n,)`` in a region that tell relative displacements: something is opposite."""
+    inside = np.all((face.nodes >= region[0]) & (face.nodes <= region[1]), axis=1)
+    near: Mask = inside & (face.opposed > 0.0) & face.reached
+    return near
+
+
+def _least_squares(
+    face: Transfer, given: Array, region: Array, near: Mask, degrees: tuple[int, int]
+) -> tuple[Array, Array]:
+    """Coefficients ``(t, 3, a, b)`` of fields ``(t, 3, n)``, and their basis at nodes ``near``."""
+    basis = face.means(_products(face.nodes, region, degrees).T).T[near]
+    weights = np.sqrt(face.opposed[near])
+    rows = (given[..., near] * weights).reshape(-1, len(basis))
+    fit = np.linalg.lstsq(weights[:, None] * basis, rows.T, rcond=LEAST_DETERMINED)[0].T
+    return np.array(fit).reshape(*given.shape[:2], degrees[0] + 1, degrees[1] + 1), basis
 
 
 def _deflection(
@@ -403,7 +425,7 @@ def _derived(scaled: Array, degree: int, size: float, order: int) -> Array:
     return (2.0 / size) ** order * derived
 
 
-def _quality(face: Transfer, near: Array, d: Array, deflection: Array, residual: Array) -> Array:
+def _quality(face: Transfer, near: Mask, d: Array, deflection: Array, residual: Array) -> Array:
     """See :class:`Link`: its ``quality`` from nodal values of the normal component ``(n,)``."""
     plane = np.column_stack([np.ones(near.sum()), face.nodes[near]])
     bent = [

@@ -18,10 +18,13 @@ def loaded(count: int, load: float) -> LoadHistory:
     return LoadHistory(np.full(count, load), *np.zeros((7, count)), sliding=np.ones(count, bool))
 
 
-def rest(grid: Grid, body: int, motion: Array, tractions: Array) -> tuple[Array, Array]:
+def rest(
+    grid: Grid, body: int, motion: Array, tractions: Array, expansion: Array | None = None
+) -> tuple[Array, Array]:
     """Stress below the cells of a body that moves so, beside its half-space's own motion.
 
-    And the places of the cells; ``tractions`` ``(3, nx, ny)`` are known at the nodes.
+    And the places of the cells; ``tractions`` ``(3, nx, ny)`` are known at the nodes, and maybe an
+    ``expansion`` ``(2, nx, ny)``.
     """
     pair = (METAL, RIGID) if body == 1 else (RIGID, METAL)
     own = SIDE[body] * HalfSpace(grid, ElasticPair(*pair)).displacement(tractions)
@@ -29,7 +32,8 @@ def rest(grid: Grid, body: int, motion: Array, tractions: Array) -> tuple[Array,
     face = BodyFace(grid, nodes, METAL, body)  # type: ignore[arg-type]
     force, moved = tractions * grid.cell_area, motion + own
     fields = (f.reshape(1, 3, -1) for f in (force, moved))
-    bulk = face.bulk_stress(loaded(1, 1.0), *fields)
+    heated = None if expansion is None else expansion.reshape(1, 2, -1)
+    bulk = face.bulk_stress(loaded(1, 1.0), *fields, heated)
     assert bulk is not None
     return bulk.at(nodes.places, DEPTH)[0], nodes.places
 
@@ -62,6 +66,41 @@ def test_shear_follows_from_tension_that_grows_along_the_face(body: int) -> None
     expected[0], expected[1] = c * x, NU * c * x
     expected[5] = -c * SIDE[body] * DEPTH
     np.testing.assert_allclose(stress, expected, atol=1e-7 * c)
+
+
+@pytest.mark.parametrize("body", [1, 2])
+def test_free_expansion_stresses_nothing(body: int) -> None:
+    """θ = a + b x + c y + d z moves the face z = 0 by ½ ((a + θ) x - b y², ...), -½ d (x² + y²)."""
+    a, b, c, d = 1e-3, 4e-4, -3e-4, 5e-4
+    pressed = np.stack(
+        [0.0 * AREA.x * AREA.y] * 2 + [500.0 * np.maximum(0.0, 1.0 - AREA.x**2 - AREA.y**2)]
+    )
+    x, y = np.broadcast_arrays(AREA.x, AREA.y)
+    motion = np.stack(
+        [
+            a * x + 0.5 * b * (x**2 - y**2) + c * x * y,
+            a * y + 0.5 * c * (y**2 - x**2) + b * x * y,
+            -0.5 * d * (x**2 + y**2),
+        ]
+    )
+    expansion = np.stack([a + b * x + c * y, np.full(AREA.shape, d)])
+    stress, _ = rest(AREA, body, motion, pressed, expansion)
+    assert np.abs(stress).max() < 1e-7 * E * a
+    held, _ = rest(AREA, body, 0.0 * motion, pressed, expansion)
+    hot = expansion[0] + SIDE[body] * DEPTH * d
+    np.testing.assert_allclose(held[:2], -E * np.stack([hot, hot]) / (1.0 - NU), rtol=1e-7)
+    np.testing.assert_allclose(held[5], SIDE[body] * DEPTH * E * b / (1.0 - NU), rtol=1e-6)
+
+
+def test_section_that_expands_presses_across_its_plane() -> None:
+    """Free in it, held across: (1 + ν) θ x, and stress -E θ along y alone."""
+    motion, nothing = np.zeros((2, 3, *LINE.shape))
+    motion[0] = (1.0 + NU) * 1e-3 * LINE.x
+    expansion = np.stack([np.full(LINE.shape, 1e-3), np.zeros(LINE.shape)])
+    stress, _ = rest(LINE, 2, motion, nothing, expansion)
+    expected = np.zeros_like(stress)
+    expected[1] = -E * 1e-3
+    np.testing.assert_allclose(stress, expected, atol=1e-7 * E * 1e-3)
 
 
 def test_a_half_space_has_nothing_to_add() -> None:

@@ -105,6 +105,8 @@ GIVEN = {
             rotation={"axis": [0, 1, 0], "through": [0, 0, 0], "speed": "6000 rpm"},
             acceleration={"acceleration": [0, 0, 9810]},
             moment={"group": "blade_top", "moment": [0, 5, 0]},
+            temperature={"change": 100},
+            nodal_temperature={"file": "temperatures.csv", "reference": 20},
         ),
         **wear("body_1", "body_2"),
     },

@@ -257,6 +257,10 @@ def template_files(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("template")
     write_joint(folder)
     (folder / "loads.csv").write_text(LOADS, encoding="utf-8")
+    # More nodes than the mesh has.
+    (folder / "temperatures.csv").write_text(
+        "node,temperature\n" + "".join(f"{n},{20 + n / 10}\n" for n in range(1, 3000)), "utf-8"
+    )
     for body in (1, 2):
         (folder / f"nodes_{body}.csv").write_text(NODES, encoding="utf-8")
     for name in ("specimens_wear.yaml", "specimens_rig.yaml"):

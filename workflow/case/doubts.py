@@ -50,6 +50,7 @@ USUAL = (
     Usual("materials.*.young", "MPa", 300.0, 1.3e6),
     Usual("materials.*.poisson", "1", 0.1, 0.5),
     Usual("materials.*.density", "t/mm^3", 5e-10, 2.3e-8),
+    Usual("materials.*.expansion", "1/K", 1e-7, 3e-4),
     Usual("materials.*.yield_stress", "MPa", 2.0, 2e4),
     Usual("friction.coefficient", "1", 0.02, 1.2),
     Usual("joint.friction", "1", 0.02, 1.2),

@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
-from sa_solver.types import Array
+from sa_solver.types import Array, Indices
 from workflow.case.fields import Quantity, shown
 from workflow.case.input_files import InputFileError, check_widths, csv_rows, number_in
 from workflow.case.units import UnitError, to_base
@@ -101,6 +101,14 @@ class TableFile:
         for row in np.flatnonzero(numbers != np.rint(numbers)).tolist():
             raise self.refusal(row, name, "not a whole number", "whole numbers")
         return [int(number) for number in numbers]
+
+    def once(self, name: str) -> Indices:
+        """A column of whole numbers ``(n,)``, each of them once. Raises InputFileError."""
+        numbers = np.array(self.whole(name), dtype=np.int64)
+        _, first = np.unique(numbers, return_index=True)
+        for row in np.setdiff1d(np.arange(len(self)), first).tolist():
+            raise self.refusal(row, name, f"{name} given twice", "once")
+        return numbers
 
     def refusal(self, row: int, name: str, wrong: str, allowed: str) -> InputFileError:
         """The error about one cell; a column that the file does not give is named alone."""

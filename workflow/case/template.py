@@ -28,10 +28,10 @@ HEADER = f"""\
 """
 # Optional entries the template fills in: a material that can yield, the length of a run, legs that
 # press, a face with all edges rounded, a joint whose friction rises and
-# a mass.
+# a mass and expands.
 FILLED_IN = (
     *("yield_stress", "cycles", "legs", "P", "gap", "end_width", "end_radius"),
-    *("friction", "density"),
+    *("friction", "density", "expansion"),
 )
 
 

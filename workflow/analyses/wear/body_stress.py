@@ -58,14 +58,16 @@ class StressedCycle:
     """What is known of one contact over a cycle.
 
     ``tractions`` on its grid and the ``loads`` that they go with. Of a structure too the
-    displacements ``(t, 3, n)`` [mm] of the ``faces`` of both bodies in these, and the ``fields`` of
-    stress in both at peak load.
+    displacements ``(t, 3, n)`` [mm] of the ``faces`` of both bodies in these, the ``fields`` of
+    stress in both at peak load, and where temperatures change the ``expansions`` ``(t, 2, n)`` of
+    the faces, with their slopes along z [1/mm].
     """
 
     tractions: CycleTractions
     loads: FaceLoads
     faces: tuple[Array, Array] | None = None
     fields: tuple[WholeStress, WholeStress] | None = None
+    expansions: tuple[Array, Array] | None = None
 
     def traction(self, t: int) -> Array:
         """Tractions qx, qy, p of increment ``t`` ``(3, nx, ny)`` [MPa]."""
@@ -104,7 +106,8 @@ class StressedBody:
         if cycle.faces is None or cycle.loads.force is None:
             return None
         moved = cycle.faces[self.number - 1]
-        return self._face.bulk_stress(cycle.loads.loads, cycle.loads.force, moved)
+        expansion = cycle.expansions and cycle.expansions[self.number - 1]
+        return self._face.bulk_stress(cycle.loads.loads, cycle.loads.force, moved, expansion)
 
     def history(
         self, cycle: StressedCycle, bulk: BulkStress | None, depth: float, known: np.ndarray

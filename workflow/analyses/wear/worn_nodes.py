@@ -66,16 +66,13 @@ def read_nodes(file: str | Path) -> NodeTable:
     table, needed = read_table_file(file), (NODE, "X", "Y")
     table.check({NODE: "1", **dict.fromkeys(AXES, "mm")})
     table.require(needed, ", ".join(needed))
-    numbers = table.whole(NODE)
-    _, first = np.unique(numbers, return_index=True)
-    for row in np.setdiff1d(np.arange(len(table)), first).tolist():
-        raise table.refusal(row, NODE, "node given twice", "once")
+    numbers = table.once(NODE)
     columns = [
         table.column(axis, Quantity("mm")) if axis in table.names else np.zeros(len(table))
         for axis in AXES
     ]
     points = np.stack(columns, axis=1)
-    return NodeTable(np.array(numbers, dtype=np.int64), points)
+    return NodeTable(numbers, points)
 
 
 def nodal_depths(points: Array, frame: Frame, grid: Grid, depth: Array) -> NodalDepths:

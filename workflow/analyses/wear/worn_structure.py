@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from fe_models.cut_face import WholeStress, whole_components
+from fe_models.cut_face import WholeStress, whole_components, whole_values
 from fe_models.elasticity import maximum_principal, von_mises
 from fe_models.mesh import Body, Interface, MeshError, StructureMesh, write_msh
 from fe_models.mesh_quality import element_sizes, elements_across, radius_ratios
@@ -59,14 +59,20 @@ class WornStructure:
 
     def under(
         self, moment: str, number: int
-    ) -> tuple[tuple[Array, Array], tuple[WholeStress, WholeStress]]:
-        """Motions of both bodies' faces under interface ``number``, and stress at peak load."""
+    ) -> tuple[tuple[Array, Array], tuple[WholeStress, WholeStress], tuple[Array, Array] | None]:
+        """Motions of both bodies' faces under interface ``number``, stress at peak load.
+
+        And thermal strains of the faces, if there are any.
+        """
         stress, interface = self.stresses[moment], self.stage.mesh.interfaces[number]
         one, two = (whole_components(interface, moved) for moved in stress.faces[number])
         field_1, field_2 = (
             WholeStress(stress.fields[place], interface) for place in interface.bodies
         )
-        return (one, two), (field_1, field_2)
+        if stress.expansions is None:
+            return (one, two), (field_1, field_2), None
+        hot_1, hot_2 = (whole_values(interface, hot) for hot in stress.expansions[number])
+        return (one, two), (field_1, field_2), (hot_1, hot_2)
 
     def loads(self, number: int) -> InterfaceHistory:
         """What the whole face of interface ``number`` does over the worn cycle."""

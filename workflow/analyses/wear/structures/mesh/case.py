@@ -19,11 +19,9 @@ from workflow.analyses.wear.case.base import (
 )
 from workflow.analyses.wear.case.gaps import Gap, HeightsGap, check_gap
 from workflow.analyses.wear.case.sections import (
-    Share,
     TwoBodies,
     Wear,
     check_rows,
-    check_shares,
 )
 from workflow.analyses.wear.structures.mesh.contacts import (
     ContactPair,
@@ -38,16 +36,17 @@ from workflow.analyses.wear.structures.mesh.faces import (
     outline_of,
     planes_of_symmetry,
 )
+from workflow.analyses.wear.structures.mesh.legs import Legs
+from workflow.analyses.wear.structures.mesh.load import Name
 from workflow.analyses.wear.structures.mesh.loads import (
     AccelerationLoad,
     DisplacementLoad,
-    Factor,
     Load,
-    Name,
     RotationLoad,
 )
+from workflow.analyses.wear.structures.mesh.temperatures import check_temperatures
 from workflow.case.changing import changed
-from workflow.case.fields import AUTO, Auto, File, OrAuto, Whole
+from workflow.case.fields import AUTO, File
 from workflow.case.input_files import read_heights
 from workflow.case.plain import counted, listed, told_of_body
 from workflow.case.sections import Length, Section, Title, disagreement, entry
@@ -165,51 +164,6 @@ def _stamp(file: str) -> Stamp:
     """Time and size by which a file that has changed is known."""
     state = Path(file).stat()
     return state.st_mtime_ns, state.st_size
-
-
-class CycleOfMix(Section):
-    """One of several cycles, in which every load has its own factor."""
-
-    share: Share = entry("of all cycles; the shares add up to 1 [1]", "100 %")
-    factors: tuple[Factor, ...] = entry(
-        "of every load, in the order of structure.loads; of the speed for a rotation [1]", [1.0]
-    )
-
-
-class Legs(Section):
-    """Every load goes linearly from leg to leg; the last legs are one cycle."""
-
-    increments: Annotated[tuple[Annotated[int, Whole(1, 10_000)], ...] | Auto, OrAuto()] = entry(
-        "of each leg; auto: as many as leave no more than wear.tolerance", [8, 14]
-    )
-    cycle_from: Annotated[int, Whole(1, 1000)] = entry(
-        "first leg of the cycle; those before it are passed once", 1, default=1
-    )
-    peak_leg: Annotated[int, Whole(1, 1000)] = entry(
-        "leg of the cycle at whose end the load peaks: stress is shown there", 1, default=1
-    )
-    mix: tuple[CycleOfMix, ...] = entry(
-        "cycles that take turns, all on these legs, the one to show first; without it there is one",
-        default=(),
-    )
-
-    @model_validator(mode="after")
-    def _are_some(self) -> Legs:
-        if not self.increments:
-            raise disagreement("none; allowed: one or more", "increments")
-        if self.mix:
-            check_shares([cycle.share for cycle in self.mix])
-        return self
-
-    @property
-    def legs(self) -> tuple[int, ...]:
-        """Increments of all legs, once they are chosen."""
-        assert isinstance(self.increments, tuple)
-        return self.increments
-
-    def mixed(self, loads: int) -> list[tuple[tuple[float, ...], float]]:
-        """Factors of all ``loads``, so many, and share of every cycle."""
-        return [(cycle.factors, cycle.share) for cycle in self.mix] or [((1.0,) * loads, 1.0)]
 
 
 class Elements(Section):
@@ -338,22 +292,26 @@ class MeshCase(FiniteElementCase):
 
     @model_validator(mode="after")
     def _mass_is_known(self) -> MeshCase:
-        known = {name: body.density is not None for name, body in self.solids.items()}
         for load in self.structure.loads:
             if not isinstance(load, RotationLoad | AccelerationLoad):
                 continue
-            for index, name in enumerate(known):
-                body = f"materials.body_{index + 1}"
-                if index > 1:
-                    body = f"structure.other_bodies.{index - 2}.material"
-                if not known[name]:
+            for key, (_, solid) in self._keyed_solids.items():
+                if solid.density is None:
                     raise disagreement(
                         f"missing, and a load of {load.kind} acts on the mass; allowed: mass per "
                         "volume [t/mm^3], such as 4430 kg/m^3",
-                        f"{body}.density",
-                        body,
+                        f"{key}.density",
+                        key,
                     )
         return self
+
+    @property
+    def _keyed_solids(self) -> dict[str, tuple[str, MeshMaterial]]:
+        """Names and materials of all bodies by where the case has the latter."""
+        keys = ["materials.body_1", "materials.body_2"]
+        others = range(len(self.structure.other_bodies))
+        keys += [f"structure.other_bodies.{index}.material" for index in others]
+        return dict(zip(keys, self.solids.items(), strict=True))
 
     @property
     def solids(self) -> dict[str, MeshMaterial]:
@@ -379,6 +337,12 @@ class MeshCase(FiniteElementCase):
     def on_one_grid(self) -> Self:
         contacts = tuple(p.model_copy(update={"grid": None}) for p in self.structure.contacts)
         return changed(self, {"structure.contacts": contacts})
+
+    @model_validator(mode="after")
+    def _expansion_is_known(self) -> MeshCase:
+        known = {key: (name, b.expansion) for key, (name, b) in self._keyed_solids.items()}
+        check_temperatures(self.structure.loads, known, self.nonlinearity)
+        return self
 
     @model_validator(mode="after")
     def _fits_the_file(self) -> MeshCase:

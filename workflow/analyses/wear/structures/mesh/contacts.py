@@ -11,7 +11,8 @@ from workflow.analyses.wear.case.evolution import EvolvingFriction
 from workflow.analyses.wear.case.gaps import Gap
 from workflow.analyses.wear.case.sections import Density, Laws, Solid, TwoBodies
 from workflow.analyses.wear.case.worn_bodies import BodyWear, wearing
-from workflow.analyses.wear.structures.mesh.loads import Component, Name
+from workflow.analyses.wear.structures.mesh.load import Component, Name
+from workflow.analyses.wear.structures.mesh.temperatures import Expansion
 from workflow.case.fields import OrAlone
 from workflow.case.sections import FaceCells, Section, disagreement, entry
 
@@ -28,6 +29,9 @@ class MeshMaterial(Solid):
         "mass per volume, for loads of rotation and acceleration [t/mm^3]",
         "4430 kg/m^3",
         default=None,
+    )
+    expansion: Expansion | None = entry(
+        "linear thermal, for loads of temperature [1/K]", "8.6e-6 1/K", default=None
     )
 
 

@@ -7,17 +7,23 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import numpy as np
 from pydantic import Field, model_validator
 
-from workflow.case.fields import Quantity, Text
-from workflow.case.plain import entries
-from workflow.case.sections import Section, disagreement, entry
+from workflow.analyses.wear.structures.mesh.load import (
+    KINDS,
+    Component,
+    Coordinate,
+    MeshLoad,
+    Name,
+)
+from workflow.analyses.wear.structures.mesh.temperatures import (
+    NodalTemperatureLoad,
+    TemperatureLoad,
+)
+from workflow.case.fields import Quantity
+from workflow.case.sections import disagreement, entry
 
 if TYPE_CHECKING:
     from fe_models import applied_loads as fe
 
-Name = Annotated[str, Text()]
-Factor = Annotated[float, Quantity("1", at_least=-1e6, at_most=1e6)]
-Coordinate = Annotated[float, Quantity("mm", at_least=-1e6, at_most=1e6)]
-Component = Annotated[float, Quantity("1", at_least=-1e6, at_most=1e6)]
 ForceComponent = Annotated[float, Quantity("N", at_least=-1e9, at_most=1e9)]
 MomentComponent = Annotated[float, Quantity("N mm", at_least=-1e12, at_most=1e12)]
 PressureValue = Annotated[float, Quantity("MPa", at_least=-1e5, at_most=1e5)]
@@ -26,33 +32,7 @@ AngularSpeed = Annotated[float, Quantity("rad/s", above=0.0, at_most=1e5)]
 AccelerationComponent = Annotated[float, Quantity("mm/s^2", at_least=-1e12, at_most=1e12)]
 
 
-# Entries that say where a load acts, and the word before each.
-PLACES = (("group", "on"), ("axis", "about"), ("through", "through"), ("at", "at"))
-KINDS = "pressure, force, moment, displacement, rotation or acceleration"
-
-
-class _Load(Section):
-    """What every load needs."""
-
-    kind: str  # named first; each load narrows it to its own name
-    path: tuple[Factor, ...] = entry(
-        "factor of the load at the end of each leg of load_path; from 0, linearly [1]", [1.0, 0.0]
-    )
-
-    @property
-    def text(self) -> str:
-        """The load in a line: what, how much, where and in which legs."""
-        sizes = entries(self, ("path", "axis", "through", "at"))
-        what = sizes if sizes.startswith(self.kind) else f"{self.kind}, {sizes}"
-        places = (
-            f"{word} {_in_brackets(getattr(self, name))}"
-            for name, word in PLACES
-            if getattr(self, name, None) is not None
-        )
-        return f"{' '.join([what, *places])}, times {_in_brackets(self.path)} at the ends of legs"
-
-
-class PressureLoad(_Load):
+class PressureLoad(MeshLoad):
     """Pressure on a boundary, into the body."""
 
     kind: Literal["pressure"] = entry(KINDS, "pressure")
@@ -66,7 +46,7 @@ class PressureLoad(_Load):
         return Pressure(self.group, self.pressure)
 
 
-class ForceLoad(_Load):
+class ForceLoad(MeshLoad):
     """Force on a boundary: spread evenly, or as a point tied to it hands it on."""
 
     kind: Literal["force"] = entry(KINDS, "force")
@@ -89,7 +69,7 @@ class ForceLoad(_Load):
         return BoundaryForce(self.group, np.array(self.force), at)
 
 
-class MomentLoad(_Load):
+class MomentLoad(MeshLoad):
     """Moment on a boundary, which stays free to deform."""
 
     kind: Literal["moment"] = entry(KINDS, "moment")
@@ -106,7 +86,7 @@ class MomentLoad(_Load):
         return BoundaryForce(self.group, np.zeros(3), moment=np.array(self.moment))
 
 
-class DisplacementLoad(_Load):
+class DisplacementLoad(MeshLoad):
     """Displacement imposed on a boundary along its own direction; free across it.
 
     Several on one boundary add up as vectors: make them perpendicular.
@@ -131,7 +111,7 @@ class DisplacementLoad(_Load):
         return Displacement(self.group, np.array(self.displacement))
 
 
-class RotationLoad(_Load):
+class RotationLoad(MeshLoad):
     """Rotation of both bodies; its path is that of the speed, whose square the forces follow."""
 
     kind: Literal["rotation"] = entry(KINDS, "rotation")
@@ -156,7 +136,7 @@ class RotationLoad(_Load):
         return Rotation(np.array(self.axis), np.array(self.through), self.speed)
 
 
-class AccelerationLoad(_Load):
+class AccelerationLoad(MeshLoad):
     """Acceleration of the frame of reference: both bodies are pulled against it."""
 
     kind: Literal["acceleration"] = entry(KINDS, "acceleration")
@@ -172,11 +152,13 @@ class AccelerationLoad(_Load):
 
 
 Load = Annotated[
-    PressureLoad | ForceLoad | MomentLoad | DisplacementLoad | RotationLoad | AccelerationLoad,
+    PressureLoad
+    | ForceLoad
+    | MomentLoad
+    | DisplacementLoad
+    | RotationLoad
+    | AccelerationLoad
+    | TemperatureLoad
+    | NodalTemperatureLoad,
     Field(discriminator="kind"),
 ]
-
-
-def _in_brackets(value: str | tuple[float, ...]) -> str:
-    """A name as it is, numbers in brackets."""
-    return value if isinstance(value, str) else f"({', '.join(f'{n:g}' for n in value)})"

@@ -42,7 +42,7 @@ class MeshModel:
     def key(self) -> tuple[object, ...]:
         structure = self._case.structure
         contents = Path(structure.file).read_bytes()
-        loads = [load.model_dump(exclude={"path"}) for load in structure.loads]
+        loads = [(load.model_dump(exclude={"path"}), load.contents) for load in structure.loads]
         # What contacts are made of does not change how the bodies deform.
         of_contacts = {"__all__": {"friction", "wear", "grid"}}
         described = structure.model_dump(

@@ -1,0 +1,150 @@
+"""Loads of mesh cases beyond forces: temperatures, and motions of points tied to faces."""
+
+import json
+
+import h5py
+import numpy as np
+import pytest
+
+from sa_solver.subsurface_influence import YY
+from tests.workflow.commands import invoke
+from tests.workflow.mesh_scenes import STEEL, refused, run
+from tests.workflow.plane_blocks import Blocks
+from workflow.analyses.wear.structures.mesh.model import MeshModel
+from workflow.kinds import load_case
+
+pytestmark = pytest.mark.usefixtures("reads_here")
+
+ALPHA = 12e-6
+HOT_STEEL = {"expansion": f"{ALPHA} 1/K"}
+# Half of a foot on half of a block, free to expand away from their plane of symmetry.
+SCENE = Blocks(
+    *((0.0, 6.0), 6.0, (0.0, 2.0), 3.0, (0.0, 1.0), "z", (HOT_STEEL, HOT_STEEL)),
+    strips=32,
+    half=True,
+)
+HELD = [
+    {"group": "base_z0", "hold": "z"},
+    {"group": "base_x0", "hold": "normal"},
+    {"group": "foot_x0", "hold": "normal"},
+]
+PRESSED = {"kind": "pressure", "group": "foot_z1", "pressure": "50 MPa", "path": [1, 0.5]}
+HEATED = {"kind": "temperature", "change": "100 K", "path": [0.5, 1]}
+LEGS = {"increments": [1, 2]}
+STRESS = "stress={section: x, depth: 1 mm, points: 9, life: {parameter: findley, depth: 20 um, "
+STRESS += "sensitivity: 0.3}}"
+
+
+def scene(folder, *loads, size=0.5):
+    folder.mkdir(exist_ok=True)
+    return SCENE.write(folder, size, [PRESSED, *loads], LEGS, friction=0.3)
+
+
+def settings(supports):
+    return STRESS, f"structure.supports={json.dumps(supports)}"
+
+
+def write_temperatures(path, nodes, values):
+    rows = "".join(f"{n},{v}\n" for n, v in zip(nodes, values, strict=True))
+    path.write_text(f"node,temperature [K]\n{rows}", encoding="utf-8")
+
+
+def sections(out):
+    with h5py.File(out / "results.h5") as file:
+        group = file["stress/section/foot/unworn"]
+        return [group[f"body_{body}/stress"][()] for body in (1, 2)]
+
+
+def test_bodies_that_expand_alike_are_pressed_across_their_plane(tmp_path):
+    """Free in the plane, they feel nothing of it there; along y it is -E θ, under contacts too."""
+    cold = run(scene(tmp_path / "cold"), tmp_path / "a", *settings(HELD))
+    hot = run(scene(tmp_path / "hot", HEATED), tmp_path / "b", *settings(HELD))
+    assert hot["foot"]["depth_1"] == pytest.approx(cold["foot"]["depth_1"], rel=1e-3)
+    least = 200e3 * ALPHA * 50.0  # peak load is at the end of the first leg
+    largest = max(np.nanmax(np.abs(stress)) for stress in sections(tmp_path / "a"))
+    for one, two in zip(sections(tmp_path / "a"), sections(tmp_path / "b"), strict=True):
+        change = two - one
+        change[YY] += least
+        assert np.nanmax(np.abs(change)) < 1e-9 * largest
+
+
+@pytest.fixture
+def heated(tmp_path):
+    """A case with a uniform temperature, and one node by node after it."""
+    path = scene(tmp_path / "case", HEATED)
+    imported = load_case(path).structure.read(None)
+    numbers = np.concatenate([imported.node_numbers[name] for name in ("base", "foot")])
+    write_temperatures(path.with_name("t.csv"), numbers, np.full(len(numbers), 120.0))
+    return path
+
+
+NODAL = {"kind": "nodal_temperature", "file": "t.csv", "reference": "20 K", "path": [0.5, 1]}
+
+
+def with_loads(*loads):
+    return f"structure.loads={json.dumps([PRESSED, *loads])}"
+
+
+def test_temperatures_of_nodes_that_are_all_alike(heated):
+    """Forces of the structure are those of one temperature for all; a new file is a new load."""
+    supports = settings(HELD)[1]
+    models = [
+        MeshModel(load_case(heated, [supports, with_loads(load)])) for load in (HEATED, NODAL)
+    ]
+    one, two = (
+        [body.loads[:, 1] for body in model.structure(model.mesh()).bodies] for model in models
+    )
+    for uniform, nodal in zip(one, two, strict=True):
+        np.testing.assert_allclose(nodal, uniform, atol=1e-12 * np.abs(uniform).max())
+    key = models[1].key
+    text = heated.with_name("t.csv").read_text("utf-8")
+    heated.with_name("t.csv").write_text(text.replace("120.0", "121.0", 1), "utf-8")
+    assert MeshModel(load_case(heated, [supports, with_loads(NODAL)])).key != key
+
+
+def test_check_tells_temperatures(heated):
+    told = invoke("check", heated, "--set", with_loads(HEATED, NODAL)).output
+    said = " ".join(told.split())
+    assert "temperature, change 100 K, times (0.5, 1) at the ends of legs" in said
+    assert "nodal temperature, reference 20 K of t.csv" in said
+    assert "120 to 120), times" in said
+
+
+@pytest.mark.parametrize(
+    ("load", "wrong"),
+    [
+        (HEATED | {"body": "lid"}, "structure.loads.1: no body lid; allowed: base, foot"),
+        (NODAL | {"file": "u.csv"}, "structure.loads.1.file: 'u.csv': no such file"),
+        (HEATED | {"change": 2e4}, "change: 20000.0: out of range"),
+    ],
+)
+def test_temperatures_that_do_not_fit_are_refused(heated, load, wrong):
+    assert wrong in refused(heated, with_loads(load))
+
+
+@pytest.mark.parametrize(
+    ("text", "wrong"),
+    [
+        ("node,temperature\n1,20\n", "nodes have no temperature, the first is 2"),
+        ("node,temperature\n1,20\n1,30\n", "t.csv:3: node: 1: node given twice; allowed: once"),
+        ("node,warmth\n1,20\n", "t.csv:1: 'warmth': unknown column"),
+        ("node,temperature [MPa]\n1,20\n", "t.csv:1: temperature: "),
+        ("node,temperature\n1,nan\n", "t.csv:2: temperature: nan: not a finite number"),
+    ],
+)
+def test_files_of_temperatures_that_do_not_fit_are_refused(heated, text, wrong):
+    heated.with_name("t.csv").write_text(text, encoding="utf-8")
+    assert wrong in refused(heated, with_loads(NODAL))
+
+
+def test_expansion_is_asked_for_where_it_counts(heated):
+    """Of the heated body alone, and of linear structures."""
+    cold = f"materials.body_2={json.dumps(STEEL)}"
+    assert "materials.body_2.expansion: missing, and a temperature of foot changes" in refused(
+        heated, cold
+    )
+    load_case(heated, [cold, with_loads(HEATED | {"body": "base"})])
+    assert "nonlinearity: temperatures change" in refused(heated, "nonlinearity.check=true")
+    assert "12: out of range; allowed: at least -0.001" in refused(
+        heated, "materials.body_1.expansion=12"
+    )

@@ -1,0 +1,57 @@
+"""What every load on the bodies of a user's mesh has in a case."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Annotated
+
+from workflow.case.fields import Quantity, Text
+from workflow.case.plain import entries
+from workflow.case.sections import Section, entry
+
+Name = Annotated[str, Text()]
+Factor = Annotated[float, Quantity("1", at_least=-1e6, at_most=1e6)]
+Coordinate = Annotated[float, Quantity("mm", at_least=-1e6, at_most=1e6)]
+Component = Annotated[float, Quantity("1", at_least=-1e6, at_most=1e6)]
+
+# Entries that say where a load acts, and the word before each.
+PLACES = (("group", "on"), ("body", "of"), ("axis", "about"), ("through", "through"), ("at", "at"))
+KINDS = (
+    "pressure, force, moment, displacement, rotation, acceleration, temperature or "
+    "nodal_temperature"
+)
+
+
+class MeshLoad(Section):
+    """What every load needs."""
+
+    kind: str  # named first; each load narrows it to its own name
+    path: tuple[Factor, ...] = entry(
+        "factor of the load at the end of each leg of load_path; from 0, linearly [1]", [1.0, 0.0]
+    )
+
+    @property
+    def text(self) -> str:
+        """The load in a line: what, how much, where and in which legs."""
+        kind = self.kind.replace("_", " ")
+        sizes = entries(self, ("path", "axis", "through", "at"))
+        what = sizes if sizes.startswith(kind) else f"{kind}, {sizes}"
+        path = in_brackets(self.path)
+        return f"{' '.join([what, *self.places])}, times {path} at the ends of legs"
+
+    @property
+    def places(self) -> Iterator[str]:
+        """Where it acts."""
+        for name, word in PLACES:
+            if getattr(self, name, None) is not None:
+                yield f"{word} {in_brackets(getattr(self, name))}"
+
+    @property
+    def contents(self) -> bytes:
+        """What its files hold: two loads are the same if that is, too."""
+        return b""
+
+
+def in_brackets(value: str | tuple[float, ...]) -> str:
+    """A name as it is, numbers in brackets."""
+    return value if isinstance(value, str) else f"({', '.join(f'{n:g}' for n in value)})"

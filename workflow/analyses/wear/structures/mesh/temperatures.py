@@ -1,0 +1,116 @@
+"""Temperatures of the bodies of a user's mesh, as a case gives them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
+
+from pydantic import model_validator
+
+from sa_solver.types import Array, Indices
+from workflow.analyses.wear.case.sections import Nonlinearity
+from workflow.analyses.wear.structures.mesh.load import KINDS, MeshLoad, Name
+from workflow.case.fields import File, Quantity
+from workflow.case.input_files import InputFileError
+from workflow.case.sections import disagreement, entry
+from workflow.case.table_file import read_table_file
+
+if TYPE_CHECKING:
+    from fe_models import thermal as fe
+
+# Solids expand by less; 12 stands for 12e-6, then.
+Expansion = Annotated[float, Quantity("1/K", at_least=-1e-3, at_most=1e-3)]
+TemperatureValue = Annotated[float, Quantity("K", at_least=-1e4, at_most=1e4)]
+# Columns of a file of temperatures.
+NODE, TEMPERATURE = "node", "temperature"
+
+
+class _Temperature(MeshLoad):
+    """What every temperature needs."""
+
+    body: Name | None = entry("that has it; all bodies if not given", "blade", default=None)
+
+
+class TemperatureLoad(_Temperature):
+    """One change of temperature of all of a body, or of all bodies."""
+
+    kind: Literal["temperature"] = entry(KINDS, "temperature")
+    change: TemperatureValue = entry("from the stress-free temperature [K]", "100 K")
+
+    def described(self) -> fe.TemperatureChange:
+        """As the structure takes it."""
+        from fe_models.thermal import TemperatureChange
+
+        return TemperatureChange(self.change, self.body)
+
+
+class NodalTemperatureLoad(_Temperature):
+    """Temperatures of the nodes of a body, or of all bodies, by their numbers in the mesh file."""
+
+    kind: Literal["nodal_temperature"] = entry(KINDS, "nodal_temperature")
+    file: Annotated[str, File((".csv",))] = entry(
+        "columns node, temperature: one for every node that is a corner of an element [K, or °C "
+        "with reference in °C]",
+        "temperatures.csv",
+    )
+    reference: TemperatureValue = entry("stress-free temperature, counted as in the file [K]", 20.0)
+
+    @model_validator(mode="after")
+    def _is_read(self) -> NodalTemperatureLoad:
+        try:
+            self._table()
+        except InputFileError as error:
+            raise disagreement(str(error), "file") from error
+        return self
+
+    @property
+    def contents(self) -> bytes:
+        return Path(self.file).read_bytes()
+
+    @property
+    def places(self) -> Iterator[str]:
+        yield from super().places
+        _, values = self._table()
+        low, high = values.min(), values.max()
+        yield f"of {Path(self.file).name} ({len(values)} nodes, {low:g} to {high:g})"
+
+    def described(self) -> fe.NodalTemperature:
+        """As the structure takes it."""
+        from fe_models.thermal import NodalTemperature
+
+        numbers, values = self._table()
+        return NodalTemperature(numbers, values - self.reference, self.body)
+
+    def _table(self) -> tuple[Indices, Array]:
+        """Node numbers and temperatures of the file, ``(n,)`` each. Raises InputFileError."""
+        table = read_table_file(self.file)
+        table.check({NODE: "1", TEMPERATURE: "K"})
+        table.require((NODE, TEMPERATURE), f"{NODE}, {TEMPERATURE}")
+        return table.once(NODE), table.column(TEMPERATURE, Quantity("K"))
+
+
+def check_temperatures(
+    loads: Sequence[MeshLoad],
+    materials: Mapping[str, tuple[str, float | None]],
+    nonlinearity: Nonlinearity,
+) -> None:
+    """Refuse temperatures of bodies whose expansion is not known, and nonlinear structures.
+
+    ``materials`` are the names of bodies and their expansions by where the case has these.
+    """
+    heating = [load for load in loads if isinstance(load, _Temperature)]
+    for key, (name, expansion) in materials.items():
+        if expansion is None and any(load.body in (None, name) for load in heating):
+            raise disagreement(
+                f"missing, and a temperature of {name} changes; allowed: linear thermal expansion "
+                "[1/K], such as 12e-6 1/K",
+                f"{key}.expansion",
+                key,
+            )
+    if heating and (nonlinearity.check or nonlinearity.stiffness != "linear"):
+        raise disagreement(
+            "temperatures change, whose strains are those of linear structures; allowed: "
+            "stiffness: linear without a check",
+            "nonlinearity",
+        )
