@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from fe_models.elasticity import ElasticBody
+from fe_models.pretension import Pretension
 from fe_models.thermal import Temperature
 from sa_solver.types import Array
 
@@ -102,7 +103,9 @@ class Acceleration:
         return elastic.body_load(lambda x: np.broadcast_to(pull[:, None, None], x.shape))
 
 
-AppliedLoad = Pressure | BoundaryForce | Displacement | Rotation | Acceleration | Temperature
+AppliedLoad = (
+    Pressure | BoundaryForce | Displacement | Rotation | Acceleration | Temperature | Pretension
+)
 
 
 def boundary_of(load: AppliedLoad) -> str | None:

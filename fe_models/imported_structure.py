@@ -25,6 +25,7 @@ from fe_models.elasticity import ElasticBody
 from fe_models.geometry.imported import ImportedMesh
 from fe_models.mesh import Body, MatchError, MeshError, StructureMesh, matched_interface
 from fe_models.mortar import frame_of_faces, mortar_interface
+from fe_models.pretension import Pretension, check_pretension
 from fe_models.rest import rigid_assemblies
 from fe_models.spin_softening import spin_softening
 from fe_models.structure import Structure
@@ -189,6 +190,8 @@ def check_support(imported: ImportedMesh, bodies: Sequence[Body], support: Suppo
 
 def check_load(imported: ImportedMesh, bodies: Sequence[Body], load: AppliedLoad) -> None:
     """Raise :class:`MeshError` if no body has the boundary, or the plane not the direction."""
+    if isinstance(load, Pretension):
+        check_pretension(load, bodies)
     if isinstance(load, Temperature):
         check_temperature(load, {body.name: imported.node_numbers[body.name] for body in bodies})
     boundaries, node_sets = _groups(imported, bodies)
@@ -321,7 +324,7 @@ def _supported(
     constraints, groups = _held(imported, elastic, supports), _names(imported, body)
     free, supported_motions = constraints.free, constraints.transformation()
     imposed = np.zeros((elastic.size, len(loads)))
-    forces = np.zeros((elastic.size, len(loads)))
+    forces, jumps = np.zeros((2, elastic.size, len(loads)))
     thermal = thermal_strains(loads, elastic, imported.node_numbers[body.name])
     moved, loaded = [], []
     for case, load in enumerate(loads):
@@ -331,6 +334,10 @@ def _supported(
                 imposed[:, case] = _impose(constraints, elastic, load)
         elif isinstance(load, Temperature):
             forces[:, case] = elastic.thermal_load(thermal[:, case])
+        elif isinstance(load, Pretension):
+            if load.body == body.name:
+                jumps[:, case] = load.jump(elastic)
+                forces[:, case] = elastic.stiffness @ jumps[:, case]
         elif boundary_of(load) is None or boundary_of(load) in groups:
             forces[:, case] = load.forces(elastic)
             loaded += [name for name in (boundary_of(load),) if name is not None]
@@ -342,7 +349,7 @@ def _supported(
     moving = imposed if imposed.any() else None
     try:
         trace = LinearTrace.of(elastic, {i.name: i.nodes(side) for i, side in faces})
-        given = *placed, forces, moving, loaded, trace, thermal
+        given = *placed, forces, moving, loaded, trace, thermal, jumps if jumps.any() else None
         supported = SupportedBody(elastic, constraints, *given)
     except ValueError as error:
         raise MeshError(f"body {body.name}: {error}") from error

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -147,9 +147,14 @@ def cycle_stress(
         elastic, free = body.elastic, body.free_facets
         thermal = body.thermal_strain(amplitudes[increments].T)
         seen = free, body.nodes, body.clamped
-        fields.append(stress_field(elastic, displacement[:, 0], *seen, thermal[:, 0]))
+        straining = body.straining(displacement, amplitudes[increments].T)
+        field = stress_field(elastic, straining[:, 0], *seen, thermal[:, 0])
+        (moved,) = _of_vertices(elastic, displacement[:, :1])
+        fields.append(replace(field, displacement=moved))
         if shown:
-            surfaces.append(surface_history(elastic, displacement[:, 1:], free, thermal[:, 1:]))
+            surface = surface_history(elastic, straining[:, 1:], free, thermal[:, 1:])
+            moved = _of_vertices(elastic, displacement[:, 1:])[:, surface.vertices]
+            surfaces.append(replace(surface, displacement=moved))
         done()
     heated = any(body.expands for body in structure.bodies)
     expansions = _face_expansions(structure, amplitudes) if heated else None
@@ -209,10 +214,10 @@ def stress_field(
         at_contact = bool(np.isin(at[0], contact))
         return PeakStress(float(told[0]), float(told[1]), place, at_contact, float(error.max()))
 
-    untouched, nodal = recovery.untouched, displacement.reshape(-1, elastic.dimension)
+    untouched = recovery.untouched
     return StressField(
         body=elastic.body,
-        displacement=np.array(in_space(nodal[:count])),
+        displacement=_of_vertices(elastic, displacement[:, None])[0],
         stress=stress,
         peak=largest(np.arange(count)),
         notch=largest(untouched) if len(untouched) else None,
@@ -229,13 +234,18 @@ def surface_history(
     mesh = elastic.body.mesh
     cells = mesh.t if elastic.dimension == 2 else mesh.facets[:, mesh.boundary_facets()]
     vertices, corners = np.unique(cells, return_inverse=True)
-    nodal = displacements.T.reshape(displacements.shape[1], -1, elastic.dimension)
     return SurfaceHistory(
         vertices=vertices,
         triangles=corners.reshape(cells.shape).T,
-        displacement=np.array(in_space(nodal[:, vertices])),
+        displacement=_of_vertices(elastic, displacements)[:, vertices],
         stress=StressRecovery(elastic, free).histories(displacements, vertices, thermal),
     )
+
+
+def _of_vertices(elastic: ElasticBody, displacements: Array) -> Array:
+    """Of the vertices in space ``(t, n, 3)``, from all displacements ``(size, t)``."""
+    nodal = displacements.T.reshape(displacements.shape[1], -1, elastic.dimension)
+    return np.array(in_space(nodal[:, : elastic.body.mesh.nvertices]))
 
 
 def turned(stress: Array, frame: Frame) -> Array:

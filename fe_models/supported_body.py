@@ -37,10 +37,11 @@ class SupportedBody:
     ``nodes`` ``(n,)`` are its interface vertices and ``frames`` ``(n, d, d)`` the axes at each, d
     the dimension; ``loads`` ``(d all, cases)`` its load cases, and ``imposed`` ``(d all, cases)``
     displacements that each imposes on nodes that ``constraints`` hold; ``loaded`` are boundaries
-    with tractions on them, and ``thermal`` ``(vertices, cases)`` expansions of the vertices, whose
-    forces are among the loads. ``held`` ``(d n,)`` marks the interface displacements that are held
-    at zero, as on a plane of symmetry. Raises ValueError if those of an interface node are
-    constrained in any other way.
+    with tractions on them; ``thermal`` ``(vertices, cases)`` expansions of the vertices and
+    ``jumps`` ``(d all, cases)`` shifts of a part of the body, which strain nothing
+    (:mod:`fe_models.pretension`): their forces are among the loads. ``held`` ``(d n,)`` marks the
+    interface displacements that are held at zero, as on a plane of symmetry. Raises ValueError if
+    those of an interface node are constrained in any other way.
 
     Without ``trace`` the interface displacements are those of the vertices, which move the face
     linearly between them. With it, a face of second-order elements moves as these do, and the
@@ -79,8 +80,10 @@ class SupportedBody:
         loaded: Sequence[str] = (),
         trace: LinearTrace | None = None,
         thermal: Array | None = None,
+        jumps: Array | None = None,
     ) -> None:
         self.elastic = elastic
+        self._jumps = jumps
         self._thermal = thermal
         self.loads = loads
         self.loaded = loaded
@@ -297,6 +300,12 @@ class SupportedBody:
         if self._thermal is None:
             return np.zeros((self.elastic.body.mesh.nvertices, *amplitudes.shape[1:]))
         return np.asarray(self._thermal @ amplitudes)
+
+    def straining(self, displacements: Array, amplitudes: Array) -> Array:
+        """What of displacements ``(d all, ...)`` strains the body: all but its ``jumps``."""
+        if self._jumps is None:
+            return displacements
+        return np.asarray(displacements - self._jumps @ amplitudes)
 
     @property
     def expands(self) -> bool:
