@@ -105,7 +105,7 @@ def mortar_interface(
     """Interface of two faces with meshes of their own, of ``surfaces`` 1 and 2 if they are known.
 
     Its nodes are those of body 2 that body 1 covers, its facets those with such nodes alone; a node
-    without a facet is left out. Raises :class:`MeshError` as :func:`mortar_projection` does, and if
+    without a facet is left out. Of body 1 it has the facets that meet these. Raises :class:`MeshError` as :func:`mortar_projection` does, and if
     body 1 covers no facet.
     """
     nodes_1, points_1, facets_1 = _face(body_1, boundary_1, frame)
@@ -120,16 +120,27 @@ def mortar_interface(
             f"the faces of interface {name} share less than a facet of {boundary_2}: refine it"
         )
     kept = np.unique(facets)
+    # Of a face that goes on beyond body 2, what is beside it alone: it stays as free as elsewhere.
+    met = np.zeros(len(nodes_1), bool)
+    met[mortar.projection[kept].indices] = True
+    near: Mask = np.any(met[facets_1], axis=1)
+    near_1 = np.unique(facets_1[near])
     return Interface(
         name=name,
         frame=frame,
         coordinates=points_2[kept, :2],
         facets=np.searchsorted(kept, facets),
-        nodes_1=nodes_1,
+        nodes_1=nodes_1[near_1],
         nodes_2=nodes_2[kept],
         gap=mortar.gap[kept],
-        projection=mortar.projection[kept],
-        face_1=Face(name, frame, points_1[:, :2], facets_1, surface=surface_1),
+        projection=mortar.projection[kept][:, near_1],
+        face_1=Face(
+            name,
+            frame,
+            points_1[near_1, :2],
+            np.searchsorted(near_1, facets_1[near]),
+            surface=surface_1 and surface_1.part(near_1, near),
+        ),
         areas=mortar.areas[kept],
         surface=surface_2 and surface_2.part(kept, whole),
     )

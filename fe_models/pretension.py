@@ -105,6 +105,19 @@ class BoltSection:
         return np.asarray(carried + amplitudes @ self.loads)
 
 
+@dataclass(frozen=True)
+class Bolt:
+    """The bolt ``name``, load case ``case``, of a ``section``; with a ``force`` [N], or as short.
+
+    What a case without force says is its shortening; with one it is found (:func:`tightened`).
+    """
+
+    name: str
+    case: int
+    section: BoltSection
+    force: float | None = None
+
+
 def check_pretension(load: Pretension, bodies: Sequence[Body]) -> None:
     """Raise :class:`MeshError` unless a plane cuts the body that a bolt is."""
     found = [body for body in bodies if body.name == load.body]
@@ -138,15 +151,19 @@ def bolt_section(
                 f"{structure.mesh.interfaces[number].name}; allowed: a point of the shank away "
                 "from contacts"
             )
-    for part, outwards, is_far in ((beyond, axis, True), (~beyond, -axis, False)):
-        shift = np.outer(part, outwards[list(body.elastic.body.axes)]).ravel()
-        if _is_free(body, shift):
-            break
-    else:
+    components = list(body.elastic.body.axes)
+    parts = (True, beyond, axis), (False, ~beyond, -axis)
+    free = [
+        (is_far, outwards, shift)
+        for is_far, part, outwards in parts
+        if _is_free(body, shift := np.outer(part, outwards[components]).ravel())
+    ]
+    if not free:
         raise MeshError(
             f"supports hold body {bolt.body} along its axis on both sides of the cut, so that its "
             "tension is not known; hold one side at most"
         )
+    is_far, outwards, shift = free[0]
     shares = np.zeros((len(structure.mesh.interfaces), 3))
     for number, side, far in faces:
         if far.all() == is_far:
@@ -183,17 +200,16 @@ def tightened(
     structure: Structure,
     joint: FrictionalJoint,
     path: Array,
-    bolts: Sequence[tuple[int, BoltSection, float]],
+    bolts: Sequence[Bolt],
 ) -> Array:
     """Shortenings ``(bolts,)`` [mm] by which bolts have their forces at the end of a ``path``.
 
     ``path`` ``(t, cases)`` are amplitudes from rest in which those of the bolts are shares of
-    their shortenings; each of the ``bolts`` is its load case, its section and its force [N]. All
-    are found together by Broyden's method, from those that would stretch the bolts alone. Raises
-    :class:`MeshError` where none are found.
+    their shortenings. All are found together by Broyden's method, from those that would stretch
+    the bolts alone. Raises :class:`MeshError` where none are found.
     """
-    cases, sections, asked = zip(*bolts, strict=True)
-    columns, forces = list(cases), np.array(asked)
+    columns, sections = [bolt.case for bolt in bolts], [bolt.section for bolt in bolts]
+    forces = np.array([bolt.force for bolt in bolts], dtype=np.float64)
 
     def missing(shortenings: Array) -> Array:
         amplitudes = path.copy()

@@ -10,7 +10,7 @@ from fe_models.friction import FrictionalJoint
 from fe_models.imported_structure import Support
 from fe_models.mesh import Body, MeshError
 from fe_models.motion import deformation
-from fe_models.pretension import Pretension, bolt_section, tightened
+from fe_models.pretension import Bolt, Pretension, bolt_section, tightened
 from fe_models.stress import cycle_stress
 from sa_solver.types import Material
 from tests.fe_models.test_many_bodies import box, built, imported, pair
@@ -146,7 +146,7 @@ def test_bolts_are_shortened_until_they_have_their_force():
     structure, section = clamped()
     joint = FrictionalJoint(structure.condense().resolvent(), 0.4)
     path = np.linspace(0.25, 1.0, 4)[:, None]
-    (shortening,) = tightened(structure, joint, path, [(0, section, 700.0)])
+    (shortening,) = tightened(structure, joint, path, [Bolt("rods", 0, section, 700.0)])
     states = marched(structure, shortening * path)
     told = tensions(structure, section, states, shortening * path)
     assert told[-1] == pytest.approx(700.0, rel=2e-6)

@@ -34,8 +34,9 @@ class Contents:
 
     ``bodies`` are the names of body 1 and 2, ``jumps`` how many there are beside the unworn state.
     ``line`` contacts have forces and energies per length, a ``mix`` of missions has the share of
-    each; ``dissipation`` says whether the loads tell what they dissipate. A ``structure`` of finite
-    elements gives tractions at its nodes, and both bodies unworn and worn, with ``mission`` over
+    each; ``dissipation`` says whether the loads tell what they dissipate; ``bolts`` are the names
+    of those that the loads tighten. A ``structure`` of finite
+    elements gives tractions at its nodes, and all bodies unworn and worn, with ``mission`` over
     the increments too; its ``nodes`` wear, or half-spaces. ``coarse`` are the interfaces with a
     solution on a coarse grid. The rest is there where a case asks for it: a ``comparison`` of
     half-space and structure, tangential ``loops``, ``sections`` of the stress under the contacts,
@@ -53,6 +54,7 @@ class Contents:
     structure: bool = False
     mission: bool = False
     nodes: bool = False
+    bolts: tuple[str, ...] = ()
     coarse: tuple[str, ...] = ()
     comparison: bool = False
     loops: bool = False

@@ -48,7 +48,7 @@ def main_results(case: WearCase, summary: Summary) -> list[Quantity]:
         for name in interfaces(summary)
         for quantity in (*_worn(case, summary, name), *_stressed(case, summary, name))
     ]
-    return told(summary, [*quantities, *_of_structure(summary)])
+    return told(summary, [*quantities, *_of_bolts(summary), *_of_structure(summary)])
 
 
 def named(body: str) -> str:
@@ -150,6 +150,18 @@ def _budgeted(summary: Summary, name: str, result: str) -> dict[str, Any]:
     path = f"{name}.error.{result}"
     known = estimate(summary, f"{path}.total", BUDGET)
     return known | {"budget": (RESULTS[result], path)} if known else {}
+
+
+def _of_bolts(summary: Summary) -> Iterator[Quantity]:
+    """Of every bolt its tension at peak load, and how much of it wear has cost."""
+    unit = unit_in(summary["per_length"], "N")
+    for bolt in summary.get(STRUCTURE, {}).get("bolts", {}):
+        of, path = partial(Quantity, named(bolt)), f"{STRUCTURE}.bolts.{bolt}"
+        yield of("shortening", f"{path}.shortening", "mm")
+        for moment in MOMENTS:
+            text = f"tension at peak load, {moment}"
+            yield of(text, f"{path}.tension.{moment}.peak", unit)
+        yield of("share of the tension that is lost", f"{path}.lost", "1")
 
 
 def _of_structure(summary: Summary) -> Iterator[Quantity]:

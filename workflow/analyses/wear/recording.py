@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from sa_solver.types import Array
 from wear.coupled import CoupledSettings, CoupledState, Observer, Stage
 from workflow.analyses.wear import checkpoint
+from workflow.analyses.wear.bolts import kept_tensions
 from workflow.analyses.wear.case.base import WearCase
 from workflow.analyses.wear.contact_loops import kept_loops, loops_due
 from workflow.analyses.wear.contact_workers import StagedContacts
@@ -80,6 +81,7 @@ class Recorder(Observer):
     peak: int
     contacts: StagedContacts
     jumps: list[str]
+    source: LoadSource
 
     def begin(self, state: CoupledState) -> None:
         if not self.jumps:
@@ -102,7 +104,8 @@ class Recorder(Observer):
                 arrays |= {f"contact/{name}/{k}": field for k, field in vars(fields).items()}
             attributes = {"cycles": float(state.cycles[-1])}
             path = self.run.folder.jump(state.jump)
-            self.jumps.append(write_arrays(path, arrays | loops, attributes))
+            arrays |= loops | kept_tensions(self.source, state)
+            self.jumps.append(write_arrays(path, arrays, attributes))
             checkpoint.keep(self.run, state, self.jumps)
 
     def _loops(self, state: CoupledState) -> dict[str, Array]:

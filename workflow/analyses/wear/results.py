@@ -179,6 +179,7 @@ def _write_results(
         write_loops(writer, run.folder, outcome.state.jump)
         if structure is not None:
             structure.write(writer, case.accuracy)
+            structure.bolts.write(writer, run.folder, outcome.state.jump)
         for stress in stresses:
             stress.write(writer)
         for name, errors in budget.items():
@@ -193,6 +194,7 @@ def _write_results(
             structure=structure is not None,
             mission=structure is not None and bool(structure.shown),
             nodes=nodes,
+            bolts=() if structure is None else structure.bolts.names,
             coarse=tuple(coarse),
             comparison=case.contact.method == "full",
             loops=case.loops.wanted,

@@ -128,7 +128,7 @@ def _march(
     """The state at the end, from ``kept`` or from unworn surfaces; and the first contact."""
     case, reporter, settings = run.case, run.reporter, coupled_settings(run.case)
     jumps = list(run.kept.jumps) if run.kept else []
-    recorder = Recorder(run, settings, source.peak, contacts, jumps)
+    recorder = Recorder(run, settings, source.peak, contacts, jumps, source)
     loop = CoupledWear(settings, source, contacts, (RunLog(run, contacts, source), recorder))
     state, first = loop.begin(unworn)
     warn_of_contact(case, source.peak, contacts.stages, state, first, reporter)

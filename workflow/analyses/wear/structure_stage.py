@@ -13,9 +13,10 @@ from scipy.linalg import eigvalsh
 from fe_models.cut_face import whole_history, whole_resultants
 from fe_models.friction import FrictionalJoint, FrictionState
 from fe_models.joint import JointResolvent
-from fe_models.mesh import Interface, StructureMesh
+from fe_models.mesh import Interface, MeshError, StructureMesh
 from fe_models.motion import deformation
 from fe_models.nonlinear import NonlinearCheck, check_nonlinearity
+from fe_models.pretension import Bolt, tightened
 from fe_models.relinearised import (
     PrestressedStructure,
     Softening,
@@ -24,7 +25,7 @@ from fe_models.relinearised import (
 )
 from fe_models.stress import CycleStress, cycle_stress
 from fe_models.structure import CycleSolution, InterfaceHistory, Structure, mixed
-from sa_solver.types import Array, Indices
+from sa_solver.types import Array, Indices, LoadHistory
 from workflow.analyses.wear.case.sections import Nonlinearity
 from workflow.analyses.wear.heard import Heard
 from workflow.analyses.wear.load_source import BODIES, ContactFace, UserFace
@@ -54,12 +55,14 @@ class StructureModel(Protocol):
     ``key`` is everything that its condensed joint depends on, ``missions`` are the closed cycles of
     its loads, one unless several are mixed; ``peak`` is the increment of peak load, counted from 0
     over all missions, ``friction`` µ of every interface before any wear, or one for all, ``order``
-    that of the elements; ``finer`` tells a user how to refine the mesh where stress is large.
+    that of the elements, ``tightening`` how many increments tighten the bolts, 0 without any;
+    ``finer`` tells a user how to refine the mesh where stress is large.
     """
 
     peak: int
     order: Literal[1, 2]
     friction: tuple[float, ...]
+    tightening: int
     nonlinearity: Nonlinearity
 
     @property
@@ -79,6 +82,10 @@ class StructureModel(Protocol):
 
     def structure(self, mesh: StructureMesh) -> Structure:
         """All bodies with supports and loads, on the mesh as it is or worn."""
+        ...
+
+    def bolts(self, structure: Structure) -> tuple[Bolt, ...]:
+        """The bolts of the structure, which its loads tighten."""
         ...
 
     def contact_face(self, interface: Interface) -> ContactFace:
@@ -222,12 +229,54 @@ class StructureStage(Heard):
 
     def cycle_under(self, missions: Sequence[MissionLoads]) -> CycleSolution:
         """The same under other missions, whose load cases are those of the model."""
-        cycles = list(map(self._unworn_mission, missions))
+        cycles = [self._unworn_mission(self._tight(mission)) for mission in missions]
         return mixed(cycles, [mission.share for mission in missions])
 
     @cached_property
     def _unworn_missions(self) -> tuple[CycleSolution, ...]:
-        return tuple(map(self._unworn_mission, self.model.missions))
+        return tuple(map(self._unworn_mission, self.missions))
+
+    @cached_property
+    def missions(self) -> tuple[MissionLoads, ...]:
+        """The closed cycles of the loads, in which bolts are as short as they were tightened."""
+        return tuple(map(self._tight, self.model.missions))
+
+    @cached_property
+    def bolts(self) -> tuple[Bolt, ...]:
+        """The bolts, none in a structure of which the loads tighten none."""
+        return self.model.bolts(self._linear) if self.model.tightening else ()
+
+    @cached_property
+    def shortenings(self) -> Array:
+        """Of the ``bolts`` at amplitudes of 1, over those of their load cases ``(bolts,)``."""
+        found = np.ones(len(self.bolts))
+        asked = [k for k, bolt in enumerate(self.bolts) if bolt.force is not None]
+        if asked:
+            mission = self.model.missions[0]
+            path = mission.preload[: self.model.tightening]
+            bolts = [self.bolts[k] for k in asked]
+            try:
+                found[asked] = tightened(self.structure, self.joint, path, bolts)
+            except MeshError as error:
+                raise MethodFailed(str(error)) from error
+        return found
+
+    def _tight(self, mission: MissionLoads) -> MissionLoads:
+        """The mission with the bolts as short as they are when tight."""
+        if not self.bolts:
+            return mission
+        factors = np.ones(mission.amplitudes.shape[1])
+        factors[[bolt.case for bolt in self.bolts]] = self.shortenings
+        amplitudes, preload = mission.amplitudes * factors, mission.preload * factors
+        return replace(mission, amplitudes=amplitudes, preload=preload)
+
+    def tensions(self, loads: Sequence[LoadHistory]) -> Array:
+        """Of all bolts ``(bolts, t)`` [N], under the loads of all whole contacts."""
+        if not self.bolts:
+            return np.empty((0, len(self._amplitudes)))
+        sides = [2.0 ** len(interface.planes) for interface in self.mesh.interfaces]
+        resultants = np.stack([of.resultants / n for of, n in zip(loads, sides, strict=True)], 1)
+        return np.array([b.section.tension(resultants, self._amplitudes) for b in self.bolts])
 
     def _unworn_mission(self, mission: MissionLoads) -> CycleSolution:
         """The closed cycle of one mission from rest, from the cache if it is there."""
@@ -266,7 +315,7 @@ class StructureStage(Heard):
         elif self._worn is not None and np.array_equal(asked, self._worn[0]):
             # A run's end is asked for again where its loads have just followed it.
             return self._worn[1]
-        pairs = zip(self.model.missions, missions, strict=True)
+        pairs = zip(self.missions, missions, strict=True)
         cycles = [self._cycle(mission, depths, unworn, friction) for mission, unworn in pairs]
         cycle = self._mixed(cycles)
         if after is None:
@@ -279,7 +328,7 @@ class StructureStage(Heard):
         return self.on_faces(self.worn_cycle(depths, friction))
 
     def _mixed(self, cycles: Sequence[CycleSolution]) -> CycleSolution:
-        return mixed(cycles, [mission.share for mission in self.model.missions])
+        return mixed(cycles, [mission.share for mission in self.missions])
 
     def _cycle(
         self,
@@ -354,7 +403,7 @@ class StructureStage(Heard):
     @property
     def _amplitudes(self) -> Array:
         """Amplitudes of the load cases in all increments ``(t, cases)``."""
-        return np.concatenate([mission.amplitudes for mission in self.model.missions])
+        return np.concatenate([mission.amplitudes for mission in self.missions])
 
     @property
     def _peak_amplitudes(self) -> Array:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -18,6 +19,7 @@ from fe_models.stress import CycleStress, PeakStress, StressField, SurfaceHistor
 from fe_models.structure import CycleSolution, InterfaceHistory
 from sa_solver.types import Array, LoadHistory, Tally
 from wear.coupled import CoupledState
+from workflow.analyses.wear.bolts import BoltTensions
 from workflow.analyses.wear.budget.parts import ResultError
 from workflow.analyses.wear.budget.report import datasets_of, summary_of
 from workflow.analyses.wear.contact_stage import ContactStage
@@ -56,6 +58,11 @@ class WornStructure:
     stresses: dict[str, CycleStress]
     written: dict[str, StructureMesh]
     shown: list[int]
+
+    @cached_property
+    def bolts(self) -> BoltTensions:
+        """What the bolts have of their tension, unworn and worn."""
+        return BoltTensions(self.stage, self.stage.on_faces(self.cycle))
 
     def under(
         self, moment: str, number: int
@@ -112,6 +119,7 @@ class WornStructure:
             "closure": unworn.closure,
             "nonlinearity": nonlinearity_summary(stage),
             "drift": [float(value) for value in state.drift],
+            **self.bolts.summary(),
             "error": {name: summary_of(errors) for name, errors in self._errors().items()},
             "peak_stress": {
                 moment: {
@@ -168,7 +176,8 @@ class WornStructure:
         return errors
 
     def sentences(self) -> Iterator[str]:
-        """The largest stresses of each body, unworn and worn."""
+        """The tensions of bolts and the largest stresses of each body, unworn and worn."""
+        yield from self.bolts.sentences()
         bodies = self.mesh.bodies
         for body, unworn, worn in zip(bodies, *self._fields, strict=True):
             parts = []

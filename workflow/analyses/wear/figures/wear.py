@@ -13,6 +13,7 @@ from matplotlib.figure import Figure
 
 from sa_solver.types import Array, Grid
 from wear.kinetics import LinearRegime
+from workflow.analyses.wear.figures.bolts import bolts
 from workflow.analyses.wear.figures.comparison import half_space_and_structure, nodes_on_middle
 from workflow.analyses.wear.figures.error_budget import error_budget
 from workflow.analyses.wear.figures.loops import loops
@@ -71,6 +72,7 @@ def figures_of(contents: Contents) -> Figures:
         "pressure_maps": (pressure_maps, not contents.line),
         "worn_profiles": (worn_profiles, contents.worn),
         "kinetics": (kinetics, contents.worn),
+        "bolts": (bolts, bool(contents.bolts)),
         "resultants": (resultants, True),
         "error_budget": (error_budget, True),
         "structure_stress": (structure_stress, contents.structure),

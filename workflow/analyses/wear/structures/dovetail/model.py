@@ -9,6 +9,7 @@ import numpy as np
 
 from fe_models.dovetail import Mission, dovetail_softening, dovetail_structure
 from fe_models.mesh import Interface, StructureMesh
+from fe_models.pretension import Bolt
 from fe_models.relinearised import Softening
 from fe_models.structure import Structure
 from workflow.analyses.wear.load_source import ContactFace
@@ -66,6 +67,12 @@ class DovetailModel:
     def structure(self, mesh: StructureMesh) -> Structure:
         disk, blade = self._case.material(1), self._case.material(2)
         return dovetail_structure(self.dovetail, mesh, disk, blade, self._mission, self.order)
+
+    tightening = 0
+
+    def bolts(self, structure: Structure) -> tuple[Bolt, ...]:
+        """None."""
+        return ()
 
     def softening(self, structure: Structure) -> Softening:
         return dovetail_softening(structure, self.dovetail, self._mission)

@@ -44,6 +44,7 @@ from workflow.analyses.wear.structures.mesh.loads import (
     Load,
     RotationLoad,
 )
+from workflow.analyses.wear.structures.mesh.pretension import PretensionLoad, check_bolts
 from workflow.analyses.wear.structures.mesh.temperatures import check_temperatures
 from workflow.case.changing import changed
 from workflow.case.fields import AUTO, File
@@ -339,9 +340,10 @@ class MeshCase(FiniteElementCase):
         return changed(self, {"structure.contacts": contacts})
 
     @model_validator(mode="after")
-    def _expansion_is_known(self) -> MeshCase:
+    def _strains_are_known(self) -> MeshCase:
         known = {key: (name, b.expansion) for key, (name, b) in self._keyed_solids.items()}
         check_temperatures(self.structure.loads, known, self.nonlinearity)
+        check_bolts(self.structure.loads, self.load_path, self.nonlinearity)
         return self
 
     @model_validator(mode="after")
@@ -405,16 +407,21 @@ class MeshCase(FiniteElementCase):
     def _check_supports(self, imported: ImportedMesh) -> None:
         """Build what holds the bodies, on elements of order 1 and without forces."""
         from fe_models.imported_structure import imported_structure
+        from fe_models.pretension import Pretension, bolt_section
 
         structure = self.structure
         supports = [support.described() for support in structure.supports]
-        imposed = [
-            load.described() for load in structure.loads if isinstance(load, DisplacementLoad)
-        ]
+        kinds = DisplacementLoad | PretensionLoad
+        asked = [(i, load) for i, load in enumerate(structure.loads) if isinstance(load, kinds)]
+        loads = [load.described() for _, load in asked]
         materials = [material.elastic() for material in self.solids.values()]
         with _pointing_at("structure.supports"):
             mesh = structure.mesh(self.mesh.size)
-            made = imported_structure(mesh, imported, materials, supports, imposed, 1)
+            made = imported_structure(mesh, imported, materials, supports, loads, 1)
+        for (index, _), load in zip(asked, loads, strict=True):
+            if isinstance(load, Pretension):
+                with _pointing_at(f"structure.loads.{index}"):
+                    bolt_section(made, load, loads)
         slices = [name for name, share in made.held_faces.items() if share == 1.0]
         if slices and made.dimension == 3:
             raise disagreement(

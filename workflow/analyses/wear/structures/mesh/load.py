@@ -17,8 +17,8 @@ Component = Annotated[float, Quantity("1", at_least=-1e6, at_most=1e6)]
 # Entries that say where a load acts, and the word before each.
 PLACES = (("group", "on"), ("body", "of"), ("axis", "about"), ("through", "through"), ("at", "at"))
 KINDS = (
-    "pressure, force, moment, displacement, rotation, acceleration, temperature or "
-    "nodal_temperature"
+    "pressure, force, moment, displacement, rotation, acceleration, temperature, "
+    "nodal_temperature or pretension"
 )
 
 

@@ -14,6 +14,7 @@ from workflow.analyses.wear.structures.mesh.load import (
     MeshLoad,
     Name,
 )
+from workflow.analyses.wear.structures.mesh.pretension import PretensionLoad
 from workflow.analyses.wear.structures.mesh.temperatures import (
     NodalTemperatureLoad,
     TemperatureLoad,
@@ -159,6 +160,7 @@ Load = Annotated[
     | RotationLoad
     | AccelerationLoad
     | TemperatureLoad
-    | NodalTemperatureLoad,
+    | NodalTemperatureLoad
+    | PretensionLoad,
     Field(discriminator="kind"),
 ]

@@ -13,6 +13,7 @@ from fe_models.curved_face import Surface
 from fe_models.cut_face import whole_face
 from fe_models.imported_structure import imported_softening, imported_structure
 from fe_models.mesh import Face, Interface, StructureMesh
+from fe_models.pretension import Bolt, Pretension, bolt_section
 from fe_models.relinearised import Softening
 from fe_models.structure import Structure
 from sa_solver.shapes import PARTING_SLOPE
@@ -23,6 +24,7 @@ from workflow.analyses.wear.structure_stage import MissionLoads
 from workflow.analyses.wear.structures.mesh.case import MeshCase
 from workflow.analyses.wear.structures.mesh.faces import face_size, planes_of_symmetry
 from workflow.analyses.wear.structures.mesh.loads import RotationLoad
+from workflow.analyses.wear.structures.mesh.pretension import PretensionLoad
 from workflow.shell.reporter import Reporter
 
 
@@ -35,6 +37,8 @@ class MeshModel:
         self.nonlinearity = case.nonlinearity
         self.order = case.mesh.order
         path = case.load_path
+        tightens = any(isinstance(load, PretensionLoad) for load in case.structure.loads)
+        self.tightening = path.legs[0] if tightens else 0
         self._increments_before = sum(path.legs[: path.cycle_from - 1])
         self.peak = sum(path.legs[: path.peak_leg]) - 1 - self._increments_before
 
@@ -119,6 +123,15 @@ class MeshModel:
             [support.described() for support in described.supports],
             [load.described() for load in described.loads],
             self.order,
+        )
+
+    def bolts(self, structure: Structure) -> tuple[Bolt, ...]:
+        given = self._case.structure.loads
+        loads = [load.described() for load in given]
+        return tuple(
+            Bolt(bolt.name, case, bolt_section(structure, load, loads), bolt.force)
+            for case, (bolt, load) in enumerate(zip(given, loads, strict=True))
+            if isinstance(bolt, PretensionLoad) and isinstance(load, Pretension)
         )
 
     def softening(self, structure: Structure) -> Softening:

@@ -1,0 +1,92 @@
+"""Bolts of a wear run: their tension over a cycle, and what of it is left as the contacts wear."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from sa_solver.types import Array
+from wear.coupled import CoupledState
+from wear.face_loads import FaceLoads
+from workflow.analyses.wear.load_source import LoadSource
+from workflow.analyses.wear.structure_stage import StructureStage
+from workflow.shell.dataset import Dataset
+from workflow.shell.folder import OutputFolder
+from workflow.shell.results import Along, ResultsWriter
+from workflow.shell.store import read_arrays
+
+# Groups of the results, and what a jump keeps.
+BOLTS, TENSION = "bolts", "bolts/tension"
+
+
+def kept_tensions(source: LoadSource, state: CoupledState) -> dict[str, Array]:
+    """Tensions ``(bolts, t)`` of a state, as its loads were last solved: what its jump keeps."""
+    if not isinstance(source, StructureStage) or not source.bolts:
+        return {}
+    return {TENSION: source.tensions([interface.loads for interface in state.interfaces])}
+
+
+class BoltTensions:
+    """Tensions ``(bolts, t)`` [N] of the ``stage``'s bolts over its unworn and its worn cycle."""
+
+    def __init__(self, stage: StructureStage, worn: Sequence[FaceLoads]) -> None:
+        self._stage = stage
+        cycles: Mapping[str, Sequence[FaceLoads]] = {"unworn": stage.unworn(), "worn": worn}
+        self.moments = {
+            moment: stage.tensions([face.loads for face in faces])
+            for moment, faces in cycles.items()
+        }
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        return tuple(bolt.name for bolt in self._stage.bolts)
+
+    def write(self, writer: ResultsWriter, folder: OutputFolder, jumps: int) -> None:
+        """Over both cycles, and at peak load after every jump as the loads were last solved."""
+        if not self.names:
+            return
+        peak = self._stage.peak
+        kept = [read_arrays(folder.jump(jump))[0][TENSION] for jump in range(jumps + 1)]
+        for number, name in enumerate(self.names):
+            over = "tension of the bolt in each increment, as far as it is meshed"
+            cycles = {
+                f"tension_{moment}": Dataset(tensions[number], "N", f"{over}, {moment}")
+                for moment, tensions in self.moments.items()
+            }
+            writer.put(f"{BOLTS}/{name}", cycles)
+            left = Dataset(
+                np.array([tensions[number, peak] for tensions in kept]),
+                "N",
+                "tension at peak load after each jump, as the loads were last solved",
+            )
+            writer.put(f"{BOLTS}/{name}", {"tension": left}, Along("kinetics/cycles"))
+
+    def summary(self) -> dict[str, Any]:
+        """Of each bolt, by name; nothing without bolts."""
+        if not self.names:
+            return {}
+        bolts = {}
+        for number, bolt in enumerate(self._stage.bolts):
+            told = {m: self._of(tensions[number]) for m, tensions in self.moments.items()}
+            before, after = told["unworn"]["peak"], told["worn"]["peak"]
+            shortening = {} if bolt.force is None else {"shortening": self._shortening(number)}
+            lost = {"lost": 1.0 - after / before} if before else {}
+            bolts[bolt.name] = {**shortening, "tension": told, **lost}
+        return {BOLTS: bolts}
+
+    def sentences(self) -> Iterator[str]:
+        """What each bolt has at peak load, unworn and worn."""
+        per = "/mm" if self._stage.line else ""
+        for name, numbers in self.summary().get(BOLTS, {}).items():
+            before, after = (numbers["tension"][m]["peak"] for m in ("unworn", "worn"))
+            lost = f", {numbers['lost']:.3g} of it lost" if "lost" in numbers else ""
+            yield f"{name}: tension {before:.4g} -> {after:.4g} N{per} at peak load{lost}"
+
+    def _shortening(self, number: int) -> float:
+        return float(self._stage.shortenings[number])
+
+    def _of(self, tension: Array) -> dict[str, float]:
+        ends = {"least": tension.min(), "largest": tension.max()}
+        return {name: float(n) for name, n in {"peak": tension[self._stage.peak], **ends}.items()}

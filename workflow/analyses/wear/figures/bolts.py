@@ -1,0 +1,48 @@
+"""Figure of bolts: what of their tension is left as contacts wear, and over a cycle."""
+
+from __future__ import annotations
+
+import h5py
+import numpy as np
+from matplotlib.figure import Figure
+
+from workflow.analyses.wear.layout import Contents
+from workflow.pictures.panels import (
+    blocks,
+    changes,
+    label_rows,
+    legend_below,
+    new_figure,
+    panel_rows,
+    whole_ticks,
+)
+from workflow.pictures.style import BLUE, HEADROOM, ORANGE
+
+
+def bolts(file: h5py.File, contents: Contents) -> Figure:
+    """Tension at peak load over the cycles, and in each increment, unworn and worn."""
+    groups = {name: file["bolts"][name] for name in contents.bolts}
+    cycles, unit = file["kinetics/cycles"][()], f" N{contents.per}"
+    ends = {name: [group["tension"][0], group["tension"][-1]] for name, group in groups.items()}
+    figure = new_figure(
+        f"Tension at peak load: {changes(ends, '.4g', unit)}", 7.0 * blocks(len(groups))
+    )
+    axes = panel_rows(figure, 2, len(groups))
+    largest = 0.0
+    for (over, within), (name, group) in zip(axes.T, groups.items(), strict=True):
+        over.plot(cycles, group["tension"][()], color=BLUE, marker="o", markersize=4)
+        over.set(title=f"{name}: at peak load", xlabel="cycles")
+        over.xaxis.set_major_formatter("{x:,.0f}")
+        over.locator_params(axis="x", nbins=5)
+        for moment, colour in (("unworn", BLUE), ("worn", ORANGE)):
+            tension = group[f"tension_{moment}"][()]
+            increments = np.arange(1, len(tension) + 1)
+            within.plot(increments, tension, color=colour, marker="o", markersize=4, label=moment)
+            largest = max(largest, float(tension.max()))
+        within.set(title=f"{name}: over a cycle", xlabel="increment")
+        whole_ticks(within.xaxis)
+    for row in axes:
+        row[0].set_ylim(0.0, HEADROOM * largest)
+    label_rows(axes, (f"tension [N{contents.per}]",) * 2)
+    legend_below(figure, axes[1])
+    return figure

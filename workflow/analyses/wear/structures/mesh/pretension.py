@@ -1,0 +1,97 @@
+"""Bolts of a user's mesh that are tightened, as a case gives them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING, Annotated, Literal
+
+import numpy as np
+from pydantic import model_validator
+
+from workflow.analyses.wear.case.sections import Nonlinearity, PressingForce
+from workflow.analyses.wear.structures.mesh.legs import Legs
+from workflow.analyses.wear.structures.mesh.load import (
+    KINDS,
+    Component,
+    Coordinate,
+    MeshLoad,
+    Name,
+)
+from workflow.case.fields import Quantity
+from workflow.case.sections import disagreement, entry
+
+if TYPE_CHECKING:
+    from fe_models import pretension as fe
+
+Shortening = Annotated[float, Quantity("mm", above=0.0, at_most=100.0)]
+
+
+class PretensionLoad(MeshLoad):
+    """A bolt, cut across its shank and shortened there: tightened, and then held as long."""
+
+    kind: Literal["pretension"] = entry(KINDS, "pretension")
+    name: Name = entry("of the bolt in all results", "bolt_1")
+    body: Name = entry("the bolt, with its head and nut", "blade")
+    through: tuple[Coordinate, Coordinate, Coordinate] = entry(
+        "a point of the shank: it is cut there, across the axis [mm]", [0.0, 0.0, "2 mm"]
+    )
+    axis: tuple[Component, Component, Component] = entry(
+        "direction of the bolt [1]", [0.0, 0.0, 1.0]
+    )
+    force: PressingForce | None = entry(
+        "at the end of the first leg, of the bolt as far as it is meshed; in the plane per length; "
+        "this or the shortening [N]",
+        "10 kN",
+        default=None,
+    )
+    shortening: Shortening | None = entry("instead of the force [mm]", "20 um", default=None)
+
+    @model_validator(mode="after")
+    def _one_of_both(self) -> PretensionLoad:
+        if (self.force is None) == (self.shortening is None):
+            raise disagreement("force and shortening; allowed: one of both", "force", "shortening")
+        if not any(self.axis):
+            raise disagreement("no direction; allowed: one that is not zero", "axis")
+        if self.force is not None and self.path[0] != 1.0:
+            raise disagreement(
+                f"{self.path[0]:g} at the end of the first leg, in which the bolt gets its force; "
+                "allowed: 1 first",
+                "path",
+            )
+        return self
+
+    @property
+    def places(self) -> Iterator[str]:
+        yield f"of {self.body}"
+
+    def described(self) -> fe.Pretension:
+        """As the structure takes it: shortened by 1 mm where it has its force."""
+        from fe_models.pretension import Pretension
+
+        amount = 1.0 if self.shortening is None else self.shortening
+        return Pretension(self.body, np.array(self.through), np.array(self.axis), amount)
+
+
+def check_bolts(loads: Sequence[MeshLoad], path: Legs, nonlinearity: Nonlinearity) -> None:
+    """Refuse bolts of one name, tightened in every cycle, or of nonlinear structures."""
+    bolts = {i: load for i, load in enumerate(loads) if isinstance(load, PretensionLoad)}
+    names = [bolt.name for bolt in bolts.values()]
+    for index, bolt in bolts.items():
+        if names.count(bolt.name) > 1:
+            raise disagreement(
+                f"two bolts called {bolt.name}; allowed: names that differ",
+                f"structure.loads.{index}.name",
+            )
+        if bolt.force is not None and path.cycle_from < 2:
+            raise disagreement(
+                "1: the bolts would be tightened in every cycle; allowed: 2 or more, after the leg "
+                "that tightens them",
+                "load_path.cycle_from",
+                "load_path",
+            )
+    if bolts and (nonlinearity.check or nonlinearity.stiffness != "linear"):
+        raise disagreement(
+            "bolts are tightened, as in linear structures; allowed: stiffness: linear without a "
+            "check",
+            "nonlinearity",
+        )
