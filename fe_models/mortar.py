@@ -105,8 +105,8 @@ def mortar_interface(
     """Interface of two faces with meshes of their own, of ``surfaces`` 1 and 2 if they are known.
 
     Its nodes are those of body 2 that body 1 covers, its facets those with such nodes alone; a node
-    without a facet is left out. Of body 1 it has the facets that meet these. Raises :class:`MeshError` as :func:`mortar_projection` does, and if
-    body 1 covers no facet.
+    without a facet is left out. Of body 1 it has the facets that meet these. Raises
+    :class:`MeshError` as :func:`mortar_projection` does, and if body 1 covers no facet.
     """
     nodes_1, points_1, facets_1 = _face(body_1, boundary_1, frame)
     nodes_2, points_2, facets_2 = _face(body_2, boundary_2, frame)
