@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 CASES = Path(__file__).parents[2] / "cases"
 HEADINGS = {
     "Wear of a dovetail": ("dovetail", "dovetail_small", "dovetail_2d"),
+    "Bolted joints": ("lap_joint",),
     "Two bodies that wear": ("cylinder_wear", "sphere_wear", "specimens_wear"),
     "Contacts": (
         *("sphere_normal", "sphere_fretting", "sphere_torsion"),

@@ -27,7 +27,7 @@ def bolts(file: h5py.File, contents: Contents) -> Figure:
     figure = new_figure(
         f"Tension at peak load: {changes(ends, '.4g', unit)}", 7.0 * blocks(len(groups))
     )
-    axes = panel_rows(figure, 2, len(groups))
+    axes = panel_rows(figure, 2, len(groups), "row")
     largest = 0.0
     for (over, within), (name, group) in zip(axes.T, groups.items(), strict=True):
         over.plot(cycles, group["tension"][()], color=BLUE, marker="o", markersize=4)

@@ -11,8 +11,9 @@ from workflow.case.plain import counted, shape_in_words
 from workflow.case.sections import Section
 
 AXIS_NAMES = "xy"
-# Faces are shared but for rounding; and usually the smaller one all but for so much.
-SHARED, WHOLE = 1e-6, 0.9
+# Faces are shared but for rounding; and usually the smaller one all but for the clearance of a
+# bolt's hole, an eighth of what is under its head.
+SHARED, WHOLE = 1e-6, 0.8
 
 
 def face_size(face: Interface) -> tuple[float, float]:
