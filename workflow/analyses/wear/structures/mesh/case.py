@@ -40,7 +40,6 @@ from workflow.analyses.wear.structures.mesh.legs import Legs
 from workflow.analyses.wear.structures.mesh.load import Name
 from workflow.analyses.wear.structures.mesh.loads import (
     AccelerationLoad,
-    DisplacementLoad,
     Load,
     RotationLoad,
 )
@@ -408,9 +407,7 @@ class MeshCase(FiniteElementCase):
 
         structure = self.structure
         supports = [support.described() for support in structure.supports]
-        imposed = [
-            load.described() for load in structure.loads if isinstance(load, DisplacementLoad)
-        ]
+        imposed = [load.described() for load in structure.loads if load.ties]
         materials = [material.elastic() for material in self.solids.values()]
         with _pointing_at("structure.supports"):
             mesh = structure.mesh(self.mesh.size)

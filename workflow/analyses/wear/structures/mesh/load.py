@@ -17,8 +17,8 @@ Component = Annotated[float, Quantity("1", at_least=-1e6, at_most=1e6)]
 # Entries that say where a load acts, and the word before each.
 PLACES = (("group", "on"), ("body", "of"), ("axis", "about"), ("through", "through"), ("at", "at"))
 KINDS = (
-    "pressure, force, moment, displacement, rotation, acceleration, temperature or "
-    "nodal_temperature"
+    "pressure, force, moment, displacement, remote_displacement, rotation, acceleration, "
+    "temperature or nodal_temperature"
 )
 
 
@@ -45,6 +45,11 @@ class MeshLoad(Section):
         for name, word in PLACES:
             if getattr(self, name, None) is not None:
                 yield f"{word} {in_brackets(getattr(self, name))}"
+
+    @property
+    def ties(self) -> bool:
+        """Whether it holds nodes, or ties them to each other."""
+        return getattr(self, "tie", None) == "rigid"
 
     @property
     def contents(self) -> bytes:
