@@ -37,7 +37,7 @@ class MeshLoad(Section):
         sizes = entries(self, ("path", "axis", "through", "at"))
         what = sizes if sizes.startswith(kind) else f"{kind}, {sizes}"
         path = in_brackets(self.path)
-        return f"{' '.join([what, *self.places])}, times {path} at the ends of legs"
+        return f"{' '.join([what, *self.places])}{self.how}, times {path} at the ends of legs"
 
     @property
     def places(self) -> Iterator[str]:
@@ -45,6 +45,11 @@ class MeshLoad(Section):
         for name, word in PLACES:
             if getattr(self, name, None) is not None:
                 yield f"{word} {in_brackets(getattr(self, name))}"
+
+    @property
+    def how(self) -> str:
+        """How it acts there, after a comma."""
+        return ", rigid" if getattr(self, "tie", None) == "rigid" else ""
 
     @property
     def ties(self) -> bool:

@@ -171,6 +171,11 @@ class RemoteDisplacementLoad(MeshLoad):
     def ties(self) -> bool:
         return True
 
+    @property
+    def how(self) -> str:
+        free = f", {' and '.join(self.free).replace('_', ' about ')} free" if self.free else ""
+        return free + super().how
+
     def described(self) -> fe.RemoteDisplacement:
         """As the structure takes it."""
         from fe_models.applied_loads import RemoteDisplacement
