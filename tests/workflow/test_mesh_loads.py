@@ -9,7 +9,7 @@ import pytest
 from sa_solver.subsurface_influence import YY
 from tests.workflow.commands import invoke
 from tests.workflow.mesh_scenes import STEEL, refused, run
-from tests.workflow.plane_blocks import Blocks
+from tests.workflow.plane_blocks import Blocks, solved
 from workflow.analyses.wear.structure_stage import StructureStage
 from workflow.analyses.wear.structures.mesh.model import MeshModel
 from workflow.kinds import load_case
@@ -186,6 +186,23 @@ def test_rigid_face_that_does_not_turn_is_imposed_a_displacement(blocks):
     averaged = first_cycle(blocks, DOWN, DOWN | aside)
     change = np.abs(averaged.histories[0].force - nodal.histories[0].force).max()
     assert 0.0 < change < 1e-3 * largest  # far below, it is the resultant that counts
+
+
+@pytest.mark.parametrize(("stroke", "slides"), [("0.5 um", 0), ("6 um", 0), ("300 um", 6)])
+def test_half_space_follows_a_point_that_is_moved(blocks, stroke, slides):
+    """With its own friction: it sticks, slips in part or slides, by the energies of the nodes."""
+    down = DOWN | {"at": [0, 0, 3], "displacement": [0, 0, "-80 um"], "path": [1, 1, 1, 1]}
+    aside = down | {"displacement": [stroke, 0, 0], "path": [0, 1, -1, 1]}
+    history, _, first = solved(
+        blocks,
+        f"structure.supports={json.dumps(BASE)}",
+        f"structure.loads={json.dumps([down, aside])}",
+        "load_path={increments: [1, 2, 4, 4], cycle_from: 3, peak_leg: 4}",
+        *("contact.method=full", "friction.coefficient=0.5"),
+    )
+    assert history.loads.sliding.sum() == slides
+    found = first.energy.sum()
+    assert found == pytest.approx(history.loads.mean_energy, rel=0.05, abs=1e-6)
 
 
 @pytest.mark.parametrize("tie", ["averaged", "rigid"])
