@@ -10,7 +10,7 @@ import numpy as np
 from fe_models.elasticity import ElasticBody
 from fe_models.pretension import Pretension
 from fe_models.thermal import Temperature
-from sa_solver.types import Array
+from sa_solver.types import Array, Mask
 
 # Second moments below this share of the largest are none: a boundary in the plane has no depth.
 FLAT = 1e-12
@@ -37,13 +37,15 @@ class BoundaryForce:
 
     They are spread as the traction t = F/A + ω x r about the centroid, so that the boundary stays
     free to deform: its mean motions are those of a point tied to it by least squares (a
-    distributing coupling, RBE3).
+    distributing coupling, RBE3). A ``rigid`` boundary keeps its form instead: there it does not
+    matter how they are spread.
     """
 
     boundary: str
     force: Array
     at: Array | None = None
     moment: Array = field(default_factory=lambda: np.zeros(3))
+    rigid: bool = False
 
     def forces(self, elastic: ElasticBody) -> Array:
         """Nodal forces ``(size,)``."""
@@ -68,6 +70,22 @@ class Displacement:
 
     boundary: str
     displacement: Array
+
+
+@dataclass(frozen=True)
+class RemoteDisplacement:
+    """``motion`` ``(6,)`` of a point ``at`` ``(3,)`` tied to a boundary: displacement, rotation.
+
+    Along and about the global axes [mm, rad]; components that are ``free`` ``(6,)`` are not given.
+    The boundary is ``rigid`` and moves with the point, or stays free to deform and has its motion
+    on average, by least squares. In the plane there are three components, x, z and about y.
+    """
+
+    boundary: str
+    at: Array
+    motion: Array
+    free: Mask
+    rigid: bool
 
 
 @dataclass(frozen=True)
@@ -104,11 +122,18 @@ class Acceleration:
 
 
 AppliedLoad = (
-    Pressure | BoundaryForce | Displacement | Rotation | Acceleration | Temperature | Pretension
+    Pressure
+    | BoundaryForce
+    | Displacement
+    | RemoteDisplacement
+    | Rotation
+    | Acceleration
+    | Temperature
+    | Pretension
 )
 
 
-def boundary_of(load: AppliedLoad) -> str | None:
+def boundary_of(load: object) -> str | None:
     """The boundary a load acts on, if on one."""
     return getattr(load, "boundary", None)
 
@@ -120,8 +145,20 @@ def vector_of(load: AppliedLoad) -> Array | None:
             return load.force
         case Displacement():
             return load.displacement
+        case RemoteDisplacement():
+            return load.motion[:3]
         case Acceleration():
             return load.acceleration
+    return None
+
+
+def turning_of(load: AppliedLoad) -> Array | None:
+    """The moment or rotation of a load that has one."""
+    match load:
+        case BoundaryForce():
+            return load.moment
+        case RemoteDisplacement():
+            return load.motion[3:]
     return None
 
 

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 import scipy.sparse as sp
+from scipy.linalg import null_space, qr
 
 from sa_solver.ties import first_largest
 from sa_solver.types import Array, Indices
 
 # An equation whose coefficients shrink to this share, once others are put in, says nothing new.
 ALREADY_MET = 1e-9
+# Motions whose share of what constraints hold is less are left free by them.
+NULL = 1e-9
 
 
 class Constraints:
@@ -60,6 +63,42 @@ class Constraints:
                 self._dofs(node), self._dofs(row).reshape(-1, self._dimension).T, strict=True
             ):
                 self._eliminated.setdefault(int(dof), (masters, share))
+
+    def no_work(self, forces: Array) -> None:
+        """Hold the displacement on which ``forces`` ``(size,)`` would do work: Σ f u = 0."""
+        dofs = np.flatnonzero(forces)
+        self._equation(dofs, forces[dofs])
+
+    def follow(self, nodes: Indices, motions: Array) -> None:
+        """Let nodes move by combinations of ``motions`` ``(dimension n, k)``, and by no others.
+
+        By those that earlier constraints leave.
+        """
+        dofs = self._dofs(nodes)
+        place = {dof: row for row, dof in enumerate(dofs.tolist())}
+        entries = {d: self._in_free(np.array([d]), np.ones(1)) for d in place if d in self}
+        inner = {d: e for d, e in entries.items() if all(m in place for m in e[0].tolist())}
+        forbidden = np.zeros((len(inner), motions.shape[1]))
+        for row, (dof, (masters, shares)) in enumerate(inner.items()):
+            rows = [place[master] for master in masters.tolist()]
+            forbidden[row] = motions[place[dof]] - shares @ motions[rows]
+        left = motions @ null_space(forbidden, NULL) if motions.size else motions
+        free = np.array([dof not in entries for dof in place])
+        alone = left[free]
+        chosen = _independent(alone)
+        by_chosen, leading = np.linalg.pinv(alone[chosen]), dofs[free][chosen]
+        for row in np.setdiff1d(np.arange(len(alone)), chosen).tolist():
+            shares = alone[row] @ by_chosen
+            some = np.abs(shares) > ALREADY_MET
+            self._eliminated[int(dofs[free][row])] = leading[some], shares[some]
+        # Those that earlier constraints tie to other nodes take these along.
+        for dof in entries.keys() - inner.keys():
+            shares = left[place[dof]] @ by_chosen
+            self._equation(np.append(leading, dof), np.append(-shares, 1.0))
+
+    def __contains__(self, dof: int) -> bool:
+        """Whether a displacement is constrained."""
+        return dof in self._eliminated
 
     def _dofs(self, nodes: Indices) -> Indices:
         """Displacements of nodes, one node after the other."""
@@ -116,3 +155,12 @@ class Constraints:
             transformation = (transformation @ step).tocsr()
             transformation.eliminate_zeros()
         return transformation[:, self.free].tocsr()
+
+
+def _independent(motions: Array) -> Indices:
+    """As many displacements as there are ``motions`` ``(n, k)`` of them, far from dependent."""
+    if not motions.size:
+        return np.empty(0, np.int64)
+    _, upper, order = qr(motions.T, mode="economic", pivoting=True)
+    sizes = np.abs(np.diag(upper))
+    return np.asarray(order[: np.sum(sizes > ALREADY_MET * sizes.max())])

@@ -13,9 +13,10 @@ from scipy.spatial import cKDTree
 from fe_models.applied_loads import (
     AppliedLoad,
     BoundaryForce,
-    Displacement,
+    RemoteDisplacement,
     Rotation,
     boundary_of,
+    turning_of,
     vector_of,
 )
 from fe_models.constraints import Constraints
@@ -23,6 +24,13 @@ from fe_models.curved_face import Surface, edges_of
 from fe_models.cut_face import cut_interface
 from fe_models.elasticity import ElasticBody
 from fe_models.geometry.imported import ImportedMesh
+from fe_models.imposed import (
+    Imposing,
+    check_against_each_other,
+    check_against_supports,
+    impose,
+    tie_rigid,
+)
 from fe_models.mesh import Body, MatchError, MeshError, StructureMesh, matched_interface
 from fe_models.mortar import frame_of_faces, mortar_interface
 from fe_models.pretension import Pretension, check_pretension
@@ -36,8 +44,6 @@ from sa_solver.ties import first_largest
 from sa_solver.types import Array, Frame, Indices, Material
 
 AXIS_NAMES = "xyz"
-# Displacements that differ by this share of themselves are the same: the rest is rounding.
-HELD_SHARE = 1e-9
 # Supports do not depend on what bodies are made of.
 ANY = Material(1.0, 0.0)
 
@@ -204,18 +210,21 @@ def check_load(imported: ImportedMesh, bodies: Sequence[Body], load: AppliedLoad
         )
         raise MeshError(f"{wrong}; allowed: {', '.join(sorted(boundaries)) or 'none'}")
     having = [body for body in bodies if group in _groups(imported, [body])[0]]
-    if isinstance(load, BoundaryForce) and len(having) > 1:
+    if isinstance(load, BoundaryForce | RemoteDisplacement) and len(having) > 1:
+        what = "take all of the force" if isinstance(load, BoundaryForce) else "be tied to it"
         raise MeshError(
             f"{group} is a boundary of {' and '.join(body.name for body in having)}, and each "
-            "would take all of the force; allowed: boundaries of one body"
+            f"would {what}; allowed: boundaries of one body"
         )
     if bodies[0].mesh.dim() == 3:
         return
     vector = vector_of(load)
     if vector is not None and vector[1] != 0.0:
         raise MeshError("a load along y, across the plane; allowed: x and z")
-    if isinstance(load, BoundaryForce) and np.any(load.moment[[0, 2]]):
-        raise MeshError("a moment about x or z, which lie in the plane; allowed: about y")
+    turning = turning_of(load)
+    if turning is not None and np.any(turning[[0, 2]]):
+        what = "moment" if isinstance(load, BoundaryForce) else "rotation"
+        raise MeshError(f"a {what} about x or z, which lie in the plane; allowed: about y")
 
 
 def _any_of(bodies: Sequence[Body]) -> str:
@@ -328,10 +337,10 @@ def _supported(
     thermal = thermal_strains(loads, elastic, imported.node_numbers[body.name])
     moved, loaded = [], []
     for case, load in enumerate(loads):
-        if isinstance(load, Displacement):
+        if isinstance(load, Imposing):
             if load.boundary in groups:
                 moved.append(load)
-                imposed[:, case] = _impose(constraints, elastic, load)
+                imposed[:, case] = impose(constraints, elastic, load)
         elif isinstance(load, Temperature):
             forces[:, case] = elastic.thermal_load(thermal[:, case])
         elif isinstance(load, Pretension):
@@ -340,9 +349,12 @@ def _supported(
                 forces[:, case] = elastic.stiffness @ jumps[:, case]
         elif boundary_of(load) is None or boundary_of(load) in groups:
             forces[:, case] = load.forces(elastic)
+            if isinstance(load, BoundaryForce) and load.rigid:
+                at = elastic.nodes[elastic.boundary_nodes(load.boundary)].mean(axis=0)
+                tie_rigid(constraints, elastic, load.boundary, at)
             loaded += [name for name in (boundary_of(load),) if name is not None]
-    _check_against_supports(loads, imposed, supported_motions @ imposed[free])
-    _check_against_each_other(elastic, moved)
+    check_against_supports(loads, imposed, supported_motions @ imposed[free])
+    check_against_each_other(elastic, moved)
     _check_separate(mesh, number)
     faces = mesh.faces_of(number)
     placed = interface_nodes(faces, body)
@@ -408,47 +420,6 @@ def _hold(
 def _unit(axis: str, body: Body) -> Array:
     """Unit vector of a named global axis in the body's components."""
     return np.eye(3)[AXIS_NAMES.index(axis), list(body.axes)]
-
-
-def _impose(constraints: Constraints, elastic: ElasticBody, load: Displacement) -> Array:
-    """Hold a boundary along a displacement and return it, ``(size,)``."""
-    nodes = elastic.boundary_nodes(load.boundary)
-    displacement = load.displacement[list(elastic.body.axes)]
-    direction = displacement / np.linalg.norm(displacement)
-    constraints.slide(nodes, np.tile(direction, (len(nodes), 1)))
-    imposed = np.zeros((len(elastic.nodes), elastic.dimension))
-    imposed[nodes] = displacement
-    return imposed.ravel()
-
-
-def _check_against_supports(loads: Sequence[AppliedLoad], imposed: Array, allowed: Array) -> None:
-    """Raise unless supports leave the ``imposed`` displacements ``(size, loads)`` as they are."""
-    for load, displacement, left in zip(loads, imposed.T, allowed.T, strict=True):
-        if np.abs(left - displacement).max() > HELD_SHARE * np.abs(displacement).max():
-            raise MeshError(
-                f"a displacement is imposed on {boundary_of(load)} along what a support holds of "
-                "its nodes; hold them across it alone, such as xy for one along z"
-            )
-
-
-def _check_against_each_other(elastic: ElasticBody, imposed: Sequence[Displacement]) -> None:
-    """Raise if displacements of two boundaries would add up where these meet.
-
-    Those of one boundary are meant to.
-    """
-    for index, one in enumerate(imposed):
-        for other in imposed[:index]:
-            along = np.linalg.norm(one.displacement) * np.linalg.norm(other.displacement)
-            across = abs(one.displacement @ other.displacement) <= HELD_SHARE * along
-            if across or one.boundary == other.boundary:
-                continue
-            nodes = elastic.boundary_nodes(one.boundary)
-            if np.isin(nodes, elastic.boundary_nodes(other.boundary)).any():
-                raise MeshError(
-                    f"{other.boundary} and {one.boundary} share nodes, on which the displacements "
-                    "imposed on both would add up; impose them on one boundary, or across each "
-                    "other"
-                )
 
 
 def imported_softening(

@@ -185,11 +185,12 @@ def _is_free(body: SupportedBody, shift: Array) -> bool:
 
 def _acting(load: AppliedLoad, body: SupportedBody) -> Array:
     """Forces of a load from outside a body ``(size,)``; none of one that strains it."""
-    from fe_models.applied_loads import Displacement, boundary_of
+    from fe_models.applied_loads import boundary_of
+    from fe_models.imposed import Imposing
     from fe_models.thermal import Temperature
 
     elastic, boundary = body.elastic, boundary_of(load)
-    if isinstance(load, Pretension | Displacement | Temperature) or (
+    if isinstance(load, Pretension | Imposing | Temperature) or (
         boundary is not None and boundary not in elastic.body.mesh.boundaries
     ):
         return np.zeros(elastic.size)

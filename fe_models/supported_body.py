@@ -26,8 +26,8 @@ FREE_MOTION = 1e-9
 # digits, and normals are differences of them.
 ALONG_AXIS = 1e-3
 TIED = (
-    "a support ties nodes of a contact face to others, as a mean over a boundary that meets the "
-    "face does; name a boundary away from it"
+    "a support or a tied load ties nodes of a contact face to others, as a mean over a boundary "
+    "that meets the face does; name a boundary away from it"
 )
 
 

@@ -57,8 +57,9 @@ class GrossSlip:
         if self.missing <= ACCURACY:
             return ""
         return (
-            f"the sliding contact dissipates an energy off by {self.missing:.1e} of that given: "
-            "check the energies of the load history, or take smaller increments"
+            f"the sliding contact dissipates an energy off by {self.missing:.1e} of that which its "
+            "loads say: take smaller increments; where a structure's nodes say it, refine its "
+            "mesh, where a file of loads does, check Edx and Edy"
         )
 
 

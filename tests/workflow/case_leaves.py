@@ -105,6 +105,11 @@ GIVEN = {
             rotation={"axis": [0, 1, 0], "through": [0, 0, 0], "speed": "6000 rpm"},
             acceleration={"acceleration": [0, 0, 9810]},
             moment={"group": "blade_top", "moment": [0, 5, 0]},
+            remote_displacement={
+                "group": "blade_top",
+                "at": [0, 0, 50],
+                "displacement": [0.01, 0, 0],
+            },
             temperature={"change": 100},
             nodal_temperature={"file": "temperatures.csv", "reference": 20},
         ),

@@ -9,7 +9,8 @@ import pytest
 from sa_solver.subsurface_influence import YY
 from tests.workflow.commands import invoke
 from tests.workflow.mesh_scenes import STEEL, refused, run
-from tests.workflow.plane_blocks import Blocks
+from tests.workflow.plane_blocks import Blocks, solved
+from workflow.analyses.wear.structure_stage import StructureStage
 from workflow.analyses.wear.structures.mesh.model import MeshModel
 from workflow.kinds import load_case
 
@@ -148,3 +149,96 @@ def test_expansion_is_asked_for_where_it_counts(heated):
     assert "12: out of range; allowed: at least -0.001" in refused(
         heated, "materials.body_1.expansion=12"
     )
+
+
+# --- points tied to faces -------------------------------------------------------------------------
+
+LID = {"group": "foot_z1", "at": [1.0, 0.0, 8.0]}
+DOWN = {"kind": "remote_displacement", **LID, "displacement": [0, 0, "-2 um"], "path": [1, 1]}
+BASE = [{"group": "base_z0", "hold": "all"}]
+WHOLE = Blocks((-6.0, 6.0), 6.0, (-2.0, 2.0), 3.0, (-1.0, 1.0), strips=32)
+
+
+@pytest.fixture
+def blocks(tmp_path):
+    return WHOLE.write(tmp_path, 0.5, [PRESSED], LEGS, friction=0.3)
+
+
+def first_cycle(path, *loads):
+    supports = f"structure.supports={json.dumps(BASE)}"
+    case = load_case(path, [supports, f"structure.loads={json.dumps(loads)}"])
+    return StructureStage(MeshModel(case)).unworn_cycle
+
+
+def test_rigid_face_that_does_not_turn_is_imposed_a_displacement(blocks):
+    """The same forces as where each of its nodes is moved."""
+    aside = {"displacement": ["1 um", 0, 0], "path": [0, 1]}
+    tied = first_cycle(blocks, DOWN | {"tie": "rigid"}, DOWN | aside | {"tie": "rigid"})
+    moved = [
+        {"kind": "displacement", "group": "foot_z1", "displacement": d, "path": p}
+        for d, p in (([0, 0, "-2 um"], [1, 1]), (["1 um", 0, 0], [0, 1]))
+    ]
+    nodal = first_cycle(blocks, *moved)
+    largest = np.abs(nodal.histories[0].force).max()
+    np.testing.assert_allclose(
+        tied.histories[0].force, nodal.histories[0].force, atol=1e-6 * largest
+    )
+    averaged = first_cycle(blocks, DOWN, DOWN | aside)
+    change = np.abs(averaged.histories[0].force - nodal.histories[0].force).max()
+    assert 0.0 < change < 1e-3 * largest  # far below, it is the resultant that counts
+
+
+@pytest.mark.parametrize(("stroke", "slides"), [("0.5 um", 0), ("6 um", 0), ("300 um", 6)])
+def test_half_space_follows_a_point_that_is_moved(blocks, stroke, slides):
+    """With its own friction: it sticks, slips in part or slides, by the energies of the nodes."""
+    down = DOWN | {"at": [0, 0, 3], "displacement": [0, 0, "-80 um"], "path": [1, 1, 1, 1]}
+    aside = down | {"displacement": [stroke, 0, 0], "path": [0, 1, -1, 1]}
+    history, _, first = solved(
+        blocks,
+        f"structure.supports={json.dumps(BASE)}",
+        f"structure.loads={json.dumps([down, aside])}",
+        "load_path={increments: [1, 2, 4, 4], cycle_from: 3, peak_leg: 4}",
+        *("contact.method=full", "friction.coefficient=0.5"),
+    )
+    assert history.loads.sliding.sum() == slides
+    found = first.energy.sum()
+    assert found == pytest.approx(history.loads.mean_energy, rel=0.05, abs=1e-6)
+
+
+@pytest.mark.parametrize("tie", ["averaged", "rigid"])
+def test_moment_of_a_force_beside_the_contact(blocks, tie):
+    """100 N/mm, 0.2 mm beside the middle: the contact carries both."""
+    load = {"kind": "force", "group": "foot_z1", "force": [0, 0, "-100 N"], "path": [1, 0.5]}
+    (history,) = first_cycle(blocks, load | {"at": [0.2, 0, 5], "tie": tie}).histories
+    np.testing.assert_allclose(history.loads.P, [100.0, 75.0, 50.0], rtol=1e-6)
+    np.testing.assert_allclose(np.abs(history.loads.My), [20.0, 15.0, 10.0], rtol=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("change", "wrong"),
+    [
+        ({"free": ["z"]}, "free: z is given, and free; allowed: 0 where it is free"),
+        ({"free": ["x", "x"]}, "free: a component twice"),
+        ({"free": ["twist"]}, "'twist': none of these words; allowed: x, y, z, rotation_x"),
+        ({"rotation": ["0.1 deg", 0, 0]}, "structure.loads.0.group: a rotation about x or z"),
+        ({"group": "foot_z0"}, "structure.supports: body foot: a displacement is imposed on nodes"),
+        ({"group": "head"}, "no boundary head on base or foot"),
+        (
+            {
+                "free": ["x", "y", "z", "rotation_x", "rotation_y", "rotation_z"],
+                "displacement": [0, 0, 0],
+            },
+            "free: all six; allowed: five or fewer",
+        ),
+    ],
+)
+def test_motions_of_points_that_do_not_fit_are_refused(blocks, change, wrong):
+    assert wrong in refused(blocks, f"structure.loads={json.dumps([DOWN | change])}")
+
+
+def test_check_tells_points(blocks):
+    loads = [DOWN | {"rotation": [0, "0.01 deg", 0], "free": ["x"], "tie": "rigid"}]
+    given = f"structure.loads={json.dumps(loads)}", f"structure.supports={json.dumps(BASE)}"
+    said = " ".join(invoke("check", blocks, "--set", given[0], "--set", given[1]).output.split())
+    assert "remote displacement, displacement (0 mm, 0 mm, -2 µm)" in said
+    assert "on foot_z1 at (1, 0, 8), x free, rigid, times (1, 1)" in said

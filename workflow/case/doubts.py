@@ -62,6 +62,8 @@ USUAL = (
     # 100 to 25,000 rpm.
     Usual("*.rotation_speed", "rad/s", 10.0, 2600.0),
     Usual("structure.loads.*.speed", "rad/s", 10.0, 2600.0),
+    # Of remote displacements, whose squares are left out.
+    Usual("structure.loads.*.rotation.*", "rad", 1e-8, 0.05),
     Usual("load_path.airfoil_mass", "t", 5e-6, 0.1),
     # Of a joint that frets.
     Usual("drive.stroke", "mm", 1e-4, 1.0),

@@ -289,6 +289,25 @@ class Formats(Entry):
 
 
 @dataclass(frozen=True)
+class Word(Entry):
+    """One of some ``words``: of a list, whose items cannot be of a literal type."""
+
+    words: tuple[str, ...]
+
+    @property
+    def allowed(self) -> str:
+        return ", ".join(self.words)
+
+    def parse(self, value: object) -> str:
+        if value not in self.words:
+            raise self.refusal(value, "none of these words")
+        return str(value)
+
+    def json_schema(self) -> dict[str, Any]:
+        return {"enum": list(self.words)}
+
+
+@dataclass(frozen=True)
 class Text(Entry):
     """One line of printable text."""
 

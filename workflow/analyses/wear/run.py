@@ -131,7 +131,7 @@ def _march(
     recorder = Recorder(run, settings, source.peak, contacts, jumps, source)
     loop = CoupledWear(settings, source, contacts, (RunLog(run, contacts, source), recorder))
     state, first = loop.begin(unworn)
-    warn_of_contact(case, source.peak, contacts.stages, state, first, reporter)
+    warn_of_contact(case, source, contacts.stages, state, first, reporter)
     end = contacts.restored(kept) if kept else state
     begun = end.jump
     with reporter.course("wear"):

@@ -40,11 +40,10 @@ from workflow.analyses.wear.structures.mesh.legs import Legs
 from workflow.analyses.wear.structures.mesh.load import Name
 from workflow.analyses.wear.structures.mesh.loads import (
     AccelerationLoad,
-    DisplacementLoad,
     Load,
     RotationLoad,
 )
-from workflow.analyses.wear.structures.mesh.pretension import PretensionLoad, check_bolts
+from workflow.analyses.wear.structures.mesh.pretension import check_bolts
 from workflow.analyses.wear.structures.mesh.temperatures import check_temperatures
 from workflow.case.changing import changed
 from workflow.case.fields import AUTO, File
@@ -411,8 +410,7 @@ class MeshCase(FiniteElementCase):
 
         structure = self.structure
         supports = [support.described() for support in structure.supports]
-        kinds = DisplacementLoad | PretensionLoad
-        asked = [(i, load) for i, load in enumerate(structure.loads) if isinstance(load, kinds)]
+        asked = [(index, load) for index, load in enumerate(structure.loads) if load.ties]
         loads = [load.described() for _, load in asked]
         materials = [material.elastic() for material in self.solids.values()]
         with _pointing_at("structure.supports"):

@@ -17,8 +17,8 @@ Component = Annotated[float, Quantity("1", at_least=-1e6, at_most=1e6)]
 # Entries that say where a load acts, and the word before each.
 PLACES = (("group", "on"), ("body", "of"), ("axis", "about"), ("through", "through"), ("at", "at"))
 KINDS = (
-    "pressure, force, moment, displacement, rotation, acceleration, temperature, "
-    "nodal_temperature or pretension"
+    "pressure, force, moment, displacement, remote_displacement, rotation, acceleration, "
+    "temperature, nodal_temperature or pretension"
 )
 
 
@@ -37,7 +37,7 @@ class MeshLoad(Section):
         sizes = entries(self, ("path", "axis", "through", "at"))
         what = sizes if sizes.startswith(kind) else f"{kind}, {sizes}"
         path = in_brackets(self.path)
-        return f"{' '.join([what, *self.places])}, times {path} at the ends of legs"
+        return f"{' '.join([what, *self.places])}{self.how}, times {path} at the ends of legs"
 
     @property
     def places(self) -> Iterator[str]:
@@ -45,6 +45,16 @@ class MeshLoad(Section):
         for name, word in PLACES:
             if getattr(self, name, None) is not None:
                 yield f"{word} {in_brackets(getattr(self, name))}"
+
+    @property
+    def how(self) -> str:
+        """How it acts there, after a comma."""
+        return ", rigid" if getattr(self, "tie", None) == "rigid" else ""
+
+    @property
+    def ties(self) -> bool:
+        """Whether it holds nodes, or ties them to each other."""
+        return getattr(self, "tie", None) == "rigid"
 
     @property
     def contents(self) -> bytes:

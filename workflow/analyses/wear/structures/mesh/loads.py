@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -19,7 +19,7 @@ from workflow.analyses.wear.structures.mesh.temperatures import (
     NodalTemperatureLoad,
     TemperatureLoad,
 )
-from workflow.case.fields import Quantity
+from workflow.case.fields import Quantity, Word
 from workflow.case.sections import disagreement, entry
 
 if TYPE_CHECKING:
@@ -30,7 +30,19 @@ MomentComponent = Annotated[float, Quantity("N mm", at_least=-1e12, at_most=1e12
 PressureValue = Annotated[float, Quantity("MPa", at_least=-1e5, at_most=1e5)]
 DisplacementComponent = Annotated[float, Quantity("mm", at_least=-1e3, at_most=1e3)]
 AngularSpeed = Annotated[float, Quantity("rad/s", above=0.0, at_most=1e5)]
+# Rotations are small: their squares are left out.
+Angle = Annotated[float, Quantity("rad", at_least=-1.0, at_most=1.0)]
 AccelerationComponent = Annotated[float, Quantity("mm/s^2", at_least=-1e12, at_most=1e12)]
+
+MOTIONS = "x", "y", "z", "rotation_x", "rotation_y", "rotation_z"
+Motion = Annotated[str, Word(MOTIONS)]
+Tie = Literal["averaged", "rigid"]
+TIE: Any = entry(
+    "of the point to the boundary; averaged: this stays free to deform and follows by least "
+    "squares; rigid: it keeps its form",
+    "averaged",
+    default="averaged",
+)
 
 
 class PressureLoad(MeshLoad):
@@ -56,22 +68,22 @@ class ForceLoad(MeshLoad):
         "along the global axes; in the plane per length, N/mm [N]", [0.0, 0.0, "-1 kN"]
     )
     at: tuple[Coordinate, Coordinate, Coordinate] | None = entry(
-        "the point it acts at, tied to the boundary, which stays free to deform; its centroid if "
-        "not given [mm]",
+        "the point it acts at, tied to the boundary; its centroid if not given [mm]",
         [0.0, 0.0, "50 mm"],
         default=None,
     )
+    tie: Tie = TIE
 
     def described(self) -> fe.BoundaryForce:
         """As the structure takes it."""
         from fe_models.applied_loads import BoundaryForce
 
         at = None if self.at is None else np.array(self.at)
-        return BoundaryForce(self.group, np.array(self.force), at)
+        return BoundaryForce(self.group, np.array(self.force), at, rigid=self.tie == "rigid")
 
 
 class MomentLoad(MeshLoad):
-    """Moment on a boundary, which stays free to deform."""
+    """Moment on a boundary."""
 
     kind: Literal["moment"] = entry(KINDS, "moment")
     group: Name = entry("boundary", "blade_top")
@@ -79,12 +91,14 @@ class MomentLoad(MeshLoad):
         "about the global axes; in the plane about y and per length, N [N mm]",
         [0.0, "5 N m", 0.0],
     )
+    tie: Tie = TIE
 
     def described(self) -> fe.BoundaryForce:
         """As the structure takes it."""
         from fe_models.applied_loads import BoundaryForce
 
-        return BoundaryForce(self.group, np.zeros(3), moment=np.array(self.moment))
+        moment = np.array(self.moment)
+        return BoundaryForce(self.group, np.zeros(3), moment=moment, rigid=self.tie == "rigid")
 
 
 class DisplacementLoad(MeshLoad):
@@ -105,11 +119,71 @@ class DisplacementLoad(MeshLoad):
             raise disagreement("no displacement; allowed: one that is not zero", "displacement")
         return self
 
+    @property
+    def ties(self) -> bool:
+        return True
+
     def described(self) -> fe.Displacement:
         """As the structure takes it."""
         from fe_models.applied_loads import Displacement
 
         return Displacement(self.group, np.array(self.displacement))
+
+
+class RemoteDisplacementLoad(MeshLoad):
+    """Displacement and rotation of a point tied to a boundary; small ones.
+
+    Several at one point add up.
+    """
+
+    kind: Literal["remote_displacement"] = entry(KINDS, "remote_displacement")
+    group: Name = entry("boundary", "blade_top")
+    at: tuple[Coordinate, Coordinate, Coordinate] = entry("the point [mm]", [0.0, 0.0, "50 mm"])
+    displacement: tuple[DisplacementComponent, DisplacementComponent, DisplacementComponent] = (
+        entry("of the point along the global axes [mm]", ["10 um", 0.0, 0.0], default=(0, 0, 0))
+    )
+    rotation: tuple[Angle, Angle, Angle] = entry(
+        "about the global axes; in the plane about y [rad]",
+        [0.0, "0.1 deg", 0.0],
+        default=(0, 0, 0),
+    )
+    free: tuple[Motion, ...] = entry(
+        "of x, y, z, rotation_x, rotation_y and rotation_z those that are not imposed",
+        ["z"],
+        default=(),
+    )
+    tie: Tie = TIE
+
+    @model_validator(mode="after")
+    def _is_given_or_free(self) -> RemoteDisplacementLoad:
+        if len(set(self.free)) < len(self.free):
+            raise disagreement("a component twice; allowed: each once", "free")
+        if len(self.free) == len(MOTIONS):
+            raise disagreement("all six; allowed: five or fewer, or no such load", "free")
+        for name, size in zip(MOTIONS, (*self.displacement, *self.rotation), strict=True):
+            if name in self.free and size:
+                key = "rotation" if name.startswith("rotation") else "displacement"
+                raise disagreement(
+                    f"{name} is given, and free; allowed: 0 where it is free", "free", key
+                )
+        return self
+
+    @property
+    def ties(self) -> bool:
+        return True
+
+    @property
+    def how(self) -> str:
+        free = f", {' and '.join(self.free).replace('_', ' about ')} free" if self.free else ""
+        return free + super().how
+
+    def described(self) -> fe.RemoteDisplacement:
+        """As the structure takes it."""
+        from fe_models.applied_loads import RemoteDisplacement
+
+        motion = np.array([*self.displacement, *self.rotation])
+        free = np.array([name in self.free for name in MOTIONS])
+        return RemoteDisplacement(self.group, np.array(self.at), motion, free, self.tie == "rigid")
 
 
 class RotationLoad(MeshLoad):
@@ -157,6 +231,7 @@ Load = Annotated[
     | ForceLoad
     | MomentLoad
     | DisplacementLoad
+    | RemoteDisplacementLoad
     | RotationLoad
     | AccelerationLoad
     | TemperatureLoad

@@ -61,6 +61,11 @@ class PretensionLoad(MeshLoad):
         return self
 
     @property
+    def ties(self) -> bool:
+        """It cuts them apart, which is looked at with what ties them."""
+        return True
+
+    @property
     def places(self) -> Iterator[str]:
         yield f"of {self.body}"
 
