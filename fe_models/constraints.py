@@ -61,6 +61,22 @@ class Constraints:
             ):
                 self._eliminated.setdefault(int(dof), (masters, share))
 
+    def tie(self, nodes: Indices, parents: Indices, shares: sp.csr_matrix, turn: Array) -> None:
+        """Let nodes do what parents do, turned: u = R Σ s u_parent, as far as nothing holds them.
+
+        ``shares`` ``(n, m)`` are s of the ``parents`` ``(m,)``, ``turn`` ``(dimension, dimension)``
+        is R. A node may be its own parent: then it keeps what the turn leaves as it is.
+        """
+        shares = shares.tocsr()
+        for row, own in enumerate(self._dofs(nodes).reshape(-1, self._dimension)):
+            of_row = slice(shares.indptr[row], shares.indptr[row + 1])
+            masters, share = self._dofs(parents[shares.indices[of_row]]), shares.data[of_row]
+            for dof, along in zip(own, turn, strict=True):
+                weights = np.outer(share, along).ravel()
+                kept = np.flatnonzero(weights)
+                dofs = np.append(dof, masters[kept])
+                self._equation(dofs, np.append(1.0, -weights[kept]))
+
     def _dofs(self, nodes: Indices) -> Indices:
         """Displacements of nodes, one node after the other."""
         return (self._dimension * np.reshape(nodes, (-1, 1)) + np.arange(self._dimension)).ravel()

@@ -21,11 +21,13 @@ from fe_models.applied_loads import (
 from fe_models.constraints import Constraints
 from fe_models.curved_face import Surface, edges_of
 from fe_models.cut_face import cut_interface
+from fe_models.cyclic import Cuts, Cyclic, hold_normal
 from fe_models.elasticity import ElasticBody
 from fe_models.geometry.imported import ImportedMesh
 from fe_models.mesh import Body, MatchError, MeshError, StructureMesh, matched_interface
 from fe_models.mortar import frame_of_faces, mortar_interface
 from fe_models.rest import rigid_assemblies
+from fe_models.sector import check_alike, check_temperatures, sector_cuts
 from fe_models.spin_softening import spin_softening
 from fe_models.structure import Structure
 from fe_models.supported_body import FREE_MOTION, SupportedBody, interface_nodes
@@ -119,18 +121,23 @@ def imported_structure(
     supports: Sequence[Support],
     loads: Sequence[AppliedLoad],
     order: int,
+    cyclic: Sequence[Cyclic] = (),
 ) -> Structure:
     """All bodies with their supports and a load case for each of the ``loads``.
 
+    They may be a sector of a wheel with ``cyclic`` cuts.
     Raises :class:`MeshError` for groups that no body has, supports that let bodies move as rigid
     ones though all faces stick, and ones on a contact face that no plane of symmetry explains.
     """
     for support in supports:
         check_support(imported, mesh.bodies, support)
+    cuts = sector_cuts(mesh, cyclic)
     for load in loads:
         check_load(imported, mesh.bodies, load)
+        check_alike(mesh.bodies, load, cyclic)
+        check_temperatures(mesh, imported.node_numbers, load, cuts)
     bodies = [
-        _supported(number, mesh, imported, material, supports, loads, order)
+        _supported(number, mesh, imported, material, supports, loads, order, cuts[number])
         for number, material in enumerate(materials)
     ]
     structure = Structure(mesh.weighted(order), tuple(bodies))
@@ -315,10 +322,11 @@ def _supported(
     supports: Sequence[Support],
     loads: Sequence[AppliedLoad],
     order: int,
+    cuts: Sequence[Cuts],
 ) -> SupportedBody:
     body = mesh.bodies[number]
     elastic = ElasticBody(body, material, order)
-    constraints, groups = _held(imported, elastic, supports), _names(imported, body)
+    constraints, groups = _held(imported, elastic, supports, cuts), _names(imported, body)
     free, supported_motions = constraints.free, constraints.transformation()
     imposed = np.zeros((elastic.size, len(loads)))
     forces = np.zeros((elastic.size, len(loads)))
@@ -342,7 +350,7 @@ def _supported(
     moving = imposed if imposed.any() else None
     try:
         trace = LinearTrace.of(elastic, {i.name: i.nodes(side) for i, side in faces})
-        given = *placed, forces, moving, loaded, trace, thermal
+        given = *placed, forces, moving, loaded, trace, thermal, cuts
         supported = SupportedBody(elastic, constraints, *given)
     except ValueError as error:
         raise MeshError(f"body {body.name}: {error}") from error
@@ -364,13 +372,20 @@ def _check_separate(mesh: StructureMesh, number: int) -> None:
             )
 
 
-def _held(imported: ImportedMesh, elastic: ElasticBody, supports: Sequence[Support]) -> Constraints:
-    """What supports hold of a body."""
+def _held(
+    imported: ImportedMesh,
+    elastic: ElasticBody,
+    supports: Sequence[Support],
+    cuts: Sequence[Cuts] = (),
+) -> Constraints:
+    """What supports hold of a body, and what ties its cuts."""
     body = elastic.body
     constraints = Constraints(len(elastic.nodes), elastic.dimension)
     for support in supports:
         if support.group in _names(imported, body):
-            _hold(constraints, elastic, imported.points[body.name], support)
+            _hold(constraints, elastic, imported.points[body.name], support, cuts)
+    for pair in cuts:
+        pair.tie(constraints, elastic)
     return constraints
 
 
@@ -380,13 +395,17 @@ def _names(imported: ImportedMesh, body: Body) -> set[str]:
 
 
 def _hold(
-    constraints: Constraints, elastic: ElasticBody, points: dict[str, Indices], support: Support
+    constraints: Constraints,
+    elastic: ElasticBody,
+    points: dict[str, Indices],
+    support: Support,
+    cuts: Sequence[Cuts],
 ) -> None:
     """Add one support to a body's constraints."""
     group, hold = support.group, support.hold
     is_boundary = group in elastic.body.mesh.boundaries
     if hold == "normal":
-        constraints.slide(*elastic.boundary_normals(group))
+        hold_normal(constraints, elastic, group, cuts)
         return
     if hold.startswith("mean_"):
         constraints.zero_mean(*elastic.boundary_weights(group), _unit(hold[-1], elastic.body))
