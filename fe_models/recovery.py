@@ -49,10 +49,7 @@ class StressRecovery:
         self._free = free
 
     def stress(
-        self,
-        displacement: Array,
-        thermal: Array | None = None,
-        vertices: Indices | None = None,
+        self, displacement: Array, thermal: Array | None = None, vertices: Indices | None = None
     ) -> Array:
         """Cauchy stress of displacements ``(size,)`` at all vertices, ``(6, vertices)`` [MPa].
 

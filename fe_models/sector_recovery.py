@@ -36,10 +36,7 @@ class SectorRecovery(StressRecovery):
         self._cuts = cuts
 
     def stress(
-        self,
-        displacement: Array,
-        thermal: Array | None = None,
-        vertices: Indices | None = None,
+        self, displacement: Array, thermal: Array | None = None, vertices: Indices | None = None
     ) -> Array:
         every = np.arange(self._elastic.body.mesh.nvertices) if vertices is None else vertices
         stress = super().stress(displacement, thermal, every)
