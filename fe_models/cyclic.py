@@ -120,8 +120,17 @@ class Cuts:
 
     @classmethod
     def of(cls, body: Body, cyclic: Cyclic) -> Cuts:
-        """Raises :class:`MeshError` unless the cuts are each other's image by one sector's turn."""
-        low, high = (_facets(body, names) for names in (cyclic.low, cyclic.high))
+        """Those of the boundaries named; raises as :meth:`between`."""
+        return cls.between(
+            body, cyclic, *(_facets(body, names) for names in (cyclic.low, cyclic.high))
+        )
+
+    @classmethod
+    def between(cls, body: Body, cyclic: Cyclic, low: Indices, high: Indices) -> Cuts:
+        """The cuts of such facets, whatever their boundaries are called.
+
+        Raises :class:`MeshError` unless they are each other's image by the turn of one sector.
+        """
         if len(np.intersect1d(low, high)):
             raise MeshError(f"{' and '.join(cyclic.boundaries)} share facets: they are one cut")
         middles = [_middle(body, facets) for facets in (low, high)]

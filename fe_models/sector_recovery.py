@@ -41,9 +41,9 @@ class SectorRecovery(StressRecovery):
         every = np.arange(self._elastic.body.mesh.nvertices) if vertices is None else vertices
         stress = super().stress(displacement, thermal, every)
         here, there = self._beyond.find(every)
-        stress[:, here] = self._beyond.recovery.stress(
-            *self._beyond.seen(displacement, thermal), there
-        )
+        if len(here):
+            seen = self._beyond.seen(displacement, thermal)
+            stress[:, here] = self._beyond.recovery.stress(*seen, there)
         return stress
 
     def histories(
@@ -51,8 +51,9 @@ class SectorRecovery(StressRecovery):
     ) -> Array:
         stress = super().histories(displacements, vertices, thermal)
         here, there = self._beyond.find(vertices)
-        moved, expanded = self._beyond.seen(displacements, thermal)
-        stress[:, :, here] = self._beyond.recovery.histories(moved, there, expanded)
+        if len(here):
+            moved, expanded = self._beyond.seen(displacements, thermal)
+            stress[:, :, here] = self._beyond.recovery.histories(moved, there, expanded)
         return stress
 
     def alternatives(
@@ -60,8 +61,9 @@ class SectorRecovery(StressRecovery):
     ) -> Array:
         found = super().alternatives(displacement, vertices, thermal)
         here, there = self._beyond.find(vertices)
-        moved, expanded = self._beyond.seen(displacement, thermal)
-        found[:, :, here] = self._beyond.recovery.alternatives(moved, there, expanded)
+        if len(here):
+            moved, expanded = self._beyond.seen(displacement, thermal)
+            found[:, :, here] = self._beyond.recovery.alternatives(moved, there, expanded)
         return found
 
     @cached_property

@@ -250,6 +250,31 @@ def surface_forces(elastic, name, stress):
 
 
 @pytest.mark.parametrize("order", [1, 2])
+def test_vertices_near_and_far_from_cuts(order):
+    """Asked for alone, they are told as among all: near a cut, far from it, on both sides."""
+    part = sector(3, (3, 16, 1))
+    elastic = ElasticBody(part, STEEL, order)
+    cuts = Cuts.of(part, about(sectors=3))
+    free = np.append(part.mesh.boundaries["rim"], part.mesh.boundaries["bore"])
+    recovery = SectorRecovery(elastic, free, [cuts])
+    moved = np.random.default_rng(3).standard_normal(elastic.size)
+    every = np.arange(part.mesh.nvertices)
+    stress, others = recovery.stress(moved), recovery.alternatives(moved, every)
+    angle = np.arctan2(part.points[:, 0], part.points[:, 2])
+    middle = np.flatnonzero(np.abs(angle - np.pi / 3.0) < 0.1)
+    size = np.abs(stress).max()
+    for some in (cuts.vertices(part)[:2], middle, np.append(middle, cuts.vertices(part)[:2])):
+        np.testing.assert_allclose(
+            recovery.stress(moved, None, some), stress[:, some], atol=1e-12 * size
+        )
+        told = recovery.histories(moved[:, None], some)[0]
+        np.testing.assert_allclose(told, stress[:, some], atol=1e-10 * size)
+        np.testing.assert_allclose(
+            recovery.alternatives(moved, some), others[:, :, some], atol=1e-10 * size
+        )
+
+
+@pytest.mark.parametrize("order", [1, 2])
 def test_cuts_that_do_not_match_converge(order):
     """A ring under pressure in its bore, by Lamé: as good as with cuts that match."""
     errors = {}
