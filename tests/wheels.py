@@ -75,8 +75,8 @@ def turned(body, cyclic, count):
     return Body(f"{body.name}_{count}", mesh.with_boundaries(body.mesh.boundaries | names))
 
 
-def wheel(part, cyclic):
-    """The whole wheel of a sector, with its boundaries but the cuts, and the pads one by one."""
+def wheel(part, cyclic, faces=("pad",)):
+    """The whole wheel of a sector, with its boundaries but the cuts, and ``faces`` one by one."""
     mesh, count = part.mesh, part.mesh.nvertices
     turns = [cyclic.turn(k) for k in range(cyclic.sectors)]
     points = np.concatenate(
@@ -89,9 +89,9 @@ def wheel(part, cyclic):
         for name in mesh.boundaries
         if name not in cyclic.boundaries
     }
-    if "pad" in named:
-        pads = named["pad"].reshape(cyclic.sectors, -1, mesh.dim())
-        named |= {f"pad_{k}": pad for k, pad in enumerate(pads)}
+    for name in set(faces) & set(named):
+        of_sectors = named[name].reshape(cyclic.sectors, -1, mesh.dim())
+        named |= {f"{name}_{k}": facets for k, facets in enumerate(of_sectors)}
     return _merged(part.name, points, cells, named, mesh.dim())
 
 
