@@ -37,6 +37,7 @@ class Constraints:
         self._dimension = dimension
         self._size = dimension * nodes
         self._eliminated: dict[int, tuple[Indices, Array]] = {}
+        self._by_ties: set[int] = set()
 
     def hold(self, nodes: Indices) -> None:
         """Set all displacements of the nodes to zero."""
@@ -74,8 +75,10 @@ class Constraints:
             for dof, along in zip(own, turn, strict=True):
                 weights = np.outer(share, along).ravel()
                 kept = np.flatnonzero(weights)
-                dofs = np.append(dof, masters[kept])
-                self._equation(dofs, np.append(1.0, -weights[kept]))
+                before = len(self._eliminated)
+                self._equation(np.append(dof, masters[kept]), np.append(1.0, -weights[kept]))
+                if len(self._eliminated) > before:
+                    self._by_ties.add(next(reversed(self._eliminated)))
 
     def _dofs(self, nodes: Indices) -> Indices:
         """Displacements of nodes, one node after the other."""
@@ -110,6 +113,17 @@ class Constraints:
     def free(self) -> Indices:
         """The displacements that nothing eliminates, ascending: the columns of T."""
         return np.setdiff1d(np.arange(self._size), np.fromiter(self._eliminated, np.int64))
+
+    @property
+    def supported(self) -> Indices:
+        """Nodes ``(n,)`` whose displacements are held or averaged, by more than :meth:`tie`."""
+        entries = [
+            np.append(masters, dof)
+            for dof, (masters, _) in self._eliminated.items()
+            if dof not in self._by_ties
+        ]
+        dofs = np.concatenate(entries) if entries else np.empty(0, np.int64)
+        return np.unique(dofs // self._dimension)
 
     def places(self, nodes: Indices) -> Indices:
         """Where the displacements of unconstrained nodes are among :attr:`free`."""

@@ -25,7 +25,7 @@ from fe_models.constraints import Constraints
 from fe_models.elasticity import ElasticBody
 from fe_models.mesh import Body, MeshError
 from fe_models.tied_faces import tied_projection
-from sa_solver.types import Array, Frame, Indices
+from sa_solver.types import Array, Frame, Indices, Mask
 
 # Nodes this share of the largest distance from the axis off their images are on them: mesh files
 # keep six digits.
@@ -246,13 +246,12 @@ class Cuts:
         largest = float(np.abs(values).max())
         return max(float(np.abs(apart).max()) - within, 0.0) / largest if largest else 0.0
 
-    def unsupported(self, elastic: ElasticBody, free: Indices) -> Indices:
-        """Vertices of the cuts that the tie alone holds, by the displacements that are ``free``."""
-        d = elastic.dimension
-        left = np.bincount(free // d, minlength=len(elastic.nodes))
-        low, high, of_low, of_high = self._nearest(elastic.body)
-        moving = low[left[low] + left[of_low] >= d], high[left[high] + left[of_high] >= d]
-        return np.setdiff1d(np.concatenate(moving), np.intersect1d(low, high))
+    def on_both(self, body: Body, marked: Mask) -> Indices:
+        """Vertices of the cuts whose images are ``marked`` ``(nodes,)``, or they themselves."""
+        low, high, of_low, of_high = self._nearest(body)
+        return np.concatenate(
+            [low[marked[low] | marked[of_low]], high[marked[high] | marked[of_high]]]
+        )
 
     def _nearest(self, body: Body) -> tuple[Indices, Indices, Indices, Indices]:
         """Vertices of the low and of the high cut, and those of the other nearest their images."""

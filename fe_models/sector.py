@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from fe_models.applied_loads import Acceleration, AppliedLoad, Rotation, boundary_of
+from fe_models.applied_loads import Acceleration, AppliedLoad, Displacement, Rotation, boundary_of
 from fe_models.cyclic import Cuts, Cyclic
 from fe_models.mesh import Body, MeshError, StructureMesh
 from fe_models.thermal import NodalTemperature
@@ -83,21 +83,9 @@ def check_alike(bodies: Sequence[Body], load: AppliedLoad, cyclic: Sequence[Cycl
     """Raise :class:`MeshError` if a load cannot be alike in all sectors, or is on a cut."""
     if not cyclic:
         return
-    axis = cyclic[0].direction
-    if isinstance(load, Rotation):
-        size = max(float(np.linalg.norm(np.ptp(body.points, axis=0))) for body in bodies)
-        if not _same_axis((axis, cyclic[0].through), (load.direction, load.through), size):
-            raise MeshError(
-                "a rotation about another axis than structure.cyclic is not alike in all sectors; "
-                "allowed: about that axis"
-            )
-    if isinstance(load, Acceleration):
-        across = load.acceleration - (load.acceleration @ axis) * axis
-        if np.linalg.norm(across) > ALONG * np.linalg.norm(load.acceleration):
-            raise MeshError(
-                "an acceleration across the axis of structure.cyclic is not alike in all sectors; "
-                "allowed: along it"
-            )
+    _check_direction(bodies, load, cyclic[0])
+    if isinstance(load, Displacement):
+        _check_displacement(bodies, load, cyclic)
     group = boundary_of(load)
     for body in bodies:
         boundaries = body.mesh.boundaries or {}
@@ -110,6 +98,45 @@ def check_alike(bodies: Sequence[Body], load: AppliedLoad, cyclic: Sequence[Cycl
                     f"{group} is on a cut, where the next sector goes on; allowed: boundaries of "
                     "the surface"
                 )
+
+
+def _check_direction(bodies: Sequence[Body], load: AppliedLoad, wheel: Cyclic) -> None:
+    """Raise :class:`MeshError` for loads on masses that turned sectors do not have alike."""
+    axis = wheel.direction
+    if isinstance(load, Rotation):
+        size = max(float(np.linalg.norm(np.ptp(body.points, axis=0))) for body in bodies)
+        if not _same_axis((axis, wheel.through), (load.direction, load.through), size):
+            raise MeshError(
+                "a rotation about another axis than structure.cyclic is not alike in all sectors; "
+                "allowed: about that axis"
+            )
+    if isinstance(load, Acceleration):
+        across = load.acceleration - (load.acceleration @ axis) * axis
+        if np.linalg.norm(across) > ALONG * np.linalg.norm(load.acceleration):
+            raise MeshError(
+                "an acceleration across the axis of structure.cyclic is not alike in all sectors; "
+                "allowed: along it"
+            )
+
+
+def _check_displacement(
+    bodies: Sequence[Body], load: Displacement, cyclic: Sequence[Cyclic]
+) -> None:
+    """Raise :class:`MeshError` if nodes of a cut would move otherwise than those of the other."""
+    axis, along = cyclic[0].direction, load.displacement
+    if np.linalg.norm(np.cross(axis, along)) <= ALONG * np.linalg.norm(along):
+        return
+    for body in bodies:
+        known = body.mesh.boundaries or {}
+        cuts = [body.vertices(n) for entry in cyclic for n in entry.boundaries if n in known]
+        if load.boundary not in known or not cuts:
+            continue
+        if len(np.intersect1d(body.vertices(load.boundary), np.concatenate(cuts))):
+            raise MeshError(
+                f"a displacement across the axis of structure.cyclic on {load.boundary}, which "
+                "meets a cut, is not alike in all sectors; allowed: along the axis, or a boundary "
+                "within the sector"
+            )
 
 
 def _has(body: Body, names: Sequence[str]) -> bool:

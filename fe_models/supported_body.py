@@ -266,13 +266,10 @@ class SupportedBody:
     def free_facets(self) -> Indices:
         """Facets of the surface on which nothing acts: no support, load or contact."""
         mesh = self.elastic.body.mesh
-        transformation, free = self._supports, self.constraints.free
-        slaves = np.setdiff1d(np.arange(transformation.shape[0]), free)
-        tied = np.concatenate([slaves, free[np.unique(transformation[slaves].indices)]])
         touched = np.zeros(len(self.elastic.nodes), bool)
-        touched[tied // self.elastic.dimension] = True
+        touched[self.constraints.supported] = True
         for pair in self.cuts:
-            touched[pair.unsupported(self.elastic, free)] = False
+            touched[pair.on_both(self.elastic.body, touched)] = True
         touched[self.nodes] = True
         acted = [mesh.boundaries[name] for name in self.loaded]
         acted += [facets for pair in self.cuts for facets in (pair.low, pair.high)]
