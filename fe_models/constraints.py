@@ -40,6 +40,7 @@ class Constraints:
         self._dimension = dimension
         self._size = dimension * nodes
         self._eliminated: dict[int, tuple[Indices, Array]] = {}
+        self._by_ties: set[int] = set()
 
     def hold(self, nodes: Indices) -> None:
         """Set all displacements of the nodes to zero."""
@@ -100,6 +101,24 @@ class Constraints:
         """Whether a displacement is constrained."""
         return dof in self._eliminated
 
+    def tie(self, nodes: Indices, parents: Indices, shares: sp.csr_matrix, turn: Array) -> None:
+        """Let nodes do what parents do, turned: u = R Σ s u_parent, as far as nothing holds them.
+
+        ``shares`` ``(n, m)`` are s of the ``parents`` ``(m,)``, ``turn`` ``(dimension, dimension)``
+        is R. A node may be its own parent: then it keeps what the turn leaves as it is.
+        """
+        shares = shares.tocsr()
+        for row, own in enumerate(self._dofs(nodes).reshape(-1, self._dimension)):
+            of_row = slice(shares.indptr[row], shares.indptr[row + 1])
+            masters, share = self._dofs(parents[shares.indices[of_row]]), shares.data[of_row]
+            for dof, along in zip(own, turn, strict=True):
+                weights = np.outer(share, along).ravel()
+                kept = np.flatnonzero(weights)
+                before = len(self._eliminated)
+                self._equation(np.append(dof, masters[kept]), np.append(1.0, -weights[kept]))
+                if len(self._eliminated) > before:
+                    self._by_ties.add(next(reversed(self._eliminated)))
+
     def _dofs(self, nodes: Indices) -> Indices:
         """Displacements of nodes, one node after the other."""
         return (self._dimension * np.reshape(nodes, (-1, 1)) + np.arange(self._dimension)).ravel()
@@ -133,6 +152,17 @@ class Constraints:
     def free(self) -> Indices:
         """The displacements that nothing eliminates, ascending: the columns of T."""
         return np.setdiff1d(np.arange(self._size), np.fromiter(self._eliminated, np.int64))
+
+    @property
+    def supported(self) -> Indices:
+        """Nodes ``(n,)`` whose displacements are held or averaged, by more than :meth:`tie`."""
+        entries = [
+            np.append(masters, dof)
+            for dof, (masters, _) in self._eliminated.items()
+            if dof not in self._by_ties
+        ]
+        dofs = np.concatenate(entries) if entries else np.empty(0, np.int64)
+        return np.unique(dofs // self._dimension)
 
     def places(self, nodes: Indices) -> Indices:
         """Where the displacements of unconstrained nodes are among :attr:`free`."""

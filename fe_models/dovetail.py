@@ -8,9 +8,10 @@ import numpy as np
 import scipy.sparse as sp
 
 from fe_models.constraints import Constraints
-from fe_models.elasticity import ElasticBody
+from fe_models.cyclic import Cuts, Cyclic
+from fe_models.elasticity import ORIGIN, ROTOR, ElasticBody
 from fe_models.geometry.dovetail import Dovetail
-from fe_models.mesh import StructureMesh
+from fe_models.mesh import Body, MeshError, StructureMesh
 from fe_models.spin_softening import CarriedMass, spin_softening
 from fe_models.structure import Structure
 from fe_models.supported_body import SupportedBody, interface_nodes
@@ -58,10 +59,13 @@ def dovetail_structure(
     blade: Material,
     mission: Mission,
     order: int,
+    cyclic: bool = False,
 ) -> Structure:
     """The two supported, loaded bodies of a dovetail; ``order`` is that of the elements.
 
-    In the plane everything is per length of the slot, whose middle section it is.
+    In the plane everything is per length of the slot, whose middle section it is. The sides of the
+    disk's sector slide on their planes, as a load does that is its own mirror image; ``cyclic``
+    ones do what those of the next sectors do.
     """
     elastic_1, elastic_2 = (
         ElasticBody(body, material, order)
@@ -70,7 +74,11 @@ def dovetail_structure(
 
     held = Constraints(len(elastic_1.nodes), elastic_1.dimension)
     held.hold(elastic_1.boundary_nodes("inner"))
-    held.slide(*elastic_1.boundary_normals("sides"))
+    cuts = [dovetail_cuts(dovetail, mesh.bodies[0])] if cyclic else []
+    for pair in cuts:
+        pair.tie(held, elastic_1)
+    if not cuts:
+        held.slide(*elastic_1.boundary_normals("sides"))
     centrifugal = elastic_1.centrifugal_load()
     loads_1 = np.stack([centrifugal, np.zeros_like(centrifugal)], axis=1)
 
@@ -87,10 +95,24 @@ def dovetail_structure(
         faces = mesh.faces_of(number)
         placed = interface_nodes(faces, elastic.body)
         trace = LinearTrace.of(elastic, {i.name: i.nodes(side) for i, side in faces})
-        supported.append(
-            SupportedBody(elastic, constraints, *placed, loads, loaded=loaded, trace=trace)
-        )
+        given = elastic, constraints, *placed, loads
+        tied = cuts if number == 0 else []
+        supported.append(SupportedBody(*given, loaded=loaded, trace=trace, cuts=tied))
     return Structure(mesh, tuple(supported))
+
+
+def dovetail_cuts(dovetail: Dovetail, disk: Body) -> Cuts:
+    """The sides of the disk's sector, beyond which the next ones are.
+
+    Raises :class:`MeshError` if the slot is skewed: the sector's ends are planes, which a side that
+    goes round with a skewed slot does not meet where the other does.
+    """
+    if dovetail.skew != 0.0:
+        raise MeshError("a skewed slot: the sides of its sector are no images of each other")
+    sides = disk.mesh.boundaries["sides"]
+    along = disk.outward_of(sides)[:, 0]
+    wheel = Cyclic(["the side at X < 0"], ["the side at X > 0"], ROTOR, ORIGIN, dovetail.blades)
+    return Cuts.between(disk, wheel, sides[along < 0.0], sides[along > 0.0])
 
 
 def dovetail_softening(

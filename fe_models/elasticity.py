@@ -181,17 +181,42 @@ class ElasticBody:
         vertices = np.unique(mesh.facets[:, mesh.boundaries[boundary]])
         return np.append(vertices, np.sort(self.midsides(boundary)[0]))
 
-    def boundary_normals(self, boundary: str) -> tuple[Indices, Array]:
-        """Nodes of a boundary and the outward unit normal at each, ``(n, dimension)``."""
+    def boundary_normals(
+        self, boundary: str, whole: Callable[[Array], Array] = lambda integrals: integrals
+    ) -> tuple[Indices, Array]:
+        """Nodes of a boundary and the outward unit normal at each, ``(n, dimension)``.
+
+        ``whole`` makes of the integrals of normals at vertices ``(vertices, dimension)`` those of a
+        boundary that goes on beyond the body, as in the next sector of a wheel.
+        """
         mesh = self.body.mesh
         linear = ELEMENTS[self.dimension, 1]()
         basis = FacetBasis(mesh, linear, facets=mesh.boundaries[boundary])
         normals = np.zeros((len(self.nodes), self.dimension))
-        normals[: mesh.nvertices] = _normal_integrals(basis)
+        normals[: mesh.nvertices] = whole(_normal_integrals(basis))
         middle, parents = self.midsides(boundary)
         normals[middle] = normals[parents].sum(axis=1)
         nodes = self.boundary_nodes(boundary)
         return nodes, normals[nodes] / np.linalg.norm(normals[nodes], axis=1, keepdims=True)
+
+    def facet_nodes(self, facets: Indices) -> Indices:
+        """Nodes of facets by their numbers, ``(m, k)``: corners, then midsides.
+
+        The midsides are those between corners 0 and 1, in space also 1 and 2, and 2 and 0.
+        """
+        mesh = self.body.mesh
+        corners: Indices = mesh.facets[:, facets].T
+        if self.order == 1:
+            return corners
+        if self.dimension == 2:
+            return np.column_stack([corners, self._basis.facet_dofs[0, facets]])
+        edges = mesh.f2e[:, facets].T
+        ends = mesh.edges[:, edges]
+        middles = []
+        for opposite in (2, 0, 1):
+            away = np.all(ends != corners[None, :, opposite, None], axis=0)
+            middles.append(self._basis.edge_dofs[0, edges[away]])
+        return np.column_stack([corners, *middles])
 
     def midsides(self, boundary: str) -> tuple[Indices, Indices]:
         """Midside nodes of a boundary ``(n,)`` and the vertices beside each, ``(n, 2)``."""

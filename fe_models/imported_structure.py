@@ -22,6 +22,7 @@ from fe_models.applied_loads import (
 from fe_models.constraints import Constraints
 from fe_models.curved_face import Surface, edges_of
 from fe_models.cut_face import cut_interface
+from fe_models.cyclic import Cuts, Cyclic, hold_normal
 from fe_models.elasticity import ElasticBody
 from fe_models.geometry.imported import ImportedMesh
 from fe_models.imposed import (
@@ -35,6 +36,7 @@ from fe_models.mesh import Body, MatchError, MeshError, StructureMesh, matched_i
 from fe_models.mortar import frame_of_faces, mortar_interface
 from fe_models.pretension import Pretension, check_pretension
 from fe_models.rest import rigid_assemblies
+from fe_models.sector import check_alike, check_temperatures, sector_cuts
 from fe_models.spin_softening import spin_softening
 from fe_models.structure import Structure
 from fe_models.supported_body import FREE_MOTION, SupportedBody, interface_nodes
@@ -126,18 +128,23 @@ def imported_structure(
     supports: Sequence[Support],
     loads: Sequence[AppliedLoad],
     order: int,
+    cyclic: Sequence[Cyclic] = (),
 ) -> Structure:
     """All bodies with their supports and a load case for each of the ``loads``.
 
+    They may be a sector of a wheel with ``cyclic`` cuts.
     Raises :class:`MeshError` for groups that no body has, supports that let bodies move as rigid
     ones though all faces stick, and ones on a contact face that no plane of symmetry explains.
     """
     for support in supports:
         check_support(imported, mesh.bodies, support)
+    cuts = sector_cuts(mesh, cyclic)
     for load in loads:
         check_load(imported, mesh.bodies, load)
+        check_alike(mesh.bodies, load, cyclic)
+        check_temperatures(mesh, imported.node_numbers, load, cuts)
     bodies = [
-        _supported(number, mesh, imported, material, supports, loads, order)
+        _supported(number, mesh, imported, material, supports, loads, order, cuts[number])
         for number, material in enumerate(materials)
     ]
     structure = Structure(mesh.weighted(order), tuple(bodies))
@@ -327,42 +334,34 @@ def _supported(
     supports: Sequence[Support],
     loads: Sequence[AppliedLoad],
     order: int,
+    cuts: Sequence[Cuts],
 ) -> SupportedBody:
     body = mesh.bodies[number]
     elastic = ElasticBody(body, material, order)
-    constraints, groups = _held(imported, elastic, supports), _names(imported, body)
+    constraints, groups = _held(imported, elastic, supports, cuts), _names(imported, body)
     free, supported_motions = constraints.free, constraints.transformation()
-    imposed = np.zeros((elastic.size, len(loads)))
-    forces, jumps = np.zeros((2, elastic.size, len(loads)))
     thermal = thermal_strains(loads, elastic, imported.node_numbers[body.name])
-    moved, loaded = [], []
+    cases = _LoadCases(elastic, thermal, groups)
     for case, load in enumerate(loads):
-        if isinstance(load, Imposing):
-            if load.boundary in groups:
-                moved.append(load)
-                imposed[:, case] = impose(constraints, elastic, load)
-        elif isinstance(load, Temperature):
-            forces[:, case] = elastic.thermal_load(thermal[:, case])
-        elif isinstance(load, Pretension):
-            if load.body == body.name:
-                jumps[:, case] = load.jump(elastic)
-                forces[:, case] = elastic.stiffness @ jumps[:, case]
-        elif boundary_of(load) is None or boundary_of(load) in groups:
-            forces[:, case] = load.forces(elastic)
-            if isinstance(load, BoundaryForce) and load.rigid:
-                at = elastic.nodes[elastic.boundary_nodes(load.boundary)].mean(axis=0)
-                tie_rigid(constraints, elastic, load.boundary, at)
-            loaded += [name for name in (boundary_of(load),) if name is not None]
-    check_against_supports(loads, imposed, supported_motions @ imposed[free])
-    check_against_each_other(elastic, moved)
+        cases.add(case, load, constraints)
+    check_against_supports(loads, cases.imposed, supported_motions @ cases.imposed[free])
+    check_against_each_other(elastic, cases.moved)
     _check_separate(mesh, number)
     faces = mesh.faces_of(number)
-    placed = interface_nodes(faces, body)
-    moving = imposed if imposed.any() else None
     try:
         trace = LinearTrace.of(elastic, {i.name: i.nodes(side) for i, side in faces})
-        given = *placed, forces, moving, loaded, trace, thermal, jumps if jumps.any() else None
-        supported = SupportedBody(elastic, constraints, *given)
+        supported = SupportedBody(
+            elastic,
+            constraints,
+            *interface_nodes(faces, body),
+            cases.forces,
+            cases.imposed if cases.imposed.any() else None,
+            cases.loaded,
+            trace,
+            thermal,
+            cuts,
+            cases.jumps if cases.jumps.any() else None,
+        )
     except ValueError as error:
         raise MeshError(f"body {body.name}: {error}") from error
     if len(constraints.free) <= np.sum(~supported.held):
@@ -370,6 +369,43 @@ def _supported(
             f"body {body.name}: all its nodes are held or on contact faces; refine its mesh"
         )
     return supported
+
+
+class _LoadCases:
+    """What loads do to a body with such ``groups``, each a column.
+
+    ``forces`` on its nodes, ``imposed`` displacements and ``jumps``, ``(size, cases)``; ``loaded``
+    are boundaries with tractions, ``moved`` the loads that impose something.
+    """
+
+    def __init__(self, elastic: ElasticBody, thermal: Array, groups: set[str]) -> None:
+        self._elastic, self._thermal, self._groups = elastic, thermal, groups
+        shape = elastic.size, thermal.shape[1]
+        self.forces, self.imposed, self.jumps = np.zeros((3, *shape))
+        self.loaded: list[str] = []
+        self.moved: list[Imposing] = []
+
+    def add(self, case: int, load: AppliedLoad, constraints: Constraints) -> None:
+        """A load, with what it holds and ties among the ``constraints``."""
+        elastic, boundary = self._elastic, boundary_of(load)
+        if boundary is not None and boundary not in self._groups:
+            return
+        if isinstance(load, Imposing):
+            self.moved.append(load)
+            self.imposed[:, case] = impose(constraints, elastic, load)
+        elif isinstance(load, Temperature):
+            self.forces[:, case] = elastic.thermal_load(self._thermal[:, case])
+        elif isinstance(load, Pretension):
+            if load.body == elastic.body.name:
+                self.jumps[:, case] = load.jump(elastic)
+                self.forces[:, case] = elastic.stiffness @ self.jumps[:, case]
+        else:
+            self.forces[:, case] = load.forces(elastic)
+            if isinstance(load, BoundaryForce) and load.rigid:
+                at = elastic.nodes[elastic.boundary_nodes(load.boundary)].mean(axis=0)
+                tie_rigid(constraints, elastic, load.boundary, at)
+            if boundary is not None:
+                self.loaded.append(boundary)
 
 
 def _check_separate(mesh: StructureMesh, number: int) -> None:
@@ -383,13 +419,20 @@ def _check_separate(mesh: StructureMesh, number: int) -> None:
             )
 
 
-def _held(imported: ImportedMesh, elastic: ElasticBody, supports: Sequence[Support]) -> Constraints:
-    """What supports hold of a body."""
+def _held(
+    imported: ImportedMesh,
+    elastic: ElasticBody,
+    supports: Sequence[Support],
+    cuts: Sequence[Cuts] = (),
+) -> Constraints:
+    """What supports hold of a body, and what ties its cuts."""
     body = elastic.body
     constraints = Constraints(len(elastic.nodes), elastic.dimension)
     for support in supports:
         if support.group in _names(imported, body):
-            _hold(constraints, elastic, imported.points[body.name], support)
+            _hold(constraints, elastic, imported.points[body.name], support, cuts)
+    for pair in cuts:
+        pair.tie(constraints, elastic)
     return constraints
 
 
@@ -399,13 +442,17 @@ def _names(imported: ImportedMesh, body: Body) -> set[str]:
 
 
 def _hold(
-    constraints: Constraints, elastic: ElasticBody, points: dict[str, Indices], support: Support
+    constraints: Constraints,
+    elastic: ElasticBody,
+    points: dict[str, Indices],
+    support: Support,
+    cuts: Sequence[Cuts],
 ) -> None:
     """Add one support to a body's constraints."""
     group, hold = support.group, support.hold
     is_boundary = group in elastic.body.mesh.boundaries
     if hold == "normal":
-        constraints.slide(*elastic.boundary_normals(group))
+        hold_normal(constraints, elastic, group, cuts)
         return
     if hold.startswith("mean_"):
         constraints.zero_mean(*elastic.boundary_weights(group), _unit(hold[-1], elastic.body))

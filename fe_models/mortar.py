@@ -42,6 +42,20 @@ SLIVER_SHARE = 1e-6
 COVERED_SHARE = 1e-2
 # Facets of one face overlap, seen along the normal, when they cover more than this of another.
 FOLDED_SHARE = 1.0 + 1e-6
+# Gauss points of triangles by the degree they are exact for: shares of the corners, and of the area
+# (of degree 4: Strang & Fix 1973, in closed form as Dunavant 1985, doi:10.1002/nme.1620210612).
+_ROOT_10, _OUTER = np.sqrt(10.0), np.sqrt(38.0 - 44.0 * np.sqrt(0.4))
+_NEAR, _FAR = ((8.0 - _ROOT_10 + sign * _OUTER) / 18.0 for sign in (1.0, -1.0))
+_OF_NEAR, _OF_FAR = (
+    (620.0 + sign * np.sqrt(213125.0 - 53320.0 * _ROOT_10)) / 3720.0 for sign in (1.0, -1.0)
+)
+GAUSS = {
+    2: (np.array([[0.5, 0.0, 0.5], [0.5, 0.5, 0.0], [0.0, 0.5, 0.5]]), np.full(3, 1.0 / 3.0)),
+    4: (
+        np.concatenate([share + (1.0 - 3.0 * share) * np.eye(3) for share in (_NEAR, _FAR)]),
+        np.repeat([_OF_NEAR, _OF_FAR], 3),
+    ),
+}
 # A facet is seen edge-on when its projection is this much smaller than its longest edge allows.
 EDGE_ON = 1e-6
 
@@ -78,8 +92,11 @@ def mortar_projection(
     Raises :class:`MeshError` if the faces miss each other, have facets edge-on, or fold over
     themselves.
     """
-    slave, master = _Projected(slave_points, slave_facets), _Projected(master_points, master_facets)
-    overlap = _overlap(slave, master)
+    slave, master = (
+        ProjectedFace(slave_points, slave_facets),
+        ProjectedFace(master_points, master_facets),
+    )
+    overlap = overlap_of(slave, master)
     dual, integrals = _dual_functions(slave, overlap)
     areas = slave.scatter(integrals)
     covered = areas / slave.nodal_areas
@@ -181,7 +198,7 @@ def frame_of_faces(
     return Frame(origin, axes), float(tilt)
 
 
-class _Projected:
+class ProjectedFace:
     """A face seen along z: its facets in the plane (x, y), or on the line x."""
 
     def __init__(self, points: Array, facets: Indices) -> None:
@@ -230,8 +247,8 @@ class _Projected:
 
 
 @dataclass(frozen=True)
-class _Overlap:
-    """Gauss points, exact for quadratic integrands, of what facets of both faces share.
+class Overlap:
+    """Gauss points of what facets of both faces share.
 
     ``slave`` and ``master`` ``(q,)`` are the facets, ``points`` ``(q, d)``, ``weights`` ``(q,)``.
     """
@@ -242,16 +259,19 @@ class _Overlap:
     weights: Array
 
 
-def _overlap(slave: _Projected, master: _Projected) -> _Overlap:
-    """Raises :class:`MeshError` if the faces have nothing in common."""
+def overlap_of(slave: ProjectedFace, master: ProjectedFace, degree: int = 2) -> Overlap:
+    """Points that integrate a polynomial of a ``degree``, 2 or 4, over what faces share.
+
+    Raises :class:`MeshError` if the faces have nothing in common.
+    """
     first, second = _neighbours(slave.corners, master.corners)
     share = _shared_segments if slave.corners.shape[2] == 1 else _shared_triangles
-    pair, points, weights = share(slave.corners[first], master.corners[second])
+    pair, points, weights = share(slave.corners[first], master.corners[second], degree)
     real = weights > ROUNDING_AREA * slave.sizes[first[pair]]
     if not real.any():
         raise MeshError("the two contact faces do not lie on each other along the contact's normal")
     pair = pair[real]
-    return _Overlap(first[pair], second[pair], points[real], weights[real])
+    return Overlap(first[pair], second[pair], points[real], weights[real])
 
 
 def _neighbours(first: Array, second: Array) -> tuple[Indices, Indices]:
@@ -270,18 +290,20 @@ def _neighbours(first: Array, second: Array) -> tuple[Indices, Indices]:
     return one[touch], other[touch]
 
 
-def _shared_segments(first: Array, second: Array) -> tuple[Indices, Array, Array]:
+def _shared_segments(first: Array, second: Array, degree: int) -> tuple[Indices, Array, Array]:
     """Gauss points of the intersections of segments ``(n, 2, 1)``: pair, point, weight."""
     low, high = np.maximum(first[:, 0], second[:, 0]), np.minimum(first[:, 1], second[:, 1])
     middle, half = 0.5 * (low + high), 0.5 * (high - low)
-    points = np.concatenate([middle - half / np.sqrt(3.0), middle + half / np.sqrt(3.0)])
-    return np.tile(np.arange(len(first)), 2), points, np.tile(half[:, 0], 2)
+    places, shares = np.polynomial.legendre.leggauss(degree // 2 + 1)
+    points = np.concatenate([middle + half * place for place in places])
+    weights = np.concatenate([half[:, 0] * share for share in shares])
+    return np.tile(np.arange(len(first)), len(places)), points, weights
 
 
-def _shared_triangles(first: Array, second: Array) -> tuple[Indices, Array, Array]:
+def _shared_triangles(first: Array, second: Array, degree: int) -> tuple[Indices, Array, Array]:
     """Gauss points of the intersections of triangles ``(n, 3, 2)``: pair, point, weight.
 
-    The polygons are cut into triangles, each with its three midsides as Gauss points.
+    The polygons are cut into triangles, each with Gauss points of its own.
     """
     polygons = first
     for corner in range(3):
@@ -291,9 +313,10 @@ def _shared_triangles(first: Array, second: Array) -> tuple[Indices, Array, Arra
         [np.repeat(polygons[:, :1], count, axis=1), polygons[:, 1:-1], polygons[:, 2:]], axis=2
     ).reshape(-1, 3, 2)
     areas = 0.5 * np.linalg.det(fans[:, 1:] - fans[:, :1])
-    midsides = 0.5 * (fans + np.roll(fans, 1, axis=1))
-    pairs = np.repeat(np.arange(len(first)), 3 * count)
-    return pairs, midsides.reshape(-1, 2), np.repeat(areas / 3.0, 3)
+    corners, shares = GAUSS[degree]
+    points = np.einsum("gc,nca->nga", corners, fans).reshape(-1, 2)
+    pairs = np.repeat(np.arange(len(first)), len(shares) * count)
+    return pairs, points, np.outer(areas, shares).ravel()
 
 
 def _clip(polygons: Array, start: Array, end: Array) -> Array:
@@ -321,7 +344,7 @@ def _clip(polygons: Array, start: Array, end: Array) -> Array:
     return clipped
 
 
-def _dual_functions(slave: _Projected, overlap: _Overlap) -> tuple[Array, Array]:
+def _dual_functions(slave: ProjectedFace, overlap: Overlap) -> tuple[Array, Array]:
     """ψ at the Gauss points ``(q, corners)``, and ∫φ over what is covered ``(m, corners)``.
 
     On each facet ψ_i = Σ_j A_ij φ_j with A = diag(∫φ) (∫φφᵀ)⁻¹. Raises :class:`MeshError` if a
@@ -345,7 +368,7 @@ def _dual_functions(slave: _Projected, overlap: _Overlap) -> tuple[Array, Array]
 
 
 def _coupling(
-    slave: _Projected, master: _Projected, overlap: _Overlap, dual: Array
+    slave: ProjectedFace, master: ProjectedFace, overlap: Overlap, dual: Array
 ) -> sp.csr_matrix:
     """M ``(n, n_master)`` of the dual functions' values ``(q, corners)``."""
     shapes = master.shapes(overlap.master, overlap.points)
@@ -357,9 +380,9 @@ def _coupling(
 
 
 def _between(
-    slave: _Projected,
-    master: _Projected,
-    overlap: _Overlap,
+    slave: ProjectedFace,
+    master: ProjectedFace,
+    overlap: Overlap,
     dual: Array,
     surfaces: tuple[Surface, Surface],
 ) -> Array:

@@ -48,13 +48,17 @@ class StressRecovery:
         self._elastic = elastic
         self._free = free
 
-    def stress(self, displacement: Array, thermal: Array | None = None) -> Array:
+    def stress(
+        self, displacement: Array, thermal: Array | None = None, vertices: Indices | None = None
+    ) -> Array:
         """Cauchy stress of displacements ``(size,)`` at all vertices, ``(6, vertices)`` [MPa].
 
-        Ordered xx, yy, zz, xy, yz, zx of the global axes. Of the strain an expansion ``thermal``
-        ``(vertices,)`` makes no stress (:mod:`fe_models.thermal`).
+        Or at some. Ordered xx, yy, zz, xy, yz, zx of the global axes. Of the strain an expansion
+        ``thermal`` ``(all vertices,)`` makes no stress (:mod:`fe_models.thermal`).
         """
-        patches, vertices = self._patches, np.arange(self._elastic.body.mesh.nvertices)
+        if vertices is None:
+            vertices = np.arange(self._elastic.body.mesh.nvertices)
+        patches = self._patches[vertices]
         return self._of(displacement, vertices, patches, self._elastic.order + 1, thermal)
 
     def histories(

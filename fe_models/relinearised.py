@@ -211,5 +211,5 @@ def _prestressed(
         elastic.stiffness = stiffness
         placed = interface_nodes(mesh.faces_of(number), elastic.body)
         given = body.constraints, *placed, loads, body.imposed, body.loaded, body.trace
-        bodies.append(SupportedBody(elastic, *given))
+        bodies.append(SupportedBody(elastic, *given, cuts=body.cuts))
     return PrestressedStructure(mesh, tuple(bodies), displacements, share)

@@ -145,14 +145,14 @@ def cycle_stress(
     fields, surfaces = [], []
     for body, displacement in zip(structure.bodies, motion.displacements, strict=True):
         elastic, free = body.elastic, body.free_facets
-        thermal = body.thermal_strain(amplitudes[increments].T)
+        thermal, recovery = body.thermal_strain(amplitudes[increments].T), body.recovery
         seen = free, body.nodes, body.clamped
         straining = body.straining(displacement, amplitudes[increments].T)
-        field = stress_field(elastic, straining[:, 0], *seen, thermal[:, 0])
+        field = stress_field(elastic, straining[:, 0], *seen, thermal[:, 0], recovery)
         (moved,) = _of_vertices(elastic, displacement[:, :1])
         fields.append(replace(field, displacement=moved))
         if shown:
-            surface = surface_history(elastic, straining[:, 1:], free, thermal[:, 1:])
+            surface = surface_history(elastic, straining[:, 1:], recovery, thermal[:, 1:])
             moved = _of_vertices(elastic, displacement[:, 1:])[:, surface.vertices]
             surfaces.append(replace(surface, displacement=moved))
         done()
@@ -186,14 +186,15 @@ def stress_field(
     contact: Indices,
     clamped: Indices,
     thermal: Array | None = None,
+    recovery: StressRecovery | None = None,
 ) -> StressField:
     """Stress of a body from its displacements ``(size,)`` and expansions ``(vertices,)``.
 
     ``free`` are the facets on which nothing acts, ``contact`` the vertices of contact faces and
-    ``clamped`` those that cannot move.
+    ``clamped`` those that cannot move. ``recovery`` may see more than the body itself.
     """
     count = elastic.body.mesh.nvertices
-    recovery = StressRecovery(elastic, free)
+    recovery = recovery or StressRecovery(elastic, free)
     clamped = np.intersect1d(clamped, elastic.body.mesh.facets[:, free])
     unbounded = recovery.beside(np.append(recovery.inward_edges, clamped))
     stress = recovery.stress(displacement, thermal)
@@ -225,11 +226,14 @@ def stress_field(
 
 
 def surface_history(
-    elastic: ElasticBody, displacements: Array, free: Indices, thermal: Array | None = None
+    elastic: ElasticBody,
+    displacements: Array,
+    recovery: StressRecovery,
+    thermal: Array | None = None,
 ) -> SurfaceHistory:
     """The surface of a body with displacements ``(size, t)`` and expansions ``(vertices, t)``.
 
-    Nothing acts on the facets ``free``. In the plane all of the body is seen.
+    ``recovery`` finds its stress. In the plane all of the body is seen.
     """
     mesh = elastic.body.mesh
     cells = mesh.t if elastic.dimension == 2 else mesh.facets[:, mesh.boundary_facets()]
@@ -238,7 +242,7 @@ def surface_history(
         vertices=vertices,
         triangles=corners.reshape(cells.shape).T,
         displacement=_of_vertices(elastic, displacements)[:, vertices],
-        stress=StressRecovery(elastic, free).histories(displacements, vertices, thermal),
+        stress=recovery.histories(displacements, vertices, thermal),
     )
 
 

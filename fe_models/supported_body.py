@@ -11,11 +11,14 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from fe_models.constraints import Constraints
+from fe_models.cyclic import Cuts
 from fe_models.elasticity import ElasticBody
 from fe_models.linear_solver import prepare
 from fe_models.mesh import Body, Interface
+from fe_models.recovery import StressRecovery
 from fe_models.reduction import reduce_body
 from fe_models.rigid_motions import rigid_body_modes, rigid_motions
+from fe_models.sector_recovery import SectorRecovery
 from fe_models.symmetry import Mirror, halves, mirror_of_nodes
 from fe_models.trace import LinearTrace
 from sa_solver.types import Array, Indices
@@ -80,11 +83,13 @@ class SupportedBody:
         loaded: Sequence[str] = (),
         trace: LinearTrace | None = None,
         thermal: Array | None = None,
+        cuts: Sequence[Cuts] = (),
         jumps: Array | None = None,
     ) -> None:
         self.elastic = elastic
         self._jumps = jumps
         self._thermal = thermal
+        self.cuts = cuts
         self.loads = loads
         self.loaded = loaded
         self.nodes = nodes
@@ -264,16 +269,23 @@ class SupportedBody:
     def free_facets(self) -> Indices:
         """Facets of the surface on which nothing acts: no support, load or contact."""
         mesh = self.elastic.body.mesh
-        transformation, free = self._supports, self.constraints.free
-        slaves = np.setdiff1d(np.arange(transformation.shape[0]), free)
-        tied = np.concatenate([slaves, free[np.unique(transformation[slaves].indices)]])
         touched = np.zeros(len(self.elastic.nodes), bool)
-        touched[tied // self.elastic.dimension] = True
+        touched[self.constraints.supported] = True
+        for pair in self.cuts:
+            touched[pair.on_both(self.elastic.body, touched)] = True
         touched[self.nodes] = True
-        facets = mesh.boundary_facets()
-        loaded = [mesh.boundaries[name] for name in self.loaded]
-        facets = np.setdiff1d(facets, np.concatenate(loaded) if loaded else [])
+        acted = [mesh.boundaries[name] for name in self.loaded]
+        acted += [facets for pair in self.cuts for facets in (pair.low, pair.high)]
+        facets = np.setdiff1d(mesh.boundary_facets(), np.concatenate(acted) if acted else [])
         return np.asarray(facets[~touched[mesh.facets[:, facets]].all(axis=0)], dtype=np.int64)
+
+    @property
+    def recovery(self) -> StressRecovery:
+        """How its stress is found from displacements."""
+        matched = [pair for pair in self.cuts if pair.matched]
+        if not matched:
+            return StressRecovery(self.elastic, self.free_facets)
+        return SectorRecovery(self.elastic, self.free_facets, matched)
 
     @property
     def is_held(self) -> bool:

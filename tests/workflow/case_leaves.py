@@ -99,6 +99,7 @@ GIVEN = {
             for section, given in laws({}, "body_1", "body_2").items()
         },
         "structure.other_bodies": {ALWAYS: BOLT},
+        "structure.cyclic": {ALWAYS: [{"low": "disk_low", "high": "disk_high", "sectors": 24}]},
         "structure.loads.0": with_path(
             force={"group": "blade_top", "force": [0, 0, -100]},
             displacement={"group": "blade_top", "displacement": [0.01, 0, 0]},
@@ -221,6 +222,8 @@ CAD = [
     "structure.supports.0.group=solid_1.face_5",
     "structure.loads.0.group=solid_2.face_6",
 ]
+# A sector of a wheel in the place of the template's mesh, with the same names.
+SECTOR = "structure.file=sector.msh"
 # Cells of the templates that may take heights.
 CELLS = {"mesh": (128, 256), "resultants": (128, 256)}
 CELLS |= dict.fromkeys(("bodies", "bodies_wear"), (128, 128))
@@ -257,6 +260,8 @@ class Leaf:
                 overrides += [f"{section}={value}" for value in chosen[:1]]
         if self.key.startswith("structure.other_bodies."):
             overrides.append(f"structure.contacts={BOLTED}")
+        if self.key.startswith("structure.cyclic."):
+            overrides.append(SECTOR)
         if "legs" in self.tags:
             overrides.append("contact.method=full")
         if "friction_contact" in self.tags:

@@ -3,7 +3,7 @@
 import json
 import shutil
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -13,9 +13,11 @@ import pytest
 from click.testing import Result
 
 from fe_models.gmsh_session import gmsh_model
+from fe_models.mesh import Body, StructureMesh, write_msh
 from fe_models.reduction import save_reduced
 from sa_solver.types import Array, Frame, Grid
 from tests.conftest import CASES
+from tests.wheels import sector, shoe
 from tests.workflow.case_leaves import BODY, CELLS
 from tests.workflow.commands import invoke, runs_here
 from workflow.analyses.wear import contact_workers
@@ -251,11 +253,29 @@ def write_joint(folder: Path) -> None:
         gmsh.write(str(folder / "joint.msh"))
 
 
+def write_sector(folder: Path) -> None:
+    """One of 24 sectors of a disk with a block on it, ``sector.msh``, named as in ``joint.msh``."""
+    names = {"pad": "top", "bore": "base", "low": "low", "high": "high"}
+    disk = renamed(sector(24, dimension=3), "disk", names)
+    blade = renamed(shoe(24, dimension=3), "blade", {"pad": "foot", "top": "top"})
+    write_msh(folder / "sector.msh", StructureMesh((disk, blade), ()))
+
+
+def renamed(body: Body, name: str, names: dict[str, str]) -> Body:
+    """The body with some of its boundaries, by other names."""
+    mesh = replace(body.mesh, _boundaries=None)
+    return Body(
+        name,
+        mesh.with_boundaries({new: body.mesh.boundaries[old] for old, new in names.items()}),
+    )
+
+
 @pytest.fixture(scope="session")
 def template_files(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with the files that the templates name, not to be changed."""
     folder = tmp_path_factory.mktemp("template")
     write_joint(folder)
+    write_sector(folder)
     (folder / "loads.csv").write_text(LOADS, encoding="utf-8")
     # More nodes than the mesh has.
     (folder / "temperatures.csv").write_text(

@@ -5,7 +5,7 @@ from typing import get_args
 
 import pytest
 
-from tests.workflow.case_leaves import BOLTED, CAD, CONTACT, INTERFACE, REDUCED
+from tests.workflow.case_leaves import BOLTED, CAD, CONTACT, INTERFACE, REDUCED, SECTOR
 from workflow.case.sections import KINDS_ARE_NAMED_BY, sections_of
 from workflow.errors import CaseError
 from workflow.kinds import about, kinds, parse_case, template
@@ -27,6 +27,7 @@ NEEDS = {
     "  law: friction_contact": [f"structure={REDUCED}"],
     "  kind: friction_rig": [f"joint={CONTACT | {'normal_load': 60}}"],
     "  # size: 2 mm  # for CAD files only": CAD,
+    "structure.cyclic": [SECTOR],
 }
 
 

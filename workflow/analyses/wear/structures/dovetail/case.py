@@ -86,6 +86,11 @@ class Dovetail(Section):
     rim_radius: Length = entry("rotor axis to the top of the flanks [mm]", "250 mm")
     disk_height: Length = entry("radial height of the sector below the rim [mm]", "60 mm")
     skew: Skew = entry("slot direction against the rotor axis [rad]", "0 deg", default=0.0)
+    sides: Literal["guided", "cyclic"] = entry(
+        "of the disk's sector: guided along their planes, or cyclic: as those of the next sectors",
+        "guided",
+        default="guided",
+    )
 
     @property
     def flanks(self) -> str:
@@ -116,6 +121,16 @@ class Dovetail(Section):
             raise disagreement(
                 "2: a skewed slot is not the same all along; allowed: dimension 3, or skew 0",
                 *("dimension", "skew"),
+            )
+        return self
+
+    @model_validator(mode="after")
+    def _sides_are_images(self) -> Dovetail:
+        if self.sides == "cyclic" and self.skew != 0.0:
+            raise disagreement(
+                "cyclic: the sides of a skewed slot's sector, which ends in planes, are no images "
+                "of each other; allowed: guided, or skew 0",
+                *("sides", "skew"),
             )
         return self
 
@@ -166,7 +181,7 @@ class Dovetail(Section):
         """The joint as the mesher takes it."""
         from fe_models.geometry.dovetail import Dovetail as Geometry
 
-        return Geometry(**self.model_dump(exclude={"kind", "dimension"}))
+        return Geometry(**self.model_dump(exclude={"kind", "dimension", "sides"}))
 
 
 def _require_below(section: Section, key: str, limit: float, name: str) -> None:

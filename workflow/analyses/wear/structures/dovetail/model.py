@@ -46,7 +46,8 @@ class DovetailModel:
         case, mission = self._case, self._mission
         pull = mission.airfoil_mass, mission.airfoil_radius
         materials = case.material(1), case.material(2)
-        return self.dovetail, case.structure.dimension, case.mesh, materials, pull
+        structure = case.structure.dimension, case.structure.sides
+        return self.dovetail, structure, case.mesh, materials, pull
 
     @property
     def missions(self) -> tuple[MissionLoads, ...]:
@@ -66,7 +67,9 @@ class DovetailModel:
 
     def structure(self, mesh: StructureMesh) -> Structure:
         disk, blade = self._case.material(1), self._case.material(2)
-        return dovetail_structure(self.dovetail, mesh, disk, blade, self._mission, self.order)
+        cyclic = self._case.structure.sides == "cyclic"
+        given = self.dovetail, mesh, disk, blade, self._mission, self.order
+        return dovetail_structure(*given, cyclic)
 
     tightening = 0
 

@@ -30,6 +30,7 @@ from workflow.analyses.wear.structures.mesh.contacts import (
     Support,
     own_terms,
 )
+from workflow.analyses.wear.structures.mesh.cyclic import CyclicCuts
 from workflow.analyses.wear.structures.mesh.faces import (
     face_size,
     hardly_met,
@@ -90,6 +91,9 @@ class ImportedStructure(Section):
     contacts: tuple[ContactPair, ...] = entry("faces that meet", min_length=1)
     supports: tuple[Support, ...] = entry("what is held", min_length=1)
     loads: tuple[Load, ...] = entry("what is applied", min_length=1)
+    cyclic: tuple[CyclicCuts, ...] = entry(
+        "cuts of bodies that are a sector of a wheel, tied to each other", default=()
+    )
 
     @model_validator(mode="after")
     def _names_differ(self) -> ImportedStructure:
@@ -223,6 +227,7 @@ class MeshCase(FiniteElementCase):
             ),
             *(("contact", text) for pair in structure.contacts if (text := own_terms(pair))),
             *(("held", f"{support.group}, {support.hold}") for support in structure.supports),
+            *(("sector", cuts.outline(mesh)) for cuts in structure.cyclic),
             ("load path", f"{self.increments_outline} in {len(self.legs)} legs{before}{cycles}"),
             *(("load", load.text) for load in structure.loads),
         ]
@@ -353,6 +358,7 @@ class MeshCase(FiniteElementCase):
             imported = structure.read(self.mesh.size)
         self._check_names(imported)
         self._check_contacts()
+        self._check_cyclic(imported)
         self._check_supports(imported)
         return self
 
@@ -403,6 +409,25 @@ class MeshCase(FiniteElementCase):
                 check_gap(pair.gap, face_size(face), cells, face.line, key)
                 _check_mirrored(pair.gap, face.planes, key)
 
+    def _check_cyclic(self, imported: ImportedMesh) -> None:
+        """Find the pair of cuts that is none, or the load that is not alike in all sectors."""
+        from fe_models.sector import check_alike, check_cuts, check_temperatures, sector_cuts
+
+        mesh = self.structure.mesh(self.mesh.size)
+        cyclic = [pair.described() for pair in self.structure.cyclic]
+        found = sector_cuts(mesh, [])
+        for index, cuts in enumerate(cyclic):
+            for key, names in (("low", cuts.low), ("high", cuts.high)):
+                with _pointing_at(f"structure.cyclic.{index}.{key}"):
+                    check_cuts(mesh.bodies, cuts, names)
+            with _pointing_at(f"structure.cyclic.{index}"):
+                found = sector_cuts(mesh, cyclic[: index + 1])
+        for index, load in enumerate(self.structure.loads):
+            with _pointing_at(f"structure.loads.{index}"):
+                described = load.described()
+                check_alike(mesh.bodies, described, cyclic)
+                check_temperatures(mesh, imported.node_numbers, described, found)
+
     def _check_supports(self, imported: ImportedMesh) -> None:
         """Build what holds the bodies, on elements of order 1 and without forces."""
         from fe_models.imported_structure import imported_structure
@@ -415,7 +440,8 @@ class MeshCase(FiniteElementCase):
         materials = [material.elastic() for material in self.solids.values()]
         with _pointing_at("structure.supports"):
             mesh = structure.mesh(self.mesh.size)
-            made = imported_structure(mesh, imported, materials, supports, loads, 1)
+            cyclic = [cuts.described() for cuts in structure.cyclic]
+            made = imported_structure(mesh, imported, materials, supports, loads, 1, cyclic)
         for (index, _), load in zip(asked, loads, strict=True):
             if isinstance(load, Pretension):
                 with _pointing_at(f"structure.loads.{index}"):

@@ -123,6 +123,7 @@ class MeshModel:
             [support.described() for support in described.supports],
             [load.described() for load in described.loads],
             self.order,
+            [cuts.described() for cuts in described.cyclic],
         )
 
     def bolts(self, structure: Structure) -> tuple[Bolt, ...]:

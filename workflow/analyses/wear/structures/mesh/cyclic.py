@@ -1,0 +1,68 @@
+"""Cyclic symmetry of the bodies of a user's mesh, as a case gives it."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated
+
+import numpy as np
+from pydantic import model_validator
+
+from workflow.analyses.wear.structures.mesh.load import Component, Coordinate, Name
+from workflow.case.fields import OrAlone, Whole
+from workflow.case.sections import Section, disagreement, entry
+
+if TYPE_CHECKING:
+    from fe_models import cyclic as fe
+    from fe_models.mesh import StructureMesh
+
+# Cuts that are images to so much [mm] are exact: nothing is said of it.
+EXACT = 1e-9
+
+Boundaries = Annotated[tuple[Name, ...], OrAlone()]
+
+
+class CyclicCuts(Section):
+    """The bodies are one of equal sectors of a wheel, with loads that are equal in each.
+
+    What one cut does the other does, turned by 360°/sectors about the axis (nodal diameter 0).
+    """
+
+    low: Boundaries = entry("boundary of one cut of a body, or several that are one", "disk_low")
+    high: Boundaries = entry("boundary of its other cut, or several", "disk_high")
+    sectors: Annotated[int, Whole(2, 10_000)] = entry("equal ones that the wheel has", 24)
+    axis: tuple[Component, Component, Component] = entry(
+        "direction of the axis [1]", [0.0, 1.0, 0.0], default=(0.0, 1.0, 0.0)
+    )
+    through: tuple[Coordinate, Coordinate, Coordinate] = entry(
+        "a point on the axis [mm]", [0.0, 0.0, 0.0], default=(0.0, 0.0, 0.0)
+    )
+
+    @model_validator(mode="after")
+    def _is_complete(self) -> CyclicCuts:
+        if not any(self.axis):
+            raise disagreement("no direction; allowed: one that is not zero", "axis")
+        for key in ("low", "high"):
+            if not getattr(self, key):
+                raise disagreement("none; allowed: a boundary, or several", key)
+        if both := sorted(set(self.low) & set(self.high)):
+            raise disagreement(f"{both[0]} is both cuts; allowed: two boundaries", "high", "low")
+        return self
+
+    def described(self) -> fe.Cyclic:
+        """As the structure takes it."""
+        from fe_models.cyclic import Cyclic
+
+        axis, through = np.array(self.axis), np.array(self.through)
+        return Cyclic(self.low, self.high, axis, through, self.sectors)
+
+    def outline(self, mesh: StructureMesh) -> str:
+        """What a user should see of the cuts before anything runs."""
+        from fe_models.sector import sector_cuts
+
+        low, high = (" + ".join(names) for names in (self.low, self.high))
+        parts = []
+        for pair in (pair for cuts in sector_cuts(mesh, [self.described()]) for pair in cuts):
+            meet = "match node to node" if pair.matched else "do not match, tied by a mortar"
+            off = f", {1e3 * pair.apart:.2g} µm off" if pair.apart > EXACT else ""
+            parts.append(f"{low} and {high} {meet}{off}")
+        return f"one of {self.sectors}: {', '.join(parts)}"
