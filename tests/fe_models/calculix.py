@@ -29,19 +29,29 @@ EDGES = {
 }
 # xx, yy, zz, xy, xz, yz of CalculiX to xx, yy, zz, xy, yz, zx.
 COMPONENTS = [0, 1, 2, 3, 5, 4]
+# What CalculiX leaves of balance, and of the last correction: by itself 0.5 and 1 %.
+BALANCED = "1.e-6, 1.e-6"
+# Tension that its penalty leaves far from contact [MPa].
+TENSION = 1e-4
 # A coefficient of an equation below this share of its largest is rounding.
 NO_COEFFICIENT = 1e-12
 
 
 @dataclass
+class Step:
+    """Loads at the end of a step of so many ``increments``, whose own ``loads`` are cards."""
+
+    increments: int = 1
+    loads: list[str] = field(default_factory=list)
+
+
+@dataclass
 class Job:
-    """Bodies, and what is asked of them; ``cards`` are further ones of the model and the step."""
+    """Bodies, cards of the model such as what holds them, and the steps of their loads."""
 
     bodies: Sequence[ElasticBody]
     model: list[str] = field(default_factory=list)
-    step: list[str] = field(default_factory=list)
-    increments: str = ""
-    contact: bool = False
+    steps: list[Step] = field(default_factory=lambda: [Step()])
 
     @property
     def offsets(self) -> Indices:
@@ -65,18 +75,37 @@ class Job:
                 self.model += [", ".join(told[k : k + 4]) for k in range(0, len(told), 4)]
 
     def load(self, number: int, forces: Array) -> None:
-        """Nodal forces ``(size,)`` on a body."""
-        self.step.append("*CLOAD")
+        """Nodal forces ``(size,)`` on a body at the end of the last step."""
+        cards = self.steps[-1].loads
+        cards.append("*CLOAD")
         for node, force in enumerate(forces.reshape(-1, 3), start=self.offsets[number] + 1):
-            self.step += [f"{node}, {axis + 1}, {f:.12e}" for axis, f in enumerate(force) if f]
+            cards += [f"{node}, {axis + 1}, {f:.12e}" for axis, f in enumerate(force) if f]
+
+    def touch(self, boundary: str, stiffness: float, friction: float) -> None:
+        """Contact of a boundary of the second body's nodes on that of the first.
+
+        Its penalty is a ``stiffness`` [MPa/mm], across the faces and along them.
+        """
+        lower, upper = self.bodies
+        nodes = self.offsets[1] + 1 + upper.body.vertices(boundary)
+        sides = element_sides(lower, lower.body.mesh.boundaries[boundary])
+        self.model += ["*SURFACE, NAME=slave, TYPE=NODE", *map(str, nodes)]
+        self.model += ["*SURFACE, NAME=master, TYPE=ELEMENT"]
+        self.model += [f"{1 + element}, S{side}" for element, side in sides]
+        self.model += ["*CONTACT PAIR, INTERACTION=joint, TYPE=NODE TO SURFACE, SMALL SLIDING"]
+        self.model += ["slave, master", "*SURFACE INTERACTION, NAME=joint"]
+        self.model += ["*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=LINEAR"]
+        self.model += [f"{stiffness:.12e}, {TENSION:.12e}"]
+        self.model += ["*FRICTION", f"{friction:.12e}, {stiffness:.12e}"]
 
     def press(self, number: int, boundary: str, pressure: float) -> None:
         """A pressure on a boundary, as CalculiX integrates it."""
         mesh = self.bodies[number].body.mesh
         first = 1 + sum(body.body.mesh.nelements for body in self.bodies[:number])
-        self.step.append("*DLOAD")
+        cards = self.steps[-1].loads
+        cards.append("*DLOAD")
         for element, side in element_sides(self.bodies[number], mesh.boundaries[boundary]):
-            self.step.append(f"{first + element}, P{side}, {pressure:.12e}")
+            cards.append(f"{first + element}, P{side}, {pressure:.12e}")
 
     def run(self, folder: Path) -> Answer:
         """Solve it; displacements and stresses at the end of the last increment."""
@@ -104,11 +133,19 @@ class Job:
             lines += [f"{material.young:.12e}, {material.poisson:.12e}"]
             lines.append(f"*SOLID SECTION, ELSET=body{number}, MATERIAL=m{number}")
         lines += self.model
-        lines += [f"*STEP{self.increments and ', INC=10000'}", "*STATIC" + self.increments]
-        lines += self.step
-        lines += ["*NODE PRINT, NSET=all, FREQUENCY=1", "U"]
+        for step in self.steps:
+            lines += self._step(step)
+        return lines
+
+    def _step(self, step: Step) -> list[str]:
+        share = f"{1.0 / step.increments:.12e}"
+        lines = ["*STEP, INC=10000", "*STATIC", f"{share}, 1., 1.e-8, {share}"]
+        lines += ["*CONTROLS, PARAMETERS=FIELD", BALANCED]
+        lines += step.loads
+        every = "FREQUENCY=10000"
+        lines += [f"*NODE PRINT, NSET=all, {every}", "U"]
         for number in range(len(self.bodies)):
-            lines += [f"*EL PRINT, ELSET=body{number}", "S"]
+            lines += [f"*EL PRINT, ELSET=body{number}, {every}", "S"]
         return [*lines, "*END STEP"]
 
 
@@ -128,7 +165,7 @@ class Answer:
         tables: dict[str, Array] = {}
         parts = re.split(r"\n\s*(displacements|stresses)[^\n]*?(?:set (\S+))[^\n]*\n", text)
         for kind, name, rows in zip(parts[1::3], parts[2::3], parts[3::3], strict=True):
-            numbers = [line.split() for line in rows.splitlines() if re.match(r"\s*\d+\s", line)]
+            numbers = [line.split() for line in rows.strip().split("\n\n")[0].splitlines()]
             tables[f"{kind} {name.upper()}"] = np.array(numbers, dtype=np.float64)
         every = tables["displacements ALL"][:, 1:4]
         displacements = np.split(every, job.offsets[1:-1])
