@@ -21,21 +21,23 @@ MIDDLE = 1e-6
 class Curvature:
     """Of a body's ``edges``, how many ``given`` have midside nodes and how many are ``curved``.
 
-    Nodes are up to ``off`` [mm] beside the middle of their edges.
+    Nodes are up to ``off`` [mm] beside the middle of their edges. ``straightened`` edges are none
+    of these in the body: they would fold an element.
     """
 
     edges: int
     given: int
     curved: int
     off: float
+    straightened: int = 0
 
 
 def with_midsides(mesh: StructureMesh, imported: ImportedMesh) -> StructureMesh:
     """The same with bodies whose elements of second order have the file's midside nodes.
 
     Bodies whose midside nodes are all in the middle of their edges, or that have none, stay as they
-    are. Raises :class:`MeshError` if midside nodes fold an element, or elements beside an edge do
-    not share its node.
+    are. Edges of elements that their midside nodes fold are straight: :func:`curvature` counts
+    them. Raises :class:`MeshError` if elements beside an edge do not share its node.
     """
     return replace(mesh, bodies=tuple(_curved(body, imported) for body in mesh.bodies))
 
@@ -45,10 +47,18 @@ def curvature(body: Body, imported: ImportedMesh) -> Curvature | None:
     if body.name not in imported.midsides:
         return None
     edges = _edges(body)
-    _, given, off = _places(body, edges, imported.midsides[body.name])
-    lengths = _lengths(body, edges)
-    curved = int(np.sum(off > MIDDLE * lengths))
-    return Curvature(len(edges), int(given.sum()), curved, float(off.max(initial=0.0)))
+    points, given, off = _places(body, edges, imported.midsides[body.name])
+    least = MIDDLE * _lengths(body, edges)
+    moved = np.zeros(0)
+    if body.midsides is not None:
+        moved = np.linalg.norm(in_space(body.midsides) - points, axis=1) > least
+    return Curvature(
+        edges=len(edges),
+        given=int(given.sum()),
+        curved=int(np.sum(off > least) - moved.sum()),
+        off=float(off.max(initial=0.0)),
+        straightened=int(moved.sum()),
+    )
 
 
 def distance_of_midsides(interface: Interface, bodies: Sequence[Body]) -> float:
@@ -93,16 +103,33 @@ def _curved(body: Body, imported: ImportedMesh) -> Body:
     points, _, off = _places(body, edges, imported.midsides[body.name])
     if np.all(off <= MIDDLE * _lengths(body, edges)):
         return body
-    curved = replace(body, midsides=np.ascontiguousarray(points[:, body.axes]))
-    wrong = folded(curved)
-    if wrong.any():
-        place = body.points[body.mesh.t[:, np.argmax(wrong)]].mean(axis=0)
-        raise MeshError(
-            f"midside nodes fold {wrong.sum()} elements of body {body.name}, the first near "
-            f"({', '.join(f'{x:.4g}' for x in place)}) mm; allowed: midsides nearer to the middle "
-            "of their edges, or elements of order 1, which are straight"
-        )
-    return curved
+    return _unfolded(replace(body, midsides=np.ascontiguousarray(points[:, body.axes])))
+
+
+def _unfolded(body: Body) -> Body:
+    """The body with the edges of folded elements straight: those inside first, then all."""
+    from fe_models.isoparametric import folded
+
+    mesh, corners = body.mesh, len(body.mesh.t)
+    ends = mesh.edges if mesh.dim() == 3 else mesh.facets
+    middle = mesh.p[:, ends].mean(axis=1).T
+    on_surface = mesh.boundary_facets()
+    if mesh.dim() == 3:
+        on_surface = np.unique(mesh.f2e[:, on_surface])
+    wrong = folded(body)
+    for inside in (True, False):
+        straight = -1
+        while wrong.any() and straight != wrong.sum():
+            straight = wrong.sum()
+            edges = np.unique(body.element_nodes[wrong][:, corners:] - mesh.nvertices)
+            if inside:
+                edges = np.setdiff1d(edges, on_surface)
+            assert body.midsides is not None
+            midsides = body.midsides.copy()
+            midsides[edges] = middle[edges]
+            body = replace(body, midsides=midsides)
+            wrong = folded(body)
+    return body
 
 
 def _edges(body: Body) -> Indices:

@@ -30,7 +30,11 @@ from workflow.analyses.wear.structures.mesh.contacts import (
     Support,
     own_terms,
 )
-from workflow.analyses.wear.structures.mesh.elements import apart, elements_outline
+from workflow.analyses.wear.structures.mesh.elements import (
+    apart,
+    elements_outline,
+    folded_elements,
+)
 from workflow.analyses.wear.structures.mesh.faces import (
     face_size,
     hardly_met,
@@ -219,7 +223,8 @@ class MeshCase(FiniteElementCase):
         structure, path = self.structure, self.load_path
         cycles = f", {len(path.mix)} cycles mixed" if path.mix else ""
         before = f", those before it in {path.cycle_from - 1} legs" if path.cycle_from > 1 else ""
-        mesh, imported = structure.mesh(self.mesh.size), structure.read(self.mesh.size)
+        imported = structure.read(self.mesh.size)
+        mesh = structure.mesh(self.mesh.size, self.mesh.order)
         bodies = [f"{b.name} of {b.mesh.nvertices} nodes" for b in mesh.bodies]
         return [
             ("structure", f"{Path(structure.file).name}: {listed(bodies)}"),
@@ -241,12 +246,14 @@ class MeshCase(FiniteElementCase):
     def doubts(self) -> Iterator[str]:
         """What the file says besides its mesh; faces that hardly meet, as parts of a face do."""
         yield from super().doubts()
-        if left := self.structure.read(self.mesh.size).left:
+        imported = self.structure.read(self.mesh.size)
+        if left := imported.left:
             yield (
                 f"structure.file: {counted(len(left), 'keyword')} with loads, supports, contact or "
                 f"materials not taken over, the first {left[0]}; all of them: fretscale describe"
             )
         mesh = self.structure.mesh(self.mesh.size, self.mesh.order)
+        yield from (f"mesh.order: {doubt}" for doubt in folded_elements(mesh, imported))
         for index, interface in enumerate(mesh.interfaces):
             for doubt in filter(None, (hardly_met(mesh, interface), apart(mesh, interface))):
                 yield f"structure.contacts.{index}: {doubt}"

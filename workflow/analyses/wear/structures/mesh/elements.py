@@ -41,6 +41,21 @@ def elements_outline(mesh: StructureMesh, imported: ImportedMesh, order: int) ->
             )
 
 
+def folded_elements(mesh: StructureMesh, imported: ImportedMesh) -> Iterator[str]:
+    """Doubts about elements that midside nodes would fold, and what is done about them."""
+    from fe_models.second_order import curvature
+
+    for body in mesh.bodies:
+        if body.midsides is None or not (found := curvature(body, imported)):
+            continue
+        if found.straightened:
+            yield (
+                f"{body.name}: midside nodes fold elements, of which "
+                f"{counted(found.straightened, 'edge')} of {found.edges} are taken straight; "
+                "refine the mesh where it bends"
+            )
+
+
 def apart(mesh: StructureMesh, interface: Interface) -> str:
     """A doubt about faces that meet node to node, but for their midside nodes; empty if none."""
     from fe_models.second_order import distance_of_midsides
