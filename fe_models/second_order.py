@@ -95,7 +95,6 @@ def set_nodes(elastic: ElasticBody, imported: ImportedMesh, group: str) -> Indic
 
 
 def _curved(body: Body, imported: ImportedMesh) -> Body:
-    from fe_models.isoparametric import folded
 
     if body.name not in imported.midsides:
         return body
