@@ -38,11 +38,13 @@ INSIDE = 1e-9
 class Midsides:
     """Points of a surface in the middle of edges, whose ends are vertices ``edges`` ``(k, 2)``.
 
-    ``points`` ``(k, 3)`` [mm]. An edge may be there more than once.
+    ``points`` ``(k, 3)`` [mm]; ``rows`` ``(k,)`` are those of their nodes among the file's, -1 of
+    points that are none. An edge may be there more than once.
     """
 
     edges: Indices
     points: Array
+    rows: Indices | None = None
 
     def at(self, edges: Indices) -> Array:
         """Those of ``edges`` ``(m, 2)``, ``(m, 3)`` [mm]; NaN where there is none."""

@@ -10,6 +10,7 @@ import scipy.sparse as sp
 from skfem import (
     Basis,
     BilinearForm,
+    Element,
     ElementTetP1,
     ElementTetP2,
     ElementTriP1,
@@ -19,6 +20,7 @@ from skfem import (
 )
 from skfem.helpers import grad
 
+from fe_models.isoparametric import INTEGRATED, facet_normals, mapping_of
 from fe_models.mesh import Body, in_space
 from sa_solver.subsurface_influence import INDICES
 from sa_solver.types import Array, Indices, Material
@@ -38,7 +40,8 @@ class ElasticBody:
     """A body of one material, with displacements numbered ``dimension node + component``.
 
     Triangles are in plane strain; their forces are per length. ``order`` is that of the elements,
-    1 or 2. Vertices are the first nodes; with order 2 the midsides follow.
+    1 or 2. Vertices are the first nodes; with order 2 the midsides follow. Elements of order 2 are
+    as curved as the midsides of the body say (:mod:`fe_models.isoparametric`).
 
     Examples
     --------
@@ -65,7 +68,19 @@ class ElasticBody:
         self.order = order
         self.dimension = body.mesh.dim()
         self._element = ELEMENTS[self.dimension, order]
-        self._basis = Basis(body.mesh, self._element())
+        self.curved = order == 2 and body.midsides is not None
+        self._basis = self.basis()
+
+    def basis(self, degree: int | None = None) -> Basis:
+        """Of the displacements, with integration exact up to a ``degree`` on straight elements."""
+        if not self.curved:
+            return Basis(self.body.mesh, self._element(), intorder=degree)
+        mapping = mapping_of(self.body)
+        intorder = max(INTEGRATED, degree or 0)
+        basis = Basis(self.body.mesh, self._element(), mapping, intorder)
+        # Jacobians of all elements, which nothing asks for again.
+        vars(mapping).pop("_cache", None)
+        return basis
 
     @property
     def nodes(self) -> Array:
@@ -190,12 +205,16 @@ class ElasticBody:
         boundary that goes on beyond the body, as in the next sector of a wheel.
         """
         mesh = self.body.mesh
-        linear = ELEMENTS[self.dimension, 1]()
-        basis = FacetBasis(mesh, linear, facets=mesh.boundaries[boundary])
         normals = np.zeros((len(self.nodes), self.dimension))
-        normals[: mesh.nvertices] = whole(_normal_integrals(basis))
-        middle, parents = self.midsides(boundary)
-        normals[middle] = normals[parents].sum(axis=1)
+        if self.curved:
+            facets = mesh.boundaries[boundary]
+            at_nodes = facet_normals(self.body, facets)[..., self.body.axes]
+            np.add.at(normals, self.body.facet_nodes(facets), at_nodes)
+        else:
+            basis = self._facet_basis(boundary, ELEMENTS[self.dimension, 1]())
+            normals[: mesh.nvertices] = whole(_normal_integrals(basis))
+            middle, parents = self.midsides(boundary)
+            normals[middle] = normals[parents].sum(axis=1)
         nodes = self.boundary_nodes(boundary)
         return nodes, normals[nodes] / np.linalg.norm(normals[nodes], axis=1, keepdims=True)
 
@@ -235,10 +254,9 @@ class ElasticBody:
         Of all vertices and of all vertices and nodes, ``(v, v)`` and ``(v, n)`` [mm²].
         """
         linear = ELEMENTS[self.dimension, 1]()
-        facets = self.body.mesh.boundaries[boundary]
         # Products of linear functions and the elements' own, exact.
         tests, trials = (
-            FacetBasis(self.body.mesh, element, facets=facets, intorder=1 + self.order)
+            self._facet_basis(boundary, element, 1 + self.order)
             for element in (linear, self._element())
         )
         product = BilinearForm(lambda u, v, w: u * v)
@@ -263,9 +281,15 @@ class ElasticBody:
         lame, shear = self.material.lame, self.material.shear_modulus
         return components(lame * trace * np.eye(3)[:, :, None] + 2.0 * shear * strain)
 
-    def _facet_basis(self, boundary: str) -> FacetBasis:
-        mesh = self.body.mesh
-        return FacetBasis(mesh, self._element(), facets=mesh.boundaries[boundary])
+    def _facet_basis(
+        self, boundary: str, element: Element | None = None, degree: int | None = None
+    ) -> FacetBasis:
+        """On a named boundary, of the displacements or another ``element``'s functions."""
+        mesh, mapping = self.body.mesh, None
+        if self.curved:
+            mapping, degree = mapping_of(self.body), max(INTEGRATED, degree or 0)
+        facets = mesh.boundaries[boundary]
+        return FacetBasis(mesh, element or self._element(), mapping, degree, facets=facets)
 
 
 def _normal_integrals(basis: FacetBasis) -> Array:

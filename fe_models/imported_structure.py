@@ -36,6 +36,7 @@ from fe_models.mesh import Body, MatchError, MeshError, StructureMesh, matched_i
 from fe_models.mortar import frame_of_faces, mortar_interface
 from fe_models.pretension import Pretension, check_pretension
 from fe_models.rest import rigid_assemblies
+from fe_models.second_order import set_nodes
 from fe_models.sector import check_alike, check_temperatures, sector_cuts
 from fe_models.spin_softening import spin_softening
 from fe_models.structure import Structure
@@ -132,7 +133,9 @@ def imported_structure(
 ) -> Structure:
     """All bodies with their supports and a load case for each of the ``loads``.
 
-    They may be a sector of a wheel with ``cyclic`` cuts.
+    They may be a sector of a wheel with ``cyclic`` cuts. Elements of ``order`` 2 are curved where
+    bodies have midsides, which :func:`fe_models.second_order.with_midsides` gives them.
+
     Raises :class:`MeshError` for groups that no body has, supports that let bodies move as rigid
     ones though all faces stick, and ones on a contact face that no plane of symmetry explains.
     """
@@ -249,7 +252,7 @@ def _with_interfaces(imported: ImportedMesh, body: Body, pairs: Sequence[Contact
             parts = [contact_facets(imported, body, name) for name in pair.boundaries(number)]
             facets = np.unique(np.concatenate(parts))
             named |= {pair.name: facets, pair.boundary(number): facets}
-    return Body(body.name, body.mesh.with_boundaries(named))
+    return replace(body, mesh=body.mesh.with_boundaries(named))
 
 
 def _surface(imported: ImportedMesh, body: Body, boundary: str, frame: Frame) -> Surface:
@@ -430,7 +433,7 @@ def _held(
     constraints = Constraints(len(elastic.nodes), elastic.dimension)
     for support in supports:
         if support.group in _names(imported, body):
-            _hold(constraints, elastic, imported.points[body.name], support, cuts)
+            _hold(constraints, elastic, imported, support, cuts)
     for pair in cuts:
         pair.tie(constraints, elastic)
     return constraints
@@ -444,7 +447,7 @@ def _names(imported: ImportedMesh, body: Body) -> set[str]:
 def _hold(
     constraints: Constraints,
     elastic: ElasticBody,
-    points: dict[str, Indices],
+    imported: ImportedMesh,
     support: Support,
     cuts: Sequence[Cuts],
 ) -> None:
@@ -457,7 +460,7 @@ def _hold(
     if hold.startswith("mean_"):
         constraints.zero_mean(*elastic.boundary_weights(group), _unit(hold[-1], elastic.body))
         return
-    nodes = elastic.boundary_nodes(group) if is_boundary else points[group]
+    nodes = elastic.boundary_nodes(group) if is_boundary else set_nodes(elastic, imported, group)
     for axis in hold:
         direction = _unit(axis, elastic.body)
         if direction.any():

@@ -23,8 +23,11 @@ if TYPE_CHECKING:
 MATCHING_TOLERANCE = 1e-9
 # Global axes that the coordinates and displacements of a mesh of each dimension run along.
 AXES = {2: (0, 2), 3: (0, 1, 2)}
-# gmsh's numbers for first-order cells and their facets, by dimension.
+# gmsh's numbers for cells and their facets, by dimension: of first order, of second order.
 GMSH_CELL, GMSH_FACET = {2: 2, 3: 4}, {2: 1, 3: 2}
+GMSH_CURVED_CELL, GMSH_CURVED_FACET = {2: 9, 3: 11}, {2: 8, 3: 9}
+# gmsh lists the last two edges of a tetrahedron the other way round than scikit-fem.
+GMSH_NODES = {2: range(6), 3: (0, 1, 2, 3, 4, 5, 6, 7, 9, 8)}
 # What a mesh of scikit-fem keeps, once asked for, of how its elements are connected.
 NUMBERED = frozenset({"_facets", "_t2f", "_f2t", "_edges", "_t2e", "_f2e"})
 # How a file of gmsh ends that is whole.
@@ -44,6 +47,9 @@ class Body:
     """One meshed body: tetrahedra, or triangles in the plane (X, Z) for plane strain.
 
     ``name`` is its own, ``mesh`` scikit-fem's [mm]; its named boundaries are those of the mesh.
+    ``midsides`` ``(edges, dim)`` [mm] are where the midside nodes of elements of second order are,
+    by the mesh's edges (in the plane: its facets). Without them they are in the middle. What this
+    class tells of sizes and normals is that of the straight elements between the vertices.
 
     Examples
     --------
@@ -61,6 +67,7 @@ class Body:
 
     name: str
     mesh: MeshTet | MeshTri
+    midsides: Array | None = field(default=None, kw_only=True)
 
     @property
     def axes(self) -> tuple[int, ...]:
@@ -71,6 +78,26 @@ class Body:
     def points(self) -> Array:
         """Vertices in space ``(n, 3)`` [mm]; Y is 0 in the plane."""
         return in_space(self.mesh.p.T)
+
+    @property
+    def nodes(self) -> Array:
+        """Vertices in space ``(n, 3)`` [mm], and the midsides after them if it has any."""
+        if self.midsides is None:
+            return self.points
+        return np.concatenate([self.points, in_space(self.midsides)])
+
+    @property
+    def element_nodes(self) -> Indices:
+        """Vertices and midsides of the elements ``(m, 10 or 6)``, as scikit-fem orders them."""
+        mesh = self.mesh
+        beside = mesh.t2f if mesh.dim() == 2 else mesh.t2e
+        return np.asarray(np.vstack([mesh.t, mesh.nvertices + beside]).T)
+
+    def facet_nodes(self, facets: Indices) -> Indices:
+        """Vertices and midsides of facets of the mesh, by their numbers, ``(m, 6 or 3)``."""
+        mesh = self.mesh
+        beside = facets[None] if mesh.dim() == 2 else mesh.f2e[:, facets]
+        return np.asarray(np.vstack([mesh.facets[:, facets], mesh.nvertices + beside]).T)
 
     def facets(self, boundary: str) -> Indices:
         """Vertices of the triangles (in the plane: edges) of a named boundary, ``(n, dim)``."""
@@ -170,7 +197,8 @@ class Interface(Face):
     ``nodes_1`` and ``nodes_2`` are vertices of body 1 and body 2; ``gap`` ``(n,)`` the distance of
     the unloaded, unworn faces [mm]. Faces that meet node to node list their nodes in the same
     order. Otherwise ``projection`` ``(n, n_1)`` gives a field of body 1's nodes at those of body 2,
-    ``face_1`` is body 1's own face and ``areas`` ``(n,)`` what it covers of each node's area [mm²].
+    ``face_1`` is body 1's own face and ``areas`` ``(n,)`` what it covers of each node's area [mm²];
+    ``bulged`` ``(n,)`` is what of the gap is due to the form of the faces between vertices [mm].
     Planes of symmetry may cut it: ``planes`` are the axes of the frame that are normal to them, and
     the frame's origin is on them (:mod:`fe_models.cut_face`).
 
@@ -199,6 +227,7 @@ class Interface(Face):
     projection: sp.csr_matrix | None = None
     face_1: Face | None = None
     areas: Array | None = None
+    bulged: Array | None = None
     planes: tuple[int, ...] = ()
     bodies: tuple[int, int] = (0, 1)
 
@@ -356,26 +385,41 @@ def matched_interface(
 def write_msh(path: Path, structure: StructureMesh) -> None:
     """Write all bodies and all their named boundaries to one gmsh 4.1 file (text).
 
+    Elements of bodies with midsides are of second order.
+
     Raises OSError where the disk is full, which gmsh does not notice.
     """
     with gmsh_model("structure") as gmsh:
         offset = 0
         for tag, body in enumerate(structure.bodies, start=1):
             dim = body.mesh.dim()
+            points, cells, faces, kinds = _listed(body)
             gmsh.model.addDiscreteEntity(dim, tag)
             gmsh.model.addPhysicalGroup(dim, [tag], name=body.name)
-            node_tags = offset + 1 + np.arange(body.mesh.nvertices)
-            gmsh.model.mesh.addNodes(dim, tag, node_tags, body.points.ravel())
-            cells = node_tags[body.mesh.t.T].ravel()
-            gmsh.model.mesh.addElementsByType(tag, GMSH_CELL[dim], [], cells)
-            for name in body.mesh.boundaries:
+            node_tags = offset + 1 + np.arange(len(points))
+            gmsh.model.mesh.addNodes(dim, tag, node_tags, points.ravel())
+            gmsh.model.mesh.addElementsByType(tag, kinds[0][dim], [], node_tags[cells].ravel())
+            for name, facets in faces.items():
                 face = gmsh.model.addDiscreteEntity(dim - 1)
                 gmsh.model.addPhysicalGroup(dim - 1, [face], name=f"{body.name}_{name}")
-                facets = node_tags[body.facets(name)].ravel()
-                gmsh.model.mesh.addElementsByType(face, GMSH_FACET[dim], [], facets)
-            offset += body.mesh.nvertices
+                of_facets = node_tags[facets].ravel()
+                gmsh.model.mesh.addElementsByType(face, kinds[1][dim], [], of_facets)
+            offset += len(points)
         gmsh.write(str(path))
     with path.open("rb") as file:
         file.seek(max(0, path.stat().st_size - len(MSH_END)))
         if file.read(len(MSH_END)) != MSH_END:
             raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(path))
+
+
+def _listed(
+    body: Body,
+) -> tuple[Array, Indices, dict[str, Indices], tuple[dict[int, int], dict[int, int]]]:
+    """Nodes of a body, those of its elements and of the facets of boundaries, and gmsh's kinds."""
+    boundaries = body.mesh.boundaries
+    if body.midsides is None:
+        faces = {name: body.facets(name) for name in boundaries}
+        return body.points, body.mesh.t.T, faces, (GMSH_CELL, GMSH_FACET)
+    cells = body.element_nodes[:, GMSH_NODES[body.mesh.dim()]]
+    faces = {name: body.facet_nodes(facets) for name, facets in boundaries.items()}
+    return body.nodes, cells, faces, (GMSH_CURVED_CELL, GMSH_CURVED_FACET)

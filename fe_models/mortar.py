@@ -67,6 +67,7 @@ class Mortar:
     ``projection`` ``(n, n_master)`` is N; ``areas`` ``(n,)`` is D, the covered area that belongs to
     each slave node [mm²], in the plane its length [mm], and ``covered`` ``(n,)`` its share of all
     the node's area; ``gap`` ``(n,)`` the distance of the faces along z, weighted by ψ [mm].
+    ``bulged`` ``(n,)`` is what surfaces add to it between vertices, and in it.
     ``kept`` ``(n,)`` marks the nodes that the master covers enough to carry a pressure: the others
     have no row in N and an infinite gap.
     """
@@ -76,6 +77,7 @@ class Mortar:
     covered: Array
     gap: Array
     kept: NDArray[np.bool_]
+    bulged: Array | None = None
 
 
 def mortar_projection(
@@ -105,9 +107,11 @@ def mortar_projection(
     projection = (sp.diags(scale) @ _coupling(slave, master, overlap, dual)).tocsr()
     projection.eliminate_zeros()
     gap = np.where(kept, slave_points[:, 2] - projection @ master_points[:, 2], np.inf)
+    bulged = None
     if surfaces is not None:
-        gap += scale * _between(slave, master, overlap, dual, surfaces)
-    return Mortar(projection, areas, covered, gap, kept)
+        bulged = scale * _between(slave, master, overlap, dual, surfaces)
+        gap += bulged
+    return Mortar(projection, areas, covered, gap, kept, bulged)
 
 
 def mortar_interface(
@@ -159,6 +163,7 @@ def mortar_interface(
             surface=surface_1 and surface_1.part(near_1, near),
         ),
         areas=mortar.areas[kept],
+        bulged=None if mortar.bulged is None else mortar.bulged[kept],
         surface=surface_2 and surface_2.part(kept, whole),
     )
 

@@ -7,7 +7,8 @@ doi:10.1137/S1064827503402837). A stress of the elements' degree is found exactl
 at the boundary too, where the superconvergent patches of Zienkiewicz and Zhu (1992,
 doi:10.1002/nme.1620330702) have few points and no partner: at the rim of a hole, 24 elements round
 it, it leaves two thirds of their error with elements of order 1 and a fifth with those of order 2.
-On surfaces that nothing touches the tractions left are taken off.
+On surfaces that nothing touches the tractions left are taken off. Curved elements have their nodes
+and normals where they are.
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from fe_models.elasticity import ElasticBody, components, tensors
+from fe_models.isoparametric import facet_normals
 from sa_solver.types import Array, Indices
 
 Flags = NDArray[np.bool_]
@@ -204,19 +206,43 @@ class StressRecovery:
         corners, normals = body.mesh.facets[:, facets].T, body.outward_of(facets)
         area = np.linalg.norm(normals, axis=1, keepdims=True)
         normals = normals / area
-        mean = _vertex_normals(body.points, corners, normals, area, count)
+        if self._elastic.curved:
+            here = facet_normals(body, facets)[:, : corners.shape[1]]
+            mean, squares = _curved_normals(corners, here, count)
+            here = here / np.linalg.norm(here, axis=2, keepdims=True)
+        else:
+            here = np.broadcast_to(normals[:, None], (*corners.shape, 3))
+            mean = _vertex_normals(body.points, corners, normals, area, count)
+            squares = _incidence(corners.T, count).T @ _dyads(area, normals)
         towards = body.points[corners].mean(axis=1)[:, None, :] - body.points[corners]
         towards /= np.linalg.norm(towards, axis=2, keepdims=True)
         turned, inward, sunk = np.ones(count), np.zeros((count, 3)), np.full(count, -np.inf)
         for k, corner in enumerate(corners.T):
-            np.minimum.at(turned, corner, np.einsum("fa,fa->f", mean[corner], normals))
+            np.minimum.at(turned, corner, np.einsum("fa,fa->f", mean[corner], here[:, k]))
             np.add.at(inward, corner, towards[:, k])
-        for corner in corners.T:
-            np.maximum.at(sunk, corner, np.einsum("fa,fa->f", inward[corner], normals))
-        squares = (area[:, :, None] * normals[:, :, None] * normals[:, None, :]).reshape(-1, 9)
-        total = (_incidence(corners.T, count).T @ squares).reshape(-1, 3, 3)
+        for k, corner in enumerate(corners.T):
+            np.maximum.at(sunk, corner, np.einsum("fa,fa->f", inward[corner], here[:, k]))
         smooth = turned > SMOOTH
-        return mean, smooth, ~smooth & (sunk > 0.0), total
+        return mean, smooth, ~smooth & (sunk > 0.0), squares.reshape(-1, 3, 3)
+
+
+def _dyads(size: Array, normals: Array) -> Array:
+    """Of unit normals ``(m, 3)``, each times its size ``(m, 1)``: ``(m, 9)``."""
+    return np.asarray(size[:, :, None] * normals[:, :, None] * normals[:, None, :]).reshape(-1, 9)
+
+
+def _curved_normals(corners: Indices, normals: Array, count: int) -> tuple[Array, Array]:
+    """Unit normals ``(count, 3)`` of curved facets at their vertices, and sums of their dyads.
+
+    ``normals`` ``(m, corners, 3)`` are as long as the facets are large.
+    """
+    mean, squares = np.zeros((count, 3)), np.zeros((count, 9))
+    for k, corner in enumerate(corners.T):
+        size = np.linalg.norm(normals[:, k], axis=1, keepdims=True)
+        np.add.at(mean, corner, normals[:, k])
+        np.add.at(squares, corner, _dyads(size, normals[:, k] / size))
+    length = np.linalg.norm(mean, axis=1, keepdims=True)
+    return np.divide(mean, length, out=mean, where=length > 0.0), squares
 
 
 def _incidence(rows: Indices, count: int) -> sp.csr_matrix:

@@ -15,6 +15,7 @@ from skfem import Basis, BilinearForm, MeshTet, MeshTri
 from skfem.helpers import dot, grad
 
 from fe_models.elasticity import ELEMENTS
+from fe_models.isoparametric import folded
 from fe_models.linear_solver import prepare
 from fe_models.mesh import (
     MATCHING_TOLERANCE,
@@ -133,6 +134,8 @@ def _unmeshed_gap(mesh: StructureMesh, interface: Interface) -> Array:
     )
     below = height_1 if interface.projection is None else interface.projection @ height_1
     form = interface.gap - (height_2 - below)
+    if interface.bulged is not None:
+        form -= interface.bulged
     form[np.abs(form) < MATCHING_TOLERANCE * np.ptp(interface.coordinates)] = 0.0
     return np.asarray(form)
 
@@ -153,9 +156,16 @@ def _followed(mesh: MeshTet | MeshTri, prescribed: Array) -> Array:
 
 def _moved(body: Body, displacement: Array) -> Body:
     mesh = replace(body.mesh, doflocs=body.mesh.p + displacement.T)
-    return Body(body.name, numbered_as(body.mesh, mesh))
+    midsides = body.midsides
+    if midsides is not None:
+        # What moves is linear between vertices: edges keep their bulges.
+        ends = body.mesh.edges if mesh.dim() == 3 else body.mesh.facets
+        midsides = midsides + displacement[ends].mean(axis=0)
+    return replace(body, mesh=numbered_as(body.mesh, mesh), midsides=midsides)
 
 
 def _crushed(before: Body, after: Body) -> bool:
     shares = element_volumes(after.mesh) / element_volumes(before.mesh)
-    return bool(np.min(shares) < SMALLEST_VOLUME_SHARE)
+    if np.min(shares) < SMALLEST_VOLUME_SHARE:
+        return True
+    return after.midsides is not None and bool(folded(after).any())

@@ -16,9 +16,8 @@ from functools import cached_property
 
 import numpy as np
 import scipy.sparse as sp
-from skfem import Basis
 
-from fe_models.elasticity import ELEMENTS, ElasticBody
+from fe_models.elasticity import ElasticBody
 from sa_solver.types import Array, Indices
 
 
@@ -32,9 +31,9 @@ class TotalLagrangian:
     def __init__(self, elastic: ElasticBody) -> None:
         self._material = elastic.material
         self._dimension = elastic.dimension
-        # F S ∇φ is of degree 4 (order - 1) in space: every integral is exact.
-        element = ELEMENTS[elastic.dimension, elastic.order]()
-        basis = Basis(elastic.body.mesh, element, intorder=max(1, 4 * (elastic.order - 1)))
+        # F S ∇φ is of degree 4 (order - 1) in space: every integral is exact
+        # where elements are straight.
+        basis = elastic.basis(max(1, 4 * (elastic.order - 1)))
         self._nodes = int(basis.N)
         self._element_nodes = basis.element_dofs.T
         self._weights = np.asarray(basis.dx)

@@ -283,7 +283,8 @@ class Model:
             for instance, chosen in elements.items():
                 known = (self.instances[instance] if instance else self._scope).elements
                 numbers = existing(chosen, known, f"{card.place}: element set {source}")
-                extend(members, {instance: [node for n in numbers for node in known[n].nodes]})
+                every = (known[n].nodes + known[n].midsides for n in numbers)
+                extend(members, {instance: [node for nodes in every for node in nodes]})
         extend(self._scope.node_sets.add(name, {}), members)
 
     def _element_set(self, card: Card) -> None:

@@ -70,6 +70,7 @@ def grouped_entities(gmsh: Any, groups: list[EntityGroup]) -> GroupedMesh:
     _refuse_ungrouped(model, top, groups)
     named: list[dict[str, Blocks]] = [{}, {}, {}, {}]
     points, second = np.asarray(coordinates).reshape(-1, 3)[order], []
+    every: dict[str, Indices] = {}
     for group in groups:
         if group.name in named[group.dimension]:
             raise MeshError(
@@ -80,18 +81,16 @@ def grouped_entities(gmsh: Any, groups: list[EntityGroup]) -> GroupedMesh:
             named[group.dimension][group.name] = [
                 (shape, cells[:, : CORNERS[shape]]) for shape, cells in blocks
             ]
-        if group.dimension == top - 1:
+        if group.dimension == top:
             second += blocks
+        if blocks and group.dimension < top - 1:
+            every[group.name] = nodes_of(blocks)
     return GroupedMesh(
         points=points,
         numbers=numbers[order],
         bodies=named[top],
         surfaces=named[top - 1] if top > 0 else {},
-        node_sets={
-            name: nodes_of(blocks)
-            for lower in named[: max(top - 1, 0)]
-            for name, blocks in lower.items()
-        },
+        node_sets=every,
         midsides=midsides_of(points, second),
     )
 

@@ -40,6 +40,8 @@ FACES: dict[str, tuple[tuple[int, ...], ...]] = {
     ),
 }  # fmt: skip
 
+HEXAHEDRON_DIAGONALS = ((0, 6), (1, 7), (2, 4), (3, 5))
+
 # Midside nodes are this share of their edge off its middle at most; a quarter where cracks begin.
 MIDDLE = 0.3
 
@@ -71,9 +73,10 @@ def midsides_of(points: Array, blocks: Iterable[tuple[str, Indices]]) -> Midside
 
     Programs list midside nodes in different orders, all elements of a shape alike: they are given
     to the edges whose middles they are nearest to. Quadrilaterals have one in their middle too,
-    on both diagonals, since they are split along one: where the eight nodes of their edges put it.
+    on both diagonals, since they are split along one: where the eight nodes of their edges put it;
+    hexahedra have one in their middle.
     """
-    edges, middles = [], []
+    edges, middles, rows = [], [], []
     for shape, cells in blocks:
         corners, pairs = CORNERS[shape], _edges(shape)
         if cells.shape[1] < corners + len(pairs) or not len(pairs):
@@ -91,14 +94,25 @@ def midsides_of(points: Array, blocks: Iterable[tuple[str, Indices]]) -> Midside
         given = given[:, order]
         edges.append(cells[:, pairs].reshape(-1, 2))
         middles.append(given.reshape(-1, 3))
+        rows.append(cells[:, corners : corners + len(pairs)][:, order].ravel())
         place = {tuple(sorted(pair)): k for k, pair in enumerate(pairs.tolist())}
+        inner: list[tuple[tuple[int, ...], Array]] = []
         for face in _quadrilaterals(shape):
             around = [place[tuple(sorted(pair))] for pair in pairwise([*face, face[0]])]
             middle = 0.5 * given[:, around].sum(axis=1) - 0.25 * points[cells[:, face]].sum(axis=1)
-            for diagonal in (face[0::2], face[1::2]):
-                edges.append(cells[:, diagonal])
-                middles.append(middle)
-    return Midsides(np.concatenate(edges), np.concatenate(middles)) if edges else None
+            diagonals = (face[0::2], face[1::2])
+            inner += [(diagonal, middle) for diagonal in diagonals]
+        if shape == "hexahedron":
+            # One of its diagonals is an edge of the tetrahedra it is split into.
+            centre = 0.25 * (given.sum(axis=1) - points[cells[:, :corners]].sum(axis=1))
+            inner += [(diagonal, centre) for diagonal in HEXAHEDRON_DIAGONALS]
+        for diagonal, middle in inner:
+            edges.append(cells[:, diagonal])
+            middles.append(middle)
+            rows.append(np.full(len(cells), -1))
+    if not edges:
+        return None
+    return Midsides(np.concatenate(edges), np.concatenate(middles), np.concatenate(rows))
 
 
 def _edges(shape: str) -> Indices:

@@ -36,8 +36,9 @@ class ImportedMesh:
 
     ``node_numbers`` ``(n,)`` are the file's own numbers of each body's vertices; ``points`` the
     vertices in each named node set of the file that has any on that body. ``midsides`` are points
-    of its surface in the middle of edges, of bodies for which the file has them; ``left`` lines of
-    the file that say more than a mesh and are not taken over.
+    in the middle of edges, of bodies for which the file has them, and ``middles`` the edges
+    ``(k, 2)`` whose midside nodes are in each of these node sets; ``left`` lines of the file that
+    say more than a mesh and are not taken over.
 
     Examples
     --------
@@ -66,6 +67,7 @@ class ImportedMesh:
     node_numbers: dict[str, Indices]
     points: dict[str, dict[str, Indices]]
     midsides: dict[str, Midsides] = field(default_factory=dict)
+    middles: dict[str, dict[str, Indices]] = field(default_factory=dict)
     left: tuple[str, ...] = ()
 
 
@@ -88,7 +90,8 @@ def read_bodies(path: Path, size: float | None = None) -> ImportedMesh:
     Reads gmsh's ``.msh`` (:func:`read_msh`), Abaqus ``.inp`` (:func:`read_abaqus`), ``.step``,
     ``.stp`` and ``.brep`` (:func:`read_cad`) and what meshio reads (:func:`read_meshio`); lengths
     are taken as mm. Elements are straight between their corners, whatever nodes they have on
-    their edges: these tell the form of contact faces. Quadrilaterals, pyramids, wedges and
+    their edges: these tell the form of contact faces, and that of elements of second order
+    (:func:`fe_models.second_order.with_midsides`). Quadrilaterals, pyramids, wedges and
     hexahedra are split into triangles or tetrahedra. A plane mesh keeps the
     two coordinates that vary, in their order, as X and Z; whether its elements are of plane strain
     or stress is not read.
@@ -221,7 +224,7 @@ def _separated(grouped: GroupedMesh) -> ImportedMesh:
     surfaces = {
         name: _facets(name, blocks, owner) for name, blocks in grouped.surfaces.items() if blocks
     }
-    bodies, numbers, points, midsides = {}, {}, {}, {}
+    bodies, numbers, points, midsides, middles = {}, {}, {}, {}, {}
     for number, name in enumerate(names):
         used = np.flatnonzero(owner == number)
         vertex = np.full(len(owner), -1)
@@ -243,7 +246,13 @@ def _separated(grouped: GroupedMesh) -> ImportedMesh:
             inside = np.all(owner[edges] == number, axis=1)
             places = in_space(grouped.midsides.points[inside][:, axes])
             midsides[name] = Midsides(vertex[edges[inside]], places)
-    return ImportedMesh(bodies, numbers, points, midsides, grouped.left)
+            rows = grouped.midsides.rows
+            assert rows is not None
+            middles[name] = {
+                points_name: vertex[edges[inside & np.isin(rows, grouped.node_sets[points_name])]]
+                for points_name in points[name]
+            }
+    return ImportedMesh(bodies, numbers, points, midsides, middles, grouped.left)
 
 
 def _axes(grouped: GroupedMesh) -> Indices:

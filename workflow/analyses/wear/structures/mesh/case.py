@@ -31,6 +31,11 @@ from workflow.analyses.wear.structures.mesh.contacts import (
     own_terms,
 )
 from workflow.analyses.wear.structures.mesh.cyclic import CyclicCuts
+from workflow.analyses.wear.structures.mesh.elements import (
+    apart,
+    elements_outline,
+    folded_elements,
+)
 from workflow.analyses.wear.structures.mesh.faces import (
     face_size,
     hardly_met,
@@ -141,9 +146,10 @@ class ImportedStructure(Section):
         """Everything in the file, read once, CAD by elements of a ``size``. Raises MeshError."""
         return _read(self.file, size, _stamp(self.file))
 
-    def mesh(self, size: float | None) -> StructureMesh:
-        """The bodies and their interfaces, made once. Raises MeshError."""
-        return _joined(self, size, _stamp(self.file))
+    def mesh(self, size: float | None, order: int = 1) -> StructureMesh:
+        """Bodies with interfaces, made once, of order 2 with midside nodes. Raises MeshError."""
+        made = _joined if order == 1 else _curved
+        return made(self, size, _stamp(self.file))
 
 
 # Reading or meshing takes seconds for every 100 000 elements: a check and the run that follows it
@@ -164,6 +170,13 @@ def _joined(structure: ImportedStructure, size: float | None, stamp: Stamp) -> S
     return imported_mesh(structure.read(size), structure.names, pairs, supports)
 
 
+@lru_cache(maxsize=1)
+def _curved(structure: ImportedStructure, size: float | None, stamp: Stamp) -> StructureMesh:
+    from fe_models.second_order import with_midsides
+
+    return with_midsides(_joined(structure, size, stamp), structure.read(size))
+
+
 def _stamp(file: str) -> Stamp:
     """Time and size by which a file that has changed is known."""
     state = Path(file).stat()
@@ -174,7 +187,7 @@ class Elements(Section):
     """Elements of the structure: those of the file, or made for its shapes."""
 
     size: Length | None = entry("for CAD files only [mm]", "2 mm", default=None)
-    order: Literal[1, 2] = entry("of the elements, 1 or 2", 1, default=1)
+    order: Literal[1, 2] = entry("of the elements; 2 has the file's midside nodes", 1, default=1)
 
 
 class MeshMaterials(TwoBodies[MeshMaterial]):
@@ -213,10 +226,12 @@ class MeshCase(FiniteElementCase):
         structure, path = self.structure, self.load_path
         cycles = f", {len(path.mix)} cycles mixed" if path.mix else ""
         before = f", those before it in {path.cycle_from - 1} legs" if path.cycle_from > 1 else ""
-        mesh = structure.mesh(self.mesh.size)
+        imported = structure.read(self.mesh.size)
+        mesh = structure.mesh(self.mesh.size, self.mesh.order)
         bodies = [f"{b.name} of {b.mesh.nvertices} nodes" for b in mesh.bodies]
         return [
             ("structure", f"{Path(structure.file).name}: {listed(bodies)}"),
+            *(("elements", text) for text in elements_outline(mesh, imported, self.mesh.order)),
             *(
                 ("face", outline_of(mesh, interface, pair.gap))
                 for interface, pair in zip(mesh.interfaces, structure.contacts, strict=True)
@@ -235,14 +250,16 @@ class MeshCase(FiniteElementCase):
     def doubts(self) -> Iterator[str]:
         """What the file says besides its mesh; faces that hardly meet, as parts of a face do."""
         yield from super().doubts()
-        if left := self.structure.read(self.mesh.size).left:
+        imported = self.structure.read(self.mesh.size)
+        if left := imported.left:
             yield (
                 f"structure.file: {counted(len(left), 'keyword')} with loads, supports, contact or "
                 f"materials not taken over, the first {left[0]}; all of them: fretscale describe"
             )
-        mesh = self.structure.mesh(self.mesh.size)
+        mesh = self.structure.mesh(self.mesh.size, self.mesh.order)
+        yield from (f"mesh.order: {doubt}" for doubt in folded_elements(mesh, imported))
         for index, interface in enumerate(mesh.interfaces):
-            if doubt := hardly_met(mesh, interface):
+            for doubt in filter(None, (hardly_met(mesh, interface), apart(mesh, interface))):
                 yield f"structure.contacts.{index}: {doubt}"
 
     @model_validator(mode="after")
@@ -360,6 +377,8 @@ class MeshCase(FiniteElementCase):
         self._check_contacts()
         self._check_cyclic(imported)
         self._check_supports(imported)
+        with _pointing_at("mesh.order"):
+            structure.mesh(self.mesh.size, self.mesh.order)
         return self
 
     def _check_names(self, imported: ImportedMesh) -> None:

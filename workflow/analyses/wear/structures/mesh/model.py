@@ -94,7 +94,7 @@ class MeshModel:
     @cached_property
     def _meshed(self) -> StructureMesh:
         """The mesh of the file, without the gaps that the case gives."""
-        return self._case.structure.mesh(self._case.mesh.size)
+        return self._case.structure.mesh(self._case.mesh.size, self.order)
 
     def _with_gap(self, interface: Interface) -> Interface:
         """The interface with the gap of the case on top of the meshes'."""

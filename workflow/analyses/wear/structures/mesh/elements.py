@@ -1,0 +1,70 @@
+"""What is used of the midside nodes of a mesh, told before anything runs."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+from workflow.case.plain import counted
+
+if TYPE_CHECKING:
+    from fe_models.geometry.imported import ImportedMesh
+    from fe_models.mesh import Interface, StructureMesh
+
+# Midside nodes of faces that meet node to node are apart by more than this share of the face.
+APART = 1e-6
+
+
+def elements_outline(mesh: StructureMesh, imported: ImportedMesh, order: int) -> Iterator[str]:
+    """How curved the elements are of each body; nothing where neither file nor case says of it."""
+    from fe_models.second_order import curvature
+
+    known = {body.name: curvature(body, imported) for body in mesh.bodies}
+    if order == 1:
+        if any(known.values()):
+            yield (
+                "of order 1, straight between their corners: midside nodes give contact faces "
+                "their form and nothing else; mesh.order: 2 takes them"
+            )
+        return
+    for name, found in known.items():
+        if found is None:
+            yield f"{name} of order 2, straight: the file has no midside nodes of it"
+        elif not found.curved:
+            yield f"{name} of order 2, straight: its midside nodes are in the middle of edges"
+        else:
+            without = found.edges - found.given
+            rest = f"; {counted(without, 'edge')} without a midside node straight" * (without > 0)
+            yield (
+                f"{name} of order 2, {found.curved} of {counted(found.edges, 'edge')} curved by "
+                f"up to {1e3 * found.off:.3g} µm{rest}"
+            )
+
+
+def folded_elements(mesh: StructureMesh, imported: ImportedMesh) -> Iterator[str]:
+    """Doubts about elements that midside nodes would fold, and what is done about them."""
+    from fe_models.second_order import curvature
+
+    for body in mesh.bodies:
+        if body.midsides is None or not (found := curvature(body, imported)):
+            continue
+        if found.straightened:
+            yield (
+                f"{body.name}: midside nodes fold elements, of which "
+                f"{counted(found.straightened, 'edge')} of {found.edges} are taken straight; "
+                "refine the mesh where it bends"
+            )
+
+
+def apart(mesh: StructureMesh, interface: Interface) -> str:
+    """A doubt about faces that meet node to node, but for their midside nodes; empty if none."""
+    from fe_models.second_order import distance_of_midsides
+
+    between = distance_of_midsides(interface, [mesh.bodies[place] for place in interface.bodies])
+    if between <= APART * float(interface.facet_sizes.max()) ** (1.0 if interface.line else 0.5):
+        return ""
+    return (
+        f"{interface.name}: its faces meet node to node, but their midside nodes are up to "
+        f"{1e3 * between:.3g} µm apart: the gap there is taken as none; give both faces the same, "
+        "or take mesh.order: 1"
+    )
