@@ -10,7 +10,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from fe_models.geometry.abaqus_cards import cards
-from fe_models.geometry.abaqus_elements import PLANE_STRESS, advice
+from fe_models.geometry.abaqus_elements import PLANE_STRESS
 from fe_models.geometry.abaqus_model import Model
 from fe_models.geometry.flattened import FlatFile, Flattened, dimension_of
 from fe_models.geometry.grouped import DIMENSION, GroupedMesh
@@ -78,6 +78,7 @@ def _check_assembly(path: Path, model: Model) -> None:
         for element in scope.elements.values():
             if DIMENSION[element.shape] != dimension or not element.stands_alone:
                 raise MeshError(
-                    f"{element.place}: element type {element.kind}{advice(element.kind)}; allowed "
-                    "in a part: solid elements, or plane ones, alone"
+                    f"{element.place}: element type {element.kind} "
+                    f"{f'is {element.advice}; ' * bool(element.advice)}"
+                    "allowed in a part: solid elements, or plane ones, alone"
                 )

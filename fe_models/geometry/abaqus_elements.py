@@ -65,7 +65,7 @@ def element_type(card: Card) -> tuple[int, str]:
         if (match := pattern.fullmatch(kind)) and int(match[1]) in shapes:
             return int(match[1]), shapes[int(match[1])]
     if kind not in FACET_TYPES:
-        told = advice(kind) or f"; allowed: {ALLOWED_TYPES}"
+        told = f" is {advice(kind)}" if advice(kind) else f"; allowed: {ALLOWED_TYPES}"
         raise MeshError(f"{card.place}: element type {kind}{told}")
     return FACET_TYPES[kind]
 
@@ -74,5 +74,5 @@ def advice(kind: str) -> str:
     """What family a type that is not read is of, and what to do; empty if it is of none known."""
     for pattern, family, remedy in FAMILIES:
         if re.fullmatch(rf"{pattern}[A-Z]*", kind):
-            return f" is {family}: {remedy}"
+            return f"{family}: {remedy}"
     return ""

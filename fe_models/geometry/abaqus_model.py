@@ -9,7 +9,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from fe_models.geometry.abaqus_cards import Card, DataLine, SourceLine, integer, real
-from fe_models.geometry.abaqus_elements import FACET_TYPES, element_type
+from fe_models.geometry.abaqus_elements import FACET_TYPES, advice, element_type
 from fe_models.geometry.grouped import CORNERS
 from fe_models.geometry.scope import Element, Members, Names, Scope, existing, extend, resolve
 from fe_models.mesh import MeshError
@@ -124,8 +124,11 @@ class Model:
         scope = self._scope
         count, shape = element_type(card)
         corners, kind = CORNERS[shape], card.name("TYPE").upper()
+        told = advice(kind)
         numbers: list[int | range] = []
         for place, (number, *nodes) in _element_rows(card, count):
+            if (shape, count) == ("line", 3):  # the middle one stands between the ends
+                nodes = [nodes[0], nodes[2], nodes[1]]
             if number in scope.elements:
                 raise MeshError(f"{place}: element {number} is defined twice")
             scope.elements[number] = Element(
@@ -135,6 +138,7 @@ class Model:
                 place=place,
                 kind=kind,
                 stands_alone=kind not in FACET_TYPES,
+                advice=told,
             )
             numbers.append(number)
         if name := card.parameters.get("ELSET"):

@@ -9,13 +9,13 @@ from typing import Any, TypeVar
 import numpy as np
 
 from fe_models.geometry.abaqus_cards import Card, SourceLine
-from fe_models.geometry.abaqus_elements import advice
 from fe_models.geometry.grouped import (
     DIMENSION,
     FACE_SHAPES,
     FACES,
     Blocks,
     GroupedMesh,
+    edges_of_shape,
     midsides_of,
     nodes_of,
     piece_blocks,
@@ -34,7 +34,7 @@ def dimension_of(scope: Scope) -> int:
     if not standing:
         first = next(iter(scope.elements.values()))
         raise MeshError(
-            f"{first.place}: element type {first.kind}{advice(first.kind)}; allowed: solid or "
+            f"{first.place}: element type {first.kind} is {first.advice}; allowed: solid or "
             "plane elements, and such facets on them"
         )
     return max(DIMENSION[element.shape] for element in standing)
@@ -177,6 +177,12 @@ def _face(element: Element, number: int, side: str, place: SourceLine) -> list[i
     return [element.nodes[corner] for corner in faces[sides.index(side)]]
 
 
+def _loose(element: Element, where: str) -> MeshError:
+    """A facet or an edge that is on no body."""
+    told = f" is {element.advice}" if element.advice else "; allowed: bodies of one kind"
+    return MeshError(f"{element.place}: {element.kind} {where}{told}")
+
+
 class FlatFile(Flattened):
     """A file without parts."""
 
@@ -212,10 +218,19 @@ class FlatFile(Flattened):
         used = {node for number in numbers for node in elements[number].nodes}
         for element in elements.values():
             if self._level(element) and not used.issuperset(element.nodes):
-                raise MeshError(
-                    f"{element.place}: a {element.shape} with nodes on no "
-                    f"{'solid' if self.top == 3 else 'plane element'}; allowed: bodies of one kind"
-                )
+                bodies = "solid" if self.top == 3 else "plane element"
+                raise _loose(element, f"with nodes on no {bodies}")
+        lines = [element for element in elements.values() if self._level(element) == 2]
+        if not lines:
+            return
+        edges = {
+            tuple(sorted((element.nodes[a], element.nodes[b])))
+            for element in (elements[number] for number in numbers)
+            for a, b in edges_of_shape(element.shape).tolist()
+        }
+        for element in lines:
+            if tuple(sorted(element.nodes)) not in edges:
+                raise _loose(element, "on no edge of a solid")
 
     def _level(self, element: Element) -> int:
         """0 for an element of a body, 1 for a facet, 2 for an edge beside solids."""

@@ -15,6 +15,8 @@ from fe_models.geometry.checked import checked_body, vector
 from fe_models.geometry.gmsh_file import read_msh
 from fe_models.geometry.grouped import DIMENSION, Blocks, GroupedMesh, nodes_of, split_blocks
 from fe_models.geometry.meshio_file import read_meshio
+from fe_models.geometry.nastran import read_nastran
+from fe_models.geometry.unv import read_unv
 from fe_models.mesh import Body, MeshError, in_space
 from fe_models.remesh import element_volumes
 from sa_solver.types import Array, Indices
@@ -23,6 +25,8 @@ from sa_solver.types import Array, Indices
 PLANE = 1e-9
 # Closed surfaces have no mean normal: theirs is rounding, below this share of the area.
 CLOSED = 1e-9
+# Endings of Nastran's bulk data.
+NASTRAN = (".bdf", ".nas", ".fem")
 # Files of programs whose own formats nothing here reads.
 EXPORTABLE = {
     ".cdb": "Ansys", ".db": "Ansys", ".odb": "Abaqus", ".cae": "Abaqus", ".mph": "COMSOL",
@@ -85,9 +89,10 @@ class Patch:
 def read_bodies(path: Path, size: float | None = None) -> ImportedMesh:
     """Read the bodies of a mesh file, or mesh those of a CAD file at ``size`` [mm].
 
-    Reads gmsh's ``.msh`` (:func:`read_msh`), Abaqus ``.inp`` (:func:`read_abaqus`), ``.step``,
-    ``.stp`` and ``.brep`` (:func:`read_cad`) and what meshio reads (:func:`read_meshio`); lengths
-    are taken as mm. Elements are straight between their corners, whatever nodes they have on
+    Reads gmsh's ``.msh`` (:func:`read_msh`), Abaqus ``.inp`` (:func:`read_abaqus`), Nastran's
+    ``.bdf`` and ``.nas`` (:func:`read_nastran`), ``.unv`` (:func:`read_unv`), ``.step``, ``.stp``
+    and ``.brep`` (:func:`read_cad`) and what meshio reads (:func:`read_meshio`); lengths are taken
+    as mm. Elements are straight between their corners, whatever nodes they have on
     their edges: these tell the form of contact faces. Quadrilaterals, pyramids, wedges and
     hexahedra are split into triangles or tetrahedra. A plane mesh keeps the
     two coordinates that vary, in their order, as X and Z; whether its elements are of plane strain
@@ -145,7 +150,8 @@ def _grouped(path: Path, size: float | None) -> GroupedMesh:
         raise MeshError(f"{path}: is a mesh already; a mesh size is for {', '.join(BEGINNINGS)}")
     if suffix == ".msh":
         return read_apart(read_msh, path)
-    return read_abaqus(path) if suffix == ".inp" else read_meshio(path)
+    reader = {".inp": read_abaqus, **dict.fromkeys(NASTRAN, read_nastran), ".unv": read_unv}
+    return reader.get(suffix, read_meshio)(path)
 
 
 def describe_bodies(imported: ImportedMesh) -> list[str]:

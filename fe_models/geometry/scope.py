@@ -48,7 +48,8 @@ class Names(Generic[_Value]):
 class Element:
     """Shape, corner nodes, nodes on its edges, of second order, place and type of an element.
 
-    One whose ``stands_alone`` is false is a facet or an edge of a body, and none itself.
+    One whose ``stands_alone`` is false is a facet or an edge of a body, and none itself; ``advice``
+    says what it is and what to do where it is taken for neither.
     """
 
     shape: str
@@ -57,6 +58,7 @@ class Element:
     place: SourceLine
     kind: str = ""
     stands_alone: bool = True
+    advice: str = ""
 
 
 @dataclass

@@ -492,7 +492,7 @@ def test_wrong_line_is_refused_where_it_stands(tmp_path, old, new, at, message):
         ),
         (
             CUBES + "*Node\n1, 9., 9., 9.\n*Element, type=R3D3\n9, 11, 12, 1\n",
-            "a triangle with nodes on no solid",
+            "R3D3 with nodes on no solid is a rigid surface: give",
         ),
         (
             CUBES.replace("C3D8R", "C3D8")[: CUBES.index("*Element")]
