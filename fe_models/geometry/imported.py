@@ -29,8 +29,10 @@ CLOSED = 1e-9
 NASTRAN = (".bdf", ".nas", ".fem")
 # Files of programs whose own formats nothing here reads.
 EXPORTABLE = {
-    ".cdb": "Ansys", ".db": "Ansys", ".odb": "Abaqus", ".cae": "Abaqus", ".mph": "COMSOL",
-    ".sldprt": "SolidWorks", ".iges": "CAD", ".igs": "CAD",
+    ".cdb": "Ansys", ".db": "Ansys", ".mechdb": "Ansys", ".rst": "Ansys", ".odb": "Abaqus",
+    ".cae": "Abaqus", ".mph": "COMSOL", ".op2": "Nastran", ".hm": "HyperMesh", ".k": "LS-DYNA",
+    ".key": "LS-DYNA", ".prt": "NX", ".sldprt": "SolidWorks", ".sldasm": "SolidWorks",
+    ".catpart": "CATIA", ".catproduct": "CATIA", ".iges": "CAD", ".igs": "CAD",
 }  # fmt: skip
 
 
@@ -139,8 +141,8 @@ def _grouped(path: Path, size: float | None) -> GroupedMesh:
         raise MeshError(f"{path}: {'not a file' if path.exists() else 'no such file'}")
     if suffix in EXPORTABLE:
         raise MeshError(
-            f"{path}: {EXPORTABLE[suffix]}'s {suffix} is not read; export it as .inp, .msh, .vtu "
-            "or .step"
+            f"{path}: {EXPORTABLE[suffix]}'s {suffix} is not read; export it as .inp, .bdf, "
+            ".unv, .msh, .vtu or .step"
         )
     if suffix in BEGINNINGS:
         if size is None:

@@ -29,7 +29,7 @@ def test_what_a_file_says_besides_is_named(blocks, tmp_path):
         f"not taken over: blocks.inp:{line + 6}: *friction: 0.3",
     ]
     said = " ".join(invoke("check", blocks).output.split())
-    assert "3 keywords with loads, supports, contact or materials not taken over" in said
+    assert "3 lines with loads, supports, contact or materials not taken over" in said
 
 
 def test_a_face_in_two_parts(blocks, tmp_path):

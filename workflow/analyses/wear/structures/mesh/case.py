@@ -59,7 +59,7 @@ CAD = (".step", ".stp", ".brep")
 # What the readers take; other endings are refused with advice.
 ENDINGS = (
     ".msh", ".inp", ".step", ".stp", ".brep", ".vtu", ".vtk", ".xdmf", ".med", ".bdf", ".mesh",
-    ".nas", ".cdb", ".odb", ".cae", ".db", ".igs", ".iges",
+    ".nas", ".fem", ".unv", ".cdb", ".odb", ".cae", ".db", ".igs", ".iges",
 )  # fmt: skip
 
 # Heights on both sides of a plane of symmetry may differ by this share of their range: files round.
@@ -232,7 +232,7 @@ class MeshCase(FiniteElementCase):
         yield from super().doubts()
         if left := self.structure.read(self.mesh.size).left:
             yield (
-                f"structure.file: {counted(len(left), 'keyword')} with loads, supports, contact or "
+                f"structure.file: {counted(len(left), 'line')} with loads, supports, contact or "
                 f"materials not taken over, the first {left[0]}; all of them: fretscale describe"
             )
         mesh = self.structure.mesh(self.mesh.size)
