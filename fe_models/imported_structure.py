@@ -23,8 +23,10 @@ from fe_models.curved_face import Surface, edges_of
 from fe_models.cut_face import cut_interface
 from fe_models.elasticity import ElasticBody
 from fe_models.geometry.imported import ImportedMesh
+from fe_models.geometry.set_faces import facets_within
 from fe_models.mesh import Body, MatchError, MeshError, StructureMesh, matched_interface
 from fe_models.mortar import frame_of_faces, mortar_interface
+from fe_models.nodal_force import forces_of, shared
 from fe_models.rest import rigid_assemblies
 from fe_models.spin_softening import spin_softening
 from fe_models.structure import Structure
@@ -159,11 +161,10 @@ def contact_facets(imported: ImportedMesh, body: Body, boundary: str) -> Indices
     if others:
         wrong = f"boundary {boundary} is on body {', '.join(others)}, not on {body.name}"
     elif boundary in node_sets:
-        surface = body.mesh.boundary_facets()
-        facets = surface[np.isin(body.mesh.facets[:, surface], node_sets[boundary]).all(axis=0)]
+        facets = facets_within(body, node_sets[boundary])
         left = len(np.setdiff1d(node_sets[boundary], body.mesh.facets[:, facets]))
         if not left:
-            return np.asarray(facets)
+            return facets
         wrong = (
             f"{boundary} is a node set; {left} of its nodes are on no facet with all corners in it"
         )
@@ -193,14 +194,16 @@ def check_load(imported: ImportedMesh, bodies: Sequence[Body], load: AppliedLoad
         check_temperature(load, {body.name: imported.node_numbers[body.name] for body in bodies})
     boundaries, node_sets = _groups(imported, bodies)
     group = boundary_of(load)
-    if group is not None and group not in boundaries:
+    if isinstance(load, BoundaryForce) and group in node_sets - boundaries:
+        _check_shared(imported, bodies, load)
+    elif group is not None and group not in boundaries:
         wrong = (
-            f"{group} is a node set, which has no area"
+            f"{group} is a node set that is no face, and has no area: it takes forces alone"
             if group in node_sets
             else f"no boundary {group} on {_any_of(bodies)}"
         )
         raise MeshError(f"{wrong}; allowed: {', '.join(sorted(boundaries)) or 'none'}")
-    having = [body for body in bodies if group in _groups(imported, [body])[0]]
+    having = [body for body in bodies if group in _names(imported, body)]
     if isinstance(load, BoundaryForce) and len(having) > 1:
         raise MeshError(
             f"{group} is a boundary of {' and '.join(body.name for body in having)}, and each "
@@ -215,6 +218,15 @@ def check_load(imported: ImportedMesh, bodies: Sequence[Body], load: AppliedLoad
         raise MeshError("a moment about x or z, which lie in the plane; allowed: about y")
 
 
+def _check_shared(imported: ImportedMesh, bodies: Sequence[Body], load: BoundaryForce) -> None:
+    """Raise unless the nodes of a set that is no face can carry a force."""
+    if getattr(load, "rigid", False):
+        raise MeshError(f"{load.boundary} is a node set that is no face; allowed: a rigid boundary")
+    for body in bodies:
+        if load.boundary in imported.points[body.name]:
+            shared(load, body.points[imported.points[body.name][load.boundary]])
+
+
 def _any_of(bodies: Sequence[Body]) -> str:
     return " or ".join(body.name for body in bodies)
 
@@ -222,9 +234,10 @@ def _any_of(bodies: Sequence[Body]) -> str:
 def _with_interfaces(imported: ImportedMesh, body: Body, pairs: Sequence[ContactPair]) -> Body:
     """The body with its contact faces as boundaries of the interfaces' names as well.
 
-    Those of several boundaries go by all of their names together, too.
+    Those of several boundaries go by all of their names together, too; node sets that are faces
+    are boundaries.
     """
-    named: dict[str, Indices] = {}
+    named = dict(imported.set_faces[body.name])
     for pair in pairs:
         for number in (n for n, name in enumerate(pair.bodies, start=1) if name == body.name):
             parts = [contact_facets(imported, body, name) for name in pair.boundaries(number)]
@@ -303,7 +316,11 @@ def _check_rest(structure: Structure) -> None:
 
 def _groups(imported: ImportedMesh, bodies: Sequence[Body]) -> tuple[set[str], set[str]]:
     """Names of the boundaries and of the node sets of the bodies."""
-    boundaries = {name for body in bodies for name in imported.bodies[body.name].mesh.boundaries}
+    boundaries = {
+        name
+        for body in bodies
+        for name in [*imported.bodies[body.name].mesh.boundaries, *imported.set_faces[body.name]]
+    }
     return boundaries, {name for body in bodies for name in imported.points[body.name]}
 
 
@@ -332,8 +349,8 @@ def _supported(
         elif isinstance(load, Temperature):
             forces[:, case] = elastic.thermal_load(thermal[:, case])
         elif boundary_of(load) is None or boundary_of(load) in groups:
-            forces[:, case] = load.forces(elastic)
-            loaded += [name for name in (boundary_of(load),) if name is not None]
+            forces[:, case] = forces_of(load, elastic, imported.points[body.name])
+            loaded += [name for name in body.mesh.boundaries if name == boundary_of(load)]
     _check_against_supports(loads, imposed, supported_motions @ imposed[free])
     _check_against_each_other(elastic, moved)
     _check_separate(mesh, number)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +17,7 @@ from fe_models.geometry.gmsh_file import read_msh
 from fe_models.geometry.grouped import DIMENSION, Blocks, GroupedMesh, nodes_of, split_blocks
 from fe_models.geometry.meshio_file import read_meshio
 from fe_models.geometry.nastran import read_nastran
+from fe_models.geometry.set_faces import faces_of_sets
 from fe_models.geometry.unv import read_unv
 from fe_models.mesh import Body, MeshError, in_space
 from fe_models.remesh import element_volumes
@@ -73,6 +75,11 @@ class ImportedMesh:
     points: dict[str, dict[str, Indices]]
     midsides: dict[str, Midsides] = field(default_factory=dict)
     left: tuple[str, ...] = ()
+
+    @cached_property
+    def set_faces(self) -> dict[str, dict[str, Indices]]:
+        """Facets of the node sets of each body that are faces, by name."""
+        return {name: faces_of_sets(body, self.points[name]) for name, body in self.bodies.items()}
 
 
 @dataclass(frozen=True)
@@ -200,8 +207,9 @@ def describe_bodies(imported: ImportedMesh) -> list[str]:
             )
         for points, vertices in imported.points[name].items():
             centre = body.points[vertices].mean(axis=0)
+            form = f", a face of {facet}" * (points in imported.set_faces[name])
             lines.append(
-                f"  node set {points}: {len(vertices)} nodes, centroid {vector(centre)} mm"
+                f"  node set {points}: {len(vertices)} nodes{form}, centroid {vector(centre)} mm"
             )
     return lines + [f"not taken over: {line}" for line in imported.left]
 

@@ -160,13 +160,35 @@ def test_size_is_for_cad_files_alone(cad, blocks):
     assert "mesh.size: missing" in refused(cad)
 
 
-def test_node_sets_take_no_force_and_no_normal(blocks):
+def test_node_sets_that_are_no_faces(blocks, tmp_path):
+    """They take forces, which their nodes share, and no pressure; one node takes no moment."""
     part = "*End Part\n*Assembly"
-    edit(blocks.with_name("blocks.inp"), part, f"*Nset, nset=tip\n5\n{part}")
-    assert "tip is a node set" in refused(blocks, "structure.loads.1.group=tip")
+    tips = "*Nset, nset=tip\n5\n*Nset, nset=top\n19, 21, 25, 27\n"
+    edit(blocks.with_name("blocks.inp"), part, f"{tips}{part}")
+    at_tip = "structure.loads.1.group=tip"
+    assert invoke("check", blocks, "--set", at_tip).exit_code == 0
+    line = refused(blocks, at_tip, "structure.loads.1.at=[9, 0, 0]")
+    assert "the 1 nodes of tip cannot carry its moment" in line
+    assert "tip is a node set that is no face" in refused(blocks, "structure.loads.0.group=tip")
     assert "tip is a node set" in refused(blocks, "structure.contacts.0.face_2=tip")
     overrides = "structure.supports.0.group=tip", "structure.supports.0.hold=normal"
     assert "node set tip has no area to hold normal" in refused(blocks, *overrides)
+    peak = run(blocks, tmp_path / "out", "structure.loads.1.group=top")["foot"]["peak_load"]
+    assert peak["unworn"]["Qx"] == pytest.approx(-4.0, rel=1e-5)
+
+
+def test_node_sets_that_are_faces_take_what_faces_take(blocks, tmp_path):
+    """Pressure and forces on the nodes of a face are those on the face, to all digits."""
+    high = "*Surface, type=ELEMENT, name=foot_high\n5, S2\n6, S2\n7, S2\n8, S2\n"
+    low = "*Surface, type=ELEMENT, name=base_low\n1, S1\n2, S1\n3, S1\n4, S1\n"
+    whole = run(blocks, tmp_path / "whole")["foot"]
+    file = blocks.with_name("blocks.inp")
+    edit(file, high, "*Nset, nset=foot_high, generate\n19, 27, 1\n")
+    edit(file, low, "*Nset, nset=base_low, generate\n1, 9, 1\n")
+    normal = "structure.supports=[{group: base_low, hold: normal}, {group: base_low, hold: xy}]"
+    by_nodes = run(blocks, tmp_path / "nodes", normal)["foot"]
+    for name in ("depth_1", "volume_2", "energy"):
+        assert by_nodes[name] == pytest.approx(whole[name], rel=1e-9)
 
 
 @pytest.mark.parametrize(
