@@ -25,15 +25,15 @@ from fe_models.cut_face import cut_interface
 from fe_models.cyclic import Cuts, Cyclic, hold_normal
 from fe_models.elasticity import ElasticBody
 from fe_models.geometry.imported import ImportedMesh
+from fe_models.geometry.set_faces import facets_within
 from fe_models.imposed import (
-    Imposing,
     check_against_each_other,
     check_against_supports,
-    impose,
-    tie_rigid,
 )
+from fe_models.load_cases import LoadCases
 from fe_models.mesh import Body, MatchError, MeshError, StructureMesh, matched_interface
 from fe_models.mortar import frame_of_faces, mortar_interface
+from fe_models.nodal_force import shared
 from fe_models.pretension import Pretension, check_pretension
 from fe_models.rest import rigid_assemblies
 from fe_models.second_order import set_nodes
@@ -176,11 +176,10 @@ def contact_facets(imported: ImportedMesh, body: Body, boundary: str) -> Indices
     if others:
         wrong = f"boundary {boundary} is on body {', '.join(others)}, not on {body.name}"
     elif boundary in node_sets:
-        surface = body.mesh.boundary_facets()
-        facets = surface[np.isin(body.mesh.facets[:, surface], node_sets[boundary]).all(axis=0)]
+        facets = facets_within(body, node_sets[boundary])
         left = len(np.setdiff1d(node_sets[boundary], body.mesh.facets[:, facets]))
         if not left:
-            return np.asarray(facets)
+            return facets
         wrong = (
             f"{boundary} is a node set; {left} of its nodes are on no facet with all corners in it"
         )
@@ -212,14 +211,16 @@ def check_load(imported: ImportedMesh, bodies: Sequence[Body], load: AppliedLoad
         check_temperature(load, {body.name: imported.node_numbers[body.name] for body in bodies})
     boundaries, node_sets = _groups(imported, bodies)
     group = boundary_of(load)
-    if group is not None and group not in boundaries:
+    if isinstance(load, BoundaryForce) and group in node_sets - boundaries:
+        _check_shared(imported, bodies, load)
+    elif group is not None and group not in boundaries:
         wrong = (
-            f"{group} is a node set, which has no area"
+            f"{group} is a node set that is no face, and has no area: it takes forces alone"
             if group in node_sets
             else f"no boundary {group} on {_any_of(bodies)}"
         )
         raise MeshError(f"{wrong}; allowed: {', '.join(sorted(boundaries)) or 'none'}")
-    having = [body for body in bodies if group in _groups(imported, [body])[0]]
+    having = [body for body in bodies if group in _names(imported, body)]
     if isinstance(load, BoundaryForce | RemoteDisplacement) and len(having) > 1:
         what = "take all of the force" if isinstance(load, BoundaryForce) else "be tied to it"
         raise MeshError(
@@ -237,6 +238,15 @@ def check_load(imported: ImportedMesh, bodies: Sequence[Body], load: AppliedLoad
         raise MeshError(f"a {what} about x or z, which lie in the plane; allowed: about y")
 
 
+def _check_shared(imported: ImportedMesh, bodies: Sequence[Body], load: BoundaryForce) -> None:
+    """Raise unless the nodes of a set that is no face can carry a force."""
+    if getattr(load, "rigid", False):
+        raise MeshError(f"{load.boundary} is a node set that is no face; allowed: a rigid boundary")
+    for body in bodies:
+        if load.boundary in imported.points[body.name]:
+            shared(load, body.points[imported.points[body.name][load.boundary]])
+
+
 def _any_of(bodies: Sequence[Body]) -> str:
     return " or ".join(body.name for body in bodies)
 
@@ -244,9 +254,10 @@ def _any_of(bodies: Sequence[Body]) -> str:
 def _with_interfaces(imported: ImportedMesh, body: Body, pairs: Sequence[ContactPair]) -> Body:
     """The body with its contact faces as boundaries of the interfaces' names as well.
 
-    Those of several boundaries go by all of their names together, too.
+    Those of several boundaries go by all of their names together, too; node sets that are faces
+    are boundaries.
     """
-    named: dict[str, Indices] = {}
+    named = dict(imported.set_faces[body.name])
     for pair in pairs:
         for number in (n for n, name in enumerate(pair.bodies, start=1) if name == body.name):
             parts = [contact_facets(imported, body, name) for name in pair.boundaries(number)]
@@ -325,7 +336,11 @@ def _check_rest(structure: Structure) -> None:
 
 def _groups(imported: ImportedMesh, bodies: Sequence[Body]) -> tuple[set[str], set[str]]:
     """Names of the boundaries and of the node sets of the bodies."""
-    boundaries = {name for body in bodies for name in imported.bodies[body.name].mesh.boundaries}
+    boundaries = {
+        name
+        for body in bodies
+        for name in [*imported.bodies[body.name].mesh.boundaries, *imported.set_faces[body.name]]
+    }
     return boundaries, {name for body in bodies for name in imported.points[body.name]}
 
 
@@ -344,7 +359,7 @@ def _supported(
     constraints, groups = _held(imported, elastic, supports, cuts), _names(imported, body)
     free, supported_motions = constraints.free, constraints.transformation()
     thermal = thermal_strains(loads, elastic, imported.node_numbers[body.name])
-    cases = _LoadCases(elastic, thermal, groups)
+    cases = LoadCases(elastic, thermal, groups, imported.points[body.name])
     for case, load in enumerate(loads):
         cases.add(case, load, constraints)
     check_against_supports(loads, cases.imposed, supported_motions @ cases.imposed[free])
@@ -357,13 +372,14 @@ def _supported(
             elastic,
             constraints,
             *interface_nodes(faces, body),
-            cases.forces,
+            cases.forces + cases.straining,
             cases.imposed if cases.imposed.any() else None,
             cases.loaded,
             trace,
             thermal,
             cuts,
             cases.jumps if cases.jumps.any() else None,
+            cases.straining,
         )
     except ValueError as error:
         raise MeshError(f"body {body.name}: {error}") from error
@@ -372,43 +388,6 @@ def _supported(
             f"body {body.name}: all its nodes are held or on contact faces; refine its mesh"
         )
     return supported
-
-
-class _LoadCases:
-    """What loads do to a body with such ``groups``, each a column.
-
-    ``forces`` on its nodes, ``imposed`` displacements and ``jumps``, ``(size, cases)``; ``loaded``
-    are boundaries with tractions, ``moved`` the loads that impose something.
-    """
-
-    def __init__(self, elastic: ElasticBody, thermal: Array, groups: set[str]) -> None:
-        self._elastic, self._thermal, self._groups = elastic, thermal, groups
-        shape = elastic.size, thermal.shape[1]
-        self.forces, self.imposed, self.jumps = np.zeros((3, *shape))
-        self.loaded: list[str] = []
-        self.moved: list[Imposing] = []
-
-    def add(self, case: int, load: AppliedLoad, constraints: Constraints) -> None:
-        """A load, with what it holds and ties among the ``constraints``."""
-        elastic, boundary = self._elastic, boundary_of(load)
-        if boundary is not None and boundary not in self._groups:
-            return
-        if isinstance(load, Imposing):
-            self.moved.append(load)
-            self.imposed[:, case] = impose(constraints, elastic, load)
-        elif isinstance(load, Temperature):
-            self.forces[:, case] = elastic.thermal_load(self._thermal[:, case])
-        elif isinstance(load, Pretension):
-            if load.body == elastic.body.name:
-                self.jumps[:, case] = load.jump(elastic)
-                self.forces[:, case] = elastic.stiffness @ self.jumps[:, case]
-        else:
-            self.forces[:, case] = load.forces(elastic)
-            if isinstance(load, BoundaryForce) and load.rigid:
-                at = elastic.nodes[elastic.boundary_nodes(load.boundary)].mean(axis=0)
-                tie_rigid(constraints, elastic, load.boundary, at)
-            if boundary is not None:
-                self.loaded.append(boundary)
 
 
 def _check_separate(mesh: StructureMesh, number: int) -> None:

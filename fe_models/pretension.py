@@ -28,7 +28,6 @@ from fe_models.remesh import element_volumes
 from sa_solver.types import Array, Mask
 
 if TYPE_CHECKING:
-    from fe_models.applied_loads import AppliedLoad
     from fe_models.friction import FrictionalJoint
     from fe_models.structure import Structure
     from fe_models.supported_body import SupportedBody
@@ -127,9 +126,7 @@ def check_pretension(load: Pretension, bodies: Sequence[Body]) -> None:
     load.far(found[0])
 
 
-def bolt_section(
-    structure: Structure, bolt: Pretension, loads: Sequence[AppliedLoad]
-) -> BoltSection:
+def bolt_section(structure: Structure, bolt: Pretension) -> BoltSection:
     """The section of a bolt, by the part that no support holds along it.
 
     Raises :class:`MeshError` where supports resist both parts, or the plane cuts a contact face.
@@ -170,10 +167,11 @@ def bolt_section(
             frame = structure.mesh.interfaces[number].frame
             x, y, z = {1: -1.0, 2: 1.0}[side] * (frame.axes @ outwards)
             shares[number] += z, x, y
-    along = np.array([shift @ _acting(load, body) for load in loads])
     length = float(np.ptp(body.elastic.nodes @ axis))
     volume = float(np.abs(element_volumes(body.elastic.body.mesh)).sum())
-    return BoltSection(shares, along, length**2 / (body.elastic.material.young * volume))
+    return BoltSection(
+        shares, shift @ body.acting, length**2 / (body.elastic.material.young * volume)
+    )
 
 
 def _is_free(body: SupportedBody, shift: Array) -> bool:
@@ -181,20 +179,6 @@ def _is_free(body: SupportedBody, shift: Array) -> bool:
     constraints = body.constraints
     left = constraints.transformation() @ shift[constraints.free] - shift
     return bool(np.abs(left).max() <= UNRESISTED)
-
-
-def _acting(load: AppliedLoad, body: SupportedBody) -> Array:
-    """Forces of a load from outside a body ``(size,)``; none of one that strains it."""
-    from fe_models.applied_loads import boundary_of
-    from fe_models.imposed import Imposing
-    from fe_models.thermal import Temperature
-
-    elastic, boundary = body.elastic, boundary_of(load)
-    if isinstance(load, Pretension | Imposing | Temperature) or (
-        boundary is not None and boundary not in elastic.body.mesh.boundaries
-    ):
-        return np.zeros(elastic.size)
-    return load.forces(elastic)
 
 
 def tightened(

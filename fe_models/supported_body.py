@@ -42,7 +42,8 @@ class SupportedBody:
     displacements that each imposes on nodes that ``constraints`` hold; ``loaded`` are boundaries
     with tractions on them; ``thermal`` ``(vertices, cases)`` expansions of the vertices and
     ``jumps`` ``(d all, cases)`` shifts of a part of the body, which strain nothing
-    (:mod:`fe_models.pretension`): their forces are among the loads. ``held`` ``(d n,)`` marks the
+    (:mod:`fe_models.pretension`): their forces are among the loads, and again what is the body's
+    ``own`` ``(d all, cases)`` of these. ``held`` ``(d n,)`` marks the
     interface displacements that are held at zero, as on a plane of symmetry. Raises ValueError if
     those of an interface node are constrained in any other way.
 
@@ -85,9 +86,11 @@ class SupportedBody:
         thermal: Array | None = None,
         cuts: Sequence[Cuts] = (),
         jumps: Array | None = None,
+        own: Array | None = None,
     ) -> None:
         self.elastic = elastic
         self._jumps = jumps
+        self._own = np.zeros_like(loads) if own is None else own
         self._thermal = thermal
         self.cuts = cuts
         self.loads = loads
@@ -312,6 +315,11 @@ class SupportedBody:
         if self._thermal is None:
             return np.zeros((self.elastic.body.mesh.nvertices, *amplitudes.shape[1:]))
         return np.asarray(self._thermal @ amplitudes)
+
+    @property
+    def acting(self) -> Array:
+        """Those of the ``loads`` that act from outside ``(d all, cases)``: not the body's own."""
+        return np.asarray(self.loads - self._own)
 
     def straining(self, displacements: Array, amplitudes: Array) -> Array:
         """What of displacements ``(d all, ...)`` strains the body: all but its ``jumps``."""

@@ -330,15 +330,22 @@ def loops(
 @cli.command()
 @click.argument("file", type=click.Path(path_type=Path))
 @click.option("--size", metavar="LENGTH", help="Of the elements, for a CAD file, such as '2 mm'.")
-def describe(file: Path, size: str | None) -> None:
+@click.option("--out", type=click.Path(path_type=Path), help="Folder for a picture and a .vtu.")
+@click.option("--force", is_flag=True, help="Overwrite what is there.")
+def describe(file: Path, size: str | None, out: Path | None, force: bool) -> None:
     """List what a case may name of a mesh or CAD FILE.
 
-    That is bodies, boundaries and node sets.
+    That is bodies, boundaries and node sets; with --out they are drawn, too.
     """
-    from workflow.commands.describe import described_file
+    from fe_models.geometry.imported import describe_bodies
+    from workflow.commands.describe import read_file, write_assembly
 
-    for line in described_file(file, size):
+    imported = read_file(file, size)
+    for line in describe_bodies(imported):
         click.echo(line)
+    if out is not None:
+        for path in write_assembly(imported, out, file.name, force):
+            click.echo(path)
 
 
 def _kinds() -> dict[str, str]:

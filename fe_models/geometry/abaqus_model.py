@@ -2,38 +2,18 @@
 
 from __future__ import annotations
 
-import re
-from collections.abc import Callable, Collection, Iterator
-from copy import deepcopy
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Generic, TypeVar
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from fe_models.geometry.abaqus_cards import Card, DataLine, SourceLine, integer, real
+from fe_models.geometry.abaqus_elements import FACET_TYPES, advice, element_type
 from fe_models.geometry.grouped import CORNERS
+from fe_models.geometry.scope import Element, Members, Names, Scope, existing, extend, resolve
 from fe_models.mesh import MeshError
 from sa_solver.types import Array
-
-# Shape of the solid (C3D) and plane (CPE, CPS) elements by their number of nodes, of which the
-# corners come first.
-SOLIDS = {
-    4: "tetra", 10: "tetra", 5: "pyramid", 6: "wedge", 15: "wedge", 8: "hexahedron",
-    20: "hexahedron",
-}  # fmt: skip
-PLANES = {3: "triangle", 6: "triangle", 4: "quad", 8: "quad"}
-# Letters after the number (reduced integration, hybrid, modified, ...) do not change the mesh.
-SOLID_TYPE, PLANE_TYPE = re.compile(r"C3D(\d+)[HIMPRST]*"), re.compile(r"CP[ES](\d+)[HIMPRT]*")
-# What gmsh and meshio write for edges and facets: neither is a body.
-FACET_TYPES = {
-    "T2D2": (2, "line"), "T2D3": (3, "line"), "T3D2": (2, "line"), "T3D3": (3, "line"),
-    "R3D3": (3, "triangle"), "R3D4": (4, "quad"), "SFM3D3": (3, "triangle"), "SFM3D4": (4, "quad"),
-}  # fmt: skip
-ALLOWED_TYPES = (
-    "C3D4, C3D5, C3D6, C3D8, C3D10, C3D15, C3D20, CPE3, CPE4, CPE6, CPE8, and CPS of these"
-)
 
 GENERATED = "it makes or moves nodes or elements; write all of them out"
 TIED = "the tie or constraint is not carried over; make one body of what is bonded"
@@ -49,137 +29,17 @@ REFUSED = (
     | dict.fromkeys(
         ["IMPERFECTION", "IMPORT", "MODELCHANGE", "SUBSTRUCTUREGENERATE", "SUBSTRUCTUREPATH",
          "USERELEMENT", "MATRIXINPUT"], MODIFIED)
+    | {"DISPLAYBODY": "it is shown and no body that is computed; leave its instance out"}
 )  # fmt: skip
 
 # Keywords that say what a case says: they are not taken over.
 LEFT = frozenset(
     ["BOUNDARY", "CLOAD", "DLOAD", "DSLOAD", "TEMPERATURE", "CONTACTPAIR", "CONTACT", "CLEARANCE",
-     "CONTACTINTERFERENCE", "FRICTION", "SURFACEBEHAVIOR", "ELASTIC", "DENSITY", "EXPANSION",
-     "AMPLITUDE", "INITIALCONDITIONS", "SPRING", "MASS"]
+     "CONTACTINTERFERENCE", "CONTACTINCLUSIONS", "CONTACTPROPERTYASSIGNMENT", "FRICTION",
+     "CHANGEFRICTION", "SURFACEBEHAVIOR", "ELASTIC", "PLASTIC", "HYPERELASTIC", "CREEP",
+     "VISCOELASTIC", "DENSITY", "EXPANSION", "AMPLITUDE", "INITIALCONDITIONS", "TRANSFORM",
+     "INERTIARELIEF", "BASEMOTION", "SUBMODEL", "SPRING", "MASS"]
 )  # fmt: skip
-
-# Numbers of nodes or elements, or ranges of which those that exist are meant, by the instance they
-# belong to; those of the scope itself are under "".
-Members = dict[str, list[int | range]]
-_Value = TypeVar("_Value")
-
-
-class Names(Generic[_Value]):
-    """Values by name. Abaqus reads upper and lower case alike; the first spelling is kept."""
-
-    def __init__(self) -> None:
-        self._entries: dict[str, tuple[str, _Value]] = {}
-
-    def __contains__(self, name: str) -> bool:
-        return name.upper() in self._entries
-
-    def __getitem__(self, name: str) -> _Value:
-        return self._entries[name.upper()][1]
-
-    def __len__(self) -> int:
-        return len(self._entries)
-
-    def __str__(self) -> str:
-        return ", ".join(name for name, _ in self.items())
-
-    def add(self, name: str, value: _Value) -> _Value:
-        """Keep the value unless the name has one; return the one kept."""
-        return self._entries.setdefault(name.upper(), (name, value))[1]
-
-    def items(self) -> Iterator[tuple[str, _Value]]:
-        return iter(self._entries.values())
-
-
-@dataclass(frozen=True)
-class Element:
-    """Shape, corner nodes, nodes on its edges, of second order, and place of an element."""
-
-    shape: str
-    nodes: tuple[int, ...]
-    midsides: tuple[int, ...]
-    place: SourceLine
-
-
-@dataclass
-class Scope:
-    """A part, an instance, the assembly, or a flat file: nodes, elements, sets and surfaces.
-
-    ``blocks`` are the element sets named on an ``*Element`` line only, as programs name them;
-    ``placing`` takes points ``(n, 3)`` to where an instance has them.
-    """
-
-    name: str
-    place: SourceLine
-    nodes: dict[int, tuple[float, float, float]] = field(default_factory=dict)
-    elements: dict[int, Element] = field(default_factory=dict)
-    node_sets: Names[Members] = field(default_factory=Names)
-    element_sets: Names[Members] = field(default_factory=Names)
-    surfaces: Names[Card] = field(default_factory=Names)
-    blocks: set[str] = field(default_factory=set)
-    placing: Callable[[Array], Array] = lambda points: points
-
-    def instance(self, card: Card) -> Scope:
-        """An instance of this part."""
-        return Scope(
-            name=card.name("NAME"),
-            place=card.place,
-            nodes=dict(self.nodes),
-            elements=dict(self.elements),
-            node_sets=deepcopy(self.node_sets),
-            element_sets=deepcopy(self.element_sets),
-            surfaces=deepcopy(self.surfaces),
-            placing=_placing(card.rows),
-        )
-
-    def is_empty(self) -> bool:
-        """Whether nothing is defined in it."""
-        return not (
-            self.nodes or self.elements or self.node_sets or self.element_sets or self.surfaces
-        )
-
-
-def resolve(
-    place: SourceLine, text: str, kind: str, scope: Scope, instances: Names[Scope]
-) -> Members:
-    """What a data line means by a number, the name of a set, or ``Instance.`` and either.
-
-    ``kind`` is ``node_sets`` or ``element_sets``.
-    """
-    text = text.strip('"')
-    if re.fullmatch(r"\d+", text):
-        return {"": [int(text)]}
-    sets: Names[Members] = getattr(scope, kind)
-    if text in sets:
-        return sets[text]
-    # Names may have dots in them, too.
-    for dot in (match.start() for match in re.finditer(r"\.", text)):
-        if text[:dot] in instances:
-            inner = instances[text[:dot]]
-            members = resolve(place, text[dot + 1 :], kind, inner, Names())
-            return {inner.name: members.get("", [])}
-    raise MeshError(
-        f"{place}: no {kind[:-1].replace('_', ' ')} {text or '(no name)'}; allowed: "
-        f"{sets or 'those defined above'}"
-    )
-
-
-def extend(members: Members, more: Members) -> None:
-    """Add members to a set."""
-    for instance, numbers in more.items():
-        members.setdefault(instance, []).extend(numbers)
-
-
-def existing(members: list[int | range], known: Collection[int], what: str) -> list[int]:
-    """All numbers meant, of ranges those that exist; raises if any other does not."""
-    numbers: list[int] = []
-    for member in members:
-        if isinstance(member, range):
-            numbers.extend(number for number in member if number in known)
-        elif member in known:
-            numbers.append(member)
-        else:
-            raise MeshError(f"{what} names number {member}, which is not defined")
-    return numbers
 
 
 class Model:
@@ -239,7 +99,9 @@ class Model:
         if name in self.instances:
             raise MeshError(f"{card.place}: instance {name} is defined twice")
         # What follows up to *End Instance belongs to it: CAE writes independent instances so.
-        self._scope = self.instances.add(name, self.parts[part].instance(card))
+        self._scope = self.instances.add(
+            name, self.parts[part].instance(name, card.place, _placing(card.rows))
+        )
 
     def _nodes(self, card: Card) -> None:
         _refuse(card, "INPUT")
@@ -260,14 +122,23 @@ class Model:
     def _elements(self, card: Card) -> None:
         _refuse(card, "INPUT")
         scope = self._scope
-        count, shape = _element_type(card)
-        corners = CORNERS[shape]
+        count, shape = element_type(card)
+        corners, kind = CORNERS[shape], card.name("TYPE").upper()
+        told = advice(kind)
         numbers: list[int | range] = []
         for place, (number, *nodes) in _element_rows(card, count):
+            if (shape, count) == ("line", 3):  # the middle one stands between the ends
+                nodes = [nodes[0], nodes[2], nodes[1]]
             if number in scope.elements:
                 raise MeshError(f"{place}: element {number} is defined twice")
             scope.elements[number] = Element(
-                shape, tuple(nodes[:corners]), tuple(nodes[corners:]), place
+                shape=shape,
+                nodes=tuple(nodes[:corners]),
+                midsides=tuple(nodes[corners:]),
+                place=place,
+                kind=kind,
+                stands_alone=kind not in FACET_TYPES,
+                advice=told,
             )
             numbers.append(number)
         if name := card.parameters.get("ELSET"):
@@ -350,17 +221,6 @@ def _refuse(card: Card, parameter: str) -> None:
             f"{card.place}: *{card.keyword} with {parameter.lower()}= is not supported; allowed: "
             "data lines, in rectangular coordinates"
         )
-
-
-def _element_type(card: Card) -> tuple[int, str]:
-    """Number of nodes and shape of a type of element."""
-    kind = card.name("TYPE").upper()
-    for pattern, shapes in ((SOLID_TYPE, SOLIDS), (PLANE_TYPE, PLANES)):
-        if (match := pattern.fullmatch(kind)) and int(match[1]) in shapes:
-            return int(match[1]), shapes[int(match[1])]
-    if kind not in FACET_TYPES:
-        raise MeshError(f"{card.place}: element type {kind}; allowed: {ALLOWED_TYPES}")
-    return FACET_TYPES[kind]
 
 
 def _element_rows(card: Card, count: int) -> Iterator[tuple[SourceLine, list[int]]]:

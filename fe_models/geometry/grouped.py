@@ -78,7 +78,7 @@ def midsides_of(points: Array, blocks: Iterable[tuple[str, Indices]]) -> Midside
     """
     edges, middles, rows = [], [], []
     for shape, cells in blocks:
-        corners, pairs = CORNERS[shape], _edges(shape)
+        corners, pairs = CORNERS[shape], edges_of_shape(shape)
         if cells.shape[1] < corners + len(pairs) or not len(pairs):
             continue
         # Takes a tenth of a second to load: where it is used.
@@ -115,7 +115,7 @@ def midsides_of(points: Array, blocks: Iterable[tuple[str, Indices]]) -> Midside
     return Midsides(np.concatenate(edges), np.concatenate(middles), np.concatenate(rows))
 
 
-def _edges(shape: str) -> Indices:
+def edges_of_shape(shape: str) -> Indices:
     """Corners of the edges of a shape, ``(k, 2)``."""
     rings = FACES[shape] if DIMENSION[shape] > 1 else ((0, 1),) * (shape == "line")
     pairs = {tuple(sorted(pair)) for ring in rings for pair in pairwise([*ring, ring[0]])}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +16,9 @@ from fe_models.geometry.checked import checked_body, vector
 from fe_models.geometry.gmsh_file import read_msh
 from fe_models.geometry.grouped import DIMENSION, Blocks, GroupedMesh, nodes_of, split_blocks
 from fe_models.geometry.meshio_file import read_meshio
+from fe_models.geometry.nastran import read_nastran
+from fe_models.geometry.set_faces import faces_of_sets
+from fe_models.geometry.unv import read_unv
 from fe_models.mesh import Body, MeshError, in_space
 from fe_models.remesh import element_volumes
 from sa_solver.types import Array, Indices
@@ -23,10 +27,14 @@ from sa_solver.types import Array, Indices
 PLANE = 1e-9
 # Closed surfaces have no mean normal: theirs is rounding, below this share of the area.
 CLOSED = 1e-9
+# Endings of Nastran's bulk data.
+NASTRAN = (".bdf", ".nas", ".fem")
 # Files of programs whose own formats nothing here reads.
 EXPORTABLE = {
-    ".cdb": "Ansys", ".db": "Ansys", ".odb": "Abaqus", ".cae": "Abaqus", ".mph": "COMSOL",
-    ".sldprt": "SolidWorks", ".iges": "CAD", ".igs": "CAD",
+    ".cdb": "Ansys", ".db": "Ansys", ".mechdb": "Ansys", ".rst": "Ansys", ".odb": "Abaqus",
+    ".cae": "Abaqus", ".mph": "COMSOL", ".op2": "Nastran", ".hm": "HyperMesh", ".k": "LS-DYNA",
+    ".key": "LS-DYNA", ".prt": "NX", ".sldprt": "SolidWorks", ".sldasm": "SolidWorks",
+    ".catpart": "CATIA", ".catproduct": "CATIA", ".iges": "CAD", ".igs": "CAD",
 }  # fmt: skip
 
 
@@ -70,6 +78,11 @@ class ImportedMesh:
     middles: dict[str, dict[str, Indices]] = field(default_factory=dict)
     left: tuple[str, ...] = ()
 
+    @cached_property
+    def set_faces(self) -> dict[str, dict[str, Indices]]:
+        """Facets of the node sets of each body that are faces, by name."""
+        return {name: faces_of_sets(body, self.points[name]) for name, body in self.bodies.items()}
+
 
 @dataclass(frozen=True)
 class Patch:
@@ -87,9 +100,10 @@ class Patch:
 def read_bodies(path: Path, size: float | None = None) -> ImportedMesh:
     """Read the bodies of a mesh file, or mesh those of a CAD file at ``size`` [mm].
 
-    Reads gmsh's ``.msh`` (:func:`read_msh`), Abaqus ``.inp`` (:func:`read_abaqus`), ``.step``,
-    ``.stp`` and ``.brep`` (:func:`read_cad`) and what meshio reads (:func:`read_meshio`); lengths
-    are taken as mm. Elements are straight between their corners, whatever nodes they have on
+    Reads gmsh's ``.msh`` (:func:`read_msh`), Abaqus ``.inp`` (:func:`read_abaqus`), Nastran's
+    ``.bdf`` and ``.nas`` (:func:`read_nastran`), ``.unv`` (:func:`read_unv`), ``.step``, ``.stp``
+    and ``.brep`` (:func:`read_cad`) and what meshio reads (:func:`read_meshio`); lengths are taken
+    as mm. Elements are straight between their corners, whatever nodes they have on
     their edges: these tell the form of contact faces, and that of elements of second order
     (:func:`fe_models.second_order.with_midsides`). Quadrilaterals, pyramids, wedges and
     hexahedra are split into triangles or tetrahedra. A plane mesh keeps the
@@ -137,8 +151,8 @@ def _grouped(path: Path, size: float | None) -> GroupedMesh:
         raise MeshError(f"{path}: {'not a file' if path.exists() else 'no such file'}")
     if suffix in EXPORTABLE:
         raise MeshError(
-            f"{path}: {EXPORTABLE[suffix]}'s {suffix} is not read; export it as .inp, .msh, .vtu "
-            "or .step"
+            f"{path}: {EXPORTABLE[suffix]}'s {suffix} is not read; export it as .inp, .bdf, "
+            ".unv, .msh, .vtu or .step"
         )
     if suffix in BEGINNINGS:
         if size is None:
@@ -148,7 +162,8 @@ def _grouped(path: Path, size: float | None) -> GroupedMesh:
         raise MeshError(f"{path}: is a mesh already; a mesh size is for {', '.join(BEGINNINGS)}")
     if suffix == ".msh":
         return read_apart(read_msh, path)
-    return read_abaqus(path) if suffix == ".inp" else read_meshio(path)
+    reader = {".inp": read_abaqus, **dict.fromkeys(NASTRAN, read_nastran), ".unv": read_unv}
+    return reader.get(suffix, read_meshio)(path)
 
 
 def describe_bodies(imported: ImportedMesh) -> list[str]:
@@ -195,8 +210,9 @@ def describe_bodies(imported: ImportedMesh) -> list[str]:
             )
         for points, vertices in imported.points[name].items():
             centre = body.points[vertices].mean(axis=0)
+            form = f", a face of {facet}" * (points in imported.set_faces[name])
             lines.append(
-                f"  node set {points}: {len(vertices)} nodes, centroid {vector(centre)} mm"
+                f"  node set {points}: {len(vertices)} nodes{form}, centroid {vector(centre)} mm"
             )
     return lines + [f"not taken over: {line}" for line in imported.left]
 

@@ -402,8 +402,20 @@ def test_bonded_sets_of_a_flat_file_are_refused(tmp_path):
         ("*Surface, name=X, combine=UNION", "combine= is not supported"),
         ("*Surface, name=X, type=CYLINDER", "surface of type CYLINDER; allowed: ELEMENT, NODE"),
         ("*Surface", "needs name=name"),
-        ("*Element, type=S4R", "element type S4R; allowed: C3D4"),
-        ("*Element, type=CAX4", "element type CAX4; allowed: C3D4"),
+        ("*Element, type=X4R", "element type X4R; allowed: C3D4"),
+        ("*Element, type=S4R", "S4R is a shell: mesh its volume with solid elements"),
+        ("*Element, type=STRI3", "STRI3 is a shell: mesh"),
+        ("*Element, type=SC8R", "SC8R is a continuum shell: write it as C3D8"),
+        ("*Element, type=M3D4R", "M3D4R is a membrane: mesh"),
+        ("*Element, type=B31OSH", "B31OSH is a beam: mesh .* or leave it out"),
+        ("*Element, type=CAX4R", "CAX4R is axisymmetric, which is not computed: take a sector"),
+        ("*Element, type=R2D2", "R2D2 is a rigid surface: give the body a mesh"),
+        ("*Element, type=COH3D8", "COH3D8 is a layer that bonds: make one body"),
+        ("*Element, type=C3D27R", "C3D27R is of a form of its own: write it as C3D20"),
+        ("*Element, type=DC3D8", "DC3D8 is of heat, sound or fields: write it as the stress"),
+        ("*Element, type=SPRINGA", "SPRINGA is a spring or a joint of points: leave it out"),
+        ("*Element, type=MASS", "MASS is a point mass: leave it out"),
+        ("*Display Body, instance=Pin-1", "no body that is computed"),
         ("*Include, input=gone.inc", "the included file gone.inc is missing"),
         ("*Instance, name=X, part=Gone", "is of part Gone; allowed: Block, Pin"),
         ("*Part, name=block", "part block is defined twice"),
@@ -464,7 +476,7 @@ def test_wrong_line_is_refused_where_it_stands(tmp_path, old, new, at, message):
         (
             PARTS.replace("*End Part\n*Part", "*Element, type=T3D2\n9, 11, 12\n*End Part\n*Part")
             + "*Assembly\n*Instance, name=B, part=Block\n*End Instance\n*End Assembly\n",
-            "a line in a part of solid",
+            "T3D2 is a truss: mesh its volume",
         ),
         ("*Heading\n", "has no elements"),
         ("1, 2, 3\n", "is no Abaqus input"),
@@ -480,7 +492,12 @@ def test_wrong_line_is_refused_where_it_stands(tmp_path, old, new, at, message):
         ),
         (
             CUBES + "*Node\n1, 9., 9., 9.\n*Element, type=R3D3\n9, 11, 12, 1\n",
-            "a triangle with nodes on no solid",
+            "R3D3 with nodes on no solid is a rigid surface: give",
+        ),
+        (
+            CUBES.replace("C3D8R", "C3D8")[: CUBES.index("*Element")]
+            + "*Element, type=R3D4\n1, 11, 12, 15, 14\n",
+            "R3D4 is a rigid surface: give the body",
         ),
         (
             CUBES + "*Element, type=SFM3D3, elset=A\n9, 11, 12, 14\n*Surface, name=A\n7, S1\n",

@@ -65,7 +65,7 @@ def clamped(loads=(), order=1, materials=None, support="xyz"):
     structure = built(
         mesh, pairs, [Support("frame_foot", support)], every, order, materials or [STEEL, STEEL]
     )
-    return structure, bolt_section(structure, BOLT, every)
+    return structure, bolt_section(structure, BOLT)
 
 
 def marched(structure, amplitudes, gap=None):
@@ -182,8 +182,8 @@ def test_cuts_that_cannot_be_are_refused():
     sideways = Pretension("frame", np.array([3.0, 0.5, 1.0]), np.array([1.0, 0.0, 0.0]))
     structure = built(mesh, pairs, held, [sideways], materials=[STEEL, STEEL])
     with pytest.raises(MeshError, match="goes through its contact face"):
-        bolt_section(structure, sideways, [sideways])
+        bolt_section(structure, sideways)
     held = [*held, Support("frame_over", "z")]
     structure = built(mesh, pairs[:1], held, [BOLT], materials=[STEEL, STEEL])
     with pytest.raises(MeshError, match="on both sides of the cut"):
-        bolt_section(structure, BOLT, [BOLT])
+        bolt_section(structure, BOLT)

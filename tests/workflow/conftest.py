@@ -20,6 +20,7 @@ from tests.conftest import CASES
 from tests.wheels import sector, shoe
 from tests.workflow.case_leaves import BODY, CELLS
 from tests.workflow.commands import invoke, runs_here
+from tests.workflow.mesh_scenes import pressed_blocks
 from workflow.analyses.wear import contact_workers
 from workflow.analyses.wear import results as wear_results
 from workflow.analyses.wear.layout import Contents
@@ -423,3 +424,9 @@ def whole(start: Runner, tmp_path_factory: pytest.TempPathFactory) -> Run:
     run = start(tmp_path_factory.mktemp("whole") / "out")
     assert run.ending.exit_code == 0, run.ending.stderr
     return run
+
+
+@pytest.fixture
+def blocks(tmp_path: Path) -> Path:
+    """The case of a cube of 1 mm on one of 2 mm."""
+    return pressed_blocks(tmp_path)

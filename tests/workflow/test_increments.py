@@ -12,8 +12,7 @@ from tests.conftest import CASES
 from tests.marks import slow
 from tests.workflow.commands import command
 from tests.workflow.interruptions import ctrl_c_after_jumps
-from tests.workflow.mesh_scenes import refused, write_case
-from tests.workflow.test_mesh_case import ASSEMBLY, BLOCKS, cube
+from tests.workflow.mesh_scenes import ASSEMBLY, BLOCKS, cube, refused, write_case
 from workflow.analyses.wear import ANALYSIS
 from workflow.analyses.wear.case.base import MOST_INCREMENTS
 from workflow.analyses.wear.increments import decide_increments, differences

@@ -1,4 +1,4 @@
-"""Mesh cases through the whole road: files of all kinds, in space and in the plane, refusals."""
+"""Mesh cases through the whole road, in space and in the plane, and refusals."""
 
 import json
 
@@ -7,76 +7,30 @@ import numpy as np
 import pytest
 
 from fe_models import friction
-from fe_models.geometry.imported import patch, read_bodies
 from fe_models.gmsh_session import gmsh_model
 from fe_models.structure import CLOSED
 from tests.marks import slow
 from tests.workflow.commands import invoke
-from tests.workflow.mesh_scenes import WEAR, refused, run, write_case
+from tests.workflow.mesh_scenes import (
+    ASSEMBLY,
+    BLOCKS,
+    TO_AND_FRO,
+    WEAR,
+    cube,
+    edit,
+    refused,
+    run,
+    write_case,
+)
 from workflow.analyses.wear.quantities import main_results
 from workflow.analyses.wear.structure_stage import StructureStage
 from workflow.analyses.wear.structures.mesh.model import MeshModel
 from workflow.errors import MethodFailed
-from workflow.kinds import load_case, template
+from workflow.kinds import load_case
 
 pytestmark = pytest.mark.usefixtures("reads_here")
 
-# --- files of all kinds, run ----------------------------------------------------------------------
-
-
-def cube(name, size):
-    """A part: a cube of 2 x 2 x 2 elements, with surfaces below, above and at y = 0."""
-    axis = np.linspace(0.0, size, 3).tolist()
-    places = [(x, y, z) for z in axis for y in axis for x in axis]
-    lines = [f"*Part, name={name}", "*Node"]
-    lines += [f"{n}, {x}, {y}, {z}" for n, (x, y, z) in enumerate(places, 1)]
-    lines.append("*Element, type=C3D8R")
-    firsts = [1 + i + 3 * j + 9 * k for k in (0, 1) for j in (0, 1) for i in (0, 1)]
-    for n, first in enumerate(firsts, 1):
-        below = [first, first + 1, first + 4, first + 3]
-        lines.append(f"{n}, {', '.join(str(m) for m in [*below, *(m + 9 for m in below)])}")
-    for side, face, elements in (
-        ("low", "S1", (1, 2, 3, 4)),
-        ("high", "S2", (5, 6, 7, 8)),
-        ("cut", "S3", (1, 2, 5, 6)),
-    ):
-        lines.append(f"*Surface, type=ELEMENT, name={name}_{side}")
-        lines += [f"{n}, {face}" for n in elements]
-    return "\n".join([*lines, "*End Part", ""])
-
-
-ASSEMBLY = """\
-*Assembly, name=Assembly
-*Instance, name=Base-1, part=base
-*End Instance
-*Instance, name=Foot-1, part=foot
-0.5, 0.5, 2.
-*End Instance
-*End Assembly
-*Step
-*Static
-*End Step
-"""
-# Two blocks, pressed together and then pushed to and fro without sliding off.
-BLOCKS = {
-    "body_1": "Base-1",
-    "body_2": "Foot-1",
-    "contacts": [{"name": "foot", "face_1": "base_high", "face_2": "foot_low", "x": [1, 0, 0]}],
-    "supports": [{"group": "base_low", "hold": "all"}],
-    "loads": [
-        {"kind": "pressure", "group": "foot_high", "pressure": "40 MPa", "path": [1, 1, 1, 1]},
-        {"kind": "force", "group": "foot_high", "force": ["4 N", 0, 0], "path": [0, 1, -1, 1]},
-    ],
-}
-TO_AND_FRO = {"increments": [1, 2, 2, 2], "cycle_from": 3, "peak_leg": 4}
-
-
-@pytest.fixture
-def blocks(tmp_path):
-    """A cube of 1 mm on one of 2 mm, as CAE would write them."""
-    text = cube("base", 2.0) + cube("foot", 1.0) + ASSEMBLY
-    (tmp_path / "blocks.inp").write_text(text, encoding="utf-8")
-    return write_case(tmp_path / "blocks.yaml", {"file": "blocks.inp", **BLOCKS}, TO_AND_FRO)
+# --- in space, run --------------------------------------------------------------------------------
 
 
 def test_density_is_for_loads_on_the_mass(blocks):
@@ -95,14 +49,6 @@ def test_density_is_for_loads_on_the_mass(blocks):
     assert case.material(2).density == 7.9e-9
 
 
-def edit(path, old, new):
-    """Replace text in a file and give its lines."""
-    text = path.read_text("utf-8")
-    assert old in text
-    path.write_text(text.replace(old, new), encoding="utf-8")
-    return path.read_text("utf-8").splitlines()
-
-
 def test_parts_and_instances_run(blocks, tmp_path):
     summary = run(blocks, tmp_path / "out")
     peak = summary["foot"]["peak_load"]["unworn"]
@@ -117,70 +63,6 @@ def test_parts_and_instances_run(blocks, tmp_path):
     told = {quantity.name for quantity in found if quantity.group == "Foot-1"}
     assert {"elements", "median element (longest edge)"} <= told
     assert "largest von Mises stress on the free surface, unworn" in told
-
-
-def test_what_a_file_says_besides_is_named(blocks, tmp_path):
-    """Loads, supports and contact of the other program, by line; nothing where there is none."""
-    file = tmp_path / "blocks.inp"
-    assert "not taken over" not in invoke("check", blocks).output
-    assert "not taken over" not in invoke("describe", file).output
-    given = "*Boundary\nBase-1.low, 1, 3\n*Cload, amplitude=up\n5, 3, -100.\n6, 3, -50.\n"
-    given += "*Friction\n0.3\n"
-    line = 1 + edit(file, "*Static\n", f"*Static\n{given}").index("*Static")
-    told = invoke("describe", file).output.splitlines()[-3:]
-    assert told == [
-        f"not taken over: blocks.inp:{line + 1}: *boundary: Base-1.low, 1, 3",
-        f"not taken over: blocks.inp:{line + 3}: *cload, amplitude=up: 5, 3, -100. ...",
-        f"not taken over: blocks.inp:{line + 6}: *friction: 0.3",
-    ]
-    said = " ".join(invoke("check", blocks).output.split())
-    assert "3 keywords with loads, supports, contact or materials not taken over" in said
-
-
-def test_a_face_in_two_parts(blocks, tmp_path):
-    """Named both, they are the whole; named one, a check doubts it; twice, or none, is refused."""
-    edit(
-        tmp_path / "blocks.inp",
-        "*Surface, type=ELEMENT, name=foot_low\n1, S1\n2, S1\n3, S1\n4, S1\n",
-        "*Surface, type=ELEMENT, name=low_a\n1, S1\n2, S1\n"
-        "*Surface, type=ELEMENT, name=low_b\n3, S1\n4, S1\n",
-    )
-    face = "structure.contacts.0.face_2="
-    said = invoke("check", blocks, "--set", f"{face}[low_a, low_b]").output
-    assert "its faces share" not in said
-    assert "1 mm² of 4 and 1 mm²" in said
-    assert "its faces share" not in invoke("check", blocks, "--set", f"{face}low_a").output
-    summary = run(blocks, tmp_path / "out", f"{face}[low_a, low_b]")
-    assert summary["foot"]["peak_load"]["unworn"]["P"] == pytest.approx(40.0, rel=1e-6)
-    assert "a boundary twice; allowed: each once" in refused(blocks, f"{face}[low_a, low_a]")
-    assert "none; allowed: a boundary, or several" in refused(blocks, f"{face}[]")
-    assert "no boundary low_c on body Foot-1" in refused(blocks, f"{face}[low_a, low_c]")
-
-
-def test_a_node_set_may_be_a_face(blocks, tmp_path):
-    """Its facets are those with all their corners in it; one with nodes elsewhere is none."""
-    surface = "*Surface, type=ELEMENT, name=foot_low\n1, S1\n2, S1\n3, S1\n4, S1\n"
-    nodes = "*Nset, nset=foot_low\n1, 2, 3, 4, 5, 6, 7, 8, 9\n"
-    whole = run(blocks, tmp_path / "whole")["foot"]
-    edit(tmp_path / "blocks.inp", surface, nodes)
-    by_nodes = run(blocks, tmp_path / "nodes")["foot"]
-    for name in ("depth_1", "volume_2", "energy"):
-        assert by_nodes[name] == pytest.approx(whole[name], rel=1e-9)
-    edit(tmp_path / "blocks.inp", "7, 8, 9\n", "7, 8, 9, 19\n")
-    line = refused(blocks)
-    assert "contacts.0.face_2: foot_low is a node set; 1 of its nodes are on no facet" in line
-    assert "allowed: foot_high, foot_cut, foot_low" in line
-
-
-def test_a_face_that_is_half_named_is_doubted(blocks, tmp_path):
-    """Of the lower cube's top one half: the foot overhangs it."""
-    edit(
-        tmp_path / "blocks.inp",
-        "*Surface, type=ELEMENT, name=base_high\n5, S2\n6, S2\n7, S2\n8, S2\n",
-        "*Surface, type=ELEMENT, name=base_high\n5, S2\n6, S2\n",
-    )
-    said = " ".join(invoke("check", blocks).output.split())
-    assert "foot: its faces share 0.5 mm² of 2 and 1; if one is in several parts" in said
 
 
 def test_a_contact_may_be_called_as_a_body(blocks, tmp_path):
@@ -258,88 +140,6 @@ def test_open_faces_are_told(blocks, tmp_path, factor, wear):
         "load_path={increments: [2, 2], peak_leg: 2}",
     )
     assert any(line.startswith(f"foot is open {wear}") for line in summary["warnings"])
-
-
-def test_keyword_that_is_not_read_is_refused_with_its_line(blocks):
-    file = blocks.with_name("blocks.inp")
-    lines = edit(file, "*Step\n", "*Tie, name=T\na, b\n*Step\n")
-    message = refused(blocks)
-    assert "structure.file: " in message
-    assert f"blocks.inp:{lines.index('*Tie, name=T') + 1}: " in message
-
-
-def face_at(imported, body, height, normal):
-    """The boundary of a body at a height that looks along z."""
-    for name in imported.bodies[body].mesh.boundaries:
-        surface = patch(imported.bodies[body], name)
-        if np.allclose(surface.normal, [0, 0, normal]) and np.isclose(surface.centroid[2], height):
-            return name
-    raise AssertionError((body, height, normal))
-
-
-@pytest.fixture
-def cad(tmp_path):
-    """Boxes of 4 and 2 mm in a STEP file, its faces found by where they are."""
-    file = tmp_path / "boxes.step"
-    with gmsh_model("boxes") as gmsh:
-        gmsh.model.occ.addBox(-2, -2, -2, 4, 4, 2)
-        gmsh.model.occ.addBox(-1, -1, 0, 2, 2, 1)
-        gmsh.model.occ.synchronize()
-        gmsh.write(str(file))
-    imported = read_bodies(file, 1.0)
-    lower, upper = imported.bodies
-    text = json.dumps(BLOCKS)
-    for group, place in {
-        "base_low": (lower, -2.0, -1.0),
-        "base_high": (lower, 0.0, 1.0),
-        "foot_low": (upper, 0.0, -1.0),
-        "foot_high": (upper, 1.0, 1.0),
-    }.items():
-        text = text.replace(json.dumps(group), json.dumps(face_at(imported, *place)))
-    structure = json.loads(text) | {"body_1": lower, "body_2": upper, "file": file.name}
-    return write_case(tmp_path / "cad.yaml", structure, TO_AND_FRO, mesh={"size": "0.5 mm"})
-
-
-def test_cad_file_runs(cad, tmp_path):
-    summary = run(cad, tmp_path / "out")
-    peak = summary["foot"]["peak_load"]["unworn"]
-    assert peak["P"] == pytest.approx(160.0, rel=1e-6)
-    assert peak["Qx"] == pytest.approx(-4.0, rel=1e-5)
-
-
-def test_describe_lists_what_a_case_may_name(cad):
-    listed = invoke("describe", cad.with_name("boxes.step"), "--size", "1 mm")
-    assert listed.exit_code == 0
-    structure = load_case(cad).structure
-    for name in (structure.body_1, structure.body_2):
-        assert f"body {name}: " in listed.stdout
-    for support in structure.supports:
-        assert f"boundary {support.group}: " in listed.stdout
-
-
-@pytest.mark.parametrize(
-    ("file", "size", "wrong"),
-    [
-        ("boxes.step", [], "needs a mesh size"),
-        ("boxes.step", ["--size", "thick"], "--size: 'thick': not a number with a unit"),
-        ("nix.msh", [], "no such file"),
-    ],
-)
-def test_describe_refuses_in_one_line(cad, file, size, wrong):
-    ending = invoke("describe", cad.with_name(file), *size)
-    assert ending.exit_code == 2
-    (line,) = ending.stderr.splitlines()
-    assert wrong in line
-
-
-def test_size_is_for_cad_files_alone(cad, blocks):
-    assert "mesh.size=0.5: 0.5 mm: the file is a mesh" in refused(blocks, "mesh.size=0.5")
-    told = "structure.size=0.5: of the elements; allowed: as mesh.size"
-    assert refused(blocks, "structure.size=0.5").endswith(told)
-    told = "structure.order=2: of the elements; allowed: as mesh.order"
-    assert refused(blocks, "structure.order=2").endswith(told)
-    edit(cad, "mesh:\n  size: 0.5 mm\n", "")
-    assert "mesh.size: missing" in refused(cad)
 
 
 # --- in the plane ---------------------------------------------------------------------------------
@@ -431,32 +231,6 @@ def test_nodes_under_a_sliding_foot_wear_to_its_shape(section, tmp_path):
 # --- refusals -------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(
-    ("key", "name", "wrong"),
-    [
-        ("body_1", "Nix", "no body Nix; allowed: Base-1, Foot-1"),
-        ("body_2", "Nix", "no body Nix; allowed: Base-1, Foot-1"),
-        ("contacts.0.face_1", "foot_low",
-         "boundary foot_low is on body Foot-1, not on Base-1; allowed: base_low, base_high, "),
-        ("contacts.0.face_2", "nix",
-         "no boundary nix on body Foot-1; allowed: foot_low, foot_high, "),
-        ("supports.0.group", "nix", "no boundary or node set nix on Base-1 or Foot-1; allowed: "),
-        ("loads.1.group", "nix", "no boundary nix on Base-1 or Foot-1; allowed: base_cut, "),
-    ],
-)  # fmt: skip
-def test_names_that_are_not_there(blocks, key, name, wrong):
-    """The line says which names there are."""
-    message = refused(blocks, f"structure.{key}={name}")
-    assert message.startswith(f"--set structure.{key}={name}: ")
-    assert wrong in message
-
-
-def test_place_in_the_file_is_named(blocks):
-    lines = edit(blocks, "group: base_low", "group: nix")
-    number = next(n for n, line in enumerate(lines, 1) if "group: nix" in line)
-    assert refused(blocks).startswith(f"{blocks}:{number}: structure.supports.0.group: ")
-
-
 def test_faces_that_miss_each_other(blocks):
     edit(blocks.with_name("blocks.inp"), "0.5, 0.5, 2.", "9.5, 0.5, 2.")
     message = refused(blocks)
@@ -471,15 +245,6 @@ def test_faces_that_look_the_same_way(blocks):
 def test_body_1_that_is_not_held(blocks):
     message = refused(blocks, "structure.supports.0.hold=xy")
     assert "structure.supports: the supports let Base-1 and Foot-1 " in message
-
-
-def test_node_sets_take_no_force_and_no_normal(blocks):
-    part = "*End Part\n*Assembly"
-    edit(blocks.with_name("blocks.inp"), part, f"*Nset, nset=tip\n5\n{part}")
-    assert "tip is a node set" in refused(blocks, "structure.loads.1.group=tip")
-    assert "tip is a node set" in refused(blocks, "structure.contacts.0.face_2=tip")
-    overrides = "structure.supports.0.group=tip", "structure.supports.0.hold=normal"
-    assert "node set tip has no area to hold normal" in refused(blocks, *overrides)
 
 
 @pytest.mark.parametrize(
@@ -546,14 +311,6 @@ def test_slice_in_plane_strain_is_refused(blocks):
     held = [{"group": group, "hold": "y"} for group in ("base_high", "foot_low", "foot_high")]
     supports = json.dumps([*BLOCKS["supports"], *held])
     assert "as in a slice in plane strain" in refused(blocks, f"structure.supports={supports}")
-
-
-def test_template_lacks_its_file(tmp_path):
-    path = tmp_path / "mesh.yaml"
-    path.write_text(template("mesh"), encoding="utf-8")
-    ending = invoke("check", path)
-    assert ending.exit_code == 2
-    assert "structure.file: 'joint.msh': no such file" in ending.stderr
 
 
 def test_lists_hold_something(blocks):

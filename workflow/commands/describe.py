@@ -1,4 +1,4 @@
-"""``fretscale describe``: what a case may name of a mesh or CAD file."""
+"""``fretscale describe``: what a case may name of a mesh or CAD file, listed and drawn."""
 
 from __future__ import annotations
 
@@ -6,18 +6,35 @@ from pathlib import Path
 
 from pydantic import TypeAdapter, ValidationError
 
-from fe_models.geometry.imported import describe_bodies, read_bodies
+from fe_models.geometry.imported import ImportedMesh, read_bodies
 from fe_models.mesh import MeshError
 from workflow.case.sections import Length
 from workflow.errors import UserError
+from workflow.shell.folder import OutputFolder
+from workflow.shell.lock import locked
+
+FIGURE, PARAVIEW = "assembly.png", "assembly.vtu"
 
 
-def described_file(file: Path, size: str | None) -> list[str]:
-    """Lines that list what a mesh or CAD file has; ``size`` with its unit. Raises UserError."""
+def read_file(file: Path, size: str | None) -> ImportedMesh:
+    """The bodies of a mesh or CAD file; ``size`` with its unit. Raises UserError."""
     try:
-        return describe_bodies(read_bodies(file, None if size is None else _length(size)))
+        return read_bodies(file, None if size is None else _length(size))
     except MeshError as error:
         raise UserError(str(error)) from error
+
+
+def write_assembly(imported: ImportedMesh, out: Path, title: str, force: bool) -> list[Path]:
+    """Draw the bodies of the file ``title`` into a folder, and write them for ParaView."""
+    from workflow.commands.assembly import shown_bodies, write_vtu
+    from workflow.commands.assembly_figure import write_figure
+
+    with locked(out):
+        folder = OutputFolder(out, "bodies of a mesh file")
+        paths = folder.replace(dict.fromkeys((FIGURE, PARAVIEW), "described file"), force)
+        write_figure(shown_bodies(imported), title, paths[0])
+        write_vtu(imported, paths[1])
+    return paths
 
 
 def _length(text: str) -> float:

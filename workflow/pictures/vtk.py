@@ -186,7 +186,7 @@ def write_series(path: Path, time_is: str, steps: Iterable[Step]) -> list[Path]:
     lines, written = [], []
     for time, name, file, data in steps:
         data.field_data[time_is] = [time]
-        _write_xml(data, file)
+        write_xml(data, file)
         written.append(file)
         part = parts[time] = parts.get(time, -1) + 1
         relative = quoteattr(file.relative_to(path.parent).as_posix())
@@ -202,7 +202,7 @@ def write_series(path: Path, time_is: str, steps: Iterable[Step]) -> list[Path]:
     return [*written, path]
 
 
-def _write_xml(data: Any, path: Path) -> None:
+def write_xml(data: Any, path: Path) -> None:
     """Write a data set as VTK XML: raw appended data, compressed."""
     from vtkmodules.vtkIOXML import vtkXMLDataSetWriter
 

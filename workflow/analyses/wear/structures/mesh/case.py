@@ -65,7 +65,7 @@ CAD = (".step", ".stp", ".brep")
 # What the readers take; other endings are refused with advice.
 ENDINGS = (
     ".msh", ".inp", ".step", ".stp", ".brep", ".vtu", ".vtk", ".xdmf", ".med", ".bdf", ".mesh",
-    ".nas", ".cdb", ".odb", ".cae", ".db", ".igs", ".iges",
+    ".nas", ".fem", ".unv", ".cdb", ".odb", ".cae", ".db", ".igs", ".iges",
 )  # fmt: skip
 
 # Heights on both sides of a plane of symmetry may differ by this share of their range: files round.
@@ -253,7 +253,7 @@ class MeshCase(FiniteElementCase):
         imported = self.structure.read(self.mesh.size)
         if left := imported.left:
             yield (
-                f"structure.file: {counted(len(left), 'keyword')} with loads, supports, contact or "
+                f"structure.file: {counted(len(left), 'line')} with loads, supports, contact or "
                 f"materials not taken over, the first {left[0]}; all of them: fretscale describe"
             )
         mesh = self.structure.mesh(self.mesh.size, self.mesh.order)
@@ -464,7 +464,7 @@ class MeshCase(FiniteElementCase):
         for (index, _), load in zip(asked, loads, strict=True):
             if isinstance(load, Pretension):
                 with _pointing_at(f"structure.loads.{index}"):
-                    bolt_section(made, load, loads)
+                    bolt_section(made, load)
         slices = [name for name, share in made.held_faces.items() if share == 1.0]
         if slices and made.dimension == 3:
             raise disagreement(

@@ -130,7 +130,7 @@ class MeshModel:
         given = self._case.structure.loads
         loads = [load.described() for load in given]
         return tuple(
-            Bolt(bolt.name, case, bolt_section(structure, load, loads), bolt.force)
+            Bolt(bolt.name, case, bolt_section(structure, load), bolt.force)
             for case, (bolt, load) in enumerate(zip(given, loads, strict=True))
             if isinstance(bolt, PretensionLoad) and isinstance(load, Pretension)
         )
