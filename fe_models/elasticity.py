@@ -248,15 +248,21 @@ class ElasticBody:
         edges = np.unique(mesh.f2e[:, facets])
         return self._basis.edge_dofs[0, edges], mesh.edges[:, edges].T
 
-    def linear_moments(self, boundary: str) -> tuple[sp.csr_matrix, sp.csr_matrix]:
-        """∫ φ_i φ_k dA and ∫ φ_i N_j dA over a boundary, φ linear and N the elements' functions.
+    def linear_moments(
+        self, boundary: str, vertices: Indices
+    ) -> tuple[sp.csr_matrix, sp.csr_matrix]:
+        """∫ φ_i φ_k dA and ∫ φ_i N_j dA, φ linear and N the elements' functions.
 
-        Of all vertices and of all vertices and nodes, ``(v, v)`` and ``(v, n)`` [mm²].
+        Over the facets of a boundary between such ``vertices`` ``(m,)``; of all vertices and of all
+        vertices and nodes, ``(v, v)`` and ``(v, n)`` [mm²].
         """
+        mesh = self.body.mesh
+        facets = np.asarray(mesh.boundaries[boundary])
+        facets = facets[np.isin(mesh.facets[:, facets], vertices).all(axis=0)]
         linear = ELEMENTS[self.dimension, 1]()
         # Products of linear functions and the elements' own, exact.
         tests, trials = (
-            self._facet_basis(boundary, element, 1 + self.order)
+            self._facet_basis(facets, element, 1 + self.order)
             for element in (linear, self._element())
         )
         product = BilinearForm(lambda u, v, w: u * v)
@@ -282,13 +288,16 @@ class ElasticBody:
         return components(lame * trace * np.eye(3)[:, :, None] + 2.0 * shear * strain)
 
     def _facet_basis(
-        self, boundary: str, element: Element | None = None, degree: int | None = None
+        self,
+        boundary: str | Indices,
+        element: Element | None = None,
+        degree: int | None = None,
     ) -> FacetBasis:
-        """On a named boundary, of the displacements or another ``element``'s functions."""
+        """On a boundary, named or by its facets, of displacements or of another ``element``."""
         mesh, mapping = self.body.mesh, None
         if self.curved:
             mapping, degree = mapping_of(self.body), max(INTEGRATED, degree or 0)
-        facets = mesh.boundaries[boundary]
+        facets = mesh.boundaries[boundary] if isinstance(boundary, str) else boundary
         return FacetBasis(mesh, element or self._element(), mapping, degree, facets=facets)
 
 

@@ -64,7 +64,9 @@ class LinearTrace:
             return None
         products, moments = [], []
         for boundary, vertices in faces.items():
-            of_vertices, of_nodes = elastic.linear_moments(boundary)
+            # Of a face that goes on beyond the other body, between these vertices alone: means
+            # over what has no part in the contact would hold rigid motions.
+            of_vertices, of_nodes = elastic.linear_moments(boundary, vertices)
             products.append(of_vertices[vertices][:, vertices])
             moments.append(of_nodes[vertices])
         return cls(sp.block_diag(products, format="csr"), sp.vstack(moments, format="csr"))
