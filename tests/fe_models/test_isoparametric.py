@@ -123,6 +123,16 @@ def test_weight_and_centrifugal_force_are_those_of_the_mass(perturbed):
     np.testing.assert_allclose(softening, 1e4 * load.ravel(), atol=1e-9 * np.abs(softening).max())
 
 
+def test_free_expansion_takes_no_force(perturbed):
+    """In plane strain it is (1 + ν) θ, since it is held across the plane."""
+    strain = 1e-3
+    free = (1.3 if perturbed.dimension == 2 else 1.0) * strain
+    load = perturbed.thermal_load(np.full(perturbed.body.mesh.nvertices, strain))
+    middle = in_body(perturbed).mean(axis=0)
+    force = perturbed.stiffness @ (free * (in_body(perturbed) - middle)).ravel()
+    np.testing.assert_allclose(force, load, rtol=0, atol=1e-11 * np.abs(load).max())
+
+
 def circle(rings, curved, inner=10.0, outer=20.0):
     """A quarter of a thick-walled cylinder, its curved edges straight or on their circles."""
     r, angle = np.linspace(inner, outer, rings + 1), np.linspace(0.0, 0.5 * np.pi, rings + 1)
