@@ -1,15 +1,18 @@
 """Elements with curved edges: linear fields exact, volumes, balances, Lamé's cylinder."""
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
 from scipy.sparse.linalg import spsolve
 from skfem import MeshTet, MeshTri
 
+from fe_models.constraints import Constraints
+from fe_models.cyclic import Cuts, Cyclic
 from fe_models.elasticity import ElasticBody, tensors
 from fe_models.isoparametric import facet_normals, folded
-from fe_models.mesh import Body
+from fe_models.mesh import Body, MeshError
 from fe_models.recovery import StressRecovery
 from fe_models.rigid_motions import rigid_motions
 from fe_models.spin_softening import spin_softening
@@ -252,6 +255,30 @@ def test_stress_round_a_hole_without_tractions():
     assert not inwards[bore].any()
     places = elastic.body.points[bore]
     np.testing.assert_allclose(mean[bore], -places / 10.0, atol=0.05)
+
+
+def test_normals_go_on_in_the_next_sector():
+    """At a cut of a wheel they are radial for both sectors; one alone leaves a thousandth."""
+    elastic = circle(4, curved=True)
+    cyclic = Cyclic(["x"], ["z"], np.array([0.0, 1.0, 0.0]), np.zeros(3), 4)
+    cuts = Cuts.of(elastic.body, cyclic)
+    assert cuts.matched
+    nodes, alone = elastic.boundary_normals("bore")
+    radii = in_body(elastic)[nodes] / np.linalg.norm(in_body(elastic)[nodes], axis=1)[:, None]
+    assert np.abs(alone + radii).max() > 1e-3
+    _, normals = elastic.boundary_normals("bore", partial(cuts.whole_normals, elastic.body))
+    np.testing.assert_allclose(normals, -radii, atol=1e-12)
+
+
+def test_cuts_whose_midsides_are_no_images_are_refused():
+    elastic = circle(2, curved=True)
+    cyclic = Cyclic(["x"], ["z"], np.array([0.0, 1.0, 0.0]), np.zeros(3), 4)
+    moved = elastic.body.midsides.copy()
+    moved[elastic.body.mesh.boundaries["x"], 0] += 0.1
+    body = replace(elastic.body, midsides=moved)
+    cuts = Cuts.of(body, cyclic)
+    with pytest.raises(MeshError, match=r"midside nodes of its cuts are up to 0\.1 mm off"):
+        cuts.tie(Constraints(len(elastic.nodes), 2), ElasticBody(body, STEEL, order=2))
 
 
 def test_far_places_of_faces_are_found():
