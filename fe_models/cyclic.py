@@ -197,7 +197,8 @@ class Cuts:
         """What nodes ``high`` ``(n,)`` follow of the displacements of ``low`` ``(m,)``."""
         images = self.images(elastic.nodes[low])
         if self.matched:
-            partner = cKDTree(images).query(elastic.nodes[high])[1]
+            apart, partner = cKDTree(images).query(elastic.nodes[high])
+            self._check_midsides(elastic, float(apart.max()))
             every = np.arange(len(high))
             return sp.csr_matrix((np.ones(len(high)), (every, partner)), (len(high), len(low)))
         frame = _plane_of(elastic.body, self.high)
@@ -217,6 +218,16 @@ class Cuts:
                 "or refine their curved edges"
             )
         return follows
+
+    def _check_midsides(self, elastic: ElasticBody, apart: float) -> None:
+        """Raise :class:`MeshError` where cuts match but for midside nodes, ``apart`` [mm]."""
+        size = float(np.sqrt(np.sum((elastic.body.points - self.through) ** 2, axis=1)).max())
+        if elastic.curved and apart > IMAGE * size:
+            raise MeshError(
+                f"body {elastic.body.name}: midside nodes of its cuts are up to {apart:.3g} mm off "
+                "each other's images; mesh both cuts alike (in gmsh: setPeriodic), or take "
+                "elements of order 1"
+            )
 
     def whole_normals(self, body: Body, integrals: Array) -> Array:
         """Integrals of normals ``(vertices, d)`` with what the next sectors add on the cuts."""

@@ -363,7 +363,8 @@ class Structure:
         for t, of_t in enumerate(in_space(forces.T.reshape(len(amplitudes), -1, self.dimension))):
             parts = zip(faces, np.split(of_t, ends), strict=True)
             acting = np.concatenate([i.frame.to_global(part) for (i, _), part in parts])
-            moments = np.cross(points - middle, acting).sum(axis=0)
+            places, borne = body.borne(acting)
+            moments = np.cross(places - middle, borne).sum(axis=0)
             applied = body.load_resultants(amplitudes[t], middle)
             force, moment = applied + np.array([acting.sum(axis=0), moments])
             errors[t] = np.linalg.norm(free @ np.append(force, moment / size))

@@ -9,6 +9,7 @@ import numpy as np
 import scipy.linalg as sl
 import scipy.sparse as sp
 from numpy.typing import NDArray
+from scipy.sparse.linalg import spsolve
 
 from fe_models.constraints import Constraints
 from fe_models.cyclic import Cuts
@@ -267,6 +268,16 @@ class SupportedBody:
         else:
             interface[self._free] = self._springs.of(displacement)
         return interface
+
+    def borne(self, forces: Array) -> tuple[Array, Array]:
+        """Places ``(m, 3)`` [mm] and forces there of contact ``forces`` ``(n, 3)`` on the vertices.
+
+        On curved faces these are linear tractions, whose resultant acts where the faces are.
+        """
+        if self.trace is None or not self.elastic.curved:
+            return self.elastic.body.points[self.nodes], forces
+        tractions = spsolve(self.trace.products.tocsc(), forces)
+        return self.elastic.nodes, np.asarray(self.trace.moments.T @ tractions)
 
     @cached_property
     def free_facets(self) -> Indices:

@@ -1,15 +1,18 @@
 """Elements with curved edges: linear fields exact, volumes, balances, Lamé's cylinder."""
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
 from scipy.sparse.linalg import spsolve
 from skfem import MeshTet, MeshTri
 
+from fe_models.constraints import Constraints
+from fe_models.cyclic import Cuts, Cyclic
 from fe_models.elasticity import ElasticBody, tensors
 from fe_models.isoparametric import facet_normals, folded
-from fe_models.mesh import Body
+from fe_models.mesh import Body, MeshError
 from fe_models.recovery import StressRecovery
 from fe_models.rigid_motions import rigid_motions
 from fe_models.spin_softening import spin_softening
@@ -121,6 +124,16 @@ def test_weight_and_centrifugal_force_are_those_of_the_mass(perturbed):
     assert total == pytest.approx(STEEL.density * volume, rel=1e-13)
     softening = spin_softening(perturbed, 100.0) @ in_body(perturbed).ravel()
     np.testing.assert_allclose(softening, 1e4 * load.ravel(), atol=1e-9 * np.abs(softening).max())
+
+
+def test_free_expansion_takes_no_force(perturbed):
+    """In plane strain it is (1 + ν) θ, since it is held across the plane."""
+    strain = 1e-3
+    free = (1.3 if perturbed.dimension == 2 else 1.0) * strain
+    load = perturbed.thermal_load(np.full(perturbed.body.mesh.nvertices, strain))
+    middle = in_body(perturbed).mean(axis=0)
+    force = perturbed.stiffness @ (free * (in_body(perturbed) - middle)).ravel()
+    np.testing.assert_allclose(force, load, rtol=0, atol=1e-11 * np.abs(load).max())
 
 
 def circle(rings, curved, inner=10.0, outer=20.0):
@@ -242,6 +255,30 @@ def test_stress_round_a_hole_without_tractions():
     assert not inwards[bore].any()
     places = elastic.body.points[bore]
     np.testing.assert_allclose(mean[bore], -places / 10.0, atol=0.05)
+
+
+def test_normals_go_on_in_the_next_sector():
+    """At a cut of a wheel they are radial for both sectors; one alone leaves a thousandth."""
+    elastic = circle(4, curved=True)
+    cyclic = Cyclic(["x"], ["z"], np.array([0.0, 1.0, 0.0]), np.zeros(3), 4)
+    cuts = Cuts.of(elastic.body, cyclic)
+    assert cuts.matched
+    nodes, alone = elastic.boundary_normals("bore")
+    radii = in_body(elastic)[nodes] / np.linalg.norm(in_body(elastic)[nodes], axis=1)[:, None]
+    assert np.abs(alone + radii).max() > 1e-3
+    _, normals = elastic.boundary_normals("bore", partial(cuts.whole_normals, elastic.body))
+    np.testing.assert_allclose(normals, -radii, atol=1e-12)
+
+
+def test_cuts_whose_midsides_are_no_images_are_refused():
+    elastic = circle(2, curved=True)
+    cyclic = Cyclic(["x"], ["z"], np.array([0.0, 1.0, 0.0]), np.zeros(3), 4)
+    moved = elastic.body.midsides.copy()
+    moved[elastic.body.mesh.boundaries["x"], 0] += 0.1
+    body = replace(elastic.body, midsides=moved)
+    cuts = Cuts.of(body, cyclic)
+    with pytest.raises(MeshError, match=r"midside nodes of its cuts are up to 0\.1 mm off"):
+        cuts.tie(Constraints(len(elastic.nodes), 2), ElasticBody(body, STEEL, order=2))
 
 
 def test_far_places_of_faces_are_found():

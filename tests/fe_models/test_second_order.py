@@ -7,6 +7,7 @@ import pytest
 from skfem import MeshTet, MeshTri
 
 from fe_models.elasticity import ElasticBody
+from fe_models.friction import FrictionalJoint
 from fe_models.geometry.imported import ImportedMesh, read_bodies
 from fe_models.isoparametric import folded
 from fe_models.mesh import Body, MeshError, StructureMesh, matched_interface, write_msh
@@ -18,6 +19,7 @@ from fe_models.second_order import (
     with_midsides,
 )
 from sa_solver.types import Frame, Material
+from tests.fe_models.test_calculix import blocks, structure_of
 
 STEEL = Material(210e3, 0.3)
 AXES = Frame(np.zeros(3), np.eye(3))
@@ -40,22 +42,28 @@ def imported(mesh, folder):
     return read_bodies(folder / "bodies.msh")
 
 
+@pytest.fixture(scope="module")
+def found(tmp_path_factory):
+    """The cubes from a file; a process of its own reads it, which takes two seconds."""
+    return imported(curved_cubes(), tmp_path_factory.mktemp("cubes"))
+
+
 def same_bodies(found: ImportedMesh):
     return StructureMesh(tuple(found.bodies.values()), ())
 
 
 @pytest.mark.parametrize("dimension", [2, 3])
-def test_written_and_read_again(tmp_path, dimension):
+def test_written_and_read_again(tmp_path, request, dimension):
     """Element by element every node is where it was, whatever order gmsh lists them in."""
     if dimension == 3:
-        mesh = curved_cubes()
+        mesh, found = curved_cubes(), request.getfixturevalue("found")
     else:
         flat = MeshTri().refined(1).with_boundaries({"side": lambda x: x[0] == 0.0})
         middle = flat.p[:, flat.facets].mean(axis=1).T
         mesh = StructureMesh(
             (Body("upper", flat, midsides=middle + 0.02 * np.sin(9.0 * middle)),), ()
         )
-    found = imported(mesh, tmp_path)
+        found = imported(mesh, tmp_path)
     before = mesh.bodies[-1]
     after = with_midsides(same_bodies(found), found).bodies[-1]
     for body in (before, after):
@@ -68,16 +76,15 @@ def test_written_and_read_again(tmp_path, dimension):
     assert told.edges == told.given == len(before.midsides)
 
 
-def test_bodies_with_straight_edges_stay_as_they_are(tmp_path):
-    mesh = curved_cubes(0.0)
-    found = imported(mesh, tmp_path)
-    assert "upper" in found.midsides
-    bodies = same_bodies(found)
-    assert with_midsides(bodies, found).bodies == bodies.bodies
+def test_bodies_with_straight_edges_stay_as_they_are(found):
+    whole = found.midsides["upper"]
+    middle = found.bodies["upper"].points[whole.edges].mean(axis=1)
+    straight = replace(found, midsides={"upper": replace(whole, points=middle)})
+    bodies = same_bodies(straight)
+    assert with_midsides(bodies, straight).bodies == bodies.bodies
 
 
-def test_edges_without_a_node_are_straight(tmp_path):
-    found = imported(curved_cubes(), tmp_path)
+def test_edges_without_a_node_are_straight(found):
     whole = found.midsides["upper"]
     some = replace(whole, edges=whole.edges[:20], points=whole.points[:20])
     part = replace(found, midsides={"upper": some})
@@ -91,9 +98,8 @@ def test_edges_without_a_node_are_straight(tmp_path):
     assert (told.given, told.edges) == (given.sum(), len(edges))
 
 
-def test_folded_elements_have_straight_edges(tmp_path):
+def test_folded_elements_have_straight_edges(found):
     """The one that folds them, if it is inside; counted, and all others as they were."""
-    found = imported(curved_cubes(), tmp_path)
     straight = found.bodies["upper"].mesh
     surface = np.unique(straight.f2e[:, straight.boundary_facets()])
     inside = np.setdiff1d(np.arange(straight.nedges), surface)[0]
@@ -113,8 +119,7 @@ def test_folded_elements_have_straight_edges(tmp_path):
     np.testing.assert_array_equal(body.midsides[inside], middle[inside])
 
 
-def test_torn_edges_are_refused(tmp_path):
-    found = imported(curved_cubes(), tmp_path)
+def test_torn_edges_are_refused(found):
     points = found.midsides["upper"].points.copy()
     ends = np.sort(found.midsides["upper"].edges, axis=1)
     _, first, count = np.unique(ends, axis=0, return_index=True, return_counts=True)
@@ -207,3 +212,14 @@ def test_a_brick_is_split_into_curved_tetrahedra(tmp_path):
     volume = ElasticBody(body, STEEL, 2).basis().dx.sum()
     # Serendipity: the top is at 2 + 0.2 (N_13 + ... + N_16), whose mean is 4/3 of its area.
     assert volume == pytest.approx(8.0 + 0.2 * 4.0 * 4.0 / 3.0, rel=1e-3)
+
+
+@pytest.mark.parametrize("matching", [True, False])
+def test_curved_faces_bear_what_is_applied(matching):
+    """Forces and moments of tractions where the bent face is, not at its corners: 0.3 % there."""
+    bodies = blocks(2, curved=True, matching=matching)
+    structure = structure_of(bodies, matching)
+    joint = FrictionalJoint(structure.condense().resolvent(), friction=0.9)
+    states = list(joint.march(np.ones((1, 1)), structure.gap()))
+    assert states[0].converged
+    assert structure.equilibrium_errors(states, np.ones((1, 1))) < 1e-7
