@@ -331,21 +331,31 @@ def loops(
 @click.argument("file", type=click.Path(path_type=Path))
 @click.option("--size", metavar="LENGTH", help="Of the elements, for a CAD file, such as '2 mm'.")
 @click.option("--out", type=click.Path(path_type=Path), help="Folder for a picture and a .vtu.")
+@click.option("--case", type=click.Path(path_type=Path), help="Case to write of what FILE says.")
 @click.option("--force", is_flag=True, help="Overwrite what is there.")
-def describe(file: Path, size: str | None, out: Path | None, force: bool) -> None:
+def describe(
+    file: Path, size: str | None, out: Path | None, case: Path | None, force: bool
+) -> None:
     """List what a case may name of a mesh or CAD FILE.
 
-    That is bodies, boundaries and node sets; with --out they are drawn, too.
+    That is bodies, boundaries and node sets; with --out they are drawn, too. With --case its
+    contacts, supports, loads and materials become a case, whose other entries are to be filled in.
     """
+    from dataclasses import replace
+
     from fe_models.geometry.imported import describe_bodies
-    from workflow.commands.describe import read_file, write_assembly
+    from workflow.commands.describe import read_file, write_assembly, write_offer
 
     imported = read_file(file, size)
-    for line in describe_bodies(imported):
+    # What is not in the case is told when that is written.
+    for line in describe_bodies(imported if case is None else replace(imported, left=())):
         click.echo(line)
     if out is not None:
         for path in write_assembly(imported, out, file.name, force):
             click.echo(path)
+    if case is not None:
+        for line in write_offer(imported, file, size, case, force):
+            click.echo(line)
 
 
 def _kinds() -> dict[str, str]:

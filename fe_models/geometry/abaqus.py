@@ -12,6 +12,7 @@ from pathlib import Path
 from fe_models.geometry.abaqus_cards import cards
 from fe_models.geometry.abaqus_elements import PLANE_STRESS
 from fe_models.geometry.abaqus_model import Model
+from fe_models.geometry.abaqus_scene import scene_of
 from fe_models.geometry.flattened import FlatFile, Flattened, dimension_of
 from fe_models.geometry.grouped import DIMENSION, GroupedMesh
 from fe_models.geometry.scope import Scope
@@ -43,7 +44,10 @@ def read_abaqus(path: Path) -> GroupedMesh:
         flattened = FlatFile(model.flat)
     else:
         raise MeshError(f"{path}: has no elements")
-    return replace(flattened.mesh(), left=(*_plane_stress(scopes), *model.left))
+    mesh = flattened.mesh()
+    plane, scene = _plane_stress(scopes), scene_of(model, flattened, mesh)
+    scene = replace(scene, ignored=(*plane, *scene.ignored))
+    return replace(mesh, left=(*plane, *model.left), scene=scene)
 
 
 def _plane_stress(scopes: list[Scope]) -> list[str]:

@@ -32,6 +32,8 @@ REFUSED = (
     | {"DISPLAYBODY": "it is shown and no body that is computed; leave its instance out"}
 )  # fmt: skip
 
+# Keywords that other ones stand below.
+CONTEXT = frozenset(["MATERIAL", "SOLIDSECTION", "SURFACEINTERACTION", "STEP"])
 # Keywords that say what a case says: they are not taken over.
 LEFT = frozenset(
     ["BOUNDARY", "CLOAD", "DLOAD", "DSLOAD", "TEMPERATURE", "CONTACTPAIR", "CONTACT", "CLEARANCE",
@@ -51,6 +53,9 @@ class Model:
         self.parts: Names[Scope] = Names()
         self.instances: Names[Scope] = Names()
         self.left: list[str] = []
+        # What a case says, with the scope it stands in, and the part of each instance.
+        self.said: list[tuple[Scope, Card]] = []
+        self.part_of: dict[str, str] = {}
         self._scope = self.flat
         self._handlers: dict[str, Callable[[Card], None]] = {
             "PART": self._part,
@@ -73,7 +78,9 @@ class Model:
                 f"{card.place}: *{card.keyword} is not supported: {REFUSED[card.keyword]}"
             )
         if card.keyword in LEFT:
-            self.left.append(_told(card))
+            self.left.append(told(card))
+        if card.keyword in LEFT | CONTEXT:
+            self.said.append((self._scope, card))
         if card.keyword in self._handlers:
             self._handlers[card.keyword](card)
 
@@ -98,6 +105,7 @@ class Model:
             )
         if name in self.instances:
             raise MeshError(f"{card.place}: instance {name} is defined twice")
+        self.part_of[name] = self.parts[part].name
         # What follows up to *End Instance belongs to it: CAE writes independent instances so.
         self._scope = self.instances.add(
             name, self.parts[part].instance(name, card.place, _placing(card.rows))
@@ -197,7 +205,7 @@ class Model:
         return members
 
 
-def _told(card: Card) -> str:
+def told(card: Card) -> str:
     """A keyword in a line: where it stands, its parameters and its first data."""
     given = card.parameters.items()
     parameters = [f"{key.lower()}={value}" if value else key.lower() for key, value in given]

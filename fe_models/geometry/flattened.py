@@ -85,7 +85,7 @@ class Flattened:
         """Facets of the element surfaces."""
         return {
             name: self._faces(scope, card)
-            for name, scope, card in self._named("surfaces")
+            for name, scope, _, card in self._named("surfaces")
             if not _is_node_surface(card)
         }
 
@@ -93,9 +93,9 @@ class Flattened:
         """Rows of the nodes of node sets and node surfaces."""
         sets = {
             name: self._rows(name, scope, members)
-            for name, scope, members in self._named("node_sets")
+            for name, scope, _, members in self._named("node_sets")
         }
-        for name, scope, card in self._named("surfaces"):
+        for name, scope, _, card in self._named("surfaces"):
             if _is_node_surface(card):
                 if name in sets:
                     raise MeshError(f"{card.place}: a node set is named {name}, too; rename one")
@@ -122,7 +122,7 @@ class Flattened:
         except KeyError as error:
             raise MeshError(f"{place}: node {error.args[0]} is not defined") from None
 
-    def _named(self, kind: str) -> Iterator[tuple[str, Scope, Any]]:
+    def _named(self, kind: str) -> Iterator[tuple[str, Scope, str, Any]]:
         """What all scopes name, with the instance before a name that is not the only one."""
         scopes = [self.common, *(scope for _, scope in self.instances.items())]
         count = Counter(
@@ -131,7 +131,15 @@ class Flattened:
         for scope in scopes:
             prefix = f"{scope.name}." if scope.name else ""
             for name, value in getattr(scope, kind).items():
-                yield (prefix + name if count[name.upper()] > 1 else name), scope, value
+                yield (prefix + name if count[name.upper()] > 1 else name), scope, name, value
+
+    def names_of_groups(self) -> dict[tuple[str, str], str]:
+        """Names of sets and surfaces by the instance they are of and their own, upper case."""
+        return {
+            (scope.name.upper(), own.upper()): name
+            for kind in ("node_sets", "surfaces")
+            for name, scope, own, _ in self._named(kind)
+        }
 
     def _rows(self, name: str, scope: Scope, members: Members) -> Indices:
         """Rows of the nodes of a set; the assembly's own nodes (reference points) have none."""

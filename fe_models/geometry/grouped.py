@@ -7,12 +7,13 @@ diagonals of the quadrilaterals between them, whatever they are split from.
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import pairwise
 
 import numpy as np
 
 from fe_models.curved_face import Midsides
+from fe_models.geometry.scene import Scene
 from fe_models.mesh import MeshError
 from sa_solver.types import Array, Indices
 
@@ -56,7 +57,7 @@ class GroupedMesh:
     ``points`` ``(n, 3)`` [mm] and ``numbers`` ``(n,)``, the file's own node numbers; per name the
     elements of a body, the facets of a surface and the rows of a node set. ``midsides`` are the
     points in the middle of edges that elements of second order have, ``left`` lines of the file
-    that say more than a mesh and are not taken over.
+    that say more than a mesh and are not taken over, ``scene`` what a case could have of them.
     """
 
     points: Array
@@ -66,6 +67,7 @@ class GroupedMesh:
     node_sets: dict[str, Indices]
     midsides: Midsides | None = None
     left: tuple[str, ...] = ()
+    scene: Scene = field(default_factory=Scene)
 
 
 def midsides_of(points: Array, blocks: Iterable[tuple[str, Indices]]) -> Midsides | None:

@@ -17,6 +17,7 @@ from fe_models.geometry.gmsh_file import read_msh
 from fe_models.geometry.grouped import DIMENSION, Blocks, GroupedMesh, nodes_of, split_blocks
 from fe_models.geometry.meshio_file import read_meshio
 from fe_models.geometry.nastran import read_nastran
+from fe_models.geometry.scene import Scene
 from fe_models.geometry.set_faces import faces_of_sets
 from fe_models.geometry.unv import read_unv
 from fe_models.mesh import Body, MeshError, in_space
@@ -46,7 +47,8 @@ class ImportedMesh:
     vertices in each named node set of the file that has any on that body. ``midsides`` are points
     in the middle of edges, of bodies for which the file has them, and ``middles`` the edges
     ``(k, 2)`` whose midside nodes are in each of these node sets; ``left`` lines of the file that
-    say more than a mesh and are not taken over.
+    say more than a mesh and are not taken over, ``scene`` what a case could have of them; ``axes``
+    are those of the file that the bodies have, all or the two of a plane.
 
     Examples
     --------
@@ -77,6 +79,8 @@ class ImportedMesh:
     midsides: dict[str, Midsides] = field(default_factory=dict)
     middles: dict[str, dict[str, Indices]] = field(default_factory=dict)
     left: tuple[str, ...] = ()
+    scene: Scene = field(default_factory=Scene)
+    axes: tuple[int, ...] = (0, 1, 2)
 
     @cached_property
     def set_faces(self) -> dict[str, dict[str, Indices]]:
@@ -268,7 +272,16 @@ def _separated(grouped: GroupedMesh) -> ImportedMesh:
                 points_name: vertex[edges[inside & np.isin(rows, grouped.node_sets[points_name])]]
                 for points_name in points[name]
             }
-    return ImportedMesh(bodies, numbers, points, midsides, middles, grouped.left)
+    return ImportedMesh(
+        bodies=bodies,
+        node_numbers=numbers,
+        points=points,
+        midsides=midsides,
+        middles=middles,
+        left=grouped.left,
+        scene=grouped.scene,
+        axes=tuple(axes.tolist()),
+    )
 
 
 def _axes(grouped: GroupedMesh) -> Indices:

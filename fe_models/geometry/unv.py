@@ -15,6 +15,7 @@ import numpy as np
 from fe_models.geometry.abaqus_cards import SourceLine, integer, real
 from fe_models.geometry.flattened import FlatFile
 from fe_models.geometry.grouped import CORNERS, DIMENSION, GroupedMesh
+from fe_models.geometry.scene import Scene
 from fe_models.geometry.scope import Element, Scope, extend
 from fe_models.mesh import MeshError
 
@@ -93,7 +94,8 @@ def read_unv(path: Path) -> GroupedMesh:
         raise MeshError(f"{path}: has no elements; allowed: dataset {ELEMENTS[0]}")
     for dataset in groups:
         _groups(scope, dataset)
-    return replace(FlatFile(scope).mesh(), left=(*left, *_plane_kinds(scope)))
+    told = (*left, *_plane_kinds(scope))
+    return replace(FlatFile(scope).mesh(), left=told, scene=Scene(ignored=told))
 
 
 def _datasets(path: Path) -> Iterator[Dataset]:

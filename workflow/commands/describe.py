@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 from pydantic import TypeAdapter, ValidationError
@@ -12,6 +13,7 @@ from workflow.case.sections import Length
 from workflow.errors import UserError
 from workflow.shell.folder import OutputFolder
 from workflow.shell.lock import locked
+from workflow.shell.store import replacing
 
 FIGURE, PARAVIEW = "assembly.png", "assembly.vtu"
 
@@ -35,6 +37,20 @@ def write_assembly(imported: ImportedMesh, out: Path, title: str, force: bool) -
         write_figure(shown_bodies(imported), title, paths[0])
         write_vtu(imported, paths[1])
     return paths
+
+
+def write_offer(
+    imported: ImportedMesh, file: Path, size: str | None, case: Path, force: bool
+) -> list[str]:
+    """Write a case of what a file says; returns lines that tell what it does not have of it."""
+    from workflow.commands.offered_case import offered_case
+
+    if case.exists() and not force:
+        raise UserError(f"{case}: exists; take another name, or --force to overwrite it")
+    offer = offered_case(imported, os.path.relpath(file, case.parent or "."), size)
+    with replacing(case) as partial:
+        partial.write_text(offer.text, encoding="utf-8")
+    return [*(f"not in the case: {line}" for line in offer.ignored), str(case)]
 
 
 def _length(text: str) -> float:

@@ -1,0 +1,243 @@
+"""``fretscale describe --case``: what a file says becomes a case, and what does not is told."""
+
+import json
+
+import pytest
+from ruamel.yaml import YAML
+
+from fe_models.gmsh_session import gmsh_model
+from tests.workflow.commands import invoke
+from tests.workflow.mesh_scenes import ASSEMBLY, BLOCKS, TO_AND_FRO, cube, run, write_case
+from workflow.commands.offered_case import TO_FILL
+
+pytestmark = pytest.mark.usefixtures("reads_here")
+
+# As CAE writes what belongs to the blocks of the other tests: 40 MPa, then 4 N to and fro.
+SECTION = "*Elset, elset=all, generate\n1, 8, 1\n*Solid Section, elset=all, material=Steel\n,\n"
+MODEL = """\
+*Material, name=Steel
+*Density
+7.85e-09,
+*Elastic
+206843.5, 0.29
+*Expansion
+1.2e-05,
+*Surface Interaction, name=dry
+1.,
+*Friction, slip tolerance=0.005
+0.55,
+*Surface Behavior, pressure-overclosure=HARD
+*Contact Pair, interaction=dry, type=SURFACE TO SURFACE
+Foot-1.foot_low, Base-1.base_high
+*Initial Conditions, type=TEMPERATURE
+Foot-1.foot_nodes, 20.
+*Boundary
+Base-1.base_nodes, ENCASTRE
+*Step, name=Press
+*Static
+*Dsload
+Foot-1.foot_high, P, 40.
+*End Step
+*Step, name=Push
+*Static
+*Dsload
+Foot-1.foot_high, TRVEC, 4., 1., 0., 0.
+*End Step
+*Step, name=Pull
+*Static
+*Dsload, amplitude=Ramp
+Foot-1.foot_high, TRVEC, -4., 1., 0., 0.
+*Cload
+Foot-1.foot_nodes, 4, 7.
+3, 1, 5.
+*Restart, write
+*End Step
+"""
+WEAR = {
+    "law": "energy",
+    "body_1": {"coefficient": "1e3 um^3/J"},
+    "body_2": {"coefficient": "1e3 um^3/J"},
+    "cycles": 1e3,
+    "step": {"kind": "implicit", "cycles": 500},
+}
+
+
+def deck(folder, model=MODEL):
+    """A file of both blocks and a model, and its path."""
+    nodes = "*Nset, nset={}_nodes, generate\n1, 9, 1\n"
+    text = "".join(
+        cube(name, size).replace("*End Part", nodes.format(name) + SECTION + "*End Part")
+        for name, size in (("base", 2.0), ("foot", 1.0))
+    )
+    path = folder / "deck.inp"
+    path.write_text(text + ASSEMBLY.replace("*Step\n*Static\n*End Step\n", model), "utf-8")
+    return path
+
+
+def offered(path, *options):
+    """The case that is offered, as data, and the lines that are not in it."""
+    case = path.with_suffix(".yaml")
+    ending = invoke("describe", path, "--case", case, *options)
+    assert ending.exit_code == 0, ending.stderr
+    lines = [line for line in ending.output.splitlines() if line.startswith("not in the case: ")]
+    with case.open(encoding="utf-8") as stream:
+        return YAML(typ="safe").load(stream), [
+            line.removeprefix("not in the case: ") for line in lines
+        ]
+
+
+def line_of(path, text):
+    return path.name + f":{path.read_text('utf-8').splitlines().index(text) + 1}"
+
+
+def test_an_abaqus_model_becomes_a_case(tmp_path):
+    path = deck(tmp_path)
+    case, ignored = offered(path)
+    structure = case["structure"]
+    assert structure["body_1"], structure["body_2"] == ("Base-1", "Foot-1")
+    (contact,) = structure["contacts"]
+    assert (contact["face_1"], contact["face_2"]) == ("base_high", "foot_low")
+    assert contact["x"] == [1.0, 0.0, 0.0]
+    assert structure["supports"] == [{"group": "base_nodes", "hold": "all"}]
+    press, push = structure["loads"]
+    assert press == {
+        "kind": "pressure", "group": "foot_high", "pressure": 40, "path": [1, 1, 1, 0]
+    }  # fmt: skip
+    assert push == {
+        "kind": "force", "group": "foot_high", "force": [4, 0, 0], "path": [0, 1, -1, 0]
+    }  # fmt: skip
+    steel = {"young": 206843.5, "poisson": 0.29, "density": 7.85e-9, "expansion": 1.2e-5}
+    assert case["materials"] == {"body_1": steel, "body_2": steel}
+    assert case["friction"] == {"coefficient": 0.55}
+    assert ignored == [
+        f"{line_of(path, '*Surface Behavior, pressure-overclosure=HARD')}: *surfacebehavior, "
+        "pressure-overclosure=HARD: not part of a case",
+        f"{line_of(path, '*Initial Conditions, type=TEMPERATURE')}: *initialconditions, "
+        "type=TEMPERATURE: Foot-1.foot_nodes, 20.: not part of a case",
+        f"{line_of(path, '*Dsload, amplitude=Ramp')}: *dsload, amplitude=Ramp: Foot-1.foot_high, "
+        "TRVEC, -4., 1., 0., 0.: amplitude Ramp: loads grow evenly over a leg",
+        f"{line_of(path, 'Foot-1.foot_nodes, 4, 7.')}: *cload: Foot-1.foot_nodes, 4, 7.: a moment "
+        "on nodes, which solids do not take: allowed: forces",
+        f"{line_of(path, '3, 1, 5.')}: *cload: 3, 1, 5.: on node 3: name a set of it",
+    ]
+
+
+def test_only_what_the_user_knows_is_missing(tmp_path):
+    """A check names it; given, the case is the one written by hand, to all digits."""
+    path = deck(tmp_path)
+    offered(path)
+    case = path.with_suffix(".yaml")
+    refusal = invoke("check", case)
+    assert refusal.exit_code == 2
+    assert "wear.body_1.coefficient" in refusal.stderr
+    assert "structure" not in refusal.stderr
+    text = case.read_text("utf-8")
+    head, _, tail = text.partition("wear:\n")
+    assert TO_FILL not in head.split("analysis:")[1]
+    case.write_text(head + f"wear: {json.dumps(WEAR)}\n" + tail[tail.index("stress:") :], "utf-8")
+    assert invoke("check", case).exit_code == 0, invoke("check", case).stderr
+    shared = "output={paraview: false, figures: false}", "contact.grid=[16, 16]"
+    legs = "load_path.increments=[1, 2, 2, 2]"
+    found = run(case, tmp_path / "offered", *shared, legs)["contact_1"]
+    paths = [1, 1, 1, 0], [0, 1, -1, 0]
+    loads = [load | {"path": path} for load, path in zip(BLOCKS["loads"], paths, strict=True)]
+    structure = {"file": path.name, **BLOCKS, "loads": loads}
+    steel = {"young": 206843.5, "poisson": 0.29}
+    hand = write_case(
+        tmp_path / "hand.yaml",
+        structure,
+        TO_AND_FRO | {"cycle_from": 1, "peak_leg": 3},
+        mu=0.55,
+        materials={"body_1": steel, "body_2": steel},
+        stress={"section": "none", "life": {"parameter": "none"}},
+    )
+    expected = run(hand, tmp_path / "hand")["foot"]
+    for name in ("depth_1", "volume_2", "energy"):
+        assert found[name] == pytest.approx(expected[name], rel=1e-9)
+
+
+def test_loads_of_every_kind(tmp_path):
+    """Of steps: what is given stays, op=new ends it; one that turns is a load of its own."""
+    model = MODEL[: MODEL.index("*Boundary")] + (
+        "*Boundary\nBase-1.base_nodes, 1, 3\nFoot-1.foot_high, 2\n"
+        "*Step\n*Static\n*Cload\nFoot-1.foot_nodes, 3, -2.\n*Dload\n, GRAV, 9810., 0., 0., -1.\n"
+        "*Boundary\nFoot-1.foot_high, 1, 1, 0.01\n*End Step\n"
+        "*Step\n*Static\n*Cload, op=NEW\n*Boundary\nFoot-1.foot_high, 1, 1, -0.02\n"
+        "*Dload\n, CENTRIF, 90000., 1., 2., 3., 0., 2., 0.\n, BX, 3.\n*End Step\n"
+    )
+    model = model.replace("Foot-1.foot_high", "Foot-1.foot_top")
+    path = deck(tmp_path, model)
+    head, tail = path.read_text("utf-8").split("*Part, name=foot\n")
+    tops = "*Nset, nset=foot_top, generate\n19, 27, 1\n*End Part"
+    path.write_text(head + "*Part, name=foot\n" + tail.replace("*End Part", tops, 1), "utf-8")
+    case, ignored = offered(path)
+    structure = case["structure"]
+    assert structure["supports"] == [
+        {"group": "base_nodes", "hold": "all"}, {"group": "foot_top", "hold": "y"}
+    ]  # fmt: skip
+    named = {load["kind"]: load for load in structure["loads"]}
+    assert named["force"]["force"] == [0, 0, -18]  # of 9 nodes
+    assert named["force"]["path"] == [1, 0, 0]
+    assert named["acceleration"]["acceleration"] == [0, 0, 9810]
+    assert named["acceleration"]["path"] == [1, 1, 0]
+    assert named["displacement"]["displacement"] == [0.01, 0, 0]
+    assert named["displacement"]["path"] == [1, -2, 0]
+    assert named["rotation"]["speed"] == 300
+    assert named["rotation"]["axis"] == [0, 1, 0]
+    assert named["rotation"]["through"] == [1, 2, 3]
+    assert named["rotation"]["path"] == [0, 1, 0]
+    assert any(line.endswith("a load of type BX: allowed: GRAV, CENTRIF, or *Dsload")
+               for line in ignored)  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "told"),
+    [
+        ("206843.5, 0.29", "2.1e11, 0.29", "is the file in other units?"),
+        ("*Elastic\n", "*Elastic, type=ORTHOTROPIC\n", "bodies are isotropic"),
+        ("206843.5, 0.29\n", "206843.5, 0.29, 20.\n2e5, 0.29, 300.\n", "the first is taken"),
+        ("Foot-1.foot_low, Base", "Foot-1.foot_low, Foot-1.foot_high\nFoot-1.foot_low, Base",
+         "body Foot-1 touches itself"),
+        ("Foot-1.foot_high, P, 40.", "Foot-1.foot_high, HP, 40., 1., 2.", "a load of type HP"),
+        ("Base-1.base_nodes, ENCASTRE", "Base-1.base_nodes, ENCASTRE\nBase-1.gone, 1",
+         "no set or surface Base-1.gone"),
+        ("*Static\n*Dsload\nFoot-1.foot_high, P", "*Static\n*Dsload\n\nFoot-1.foot_high\n"
+         "Foot-1.foot_high, P", "not understood"),
+    ],
+)  # fmt: skip
+def test_what_is_not_taken_is_told(tmp_path, old, new, told):
+    assert old in MODEL
+    _, ignored = offered(deck(tmp_path, MODEL.replace(old, new, 1)))
+    assert any(told in line for line in ignored), ignored
+
+
+def test_files_that_say_nothing_leave_more_to_fill_in(tmp_path):
+    """Of CAD there are faces that lie on each other; what is held and loaded is asked for."""
+    path = tmp_path / "boxes.step"
+    with gmsh_model("boxes") as gmsh:
+        gmsh.model.occ.addBox(-2, -2, -2, 4, 4, 2)
+        gmsh.model.occ.addBox(-1, -1, 0, 2, 2, 1)
+        gmsh.model.occ.addBox(-1, -1, 1, 2, 2, 1)
+        gmsh.model.occ.synchronize()
+        gmsh.write(str(path))
+    case, ignored = offered(path, "--size", "1 mm")
+    structure = case["structure"]
+    assert [body["name"] for body in structure["other_bodies"]] == ["solid_3"]
+    faces = [(pair["face_1"], pair["face_2"]) for pair in structure["contacts"]]
+    assert faces == [
+        ("solid_1.face_6", "solid_2.face_5"), ("solid_2.face_6", "solid_3.face_5")
+    ]  # fmt: skip
+    assert structure["contacts"][1]["bodies"] == ["solid_2", "solid_3"]
+    assert structure["supports"] == [{"group": TO_FILL, "hold": "all"}]
+    assert case["mesh"] == {"size": "1 mm"}
+    assert case["friction"] == {"coefficient": TO_FILL}
+    assert ignored == []
+
+
+def test_a_case_is_not_written_over(tmp_path):
+    path = deck(tmp_path)
+    offered(path)
+    ending = invoke("describe", path, "--case", path.with_suffix(".yaml"))
+    assert ending.exit_code == 2
+    assert "exists; take another name, or --force" in ending.stderr
+    offered(path, "--force")

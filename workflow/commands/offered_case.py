@@ -1,0 +1,324 @@
+"""A case of ``kind: mesh`` with what a file says: what it does not say is left to fill in."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from itertools import combinations
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from fe_models.geometry.imported import ImportedMesh, Patch, patch
+from fe_models.geometry.scene import SaidContact, SaidLoad, SaidSupport, Vector
+from fe_models.mesh import Body
+from sa_solver.types import Array
+
+TO_FILL = "fill in"
+# Increments of a leg to begin with.
+INCREMENTS = 4
+# Faces look at each other to this cosine, and are this share of their size apart.
+OPPOSITE, NEAR = -0.95, 0.02
+# Young's moduli above this one are of another unit than MPa.
+STIFFEST = 2e6
+AXES = "xyz"
+
+
+@dataclass(frozen=True)
+class Offer:
+    """The text of a case, and lines on what is not in it."""
+
+    text: str
+    ignored: list[str]
+
+
+def offered_case(imported: ImportedMesh, file: str, size: str | None) -> Offer:
+    """A case of what a mesh file says, which goes by the name ``file`` from where the case is."""
+    return _Offered(imported, file, size).offer()
+
+
+class _Offered:
+    def __init__(self, imported: ImportedMesh, file: str, size: str | None) -> None:
+        self.imported, self.file, self.size = imported, file, size
+        self.scene = imported.scene
+        self.ignored = list(self.scene.ignored)
+        self.plane = len(imported.axes) == 2
+        self.loads = [load for load in map(self._placed, self.scene.loads) if load is not None]
+        self.supports = list(self._supports())
+        held = {self._owner(support.group) for support in self.supports}
+        # Those that are held come first: body 1 is.
+        self.order = sorted(imported.bodies, key=lambda name: name not in held)
+        said = [pair for pair in self.scene.contacts if self._is_known(pair)]
+        self.contacts = [self._ordered(pair) for pair in said or self._facing()]
+        meeting = {self._owner(face) for pair in self.contacts for face in pair.faces}
+        self.bodies = [name for name in self.order if name in meeting] or self.order
+        for name in self.order:
+            if name not in self.bodies:
+                self.ignored.append(f"body {name}: in no contact")
+
+    def offer(self) -> Offer:
+        lines = [
+            f"# What {Path(self.file).name} says, by `fretscale describe`: look at every entry,",
+            f"# and give what says {TO_FILL!r}. `fretscale check` tells what is wrong or missing.",
+            f"title: {_text('Bodies of ' + Path(self.file).name)}",
+            "analysis: wear",
+            "structure:",
+            "  kind: mesh",
+            f"  file: {_text(self.file)}",
+            *self._bodies(),
+            "  contacts:",
+            *self._contacts(),
+            "  supports:",
+            *self._held(),
+            "  loads:",
+            *self._loaded(),
+            "materials:",
+            *(line for number in (1, 2) for line in self._material(f"body_{number}", number - 1)),
+            *self._friction(),
+            *self._legs(),
+            *(["mesh:", f"  size: {_text(self.size)}"] if self.size else []),
+            "contact: {grid: [64, 64]}",
+            "wear:",
+            "  law: energy  # or archard, energy_amplitude",
+            f"  body_1: {{coefficient: {TO_FILL}}}  # such as 1e4 um^3/J",
+            f"  body_2: {{coefficient: {TO_FILL}}}",
+            f"  cycles: {TO_FILL}  # of the whole run, such as 1e5",
+            "  step: {kind: implicit}",
+            "stress: {section: none, life: {parameter: none}}",
+        ]
+        return Offer("\n".join([*lines, ""]), self.ignored)
+
+    # --- names and places -----------------------------------------------------------------------
+
+    def _owners(self, group: str) -> list[str]:
+        return [
+            name
+            for name, body in self.imported.bodies.items()
+            if group in (body.mesh.boundaries or {}) or group in self.imported.points[name]
+        ]
+
+    def _owner(self, group: str) -> str:
+        return next(iter(self._owners(group)), "")
+
+    def _patch(self, group: str) -> Patch | None:
+        """Size and place of a group that is a face."""
+        name = self._owner(group)
+        body = self.imported.bodies[name]
+        if group in (body.mesh.boundaries or {}):
+            return patch(body, group)
+        if group in self.imported.set_faces[name]:
+            facets = self.imported.set_faces[name][group]
+            return patch(Body(name, body.mesh.with_boundaries({group: facets})), group)
+        return None
+
+    def _is_known(self, pair: SaidContact) -> bool:
+        """Whether both faces are, each on a body of its own; or it is told why not."""
+        for face in pair.faces:
+            if len(self._owners(face)) != 1 or self._patch(face) is None:
+                self.ignored.append(f"{pair.line}: contact face {face} is no face of one body")
+                return False
+        one, two = (self._owner(face) for face in pair.faces)
+        if one == two:
+            self.ignored.append(f"{pair.line}: body {one} touches itself")
+        return one != two
+
+    def _axes(self, axes: str) -> str:
+        """Axes of the file by the names that a case has for them: those of a plane are x and z."""
+        if not self.plane:
+            return "".join(sorted(set(axes)))
+        names = {AXES[axis]: name for axis, name in zip(self.imported.axes, "xz", strict=True)}
+        return "".join(sorted({names[axis] for axis in axes if axis in names}))
+
+    def _vector(self, vector: Vector) -> Array:
+        """A vector of the file along the axes of a case."""
+        if not self.plane:
+            return np.array(vector)
+        one, two = self.imported.axes
+        return np.array([vector[one], 0.0, vector[two]])
+
+    # --- what is held and loaded ----------------------------------------------------------------
+
+    def _supports(self) -> Iterator[SaidSupport]:
+        """All axes held of a group together, without those along which it is moved."""
+        moved = {
+            (load.group, AXES[int(np.argmax(np.abs(load.value)))])
+            for load in self.loads
+            if load.kind == "displacement"
+        }
+        together: dict[str, SaidSupport] = {}
+        for support in self.scene.supports:
+            if not self._owners(support.group):
+                self.ignored.append(f"{support.line}: {support.group} is on no body")
+                continue
+            before = together.setdefault(support.group, replace(support, axes=""))
+            axes = {*before.axes, *self._axes(support.axes)}
+            axes -= {axis for group, axis in moved if group == support.group}
+            together[support.group] = replace(before, axes="".join(sorted(axes)))
+        return (support for support in together.values() if support.axes)
+
+    def _placed(self, load: SaidLoad) -> SaidLoad | None:
+        """A load as a case has it: along its axes, a traction as a force; None if it cannot."""
+        if load.group and len(self._owners(load.group)) != 1:
+            self.ignored.append(f"{load.line}: {load.group} is not on one body")
+            return None
+        if isinstance(load.value, float):
+            return load
+        x, y, z = self._vector(load.value).tolist()
+        if load.kind == "rotation" and self.plane:
+            self.ignored.append(f"{load.line}: a rotation of a plane mesh: see rotation loads")
+            return None
+        if not any((x, y, z)):
+            self.ignored.append(f"{load.line}: across the plane of the mesh")
+            return None
+        if load.kind == "traction":
+            face = self._patch(load.group)
+            if face is None:
+                self.ignored.append(f"{load.line}: {load.group} is no face")
+                return None
+            x, y, z = face.area * x, face.area * y, face.area * z
+            return replace(load, kind="force", value=(x, y, z))
+        group = self._patch(load.group) if load.kind == "displacement" else None
+        if load.kind == "displacement" and group is None:
+            self.ignored.append(f"{load.line}: a displacement is for faces; {load.group} is none")
+            return None
+        return replace(load, value=(x, y, z))
+
+    # --- contacts -------------------------------------------------------------------------------
+
+    def _ordered(self, pair: SaidContact) -> SaidContact:
+        """Faces in the order of their bodies."""
+        one, two = sorted(pair.faces, key=lambda face: self.order.index(self._owner(face)))
+        return replace(pair, faces=(one, two))
+
+    def _facing(self) -> Iterator[SaidContact]:
+        """Pairs of boundaries of two bodies that lie on each other, where the file names none."""
+        places = {
+            (name, boundary): patch(body, boundary)
+            for name, body in self.imported.bodies.items()
+            for boundary in body.mesh.boundaries or {}
+        }
+        for (one, face_1), (two, face_2) in combinations(places, 2):
+            a, b = places[one, face_1], places[two, face_2]
+            size = min(a.area, b.area) if self.plane else np.sqrt(min(a.area, b.area))
+            apart = b.centroid - a.centroid
+            reach = max(a.area, b.area) if self.plane else np.sqrt(max(a.area, b.area))
+            if (
+                one != two
+                and a.normal @ b.normal < OPPOSITE
+                and abs(apart @ a.normal) < NEAR * size
+                and np.linalg.norm(apart) < reach
+            ):
+                yield SaidContact((face_1, face_2), None, "by their places")
+
+    def _sliding(self, normal: Array) -> list[float]:
+        """Where body 2 would slide: along what is pushed or moved, else along an axis."""
+        pushed = [
+            np.array(load.value) / np.linalg.norm(load.value)
+            for load in self.loads
+            if load.kind in ("force", "displacement")
+        ]
+        for direction in [*pushed, *np.eye(3)[[0, 2] if self.plane else slice(None)]]:
+            along = direction - (direction @ normal) * normal
+            if np.linalg.norm(along) > 0.5:
+                unit = along / np.linalg.norm(along)
+                return [float(f"{c:.6g}") + 0.0 for c in unit]
+        return [1.0, 0.0, 0.0]
+
+    # --- lines ----------------------------------------------------------------------------------
+
+    def _bodies(self) -> Iterator[str]:
+        names = [*self.bodies, TO_FILL, TO_FILL][: max(2, len(self.bodies))]
+        yield f"  body_1: {_text(names[0])}"
+        yield f"  body_2: {_text(names[1])}"
+        if len(names) > 2:
+            yield "  other_bodies:"
+        for number, name in enumerate(names[2:], start=2):
+            yield f"    - name: {_text(name)}"
+            yield from (f"      {line.strip()}" for line in self._material("material", number))
+
+    def _contacts(self) -> Iterator[str]:
+        if not self.contacts:
+            yield f"    - {{name: contact, face_1: {TO_FILL}, face_2: {TO_FILL}, x: [1, 0, 0]}}"
+        for number, pair in enumerate(self.contacts, start=1):
+            face = self._patch(pair.faces[0])
+            assert face is not None
+            owners = [self._owner(name) for name in pair.faces]
+            yield f"    - name: contact_{number}  # {pair.line}"
+            yield f"      face_1: {_text(pair.faces[0])}"
+            yield f"      face_2: {_text(pair.faces[1])}"
+            yield f"      x: {_numbers(self._sliding(face.normal))}  # where body 2 would slide"
+            if owners != self.bodies[:2]:
+                yield f"      bodies: [{', '.join(map(_text, owners))}]"
+            if pair.friction is not None and pair.friction != self._coefficient:
+                yield f"      friction: {{coefficient: {_number(pair.friction)}}}"
+
+    def _held(self) -> Iterator[str]:
+        if not self.supports:
+            yield f"    - {{group: {TO_FILL}, hold: all}}"
+        whole = "xz" if self.plane else "xyz"
+        for support in self.supports:
+            hold = "all" if support.axes == whole else support.axes
+            yield f"    - {{group: {_text(support.group)}, hold: {hold}}}  # {support.line}"
+
+    def _loaded(self) -> Iterator[str]:
+        if not self.loads:
+            yield (f"    - {{kind: pressure, group: {TO_FILL}, pressure: {TO_FILL}, path: [1, 0]}}")
+        for load in self.loads:
+            path = _numbers([*load.path, 0.0])
+            group = f"group: {_text(load.group)}, " * bool(load.group)
+            yield f"    - {{kind: {load.kind}, {group}{_value(load)}, path: {path}}}  # {load.line}"
+
+    def _material(self, entry: str, number: int) -> Iterator[str]:
+        name = self.bodies[number] if number < len(self.bodies) else ""
+        known = self.scene.materials.get(name, {})
+        if known.get("young", 0.0) > STIFFEST:
+            self.ignored.append(
+                f"material of {name}: Young's modulus of {known['young']:g} MPa: is the file in "
+                "other units? lengths are taken as mm, forces as N"
+            )
+        values = {"young": TO_FILL, "poisson": TO_FILL}
+        values |= {key: _number(value) for key, value in known.items()}
+        told = ", ".join(f"{key}: {value}" for key, value in values.items())
+        yield f"  {entry}: {{{told}}}"
+
+    @property
+    def _coefficient(self) -> float | None:
+        """The friction of most contacts: the first that has any."""
+        return next((p.friction for p in self.contacts if p.friction is not None), None)
+
+    def _friction(self) -> Iterator[str]:
+        known = self._coefficient
+        yield f"friction: {{coefficient: {TO_FILL if known is None else _number(known)}}}"
+
+    def _legs(self) -> Iterator[str]:
+        steps = max(self.scene.steps, 1)
+        yield "load_path:  # a leg for every step of the file, and one back: make it your cycle"
+        yield f"  increments: {_numbers([INCREMENTS] * (steps + 1))}"
+        yield f"  peak_leg: {steps}"
+
+
+def _value(load: SaidLoad) -> str:
+    if isinstance(load.value, float):
+        return f"pressure: {_number(load.value)}"
+    if load.kind == "rotation":
+        speed = float(np.linalg.norm(load.value))
+        axis = _numbers([c / speed for c in load.value])
+        return f"axis: {axis}, through: {_numbers(load.through)}, speed: {_number(speed)}"
+    return f"{load.kind}: {_numbers(load.value)}"
+
+
+def _numbers(values: Sequence[Any]) -> str:
+    return f"[{', '.join(map(_number, values))}]"
+
+
+def _number(value: float) -> str:
+    """All digits that a file has; adding zero turns -0 into 0."""
+    return f"{value + 0.0:.12g}"
+
+
+def _text(text: str) -> str:
+    """A name as YAML has it: in quotes unless it is plain words."""
+    return text if re.fullmatch(r"[A-Za-z][\w.\-]*( [\w.\-]+)*", text) else json.dumps(text)
