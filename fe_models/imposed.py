@@ -45,8 +45,11 @@ def impose(constraints: Constraints, elastic: ElasticBody, load: Imposing) -> Ar
         units = np.eye(6)[~load.free & _known(elastic)]
         means = [BoundaryForce(load.boundary, unit[:3], load.at, unit[3:]) for unit in units]
         if means:
-            forces = np.stack([mean.forces(elastic) for mean in means])
-            constraints.no_work(forces, elastic.nodes)
+            # Behind the face there is nothing but rounding.
+            forces = np.zeros((len(means), *imposed.shape))
+            for row, mean in zip(forces, means, strict=True):
+                row[nodes] = mean.forces(elastic).reshape(imposed.shape)[nodes]
+            constraints.no_work(forces.reshape(len(means), -1), elastic.nodes)
     imposed[nodes] = _motions(elastic, load.boundary, load.at) @ load.motion
     return imposed.ravel()
 
