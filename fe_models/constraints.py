@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import scipy.sparse as sp
-from scipy.linalg import null_space, qr
+from scipy.linalg import null_space, orth
 
+from fe_models.averages import leaving_means
 from sa_solver.ties import first_largest
 from sa_solver.types import Array, Indices
 
@@ -41,6 +42,10 @@ class Constraints:
         self._size = dimension * nodes
         self._eliminated: dict[int, tuple[Indices, Array]] = {}
         self._by_ties: set[int] = set()
+        # Displacements that combinations stand for, numbered after those of all nodes.
+        self._combined: list[tuple[Indices, sp.csr_matrix]] = []
+        # Displacements that follow motions, by which combinations, and how.
+        self._following: list[tuple[Indices, Indices, Array]] = []
 
     def hold(self, nodes: Indices) -> None:
         """Set all displacements of the nodes to zero."""
@@ -65,17 +70,57 @@ class Constraints:
             ):
                 self._eliminated.setdefault(int(dof), (masters, share))
 
-    def no_work(self, forces: Array) -> None:
-        """Hold the displacement on which ``forces`` ``(size,)`` would do work: Σ f u = 0."""
-        dofs = np.flatnonzero(forces)
-        self._equation(dofs, forces[dofs])
+    def no_work(self, forces: Array, points: Array) -> None:
+        """Hold what each of the ``forces`` ``(k, size)`` would do work on: Σ f u = 0.
+
+        The nodes' ``points`` ``(n, 3)`` say which are near each other: those under the forces move
+        by local combinations that do no work (:mod:`fe_models.averages`), which are free
+        displacements in the place of theirs.
+        """
+        found = [self._in_free(np.flatnonzero(row), row[row != 0.0]) for row in forces]
+        dofs = np.unique(np.concatenate([own for own, _ in found]))
+        means = np.zeros((len(found), len(dofs)))
+        for row, (own, shares) in zip(means, found, strict=True):
+            row[np.searchsorted(dofs, own)] = shares
+        means = means[np.linalg.norm(means, axis=1) > ALREADY_MET * np.linalg.norm(forces, axis=1)]
+        if not len(means):
+            return
+        nodes = np.where(dofs < self._size, dofs // self._dimension, 0)
+        basis = leaving_means(means, points[nodes])
+        added = self._combine(dofs, basis)
+        for dof, first, last in zip(dofs.tolist(), basis.indptr, basis.indptr[1:], strict=False):
+            entries = slice(first, last)
+            self._eliminated[dof] = added[basis.indices[entries]], basis.data[entries]
+
+    def values(self, displacements: Array) -> Array:
+        """The free displacements ``(free, ...)`` of such ``displacements`` ``(size, ...)``."""
+        every = np.asarray(displacements)
+        for dofs, basis in self._combined:
+            every = np.concatenate([every, basis.T @ every[dofs]])
+        return every[self.free]
+
+    @property
+    def rigid(self) -> Indices:
+        """Nodes that follow motions."""
+        parts = [dofs // self._dimension for dofs, *_ in self._following]
+        return np.unique(np.concatenate(parts)) if parts else np.empty(0, np.int64)
+
+    @property
+    def _total(self) -> int:
+        """Displacements of nodes and combinations of them."""
+        return self._size + sum(basis.shape[1] for _, basis in self._combined)
 
     def follow(self, nodes: Indices, motions: Array) -> None:
         """Let nodes move by combinations of ``motions`` ``(dimension n, k)``, and by no others.
 
-        By those that earlier constraints leave.
+        By those that earlier constraints leave; what is left of the motions are free displacements
+        in the place of the nodes'.
         """
         dofs = self._dofs(nodes)
+        for same, added, basis in self._following:
+            if np.array_equal(same, dofs):
+                self._follow_too(added, basis, motions)
+                return
         place = {dof: row for row, dof in enumerate(dofs.tolist())}
         entries = {d: self._in_free(np.array([d]), np.ones(1)) for d in place if d in self}
         inner = {d: e for d, e in entries.items() if all(m in place for m in e[0].tolist())}
@@ -84,18 +129,29 @@ class Constraints:
             rows = [place[master] for master in masters.tolist()]
             forbidden[row] = motions[place[dof]] - shares @ motions[rows]
         left = motions @ null_space(forbidden, NULL) if motions.size else motions
-        free = np.array([dof not in entries for dof in place])
-        alone = left[free]
-        chosen = _independent(alone)
-        by_chosen, leading = np.linalg.pinv(alone[chosen]), dofs[free][chosen]
-        for row in np.setdiff1d(np.arange(len(alone)), chosen).tolist():
-            shares = alone[row] @ by_chosen
-            some = np.abs(shares) > ALREADY_MET
-            self._eliminated[int(dofs[free][row])] = leading[some], shares[some]
+        basis = orth(left, NULL) if left.size else left
+        added = self._combine(dofs, sp.csr_matrix(basis))
+        self._following.append((dofs, added, basis))
+        for dof, row in zip(place, basis, strict=True):
+            if dof not in entries:
+                self._eliminated[dof] = added, row
         # Those that earlier constraints tie to other nodes take these along.
         for dof in entries.keys() - inner.keys():
-            shares = left[place[dof]] @ by_chosen
-            self._equation(np.append(leading, dof), np.append(-shares, 1.0))
+            self._equation(np.append(added, dof), np.append(-basis[place[dof]], 1.0))
+
+    def _follow_too(self, added: Indices, basis: Array, motions: Array) -> None:
+        """Leave of the motions that nodes follow already those that are among others, too."""
+        also = orth(motions, NULL) if motions.size else motions
+        lost = basis - also @ (also.T @ basis)
+        _, sizes, shapes = np.linalg.svd(lost, full_matrices=False)
+        for shape in shapes[sizes > NULL]:
+            self._equation(added, shape)
+
+    def _combine(self, dofs: Indices, basis: sp.csr_matrix) -> Indices:
+        """Number combinations of displacements ``dofs`` after all others."""
+        added = self._total + np.arange(basis.shape[1])
+        self._combined.append((dofs, basis))
+        return added
 
     def __contains__(self, dof: int) -> bool:
         """Whether a displacement is constrained."""
@@ -150,8 +206,12 @@ class Constraints:
 
     @property
     def free(self) -> Indices:
-        """The displacements that nothing eliminates, ascending: the columns of T."""
-        return np.setdiff1d(np.arange(self._size), np.fromiter(self._eliminated, np.int64))
+        """The displacements that nothing eliminates, ascending: the columns of T.
+
+        After those of nodes, below ``size``, come combinations of them (:meth:`no_work`,
+        :meth:`follow`).
+        """
+        return np.setdiff1d(np.arange(self._total), np.fromiter(self._eliminated, np.int64))
 
     @property
     def supported(self) -> Indices:
@@ -162,7 +222,7 @@ class Constraints:
             if dof not in self._by_ties
         ]
         dofs = np.concatenate(entries) if entries else np.empty(0, np.int64)
-        return np.unique(dofs // self._dimension)
+        return np.unique(dofs[dofs < self._size] // self._dimension)
 
     def places(self, nodes: Indices) -> Indices:
         """Where the displacements of unconstrained nodes are among :attr:`free`."""
@@ -170,27 +230,18 @@ class Constraints:
 
     def transformation(self) -> sp.csr_matrix:
         """T, ``(displacements, free)``; eliminated masters are followed to the end."""
-        slaves = np.setdiff1d(np.arange(self._size), self.free)
+        slaves = np.setdiff1d(np.arange(self._total), self.free)
         entries = [self._eliminated[dof] for dof in slaves.tolist()]
         counts = [len(masters) for masters, _ in entries]
         columns = np.concatenate([m for m, _ in entries]) if entries else np.empty(0, np.int64)
         values = np.concatenate([c for _, c in entries]) if entries else np.empty(0)
-        shape = (self._size, self._size)
+        shape = (self._total, self._total)
         relation = sp.csr_matrix((values, (np.repeat(slaves, counts), columns)), shape=shape)
-        kept = np.zeros(self._size)
+        kept = np.zeros(self._total)
         kept[self.free] = 1.0
         step = sp.diags(kept) + relation
         transformation = step
         while len(transformation[:, slaves].data):
             transformation = (transformation @ step).tocsr()
             transformation.eliminate_zeros()
-        return transformation[:, self.free].tocsr()
-
-
-def _independent(motions: Array) -> Indices:
-    """As many displacements as there are ``motions`` ``(n, k)`` of them, far from dependent."""
-    if not motions.size:
-        return np.empty(0, np.int64)
-    _, upper, order = qr(motions.T, mode="economic", pivoting=True)
-    sizes = np.abs(np.diag(upper))
-    return np.asarray(order[: np.sum(sizes > ALREADY_MET * sizes.max())])
+        return transformation[: self._size, self.free].tocsr()

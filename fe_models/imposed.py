@@ -42,10 +42,14 @@ def impose(constraints: Constraints, elastic: ElasticBody, load: Imposing) -> Ar
     if load.rigid:
         tie_rigid(constraints, elastic, load.boundary, load.at, load.free)
     else:
-        for k in np.flatnonzero(~load.free & _known(elastic)):
-            unit = np.eye(6)[k]
-            mean = BoundaryForce(load.boundary, unit[:3], load.at, unit[3:])
-            constraints.no_work(mean.forces(elastic))
+        units = np.eye(6)[~load.free & _known(elastic)]
+        means = [BoundaryForce(load.boundary, unit[:3], load.at, unit[3:]) for unit in units]
+        if means:
+            # Behind the face there is nothing but rounding.
+            forces = np.zeros((len(means), *imposed.shape))
+            for row, mean in zip(forces, means, strict=True):
+                row[nodes] = mean.forces(elastic).reshape(imposed.shape)[nodes]
+            constraints.no_work(forces.reshape(len(means), -1), elastic.nodes)
     imposed[nodes] = _motions(elastic, load.boundary, load.at) @ load.motion
     return imposed.ravel()
 
@@ -111,7 +115,7 @@ def _leaves(elastic: ElasticBody, one: Imposing, other: Imposing) -> bool:
     nothing, alone = (Constraints(len(elastic.nodes), elastic.dimension) for _ in range(2))
     imposed = impose(nothing, elastic, other)
     impose(alone, elastic, one)
-    left = alone.transformation() @ imposed[alone.free]
+    left = alone.transformation() @ alone.values(imposed)
     return bool(np.abs(left - imposed).max() <= HELD_SHARE * np.abs(imposed).max())
 
 

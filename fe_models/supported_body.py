@@ -139,6 +139,8 @@ class SupportedBody:
         loads need not.
         """
         free = self.constraints.free
+        if free[-1] >= self.elastic.size:
+            return None  # means of a face leave combinations of its nodes, not these, free
         of_nodes = mirror_of_nodes(self.elastic.nodes, self.elastic.body.axes, axis)
         of_free = None if of_nodes is None else of_nodes.restricted(free)
         if of_nodes is None or of_free is None:
@@ -308,10 +310,11 @@ class SupportedBody:
 
     @property
     def clamped(self) -> Indices:
-        """Vertices that cannot move in any direction."""
+        """Vertices that cannot move in any direction, or not without others: of rigid faces."""
         still = np.diff(self._supports.indptr) == 0
         vertices = still.reshape(-1, self.elastic.dimension)[: self.elastic.body.mesh.nvertices]
-        return np.flatnonzero(vertices.all(axis=1))
+        still, rigid = np.flatnonzero(vertices.all(axis=1)), self.constraints.rigid
+        return np.union1d(still, rigid[rigid < len(vertices)])
 
     def load_resultants(self, amplitudes: Array, about: Array) -> Array:
         """Force and moment ``(2, 3)`` of the applied loads about a point."""
@@ -356,7 +359,7 @@ class SupportedBody:
         the global axes.
         """
         motions = rigid_motions((self.elastic.nodes - about) / size, self.elastic.body.axes)
-        held = motions - self._supports @ motions[self.constraints.free]
+        held = motions - self._supports @ self.constraints.values(motions)
         gram = motions.T @ motions
         # Motions along the plane of a plane body are the only ones it knows.
         known = np.flatnonzero(np.diag(gram) > 0.0)

@@ -193,6 +193,28 @@ def test_two_loads_of_one_point_add_up():
         np.testing.assert_allclose(both, one, atol=1e-10 * np.abs(one).max())
 
 
+@pytest.mark.parametrize("order", [1, 2])
+def test_mean_of_a_face_is_of_its_own_nodes(order):
+    """What integrals over facets leave behind them is rounding, and ties nothing."""
+    elastic = bar(order)
+    constraints = Constraints(len(elastic.nodes))
+    impose(constraints, elastic, remote(np.ones(6), False))
+    tied = constraints.supported
+    np.testing.assert_array_equal(tied, np.sort(elastic.boundary_nodes("end")))
+
+
+def test_means_of_a_rigid_face_are_its_motion():
+    """A force keeps it rigid, a motion is given on average: as a rigid face that is given it."""
+    elastic = bar(2)
+    motion = np.array([1e-3, 0, -2e-3, 3e-4, 1e-4, 0])
+    constraints = held_at_left(elastic)
+    tie_rigid(constraints, elastic, "end", AT)
+    imposed = impose(constraints, elastic, remote(motion, False))
+    found = solved(elastic, constraints, np.zeros(elastic.size), imposed)
+    exact = moved_by(elastic, remote(motion, True))
+    np.testing.assert_allclose(found, exact, atol=1e-10 * np.abs(exact).max())
+
+
 def test_rigid_edge_of_nodes_on_a_line():
     """In the plane a boundary of one facet, in space one whose turn about itself nobody sees."""
     constraints = Constraints(3)

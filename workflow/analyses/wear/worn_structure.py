@@ -157,8 +157,8 @@ class WornStructure:
         if not peak.bounded:
             return (
                 "is beside a sharp inward corner, a fillet of fewer than nine elements round the "
-                "circle or the end of a clamped face, where it grows with every refinement: round "
-                "the corner, refine it, or hold the body farther away"
+                "circle or the end of a clamped or rigid face, where it grows with every "
+                "refinement: round the corner, refine it, or hold the body farther away"
             )
         return (
             f"has an estimated error of {peak.error:.0%} by the mesh, where {100 * accuracy:g} % "
