@@ -37,7 +37,7 @@ from fe_models.nodal_force import shared
 from fe_models.pretension import Pretension, check_pretension
 from fe_models.rest import rigid_assemblies
 from fe_models.second_order import set_nodes
-from fe_models.sector import check_alike, check_temperatures, sector_cuts
+from fe_models.sector import check_alike, check_off_cuts, check_temperatures, sector_cuts
 from fe_models.spin_softening import spin_softening
 from fe_models.structure import Structure
 from fe_models.supported_body import FREE_MOTION, SupportedBody, interface_nodes
@@ -142,6 +142,8 @@ def imported_structure(
     for support in supports:
         check_support(imported, mesh.bodies, support)
     cuts = sector_cuts(mesh, cyclic)
+    for support in supports:
+        check_off_cuts(mesh.bodies, support.group, cyclic)
     for load in loads:
         check_load(imported, mesh.bodies, load)
         check_alike(mesh.bodies, load, cyclic)

@@ -87,16 +87,21 @@ def check_alike(bodies: Sequence[Body], load: AppliedLoad, cyclic: Sequence[Cycl
     if isinstance(load, Displacement):
         _check_displacement(bodies, load, cyclic)
     group = boundary_of(load)
+    if group is not None:
+        check_off_cuts(bodies, group, cyclic)
+
+
+def check_off_cuts(bodies: Sequence[Body], group: str, cyclic: Sequence[Cyclic]) -> None:
+    """Raise :class:`MeshError` if a support or a load is on a cut, where there is no surface."""
     for body in bodies:
         boundaries = body.mesh.boundaries or {}
-        if group not in boundaries:
-            continue
         for entry in cyclic:
             cuts = [boundaries[name] for name in entry.boundaries if name in boundaries]
-            if cuts and len(np.intersect1d(boundaries[group], np.concatenate(cuts))):
+            held = boundaries.get(group, [])
+            if cuts and len(np.intersect1d(held, np.concatenate(cuts))):
                 raise MeshError(
-                    f"{group} is on a cut, where the next sector goes on; allowed: boundaries of "
-                    "the surface"
+                    f"{group} is on a cut of structure.cyclic, where the next sector goes on; "
+                    "allowed: boundaries of the surface"
                 )
 
 

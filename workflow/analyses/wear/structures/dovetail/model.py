@@ -91,7 +91,13 @@ class DovetailModel:
         """Nobody but us knows the nodes."""
 
     def warn(self, structure: Structure, reporter: Reporter) -> None:
-        """Self-locking joints."""
+        """Self-locking joints, and sides that a moment would move."""
+        moments = any(mission["aerodynamic_moment"] for mission in self._case.load_path.missions())
+        if moments and self._case.structure.sides == "guided" and self.dovetail.skew == 0.0:
+            reporter.say(
+                "the sides of the disk's sector are guided, as the next sectors do without a "
+                "moment; structure.sides: cyclic has them move as those do with one"
+            )
         slope = np.tan(self.dovetail.flank_angle)
         (friction,) = self.friction
         if friction > slope:

@@ -430,7 +430,13 @@ class MeshCase(FiniteElementCase):
 
     def _check_cyclic(self, imported: ImportedMesh) -> None:
         """Find the pair of cuts that is none, or the load that is not alike in all sectors."""
-        from fe_models.sector import check_alike, check_cuts, check_temperatures, sector_cuts
+        from fe_models.sector import (
+            check_alike,
+            check_cuts,
+            check_off_cuts,
+            check_temperatures,
+            sector_cuts,
+        )
 
         mesh = self.structure.mesh(self.mesh.size)
         cyclic = [pair.described() for pair in self.structure.cyclic]
@@ -441,6 +447,9 @@ class MeshCase(FiniteElementCase):
                     check_cuts(mesh.bodies, cuts, names)
             with _pointing_at(f"structure.cyclic.{index}"):
                 found = sector_cuts(mesh, cyclic[: index + 1])
+        for index, support in enumerate(self.structure.supports):
+            with _pointing_at(f"structure.supports.{index}.group"):
+                check_off_cuts(mesh.bodies, support.group, cyclic)
         for index, load in enumerate(self.structure.loads):
             with _pointing_at(f"structure.loads.{index}"):
                 described = load.described()
