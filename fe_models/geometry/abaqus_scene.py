@@ -17,7 +17,14 @@ from fe_models.geometry.abaqus_cards import Card, DataLine, real
 from fe_models.geometry.abaqus_model import Model, told
 from fe_models.geometry.flattened import Flattened
 from fe_models.geometry.grouped import GroupedMesh
-from fe_models.geometry.scene import SaidContact, SaidLoad, SaidSupport, Scene, Vector
+from fe_models.geometry.scene import (
+    NotTakenError,
+    SaidContact,
+    SaidLoad,
+    SaidSupport,
+    Scene,
+    Vector,
+)
 from fe_models.geometry.scope import Scope, existing
 from fe_models.mesh import MeshError
 
@@ -32,10 +39,6 @@ KINDS = {
     "CLOAD": ("force",), "DSLOAD": ("pressure", "traction"), "DLOAD": ("acceleration", "rotation"),
     "BOUNDARY": ("displacement",),
 }  # fmt: skip
-
-
-class NotTakenError(Exception):
-    """Why a line is ignored."""
 
 
 # What reading a line raises: nothing of it keeps a mesh from being read.

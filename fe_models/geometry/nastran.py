@@ -16,8 +16,9 @@ import numpy as np
 from fe_models.geometry.abaqus_cards import SourceLine
 from fe_models.geometry.flattened import FlatFile
 from fe_models.geometry.grouped import CORNERS, GroupedMesh
-from fe_models.geometry.nastran_cards import BulkData, Entry, bulk_data
+from fe_models.geometry.nastran_cards import BulkData, Entry, bulk_data, told
 from fe_models.geometry.nastran_groups import Groups
+from fe_models.geometry.nastran_scene import scene_of
 from fe_models.geometry.scope import Element, Scope, extend
 from fe_models.mesh import MeshError
 from sa_solver.types import Array
@@ -64,7 +65,7 @@ REFUSED = (
 # Entries that say what a case says: they are not taken over.
 LEFT = re.compile(
     r"SPC1?|SPCD|FORCE\d?|MOMENT\d?|PLOAD\d?|GRAV|ACCEL1?|RFORCE|TEMPD?|TEMPP\d|MAT\d+|MATS1|"
-    r"BCTABLE1?|BCTSET|BCTPARM|BCONP|BFRIC|BCBODY|BCTADD|BSURFS?|DEFORM"
+    r"LOAD|LSEQ|BCTABLE1?|BCTSET|BCTPARM|BCONP|BFRIC|BCBODY|BCTADD|BSURFS?|DEFORM"
 )
 # Names that pre-processors write into comments: of a property by its number.
 NAMED = (
@@ -87,7 +88,13 @@ def read_nastran(path: Path) -> GroupedMesh:
     read = _Read(path, bulk_data(path))
     if not read.scope.elements:
         raise MeshError(f"{path}: has no elements that are read: {', '.join(SOLIDS)}")
-    return replace(FlatFile(read.scope).mesh(), left=tuple(read.left))
+    mesh = FlatFile(read.scope).mesh()
+    scene = scene_of(read.entries, mesh, read.left)
+    return replace(
+        mesh,
+        left=(*map(told, read.left), *read.caveats),
+        scene=replace(scene, ignored=(*scene.ignored, *read.caveats)),
+    )
 
 
 class _Read:
@@ -95,7 +102,9 @@ class _Read:
 
     def __init__(self, path: Path, data: BulkData) -> None:
         self.scope = Scope("", SourceLine(path, 1))
-        self.left: list[str] = []
+        self.entries, self.left = data.entries, [e for e in data.entries if LEFT.fullmatch(e.name)]
+        # What bodies do not have of elements that name faces, or of plane ones.
+        self.caveats: list[str] = []
         self._names = _property_names(data.comments)
         self._shells: dict[str, Element] = {}
         self._systems = {e.whole(0): e for e in data.entries if re.fullmatch("CORD2[RCS]", e.name)}
@@ -115,8 +124,6 @@ class _Read:
         groups = Groups(self.scope)
         for entry in data.entries:
             groups.read(entry)
-            if LEFT.fullmatch(entry.name):
-                self.left.append(told(entry))
         self._tell_shells(plane=not solids)
 
     def _refuse(self, entry: Entry) -> None:
@@ -129,7 +136,7 @@ class _Read:
         if number in self.scope.nodes:
             raise entry.wrong(f"node {number} is defined twice")
         place = np.array([entry.real(k) for k in (2, 3, 4)])
-        system = int(entry.text(1) or 0)
+        system = entry.whole(1) if entry.text(1) else 0
         x, y, z = self._placed(entry, system, place).tolist()
         self.scope.nodes[number] = (x, y, z)
 
@@ -221,18 +228,13 @@ class _Read:
             place = f"{element.place.path.name}:{element.place.line}"
             if not plane:
                 what = "edges" if element.kind in BEAMS else "faces"
-                self.left.append(f"{place}: stiffness of {element.kind}, which names {what} {name}")
+                self.caveats.append(
+                    f"{place}: stiffness of {element.kind}, which names {what} {name}"
+                )
             elif not element.kind.startswith("CPLSTN"):
-                self.left.append(
+                self.caveats.append(
                     f"{place}: {element.kind}: bodies in the plane are in plane strain"
                 )
-
-
-def told(entry: Entry) -> str:
-    """An entry in a line: where it stands, and its fields."""
-    place = f"{entry.place.path.name}:{entry.place.line}"
-    shown = ", ".join(text for text in entry.fields[:8])
-    return f"{place}: {entry.name}: {shown.rstrip(', ')}{' ...' * (len(entry.fields) > 8)}"
 
 
 def _cartesian(kind: str, place: Array) -> Array:

@@ -135,3 +135,10 @@ def _divided(text: str) -> tuple[str, list[str], int]:
 def _filled(fields: list[str], width: int) -> list[str]:
     """Empty fields up to the end of the line before: lines of 4 or 8 fields follow each other."""
     return [""] * (-len(fields) % width)
+
+
+def told(entry: Entry) -> str:
+    """An entry in a line: where it stands, and its fields."""
+    place = f"{entry.place.path.name}:{entry.place.line}"
+    shown = ", ".join(text for text in entry.fields[:8])
+    return f"{place}: {entry.name}: {shown.rstrip(', ')}{' ...' * (len(entry.fields) > 8)}"

@@ -57,3 +57,7 @@ class Scene:
     loads: tuple[SaidLoad, ...] = ()
     steps: int = 0
     ignored: tuple[str, ...] = ()
+
+
+class NotTakenError(Exception):
+    """Why a line of a file is ignored."""

@@ -118,13 +118,21 @@ def _datasets(path: Path) -> Iterator[Dataset]:
 
 def _nodes(scope: Scope, dataset: Dataset) -> None:
     for (place, head), (below, coordinates) in _in_groups(dataset, 2):
-        number = integer(place, head.split()[0])
+        number = integer(place, _fields(place, head)[0])
         if number in scope.nodes:
             raise MeshError(f"{place}: node {number} is defined twice")
         values = [real(below, text) for text in coordinates.split()]
         if len(values) != 3:
             raise MeshError(f"{below}: {len(values)} coordinates; allowed: 3")
         scope.nodes[number] = (values[0], values[1], values[2])
+
+
+def _fields(place: SourceLine, text: str) -> list[str]:
+    """Fields of a line that is not blank."""
+    fields = text.split()
+    if not fields:
+        raise MeshError(f"{place}: a blank line in a dataset: damaged?")
+    return fields
 
 
 def _in_groups(
@@ -183,7 +191,7 @@ def _groups(scope: Scope, dataset: Dataset) -> None:
     """Groups with their members, two to a line; a name may come once only."""
     rows = iter(dataset.lines)
     for place, text in rows:
-        fields = text.split()
+        fields = _fields(place, text)
         count = integer(place, fields[-1])
         _, name = next(rows, (place, ""))
         name = name.strip() or f"group_{fields[0]}"
@@ -231,7 +239,7 @@ def _left(dataset: Dataset) -> str:
     if dataset.number == HEADER:
         return ""
     if dataset.number == UNITS:
-        code, *rest = dataset.lines[0][1].split() if dataset.lines else [""]
+        code, *rest = (dataset.lines[0][1] if dataset.lines else "").split() or [""]
         told = " ".join(rest[:-1]) or f"code {code}"
         return "" if code in MILLIMETRES else f"{place}: units, {told}: lengths are taken as mm"
     return f"{place}: dataset {dataset.number}, {SAID.get(dataset.number, 'not read')}"

@@ -440,7 +440,7 @@ def test_solid_and_plane_bodies_are_not_mixed(tmp_path):
     "suffix",
     [
         ".msh", ".inp", ".vtu", ".vtk", ".step", ".brep", ".xdmf", ".mesh", ".bdf", ".e", ".xyz",
-        ".med",
+        ".med", ".nas", ".unv",
     ],
 )  # fmt: skip
 def test_nonsense_ends_in_one_line(tmp_path, suffix, content, capfd):

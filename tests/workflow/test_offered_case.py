@@ -2,6 +2,7 @@
 
 import json
 
+import numpy as np
 import pytest
 from ruamel.yaml import YAML
 
@@ -94,7 +95,7 @@ def test_an_abaqus_model_becomes_a_case(tmp_path):
     path = deck(tmp_path)
     case, ignored = offered(path)
     structure = case["structure"]
-    assert structure["body_1"], structure["body_2"] == ("Base-1", "Foot-1")
+    assert (structure["body_1"], structure["body_2"]) == ("Base-1", "Foot-1")
     (contact,) = structure["contacts"]
     assert (contact["face_1"], contact["face_2"]) == ("base_high", "foot_low")
     assert contact["x"] == [1.0, 0.0, 0.0]
@@ -241,3 +242,85 @@ def test_a_case_is_not_written_over(tmp_path):
     assert ending.exit_code == 2
     assert "exists; take another name, or --force" in ending.stderr
     offered(path, "--force")
+
+
+# --- Nastran --------------------------------------------------------------------------------------
+
+BULK = """\
+BEGIN BULK
+{grid}CHEXA,1,1,1,2,3,4,5,6,+
++,7,8
+CHEXA,2,2,9,10,11,12,13,14,+
++,15,16
+PSOLID,1,7
+PSOLID,2,8
+MAT1,7,210000.,,0.3,7.85-9
+MAT1,8,,26316.,.33
+BSURFS,1,,,,1,5,6,7
+BSURFS,2,,,,2,9,10,11
+BCTSET,4,2,1,0.45
+SPC1,1,123456,1,THRU,4
+SPC1,1,2,13,14
+PLOAD4,3,2,25.,,,,13,15
+FORCE,3,13,,2.,1.,0.,0.
+FORCE,3,14,,2.,1.,0.,0.
+FORCE,3,15,5,2.,1.,0.,0.
+GRAV,3,,9810.,0.,0.,-1.
+RFORCE,3,,,50.,0.,0.,1.
+TEMP,3,1,400.
+ENDDATA
+"""
+
+
+def bulk(folder, **changes):
+    cube_at = [(x, y, z) for z in (0, 1) for x, y in ((0, 0), (1, 0), (1, 1), (0, 1))]
+    places = [*cube_at, *((x, y, z + 1) for x, y, z in cube_at)]
+    grid = "".join(f"GRID,{n},,{x}.,{y}.,{z}.\n" for n, (x, y, z) in enumerate(places, 1))
+    text = BULK.format(grid=grid)
+    for old, new in changes.values():
+        assert old in text
+        text = text.replace(old, new)
+    path = folder / "deck.bdf"
+    path.write_text(text, "utf-8")
+    return path
+
+
+def test_a_nastran_deck_becomes_a_case(tmp_path):
+    path = bulk(tmp_path)
+    case, ignored = offered(path)
+    structure = case["structure"]
+    assert (structure["body_1"], structure["body_2"]) == ("1", "2")
+    (contact,) = structure["contacts"]
+    assert (contact["face_1"], contact["face_2"]) == ("bsurfs_1", "bsurfs_2")
+    assert structure["supports"] == [
+        {"group": "spc_1_xyz", "hold": "all"}, {"group": "spc_1_y", "hold": "y"}
+    ]  # fmt: skip
+    loads = {load.pop("kind"): load for load in structure["loads"]}
+    assert loads["pressure"] == {"group": "pload4_3", "pressure": 25, "path": [1, 0]}
+    assert loads["force"] == {"group": "force_3", "force": [4, 0, 0], "path": [1, 0]}
+    assert loads["acceleration"] == {"acceleration": [0, 0, 9810], "path": [1, 0]}
+    assert loads["rotation"]["speed"] == pytest.approx(100 * np.pi, rel=1e-9)
+    one, two = case["materials"]["body_1"], case["materials"]["body_2"]
+    assert one == {"young": 210000, "poisson": 0.3, "density": 7.85e-9}
+    assert two["young"] == pytest.approx(2 * 26316 * 1.33, rel=1e-9)
+    assert case["friction"] == {"coefficient": 0.45}
+    told = [f"{line_of(path, 'FORCE,3,15,5,2.,1.,0.,0.')}: FORCE: 3, 15, 5, 2., 1., 0., 0.: along "
+            "the axes of another coordinate system",
+            f"{line_of(path, 'TEMP,3,1,400.')}: TEMP: 3, 1, 400.: not part of a case"]  # fmt: skip
+    assert ignored == told
+
+
+@pytest.mark.parametrize(
+    ("change", "told"),
+    [
+        (("PLOAD4,3,2,25.,,", "PLOAD4,3,2,25.,30.,"), "not the same at all corners"),
+        (("FORCE,3,14,,2.", "FORCE,3,14,,3."), "forces of force_3 that differ: their sum"),
+        (("GRID,14,,1.,0.,2.", "GRID,14,,1.,0.,2.,6"), "another coordinate system"),
+        (("BCTSET,4,2,1", "BCTSET,4,2,9"), "no contact surface 9: allowed: BSURFS, BSURF"),
+        (("MAT1,8,,26316.", "MAT1,8,,x"), "'x' is no number"),
+        (("FORCE,3,13", "FORCE,6,13"), "load sets 3, 6: all are taken, together"),
+    ],
+)
+def test_what_a_nastran_deck_does_not_give_is_told(tmp_path, change, told):
+    _, ignored = offered(bulk(tmp_path, change=change))
+    assert any(told in line for line in ignored), ignored

@@ -254,7 +254,8 @@ class MeshCase(FiniteElementCase):
         if left := imported.left:
             yield (
                 f"structure.file: {counted(len(left), 'line')} with loads, supports, contact or "
-                f"materials not taken over, the first {left[0]}; all of them: fretscale describe"
+                f"materials not taken over, the first {left[0]}; all of them: fretscale describe, "
+                "as a case: fretscale describe --case"
             )
         mesh = self.structure.mesh(self.mesh.size, self.mesh.order)
         yield from (f"mesh.order: {doubt}" for doubt in folded_elements(mesh, imported))
