@@ -372,3 +372,18 @@ def test_a_rotation_out_of_the_plane_is_refused():
     ):
         with pytest.raises(MeshError, match=wrong):
             check_load(imported, list(bodies.values()), remote(motion, True, boundary="lid"))
+
+
+@pytest.mark.parametrize("rigid", [True, False])
+def test_faces_of_curved_elements_follow_too(rigid):
+    """A rigid motion of a body that nothing else holds strains nothing, whatever its edges."""
+    grid = np.linspace(0.0, 1.0, 3)
+    mesh = with_faces(MeshTet.init_tensor(grid, grid, grid), {"end": (0, 1.0)})
+    middles = mesh.p[:, mesh.edges].mean(axis=1).T
+    off = np.random.default_rng(3).uniform(-0.03, 0.03, middles.shape)
+    elastic = ElasticBody(Body("block", mesh, midsides=middles + off), STEEL, 2)
+    constraints, motion = Constraints(len(elastic.nodes)), np.array([1e-3, 0, 2e-3, 0, 1e-4, 3e-4])
+    imposed = impose(constraints, elastic, remote(motion, rigid))
+    found = solved(elastic, constraints, np.zeros(elastic.size), imposed)
+    exact = rigid_motions(elastic.nodes - AT) @ motion
+    np.testing.assert_allclose(found, exact, atol=1e-9 * np.abs(exact).max())

@@ -259,3 +259,20 @@ def test_nonlinear_structures_know_no_temperature():
     still = tuple(np.zeros(body.elastic.size) for body in joined.bodies)
     with pytest.raises(ValueError, match="no temperature may change"):
         relinearised(joined, still, np.ones(1), (0.0, 0.0))
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_curved_elements_expand_freely(dimension):
+    """Midsides off the middle of their edges: the forces are those of θ x, in the plane (1 + ν)."""
+    grid = np.linspace(0.0, 1.0, 3)
+    mesh = MeshTri.init_tensor(grid, grid) if dimension == 2 else MeshTet.init_tensor(*[grid] * 3)
+    edges = mesh.facets if dimension == 2 else mesh.edges
+    middles = mesh.p[:, edges].mean(axis=1).T
+    off = np.random.default_rng(3).uniform(-0.03, 0.03, middles.shape)
+    elastic = ElasticBody(Body("block", mesh, midsides=middles + off), STEEL, 2)
+    assert elastic.curved
+    strain = np.full(mesh.nvertices, FREE)
+    forces = elastic.thermal_load(strain)
+    grown = FREE * (1.0 + STEEL.poisson) if dimension == 2 else FREE
+    free = grown * elastic.nodes[:, list(elastic.body.axes)].ravel()
+    np.testing.assert_allclose(elastic.stiffness @ free, forces, atol=1e-11 * np.abs(forces).max())

@@ -12,7 +12,8 @@ from tests.workflow.mesh_scenes import STEEL, refused, run
 from tests.workflow.plane_blocks import Blocks, solved
 from workflow.analyses.wear.structure_stage import StructureStage
 from workflow.analyses.wear.structures.mesh.model import MeshModel
-from workflow.kinds import load_case
+from workflow.errors import CaseError
+from workflow.kinds import load_case, parse_case, template
 
 pytestmark = pytest.mark.usefixtures("reads_here")
 
@@ -136,6 +137,14 @@ def test_temperatures_that_do_not_fit_are_refused(heated, load, wrong):
 def test_files_of_temperatures_that_do_not_fit_are_refused(heated, text, wrong):
     heated.with_name("t.csv").write_text(text, encoding="utf-8")
     assert wrong in refused(heated, with_loads(NODAL))
+
+
+def test_numbers_of_nodes_are_those_of_a_mesh_file(template_files):
+    """Of shapes, which a run meshes itself, nobody knows them."""
+    load = json.dumps([NODAL | {"file": "temperatures.csv", "path": [1, 0]}])
+    cad = "structure.file=joint.step", "mesh.size=4 mm", f"structure.loads={load}"
+    with pytest.raises(CaseError, match=r"structure.loads.0.kind: a CAD file is meshed here"):
+        parse_case(template("mesh"), str(template_files / "case.yaml"), cad)
 
 
 def test_expansion_is_asked_for_where_it_counts(heated):

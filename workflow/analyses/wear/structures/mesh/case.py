@@ -364,7 +364,7 @@ class MeshCase(FiniteElementCase):
     @model_validator(mode="after")
     def _strains_are_known(self) -> MeshCase:
         known = {key: (name, b.expansion) for key, (name, b) in self._keyed_solids.items()}
-        check_temperatures(self.structure.loads, known, self.nonlinearity)
+        check_temperatures(self.structure.loads, known, self.nonlinearity, self.mesh.size)
         check_bolts(self.structure.loads, self.load_path, self.nonlinearity)
         return self
 

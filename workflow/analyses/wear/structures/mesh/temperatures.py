@@ -94,9 +94,11 @@ def check_temperatures(
     loads: Sequence[MeshLoad],
     materials: Mapping[str, tuple[str, float | None]],
     nonlinearity: Nonlinearity,
+    size: float | None,
 ) -> None:
     """Refuse temperatures of bodies whose expansion is not known, and nonlinear structures.
 
+    And those of nodes that only this run numbers, as it meshes a shape by elements of a ``size``.
     ``materials`` are the names of bodies and their expansions by where the case has these.
     """
     heating = [load for load in loads if isinstance(load, _Temperature)]
@@ -107,6 +109,13 @@ def check_temperatures(
                 "[1/K], such as 12e-6 1/K",
                 f"{key}.expansion",
                 key,
+            )
+    for index, load in enumerate(loads):
+        if size is not None and isinstance(load, NodalTemperatureLoad):
+            raise disagreement(
+                "a CAD file is meshed here, by nodes whose numbers no file of temperatures knows; "
+                "allowed: kind: temperature, or a mesh file",
+                f"structure.loads.{index}.kind",
             )
     if heating and (nonlinearity.check or nonlinearity.stiffness != "linear"):
         raise disagreement(
