@@ -24,7 +24,7 @@ from scipy.spatial import cKDTree
 from fe_models.constraints import Constraints
 from fe_models.elasticity import ElasticBody
 from fe_models.mesh import Body, MeshError
-from fe_models.tied_faces import tied_projection
+from fe_models.tied_faces import ENDS, tied_projection
 from sa_solver.types import Array, Frame, Indices, Mask
 
 # Nodes this share of the largest distance from the axis off their images are on them: mesh files
@@ -196,11 +196,17 @@ class Cuts:
     def _shares(self, elastic: ElasticBody, low: Indices, high: Indices) -> sp.csr_matrix:
         """What nodes ``high`` ``(n,)`` follow of the displacements of ``low`` ``(m,)``."""
         images = self.images(elastic.nodes[low])
+        reach = IMAGE * float(np.linalg.norm(elastic.nodes - self.through, axis=1).max())
         if self.matched:
             apart, partner = cKDTree(images).query(elastic.nodes[high])
-            self._check_midsides(elastic, float(apart.max()))
+            self._check_midsides(elastic, float(apart.max()), reach)
             every = np.arange(len(high))
             return sp.csr_matrix((np.ones(len(high)), (every, partner)), (len(high), len(low)))
+        if elastic.curved and max(_bent(elastic, side) for side in (self.low, self.high)) > reach:
+            raise MeshError(
+                f"body {elastic.body.name}: edges of the cuts are curved, and their meshes do not "
+                "match; mesh both alike (in gmsh: setPeriodic), or take elements of order 1"
+            )
         frame = _plane_of(elastic.body, self.high)
         follows, tied = tied_projection(
             frame.coordinates(elastic.nodes[high]),
@@ -219,20 +225,20 @@ class Cuts:
             )
         return follows
 
-    def _check_midsides(self, elastic: ElasticBody, apart: float) -> None:
+    def _check_midsides(self, elastic: ElasticBody, apart: float, reach: float) -> None:
         """Raise :class:`MeshError` where cuts match but for midside nodes, ``apart`` [mm]."""
-        size = float(np.sqrt(np.sum((elastic.body.points - self.through) ** 2, axis=1)).max())
-        if elastic.curved and apart > IMAGE * size:
+        if elastic.curved and apart > reach:
             raise MeshError(
                 f"body {elastic.body.name}: midside nodes of its cuts are up to {apart:.3g} mm off "
                 "each other's images; mesh both cuts alike (in gmsh: setPeriodic), or take "
                 "elements of order 1"
             )
 
-    def whole_normals(self, body: Body, integrals: Array) -> Array:
-        """Integrals of normals ``(vertices, d)`` with what the next sectors add on the cuts."""
-        turn, whole = self.of_turn(body), integrals.copy()
-        low, high, of_low, of_high = self._nearest(body)
+    def whole_normals(self, elastic: ElasticBody, integrals: Array) -> Array:
+        """Integrals of normals ``(nodes, d)`` with what the next sectors add on the cuts."""
+        turn, whole = self.of_turn(elastic.body), integrals.copy()
+        low, high = (np.unique(elastic.facet_nodes(facets)) for facets in (self.low, self.high))
+        of_low, of_high = self._images_of(elastic.nodes, low, high)
         whole[low] += integrals[of_low] @ turn
         whole[high] += integrals[of_high] @ turn.T
         axis = np.intersect1d(low, high)
@@ -242,6 +248,14 @@ class Cuts:
         shifted = integrals[axis] @ along @ along.T
         whole[axis] = np.where(np.any(shifted, axis=1)[:, None], shifted, integrals[axis])
         return whole
+
+    def off_images(self, body: Body, vectors: Array) -> float:
+        """Largest difference of ``vectors`` ``(nodes, d, ...)`` of cuts and of their images."""
+        low, high, of_low, of_high = self._nearest(body)
+        turn = self.of_turn(body)
+        one = np.einsum("ab,nb...->na...", turn, vectors[low]) - vectors[of_low]
+        other = vectors[high] - np.einsum("ab,nb...->na...", turn, vectors[of_high])
+        return float(max(np.abs(one).max(), np.abs(other).max()))
 
     def unlike(self, body: Body, values: Array) -> float:
         """How much ``values`` ``(vertices,)`` of both cuts differ, of their largest.
@@ -264,14 +278,6 @@ class Cuts:
             [low[marked[low] | marked[of_low]], high[marked[high] | marked[of_high]]]
         )
 
-    def _nearest(self, body: Body) -> tuple[Indices, Indices, Indices, Indices]:
-        """Vertices of the low and of the high cut, and those of the other nearest their images."""
-        low, high = (np.unique(body.mesh.facets[:, facets]) for facets in (self.low, self.high))
-        points = body.points
-        of_low = high[cKDTree(points[high]).query(self.images(points[low]))[1]]
-        of_high = low[cKDTree(points[low]).query(self.images(points[high], -1))[1]]
-        return low, high, of_low, of_high
-
     def led(self, elastic: ElasticBody, nodes: Indices) -> Indices:
         """Those of ``nodes`` on the high cut that a mortar leads, if some lead them on the low."""
         low, high = (np.unique(elastic.facet_nodes(facets)) for facets in (self.low, self.high))
@@ -279,6 +285,17 @@ class Cuts:
         if self.matched or not len(leading):
             return np.empty(0, np.int64)
         return np.setdiff1d(np.intersect1d(nodes, high), low)
+
+    def _nearest(self, body: Body) -> tuple[Indices, Indices, Indices, Indices]:
+        """Vertices of the low and of the high cut, and those of the other nearest their images."""
+        low, high = (np.unique(body.mesh.facets[:, facets]) for facets in (self.low, self.high))
+        return low, high, *self._images_of(body.points, low, high)
+
+    def _images_of(self, points: Array, low: Indices, high: Indices) -> tuple[Indices, Indices]:
+        """Of ``points`` ``low`` and ``high`` of the cuts, those of the other nearest the images."""
+        of_low = high[cKDTree(points[high]).query(self.images(points[low]))[1]]
+        of_high = low[cKDTree(points[low]).query(self.images(points[high], -1))[1]]
+        return of_low, of_high
 
 
 def hold_normal(
@@ -292,7 +309,7 @@ def hold_normal(
 
     def whole(integrals: Array) -> Array:
         for pair in cuts:
-            integrals = pair.whole_normals(elastic.body, integrals)
+            integrals = pair.whole_normals(elastic, integrals)
         return integrals
 
     nodes, normals = elastic.boundary_normals(boundary, whole)
@@ -304,6 +321,14 @@ def hold_normal(
 def _facets(body: Body, names: Sequence[str]) -> Indices:
     """Facets of boundaries of a body, each once."""
     return np.unique(np.concatenate([body.mesh.boundaries[name] for name in names]))
+
+
+def _bent(elastic: ElasticBody, facets: Indices) -> float:
+    """How far midsides of facets are beside the middle of their edges at most [mm]."""
+    nodes, corners = elastic.facet_nodes(facets), elastic.dimension
+    middles = (elastic.nodes[nodes[:, [a, b]]].mean(axis=1) for a, b in ENDS[corners])
+    off = np.stack(list(middles), axis=1) - elastic.nodes[nodes[:, corners:]]
+    return float(np.linalg.norm(off, axis=2).max())
 
 
 def _said(cyclic: Cyclic) -> str:

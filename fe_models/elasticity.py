@@ -201,25 +201,23 @@ class ElasticBody:
     ) -> tuple[Indices, Array]:
         """Nodes of a boundary and the outward unit normal at each, ``(n, dimension)``.
 
-        ``whole`` makes of the integrals of normals at vertices ``(vertices, dimension)`` those of a
-        boundary that goes on beyond the body, as in the next sector of a wheel.
+        ``whole`` makes of the integrals of normals ``(nodes, dimension)``, of which straight
+        elements have those of vertices alone, what they are of a boundary that goes on beyond the
+        body, as in the next sector of a wheel.
         """
         mesh = self.body.mesh
-        vertices, (middle, parents) = slice(mesh.nvertices), self.midsides(boundary)
         normals = np.zeros((len(self.nodes), self.dimension))
         if self.curved:
             facets = mesh.boundaries[boundary]
             at_nodes = facet_normals(self.body, facets)[..., self.body.axes]
             np.add.at(normals, self.body.facet_nodes(facets), at_nodes)
-            own = normals[vertices].copy()
-            normals[vertices] = whole(own)
-            # Of edges along which the boundary goes on beyond the body.
-            on = np.any(normals[vertices] != own, axis=1)[parents].all(axis=1)
-            middle, parents = middle[on], parents[on]
+            normals = whole(normals)
         else:
             basis = self._facet_basis(boundary, ELEMENTS[self.dimension, 1]())
-            normals[vertices] = whole(_normal_integrals(basis))
-        normals[middle] = normals[parents].sum(axis=1)
+            normals[: mesh.nvertices] = _normal_integrals(basis)
+            normals = whole(normals)
+            middle, parents = self.midsides(boundary)
+            normals[middle] = normals[parents].sum(axis=1)
         nodes = self.boundary_nodes(boundary)
         return nodes, normals[nodes] / np.linalg.norm(normals[nodes], axis=1, keepdims=True)
 

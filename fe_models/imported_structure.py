@@ -37,7 +37,13 @@ from fe_models.nodal_force import shared
 from fe_models.pretension import Pretension, check_pretension
 from fe_models.rest import rigid_assemblies
 from fe_models.second_order import set_nodes
-from fe_models.sector import check_alike, check_off_cuts, check_temperatures, sector_cuts
+from fe_models.sector import (
+    check_alike,
+    check_jumps,
+    check_off_cuts,
+    check_temperatures,
+    sector_cuts,
+)
 from fe_models.spin_softening import spin_softening
 from fe_models.structure import Structure
 from fe_models.supported_body import FREE_MOTION, SupportedBody, interface_nodes
@@ -367,6 +373,7 @@ def _supported(
         cases.add(case, load, constraints)
     check_against_supports(loads, cases.imposed, supported_motions @ cases.imposed[free])
     check_against_each_other(elastic, cases.moved)
+    check_jumps(body, cases.jumps, cuts)
     _check_separate(mesh, number)
     faces = mesh.faces_of(number)
     try:

@@ -6,7 +6,15 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from fe_models.applied_loads import Acceleration, AppliedLoad, Displacement, Rotation, boundary_of
+from fe_models.applied_loads import (
+    Acceleration,
+    AppliedLoad,
+    BoundaryForce,
+    Displacement,
+    RemoteDisplacement,
+    Rotation,
+    boundary_of,
+)
 from fe_models.cyclic import Cuts, Cyclic
 from fe_models.mesh import Body, MeshError, StructureMesh
 from fe_models.thermal import NodalTemperature
@@ -79,14 +87,32 @@ def check_temperatures(
             )
 
 
+def check_jumps(body: Body, jumps: Array, cuts: Sequence[Cuts]) -> None:
+    """Raise :class:`MeshError` unless ``jumps`` ``(size, loads)`` of both cuts are images.
+
+    They are what bolts shift of a body (:mod:`fe_models.pretension`).
+    """
+    if not jumps.any():
+        return
+    nodal = jumps.reshape(-1, body.mesh.dim(), jumps.shape[1])
+    if any(pair.off_images(body, nodal) > ALONG * np.abs(jumps).max() for pair in cuts):
+        raise MeshError(
+            f"the pretension of body {body.name} shifts its cuts, and not alike in all sectors; "
+            "allowed: bolts within the sector, or along its axis"
+        )
+
+
 def check_alike(bodies: Sequence[Body], load: AppliedLoad, cyclic: Sequence[Cyclic]) -> None:
     """Raise :class:`MeshError` if a load cannot be alike in all sectors, or is on a cut."""
     if not cyclic:
         return
+    axis = cyclic[0].direction
     _check_direction(bodies, load, cyclic[0])
-    if isinstance(load, Displacement):
-        _check_displacement(bodies, load, cyclic)
     group = boundary_of(load)
+    along = isinstance(load, Displacement) and not _crosses(axis, load.displacement)
+    tied = isinstance(load, RemoteDisplacement) or (isinstance(load, BoundaryForce) and load.rigid)
+    if group is not None and (tied or isinstance(load, Displacement)) and not along:
+        _check_within(bodies, group, cyclic)
     if group is not None:
         check_off_cuts(bodies, group, cyclic)
 
@@ -115,33 +141,31 @@ def _check_direction(bodies: Sequence[Body], load: AppliedLoad, wheel: Cyclic) -
                 "a rotation about another axis than structure.cyclic is not alike in all sectors; "
                 "allowed: about that axis"
             )
-    if isinstance(load, Acceleration):
-        across = load.acceleration - (load.acceleration @ axis) * axis
-        if np.linalg.norm(across) > ALONG * np.linalg.norm(load.acceleration):
-            raise MeshError(
-                "an acceleration across the axis of structure.cyclic is not alike in all sectors; "
-                "allowed: along it"
-            )
+    if isinstance(load, Acceleration) and _crosses(axis, load.acceleration):
+        raise MeshError(
+            "an acceleration across the axis of structure.cyclic is not alike in all sectors; "
+            "allowed: along it"
+        )
 
 
-def _check_displacement(
-    bodies: Sequence[Body], load: Displacement, cyclic: Sequence[Cyclic]
-) -> None:
-    """Raise :class:`MeshError` if nodes of a cut would move otherwise than those of the other."""
-    axis, along = cyclic[0].direction, load.displacement
-    if np.linalg.norm(np.cross(axis, along)) <= ALONG * np.linalg.norm(along):
-        return
+def _check_within(bodies: Sequence[Body], group: str, cyclic: Sequence[Cyclic]) -> None:
+    """Raise :class:`MeshError` if what moves as a load says meets a cut."""
     for body in bodies:
         known = body.mesh.boundaries or {}
         cuts = [body.vertices(n) for entry in cyclic for n in entry.boundaries if n in known]
-        if load.boundary not in known or not cuts:
+        if group not in known or not cuts:
             continue
-        if len(np.intersect1d(body.vertices(load.boundary), np.concatenate(cuts))):
+        if len(np.intersect1d(body.vertices(group), np.concatenate(cuts))):
             raise MeshError(
-                f"a displacement across the axis of structure.cyclic on {load.boundary}, which "
-                "meets a cut, is not alike in all sectors; allowed: along the axis, or a boundary "
-                "within the sector"
+                f"{group} meets a cut of structure.cyclic: a displacement across the axis, or a "
+                "point that it is tied to, is not alike in all sectors; allowed: a boundary within "
+                "the sector, or a displacement along the axis"
             )
+
+
+def _crosses(axis: Array, direction: Array) -> bool:
+    """Whether a direction is another than a unit axis."""
+    return bool(np.linalg.norm(np.cross(axis, direction)) > ALONG * np.linalg.norm(direction))
 
 
 def _has(body: Body, names: Sequence[str]) -> bool:

@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 import scipy.sparse as sp
@@ -21,6 +22,9 @@ from fe_models.elasticity import ElasticBody
 from fe_models.mesh import Body, named_mesh
 from fe_models.recovery import StressRecovery
 from sa_solver.types import Array, Indices, Mask
+
+if TYPE_CHECKING:
+    from skfem import MeshTet, MeshTri
 
 # Rings of elements that the widest patches reach.
 RINGS = 3
@@ -137,7 +141,7 @@ class _Beyond:
         mesh, points = self._elastic.body.mesh, self._elastic.body.points
         others = np.setdiff1d(mesh.t[:, parts[0]], self.own)
         self.vertices = np.append(self.own, others)
-        placed, cells, facets = points[self.vertices], [], []
+        placed, cells, facets, edges = points[self.vertices], [], [], []
         for sectors, elements in parts.items():
             vertices = np.unique(mesh.t[:, elements])
             images = self._first.images(points[vertices], sectors)
@@ -149,11 +153,15 @@ class _Beyond:
             of_free = free[np.isin(mesh.f2t[0, free], elements)]
             cells.append(place[np.searchsorted(vertices, mesh.t[:, elements])].T)
             facets.append(place[np.searchsorted(vertices, mesh.facets[:, of_free])].T)
+            if self._elastic.curved:
+                ends, middles = _curved_edges(self._elastic.body, elements)
+                ends = place[np.searchsorted(vertices, ends)]
+                edges.append((ends, self._first.images(middles, sectors)))
         named = {"free": np.concatenate(facets)}
         axes = list(self._elastic.body.axes)
-        return Body(
-            self._elastic.body.name, named_mesh(placed[:, axes], np.concatenate(cells), named)
-        )
+        joined = named_mesh(placed[:, axes], np.concatenate(cells), named)
+        midsides = _midsides(joined, edges)[:, axes] if edges else None
+        return Body(self._elastic.body.name, joined, midsides=midsides)
 
     def _images(self, nodes: Array, sectors: Sequence[int]) -> tuple[Indices, Array]:
         """Nodes that ``nodes`` ``(n, 3)`` are images of, and their turns ``(n, d, d)``."""
@@ -167,7 +175,27 @@ class _Beyond:
             found = distance <= self._same
             sources[left[found]] = nearest[found]
             turns[left[found]] = np.linalg.matrix_power(turn, count)
+        if np.any(sources < 0):
+            raise RuntimeError("nodes beyond the cuts of a sector are none of its images")
         return sources, turns
+
+
+def _curved_edges(body: Body, elements: Indices) -> tuple[Indices, Array]:
+    """Edges of some elements: their ends ``(m, 2)`` and midsides ``(m, 3)`` [mm]."""
+    mesh = body.mesh
+    ends = mesh.edges if mesh.dim() == 3 else mesh.facets
+    used = np.unique(body.element_nodes[elements][:, mesh.t.shape[0] :]) - mesh.nvertices
+    return ends[:, used].T, body.nodes[mesh.nvertices + used]
+
+
+def _midsides(mesh: MeshTet | MeshTri, edges: Sequence[tuple[Indices, Array]]) -> Array:
+    """Midsides ``(m, 3)`` of a mesh's edges, from those that some ends ``(n, 2)`` are known of."""
+    known = np.sort(np.concatenate([ends for ends, _ in edges]), axis=1)
+    asked = np.sort((mesh.edges if mesh.dim() == 3 else mesh.facets).T, axis=1)
+    key = np.array([mesh.nvertices, 1])
+    keys, first = np.unique(known @ key, return_index=True)
+    middles = np.concatenate([middles for _, middles in edges])
+    return np.asarray(middles[first[np.searchsorted(keys, asked @ key)]])
 
 
 def _alike(cuts: Sequence[Cuts]) -> list[Cuts]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from scipy.spatial import cKDTree
 
@@ -51,6 +53,18 @@ def sector(sectors, counts=(4, 5, 2), dimension=2, inner=INNER, axis=Y, through=
     to_axis = _frame(axis)
     placed = points @ to_axis + (np.zeros(3) if through is None else through)
     return _merged("wheel", placed, cells, named, 3)
+
+
+def curved(body):
+    """The body with edges that go round its axis, Y, as circles do."""
+    mesh = body.mesh
+    ends = body.points[(mesh.edges if mesh.dim() == 3 else mesh.facets).T]
+    depth, arms = ends[..., 1].mean(axis=1), ends * np.array([1.0, 0.0, 1.0])
+    radii = np.linalg.norm(arms, axis=2)
+    direction = (arms / radii[..., None]).sum(axis=1)
+    direction /= np.linalg.norm(direction, axis=1, keepdims=True)
+    middles = radii.mean(axis=1)[:, None] * direction + np.outer(depth, Y)
+    return replace(body, midsides=np.ascontiguousarray(middles[:, body.axes]))
 
 
 def shoe(sectors, counts=(4, 5, 2), dimension=2):

@@ -1,5 +1,7 @@
 """A sector with its cuts tied is the whole wheel."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.sparse.linalg import spsolve
@@ -14,7 +16,7 @@ from fe_models.sector_recovery import SectorRecovery
 from fe_models.supported_body import SupportedBody
 from sa_solver.types import Material
 from tests.marks import slow
-from tests.wheels import INNER, OBLIQUE, OUTER, THROUGH, Y, about, sector, wheel
+from tests.wheels import INNER, OBLIQUE, OUTER, THROUGH, Y, about, curved, sector, wheel
 
 STEEL = Material(200e3, 0.3, 7.8e-9)
 NONE = np.empty(0, np.int64)
@@ -47,8 +49,10 @@ def solved(elastic, constraints, load):
 
 def of_wheel(part, cyclic, order, hold, load):
     """Displacements of sector and wheel, each with its elastic body."""
-    answers = []
-    for body, cuts in ((part, [Cuts.of(part, cyclic)]), (wheel(part, cyclic), [])):
+    answers, whole = [], wheel(part, cyclic)
+    if part.midsides is not None:
+        whole = curved(whole)
+    for body, cuts in ((part, [Cuts.of(part, cyclic)]), (whole, [])):
         elastic, constraints = supported(body, order, cuts, hold)
         answers.append((elastic, constraints, solved(elastic, constraints, load(elastic))))
     return answers
@@ -88,7 +92,17 @@ CASES = [
 def test_sector_is_the_wheel(dimension, sectors, order, inner, axis, through):
     """Displacements and stresses, on the cuts and their edges too."""
     part = sector(sectors, dimension=dimension, axis=axis, through=through)
-    cyclic = about(axis, through, sectors)
+    check_wheel(part, about(axis, through, sectors), order)
+
+
+@pytest.mark.parametrize("dimension", [2, slow(3)])
+def test_curved_sector_is_the_curved_wheel(dimension):
+    """Elements of second order that go round as circles do."""
+    check_wheel(curved(sector(5, dimension=dimension)), about(sectors=5), 2)
+
+
+def check_wheel(part, cyclic, order):
+    """Displacements and recovered stresses of a sector are those of its wheel."""
     load = pressed(cyclic.direction, cyclic.through)
     mine, theirs = of_wheel(part, cyclic, order, held_bore, load)
     place = same_places(mine[0], theirs[0])
@@ -113,6 +127,10 @@ def test_sector_is_the_wheel(dimension, sectors, order, inner, axis, through):
         np.testing.assert_array_equal(getattr(mine_, name), np.flatnonzero(there))
 
 
+def unchanged(body):
+    return body
+
+
 def free_motions(elastic, constraints, cuts=()):
     """Of a body with its pad as a contact face."""
     nodes = elastic.body.vertices("pad")
@@ -128,21 +146,31 @@ def squeezed(elastic):
     return 1e3**2 * elastic.centrifugal_load() + 30.0 * elastic.pressure_load("pad")
 
 
-@pytest.mark.parametrize(("dimension", "order"), [(2, 1), (2, 2), (3, 1), slow(3, 2)])
-def test_sliding_boundary_goes_on_beyond_the_cuts(dimension, order):
+@pytest.mark.parametrize(
+    ("dimension", "order", "shape"),
+    [
+        (2, 1, unchanged),
+        (2, 2, unchanged),
+        (2, 2, curved),
+        (3, 1, unchanged),
+        slow(3, 2, unchanged),
+    ],
+)
+def test_sliding_boundary_goes_on_beyond_the_cuts(dimension, order, shape):
     """Normals are those of the wheel where a curved boundary meets a cut: it turns freely."""
-    part, cyclic = sector(5, dimension=dimension), about(sectors=5)
+    part, cyclic = shape(sector(5, dimension=dimension)), about(sectors=5)
     rim = np.setdiff1d(part.vertices("rim"), Cuts.of(part, cyclic).vertices(part))
     place = part.points[rim[0]]
     across = np.cross(Y, place) / np.linalg.norm(place)
     answers = []
-    for body, cuts in ((part, [Cuts.of(part, cyclic)]), (wheel(part, cyclic), [])):
+    for body, cuts in ((part, [Cuts.of(part, cyclic)]), (shape(wheel(part, cyclic)), [])):
         elastic, constraints = supported(body, order, cuts, sliding_bore)
         # Facets of a bore in space have normals of their own, which hold the turn.
-        assert len(free_motions(elastic, constraints)) == 1
+        turns = dimension == 2
+        assert len(free_motions(elastic, constraints)) == dimension - 2 + turns
         node = np.array([np.argmin(np.linalg.norm(elastic.nodes - place, axis=1))])
-        direction = across if dimension == 2 else Y
-        constraints.slide(node, direction[None, list(elastic.body.axes)])
+        for direction in [across] * turns + [Y] * (dimension - 2):
+            constraints.slide(node, direction[None, list(elastic.body.axes)])
         answers.append((elastic, solved(elastic, constraints, squeezed(elastic))))
     (mine, one), (whole, two) = answers
     np.testing.assert_allclose(one, two[same_places(mine, whole)], atol=1e-10 * np.abs(two).max())
@@ -296,6 +324,38 @@ def test_cuts_that_do_not_match_converge(order):
     for fine in (1, 2, 4):
         assert errors[0.3, fine] < 2.0 * errors[0.0, fine]
     assert errors[0.3, 4] < 0.1 * errors[0.3, 1]
+
+
+@pytest.mark.parametrize("moved", [0.0, 0.3])
+def test_curved_elements_converge(moved):
+    """A ring under pressure in its bore, by Lamé: a twentieth of what straight sides leave."""
+    part = curved(sector(6, (8, 8, 1), moved=moved))
+    cuts = [Cuts.of(part, about(sectors=6))]
+    elastic, constraints = supported(part, 2, cuts, lambda *_: None)
+    node = part.vertices("bore")[2:3]
+    across = np.cross(Y, part.points[node])[:, [0, 2]]
+    constraints.slide(node, across / np.linalg.norm(across))
+    u = solved(elastic, constraints, 100.0 * elastic.pressure_load("bore"))
+    radius = np.linalg.norm(elastic.nodes, axis=1, keepdims=True)
+    size = 100.0 * INNER**2 / (2.0 * STEEL.shear_modulus * (OUTER**2 - INNER**2))
+    scaled = (1.0 - 2.0 * STEEL.poisson) * radius + OUTER**2 / radius
+    exact = size * scaled * elastic.nodes / radius
+    assert np.abs(u - exact[:, [0, 2]]).max() < 1e-4 * np.abs(exact).max()
+
+
+def test_curved_cuts_of_other_meshes():
+    """Refused for elements of second order, as their edges would part."""
+    part = bend(sector(6))
+    middles = part.points[part.mesh.facets.T].mean(axis=1)[:, [0, 2]]
+    rng = np.random.default_rng(0)
+    shaken = replace(part, midsides=middles + 0.01 * rng.standard_normal(middles.shape))
+    with pytest.raises(MeshError, match="midside nodes of the cuts are up to"):
+        supported(shaken, 2, [Cuts.of(shaken, about(sectors=6))], lambda *_: None)
+    other = sector(6, moved=0.3)
+    middles = other.points[other.mesh.facets.T].mean(axis=1)[:, [0, 2]]
+    shaken = replace(other, midsides=middles + 0.01 * rng.standard_normal(middles.shape))
+    with pytest.raises(MeshError, match="edges of the cuts are curved"):
+        supported(shaken, 2, [Cuts.of(shaken, about(sectors=6))], lambda *_: None)
 
 
 @pytest.mark.parametrize("moved", [0.0, 0.3])

@@ -266,7 +266,7 @@ def test_normals_go_on_in_the_next_sector():
     nodes, alone = elastic.boundary_normals("bore")
     radii = in_body(elastic)[nodes] / np.linalg.norm(in_body(elastic)[nodes], axis=1)[:, None]
     assert np.abs(alone + radii).max() > 1e-3
-    _, normals = elastic.boundary_normals("bore", partial(cuts.whole_normals, elastic.body))
+    _, normals = elastic.boundary_normals("bore", partial(cuts.whole_normals, elastic))
     np.testing.assert_allclose(normals, -radii, atol=1e-12)
 
 

@@ -15,7 +15,7 @@ from fe_models.geometry.imported import ImportedMesh
 from fe_models.imported_structure import ContactPair, Support, imported_mesh, imported_structure
 from fe_models.mesh import MeshError
 from fe_models.motion import deformation
-from fe_models.sector import sector_cuts
+from fe_models.sector import check_jumps, sector_cuts
 from fe_models.stress import cycle_stress
 from fe_models.supported_body import SupportedBody
 from fe_models.thermal import NodalTemperature
@@ -194,7 +194,7 @@ def test_wrong_cuts_are_refused(changes, said):
         (Rotation(Y, np.array([1.0, 0.0, 0.0]), 500.0), "a rotation about another axis"),
         (Acceleration(np.array([0.0, 0.0, 9810.0])), "an acceleration across the axis"),
         (Pressure("low", 5.0), "low is on a cut"),
-        (Displacement("rim", np.array([0.01, 0.0, 0.0])), "a displacement across the axis"),
+        (Displacement("rim", np.array([0.01, 0.0, 0.0])), "rim meets a cut of structure.cyclic"),
     ],
 )
 def test_loads_that_are_not_alike_in_all_sectors(load, said):
@@ -248,3 +248,16 @@ def test_heated_sector_is_the_heated_wheel():
     apart = np.linalg.norm(whole.points[:, None] - part.points[None], axis=2)
     scale = np.abs(stresses[1]).max()
     np.testing.assert_allclose(stresses[0], stresses[1][:, apart.argmin(axis=0)], atol=1e-8 * scale)
+
+
+def test_bolts_shift_cuts_alike():
+    """Along the axis, or not at all."""
+    part = sector(SECTORS, COUNTS, 3)
+    pair, nothing = Cuts.of(part, CYCLIC), np.zeros((len(part.points), 3, 1))
+    within, along, across = nothing.copy(), nothing.copy(), nothing.copy()
+    within[part.vertices("pad")] = 1.0
+    along[:, 1] = across[:, 0] = 1.0
+    for jumps in (nothing, within, along):
+        check_jumps(part, jumps.reshape(-1, 1), [pair])
+    with pytest.raises(MeshError, match="not alike in all sectors"):
+        check_jumps(part, across.reshape(-1, 1), [pair])
