@@ -44,11 +44,15 @@ class BoltTensions:
         return tuple(bolt.name for bolt in self._stage.bolts)
 
     def write(self, writer: ResultsWriter, folder: OutputFolder, jumps: int) -> None:
-        """Over both cycles, and at peak load after every jump as the loads were last solved."""
+        """Over both cycles, and at peak load after every jump as the loads were last solved.
+
+        After the last one as the worn cycle has it.
+        """
         if not self.names:
             return
         peak = self._stage.peak
-        kept = [read_arrays(folder.jump(jump))[0][TENSION] for jump in range(jumps + 1)]
+        kept = [read_arrays(folder.jump(jump))[0][TENSION] for jump in range(jumps)]
+        kept.append(self.moments["worn"])  # solved on the last surfaces, whatever the coupling
         for number, name in enumerate(self.names):
             over = "tension of the bolt in each increment, as far as it is meshed"
             cycles = {
