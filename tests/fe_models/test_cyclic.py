@@ -7,9 +7,11 @@ import pytest
 from scipy.sparse.linalg import spsolve
 from scipy.spatial import cKDTree
 
+from fe_models.applied_loads import BoundaryForce
 from fe_models.constraints import Constraints
 from fe_models.cyclic import Cuts, hold_normal
 from fe_models.elasticity import ElasticBody, von_mises
+from fe_models.imposed import tie_rigid
 from fe_models.mesh import Body, MeshError
 from fe_models.recovery import StressRecovery
 from fe_models.sector_recovery import SectorRecovery
@@ -129,6 +131,29 @@ def check_wheel(part, cyclic, order):
 
 def unchanged(body):
     return body
+
+
+@pytest.mark.parametrize(("dimension", "order"), [(2, 1), (2, 2), (3, 1)])
+def test_rigid_bore_turns_as_that_of_the_wheel(dimension, order):
+    """Under a moment, and a force along the axis in space; its motions are those of all sectors."""
+    sectors, through = 4, np.zeros(3)
+    part, cyclic = sector(sectors, dimension=dimension), about(Y, (0.0, 0.0, 0.0), sectors)
+    push = np.zeros(3) if dimension == 2 else 500.0 * np.array(Y)
+    moved = []
+    for body, cuts, share in (
+        (part, [Cuts.of(part, cyclic)], 1.0 / sectors),
+        (wheel(part, cyclic), [], 1.0),
+    ):
+        elastic, constraints = supported(
+            body, order, cuts, lambda c, e, _: c.hold(e.boundary_nodes("rim"))
+        )
+        tie_rigid(constraints, elastic, "bore", through)
+        load = BoundaryForce("bore", share * push, through, share * 2e4 * np.array(Y))
+        found = solved(elastic, constraints, load.forces(elastic))
+        moved.append((elastic, found))
+    (one, mine), (two, theirs) = moved
+    size = np.abs(theirs).max()
+    np.testing.assert_allclose(mine, theirs[same_places(one, two)], atol=1e-9 * size)
 
 
 def free_motions(elastic, constraints, cuts=()):
