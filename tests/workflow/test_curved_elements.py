@@ -1,5 +1,7 @@
 """Elements of a mesh file with its midside nodes: what is told of them, and Hertz with them."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -8,6 +10,7 @@ from tests.workflow.commands import invoke
 from tests.workflow.mesh_scenes import run
 from tests.workflow.test_curved_mesh import PEAK, pressed
 from workflow.analyses.wear.structures.mesh.case import MeshCase
+from workflow.analyses.wear.structures.mesh.elements import folded_elements
 from workflow.analyses.wear.structures.mesh.model import MeshModel
 from workflow.kinds import load_case
 
@@ -53,3 +56,17 @@ def test_only_bodies_with_curved_edges_have_midsides(tmp_path):
     arc = foot.mesh.boundaries["sole"]
     radii = np.hypot(foot.midsides[arc, 0], foot.midsides[arc, 1] - 30.0)
     np.testing.assert_allclose(radii, 30.0, rtol=1e-6)
+
+
+def test_edges_that_are_taken_straight_are_doubted(tmp_path):
+    case = load_case(pressed(tmp_path, 2, 2))
+    assert isinstance(case, MeshCase)
+    imported, mesh = case.structure.read(None), case.structure.mesh(None, 2)
+    assert list(folded_elements(mesh, imported)) == []
+    block, foot = mesh.bodies
+    midsides = foot.midsides.copy()
+    arc = foot.mesh.boundaries["sole"][:3]
+    midsides[arc] = foot.mesh.p[:, foot.mesh.facets[:, arc]].mean(axis=1).T
+    told = replace(mesh, bodies=(block, replace(foot, midsides=midsides)))
+    (doubt,) = folded_elements(told, imported)
+    assert doubt.startswith("foot: midside nodes fold elements, of which 3 edges of ")
