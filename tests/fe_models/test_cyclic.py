@@ -374,7 +374,7 @@ def test_curved_cuts_of_other_meshes():
     middles = part.points[part.mesh.facets.T].mean(axis=1)[:, [0, 2]]
     rng = np.random.default_rng(0)
     shaken = replace(part, midsides=middles + 0.01 * rng.standard_normal(middles.shape))
-    with pytest.raises(MeshError, match="midside nodes of the cuts are up to"):
+    with pytest.raises(MeshError, match="midside nodes of its cuts are up to"):
         supported(shaken, 2, [Cuts.of(shaken, about(sectors=6))], lambda *_: None)
     other = sector(6, moved=0.3)
     middles = other.points[other.mesh.facets.T].mean(axis=1)[:, [0, 2]]

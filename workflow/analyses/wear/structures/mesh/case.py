@@ -30,7 +30,7 @@ from workflow.analyses.wear.structures.mesh.contacts import (
     Support,
     own_terms,
 )
-from workflow.analyses.wear.structures.mesh.cyclic import CyclicCuts
+from workflow.analyses.wear.structures.mesh.cyclic import CyclicCuts, check_sector
 from workflow.analyses.wear.structures.mesh.elements import (
     apart,
     elements_outline,
@@ -376,7 +376,8 @@ class MeshCase(FiniteElementCase):
             imported = structure.read(self.mesh.size)
         self._check_names(imported)
         self._check_contacts()
-        self._check_cyclic(imported)
+        mesh = structure.mesh(self.mesh.size)
+        check_sector(structure, mesh, imported.node_numbers, _pointing_at)
         self._check_supports(imported)
         with _pointing_at("mesh.order"):
             structure.mesh(self.mesh.size, self.mesh.order)
@@ -428,34 +429,6 @@ class MeshCase(FiniteElementCase):
                 key = f"structure.contacts.{index}.gap"
                 check_gap(pair.gap, face_size(face), cells, face.line, key)
                 _check_mirrored(pair.gap, face.planes, key)
-
-    def _check_cyclic(self, imported: ImportedMesh) -> None:
-        """Find the pair of cuts that is none, or the load that is not alike in all sectors."""
-        from fe_models.sector import (
-            check_alike,
-            check_cuts,
-            check_off_cuts,
-            check_temperatures,
-            sector_cuts,
-        )
-
-        mesh = self.structure.mesh(self.mesh.size)
-        cyclic = [pair.described() for pair in self.structure.cyclic]
-        found = sector_cuts(mesh, [])
-        for index, cuts in enumerate(cyclic):
-            for key, names in (("low", cuts.low), ("high", cuts.high)):
-                with _pointing_at(f"structure.cyclic.{index}.{key}"):
-                    check_cuts(mesh.bodies, cuts, names)
-            with _pointing_at(f"structure.cyclic.{index}"):
-                found = sector_cuts(mesh, cyclic[: index + 1])
-        for index, support in enumerate(self.structure.supports):
-            with _pointing_at(f"structure.supports.{index}.group"):
-                check_off_cuts(mesh.bodies, support.group, cyclic)
-        for index, load in enumerate(self.structure.loads):
-            with _pointing_at(f"structure.loads.{index}"):
-                described = load.described()
-                check_alike(mesh.bodies, described, cyclic)
-                check_temperatures(mesh, imported.node_numbers, described, found)
 
     def _check_supports(self, imported: ImportedMesh) -> None:
         """Build what holds the bodies, on elements of order 1 and without forces."""

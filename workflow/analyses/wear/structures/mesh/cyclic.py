@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import AbstractContextManager
+from typing import TYPE_CHECKING, Annotated, Protocol
 
 import numpy as np
 from pydantic import model_validator
@@ -14,6 +16,9 @@ from workflow.case.sections import Section, disagreement, entry
 if TYPE_CHECKING:
     from fe_models import cyclic as fe
     from fe_models.mesh import StructureMesh
+    from sa_solver.types import Indices
+    from workflow.analyses.wear.structures.mesh.contacts import Support
+    from workflow.analyses.wear.structures.mesh.loads import Load
 
 # Cuts that are images to so much [mm] are exact: nothing is said of it.
 EXACT = 1e-9
@@ -66,3 +71,51 @@ class CyclicCuts(Section):
             off = f", {1e3 * pair.apart:.2g} µm off" if pair.apart > EXACT else ""
             parts.append(f"{low} and {high} {meet}{off}")
         return f"one of {self.sectors}: {', '.join(parts)}"
+
+
+class _Structure(Protocol):
+    """What is asked of a structure."""
+
+    @property
+    def cyclic(self) -> Sequence[CyclicCuts]: ...
+    @property
+    def supports(self) -> Sequence[Support]: ...
+    @property
+    def loads(self) -> Sequence[Load]: ...
+
+
+def check_sector(
+    structure: _Structure,
+    mesh: StructureMesh,
+    numbers: Mapping[str, Indices],
+    pointing_at: Callable[[str], AbstractContextManager[None]],
+) -> None:
+    """Find the pair of cuts that is none, or what is not alike in all sectors.
+
+    ``numbers`` are those of the nodes in the file, by body; ``pointing_at`` says of which entry a
+    :class:`MeshError` is.
+    """
+    from fe_models.sector import (
+        check_alike,
+        check_cuts,
+        check_off_cuts,
+        check_temperatures,
+        sector_cuts,
+    )
+
+    cyclic = [pair.described() for pair in structure.cyclic]
+    found = sector_cuts(mesh, [])
+    for index, cuts in enumerate(cyclic):
+        for key, names in (("low", cuts.low), ("high", cuts.high)):
+            with pointing_at(f"structure.cyclic.{index}.{key}"):
+                check_cuts(mesh.bodies, cuts, names)
+        with pointing_at(f"structure.cyclic.{index}"):
+            found = sector_cuts(mesh, cyclic[: index + 1])
+    for index, support in enumerate(structure.supports):
+        with pointing_at(f"structure.supports.{index}.group"):
+            check_off_cuts(mesh.bodies, support.group, cyclic)
+    for index, load in enumerate(structure.loads):
+        with pointing_at(f"structure.loads.{index}"):
+            described = load.described()
+            check_alike(mesh.bodies, described, cyclic)
+            check_temperatures(mesh, numbers, described, found)
