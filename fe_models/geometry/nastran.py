@@ -111,8 +111,10 @@ class _Read:
         solids = [entry for entry in data.entries if entry.name in SOLIDS]
         self._solid_properties = {entry.text(1) for entry in solids}
         self._shell_properties = {e.text(1) for e in data.entries if e.name in SHELLS | PLANES}
+        # The first of each name.
+        for entry in {entry.name: entry for entry in reversed(data.entries)}.values():
+            _refuse(entry)
         for entry in data.entries:
-            self._refuse(entry)
             if entry.name == "GRID":
                 self._grid(entry)
             elif entry.name in SOLIDS:
@@ -125,11 +127,6 @@ class _Read:
         for entry in data.entries:
             groups.read(entry)
         self._tell_shells(plane=not solids)
-
-    def _refuse(self, entry: Entry) -> None:
-        for pattern, reason in REFUSED:
-            if re.fullmatch(pattern, entry.name):
-                raise entry.wrong(reason)
 
     def _grid(self, entry: Entry) -> None:
         number = entry.whole(0)
@@ -235,6 +232,12 @@ class _Read:
                 self.caveats.append(
                     f"{place}: {element.kind}: bodies in the plane are in plane strain"
                 )
+
+
+def _refuse(entry: Entry) -> None:
+    for pattern, reason in REFUSED:
+        if re.fullmatch(pattern, entry.name):
+            raise entry.wrong(reason)
 
 
 def _cartesian(kind: str, place: Array) -> Array:

@@ -15,6 +15,7 @@ from fe_models.geometry.abaqus_cards import SourceLine
 from fe_models.mesh import MeshError
 
 SMALL, LARGE = 8, 16
+INCLUDE, END = "INCLUDE", "ENDDATA"
 # An exponent may follow its sign without a letter: 1.5-3 is 0.0015.
 BARE_EXPONENT = re.compile(r"(?<=[\d.])([+-]\d+)$")
 
@@ -68,12 +69,12 @@ def bulk_data(path: Path) -> BulkData:
     """
     found = BulkData()
     lines = list(_lines(path, ()))
-    upper = [text.upper() for _, text in lines]
-    begin = next((k for k, text in enumerate(upper) if re.match(r"\s*BEGIN\s+BULK", text)), -1)
+    heads = (text.split()[:2] for _, text in lines)
+    begin = next((k for k, head in enumerate(heads) if "".join(head).upper() == "BEGINBULK"), -1)
     for place, text in lines[begin + 1 :]:
         if text.startswith("$"):
             found.comments.append(text)
-        elif re.match(r"\s*ENDDATA", text.upper()):
+        elif text.lstrip()[: len(END)].upper() == END:
             break
         else:
             _take(found.entries, place, text)
@@ -87,7 +88,11 @@ def _lines(path: Path, including: tuple[Path, ...]) -> Iterator[tuple[SourceLine
             text, place = line.expandtabs(SMALL).rstrip(), SourceLine(path, number)
             if not text:
                 continue
-            match = re.match(r"\s*INCLUDE\s*['\"]?([^'\"]+?)['\"]?\s*$", text, re.IGNORECASE)
+            match = None
+            if text.lstrip()[: len(INCLUDE)].upper() == INCLUDE:
+                match = re.fullmatch(
+                    r"['\"]?([^'\"]+?)['\"]?", text.lstrip()[len(INCLUDE) :].strip()
+                )
             if match is None:
                 yield place, text
                 continue
