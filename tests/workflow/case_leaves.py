@@ -86,6 +86,7 @@ BOLTED = [
         "x": [1, 0, 0],
     },
 ]
+SHANK = {"name": "bolt", "body": "blade", "through": [0, 0, 2], "axis": [0, 0, 1]}
 # Sections that the templates do not have: kind of case, key of the section, its own kinds.
 GIVEN = {
     "dovetail": {"load_path.mix": {ALWAYS: [{"share": 1}]}, **wear("blade", "disk")},
@@ -105,6 +106,8 @@ GIVEN = {
             displacement={"group": "blade_top", "displacement": [0.01, 0, 0]},
             rotation={"axis": [0, 1, 0], "through": [0, 0, 0], "speed": "6000 rpm"},
             acceleration={"acceleration": [0, 0, 9810]},
+            pretension=SHANK | {"force": "10 kN"},
+            shortening=SHANK | {"shortening": "20 um"},
             moment={"group": "blade_top", "moment": [0, 5, 0]},
             remote_displacement={
                 "group": "blade_top",
@@ -264,6 +267,8 @@ class Leaf:
             overrides.append(SECTOR)
         if "legs" in self.tags:
             overrides.append("contact.method=full")
+        if "pretension" in self.tags:
+            overrides += ["load_path.cycle_from=2", "load_path.peak_leg=2"]
         if "friction_contact" in self.tags:
             overrides.append(f"structure={REDUCED}")
         if "friction_rig" in self.tags:

@@ -20,6 +20,7 @@ NEEDS = {
     "structure.contacts.wear.reference_amplitude": [
         "structure.contacts.0.wear.law=energy_amplitude"
     ],
+    " - kind: pretension": ["load_path.cycle_from=2", "load_path.peak_leg=2"],
     "structure.other_bodies": [f"structure.contacts={BOLTED}"],
     "load_path": ["contact.method=full"],
     "structure.body": ["structure.file=specimens.yaml"],

@@ -18,7 +18,7 @@ Component = Annotated[float, Quantity("1", at_least=-1e6, at_most=1e6)]
 PLACES = (("group", "on"), ("body", "of"), ("axis", "about"), ("through", "through"), ("at", "at"))
 KINDS = (
     "pressure, force, moment, displacement, remote_displacement, rotation, acceleration, "
-    "temperature, nodal_temperature or pretension"
+    "temperature, nodal_temperature, pretension or shortening"
 )
 
 

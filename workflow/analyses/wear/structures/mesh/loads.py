@@ -14,7 +14,7 @@ from workflow.analyses.wear.structures.mesh.load import (
     MeshLoad,
     Name,
 )
-from workflow.analyses.wear.structures.mesh.pretension import PretensionLoad
+from workflow.analyses.wear.structures.mesh.pretension import PretensionLoad, ShorteningLoad
 from workflow.analyses.wear.structures.mesh.temperatures import (
     NodalTemperatureLoad,
     TemperatureLoad,
@@ -236,6 +236,7 @@ Load = Annotated[
     | AccelerationLoad
     | TemperatureLoad
     | NodalTemperatureLoad
-    | PretensionLoad,
+    | PretensionLoad
+    | ShorteningLoad,
     Field(discriminator="kind"),
 ]

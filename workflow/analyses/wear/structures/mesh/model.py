@@ -24,7 +24,7 @@ from workflow.analyses.wear.structure_stage import MissionLoads
 from workflow.analyses.wear.structures.mesh.case import MeshCase
 from workflow.analyses.wear.structures.mesh.faces import face_size, planes_of_symmetry
 from workflow.analyses.wear.structures.mesh.loads import RotationLoad
-from workflow.analyses.wear.structures.mesh.pretension import PretensionLoad
+from workflow.analyses.wear.structures.mesh.pretension import BoltLoad
 from workflow.shell.reporter import Reporter
 
 
@@ -37,7 +37,7 @@ class MeshModel:
         self.nonlinearity = case.nonlinearity
         self.order = case.mesh.order
         path = case.load_path
-        tightens = any(isinstance(load, PretensionLoad) for load in case.structure.loads)
+        tightens = any(isinstance(load, BoltLoad) for load in case.structure.loads)
         self.tightening = path.legs[0] if tightens else 0
         self._increments_before = sum(path.legs[: path.cycle_from - 1])
         self.peak = sum(path.legs[: path.peak_leg]) - 1 - self._increments_before
@@ -130,9 +130,9 @@ class MeshModel:
         given = self._case.structure.loads
         loads = [load.described() for load in given]
         return tuple(
-            Bolt(bolt.name, case, bolt_section(structure, load), bolt.force)
+            Bolt(bolt.name, case, bolt_section(structure, load), bolt.tension)
             for case, (bolt, load) in enumerate(zip(given, loads, strict=True))
-            if isinstance(bolt, PretensionLoad) and isinstance(load, Pretension)
+            if isinstance(bolt, BoltLoad) and isinstance(load, Pretension)
         )
 
     def softening(self, structure: Structure) -> Softening:

@@ -26,10 +26,9 @@ if TYPE_CHECKING:
 Shortening = Annotated[float, Quantity("mm", above=0.0, at_most=100.0)]
 
 
-class PretensionLoad(MeshLoad):
-    """A bolt, cut across its shank and shortened there: tightened, and then held as long."""
+class BoltLoad(MeshLoad):
+    """A bolt that is cut across its shank and shortened there, and then held as long."""
 
-    kind: Literal["pretension"] = entry(KINDS, "pretension")
     name: Name = entry("of the bolt in all results", "bolt_1")
     body: Name = entry("the bolt, with its head and nut", "blade")
     through: tuple[Coordinate, Coordinate, Coordinate] = entry(
@@ -38,27 +37,17 @@ class PretensionLoad(MeshLoad):
     axis: tuple[Component, Component, Component] = entry(
         "direction of the bolt [1]", [0.0, 0.0, 1.0]
     )
-    force: PressingForce | None = entry(
-        "at the end of the first leg, of the bolt as far as it is meshed; in the plane per length; "
-        "this or the shortening [N]",
-        "10 kN",
-        default=None,
-    )
-    shortening: Shortening | None = entry("instead of the force [mm]", "20 um", default=None)
 
     @model_validator(mode="after")
-    def _one_of_both(self) -> PretensionLoad:
-        if (self.force is None) == (self.shortening is None):
-            raise disagreement("force and shortening; allowed: one of both", "force", "shortening")
+    def _has_direction(self) -> BoltLoad:
         if not any(self.axis):
             raise disagreement("no direction; allowed: one that is not zero", "axis")
-        if self.force is not None and self.path[0] != 1.0:
-            raise disagreement(
-                f"{self.path[0]:g} at the end of the first leg, in which the bolt gets its force; "
-                "allowed: 1 first",
-                "path",
-            )
         return self
+
+    @property
+    def tension(self) -> float | None:
+        """What the bolt is tightened to [N]; None where its shortening is given."""
+        return None
 
     @property
     def ties(self) -> bool:
@@ -73,13 +62,45 @@ class PretensionLoad(MeshLoad):
         """As the structure takes it: shortened by 1 mm where it has its force."""
         from fe_models.pretension import Pretension
 
-        amount = 1.0 if self.shortening is None else self.shortening
-        return Pretension(self.body, np.array(self.through), np.array(self.axis), amount)
+        through, axis = np.array(self.through), np.array(self.axis)
+        return Pretension(self.body, through, axis, getattr(self, "shortening", 1.0))
+
+
+class PretensionLoad(BoltLoad):
+    """A bolt that is tightened to a force in the first leg, and then held as long."""
+
+    kind: Literal["pretension"] = entry(KINDS, "pretension")
+    force: PressingForce = entry(
+        "at the end of the first leg, of the bolt as far as it is meshed; in the plane per length "
+        "[N]",
+        "10 kN",
+    )
+
+    @model_validator(mode="after")
+    def _is_tightened_first(self) -> PretensionLoad:
+        if self.path[0] != 1.0:
+            raise disagreement(
+                f"{self.path[0]:g} at the end of the first leg, in which the bolt gets its force; "
+                "allowed: 1 first",
+                "path",
+            )
+        return self
+
+    @property
+    def tension(self) -> float | None:
+        return self.force
+
+
+class ShorteningLoad(BoltLoad):
+    """A bolt that is shortened by a length, whatever force that takes, and held so."""
+
+    kind: Literal["shortening"] = entry(KINDS, "shortening")
+    shortening: Shortening = entry("of the shank [mm]", "20 um")
 
 
 def check_bolts(loads: Sequence[MeshLoad], path: Legs, nonlinearity: Nonlinearity) -> None:
     """Refuse bolts of one name, tightened in every cycle, or of nonlinear structures."""
-    bolts = {i: load for i, load in enumerate(loads) if isinstance(load, PretensionLoad)}
+    bolts = {i: load for i, load in enumerate(loads) if isinstance(load, BoltLoad)}
     names = [bolt.name for bolt in bolts.values()]
     for index, bolt in bolts.items():
         if names.count(bolt.name) > 1:
@@ -87,7 +108,7 @@ def check_bolts(loads: Sequence[MeshLoad], path: Legs, nonlinearity: Nonlinearit
                 f"two bolts called {bolt.name}; allowed: names that differ",
                 f"structure.loads.{index}.name",
             )
-        if bolt.force is not None and path.cycle_from < 2:
+        if bolt.tension is not None and path.cycle_from < 2:
             raise disagreement(
                 "1: the bolts would be tightened in every cycle; allowed: 2 or more, after the leg "
                 "that tightens them",
