@@ -83,6 +83,10 @@ def _nodes(size: int) -> str:
     return f"{size} nodes"
 
 
+def _bodies(size: int) -> str:
+    return f"{size} bodies"
+
+
 def _harmonics(size: int) -> str:
     return f"{size} odd harmonics"
 
@@ -111,6 +115,11 @@ CHARTS: Mapping[str, CostChart] = {
             Line("condensation", "condensed", (10, 14, 20, 28, 39), "unknowns", _nodes),
             Line("missions", "friction", (10, 14, 20, 28, 39), "iterations", _nodes),
         ),
+    ),
+    "bodies": CostChart(
+        "Blocks on each other, 256 nodes on each face: condensed, and a cycle with friction",
+        "bodies",
+        (Line("stack", "blocks on each other", (2, 3, 5, 8, 12), "unknowns", _bodies),),
     ),
     "harmonics": CostChart(
         "A response of the rig's 121 contacts by harmonic balance",
@@ -262,7 +271,9 @@ def limits() -> list[list[str]]:
 
 
 def _of(name: str) -> str:
-    return {"contact": "contact, ", "structure": "structure, "}.get(name, f"vibration by {name}, ")
+    if name in ("contact", "structure"):
+        return f"{name}, "
+    return "structure, " if name == "bodies" else f"vibration by {name}, "
 
 
 def _reach(line: Line, own: Points, measure: str, most: float) -> str:

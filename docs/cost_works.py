@@ -16,16 +16,24 @@ import sys
 import time
 from collections.abc import Callable
 from functools import partial
+from itertools import pairwise
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, NamedTuple
 
 import numpy as np
+from skfem import MeshTet
 
+from fe_models.applied_loads import BoundaryForce, Pressure
 from fe_models.dynamics.continuation import ContinuationControl
 from fe_models.dynamics.forced_response import along_frequency
 from fe_models.dynamics.harmonic_balance import HarmonicBalance
 from fe_models.dynamics.harmonics import Resolution
+from fe_models.friction import FrictionalJoint
+from fe_models.geometry.imported import ImportedMesh
+from fe_models.imported_structure import ContactPair, Support, imported_mesh, imported_structure
+from fe_models.mesh import Body
+from fe_models.structure import Structure
 from sa_solver import (
     ContactLoad,
     ElasticPair,
@@ -54,6 +62,8 @@ AGAIN = ("normal", "friction", "unlike")
 CONTACT_SHARE, SHEAR_SHARE = 0.6, 0.75
 # Nodes across a flank of the default dovetail, and along it.
 FLANK = np.array([20, 34])
+# Nodes along a side of the blocks of a stack, whose cycle has four increments.
+SIDE, PATH = 16, np.array([[1.0, 0.5], [1.0, 1.0], [1.0, 0.0], [1.0, -1.0]])
 # The shipped rig: nodes along a side of its pads less one, odd harmonics, force [N], span [Hz].
 PAD, ODD, FORCE, SPAN = 10, 5, 10.0, (50.0, 500.0)
 STEPS = ContinuationControl(most=0.1)
@@ -122,11 +132,45 @@ def missions(nodes: int) -> Sized:
     cycle = partial(structure.solve_cycle, joint, model.missions[0].amplitudes, structure.gap())
 
     def run() -> int:
-        solution = cycle(model.friction)
+        solution = cycle(model.friction[0])
         assert solution.converged
         return solution.iterations
 
     return Sized(stage.interface_count(), run)
+
+
+def stack(bodies: int) -> Sized:
+    """So many blocks on each other, each pressed and sheared by friction; counts unknowns."""
+    structure = _stack(bodies)
+
+    def run() -> int:
+        joint = FrictionalJoint(structure.condense().resolvent(), FRICTION)
+        cycle = structure.solve_cycle(joint, PATH, structure.gap(), FRICTION)
+        assert cycle.converged
+        return sum(body.elastic.size for body in structure.bodies)
+
+    return Sized(bodies, run)
+
+
+def _stack(bodies: int) -> Structure:
+    side, names = np.linspace(0.0, 12.0, SIDE), [f"block_{k}" for k in range(bodies)]
+    meshes, pairs = {}, []
+    for k, name in enumerate(names):
+        z = np.linspace(6.0 * k, 6.0 * (k + 1), SIDE // 2 + 1)
+        ends = {
+            f"{name}_{end}": lambda p, at=at: np.isclose(p[2], at)
+            for end, at in (("low", z[0]), ("high", z[-1]))
+        }
+        meshes[name] = Body(name, MeshTet.init_tensor(side, side, z).with_boundaries(ends))
+    for k, (one, two) in enumerate(pairwise(names)):
+        faces = [f"{one}_high"], [f"{two}_low"]
+        pairs.append(ContactPair(f"contact_{k}", (one, two), *faces, np.array([1.0, 0.0, 0.0])))
+    numbers = {name: np.arange(body.mesh.nvertices) for name, body in meshes.items()}
+    imported = ImportedMesh(meshes, numbers, {name: {} for name in names})
+    held, top = [Support(f"{names[0]}_low", "xyz")], f"{names[-1]}_high"
+    loads = [Pressure(top, 50.0), BoundaryForce(top, np.array([200.0, 0.0, 0.0]))]
+    mesh = imported_mesh(imported, names, pairs, held)
+    return imported_structure(mesh, imported, [TITANIUM] * bodies, held, loads, 1)
 
 
 def _dovetail(nodes: int) -> StructureStage:
@@ -176,6 +220,7 @@ WORKS: dict[str, tuple[Callable[[int], Sized], int]] = {
     "unlike": (partial(friction, pair=UNLIKE), 32),
     "condensation": (condensation, 8),
     "missions": (missions, 8),
+    "stack": (stack, 2),
     "harmonics": (harmonics, 1),
     "contacts": (contacts, 4),
 }

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+from sa_solver.errors import InputError
+
 Vector = tuple[float, float, float]
 
 
@@ -59,5 +61,5 @@ class Scene:
     ignored: tuple[str, ...] = ()
 
 
-class NotTakenError(Exception):
+class NotTakenError(InputError):
     """Why a line of a file is ignored."""

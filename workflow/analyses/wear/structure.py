@@ -41,13 +41,15 @@ def memory(
     interface_nodes: int = 0,
     kept: int = SPECTRA,
     remedy: str = "lower contact.grid",
+    matrices: int = DENSE_MATRICES,
 ) -> Memory:
     """Of the contacts, and of a structure condensed onto its interfaces.
 
     The structure has so many nodes, and its interfaces so many, once they are known; numbers
-    ``kept`` per cell of the grid are those of one contact at a time unless given.
+    ``kept`` per cell of the grid are those of one contact at a time unless given; so many dense
+    ``matrices`` of the interfaces are alive at once.
     """
-    dense = DENSE_MATRICES * (3 * interface_nodes) ** 2
+    dense = matrices * (3 * interface_nodes) ** 2
     cells = max(prod(terms.grid) for terms in case.every_terms)
     return Memory(dense + cells * kept, remedy, factor_bytes(nodes))
 

@@ -5,13 +5,17 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from workflow.analyses.wear.run_time import DISSIPATING, Extent
-from workflow.analyses.wear.structure import Finer, WearStructure, memory
+from workflow.analyses.wear.structure import DENSE_MATRICES, Finer, WearStructure, memory
 from workflow.analyses.wear.structures.mesh.case import MeshCase
 from workflow.errors import UserError
+from workflow.shell.memory import Memory
 
 if TYPE_CHECKING:
     from workflow.analyses.wear.load_source import LoadSource
 
+# Dense matrices of the interfaces at once while more than two bodies are joined: of 12 blocks on
+# each other 9.6.
+OF_MANY = 10
 # Nodes in space of which elements of second order, seven times as many, are still cheap.
 MOST_NODES = 4000
 
@@ -43,6 +47,11 @@ def _finer(case: MeshCase) -> Finer[MeshCase] | None:
     return Finer({"mesh.order": 2}) if case.mesh.order == 1 and cheap else None
 
 
+def _memory(case: MeshCase, nodes: int = 0, interface_nodes: int = 0) -> Memory:
+    matrices = OF_MANY if case.structure.other_bodies else DENSE_MATRICES
+    return memory(case, nodes, interface_nodes, matrices=matrices)
+
+
 def _choose(case: MeshCase) -> tuple[MeshCase, dict[str, Any] | None]:
     if any(case.legs):
         return case, None
@@ -51,7 +60,7 @@ def _choose(case: MeshCase) -> tuple[MeshCase, dict[str, Any] | None]:
     from workflow.analyses.wear.structures.mesh.model import MeshModel
 
     extent = _extent(case)
-    memory(case, int(extent.nodes), int(extent.interface_nodes)).check()
+    _memory(case, int(extent.nodes), int(extent.interface_nodes)).check()
     try:
         return choose_increments(case, MeshModel)
     except MeshError as error:
@@ -63,6 +72,7 @@ STRUCTURE = WearStructure(
     case=MeshCase,
     source=_source,
     extent=_extent,
+    memory=_memory,
     choose=_choose,
     finer=_finer,
     settings={"mesh": "mesh.order or a finer mesh"},
