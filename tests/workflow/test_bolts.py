@@ -110,6 +110,7 @@ def test_wear_of_what_is_clamped_costs_tension(clamp, tmp_path):
     assert before - after == pytest.approx(stiffness * worn, rel=0.05)
 
 
+@pytest.mark.slow
 def test_a_bolt_is_told_in_check_summary_and_report(clamp, tmp_path):
     checked = invoke("check", clamp)
     assert checked.exit_code == 0, checked.stderr

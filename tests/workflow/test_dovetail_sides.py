@@ -32,6 +32,7 @@ def energies(folder, sides, moment):
     return [summary[name]["energy_per_cycle"]["structure"] for name in ("intrados", "extrados")]
 
 
+@pytest.mark.slow
 def test_neighbours_change_what_a_moment_does(tmp_path):
     """More slip on the flank that it presses on, less on the other; alike without one."""
     for moment in (0, 30):

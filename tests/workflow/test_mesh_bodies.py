@@ -144,6 +144,7 @@ def test_terms_of_their_own_do_not_go_into_resultants(strips, tmp_path):
     assert "of their own, which a case of resultants cannot have" in ending.stderr
 
 
+@pytest.mark.slow
 def test_method_full_takes_each_friction(strips, tmp_path):
     numbers = run(strips, tmp_path / "out", "contact.method=full", "wear.cycles=500")
     assert numbers["upper"]["energy"] > 10.0 * numbers["lower"]["energy"]
