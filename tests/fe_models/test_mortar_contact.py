@@ -305,7 +305,7 @@ def test_dovetail_of_two_meshes_does_what_that_of_one_does(
         np.testing.assert_array_equal(face.nodes_2, interface.nodes_2)
         np.testing.assert_allclose(face.gap, 0.0, atol=1e-9)
         faces.append(replace(face, gap=interface.gap))
-    mesh = replace(coarse_mesh, body_1=disk, interfaces=tuple(faces))
+    mesh = replace(coarse_mesh, bodies=(disk, coarse_mesh.bodies[1]), interfaces=tuple(faces))
     structure = dovetail_structure(dovetail, mesh, titanium, titanium, mission, 1)
     joint = structure.condense()
     assert joint.rigid_modes == 5

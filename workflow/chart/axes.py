@@ -361,7 +361,10 @@ def _alone(case: Case) -> Iterator[Rung]:
     Those are of second order, in elements and in twice the increments.
     """
     kind = entry_at(case, "structure.kind")
-    plane = kind == "mesh" and entry_at(case, "structure").mesh().interfaces[0].line
+    plane = False
+    if kind == "mesh":
+        mesh = entry_at(case, "structure").mesh(entry_at(case, "mesh.size"))
+        plane = mesh.interfaces[0].line
     if not plane and not (kind == "dovetail" and _is_line(case)):
         return
     yield from _methods(case)

@@ -41,7 +41,9 @@ def modes(structure: Rig | FrictionRig, stiffness: float) -> Array:
     masses, springs = np.array(structure.masses), np.array(structure.springs)
     matrix = np.diag(springs + np.append(springs[1:], stiffness))
     matrix -= np.diag(springs[1:], 1) + np.diag(springs[1:], -1)
-    scale = 1.0 / np.sqrt(masses)
+    # Over the smallest mass, so that no slipped exponent overflows.
+    least = masses.min()
+    scale = np.sqrt(least / masses)
     squares = np.linalg.eigvalsh(scale[:, None] * matrix * scale)
-    frequencies: Array = np.sqrt(np.maximum(squares, 0.0)) / (2.0 * np.pi)
+    frequencies: Array = np.sqrt(np.maximum(squares, 0.0)) / np.sqrt(least) / (2.0 * np.pi)
     return frequencies
