@@ -20,12 +20,12 @@ run: $(INSTALLED)
 	$(BIN)/fretscale run cases/dovetail.yaml --out out/dovetail --force
 
 test: $(TESTABLE)
-	@echo 'fretscale: style, types and layers, then the tests: about 4 minutes on two cores.'
+	@echo 'fretscale: style, types and layers, then the tests: 4 to 5 minutes on two cores.'
 	@$(MAKE) --no-print-directory lint
 	$(TESTING) $(BIN)/python -m pytest -q -n 2 --dist worksteal
 
 test-full: test
-	@echo 'fretscale: the tests of more than a few seconds: about 17 minutes on two cores.'
+	@echo 'fretscale: the tests of more than a few seconds: about 18 minutes on two cores.'
 	$(TESTING) $(BIN)/python -m pytest -q -n 2 --dist worksteal -m slow
 
 lint: $(TESTABLE)

@@ -21,6 +21,7 @@ from fe_models.linear_solver import prepare
 from fe_models.mesh import Body, MeshError
 from fe_models.rigid_motions import rigid_motions
 from sa_solver.types import Material
+from tests.marks import slow
 from tests.mirrored_blocks import along, mirrored, with_faces
 
 STEEL = Material(200e3, 0.3)
@@ -125,7 +126,7 @@ def test_averaged_face_has_its_points_motion_on_average(dimension, order):
     np.testing.assert_allclose(residual[nodes], given, atol=1e-9 * np.abs(given).max())
 
 
-@pytest.mark.parametrize("rigid", [True, False])
+@pytest.mark.parametrize("rigid", [True, slow(False)])
 @pytest.mark.parametrize(("dimension", "order"), MODELS)
 def test_forces_and_motions_of_a_point_are_reciprocal(dimension, order, rigid):
     """The stiffness of given motions is the inverse of the compliance under forces."""
@@ -374,7 +375,7 @@ def test_a_rotation_out_of_the_plane_is_refused():
             check_load(imported, list(bodies.values()), remote(motion, True, boundary="lid"))
 
 
-@pytest.mark.parametrize("rigid", [True, False])
+@pytest.mark.parametrize("rigid", [True, slow(False)])
 def test_faces_of_curved_elements_follow_too(rigid):
     """A rigid motion of a body that nothing else holds strains nothing, whatever its edges."""
     grid = np.linspace(0.0, 1.0, 3)

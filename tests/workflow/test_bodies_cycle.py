@@ -140,6 +140,7 @@ def test_the_force_of_a_held_approach_is_told_worn_too(tmp_path: Path) -> None:
     assert 0.0 < found["worn"]["P"] < 0.95 * found["unworn"]["P"]
 
 
+@pytest.mark.slow
 def test_what_forces_dissipate_only_the_half_space_knows(tmp_path: Path) -> None:
     """Slip and energies that imposed forces do not tell are left out, in all that is written."""
     settings = ["wear.cycles=200", "wear.step.cycles=200", NO_STRESS, "output.paraview=false"]

@@ -123,6 +123,7 @@ def test_a_bolt_is_told_in_check_summary_and_report(clamp, tmp_path):
     assert "tension at peak load, worn" in report
 
 
+@pytest.mark.slow
 def test_a_shortening_is_as_long_as_it_is(clamp, tmp_path):
     """Twice as short, twice as tight."""
     gently = "structure.loads.1.force=[10 N, 0, 0]"

@@ -3,6 +3,7 @@
 import pytest
 
 from fe_models.mesh import StructureMesh, write_msh
+from tests.marks import slow
 from tests.wheels import about, sector, shoe, turned
 from tests.workflow.commands import invoke
 from tests.workflow.mesh_scenes import refused, run, write_case
@@ -37,7 +38,7 @@ def case_of(folder, moved=0.0, **changes):
     return write_case(folder / "sector.yaml", structure, LEGS, grid=(24, 1))
 
 
-@pytest.mark.parametrize("order", [1, 2])
+@pytest.mark.parametrize("order", [1, slow(2)])
 def test_sector_runs(tmp_path, order):
     """With its cuts tied; what is tied is told beforehand."""
     case, elements = case_of(tmp_path), f"mesh.order={order}"

@@ -57,6 +57,7 @@ def sections(out):
         return [group[f"body_{body}/stress"][()] for body in (1, 2)]
 
 
+@pytest.mark.slow
 def test_bodies_that_expand_alike_are_pressed_across_their_plane(tmp_path):
     """Free in the plane, they feel nothing of it there; along y it is -E θ, under contacts too."""
     cold = run(scene(tmp_path / "cold"), tmp_path / "a", *settings(HELD))

@@ -341,6 +341,7 @@ def test_a_force_without_a_contact_in_reach_of_its_grid_is_warned_of(tmp_path):
     assert "reaches the border of its grid" in result.stderr
 
 
+@pytest.mark.slow
 def test_the_worn_contact_is_shown_in_paraview(tmp_path):
     ended = run(tmp_path, "output.paraview=true", "wear.cycles=[2e4]", "forces=[5 N]")
     assert ended.exit_code == 0, ended.stderr
