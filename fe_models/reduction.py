@@ -42,6 +42,7 @@ DATASETS = {
     "kept": ("1", "displacements of the full model that are kept, in this order"),
     "stiffness": ("N/mm", "stiffness on kept displacements, then modes (modes: 1/s^2)"),
     "mass": ("t", "mass on kept displacements, then modes (modes: 1, mixed: t^0.5)"),
+    "damping": ("N s/mm", "damping on kept displacements, then modes (modes: 1/s)"),
     "loads": ("N", "load cases on kept displacements, then modes (modes: N/t^0.5)"),
     "mode_shapes": ("1/t^0.5", "fixed-interface modes over all displacements of the full model"),
     "frequencies": ("Hz", "natural frequencies of the fixed-interface modes"),
@@ -49,7 +50,7 @@ DATASETS = {
     "places": ("mm", "x, y, z of the point of each kept displacement"),
 }
 # Those that a stored model may lack.
-OPTIONAL = "mass", "names", "places"
+OPTIONAL = "mass", "damping", "names", "places"
 
 
 @dataclass(frozen=True)
@@ -60,7 +61,8 @@ class ReducedModel:
     ``mode_shapes`` ``(n, m)`` of unit modal mass, zero where kept; their ``frequencies`` [Hz]. With
     mm, N, s and t a modal coordinate has the unit t^0.5 mm. Where they are known, ``names``
     ``(c,)`` of the kept displacements, point and direction as in ``pad 17 x``, and ``places``
-    ``(c, 3)`` of their points [mm].
+    ``(c, 3)`` of their points [mm]. ``damping`` ``(c + m, c + m)`` is there if the body has a
+    matrix of it.
 
     Examples
     --------
@@ -85,6 +87,7 @@ class ReducedModel:
     frequencies: Array
     names: tuple[str, ...] | None = None
     places: Array | None = None
+    damping: Array | None = None
 
     @property
     def static_stiffness(self) -> Array:
@@ -113,14 +116,16 @@ def reduce_body(
     modes: int = 0,
     loads: Array | None = None,
     done: Callable[[], None] = lambda: None,
+    damping: sp.csr_matrix | None = None,
 ) -> ReducedModel:
     """Reduce a body to its ``kept`` displacements and ``modes`` fixed-interface modes.
 
-    ``stiffness`` and ``mass`` ``(n, n)`` are symmetric; the mass may be left out where there are no
-    modes. ``loads`` ``(n, cases)``. The order of ``kept`` is that of the result. With mass and
-    modes ``done`` is called after each of ``STEPS`` steps. Raises ``ValueError`` if
-    modes are asked for that the body does not have, or without mass, and
-    :class:`~fe_models.linear_solver.SolverError` if the body can move while they are held.
+    ``stiffness``, ``mass`` and ``damping`` ``(n, n)`` are symmetric; the mass may be left out where
+    there are no modes, damping always. ``loads`` ``(n, cases)``. The order of ``kept`` is that of
+    the result. With mass and modes ``done`` is called after each of ``STEPS`` steps. Raises
+    ``ValueError`` if modes are asked for that the body does not have, or modes or damping without
+    mass, and :class:`~fe_models.linear_solver.SolverError` if the body can move while they are
+    held.
 
     Examples
     --------
@@ -139,21 +144,27 @@ def reduce_body(
     """
     size = stiffness.shape[0]
     inner = _others(size, kept)
-    if modes > 0 and mass is None:
-        raise ValueError("fixed-interface modes need a mass matrix")
+    if (modes > 0 or damping is not None) and mass is None:
+        raise ValueError("fixed-interface modes, and damping, need a mass matrix")
     if modes >= len(inner) > 0 or modes < 0:
         raise ValueError(f"{modes} modes of {len(inner)} inner displacements: take 0 to fewer")
     full_loads = np.zeros((size, 0)) if loads is None else loads
     static, static_loads = condense(stiffness, full_loads, kept)
     done()
     values, shapes, reduced_mass = np.empty(0), np.zeros((size, modes)), None
+    reduced_damping = None
     if mass is not None:
         solve = factorise(stiffness[inner][:, inner].tocsr())
         done()
         if modes > 0:
             values, shapes[inner] = _lowest_modes(stiffness, mass, inner, modes, solve)
             done()
-        reduced_mass = _reduced_mass(stiffness, mass, kept, inner, shapes, solve)
+        following = _following(stiffness, kept, inner, solve)
+        reduced_mass = _projected(mass, kept, inner, following, shapes)
+        # The modes have unit mass, and rounding would leave a little between them.
+        reduced_mass[len(kept) :, len(kept) :] = np.eye(modes)
+        if damping is not None:
+            reduced_damping = _projected(damping, kept, inner, following, shapes)
         done()
     return ReducedModel(
         kept=kept,
@@ -162,6 +173,7 @@ def reduce_body(
         loads=np.concatenate([static_loads, shapes.T @ full_loads]),
         mode_shapes=shapes,
         frequencies=np.sqrt(values) / (2.0 * np.pi),
+        damping=reduced_damping,
     )
 
 
@@ -232,6 +244,7 @@ def _check_shapes(path: Path, datasets: Mapping[str, Any]) -> None:
         "frequencies": (modes,),
         "stiffness": (size, size),
         "mass": (size, size),
+        "damping": (size, size),
         "loads": (size, *datasets["loads"].shape[-1:]),
         "mode_shapes": (*datasets["mode_shapes"].shape[:1], modes),
         "names": (kept,),
@@ -278,24 +291,27 @@ def _lowest_modes(
     return values, shapes / np.sqrt(np.einsum("im,im->m", shapes, M @ shapes))
 
 
-def _reduced_mass(
-    stiffness: sp.csr_matrix,
-    mass: sp.csr_matrix,
-    kept: Indices,
-    inner: Indices,
-    shapes: Array,
-    solve: Factorisation,
+def _following(
+    stiffness: sp.csr_matrix, kept: Indices, inner: Indices, solve: Factorisation
 ) -> Array:
-    """Tᵀ M T, the static shapes Ψ held in full: ``(i, c)``."""
+    """The static shapes Ψ, held in full: ``(i, c)``."""
     coupling = stiffness[inner][:, kept].tocsc()
     static = np.empty((len(inner), len(kept)))
     for start in range(0, len(kept), COLUMNS_AT_ONCE):
         block = slice(start, start + COLUMNS_AT_ONCE)
         static[:, block] = -solve(coupling[:, block].toarray())
-    inner_mass, coupling_mass = mass[inner][:, inner], mass[inner][:, kept]
-    half = coupling_mass.T @ static
-    kept_mass = mass[kept][:, kept].toarray() + half + half.T + static.T @ (inner_mass @ static)
+    return static
+
+
+def _projected(
+    matrix: sp.csr_matrix, kept: Indices, inner: Indices, static: Array, shapes: Array
+) -> Array:
+    """Tᵀ M T of a mass, or a damping, with the static shapes Ψ ``(i, c)``."""
+    within, coupling = matrix[inner][:, inner], matrix[inner][:, kept]
+    half = coupling.T @ static
+    on_kept = matrix[kept][:, kept].toarray() + half + half.T + static.T @ (within @ static)
     modal = shapes[inner]
-    mixed = static.T @ (inner_mass @ modal) + coupling_mass.T @ modal
-    symmetric = 0.5 * (kept_mass + kept_mass.T)
-    return np.block([[symmetric, mixed], [mixed.T, np.eye(modal.shape[1])]])
+    moved = within @ modal
+    mixed = static.T @ moved + coupling.T @ modal
+    symmetric = 0.5 * (on_kept + on_kept.T)
+    return np.block([[symmetric, mixed], [mixed.T, modal.T @ moved]])

@@ -7,7 +7,7 @@ without friction rings down as measured: C = M Φ diag(2 ζ ω) Φᵀ M with Φ�
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.linalg as sl
@@ -88,8 +88,9 @@ def reduced_rig(
     ``names`` ``(c,)`` are those of its kept displacements; its modes follow as ``mode 1`` ... A
     mass of another name is a further point. Every joint is one link per direction, its
     displacement the second's minus the first's. ``damping_ratio`` is one, or that of each mode
-    ``(n,)`` of the rig. Raises :class:`RigError` for a model without mass, for names that are not
-    as many as the kept displacements, and as :func:`lumped_rig`.
+    ``(n,)`` of the rig; a damping matrix of the body comes to it. Raises :class:`RigError` for a
+    model without mass, for names that are not as many as the kept displacements, and as
+    :func:`lumped_rig`.
 
     Examples
     --------
@@ -117,9 +118,13 @@ def reduced_rig(
         )
     modes = tuple(f"mode {mode + 1}" for mode in range(len(reduced.frequencies)))
     named = (*names, *modes)
-    return connected_rig(
+    rig = connected_rig(
         reduced.mass, reduced.stiffness, named, masses, springs or {}, joints, damping_ratio
     )
+    if reduced.damping is None:
+        return rig
+    added = len(rig.mass) - len(named)
+    return replace(rig, damping=rig.damping + np.pad(reduced.damping, (0, added)))
 
 
 def connected_rig(

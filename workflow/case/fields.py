@@ -20,6 +20,8 @@ from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
 from workflow.case import units
 
+# Files of several arrays, and behind a colon the one that is meant.
+OF_SEVERAL = r"(.*\.(?:h5|hdf5|npz|mat|op4|pch|bdf)):(.*)"
 DOTTED = r"[\w-]+(\.[\w-]+)*"
 NO_CONTEXT: Mapping[str, Any] = {}
 Auto = Literal["auto"]  # of an entry that is chosen before the run
@@ -345,8 +347,8 @@ class Path(Entry):
 class File(Entry):
     """A file there is, relative to the folder of the case; read as its absolute path.
 
-    Data in an HDF5 file are named after a colon: ``gaps.h5:scan/gap``. The folder comes from the
-    validation context, entry ``folder``.
+    Data in a file of several are named after a colon: ``gaps.h5:scan/gap``. The folder comes from
+    the validation context, entry ``folder``.
     """
 
     endings: tuple[str, ...]
@@ -397,5 +399,5 @@ def unreadable(path: Pathname) -> str:
 
 def split_dataset(text: str) -> tuple[str, str]:
     """File and dataset of ``file.h5:dataset``; an empty dataset where there is none."""
-    name, colon, dataset = text.rpartition(".h5:")
-    return (f"{name}.h5", dataset) if colon else (text, "")
+    match = re.fullmatch(OF_SEVERAL, text, re.DOTALL)
+    return (match[1], match[2]) if match else (text, "")

@@ -9,18 +9,18 @@ from workflow.analyses.rig.friction_rig import friction_rig_model
 from workflow.analyses.rig.joint_sections import FrictionContactJoint, Joint
 from workflow.analyses.rig.reduced_rig import reduced_rig_model
 from workflow.analyses.rig.rig_model import RigModel
-from workflow.analyses.rig.structure import FrictionRig, ReducedBody, Rig
+from workflow.analyses.rig.structure import FrictionRig, JointedBody, Rig
 from workflow.shell.reporter import Reporter
 
 
 def rig_model(
-    structure: Rig | ReducedBody | FrictionRig, joint: Joint, mass: int | None, reporter: Reporter
+    structure: Rig | JointedBody | FrictionRig, joint: Joint, mass: int | None, reporter: Reporter
 ) -> RigModel:
     """The rig with its joints, of masses in a row driven at the ``mass`` of this number.
 
     Raises UserError where its bodies cannot be what the case says.
     """
-    if isinstance(structure, ReducedBody):
+    if isinstance(structure, JointedBody):
         directions = 3 if isinstance(joint, FrictionContactJoint) else 1
         return reduced_rig_model(structure, directions, reporter)
     if isinstance(structure, FrictionRig):

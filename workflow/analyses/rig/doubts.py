@@ -7,6 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from sa_solver.types import Array
+from workflow.analyses.rig.matrix_body import MatrixBody
 from workflow.analyses.rig.structure import FrictionRig, Rig
 from workflow.case.sections import Section
 
@@ -34,6 +35,12 @@ def about_modes(
             f"{path}: no mode of the rig is near: they are at {free} Hz with an open joint, at "
             f"{held} Hz with a stuck one; are masses, springs and stiffness in the units meant?"
         )
+
+
+def about_matrices(structure: Section) -> Iterator[str]:
+    """About matrices that are hardly meant, by their masses and frequencies."""
+    if isinstance(structure, MatrixBody):
+        yield from structure.doubts()
 
 
 def modes(structure: Rig | FrictionRig, stiffness: float) -> Array:

@@ -7,12 +7,16 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from fe_models.dynamics.model import DynamicModel
 from fe_models.dynamics.rig import Link, RigError, reduced_rig, unit_force
+from fe_models.matrices import MatrixError
+from fe_models.matrices.reduction import listed_names
 from fe_models.mesh import MeshError
-from fe_models.reduction import ReducedModel
-from sa_solver.types import Progress
+from fe_models.reduction import STEPS, ReducedModel
+from sa_solver.types import Array, Progress, Tally
+from workflow.analyses.rig.matrix_body import LoadCase, MatrixBody
 from workflow.analyses.rig.rig_model import RigModel
-from workflow.analyses.rig.structure import Against, JointPlaces, Moved, ReducedBody
+from workflow.analyses.rig.structure import Against, JointedBody, JointPlaces, Moved, ReducedBody
 from workflow.analyses.specimens.case import SpecimensCase
 from workflow.analyses.specimens.memory import memory
 from workflow.analyses.specimens.model import SpecimensModel
@@ -23,13 +27,13 @@ from workflow.shell.reporter import Reporter
 AXES = "xyz"
 
 
-def reduced_rig_model(body: ReducedBody, directions: int, reporter: Reporter) -> RigModel:
+def reduced_rig_model(body: JointedBody, directions: int, reporter: Reporter) -> RigModel:
     """The rig that a reduced body makes, with joints of so many ``directions``, 1 or 3.
 
     Raises UserError for a file without such a body, and for points that it does not have.
     """
     with reporter.stage("reduction", "steps") as told:
-        reduced = _reduced_body(body, reporter, told)
+        reduced, massless = _reduced_body(body, reporter, told)
     points = _Points(reduced)
     joints = [
         joint
@@ -45,20 +49,32 @@ def reduced_rig_model(body: ReducedBody, directions: int, reporter: Reporter) ->
             points.springs(body),
             body.damping_ratio,
         )
-        driven, seen = (
-            np.sum(
-                [share * unit_force(model, name) for name, share in points.shared(moved, key)], 0
-            )
-            for moved, key in ((body.driven, "driven"), (body.seen, "seen"))
-        )
+        driven = _driven(body, reduced, model, points)
+        seen = _shape(model, points, body.seen, "seen")
     except RigError as error:
-        raise UserError(f"structure: {error}") from error
+        raise UserError(f"structure: {error}{_told(massless)}") from error
     label = f"{body.seen.points} {body.seen.direction}"
     along = _along(directions, body)
     return RigModel(model, driven, seen[None], (label,), directions, along, in_a_row=False)
 
 
-def _along(directions: int, body: ReducedBody) -> int:
+def _driven(
+    body: JointedBody, reduced: ReducedModel, model: DynamicModel, points: _Points
+) -> Array:
+    """Forces ``(n,)`` of an excitation of 1 N."""
+    driven: Moved | LoadCase = body.driven
+    if isinstance(driven, Moved):
+        return _shape(model, points, driven, "driven")
+    return reduced.loads[:, driven.load - 1]
+
+
+def _shape(model: DynamicModel, points: _Points, moved: Moved, key: str) -> Array:
+    """Even shares ``(n,)`` of the displacements of points along a direction."""
+    shares = points.shared(moved, key)
+    return np.sum([share * unit_force(model, name) for name, share in shares], axis=0)
+
+
+def _along(directions: int, body: JointedBody) -> int:
     """The joints' direction that is looked at: their only one, or of two across the one seen."""
     if directions == 1:
         return 0
@@ -75,11 +91,39 @@ def _across(direction: str) -> list[str]:
 # --- the body -----------------------------------------------------------------------------------
 
 
-def _reduced_body(body: ReducedBody, reporter: Reporter, progress: Progress) -> ReducedModel:
+def _reduced_body(
+    body: JointedBody, reporter: Reporter, progress: Progress
+) -> tuple[ReducedModel, tuple[str, ...]]:
+    """The model, and names of displacements without mass that are none of it."""
+    if isinstance(body, MatrixBody):
+        return _of_matrices(body, reporter, progress)
+    assert isinstance(body, ReducedBody)
     if body.body is None:
-        return body.stored()
+        return body.stored(), ()
     specimens = reduced_specimens("structure.file", body.file, reporter, progress)
-    return specimens.reduction.models[body.body - 1]
+    return specimens.reduction.models[body.body - 1], ()
+
+
+def _of_matrices(
+    body: MatrixBody, reporter: Reporter, progress: Progress
+) -> tuple[ReducedModel, tuple[str, ...]]:
+    body.memory().check()
+    try:
+        reduced, massless = body.reduced(Tally(progress, STEPS))
+    except MatrixError as error:
+        raise UserError(f"structure.{error.part or 'matrices'}: {error}") from error
+    reporter.log(f"matrices: {len(reduced.stiffness)} unknowns in the rig{_told(massless)}")
+    return reduced, massless
+
+
+def _told(massless: tuple[str, ...]) -> str:
+    """What is none of the model, behind a sentence."""
+    if not massless:
+        return ""
+    return (
+        f"; {listed_names(massless)} have no mass and follow the others statically; allowed there: "
+        "structure.masses"
+    )
 
 
 def reduced_specimens(
@@ -159,17 +203,19 @@ class _Points:
         for point, opposite in self.pairs(places, key):
             yield [_link(point, opposite, axis) for axis in (*across, places.direction)]
 
-    def masses(self, body: ReducedBody) -> dict[str, float]:
+    def masses(self, body: JointedBody) -> dict[str, float]:
         """Masses added to displacements [t]."""
         added: defaultdict[str, float] = defaultdict(float)
         for number, point_mass in enumerate(body.masses):
             points = self.of(point_mass.points, f"masses.{number}.points")
             for name in self.names:
-                if name.rpartition(" ")[0] in points:
+                point, _, direction = name.rpartition(" ")
+                # Not to rotations.
+                if point in points and direction in AXES:
                     added[name] += point_mass.mass / len(points)
         return added
 
-    def springs(self, body: ReducedBody) -> dict[Link, float]:
+    def springs(self, body: JointedBody) -> dict[Link, float]:
         """Springs added between displacements [N/mm]."""
         added: defaultdict[Link, float] = defaultdict(float)
         for number, spring in enumerate(body.springs):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
@@ -96,8 +97,8 @@ class AddedSpring(Against):
     stiffness: Spring = entry("of all of them together [N/mm]", "273 N/um")
 
 
-class ReducedBody(Section):
-    """A body on a few points and its lowest modes, with joints, masses and springs there."""
+class StoredBody(Section):
+    """A body that is reduced to a few points and its lowest modes."""
 
     kind: Literal["reduced"] = entry("a Craig-Bampton model with joints at its points", "reduced")
     file: Annotated[str, CaseFile((".h5", YAML), (SpecimensCase,), "specimens")] = entry(
@@ -108,12 +109,45 @@ class ReducedBody(Section):
     body: Annotated[int, Whole(1, 2)] | None = entry(
         "of a specimens case: 1 below its pad, or 2 above", 2, default=None
     )
+
+
+class JointedBody(Section, ABC):
+    """A body with joints, masses and springs at its points."""
+
     joints: tuple[JointPlaces, ...] = entry("where they are", min_length=1)
     masses: tuple[AddedMass, ...] = entry("added, moving in x, y and z", default=())
     springs: tuple[AddedSpring, ...] = entry("added", default=())
     damping_ratio: DampingRatio = entry("of every mode without the joints [1]", 0.001)
     driven: Moved = entry("points that share the force of the excitation evenly")
     seen: Moved = entry("points whose mean displacement is looked at")
+
+    @property
+    @abstractmethod
+    def text(self) -> str:
+        """The structure in a few words."""
+
+    @property
+    def driven_place(self) -> str:
+        """Where the force of an excitation acts, in a few words."""
+        return f"{self.driven.points} along {self.driven.direction}"
+
+    @property
+    def added(self) -> str:
+        """Where joints are, and what is added, in a few words."""
+        places = ", ".join(joint.points for joint in self.joints)
+        added = [f"{1e3 * added.mass:g} kg at {added.points}" for added in self.masses] + [
+            f"{1e-3 * spring.stiffness:g} N/um at {spring.points} along {spring.direction}"
+            for spring in self.springs
+        ]
+        return f"joints at {places}" + (f"; added: {', '.join(added)}" if added else "")
+
+    def outline(self) -> list[tuple[str, str]]:
+        """Rows about the body itself."""
+        return []
+
+
+class ReducedBody(JointedBody, StoredBody):
+    """A body on a few points and its lowest modes, with joints, masses and springs there."""
 
     @model_validator(mode="after")
     def _body_of_a_case(self) -> ReducedBody:
@@ -141,14 +175,7 @@ class ReducedBody(Section):
 
     @property
     def text(self) -> str:
-        """The structure in a few words."""
-        places = ", ".join(joint.points for joint in self.joints)
-        added = [f"{1e3 * added.mass:g} kg at {added.points}" for added in self.masses] + [
-            f"{1e-3 * spring.stiffness:g} N/um at {spring.points} along {spring.direction}"
-            for spring in self.springs
-        ]
-        beside = f"; added: {', '.join(added)}" if added else ""
-        return f"reduced body of {Path(self.file).name}, joints at {places}{beside}"
+        return f"reduced body of {Path(self.file).name}, {self.added}"
 
 
 class FrictionRig(Section):
@@ -194,17 +221,17 @@ def _on_springs(masses: Sequence[float], springs: Sequence[float]) -> str:
     return f"{', '.join(f'{1e3 * mass:g}' for mass in masses)} kg on springs of {stiff} N/µm"
 
 
-def structure_outline(structure: Rig | ReducedBody | FrictionRig) -> list[tuple[str, str]]:
+def structure_outline(structure: Rig | JointedBody | FrictionRig) -> list[tuple[str, str]]:
     """What holds the joints, and the bodies that another case describes."""
     damping = f"damping ratio {shares(structure.damping_ratio)}"
-    below = structure.outline() if isinstance(structure, FrictionRig) else []
+    below = [] if isinstance(structure, Rig) else structure.outline()
     return [("structure", f"{structure.text}, {damping}"), *below]
 
 
 def driven_place(structure: Section, mass: int | None) -> str:
     """Where a force on a structure acts, in a few words."""
-    if isinstance(structure, ReducedBody):
-        return f"{structure.driven.points} along {structure.driven.direction}"
+    if isinstance(structure, JointedBody):
+        return structure.driven_place
     return f"mass {mass or 1}"
 
 

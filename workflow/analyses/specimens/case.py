@@ -20,13 +20,14 @@ from workflow.analyses.wear.case.sections import (
     TwoMaterials,
 )
 from workflow.analyses.wear.case.worn_bodies import BodyWear, WornByArchard, wearing
-from workflow.case.fields import Quantity, Whole
+from workflow.case.fields import Formats, Quantity, Whole
 from workflow.case.plain import of_bodies, plain, shares, times
 from workflow.case.sections import (
     Case,
     Friction,
     GridCells,
     Length,
+    Output,
     RoundingRadius,
     Section,
     Title,
@@ -39,6 +40,8 @@ from workflow.case.sections import (
 if TYPE_CHECKING:
     from fe_models.geometry.specimens import Specimen
 
+# Of matrices; the first if nothing is said.
+MATRIX_FORMATS = "npz", "mat", "mtx"
 Depth = Annotated[float, Quantity("mm", at_least=0.0, at_most=1e4)]
 
 
@@ -199,6 +202,24 @@ class SpecimensWear(TwoBodies[BodyWear], Laws):
         return self
 
 
+class SpecimensOutput(Output):
+    """What is written beside summary, results and the reduced bodies."""
+
+    matrices: Annotated[bool | tuple[str, ...], Formats(MATRIX_FORMATS)] = entry(
+        "of the reduced bodies, for other programs: false, true (npz), or one or a list of npz, "
+        "mat and mtx; body_1.h5 and body_2.h5 are always there",
+        ["npz", "mat"],
+        default=False,
+    )
+
+    @property
+    def matrix_formats(self) -> tuple[str, ...]:
+        """The formats in which matrices are written: none where they are not wanted."""
+        if isinstance(self.matrices, tuple):
+            return self.matrices
+        return MATRIX_FORMATS[:1] if self.matrices else ()
+
+
 class SpecimensCase(Case):
     """Two specimens of a friction rig, on their reduced models and on a half-space."""
 
@@ -214,6 +235,7 @@ class SpecimensCase(Case):
     reduction: Reduction = entry("of each specimen", default=Reduction())
     contact: PadGrid = entry("half-space beside the specimens", default=PadGrid())
     wear: SpecimensWear = entry("law, length of the run and of its cycle blocks")
+    output: SpecimensOutput = entry("files beside summary and results", default=SpecimensOutput())
 
     @property
     def elastic(self) -> tuple[ElasticMaterial, ElasticMaterial]:

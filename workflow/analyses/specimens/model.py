@@ -111,7 +111,8 @@ class SpecimensModel:
         )
         arrays: dict[str, Any] = {}
         for number, model in zip(bodies, models, strict=True):
-            arrays |= {f"{number}/{name}": values for name, values in vars(model).items()}
+            given = {name: values for name, values in vars(model).items() if values is not None}
+            arrays |= {f"{number}/{name}": values for name, values in given.items()}
             assert model.mass is not None
             arrays[f"reduced/{number}"] = _lowest(model.stiffness, model.mass)
             arrays[f"full/{number}"] = self._full_frequencies(number, arrays)

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from fe_models.matrices import write_matrices
 from fe_models.reduced_contact import masing_loop
 from fe_models.reduction import save_reduced
 from sa_solver.types import Array
@@ -78,6 +79,8 @@ def write_specimens_output(outcome: SpecimensOutcome, run: Run[SpecimensCase]) -
             for number, model in enumerate(outcome.model.reduction.models, 1):
                 with replacing_hdf5(reduced / f"body_{number}.h5") as stream:
                     save_reduced(stream, model)
+                formats = run.case.output.matrix_formats
+                write_matrices(model, reduced, f"body_{number}", formats)
         _write_results(outcome, run)
     run.draw(None)  # every run leaves the same
     summary = _summary(outcome, reporter)

@@ -9,10 +9,11 @@ from typing import Annotated, Any, ClassVar, Literal
 import numpy as np
 from pydantic import Field, model_validator
 
-from workflow.analyses.rig.doubts import AWAY, about_modes
+from workflow.analyses.rig.doubts import AWAY, about_matrices, about_modes
 from workflow.analyses.rig.excitation import Drive, Excitation, Hammer, Harmonic, Recorded, Time
 from workflow.analyses.rig.joint_evolution import JointEvolution
 from workflow.analyses.rig.joint_sections import ContactLaw, FrictionContactJoint, Joint, JointLaw
+from workflow.analyses.rig.matrix_body import MatrixBody
 from workflow.analyses.rig.structure import (
     ReducedBody,
     Rig,
@@ -168,7 +169,7 @@ class RigCase(TimeCase):
     about: ClassVar[str] = "masses on friction joints, shaken, hit or driven by a record"
 
     title: Title = entry("one line", "Friction rig driven by a force")
-    structure: Annotated[Rig | ReducedBody, Field(discriminator="kind")] = entry(
+    structure: Annotated[Rig | ReducedBody | MatrixBody, Field(discriminator="kind")] = entry(
         "what holds the joint"
     )
     joint: ContactLaw = entry(
@@ -245,6 +246,7 @@ class RigCase(TimeCase):
             yield from about_modes("excitation.frequency", span, self.structure, stiffness)
         elif isinstance(excitation, Hammer):
             yield from about_modes("excitation.band", excitation.band, self.structure, stiffness)
+        yield from about_matrices(self.structure)
 
 
 # Of the difference of two recorded times.

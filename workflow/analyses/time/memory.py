@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from workflow.analyses.rig.structure import ReducedBody
+from workflow.analyses.rig.structure import ReducedBody, Rig
 from workflow.analyses.time.case import JointCase, RigCase
 from workflow.shell.memory import Memory
 
@@ -21,8 +21,11 @@ def memory(case: JointCase | RigCase, displacements: int = 0) -> Memory:
     remedy = "raise integration.step, or shorten what is recorded"
     if isinstance(case, JointCase):
         return Memory(0.0, remedy)
+    if isinstance(case.structure, Rig):
+        columns = STEP_COLUMNS * len(case.structure.masses) * len(case.energies)
+        return Memory(columns * case.steps, remedy)
+    # Of these motions little is kept once they are found.
+    motions = Memory(REDUCED_COLUMNS * displacements * case.steps, remedy)
     if isinstance(case.structure, ReducedBody):
-        # Of these motions little is kept once they are found.
-        return Memory(REDUCED_COLUMNS * displacements * case.steps, remedy)
-    columns = STEP_COLUMNS * len(case.structure.masses) * len(case.energies)
-    return Memory(columns * case.steps, remedy)
+        return motions
+    return max(motions, case.structure.memory(), key=lambda memory: memory.required)

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from workflow.analyses import wear
 from workflow.analyses.rig.excitation import Harmonic
-from workflow.analyses.rig.structure import ReducedBody
+from workflow.analyses.rig.matrix_body import MatrixBody
+from workflow.analyses.rig.structure import JointedBody, ReducedBody
 from workflow.analyses.specimens.run_time import reduction_of
 from workflow.analyses.time.case import JointCase, RigCase
 from workflow.case.loading import load_case
@@ -23,7 +24,7 @@ def run_time(case: JointCase | RigCase) -> RunTime:
     worn = _computed_wear(case.evolution.file)
     if isinstance(case, JointCase):
         return RunTime(worn, JOINT)
-    reduced = isinstance(case.structure, ReducedBody)
+    reduced = isinstance(case.structure, JointedBody)
     motions = len(case.energies)
     if isinstance(case.excitation, Harmonic):
         motions = PERIODS * (motions + (AGEING if case.ageing.wanted else 0))
@@ -32,6 +33,8 @@ def run_time(case: JointCase | RigCase) -> RunTime:
         step *= CHOSEN
     if isinstance(case.structure, ReducedBody):
         worn += reduction_of(case.structure.file)
+    elif isinstance(case.structure, MatrixBody):
+        worn += case.structure.build_time()
     return RunTime(worn, motions * case.steps * step)
 
 

@@ -10,9 +10,10 @@ from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import Field, StrictBool, model_validator
 
-from workflow.analyses.rig.doubts import RIGID, about_modes
+from workflow.analyses.rig.doubts import RIGID, about_matrices, about_modes
 from workflow.analyses.rig.excitation import DrivingForce, Frequency, MassNumber
 from workflow.analyses.rig.joint_sections import ContactLaw, FrictionContactJoint
+from workflow.analyses.rig.matrix_body import MatrixBody
 from workflow.analyses.rig.structure import (
     FrictionRig,
     ReducedBody,
@@ -164,7 +165,7 @@ class VibrationCaseBase(Case):
 
     title: Title = entry("one line", "Forced response of a friction rig")
     analysis: Literal["vibration"] = entry("what is computed", "vibration")
-    structure: Rig | ReducedBody | FrictionRig = entry("what holds the joints")
+    structure: Rig | ReducedBody | MatrixBody | FrictionRig = entry("what holds the joints")
     forces: Annotated[tuple[DrivingForce, ...], Field(min_length=1, max_length=100)] = entry(
         "amplitudes, ascending, each followed through the frequencies [N]", ["10 N", "40 N"]
     )
@@ -199,6 +200,7 @@ class VibrationCaseBase(Case):
     def doubts(self) -> Iterator[str]:
         stiffness = getattr(getattr(self, "joint", None), "stiffness", RIGID)
         yield from about_modes("frequencies", self.frequencies, self.structure, stiffness)
+        yield from about_matrices(self.structure)
 
     @property
     def driving(self) -> str:
@@ -256,9 +258,9 @@ class VibrationCase(DrivenMass):
     def suits(cls, source: Source) -> bool:
         return not wears(source)
 
-    structure: Annotated[Rig | ReducedBody | FrictionRig, Field(discriminator="kind")] = entry(
-        "what holds the joints"
-    )
+    structure: Annotated[
+        Rig | ReducedBody | MatrixBody | FrictionRig, Field(discriminator="kind")
+    ] = entry("what holds the joints")
     joint: ContactLaw = entry("its law and its parameters; of all joints together")
     loops: LoopsAt | None = entry("of all joints together, at one frequency", default=None)
     force_sweeps: Annotated[tuple[Frequency, ...], Field(max_length=100)] = entry(

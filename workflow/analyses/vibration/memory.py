@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from workflow.analyses.rig.matrix_body import MatrixBody
 from workflow.analyses.vibration.case import VibrationCaseBase
 from workflow.shell.memory import Memory
 
@@ -20,7 +21,10 @@ def memory(case: VibrationCaseBase, displacements: int = 0, joints: int = 1) -> 
     motion = functions * (displacements + joints * directions)
     slopes = joints * (functions * directions) ** 2
     samples = case.resolution.samples * joints * (directions + 1)
-    return Memory(
+    motions = Memory(
         CURVE_POINTS * (samples + motion) + SLOPES * slopes,
         "lower resolution.samples or resolution.harmonics",
     )
+    if not isinstance(case.structure, MatrixBody):
+        return motions
+    return max(motions, case.structure.memory(), key=lambda memory: memory.required)

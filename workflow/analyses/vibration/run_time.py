@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from math import log
 
+from workflow.analyses.rig.matrix_body import MatrixBody
 from workflow.analyses.rig.structure import FrictionRig, ReducedBody, Rig
 from workflow.analyses.specimens.case import SpecimensCase
 from workflow.analyses.specimens.run_time import reduction_of
@@ -39,6 +40,8 @@ def structure_time(case: VibrationCaseBase) -> float:
         return limits + reduction_of(case.structure.specimens)
     if isinstance(case.structure, ReducedBody):
         return limits + reduction_of(case.structure.file)
+    if isinstance(case.structure, MatrixBody):
+        return limits + case.structure.build_time()
     return limits
 
 
@@ -54,6 +57,8 @@ def _directions(case: VibrationCaseBase) -> int:
     if isinstance(case.structure, Rig):
         return 1
     joints = JOINTS
+    if isinstance(case.structure, MatrixBody):
+        joints = case.structure.joint_count
     if isinstance(case.structure, FrictionRig):
         file = case.structure.specimens
         specimens = load_case(file, [SpecimensCase])

@@ -1,0 +1,77 @@
+"""Structures that other programs have made matrices of, and reduced models for other programs.
+
+- ``own_matrices``, ``OwnMatrices``: stiffness, mass, damping and loads from files, in base units
+- ``Unknown``, ``GivenUnknowns``, ``FileUnits``: what their rows are, and in which units they are
+- ``read_matrix_file``, ``MatrixFile``: what a single file has
+- ``on_retained``, ``on_all``: the reduced model that they are, on some points or on all
+- ``without_massless``, ``check_definite``: what such a model must be to vibrate
+- ``lowest_frequencies``: those of the matrices, rigid motions first
+- ``write_matrices``: a reduced model as ``.npz``, ``.mat`` or Matrix Market
+- ``MatrixError``: matrices that cannot be taken
+
+A mass of 2 kg on 1 N/µm in two files of Matrix Market, in m and N:
+
+>>> import tempfile
+>>> from pathlib import Path
+>>> from fe_models.matrices import FileUnits, GivenUnknowns, Unknown, own_matrices
+>>> folder = Path(tempfile.mkdtemp())
+>>> for name, value in (("k", "1e6"), ("m", "2")):
+...     text = f"%%MatrixMarket matrix array real general\\n1 1\\n{value}\\n"
+...     _ = (folder / f"{name}.mtx").write_text(text)
+>>> sources = {"stiffness": (folder / "k.mtx", ""), "mass": (folder / "m.mtx", "")}
+>>> given = GivenUnknowns((Unknown("mass", "x"),))
+>>> own = own_matrices(sources, given=given, units=FileUnits(length=1000.0))
+>>> print(own.stiffness.toarray(), own.mass.toarray())
+[[1000.]] [[0.002]]
+"""
+
+from typing import TYPE_CHECKING
+
+from sa_solver.lazy import lazy_names
+
+if TYPE_CHECKING:
+    from fe_models.matrices.export import write_matrices
+    from fe_models.matrices.parts import read_matrix_file
+    from fe_models.matrices.reduction import (
+        check_definite,
+        lowest_frequencies,
+        on_all,
+        on_retained,
+        without_massless,
+    )
+    from fe_models.matrices.structure import FileUnits, GivenUnknowns, OwnMatrices, own_matrices
+    from fe_models.matrices.unknowns import MatrixError, MatrixFile, Unknown
+
+__all__ = [
+    "FileUnits",
+    "GivenUnknowns",
+    "MatrixError",
+    "MatrixFile",
+    "OwnMatrices",
+    "Unknown",
+    "check_definite",
+    "lowest_frequencies",
+    "on_all",
+    "on_retained",
+    "own_matrices",
+    "read_matrix_file",
+    "without_massless",
+    "write_matrices",
+]
+
+__getattr__, __dir__ = lazy_names(
+    __name__,
+    {
+        "export": ("write_matrices",),
+        "parts": ("read_matrix_file",),
+        "reduction": (
+            "check_definite",
+            "lowest_frequencies",
+            "on_all",
+            "on_retained",
+            "without_massless",
+        ),
+        "structure": ("FileUnits", "GivenUnknowns", "OwnMatrices", "own_matrices"),
+        "unknowns": ("MatrixError", "MatrixFile", "Unknown"),
+    },
+)

@@ -1,0 +1,318 @@
+"""Own matrices as a reduced model: on retained points and modes, or all unknowns as they are."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+import scipy.linalg as sl
+
+from fe_models.linear_solver import FactorMemoryError, SolverError
+from fe_models.matrices.structure import OwnMatrices
+from fe_models.matrices.unknowns import MODAL, ROTATIONS, MatrixError, Unknown
+from fe_models.reduction import ReducedModel, free_frequencies, reduce_body
+from sa_solver.types import Array, Indices
+
+# Masses that are nothing, over the largest of their kind (displacements, rotations, modes).
+MASSLESS = 1e-13
+NOTHING: Mapping[str, float] = {}
+# Eigenvalues below zero, and those of a mass that is not definite, of the matrix scaled to 1 on its
+# diagonal: what single precision leaves of the rigid motions of a free body.
+NEGATIVE, SINGULAR = 1e-6, 1e-10
+# Rigid motions that a body may have, and a frequency over the next above it that is one of them.
+MOST_RIGID, RIGID = 6, 1e-3
+# Unknowns up to which all frequencies are found.
+DENSE = 600
+# Names that fit into a message.
+MOST_LISTED = 12
+
+
+def on_all(matrices: OwnMatrices) -> ReducedModel:
+    """The matrices as they are, dense, coordinates of modes behind all others.
+
+    Examples
+    --------
+    A mass on a spring, and a mode of a superelement:
+
+    >>> import numpy as np
+    >>> import scipy.sparse as sp
+    >>> from fe_models.matrices import OwnMatrices, Unknown, on_all
+    >>> unknowns = Unknown("mode 1", "modal"), Unknown("tip", "x")
+    >>> K, M = sp.diags([4e6, 1e3]).tocsr(), sp.diags([1.0, 1e-3]).tocsr()
+    >>> model = on_all(OwnMatrices(K, M, None, np.zeros((2, 0)), unknowns))
+    >>> print(model.names, model.frequencies.round(1), model.static_stiffness)
+    ('tip x',) [318.3] [[1000.]]
+    """
+    unknowns = matrices.unknowns
+    modal = np.array([unknown.direction == MODAL for unknown in unknowns], dtype=bool)
+    order: Indices = np.concatenate([np.flatnonzero(~modal), np.flatnonzero(modal)])
+    K, M = (
+        matrix.toarray()[np.ix_(order, order)] for matrix in (matrices.stiffness, matrices.mass)
+    )
+    damping = matrices.damping
+    kept = order[: int((~modal).sum())]
+    squares = np.diag(K)[len(kept) :] / np.where(np.diag(M) > 0.0, np.diag(M), np.inf)[len(kept) :]
+    return ReducedModel(
+        kept=kept,
+        stiffness=K,
+        mass=M,
+        loads=matrices.loads[order],
+        mode_shapes=np.zeros((len(unknowns), int(modal.sum()))),
+        frequencies=np.sqrt(np.maximum(squares, 0.0)) / (2.0 * np.pi),
+        names=tuple(unknowns[k].name for k in kept),
+        places=None if matrices.places is None else matrices.places[kept],
+        damping=None if damping is None else damping.toarray()[np.ix_(order, order)],
+    )
+
+
+def on_retained(
+    matrices: OwnMatrices,
+    points: Sequence[str],
+    modes: int,
+    done: Callable[[], None] = lambda: None,
+) -> ReducedModel:
+    """The matrices on the unknowns of ``points`` and so many modes, by Craig and Bampton.
+
+    Damping and loads are projected onto the same shapes. ``done`` is called as by
+    :func:`~fe_models.reduction.reduce_body`. Raises :class:`MatrixError` for modes that there are
+    not, and where what is not retained can move while the points are held.
+
+    Examples
+    --------
+    Eleven masses and ten springs in a row, on its ends and one mode: 2 √(k/m) sin(π/22)
+
+    >>> import numpy as np
+    >>> import scipy.sparse as sp
+    >>> from fe_models.matrices import OwnMatrices, Unknown, on_retained
+    >>> K = 1e3 * sp.diags([-1.0, 2.0, -1.0], [-1, 0, 1], shape=(11, 11)).tolil()
+    >>> K[0, 0] = K[10, 10] = 1e3
+    >>> names = tuple(Unknown(str(k), "x") for k in range(11))
+    >>> row = OwnMatrices(K.tocsr(), 1e-3 * sp.identity(11, format="csr"), None,
+    ...                   np.zeros((11, 0)), names)
+    >>> model = on_retained(row, ["0", "10"], modes=1)
+    >>> print(model.names, model.static_stiffness.round(6)[0], model.frequencies.round(3))
+    ('0 x', '10 x') [ 100. -100.] [49.795]
+    """
+    unknowns = matrices.unknowns
+    wanted = set(points)
+    kept: Indices = np.flatnonzero([u.point in wanted and u.direction != MODAL for u in unknowns])
+    moving = int((matrices.mass.diagonal() > 0.0).sum()) - int(
+        (matrices.mass.diagonal()[kept] > 0.0).sum()
+    )
+    if modes >= max(moving, 1):
+        raise MatrixError(
+            f"{modes} modes of {moving} displacements with mass that are not retained; allowed: "
+            "fewer",
+            "modes",
+        )
+    try:
+        model = reduce_body(
+            matrices.stiffness,
+            matrices.mass,
+            kept,
+            modes,
+            matrices.loads,
+            done,
+            matrices.damping,
+        )
+    except FactorMemoryError:
+        raise
+    except SolverError as error:
+        raise MatrixError(
+            f"what is not retained moves while the points are held ({error}); allowed: points that "
+            "hold it, and no unknowns without stiffness",
+            "retained",
+        ) from error
+    return replace(
+        model,
+        names=tuple(unknowns[k].name for k in kept),
+        places=None if matrices.places is None else matrices.places[kept],
+    )
+
+
+def without_massless(
+    model: ReducedModel, laden: Sequence[str] = ()
+) -> tuple[ReducedModel, tuple[str, ...]]:
+    """The model without kept unknowns that have no mass, and their names.
+
+    They follow the others statically, which is exact: no force of inertia acts on them, and none
+    of joints or dampers once they are none of the model. Those ``laden`` with added mass stay.
+    Raises :class:`MatrixError` where they move freely, or have damping.
+
+    Examples
+    --------
+    A mass on two springs in a row, without mass between them, is on one of half the stiffness:
+
+    >>> import numpy as np
+    >>> import scipy.sparse as sp
+    >>> from fe_models.matrices import OwnMatrices, Unknown, on_all, without_massless
+    >>> K = sp.csr_matrix([[2000.0, -1000.0], [-1000.0, 1000.0]])
+    >>> names = Unknown("between", "x"), Unknown("end", "x")
+    >>> pair = OwnMatrices(K, sp.diags([0.0, 1e-3]).tocsr(), None, np.zeros((2, 0)), names)
+    >>> model, dropped = without_massless(on_all(pair))
+    >>> print(model.stiffness, model.names, dropped)
+    [[500.]] ('end x',) ('between x',)
+    """
+    assert model.mass is not None
+    assert model.names is not None
+    count, names = len(model.kept), model.names
+    dropped = _massless(np.diag(model.mass)[:count], names)
+    dropped &= ~np.isin(names, list(laden))
+    if not dropped.any():
+        return model, ()
+    gone = np.pad(dropped, (0, len(model.mass) - count))
+    told = tuple(name for name, is_gone in zip(names, dropped, strict=True) if is_gone)
+    followed = _following(model, gone, told)
+    stays = ~gone
+    square = np.ix_(stays, stays)
+    damping = None if model.damping is None else model.damping[square]
+    return (
+        replace(
+            model,
+            kept=model.kept[~dropped],
+            stiffness=model.stiffness[square] + model.stiffness[np.ix_(stays, gone)] @ followed,
+            mass=model.mass[square],
+            loads=model.loads[stays] + followed.T @ model.loads[gone],
+            names=tuple(name for name in names if name not in told),
+            places=None if model.places is None else model.places[~dropped],
+            damping=damping,
+        ),
+        told,
+    )
+
+
+def _massless(masses: Array, names: Sequence[str]) -> np.ndarray:
+    """Which unknowns ``(c,)`` have no mass beside those of their kind."""
+    turning = np.array([name.rpartition(" ")[2] in ROTATIONS for name in names], dtype=bool)
+    massless = np.zeros(len(masses), dtype=bool)
+    for kind in (turning, ~turning):
+        if kind.any():
+            massless[kind] = masses[kind] <= MASSLESS * masses[kind].max()
+    return massless
+
+
+def _following(model: ReducedModel, gone: np.ndarray, names: tuple[str, ...]) -> Array:
+    """How unknowns without mass follow the others ``(a, b)``: -K_aa⁻¹ K_ab."""
+    listed = listed_names(names)
+    if model.damping is not None and model.damping[gone].any():
+        raise MatrixError(
+            f"no mass but damping at {listed}; allowed: masses added there, or no damping",
+            "mass",
+        )
+    K = model.stiffness[gone]
+    # What nothing holds and nothing loads is not there at all.
+    loose = ~K.any(axis=1) & ~model.loads[gone].any(axis=1)
+    followed = np.zeros((len(K), int((~gone).sum())))
+    bound = np.flatnonzero(~loose)
+    try:
+        factors = sl.cho_factor(K[bound][:, np.flatnonzero(gone)[bound]])
+    except np.linalg.LinAlgError:
+        raise MatrixError(
+            f"no mass at {listed}, and nothing that holds them; allowed: masses added there",
+            "mass",
+        ) from None
+    followed[bound] = -sl.cho_solve(factors, K[bound][:, ~gone])
+    return followed
+
+
+def check_definite(model: ReducedModel, laden: Mapping[str, float] = NOTHING) -> int:
+    """How many rigid motions a model has. Raises :class:`MatrixError` for what no structure is.
+
+    Stiffness must have no eigenvalue below zero, mass all above it, with what is added to
+    displacements by their names, ``laden`` [t].
+
+    Examples
+    --------
+    Two masses that a spring joins move as one:
+
+    >>> import numpy as np
+    >>> import scipy.sparse as sp
+    >>> from fe_models.matrices import OwnMatrices, Unknown, check_definite, on_all
+    >>> K = 1e3 * sp.csr_matrix([[1.0, -1.0], [-1.0, 1.0]])
+    >>> names = Unknown("a", "x"), Unknown("b", "x")
+    >>> check_definite(on_all(OwnMatrices(K, sp.identity(2), None, np.zeros((2, 0)), names)))
+    1
+    """
+    assert model.mass is not None
+    names = _all_names(model)
+    added = np.diag([laden.get(name, 0.0) for name in names])
+    lowest, values = _lowest(model.mass + added, names, "mass")
+    if values[0] <= SINGULAR:
+        raise MatrixError(
+            f"not positive definite: the motion mostly of {lowest} has "
+            f"{'no' if values[0] > -SINGULAR else 'a negative'} mass; allowed: masses added there, "
+            "or full matrices with retained points and modes",
+            "mass",
+        )
+    lowest, values = _lowest(model.stiffness, names, "stiffness")
+    if values[0] < -NEGATIVE:
+        raise MatrixError(
+            f"an eigenvalue below zero, {values[0]:.2g} of its diagonal, in a motion mostly of "
+            f"{lowest}; allowed: a structure that is stable, its rigid motions apart",
+            "stiffness",
+        )
+    return int((values < NEGATIVE).sum())
+
+
+def lowest_frequencies(matrices: OwnMatrices, count: int) -> Array:
+    """The lowest natural frequencies [Hz]: 0 of rigid motions, and up to ``count`` above them.
+
+    Raises :class:`MatrixError` for what has no mass or no stiffness, and
+    :class:`~fe_models.linear_solver.SolverError` where large matrices have no such frequencies.
+
+    Examples
+    --------
+    Two masses of 1 kg that a spring of 1 N/µm joins: 0 and √(2 k/m)
+
+    >>> import numpy as np
+    >>> import scipy.sparse as sp
+    >>> from fe_models.matrices import OwnMatrices, Unknown, lowest_frequencies
+    >>> K = 1e3 * sp.csr_matrix([[1.0, -1.0], [-1.0, 1.0]])
+    >>> names = Unknown("a", "x"), Unknown("b", "x")
+    >>> pair = OwnMatrices(K, 1e-3 * sp.identity(2).tocsr(), None, np.zeros((2, 0)), names)
+    >>> print((2.0 * np.pi * lowest_frequencies(pair, 3)).round(2))
+    [   0.   1414.21]
+    """
+    size = len(matrices.unknowns)
+    if size <= DENSE:
+        model, _ = without_massless(on_all(matrices))
+        check_definite(model)
+        squares = sl.eigh(model.stiffness, model.mass, eigvals_only=True)
+        found = np.sqrt(np.maximum(squares, 0.0)) / (2.0 * np.pi)
+    else:
+        found = free_frequencies(matrices.stiffness, matrices.mass, count + MOST_RIGID)
+    after = found[1 : MOST_RIGID + 1]
+    # The last gap of such a size among the first: elastic modes are closer to each other.
+    gaps = np.flatnonzero(found[: len(after)] < RIGID * after)
+    rigid = int(gaps[-1]) + 1 if len(gaps) else 0
+    found[:rigid] = 0.0
+    return np.asarray(found[: rigid + count])
+
+
+def _lowest(matrix: Array, names: Sequence[str], part: str) -> tuple[str, Array]:
+    """The unknown that moves most in the lowest eigenvector, and the eigenvalues.
+
+    Those of the matrix scaled to 1 on its diagonal, on which units have no influence.
+    """
+    diagonal = np.diag(matrix)
+    wrong = np.flatnonzero((diagonal < 0.0) | ((diagonal == 0.0) & matrix.any(axis=1)))
+    if len(wrong):
+        k = int(wrong[0])
+        raise MatrixError(
+            f"{names[k]}: {diagonal[k]:.6g} on the diagonal; allowed: above zero", part
+        )
+    scale = 1.0 / np.sqrt(np.where(diagonal > 0.0, diagonal, 1.0))
+    values, shapes = sl.eigh(scale[:, None] * matrix * scale)
+    return names[int(np.abs(shapes[:, 0]).argmax())], values
+
+
+def _all_names(model: ReducedModel) -> list[str]:
+    modes = range(1, len(model.stiffness) - len(model.kept) + 1)
+    return [*(model.names or ()), *(Unknown(f"mode {mode}", MODAL).name for mode in modes)]
+
+
+def listed_names(names: Sequence[str]) -> str:
+    """Names as they fit into a line."""
+    more = f" and {len(names) - MOST_LISTED} more" if len(names) > MOST_LISTED else ""
+    return ", ".join(names[:MOST_LISTED]) + more

@@ -1,0 +1,266 @@
+"""A structure as matrices from files: put together, in base units, and looked at.
+
+Energies do not depend on units, which makes the change of them one rule for all kinds of unknown.
+With x = S x_file the stiffness is K = e S⁻¹ K_file S⁻¹ and so are mass and damping, e being the
+energy that the file's units make of one (force times length; of the mass, mass times length² over
+s²). S is the file's length in mm for displacements, 1 for rotations, and for coordinates of modes
+the length times the root of the mass, so that modal masses of 1 stay 1.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import scipy.sparse as sp
+
+from fe_models.matrices.parts import (
+    DAMPING,
+    LOADS,
+    MASS,
+    STIFFNESS,
+    Part,
+    found,
+    shape_of,
+    symmetric,
+)
+from fe_models.matrices.unknowns import MODAL, TRANSLATIONS, MatrixError, Unknown, once
+from sa_solver.types import Array, Indices
+
+
+@dataclass(frozen=True)
+class FileUnits:
+    """Units of matrices by their size: ``length`` in mm, ``force`` in N, and ``mass`` in t.
+
+    Without a ``mass`` it is that which the force moves by a length in s².
+
+    Examples
+    --------
+    In m and N masses are kg:
+
+    >>> from fe_models.matrices import FileUnits
+    >>> print(FileUnits(length=1000.0, force=1.0).mass)
+    0.001
+    """
+
+    length: float = 1.0
+    force: float = 1.0
+    mass: float = 0.0
+
+    def __post_init__(self) -> None:
+        if not self.mass:
+            object.__setattr__(self, "mass", self.force / self.length)
+
+    def scales(self, unknowns: Sequence[Unknown]) -> Array:
+        """S ``(n,)``: unknowns in base units over those of the file."""
+        modal = self.length * np.sqrt(self.mass)
+        sizes = dict.fromkeys(TRANSLATIONS, self.length) | {MODAL: modal}
+        return np.array([sizes.get(unknown.direction, 1.0) for unknown in unknowns])
+
+
+@dataclass(frozen=True)
+class OwnMatrices:
+    """A structure of ``n`` unknowns: ``stiffness``, ``mass`` and ``damping`` ``(n, n)`` or None.
+
+    ``loads`` ``(n, cases)`` are the forces of a load of 1 N; ``unknowns`` ``(n,)`` say what the
+    rows are, ``places`` ``(n, 3)`` where their points are [mm], if known. ``held`` are those that a
+    file holds and that are none of these, ``taken`` the matrices by the parts they are taken for,
+    ``left`` those of the files that nothing is made of.
+    """
+
+    stiffness: sp.csr_matrix
+    mass: sp.csr_matrix
+    damping: sp.csr_matrix | None
+    loads: Array
+    unknowns: tuple[Unknown, ...]
+    places: Array | None = None
+    held: tuple[Unknown, ...] = ()
+    taken: Mapping[str, str] | None = None
+    left: tuple[str, ...] = ()
+
+    def moved_mass(self) -> dict[str, float]:
+        """Mass [t] along x, y and z of what moves as one with all points: of a free body, all."""
+        shares = {}
+        for axis in TRANSLATIONS:
+            along = np.array([float(unknown.direction == axis) for unknown in self.unknowns])
+            if along.any():
+                shares[axis] = float(along @ (self.mass @ along))
+        return shares
+
+
+@dataclass(frozen=True)
+class GivenUnknowns:
+    """What is said of unknowns beside the files.
+
+    Either ``rows`` ``(n,)`` of matrices in files that say nothing of them, or the names of points
+    by their ``nodes``; ``places`` ``(n, 3)`` of the rows, or by node [mm].
+    """
+
+    rows: tuple[Unknown, ...] | None = None
+    nodes: Mapping[str, str] | None = None
+    places: Array | Mapping[str, Array] | None = None
+
+
+def own_matrices(
+    sources: Mapping[str, tuple[Path, str]],
+    file: Path | None = None,
+    given: GivenUnknowns | None = None,
+    units: FileUnits | None = None,
+) -> OwnMatrices:
+    """Matrices from files, in mm, N, s and t.
+
+    ``sources`` are file and name of each of the parts stiffness, mass, damping and loads (a name
+    may be empty where the file has one matrix, or usual names); what is not among them is looked
+    for in ``file`` by the usual names. Raises :class:`MatrixError` where stiffness or mass are
+    missing, where matrices do not fit each other, are not real, finite and symmetric, or where
+    their unknowns are not known.
+
+    Examples
+    --------
+    Two masses in a row, in a file of arrays in m, N and kg:
+
+    >>> import tempfile
+    >>> from pathlib import Path
+    >>> import numpy as np
+    >>> from fe_models.matrices import FileUnits, GivenUnknowns, Unknown, own_matrices
+    >>> path = Path(tempfile.mkdtemp()) / "row.npz"
+    >>> np.savez(path, K=np.array([[2e6, -1e6], [-1e6, 1e6]]), M=np.diag([2.0, 1.0]))
+    >>> rows = Unknown("a", "x"), Unknown("b", "x")
+    >>> row = own_matrices({}, path, GivenUnknowns(rows), FileUnits(length=1e3))
+    >>> print(row.stiffness.toarray(), row.moved_mass(), row.taken)
+    [[ 2000. -1000.]
+     [-1000.  1000.]] {'x': 0.003} {'stiffness': 'K', 'mass': 'M'}
+    """
+    parts, left = found(sources, file)
+    unknowns, places = _unknowns(parts, given or GivenUnknowns())
+    held = {unknown for part in parts.values() for unknown in part.file.held}
+    size = len(unknowns)
+    aligned = {name: _aligned(part, unknowns) for name, part in parts.items()}
+    free = np.array([unknown not in held for unknown in unknowns], dtype=bool)
+    units = units or FileUnits()
+    kept = tuple(unknown for unknown, is_free in zip(unknowns, free, strict=True) if is_free)
+    scale = sp.diags(1.0 / units.scales(kept))
+
+    def square(part: str, energy: float) -> sp.csr_matrix | None:
+        if part not in aligned:
+            return None
+        values = symmetric(parts[part], aligned[part], unknowns)
+        return energy * (scale @ values[free][:, free] @ scale).tocsr()
+
+    loads = aligned.get(LOADS, sp.csr_matrix((size, 0))).toarray()[free]
+    energy = units.force * units.length
+    return _named(
+        OwnMatrices(
+            _there(square(STIFFNESS, energy)),
+            _there(square(MASS, units.mass * units.length**2)),
+            square(DAMPING, energy),
+            # Those of a load of one of the file's forces: of 1 N as much.
+            units.length * (scale @ loads),
+            kept,
+            None if places is None else places[free],
+            tuple(sorted(held)),
+            {name: part.name for name, part in parts.items()},
+            left,
+        ),
+        given,
+    )
+
+
+def _there(matrix: sp.csr_matrix | None) -> sp.csr_matrix:
+    assert matrix is not None
+    return matrix
+
+
+# --- unknowns -----------------------------------------------------------------------------------
+
+
+def _unknowns(
+    parts: Mapping[str, Part], given: GivenUnknowns
+) -> tuple[tuple[Unknown, ...], Array | None]:
+    """What the rows are, and the places of their points."""
+    told = [part for part in parts.values() if part.file.unknowns is not None]
+    if given.rows is not None:
+        if told:
+            raise MatrixError(
+                f"{told[0].file.path} says itself what its rows are; allowed: columns node and "
+                "point, which name its nodes",
+                "unknowns",
+            )
+        for part in parts.values():
+            if part.values.shape[0] != len(given.rows):
+                raise MatrixError(
+                    f"{len(given.rows)} unknowns for {shape_of(part.values)} in {part.file.path}; "
+                    "allowed: one for each row",
+                    "unknowns",
+                )
+        assert not isinstance(given.places, Mapping)
+        return once("unknowns", given.rows), given.places
+    if len(told) < len(parts):
+        silent = next(part for part in parts.values() if part.file.unknowns is None)
+        raise MatrixError(
+            f"{silent.file.path} does not say what its {silent.values.shape[0]} rows are; allowed: "
+            "unknowns, a CSV file with columns point and direction and a row for each",
+            "unknowns",
+        )
+    every = dict.fromkeys(u for part in told for u in (*_rows(part), *part.file.held))
+    files = {part.file.path for part in told}
+    unknowns = tuple(every) if len(files) == 1 else tuple(sorted(every, key=_order))
+    places = next((part.file.places for part in told if part.file.places is not None), None)
+    return unknowns, places if places is not None and len(places) == len(unknowns) else None
+
+
+def _rows(part: Part) -> tuple[Unknown, ...]:
+    unknowns = part.file.unknowns or ()
+    if len(unknowns) != part.values.shape[0]:
+        raise part.refuse(
+            f"{shape_of(part.values)} for {len(unknowns)} unknowns that the file names; allowed: "
+            "as many"
+        )
+    return unknowns
+
+
+def _order(unknown: Unknown) -> tuple:
+    """By node, then by direction."""
+    point = unknown.point
+    numbered = point.lstrip("-").isdecimal()
+    return (0, int(point), unknown) if numbered else (1, 0, unknown)
+
+
+def _aligned(part: Part, unknowns: tuple[Unknown, ...]) -> sp.csr_matrix:
+    """The matrix on all unknowns, in their order. Raises MatrixError where it does not fit."""
+    rows, size = part.file.unknowns, len(unknowns)
+    if rows is None:
+        if part.values.shape[0] != size:
+            raise part.refuse(f"{shape_of(part.values)}; allowed: {size} rows, as the unknowns")
+        return part.values
+    if rows == unknowns:
+        return part.values
+    places: dict[Unknown, int] = {unknown: k for k, unknown in enumerate(unknowns)}
+    to: Indices = np.array([places[row] for row in rows], dtype=np.int64)
+    entries = sp.coo_matrix(part.values)
+    if part.part == LOADS:
+        shape, columns = (size, entries.shape[1]), entries.col
+    else:
+        shape, columns = (size, size), to[entries.col]
+    return sp.csr_matrix((entries.data, (to[entries.row], columns)), shape=shape)
+
+
+def _named(matrices: OwnMatrices, given: GivenUnknowns | None) -> OwnMatrices:
+    """The same with the names, and the places, that nodes are given."""
+    if given is None or given.nodes is None:
+        return matrices
+    known = {unknown.point for unknown in matrices.unknowns}
+    for node in given.nodes:
+        if node not in known:
+            raise MatrixError(f"node {node}: not in the matrices; allowed: its nodes", "unknowns")
+    unknowns = [
+        Unknown(given.nodes.get(unknown.point, unknown.point), unknown.direction)
+        for unknown in matrices.unknowns
+    ]
+    places = matrices.places
+    if isinstance(given.places, Mapping):
+        nowhere = np.full(3, np.nan)
+        places = np.array([given.places.get(u.point, nowhere) for u in matrices.unknowns])
+    return replace(matrices, unknowns=once("unknowns", unknowns), places=places)

@@ -1,0 +1,432 @@
+"""A body of a rig as matrices of another program: their files, their unknowns, their units."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
+
+import numpy as np
+from pydantic import Discriminator, Tag, model_validator
+
+from sa_solver.types import Array
+from workflow.analyses.rig.point_kinds import known, matching
+from workflow.analyses.rig.structure import JointedBody, Moved
+from workflow.analyses.rig.unknowns_file import AXES, given_unknowns
+from workflow.case.fields import File, Text, Whole, shown, split_dataset
+from workflow.case.input_files import InputFileError, open_hdf5
+from workflow.case.plain import counted, plain
+from workflow.case.sections import Section, Title, disagreement, entry, together
+from workflow.case.units import UnitError, to_base
+from workflow.shell.memory import Memory, factor_bytes
+from workflow.shell.run_time import factors
+
+if TYPE_CHECKING:
+    from fe_models.matrices import OwnMatrices
+    from fe_models.reduction import ReducedModel
+
+# Files with the times they were written at, and their sizes.
+Stamps = tuple[tuple[str, int, int], ...]
+PARTS = "stiffness", "mass", "damping", "loads"
+SEVERAL = ".npz", ".mat", ".h5", ".hdf5", ".pch", ".bdf", ".op4"
+ENDINGS = (*SEVERAL, ".mtx")
+HDF5 = ".h5", ".hdf5", ".mat"
+HDF5_BEGINS = b"\x89HDF"
+# Unknowns up to which `check` builds the model itself; up to which it finds frequencies of the full
+# matrices, in seconds; and from which it is doubted that all are to be kept.
+SMALL, MODERATE, MANY = 600, 20_000, 2000
+# Dense matrices of a model at once, and of shapes over all unknowns; seconds of all that is done
+# with 1000 unknowns that are all kept.
+DENSE_MATRICES, SHAPES, ALL_KEPT = 12, 3, 5.0
+# Frequencies above rigid motions, and held unknowns, that are told.
+TOLD = 6
+# What no structure with joints is: its lowest elastic frequency [Hz], its mass [t].
+SLOWEST, FASTEST = 0.05, 1e6
+LIGHTEST, HEAVIEST = 1e-9, 1e4
+
+
+@dataclass(frozen=True)
+class UnitName(Text):
+    """A unit that ``base`` has the dimension of."""
+
+    base: str
+
+    allowed = "a unit of this dimension, such as mm, N or kg"
+
+    def parse(self, value: object) -> str:
+        name = super().parse(value)
+        try:
+            to_base(f"1 {name}", self.base)
+        except (UnitError, ArithmeticError) as error:
+            raise self.refusal(value, str(error)) from error
+        return name
+
+
+class MatrixUnits(Section):
+    """Units of matrices."""
+
+    length: Annotated[str, UnitName("mm")] = entry(
+        "of displacements; rotations are in rad, times in s", "mm"
+    )
+    force: Annotated[str, UnitName("N")] = entry("of stiffness times length", "N")
+    mass: Annotated[str, UnitName("t")] | None = entry(
+        "without it that which fits: kg for N and m, t for N and mm", "t", default=None
+    )
+
+
+class MatrixFiles(Section):
+    """Files of matrices: one of all, or one for each."""
+
+    file: Annotated[str, File(ENDINGS)] | None = entry(
+        "of all that has no file below, by usual names: stiffness or K, mass or M, damping or C, "
+        "loads or F, Nastran's KAAX, MAAX, BAAX, PAX; .mtx: Abaqus' substructures",
+        "matrices.h5",
+        default=None,
+    )
+    stiffness: Annotated[str, File(ENDINGS)] | None = entry(
+        "of its own; a matrix of several by its name: plant.mat:Kred", "k.mtx", default=None
+    )
+    mass: Annotated[str, File(ENDINGS)] | None = entry("of its own", "m.mtx", default=None)
+    damping: Annotated[str, File(ENDINGS)] | None = entry(
+        "viscous, of its own; damping_ratio comes to it", "c.mtx", default=None
+    )
+    loads: Annotated[str, File(ENDINGS)] | None = entry(
+        "of its own: a column for each load, its forces over the load", "f.mtx", default=None
+    )
+    unknowns: Annotated[str, File((".csv",))] | None = entry(
+        "what the rows are, where files do not say it: columns point and direction (x, y, z, rx, "
+        "ry, rz or modal), if known x, y, z; or names of nodes: columns node and point",
+        "unknowns.csv",
+        default=None,
+    )
+    units: MatrixUnits = entry("of all files")
+
+    @model_validator(mode="after")
+    def _whole(self) -> MatrixFiles:
+        if self.file is None and (self.stiffness is None or self.mass is None):
+            raise disagreement("missing; allowed: a file of all, or stiffness and mass", "file")
+        return self
+
+    @property
+    def sources(self) -> dict[str, tuple[Path, str]]:
+        """File and name of each matrix that has its own."""
+        given = {part: getattr(self, part) for part in PARTS}
+        split = {part: split_dataset(text) for part, text in given.items() if text is not None}
+        return {part: (Path(file), name) for part, (file, name) in split.items()}
+
+    @property
+    def stamps(self) -> Stamps:
+        """The files with when they were written and their sizes: what they are known again by."""
+        files = {path for path, _ in self.sources.values()}
+        files |= {Path(split_dataset(f)[0]) for f in (self.file, self.unknowns) if f is not None}
+        states = ((path, path.stat()) for path in sorted(files))
+        return tuple((str(path), state.st_mtime_ns, state.st_size) for path, state in states)
+
+    def read(self) -> OwnMatrices:
+        """The matrices; of files that are as they were, as they were read.
+
+        Raises ``MatrixError`` and InputFileError.
+        """
+        return _read(self, self.stamps)
+
+    def key_of(self, part: str) -> str:
+        """The entry that a ``part`` comes from, as far as there is one."""
+        if part in PARTS:
+            part = "file" if getattr(self, part) is None else part
+        given = [name for name in ("file", *PARTS) if getattr(self, name) is not None]
+        return part or given[0]
+
+
+@lru_cache(4)
+def _read(files: MatrixFiles, stamps: Stamps) -> OwnMatrices:
+    from fe_models.matrices import FileUnits, own_matrices
+
+    for name, *_ in stamps:
+        _check_links(name)
+    file = None if files.file is None else Path(split_dataset(files.file)[0])
+    length, force = to_base(f"1 {files.units.length}", "mm"), to_base(f"1 {files.units.force}", "N")
+    mass = 0.0 if files.units.mass is None else to_base(f"1 {files.units.mass}", "t")
+    units = FileUnits(length, force, mass)
+    return own_matrices(files.sources, file, given_unknowns(files.unknowns), units)
+
+
+def _check_links(file: str) -> None:
+    """Refuse HDF5 that leads to other files."""
+    if file.endswith(HDF5):
+        with Path(file).open("rb") as opened:
+            head = opened.read(1024)
+        if HDF5_BEGINS in head:
+            with open_hdf5(file):
+                pass
+
+
+@contextmanager
+def refusing(body: MatrixBody) -> Iterator[None]:
+    """What is wrong with matrices, at the entry that they come from."""
+    from fe_models.matrices import MatrixError
+
+    try:
+        yield
+    except MatrixError as error:
+        own = error.part in ("retained", "modes")
+        key = error.part if own else f"matrices.{body.matrices.key_of(error.part)}"
+        raise disagreement(str(error), key) from error
+    except InputFileError as error:
+        raise disagreement(str(error), "matrices") from error
+
+
+# --- the body -----------------------------------------------------------------------------------
+
+
+class LoadCase(Section):
+    """A load of the matrices: forces wherever its column has them."""
+
+    known_by: ClassVar[frozenset[str]] = frozenset({"load"})
+
+    load: Annotated[int, Whole(1, 10_000)] = entry(
+        "column of the loads: its forces times the force of the excitation", 1
+    )
+
+
+def _way(value: object) -> str:
+    """How a force is given: by a load, unless there are points."""
+    by_load = isinstance(value, LoadCase) or (isinstance(value, dict) and "load" in value)
+    return "(load)" if by_load else "(points)"
+
+
+Driven = Annotated[
+    Annotated[Moved, Tag("(points)")] | Annotated[LoadCase, Tag("(load)")], Discriminator(_way)
+]
+
+
+class Matrices(Section):
+    """Matrices of a structure."""
+
+    kind: Literal["matrices"] = entry("stiffness and mass of another program", "matrices")
+    matrices: MatrixFiles = entry("where they are")
+    retained: tuple[Title, ...] = entry(
+        "points, or kinds of them, onto which large matrices are reduced first, by Craig and "
+        "Bampton; without them all are kept",
+        ["pad", "tip"],
+        default=(),
+    )
+    modes: Annotated[int, Whole(0, 1000)] | None = entry(
+        "lowest ones with the retained points held, beside these", 20, default=None
+    )
+
+
+class MatrixBody(JointedBody, Matrices):
+    """Matrices of another program, with joints, masses and springs at their points."""
+
+    in_schema: ClassVar[Mapping[str, Any]] = together("retained", "modes")
+
+    driven: Driven = entry("points that share the force of the excitation evenly")  # type: ignore[assignment]
+
+    @model_validator(mode="after")
+    def _modes_of_retained(self) -> MatrixBody:
+        if self.retained and self.modes is None:
+            raise disagreement("missing; allowed: with retained, from 0 on", "modes", "retained")
+        if self.modes is not None and not self.retained:
+            raise disagreement(
+                f"{self.modes}: given without retained; allowed: with points to keep", "modes"
+            )
+        return self
+
+    @model_validator(mode="after")
+    def _is_a_structure(self) -> MatrixBody:
+        """Read the files with the case, and of few unknowns build the model."""
+        with refusing(self):
+            matrices = self.matrices.read()
+        self._check_points()
+        count = matrices.loads.shape[1]
+        if isinstance(self.driven, LoadCase) and self.driven.load > count:
+            allowed = f"1 to {count}" if count else "points, as there are no loads"
+            raise disagreement(f"{self.driven.load}: no such load; allowed: {allowed}", "driven")
+        if len(matrices.unknowns) <= SMALL:
+            with refusing(self):
+                self.reduced()
+        return self
+
+    def _check_points(self) -> None:
+        """Refuse points that there are not."""
+        wanted = {f"retained.{k}": point for k, point in enumerate(self.retained)}
+        sections = {
+            f"{name}.{k}": part
+            for name in ("joints", "masses", "springs")
+            for k, part in enumerate(getattr(self, name))
+        }
+        for key, part in (sections | {"driven": self.driven, "seen": self.seen}).items():
+            for end in ("points", "against"):
+                if getattr(part, end, None) is not None:
+                    wanted[f"{key}.{end}"] = getattr(part, end)
+        for key, point in wanted.items():
+            there = self.points if key.startswith("retained.") else self.kept
+            if not matching(there, point):
+                held = ", but not retained" if matching(self.points, point) else ""
+                raise disagreement(
+                    f"{shown(point)}: no such point{held}; allowed: {known(there)}", key
+                )
+
+    @property
+    def points(self) -> list[str]:
+        """All points of the matrices, modes apart."""
+        unknowns = self.matrices.read().unknowns
+        return list(dict.fromkeys(u.point for u in unknowns if u.direction != "modal"))
+
+    @property
+    def kept(self) -> list[str]:
+        """Those that the model has: the retained ones, or all."""
+        if not self.retained:
+            return self.points
+        return [p for wanted in self.retained for p in matching(self.points, wanted)]
+
+    @property
+    def joint_count(self) -> int:
+        """How many joints there are."""
+        return sum(len(matching(self.kept, joint.points)) for joint in self.joints)
+
+    @property
+    def laden(self) -> dict[str, float]:
+        """Masses added to displacements [t]."""
+        laden: defaultdict[str, float] = defaultdict(float)
+        for mass in self.masses:
+            points = matching(self.kept, mass.points)
+            for point in points:
+                for axis in AXES:
+                    laden[f"{point} {axis}"] += mass.mass / len(points)
+        return laden
+
+    def reduced(
+        self, done: Callable[[], None] = lambda: None
+    ) -> tuple[ReducedModel, tuple[str, ...]]:
+        """The model, and names of unknowns without mass, which follow the others statically.
+
+        Raises ``MatrixError``.
+        """
+        from fe_models.matrices import check_definite, on_all, on_retained, without_massless
+
+        matrices = self.matrices.read()
+        if self.retained:
+            model = on_retained(matrices, self.kept, self.modes or 0, done)
+        else:
+            model = on_all(matrices)
+        model, dropped = without_massless(model, tuple(self.laden))
+        check_definite(model, self.laden)
+        return model, dropped
+
+    def memory(self) -> Memory:
+        """Of the model: dense matrices, and to reduce large ones their factors."""
+        matrices = self.matrices.read()
+        size, retained = len(matrices.unknowns), set(self.kept)
+        if not self.retained:
+            return Memory(DENSE_MATRICES * size**2, "give structure.retained and structure.modes")
+        kept = sum(unknown.point in retained for unknown in matrices.unknowns)
+        numbers = SHAPES * size * (kept + (self.modes or 0)) + DENSE_MATRICES * kept**2
+        return Memory(numbers, "retain fewer points, or modes", factor_bytes(size // 3))
+
+    def build_time(self) -> float:
+        """Until the model is there [s]."""
+        size = len(self.matrices.read().unknowns)
+        if self.retained:
+            return factors(size / 3.0)
+        return float(ALL_KEPT * (size / 1000.0) ** 3)
+
+    @property
+    def text(self) -> str:
+        files = dict.fromkeys(path.name for path, _ in self.matrices.sources.values())
+        if self.matrices.file is not None:
+            files = {Path(self.matrices.file).name: None} | files
+        reduced = f", reduced to {len(self.kept)} points and {self.modes} modes"
+        return f"matrices of {', '.join(files)}{reduced if self.retained else ''}, {self.added}"
+
+    @property
+    def driven_place(self) -> str:
+        if isinstance(self.driven, LoadCase):
+            return f"load {self.driven.load}"
+        return super().driven_place
+
+    def outline(self) -> list[tuple[str, str]]:
+        matrices = self.matrices.read()
+        taken = (f"{part} {name}".rstrip() for part, name in (matrices.taken or {}).items())
+        left = f"; not taken: {', '.join(matrices.left)}" if matrices.left else ""
+        count = len(matrices.unknowns)
+        unknowns = f"{count} of {counted(len(self.points), 'point')}: {known(self.points)}"
+        modal = sum(u.direction == "modal" for u in matrices.unknowns)
+        unknowns += f"; {modal} of modes" if modal else ""
+        if matrices.held:
+            unknowns += f"; held: {', '.join(u.name for u in matrices.held[:TOLD])}"
+            unknowns += f", {len(matrices.held)} in all" if len(matrices.held) > TOLD else ""
+        masses = matrices.moved_mass()
+        mass = ", ".join(f"{plain(m, 't', 4)} along {axis}" for axis, m in masses.items())
+        rows = [
+            ("matrices", f"{', '.join(taken)}{left}"),
+            ("unknowns", unknowns),
+            ("mass", f"{mass}, of all points moved as one"),
+        ]
+        if isinstance(self.driven, LoadCase):
+            rows.append(("load", _resultant(matrices, self.driven.load)))
+        return [*rows, *self._told_frequencies()]
+
+    def _told_frequencies(self) -> list[tuple[str, str]]:
+        """The lowest frequencies without joints and what is added, where they are soon found."""
+        lowest = self._lowest()
+        if lowest is None or not len(lowest):
+            return []
+        values = ", ".join(f"{frequency:.5g}" for frequency in lowest)
+        return [("modes", f"lowest without joints, masses and springs: {values} Hz")]
+
+    def _lowest(self) -> Array | None:
+        """The lowest natural frequencies of the matrices [Hz], None where that takes long."""
+        if len(self.matrices.read().unknowns) > MODERATE:
+            return None
+        return _frequencies(self.matrices, self.matrices.stamps)
+
+    def doubts(self) -> Iterator[str]:
+        """A line for each thing that is hardly meant."""
+        matrices = self.matrices.read()
+        count = len(matrices.unknowns)
+        if count > MANY and not self.retained:
+            yield (
+                f"structure.retained: none, so that all {count} unknowns are kept; usual: some "
+                f"points, and modes, for more than {MANY}"
+            )
+        for axis, mass in matrices.moved_mass().items():
+            if mass and not LIGHTEST <= mass <= HEAVIEST:
+                yield (
+                    f"structure.matrices.units: {plain(mass, 't', 3)} along {axis}, of all points "
+                    "moved as one: are they right?"
+                )
+                break
+        lowest = self._lowest()
+        elastic = np.empty(0) if lowest is None else lowest[lowest > 0.0]
+        if len(elastic) and not SLOWEST <= elastic[0] <= FASTEST:
+            yield (
+                f"structure.matrices.units: the lowest frequency above 0 is {elastic[0]:.3g} Hz: "
+                "are they right, that of mass too?"
+            )
+
+
+def _resultant(matrices: OwnMatrices, number: int) -> str:
+    """The sum of the forces of a load, over the load."""
+    column = matrices.loads[:, number - 1]
+    sums = [
+        f"{sum(f for f, u in zip(column, matrices.unknowns, strict=True) if u.direction == axis):g}"
+        for axis in AXES
+    ]
+    return f"{number}, with forces of {', '.join(sums)} along x, y, z in all for a force of 1"
+
+
+@lru_cache(4)
+def _frequencies(files: MatrixFiles, stamps: Stamps) -> Array:
+    """The lowest natural frequencies [Hz], rigid motions 0; none where they are not found."""
+    from fe_models.linear_solver import SolverError
+    from fe_models.matrices import MatrixError, lowest_frequencies
+
+    try:
+        return lowest_frequencies(files.read(), TOLD)
+    except (MatrixError, SolverError):  # what masses that are added may yet mend
+        return np.empty(0)
