@@ -6,6 +6,7 @@ is read by pyYeti, where it is installed (Nastran Quick Reference Guide: DMIG).
 
 from __future__ import annotations
 
+import warnings
 from collections import defaultdict
 from collections.abc import Callable
 from pathlib import Path
@@ -55,7 +56,10 @@ def read_op4(path: Path) -> MatrixFile:
             f"{path}: .op4 is read by pyYeti, which is not installed: pip install "
             "'fretscale[nastran]', or write the matrices as DMIG (.pch)"
         ) from None
-    names, values, _, _ = op4.load(str(path), into="list", sparse=None)
+    with warnings.catch_warnings():
+        # Of damage that it passes over.
+        warnings.simplefilter("error", RuntimeWarning)
+        names, values, _, _ = op4.load(str(path), into="list", sparse=None)
     return MatrixFile(path, {n: _plain(v) for n, v in zip(names, values, strict=True)})
 
 
@@ -86,7 +90,9 @@ class _Dmig:
                 continue
             row = _label(column, first)
             if (row, to) in self.entries or (self.form == SYMMETRIC and (to, row) in self.entries):
-                raise column.wrong(f"point {row[0]}, component {row[1]}: given twice")
+                raise column.wrong(
+                    f"point {row[0]}, component {row[1]}: given twice; allowed: once"
+                )
             self.entries[row, to] = column.real(first + 2)
 
     def labels(self) -> set[Label]:
@@ -126,13 +132,13 @@ def _gathered(entries: list[Entry]) -> dict[str, _Dmig]:
         # A header has 0 where a column has its point, and more behind it than a component.
         if entry.text(1) == "0" and entry.text(FORM):
             if name in found:
-                raise entry.wrong(f"{name}: a second header")
+                raise entry.wrong(f"{name}: a second header; allowed: one")
             found[name] = _Dmig(entry)
         else:
             columns[name].append(entry)
     for name, given in columns.items():
         if name not in found:
-            raise given[0].wrong(f"{name}: no header before it")
+            raise given[0].wrong(f"{name}: no header; allowed: one, with 0 for the point")
         for column in given:
             found[name].take(column)
     return found

@@ -148,7 +148,9 @@ def _reading(path: Path, read: Callable[[], AnyRead]) -> AnyRead:
         raise
     except Exception as error:  # libraries end damage in a dozen ways
         said = " ".join(str(error).split())[:120] or type(error).__name__
-        raise MatrixError(f"{path}: cannot be read ({said})") from error
+        raise MatrixError(
+            f"{path}: cannot be read ({said}); allowed: a file as its program leaves it"
+        ) from error
 
 
 # --- checks -------------------------------------------------------------------------------------
@@ -169,7 +171,7 @@ def _checked(part: Part) -> Part:
         if part.part == LOADS and values.shape[0] == 1:
             values = values.T
     values = sp.csr_matrix(values, dtype=np.float64)
-    if max(values.shape) > MOST_UNKNOWNS or min(values.shape) == 0:
+    if not 0 < values.shape[0] <= MOST_UNKNOWNS or values.shape[1] > MOST_UNKNOWNS:
         raise part.refuse(f"{shape_of(values)}; allowed: 1 to {MOST_UNKNOWNS:,} unknowns")
     if not np.isfinite(values.data).all():
         coordinates = values.tocoo()

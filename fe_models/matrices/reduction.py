@@ -162,6 +162,8 @@ def without_massless(
     if not dropped.any():
         return model, ()
     gone = np.pad(dropped, (0, len(model.mass) - count))
+    if gone.all():
+        raise MatrixError("no mass at all; allowed: masses, or masses added to points", "mass")
     told = tuple(name for name, is_gone in zip(names, dropped, strict=True) if is_gone)
     followed = _following(model, gone, told)
     stays = ~gone
@@ -188,7 +190,8 @@ def _massless(masses: Array, names: Sequence[str]) -> np.ndarray:
     massless = np.zeros(len(masses), dtype=bool)
     for kind in (turning, ~turning):
         if kind.any():
-            massless[kind] = masses[kind] <= MASSLESS * masses[kind].max()
+            sizes = np.abs(masses[kind])
+            massless[kind] = sizes <= MASSLESS * sizes.max()
     return massless
 
 

@@ -26,7 +26,7 @@ from fe_models.matrices.parts import (
     shape_of,
     symmetric,
 )
-from fe_models.matrices.unknowns import MODAL, TRANSLATIONS, MatrixError, Unknown, once
+from fe_models.matrices.unknowns import DIRECTIONS, MODAL, TRANSLATIONS, MatrixError, Unknown, once
 from sa_solver.types import Array, Indices
 
 
@@ -223,9 +223,9 @@ def _rows(part: Part) -> tuple[Unknown, ...]:
 
 def _order(unknown: Unknown) -> tuple:
     """By node, then by direction."""
-    point = unknown.point
+    point, direction = unknown.point, DIRECTIONS.index(unknown.direction)
     numbered = point.lstrip("-").isdecimal()
-    return (0, int(point), unknown) if numbered else (1, 0, unknown)
+    return (0, int(point), "", direction) if numbered else (1, 0, point, direction)
 
 
 def _aligned(part: Part, unknowns: tuple[Unknown, ...]) -> sp.csr_matrix:
@@ -262,5 +262,5 @@ def _named(matrices: OwnMatrices, given: GivenUnknowns | None) -> OwnMatrices:
     places = matrices.places
     if isinstance(given.places, Mapping):
         nowhere = np.full(3, np.nan)
-        places = np.array([given.places.get(u.point, nowhere) for u in matrices.unknowns])
+        places = np.array([given.places.get(unknown.point, nowhere) for unknown in unknowns])
     return replace(matrices, unknowns=once("unknowns", unknowns), places=places)

@@ -106,7 +106,7 @@ def _wholes(path: Path, columns: Array) -> Indices:
     """Labels and places. Raises :class:`MatrixError` where one is no whole number."""
     rounded = np.rint(columns)
     if not (np.abs(columns) < 2**52).all() or (columns != rounded).any():
-        raise MatrixError(f"{path}: labels that are no whole numbers")
+        raise MatrixError(f"{path}: labels that are no whole numbers; allowed: these")
     return rounded.astype(np.int64)
 
 

@@ -108,9 +108,9 @@ def number(place: object, text: str) -> float:
     try:
         value = float(plain if "E" in plain else BARE_EXPONENT.sub(r"E\1", plain))
     except ValueError:
-        raise MatrixError(f"{place}: {text.strip()!r} is no number") from None
+        raise MatrixError(f"{place}: {text.strip()!r} is no number; allowed: numbers") from None
     if not np.isfinite(value):
-        raise MatrixError(f"{place}: {text.strip()!r} is no finite number")
+        raise MatrixError(f"{place}: {text.strip()!r}; allowed: finite numbers")
     return value
 
 
@@ -119,7 +119,9 @@ def whole(place: object, text: str) -> int:
     try:
         return int(text)
     except ValueError:
-        raise MatrixError(f"{place}: {text.strip()!r} is no whole number") from None
+        raise MatrixError(
+            f"{place}: {text.strip()!r} is no whole number; allowed: whole numbers"
+        ) from None
 
 
 def mirrored(lower: sp.coo_matrix) -> sp.csr_matrix:

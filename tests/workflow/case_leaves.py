@@ -188,6 +188,14 @@ REDUCED = {
     "driven": {"points": "ring", "direction": "x"},
     "seen": {"points": "pad", "direction": "x"},
 }
+MATRICES = {
+    **{name: value for name, value in REDUCED.items() if name != "file"},
+    "kind": "matrices",
+    "matrices": {"file": "matrices.npz", "units": {"length": "mm", "force": "N"}},
+    "masses": [{"points": "tip", "mass": 1}],
+    "springs": [{"points": "tip", "direction": "x", "stiffness": 1}],
+    "driven": {"points": "tip", "direction": "x"},
+}
 FRICTION_RIG = {
     "kind": "friction_rig",
     "specimens": "specimens_rig.yaml",
@@ -196,12 +204,14 @@ FRICTION_RIG = {
     "damping_ratio": 0.1,
 }
 GIVEN["vibration"] = {
-    "structure": {"reduced": REDUCED, "friction_rig": FRICTION_RIG},
+    "structure": {"reduced": REDUCED, "matrices": MATRICES, "friction_rig": FRICTION_RIG},
+    "structure.driven": {"load": {"load": 1}},
     "joint": JOINTS | {"friction_contact": CONTACT},
     "loops": {ALWAYS: {"frequency": "100 Hz"}},
 }
 GIVEN["rig"] = GIVEN["joint"] | {
-    "structure": {"reduced": REDUCED},
+    "structure": {"reduced": REDUCED, "matrices": MATRICES},
+    "structure.driven": {"load": {"load": 1}},
     "joint": JOINTS | {"friction_contact": CONTACT},
     "ageing": {ALWAYS: {"cycles": 1000}},
     "excitation": {
@@ -225,6 +235,15 @@ CAD = [
     "structure.supports.0.group=solid_1.face_5",
     "structure.loads.0.group=solid_2.face_6",
 ]
+# Each of the matrices in a file of its own.
+APART_MATRICES = {
+    "stiffness": "k.mtx",
+    "mass": "m.mtx",
+    "damping": "c.mtx",
+    "loads": "f.mtx",
+    "unknowns": "unknowns.csv",
+}
+APART = f"structure.matrices={APART_MATRICES | {'units': {'length': 'mm', 'force': 'N'}}}"
 # A sector of a wheel in the place of the template's mesh, with the same names.
 SECTOR = "structure.file=sector.msh"
 # Cells of the templates that may take heights.

@@ -10,6 +10,7 @@ from typing import Any
 import h5py
 import numpy as np
 import pytest
+import scipy.io
 from click.testing import Result
 
 from fe_models.gmsh_session import gmsh_model
@@ -271,6 +272,24 @@ def renamed(body: Body, name: str, names: dict[str, str]) -> Body:
     )
 
 
+def write_matrices_of_templates(folder: Path) -> None:
+    """A row of masses from the ground over pads and rings to a tip, in files of several kinds."""
+    inner = [f"inner {number} x" for number in range(1, 36)]
+    names = ["pad 1 x", "pad 2 x", "ring 1 x", "ring 2 x", *inner, "tip x"]
+    size = len(names)
+    stiffness = 2.0 * np.eye(size) - np.eye(size, k=1) - np.eye(size, k=-1)
+    matrices = {"k": 1e3 * stiffness, "m": 1e-3 * np.eye(size), "c": 1e-3 * stiffness}
+    matrices |= {"f": np.eye(size, 1, k=1 - size)}
+    np.savez(folder / "matrices.npz", **matrices, names=names)
+    with h5py.File(folder / "matrices.h5", "w") as file:
+        file.update(matrices | {"names": [name.encode() for name in names]})
+    for name, matrix in matrices.items():
+        symmetry = "general" if name == "f" else "symmetric"
+        scipy.io.mmwrite(folder / f"{name}.mtx", matrix, symmetry=symmetry)
+    rows = [",".join(name.rsplit(" ", 1)) for name in names]
+    (folder / "unknowns.csv").write_text("\n".join(["point,direction", *rows, ""]), "utf-8")
+
+
 @pytest.fixture(scope="session")
 def template_files(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with the files that the templates name, not to be changed."""
@@ -301,6 +320,7 @@ def folders(tmp_path_factory: pytest.TempPathFactory, template_files: Path) -> d
         (made[kind] / "force.csv").write_text("time,force\n0,0\n1,5\n", encoding="utf-8")
         shutil.copy(CASES / "specimens_coarse.yaml", made[kind] / "specimens.yaml")
         save_reduced(made[kind] / "body_2.h5", BODY)
+        write_matrices_of_templates(made[kind])
         (made[kind] / "loops.csv").write_text("energy,P,kt,mu\n0,1,1,1\n", encoding="utf-8")
     return made
 

@@ -12,6 +12,8 @@ import pytest
 from pydantic import BaseModel
 
 from tests.workflow.case_leaves import (
+    APART,
+    APART_MATRICES,
     CAD,
     EXPECT,
     LEAVES,
@@ -130,6 +132,13 @@ def test_entries_are_described():
             assert leaf.field.description.endswith(f"[{entry.unit}]"), leaf
 
 
+# What an example asks for beside itself.
+BESIDE = {f"structure.matrices.{part}": [APART] for part in APART_MATRICES} | {
+    "structure.retained": ["structure.modes=20"],
+    "structure.modes": ["structure.retained=[pad, tip]"],
+}
+
+
 def stated(leaf):
     """Overrides that give an entry its example; what it takes the place of goes."""
     (example,) = leaf.field.examples
@@ -158,7 +167,7 @@ def stated(leaf):
         force = {"P": 1.0} if leaf.name != "approach" else {}
         assert len(FORCES) == len(MOTIONS)
         return [f"load_path.legs={[force | {leaf.name: example}]}".replace("'", "")]
-    return [plain]
+    return [*BESIDE.get(leaf.key, ()), plain]
 
 
 @each_section

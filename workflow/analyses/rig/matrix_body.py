@@ -81,6 +81,8 @@ class MatrixUnits(Section):
 class MatrixFiles(Section):
     """Files of matrices: one of all, or one for each."""
 
+    also_filled_in: ClassVar[tuple[str, ...]] = ("file",)
+
     file: Annotated[str, File(ENDINGS)] | None = entry(
         "of all that has no file below, by usual names: stiffness or K, mass or M, damping or C, "
         "loads or F, Nastran's KAAX, MAAX, BAAX, PAX; .mtx: Abaqus' substructures",

@@ -34,6 +34,16 @@ def reduced_rig_model(body: JointedBody, directions: int, reporter: Reporter) ->
     """
     with reporter.stage("reduction", "steps") as told:
         reduced, massless = _reduced_body(body, reporter, told)
+    try:
+        return _rig_on(reduced, body, directions)
+    except UserError as error:
+        if not massless:
+            raise
+        raise UserError(f"{error}{_told(massless)}") from error
+
+
+def _rig_on(reduced: ReducedModel, body: JointedBody, directions: int) -> RigModel:
+    """The rig on a reduced model."""
     points = _Points(reduced)
     joints = [
         joint
@@ -52,7 +62,7 @@ def reduced_rig_model(body: JointedBody, directions: int, reporter: Reporter) ->
         driven = _driven(body, reduced, model, points)
         seen = _shape(model, points, body.seen, "seen")
     except RigError as error:
-        raise UserError(f"structure: {error}{_told(massless)}") from error
+        raise UserError(f"structure: {error}") from error
     label = f"{body.seen.points} {body.seen.direction}"
     along = _along(directions, body)
     return RigModel(model, driven, seen[None], (label,), directions, along, in_a_row=False)

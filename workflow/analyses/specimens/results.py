@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
 
 from fe_models.matrices import write_matrices
 from fe_models.reduced_contact import masing_loop
-from fe_models.reduction import save_reduced
+from fe_models.reduction import ReducedModel, save_reduced
 from sa_solver.types import Array
 from workflow.analyses.specimens.case import SpecimensCase
 from workflow.analyses.specimens.outcome import KeptState, LoadOutcome, SpecimensOutcome
@@ -79,12 +81,19 @@ def write_specimens_output(outcome: SpecimensOutcome, run: Run[SpecimensCase]) -
             for number, model in enumerate(outcome.model.reduction.models, 1):
                 with replacing_hdf5(reduced / f"body_{number}.h5") as stream:
                     save_reduced(stream, model)
-                formats = run.case.output.matrix_formats
-                write_matrices(model, reduced, f"body_{number}", formats)
+                _write_matrices(model, reduced, f"body_{number}", run.case.output.matrix_formats)
         _write_results(outcome, run)
     run.draw(None)  # every run leaves the same
     summary = _summary(outcome, reporter)
     finish(run, summary, _lines(summary))
+
+
+def _write_matrices(model: ReducedModel, folder: Path, stem: str, formats: tuple[str, ...]) -> None:
+    """Matrices for other programs, put into the folder once they are whole."""
+    with TemporaryDirectory(dir=folder) as beside:
+        write_matrices(model, Path(beside), stem, formats)
+        for path in Path(beside).iterdir():
+            path.replace(folder / path.name)
 
 
 # --- results ------------------------------------------------------------------------------------
