@@ -13,7 +13,8 @@ import pytest
 
 ROOT = Path(__file__).parent.parent
 FACES = ["sa_solver", "wear", "wear.joints"]
-FACES += ["fe_models", "fe_models.dynamics", "fe_models.geometry", "fretscale"]
+FACES += ["fe_models", "fe_models.dynamics", "fe_models.geometry", "fe_models.matrices"]
+FACES += ["fretscale"]
 LARGEST = 28
 # A protocol and a base, which name what implements them, ...
 WITHOUT_EXAMPLE = {"Observer", "WearLaw"}

@@ -34,6 +34,7 @@ LIBRARIES = {
         "fe_models": "structures",
         "fe_models.dynamics": "structures that vibrate",
         "fe_models.geometry": "meshes",
+        "fe_models.matrices": "matrices of other programs",
     },
 }
 PAGES = "reference/libraries/"

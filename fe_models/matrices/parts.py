@@ -70,6 +70,22 @@ def read_matrix_file(path: Path) -> MatrixFile:
     """What a file of matrices has, by its ending.
 
     Raises :class:`MatrixError` for a file that cannot be read: damage ends in a dozen ways.
+
+    Examples
+    --------
+    What Abaqus writes by ``*MATRIX OUTPUT, STIFFNESS``: one triangle, with nodes and components
+
+    >>> import tempfile
+    >>> from pathlib import Path
+    >>> from fe_models.matrices import read_matrix_file
+    >>> path = Path(tempfile.mkdtemp()) / "job_STIF1.mtx"
+    >>> _ = path.write_text("1,1, 1,1, 2.0e+03\\n2,1, 1,1, -1.0e+03\\n2,1, 2,1, 1.0e+03\\n")
+    >>> file = read_matrix_file(path)
+    >>> print([unknown.name for unknown in file.unknowns])
+    ['1 x', '2 x']
+    >>> print(file.matrices[""]().toarray())
+    [[ 2000. -1000.]
+     [-1000.  1000.]]
     """
     reader = READERS.get(path.suffix.lower())
     if reader is None:

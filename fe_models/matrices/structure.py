@@ -68,6 +68,18 @@ class OwnMatrices:
     rows are, ``places`` ``(n, 3)`` where their points are [mm], if known. ``held`` are those that a
     file holds and that are none of these, ``taken`` the matrices by the parts they are taken for,
     ``left`` those of the files that nothing is made of.
+
+    Examples
+    --------
+    Made without files, and the mass that moves along x:
+
+    >>> import numpy as np
+    >>> import scipy.sparse as sp
+    >>> from fe_models.matrices import OwnMatrices, Unknown
+    >>> unknowns = Unknown("a", "x"), Unknown("b", "x")
+    >>> K, M = 1e3 * sp.identity(2, format="csr"), 1e-3 * sp.identity(2, format="csr")
+    >>> print(OwnMatrices(K, M, None, np.zeros((2, 0)), unknowns).moved_mass())
+    {'x': 0.002}
     """
 
     stiffness: sp.csr_matrix
@@ -95,7 +107,15 @@ class GivenUnknowns:
     """What is said of unknowns beside the files.
 
     Either ``rows`` ``(n,)`` of matrices in files that say nothing of them, or the names of points
-    by their ``nodes``; ``places`` ``(n, 3)`` of the rows, or by node [mm].
+    by their ``nodes``; ``places`` ``(n, 3)`` of the rows, or by point [mm].
+
+    Examples
+    --------
+    Rows of a matrix without names, and names of nodes:
+
+    >>> from fe_models.matrices import GivenUnknowns, Unknown
+    >>> rows = GivenUnknowns(rows=(Unknown("tip", "x"), Unknown("tip", "rz")))
+    >>> nodes = GivenUnknowns(nodes={"17": "tip", "101": "pad 1"})
     """
 
     rows: tuple[Unknown, ...] | None = None

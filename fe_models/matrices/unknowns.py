@@ -55,11 +55,21 @@ class Unknown(NamedTuple):
 
 @dataclass(frozen=True)
 class MatrixFile:
-    """What a file of matrices has, each read when it is asked for.
+    """What a file at ``path`` has of matrices, each read when it is asked for.
 
     ``matrices`` by name, "" where the format has no names. Where the file says them, ``unknowns``
     are those of the rows of all of them, ``places`` ``(n, 3)`` of their points, and ``held`` those
     that the file holds.
+
+    Examples
+    --------
+    >>> from fe_models.matrices import read_matrix_file
+    >>> import numpy as np, pathlib, tempfile
+    >>> path = pathlib.Path(tempfile.mkdtemp()) / "two.npz"
+    >>> np.savez(path, K=np.eye(2), names=["tip x", "tip rz"])
+    >>> file = read_matrix_file(path)
+    >>> print(list(file.matrices), file.unknowns[1].name, file.held)
+    ['K'] tip rz frozenset()
     """
 
     path: Path
