@@ -4,7 +4,8 @@
 - ``Unknown``, ``GivenUnknowns``, ``FileUnits``: what their rows are, and in which units they are
 - ``read_matrix_file``, ``MatrixFile``: what a single file has
 - ``on_retained``, ``on_all``: the reduced model that they are, on some points or on all
-- ``without_massless``, ``check_definite``: what such a model must be to vibrate
+- ``without_massless``, ``with_light_motions``, ``check_definite``: what such a model must be to
+  vibrate
 - ``lowest_frequencies``: those of the matrices, rigid motions first
 - ``write_matrices``: a reduced model as ``.npz``, ``.mat`` or Matrix Market
 - ``MatrixError``: matrices that cannot be taken
@@ -37,6 +38,7 @@ if TYPE_CHECKING:
         lowest_frequencies,
         on_all,
         on_retained,
+        with_light_motions,
         without_massless,
     )
     from fe_models.matrices.structure import FileUnits, GivenUnknowns, OwnMatrices, own_matrices
@@ -55,6 +57,7 @@ __all__ = [
     "on_retained",
     "own_matrices",
     "read_matrix_file",
+    "with_light_motions",
     "without_massless",
     "write_matrices",
 ]
@@ -69,6 +72,7 @@ __getattr__, __dir__ = lazy_names(
             "lowest_frequencies",
             "on_all",
             "on_retained",
+            "with_light_motions",
             "without_massless",
         ),
         "structure": ("FileUnits", "GivenUnknowns", "OwnMatrices", "own_matrices"),

@@ -20,8 +20,9 @@ NOTHING: Mapping[str, float] = {}
 # Eigenvalues below zero, and those of a mass that is not definite, of the matrix scaled to 1 on its
 # diagonal: what single precision leaves of the rigid motions of a free body.
 NEGATIVE, SINGULAR = 1e-6, 1e-10
-# Rigid motions that a body may have, and a frequency over the next above it that is one of them.
-MOST_RIGID, RIGID = 6, 1e-3
+# Rigid motions that a body may have: their frequencies are below this share of the next, and their
+# squares below this one of the median of K_jj/M_jj, which nine digits of a stiffness leave.
+MOST_RIGID, RIGID, ROUNDING = 6, 1e-3, 1e-8
 # Unknowns up to which all frequencies are found.
 DENSE = 600
 # Names that fit into a message.
@@ -219,6 +220,62 @@ def _following(model: ReducedModel, gone: np.ndarray, names: tuple[str, ...]) ->
     return followed
 
 
+def with_light_motions(
+    model: ReducedModel, frequency: float
+) -> tuple[ReducedModel, tuple[str, ...]]:
+    """The model with mass in every motion, and what moves most in those that had none.
+
+    Motions without mass are the null space N of the mass scaled to 1 on its diagonal. To them
+    alone comes N Nᵀ K N Nᵀ / ω², with which they vibrate at ``frequency`` [Hz] where the others
+    are held. Statics stay as they were; at a frequency f the flexibility of these motions is
+    (f / ``frequency``)² too large. Raises :class:`MatrixError` where nothing holds one of them.
+
+    Examples
+    --------
+    A mass of 1 kg and two points that move it together, on springs: as two have no mass apart,
+
+    >>> import numpy as np
+    >>> import scipy.sparse as sp
+    >>> from fe_models.matrices import OwnMatrices, Unknown, on_all, with_light_motions
+    >>> K = sp.csr_matrix([[2000.0, -1000.0], [-1000.0, 2000.0]])
+    >>> M = sp.csr_matrix([[0.25e-3, 0.25e-3], [0.25e-3, 0.25e-3]])
+    >>> names = Unknown("a", "x"), Unknown("b", "x")
+    >>> own = OwnMatrices(K, M, None, np.zeros((2, 0)), names)
+    >>> model, light = with_light_motions(on_all(own), frequency=1e4)
+    >>> print(light, np.linalg.eigvalsh(model.mass).round(9))
+    ('a x',) [7.6e-07 5.0e-04]
+    """
+    assert model.mass is not None
+    diagonal = np.diag(model.mass)
+    scale = 1.0 / np.sqrt(np.where(diagonal > 0.0, diagonal, np.inf))
+    # What has no mass at all is scaled by its stiffness: it is in the null space alone.
+    bare = diagonal <= 0.0
+    scale[bare] = 1.0 / np.sqrt(np.abs(np.diag(model.stiffness)[bare]))
+    values, shapes = sl.eigh(scale[:, None] * model.mass * scale)
+    light = shapes[:, np.abs(values) <= SINGULAR]
+    if not light.shape[1]:
+        return model, ()
+    names = _all_names(model)
+    motions = scale[:, None] * light
+    held = motions.T @ model.stiffness @ motions
+    if sl.eigvalsh(held)[0] <= 0.0:
+        raise MatrixError(
+            f"no mass and no stiffness in a motion mostly of {names[_most(light[:, 0])]}; "
+            "allowed: masses added there",
+            "mass",
+        )
+    within = light / scale[:, None]
+    added = within @ (held / (2.0 * np.pi * frequency) ** 2) @ within.T
+    most = dict.fromkeys(names[_most(shape)] for shape in light.T)
+    return replace(model, mass=model.mass + 0.5 * (added + added.T)), tuple(most)
+
+
+def _most(shape: Array) -> int:
+    """The first of those that move most, to what rounding leaves."""
+    sizes = np.abs(shape)
+    return int(np.argmax(sizes > (1.0 - 1e-6) * sizes.max()))
+
+
 def check_definite(model: ReducedModel, laden: Mapping[str, float] = NOTHING) -> int:
     """How many rigid motions a model has. Raises :class:`MatrixError` for what no structure is.
 
@@ -245,7 +302,7 @@ def check_definite(model: ReducedModel, laden: Mapping[str, float] = NOTHING) ->
         raise MatrixError(
             f"not positive definite: the motion mostly of {lowest} has "
             f"{'no' if values[0] > -SINGULAR else 'a negative'} mass; allowed: masses added there, "
-            "or full matrices with retained points and modes",
+            "structure.massless, or full matrices with retained points and modes",
             "mass",
         )
     lowest, values = _lowest(model.stiffness, names, "stiffness")
@@ -277,17 +334,19 @@ def lowest_frequencies(matrices: OwnMatrices, count: int) -> Array:
     >>> print((2.0 * np.pi * lowest_frequencies(pair, 3)).round(2))
     [   0.   1414.21]
     """
-    size = len(matrices.unknowns)
-    if size <= DENSE:
+    if len(matrices.unknowns) <= DENSE:
         model, _ = without_massless(on_all(matrices))
         check_definite(model)
-        squares = sl.eigh(model.stiffness, model.mass, eigvals_only=True)
-        found = np.sqrt(np.maximum(squares, 0.0)) / (2.0 * np.pi)
+        assert model.mass is not None
+        K, M = model.stiffness, model.mass
+        found = free_frequencies(K, M, min(count + MOST_RIGID, len(K)))
     else:
-        found = free_frequencies(matrices.stiffness, matrices.mass, count + MOST_RIGID)
-    after = found[1 : MOST_RIGID + 1]
-    # The last gap of such a size among the first: elastic modes are closer to each other.
-    gaps = np.flatnonzero(found[: len(after)] < RIGID * after)
+        K, M = matrices.stiffness, matrices.mass
+        found = free_frequencies(K, M, count + MOST_RIGID)
+    moved = M.diagonal() > 0.0
+    local = float(np.median(K.diagonal()[moved] / M.diagonal()[moved]))
+    small = (2.0 * np.pi * found[:-1]) ** 2 < ROUNDING * local
+    gaps = np.flatnonzero((small & (found[:-1] < RIGID * found[1:]))[:MOST_RIGID])
     rigid = int(gaps[-1]) + 1 if len(gaps) else 0
     found[:rigid] = 0.0
     return np.asarray(found[: rigid + count])
@@ -307,7 +366,7 @@ def _lowest(matrix: Array, names: Sequence[str], part: str) -> tuple[str, Array]
         )
     scale = 1.0 / np.sqrt(np.where(diagonal > 0.0, diagonal, 1.0))
     values, shapes = sl.eigh(scale[:, None] * matrix * scale)
-    return names[int(np.abs(shapes[:, 0]).argmax())], values
+    return names[_most(shapes[:, 0])], values
 
 
 def _all_names(model: ReducedModel) -> list[str]:

@@ -23,6 +23,7 @@ from fe_models.matrices import (
     on_retained,
     own_matrices,
     read_matrix_file,
+    with_light_motions,
     without_massless,
     write_matrices,
 )
@@ -539,6 +540,25 @@ def test_what_has_no_mass_follows_exactly():
     damped = own_of(STIFFNESS, mass, damping=sp.csr_matrix(STIFFNESS))
     with pytest.raises(MatrixError, match="no mass but damping at 2 x"):
         without_massless(on_all(damped))
+
+
+def test_motions_without_mass_are_given_a_frequency():
+    """Of a mass that moves with the mean of two points: their difference has none."""
+    mean = np.array([[0.5, 0.5, 0.0], [0.0, 0.0, 1.0]])
+    mass = mean.T @ np.diag([2e-3, 5e-4]) @ mean
+    bare = on_all(own_of(STIFFNESS, mass))
+    with pytest.raises(MatrixError, match="has no mass; allowed: masses added there, structure"):
+        check_definite(bare)
+    model, light = with_light_motions(bare, 1e4)
+    assert light == ("1 x",)
+    np.testing.assert_array_equal(model.stiffness, STIFFNESS)
+    np.testing.assert_allclose(mean @ (model.mass - mass), 0.0, atol=1e-15)
+    # Its flexibility at 100 Hz is too large by the square of 100 Hz over its frequency.
+    apart, angular = np.array([1.0, -1.0, 0.0]), 2.0 * np.pi * 100.0
+    moved = [np.linalg.solve(STIFFNESS - angular**2 * m, apart) for m in (mass, model.mass)]
+    held = apart @ STIFFNESS @ apart
+    assert apart @ (moved[1] - moved[0]) == pytest.approx(4.0 / held * 1e-4, rel=0.3)
+    assert with_light_motions(model, 1e4)[1] == ()
 
 
 def test_what_has_neither_mass_nor_stiffness_is_not_there():

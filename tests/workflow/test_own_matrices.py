@@ -210,6 +210,32 @@ def test_points_without_mass_follow_the_others_and_are_told(two):
     assert np.diag(laden.model.mass) == pytest.approx([1e-3, 1e-3, 1e-6])
 
 
+def test_a_joint_on_a_point_without_mass_is_in_series_with_its_spring(two):
+    """Jenkins' 10 N/µm behind 30 N/µm to the holder is one of 7.5 N/µm on it."""
+    K = np.pad(STIFF, (0, 1)) + 30e3 * np.outer([0, -1, 1], [0, -1, 1])
+    np.savez(two / "two.npz", K=K, M=np.pad(MASS, (0, 1)))
+    (two / "unknowns.csv").write_text(f"{ROWS}tip,x\n", encoding="utf-8")
+    at_the_tip = "structure.joints=[{points: tip, direction: x}]", "structure.massless=10 MHz"
+    fine = "resolution={harmonics: 20, samples: 1024}"
+    own = run(two, OWN, *at_the_tip, fine)["responses"][0]
+    lumped = run(two / "lumped", RIG, "joint.stiffness=7.5 N/um", fine)["responses"][0]
+    # What harmonics leave, which falls by their square: 4e-4 with ten.
+    for name in ("amplitude", "energy_per_cycle"):
+        assert own[name] == pytest.approx(lumped[name], rel=1.5e-4), name
+    assert lumped["energy_per_cycle"] > 0.0
+    (two / "case.yaml").write_text(OWN, encoding="utf-8")
+    checked = command("check", two / "case.yaml", overrides=["structure.massless=2 kHz"])
+    assert "doubt: structure.massless: 2000 Hz; at 310 Hz" in checked.stdout
+
+
+def test_a_mode_that_is_lost_beside_faster_ones_is_told(two):
+    np.savez(two / "two.npz", K=np.diag([1.0, 1e7, 2e7, 1e14]), M=1e-3 * np.eye(4))
+    (two / "unknowns.csv").write_text(f"{ROWS}a,x\nb,x\n", encoding="utf-8")
+    rig_of(two)
+    warning = "the mode of 5.03 Hz is taken for a rigid motion beside the fastest"
+    assert warning in (two / "run.log").read_text(encoding="utf-8")
+
+
 def test_added_masses_do_not_turn(two):
     (two / "unknowns.csv").write_text("point,direction\nblock,x\nblock,rz\n", encoding="utf-8")
     at = "structure.joints=[{points: block, direction: x}]", "structure.seen.points=block"

@@ -37,10 +37,13 @@ def about_modes(
         )
 
 
-def about_matrices(structure: Section) -> Iterator[str]:
-    """About matrices that are hardly meant, by their masses and frequencies."""
+def about_matrices(structure: Section, highest: float) -> Iterator[str]:
+    """About matrices that are hardly meant, by their masses and frequencies.
+
+    They are to move up to the ``highest`` one [Hz].
+    """
     if isinstance(structure, MatrixBody):
-        yield from structure.doubts()
+        yield from structure.doubts(highest)
 
 
 def modes(structure: Rig | FrictionRig, stiffness: float) -> Array:

@@ -17,9 +17,9 @@ from sa_solver.types import Array
 from workflow.analyses.rig.point_kinds import known, matching
 from workflow.analyses.rig.structure import JointedBody, Moved
 from workflow.analyses.rig.unknowns_file import AXES, given_unknowns
-from workflow.case.fields import File, Text, Whole, shown, split_dataset
+from workflow.case.fields import File, Quantity, Text, Whole, shown, split_dataset
 from workflow.case.input_files import InputFileError, open_hdf5
-from workflow.case.plain import counted, plain
+from workflow.case.plain import counted, plain, shares
 from workflow.case.sections import Section, Title, disagreement, entry, together
 from workflow.case.units import UnitError, to_base
 from workflow.shell.memory import Memory, factor_bytes
@@ -42,6 +42,8 @@ SMALL, MODERATE, MANY = 600, 20_000, 2000
 # Dense matrices of a model at once, and of shapes over all unknowns; seconds of all that is done
 # with 1000 unknowns that are all kept.
 DENSE_MATRICES, SHAPES, ALL_KEPT = 12, 3, 5.0
+# Of motions that are given a frequency: a share of it from which it is doubted.
+SOFT = 0.03
 # Frequencies above rigid motions, and held unknowns, that are told.
 TOLD = 6
 # What no structure with joints is: its lowest elastic frequency [Hz], its mass [t].
@@ -219,6 +221,13 @@ class Matrices(Section):
     modes: Annotated[int, Whole(0, 1000)] | None = entry(
         "lowest ones with the retained points held, beside these", 20, default=None
     )
+    massless: Annotated[float, Quantity("Hz", above=0.0, at_most=1e9)] | None = entry(
+        "natural frequency that motions without mass are given, far above those of interest: at a "
+        "frequency f they are (f / massless)² too soft, and damped as modes are; without it points "
+        "without mass follow the others, and no other motion may lack mass [Hz]",
+        "200 kHz",
+        default=None,
+    )
 
 
 class MatrixBody(JointedBody, Matrices):
@@ -305,20 +314,32 @@ class MatrixBody(JointedBody, Matrices):
     def reduced(
         self, done: Callable[[], None] = lambda: None
     ) -> tuple[ReducedModel, tuple[str, ...]]:
-        """The model, and names of unknowns without mass, which follow the others statically.
+        """The model, and names of unknowns without mass, or of what moves most without it.
+
+        The former follow the others statically and are none of the model; ``massless`` gives mass
+        to motions, and all unknowns stay.
 
         Raises ``MatrixError``.
         """
-        from fe_models.matrices import check_definite, on_all, on_retained, without_massless
+        from fe_models.matrices import (
+            check_definite,
+            on_all,
+            on_retained,
+            with_light_motions,
+            without_massless,
+        )
 
         matrices = self.matrices.read()
         if self.retained:
             model = on_retained(matrices, self.kept, self.modes or 0, done)
         else:
             model = on_all(matrices)
-        model, dropped = without_massless(model, tuple(self.laden))
+        if self.massless is not None:
+            model, light = with_light_motions(model, self.massless)
+        else:
+            model, light = without_massless(model, tuple(self.laden))
         check_definite(model, self.laden)
-        return model, dropped
+        return model, light
 
     def memory(self) -> Memory:
         """Of the model: dense matrices, and to reduce large ones their factors."""
@@ -375,20 +396,26 @@ class MatrixBody(JointedBody, Matrices):
 
     def _told_frequencies(self) -> list[tuple[str, str]]:
         """The lowest frequencies without joints and what is added, where they are soon found."""
-        lowest = self._lowest()
+        lowest = self.lowest_frequencies()
         if lowest is None or not len(lowest):
             return []
         values = ", ".join(f"{frequency:.5g}" for frequency in lowest)
         return [("modes", f"lowest without joints, masses and springs: {values} Hz")]
 
-    def _lowest(self) -> Array | None:
+    def lowest_frequencies(self) -> Array | None:
         """The lowest natural frequencies of the matrices [Hz], None where that takes long."""
         if len(self.matrices.read().unknowns) > MODERATE:
             return None
         return _frequencies(self.matrices, self.matrices.stamps)
 
-    def doubts(self) -> Iterator[str]:
-        """A line for each thing that is hardly meant."""
+    def doubts(self, highest: float) -> Iterator[str]:
+        """A line for each thing that is hardly meant, of motions up to a frequency [Hz]."""
+        if self.massless is not None and highest > SOFT * self.massless:
+            yield (
+                f"structure.massless: {plain(self.massless, 'Hz')}; at {plain(highest, 'Hz', 3)}, "
+                "the highest of the motion, what has no mass is "
+                f"{shares((highest / self.massless) ** 2)} too soft"
+            )
         matrices = self.matrices.read()
         count = len(matrices.unknowns)
         if count > MANY and not self.retained:
@@ -403,7 +430,7 @@ class MatrixBody(JointedBody, Matrices):
                     "moved as one: are they right?"
                 )
                 break
-        lowest = self._lowest()
+        lowest = self.lowest_frequencies()
         elastic = np.empty(0) if lowest is None else lowest[lowest > 0.0]
         if len(elastic) and not SLOWEST <= elastic[0] <= FASTEST:
             yield (

@@ -6,8 +6,10 @@ from collections import Counter, defaultdict
 from collections.abc import Iterator
 
 import numpy as np
+import scipy.linalg as sl
 
 from fe_models.dynamics.model import DynamicModel
+from fe_models.dynamics.receptance import RIGID
 from fe_models.dynamics.rig import Link, RigError, reduced_rig, unit_force
 from fe_models.matrices import MatrixError
 from fe_models.matrices.reduction import listed_names
@@ -122,8 +124,33 @@ def _of_matrices(
         reduced, massless = body.reduced(Tally(progress, STEPS))
     except MatrixError as error:
         raise UserError(f"structure.{error.part or 'matrices'}: {error}") from error
-    reporter.log(f"matrices: {len(reduced.stiffness)} unknowns in the rig{_told(massless)}")
+    count = f"matrices: {len(reduced.stiffness)} unknowns in the rig"
+    if body.massless is None:
+        reporter.log(f"{count}{_told(massless)}")
+    else:
+        light = listed_names(massless) or "none"
+        reporter.log(f"{count}; given mass for {body.massless:g} Hz: motions mostly of {light}")
+        massless = ()
+    _warn_of_slow(body, reduced, reporter)
     return reduced, massless
+
+
+def _warn_of_slow(body: MatrixBody, reduced: ReducedModel, reporter: Reporter) -> None:
+    """Tell of modes so slow beside the fastest that they are taken for rigid motions."""
+    lowest = body.lowest_frequencies()
+    if lowest is None or not (lowest > 0.0).any():
+        return
+    assert reduced.names is not None
+    laden = np.zeros(len(reduced.stiffness))
+    laden[: len(reduced.names)] = [body.laden.get(name, 0.0) for name in reduced.names]
+    slowest = float(lowest[lowest > 0.0][0])
+    squares = sl.eigvalsh(reduced.stiffness, reduced.mass + np.diag(laden))
+    fastest = np.sqrt(squares[-1]) / (2.0 * np.pi)
+    if slowest < np.sqrt(RIGID) * fastest:
+        reporter.warn(
+            f"the mode of {slowest:.3g} Hz is taken for a rigid motion beside the fastest, "
+            f"{fastest:.3g} Hz; reduce by structure.retained and structure.modes"
+        )
 
 
 def _told(massless: tuple[str, ...]) -> str:

@@ -246,7 +246,8 @@ class RigCase(TimeCase):
             yield from about_modes("excitation.frequency", span, self.structure, stiffness)
         elif isinstance(excitation, Hammer):
             yield from about_modes("excitation.band", excitation.band, self.structure, stiffness)
-        yield from about_matrices(self.structure)
+        # What the steps of time resolve.
+        yield from about_matrices(self.structure, 1.0 / (FEWEST_STEPS * self.integration.step))
 
 
 # Of the difference of two recorded times.

@@ -200,7 +200,7 @@ class VibrationCaseBase(Case):
     def doubts(self) -> Iterator[str]:
         stiffness = getattr(getattr(self, "joint", None), "stiffness", RIGID)
         yield from about_modes("frequencies", self.frequencies, self.structure, stiffness)
-        yield from about_matrices(self.structure)
+        yield from about_matrices(self.structure, self.frequencies[1] * self.harmonics[-1])
 
     @property
     def driving(self) -> str:
