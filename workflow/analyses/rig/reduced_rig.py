@@ -141,6 +141,7 @@ def _warn_of_slow(body: MatrixBody, reduced: ReducedModel, reporter: Reporter) -
     if lowest is None or not (lowest > 0.0).any():
         return
     assert reduced.names is not None
+    assert reduced.mass is not None
     laden = np.zeros(len(reduced.stiffness))
     laden[: len(reduced.names)] = [body.laden.get(name, 0.0) for name in reduced.names]
     slowest = float(lowest[lowest > 0.0][0])
