@@ -11,6 +11,7 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
+from fe_models.condensation import Keep, made_anew
 from fe_models.friction import LOAD_FLOOR, FrictionalJoint, FrictionState
 from fe_models.joint import JointResolvent, JointStiffness, join, join_halves
 from fe_models.mesh import Face, Interface, StructureMesh, in_space
@@ -167,24 +168,27 @@ class Structure:
         return held[: self.dimension * faces_1], held[self.dimension * faces_1 :]
 
     def condense(
-        self, like: JointResolvent | None = None, progress: Progress = unseen
+        self,
+        like: JointResolvent | None = None,
+        progress: Progress = unseen,
+        keep: Keep = made_anew,
     ) -> JointStiffness:
         """Stiffness and loads of the joint on its interface displacements.
 
         ``like`` is a joint that differs little from this one and lends it its ρ. ``progress`` is
-        told the steps of it that are done.
+        told the steps of it that are done, ``keep`` may know bodies that were condensed before.
         """
         held_1, held_2 = self.held
         projection, held = self.projection, held_1.any() or held_2.any()
         if like is None and projection is None and not held and len(self.bodies) == 2:
-            halves = self._condense_halves(progress)
+            halves = self._condense_halves(progress, keep)
             if halves is not None:
                 return halves
         if held:
             every = sp.identity(len(held_2), format="csr") if projection is None else projection
             projection = every[~held_2][:, ~held_1]
         done = self._steps(progress)
-        condensed = self.at_once(*(partial(body.condense, done) for body in self.bodies))
+        condensed = self.at_once(*(partial(body.condense, done, keep) for body in self.bodies))
         among_free = np.cumsum(~np.concatenate(self.held)) - 1
         pairs = zip(self.bodies, self.places, strict=True)
         places = [among_free[place[~body.held]] for body, place in pairs]
@@ -196,7 +200,7 @@ class Structure:
         """Steps of a condensation: two of each body, and the joint of all."""
         return Tally(progress, 2 * len(self.bodies) + 1)
 
-    def _condense_halves(self, progress: Progress) -> JointStiffness | None:
+    def _condense_halves(self, progress: Progress, keep: Keep) -> JointStiffness | None:
         """As :meth:`condense`, by a mirror symmetry of two bodies; None if there is none."""
         body_1, body_2 = self.bodies
         for axis in body_1.elastic.body.axes:
@@ -208,8 +212,8 @@ class Structure:
                 continue
             done = self._steps(progress)
             halves_1, halves_2 = self.at_once(
-                partial(body_1.condense_halves, mirrors[0], on_1, done),
-                partial(body_2.condense_halves, mirrors[1], on_1, done),
+                partial(body_1.condense_halves, mirrors[0], on_1, done, keep),
+                partial(body_2.condense_halves, mirrors[1], on_1, done, keep),
             )
             if halves_1 is not None and halves_2 is not None:
                 joint = join_halves(halves_1, halves_2, on_1)
