@@ -59,7 +59,6 @@ def test_a_circle_through_its_nodes_alone():
     facetted = straight(points, facets).over(points[:, :2], facets, x, ROW)[:, 0]
     error, before = (abs(h - sunk(x[:, 0])).max() for h in (height, facetted))
     assert error < 0.05 * before
-    assert surface.fitted
     assert surface.straight == 0
     assert 0.1 * error < surface.error < 3.0 * error
 
@@ -77,7 +76,7 @@ def test_a_sphere_through_its_nodes_or_midsides(known: bool, left: float):
         for s in (surface, straight(points, facets))
     )
     assert error < left * before
-    assert surface.fitted is not known
+    assert (surface.left is None) is known
 
 
 def test_beside_the_face_nothing_is_known():
