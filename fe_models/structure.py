@@ -145,16 +145,15 @@ class Structure:
 
         These are displacements of faces 1, interface by interface, and then of faces 2.
         """
-        d, sides = self.dimension, (1, 2)
-        order = [(i, side) for side in sides for i in range(len(self.mesh.interfaces))]
-        sizes = [d * len(self.mesh.interfaces[i].nodes(side)) for i, side in order]
+        d, faces = self.dimension, self.mesh.interfaces
+        order = [(i, side) for side in (1, 2) for i in range(len(faces))]
+        sizes = [d * len(faces[i].nodes(side)) for i, side in order]
         ends = np.cumsum(sizes)
         place = {
             key: np.arange(end - n, end) for key, n, end in zip(order, sizes, ends, strict=True)
         }
-        names = [interface.name for interface in self.mesh.interfaces]
         return tuple(
-            np.concatenate([place[names.index(i.name), s] for i, s in self.mesh.faces_of(number)])
+            np.concatenate([place[key] for key in self.mesh.sides_of(number)])
             for number in range(len(self.bodies))
         )
 
@@ -239,6 +238,11 @@ class Structure:
         blocks = [sp.identity(len(i)) if i.projection is None else i.projection for i in interfaces]
         components = sp.identity(self.dimension)
         return sp.kron(sp.block_diag(blocks), components, format="csr")
+
+    def carried(self, moved: Array) -> Array:
+        """Displacements ``(d n, ...)`` of faces 1 at faces 2's nodes, from ``(d n_1, ...)``."""
+        projection = self.projection
+        return moved if projection is None else np.asarray(projection @ moved)
 
     @property
     def held_faces(self) -> dict[str, float]:

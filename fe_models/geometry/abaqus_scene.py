@@ -118,9 +118,8 @@ class _Reader:
                     _ignored(card, f"amplitude {amplitude}: loads grow evenly over a leg")
                 )
             for row in card.rows:
-                line = f"{row.place.path.name}:{row.place.line}"
                 try:
-                    take(card, row, line)
+                    take(card, row, row.place.short)
                 except WRONG as error:
                     one = replace(card, place=row.place, rows=[row])
                     self.ignored.append(_ignored(one, error))
@@ -169,7 +168,7 @@ class _Reader:
                 raise NotTakenError("a surface with itself")
             faces = self._group(row.fields[0]), self._group(row.fields[1])
             interaction = card.parameters.get("INTERACTION", "")
-            self.pairs.append((faces, interaction, f"{row.place.path.name}:{row.place.line}"))
+            self.pairs.append((faces, interaction, row.place.short))
 
     def _materials(self) -> dict[str, dict[str, float]]:
         """Constants of the bodies all of whose elements are of one material."""

@@ -8,7 +8,7 @@ from ruamel.yaml import YAML
 
 from fe_models.gmsh_session import gmsh_model
 from tests.workflow.commands import invoke
-from tests.workflow.mesh_scenes import ASSEMBLY, BLOCKS, TO_AND_FRO, cube, run, write_case
+from tests.workflow.mesh_scenes import ASSEMBLY, BLOCKS, TO_AND_FRO, WEAR, cube, run, write_case
 from workflow.commands.offered_case import TO_FILL
 
 pytestmark = pytest.mark.usefixtures("reads_here")
@@ -54,13 +54,6 @@ Foot-1.foot_nodes, 4, 7.
 *Restart, write
 *End Step
 """
-WEAR = {
-    "law": "energy",
-    "body_1": {"coefficient": "1e3 um^3/J"},
-    "body_2": {"coefficient": "1e3 um^3/J"},
-    "cycles": 1e3,
-    "step": {"kind": "implicit", "cycles": 500},
-}
 
 
 def deck(folder, model=MODEL):
