@@ -11,6 +11,7 @@ M x'' + C x' + K x = f(t) - Bᵀ F(B x), with joint laws F that are handed over,
 - ``HarmonicBalance``, ``PeriodicLoad``, ``Resolution``: periodic motions, by their harmonics
 - ``along_frequency``, ``along_force``: branches of them, folds included
 - ``along_phase_resonance``: the backbone of a resonance
+- ``along_nonlinear_mode``, ``LinearMode``: frequency and damping of a mode against its amplitude
 - ``ContinuationControl``, ``Accuracy``: the steps along a branch, how fine its motions are
 - ``frequency_response``, ``ring_down``: what a hammer's blow shows
 
@@ -48,6 +49,7 @@ if TYPE_CHECKING:
     from fe_models.dynamics.impact_hammer import frequency_response
     from fe_models.dynamics.model import DynamicModel
     from fe_models.dynamics.newmark import TimeStepControl, integrate
+    from fe_models.dynamics.nonlinear_mode import LinearMode, along_nonlinear_mode
     from fe_models.dynamics.phase_resonance import along_phase_resonance
     from fe_models.dynamics.rig import (
         Link,
@@ -66,6 +68,7 @@ __all__ = [
     "HammerBlow",
     "HarmonicBalance",
     "HarmonicForce",
+    "LinearMode",
     "Link",
     "PeriodicLoad",
     "RecordedForce",
@@ -73,6 +76,7 @@ __all__ = [
     "TimeStepControl",
     "along_force",
     "along_frequency",
+    "along_nonlinear_mode",
     "along_phase_resonance",
     "frequency_response",
     "integrate",
@@ -110,6 +114,10 @@ __getattr__, __dir__ = lazy_names(
         "newmark": (
             "TimeStepControl",
             "integrate",
+        ),
+        "nonlinear_mode": (
+            "LinearMode",
+            "along_nonlinear_mode",
         ),
         "phase_resonance": ("along_phase_resonance",),
         "rig": (

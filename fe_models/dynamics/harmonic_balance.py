@@ -345,14 +345,24 @@ class HarmonicBalance:
             self._richer = self.refined(Resolution(every, samples))
         return self._richer
 
-    def evaluate(self, unknowns: Array, frequency: float, force: float, over: str) -> Balance:
-        """The equations; ``over`` is what varies in their derivatives, frequency or force."""
+    def evaluate(
+        self,
+        unknowns: Array,
+        frequency: float,
+        force: float,
+        over: str,
+        steady: SteadyMotion | None = None,
+    ) -> Balance:
+        """The equations; ``over`` is what varies in their derivatives, frequency or force.
+
+        ``steady`` is the structure at this frequency, if it is damped otherwise than it is.
+        """
         resolution = self.resolution
         coefficients = self.transfer.shaped(unknowns)
         cycle = self.joints.settle(
             coefficients, resolution.basis, resolution.weights, resolution.lead
         )
-        steady = self.receptance.at(frequency * self.turning)
+        steady = steady or self.receptance.at(frequency * self.turning)
         on_modes = self._constant + force * self.wave
         on_modes -= self.transfer.on_modes(cycle.force, unknowns)
         vibration = steady.vibrate(on_modes)

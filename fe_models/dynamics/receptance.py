@@ -11,6 +11,8 @@ joints' displacement off their force: the same equations, but regular.
 
 from __future__ import annotations
 
+from copy import copy
+
 import numpy as np
 import scipy.linalg as sl
 from numba import njit
@@ -180,6 +182,13 @@ class Receptance:
     def at(self, angular: Array) -> SteadyMotion:
         """The structure at ``k`` frequencies [rad/s]."""
         return SteadyMotion(self, angular)
+
+    def less_damped(self, rate: float) -> Receptance:
+        """The structure with C - ``rate`` M [1/s] in the place of its damping."""
+        other = copy(self)
+        share = np.eye(len(self.squares)) if self.damping.ndim == 2 else 1.0
+        other.damping = self.damping - rate * share
+        return other
 
     def displacement(self, motion: ComplexArray) -> ComplexArray:
         """That of the structure ``(k, n)`` by a motion of its modes."""
