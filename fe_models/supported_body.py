@@ -43,8 +43,8 @@ class SupportedBody:
     displacements that each imposes on nodes that ``constraints`` hold; ``loaded`` are boundaries
     with tractions on them; ``thermal`` ``(vertices, cases)`` expansions of the vertices and
     ``jumps`` ``(d all, cases)`` shifts of a part of the body, which strain nothing
-    (:mod:`fe_models.pretension`): their forces are among the loads, and again what is the body's
-    ``own`` ``(d all, cases)`` of these. ``held`` ``(d n,)`` marks the
+    (:mod:`fe_models.pretension`). The forces of both are among the loads; ``own`` ``(d all,
+    cases)`` are those of the loads that do not act from outside. ``held`` ``(d n,)`` marks the
     interface displacements that are held at zero, as on a plane of symmetry. Raises ValueError if
     those of an interface node are constrained in any other way.
 

@@ -144,6 +144,16 @@ def test_the_gap_knows_what_facets_leave(turned: bool):
     assert abs(bare.areas @ bare.gap / exact - 1.0) > 0.01
 
 
+def test_the_bulge_of_an_edge_at_each_corner_in_closed_form():
+    """∫ψ_i 4 b λ_1 λ_2 with ψ_i = 4 λ_i - 1, over a third of the area: 0.6 b, 0.6 b and -0.2 b."""
+    corners, facet = np.array([[0.0, 0.0, 0.0], [1.0, 0.2, 0.0], [0.3, 0.9, 0.0]]), np.arange(3)
+    around = np.array([[-9.0, -9.0, 0.0], [9.0, -9.0, 0.0], [0.0, 9.0, 0.0]])
+    bulging = Surface(np.zeros(3), np.array([[0.01, 0.0, 0.0]]))
+    surfaces = bulging, straight(around, facet[None])
+    gap = mortar_projection(corners, facet[None], around, facet[None], surfaces).gap
+    np.testing.assert_allclose(gap, [0.006, 0.006, -0.002], rtol=1e-10)
+
+
 # --- midside nodes of files -----------------------------------------------------------------------
 
 
