@@ -10,6 +10,7 @@ M x'' + C x' + K x = f(t) - Bᵀ F(B x), with joint laws F that are handed over,
 - ``integrate``, ``TimeStepControl``: the motion in time, by Newmark's average acceleration
 - ``HarmonicBalance``, ``PeriodicLoad``, ``Resolution``: periodic motions, by their harmonics
 - ``along_frequency``, ``along_force``: branches of them, folds included
+- ``motions_at``: all motions of a branch at a frequency
 - ``along_phase_resonance``: the backbone of a resonance
 - ``ContinuationControl``, ``Accuracy``: the steps along a branch, how fine its motions are
 - ``frequency_response``, ``ring_down``: what a hammer's blow shows
@@ -34,6 +35,7 @@ from sa_solver.lazy import lazy_names
 
 if TYPE_CHECKING:
     from fe_models.dynamics.continuation import ContinuationControl
+    from fe_models.dynamics.crossings import motions_at
     from fe_models.dynamics.excitation import (
         CombinedForces,
         ConstantForce,
@@ -77,6 +79,7 @@ __all__ = [
     "frequency_response",
     "integrate",
     "lumped_rig",
+    "motions_at",
     "natural_frequencies",
     "reduced_rig",
     "ring_down",
@@ -87,6 +90,7 @@ __getattr__, __dir__ = lazy_names(
     __name__,
     {
         "continuation": ("ContinuationControl",),
+        "crossings": ("motions_at",),
         "excitation": (
             "CombinedForces",
             "ConstantForce",

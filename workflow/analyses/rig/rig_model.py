@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -13,12 +14,14 @@ from fe_models.dynamics.model import DynamicModel
 from fe_models.dynamics.motion import Motion
 from fe_models.dynamics.receptance import RIGID
 from fe_models.dynamics.rig import natural_frequencies
-from sa_solver.types import Array
+from sa_solver.types import Array, Indices
 from wear.joints.friction_contact import FrictionContact
 from workflow.analyses.rig.laws import Law
 
 # Natural frequencies that are reported, from the lowest on: those of a row of masses, all.
 MOST_FREQUENCIES = 20
+# Names of displacements that are those of modes, whichever body has them.
+MODE = r"(.* )?mode \d+"
 
 
 @dataclass(frozen=True)
@@ -54,6 +57,23 @@ class RigModel:
     def joints(self) -> int:
         """How many there are."""
         return len(self.model.connection) // self.directions
+
+    @property
+    def retained(self) -> Indices:
+        """The displacements of places ``(p,)``: all but the modes of reduced bodies."""
+        modal = [re.fullmatch(MODE, name) is not None for name in self.model.names]
+        return np.flatnonzero(np.logical_not(modal))
+
+    @property
+    def stretched(self) -> list[str]:
+        """What every direction of every joint stretches by ``(j d,)``, such as ``m2 - m1``."""
+        return [
+            " - ".join(
+                "+".join(self.model.names[place] for place in np.flatnonzero(side)) or "ground"
+                for side in ((row > 0.0, row < 0.0) if (row < 0.0).any() else (row > 0.0,))
+            )
+            for row in self.model.connection
+        ]
 
     @property
     def still(self) -> Array:
