@@ -5,6 +5,7 @@ M x'' + C x' + K x = f(t) - Bᵀ F(B x), with joint laws F that are handed over,
 
 - ``DynamicModel``: mass, damping, stiffness and where the joints are
 - ``lumped_rig``, ``reduced_rig``, ``Link``: it, from masses, springs and a reduced body
+- ``damped``: it, with Rayleigh's damping, a loss factor or dashpots
 - ``unit_force``, ``natural_frequencies``: a force on one of its points; its modes
 - ``ConstantForce``, ``HarmonicForce``, ``HammerBlow``, ``RecordedForce``, ``CombinedForces``
 - ``integrate``, ``TimeStepControl``: the motion in time, by Newmark's average acceleration
@@ -36,6 +37,7 @@ from sa_solver.lazy import lazy_names
 if TYPE_CHECKING:
     from fe_models.dynamics.continuation import ContinuationControl
     from fe_models.dynamics.crossings import motions_at
+    from fe_models.dynamics.damping import damped
     from fe_models.dynamics.excitation import (
         CombinedForces,
         ConstantForce,
@@ -76,6 +78,7 @@ __all__ = [
     "along_force",
     "along_frequency",
     "along_phase_resonance",
+    "damped",
     "frequency_response",
     "integrate",
     "lumped_rig",
@@ -91,6 +94,7 @@ __getattr__, __dir__ = lazy_names(
     {
         "continuation": ("ContinuationControl",),
         "crossings": ("motions_at",),
+        "damping": ("damped",),
         "excitation": (
             "CombinedForces",
             "ConstantForce",

@@ -17,6 +17,7 @@ from fe_models.dynamics.rig import natural_frequencies
 from sa_solver.types import Array, Indices
 from wear.joints.friction_contact import FrictionContact
 from workflow.analyses.rig.laws import Law
+from workflow.analyses.rig.place_names import PlaceNames
 
 # Natural frequencies that are reported, from the lowest on: those of a row of masses, all.
 MOST_FREQUENCIES = 20
@@ -63,6 +64,15 @@ class RigModel:
         """The displacements of places ``(p,)``: all but the modes of reduced bodies."""
         modal = [re.fullmatch(MODE, name) is not None for name in self.model.names]
         return np.flatnonzero(np.logical_not(modal))
+
+    @property
+    def place_names(self) -> PlaceNames:
+        """Its places as a case names them: masses in a row move along x."""
+        names = [self.model.names[place] for place in self.retained]
+        if not self.in_a_row:
+            return PlaceNames(names)
+        along = {f"{name} x": name for name in names}
+        return PlaceNames(list(along), along)
 
     @property
     def stretched(self) -> list[str]:
@@ -138,8 +148,11 @@ class RigModel:
         squares, shapes = sl.eigh(stiffness, self.model.mass)
         # Modes of a structure that moves freely have no damping ratio.
         lowest = np.flatnonzero(squares > RIGID * squares[-1])[:MOST_FREQUENCIES]
+        angular = np.sqrt(squares[lowest])
         lost = np.einsum("nm,nm->m", shapes, self.model.damping @ shapes)[lowest]
-        ratios: list[float] = (0.5 * lost / np.sqrt(squares[lowest])).tolist()
+        if self.model.structural is not None:
+            lost += np.einsum("nm,nm->m", shapes, self.model.structural @ shapes)[lowest] / angular
+        ratios: list[float] = (0.5 * lost / angular).tolist()
         return ratios
 
     def modes(self, law: Law, rest: Array | None = None) -> dict[str, list[float]]:
