@@ -267,6 +267,17 @@ class VibrationCase(DrivenMass):
         ["100 Hz"],
         default=(),
     )
+    at: Annotated[tuple[Frequency, ...], Field(max_length=100)] = entry(
+        "frequencies at which every motion under each force is solved for [Hz]",
+        ["100 Hz", "150 Hz"],
+        default=(),
+    )
+    harmonics_along_curves: StrictBool = entry(
+        "whether the harmonics of every point of the curves are written too, which may be large; "
+        "those at resonance, and of the motions that are solved for, always are",
+        False,
+        default=False,
+    )
     backbone: StrictBool = entry(
         "whether phase resonance, what is driven 90 degrees behind the force, is followed too",
         False,
@@ -318,14 +329,20 @@ class VibrationCase(DrivenMass):
             )
 
     @model_validator(mode="after")
-    def _loops_inside(self) -> VibrationCase:
+    def _looks_inside(self) -> VibrationCase:
         low, high = self.frequencies
-        if self.loops is not None and not low <= self.loops.frequency <= high:
-            raise disagreement(
-                f"{self.loops.frequency:g} Hz: outside; allowed: within frequencies, {low:g} to "
-                f"{high:g} Hz",
-                "loops.frequency",
-            )
+        looked_at = {f"at.{place}": frequency for place, frequency in enumerate(self.at)}
+        if self.loops is not None:
+            looked_at["loops.frequency"] = self.loops.frequency
+        for key, frequency in looked_at.items():
+            if not low <= frequency <= high:
+                raise disagreement(
+                    f"{frequency:g} Hz: outside; allowed: within frequencies, {low:g} to "
+                    f"{high:g} Hz",
+                    key,
+                )
+        if any(after <= before for before, after in pairwise(self.at)):
+            raise disagreement("not ascending; allowed: each frequency above the last", "at")
         return self
 
     def outline(self) -> list[tuple[str, str]]:
@@ -335,5 +352,6 @@ class VibrationCase(DrivenMass):
             ("joint", f"{joint.law}, {entries(joint)}"),
             ("forces", self.driving),
             ("method", self.resolved),
+            *([("motions at", f"{', '.join(f'{at:g}' for at in self.at)} Hz")] if self.at else []),
             *([] if self.loops is None else [("loops", self.loops.text)]),
         ]

@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from math import degrees
 from typing import Any
 
 from workflow.analyses.vibration.case import VibrationCase
+from workflow.analyses.vibration.harmonics import CURVE, write_harmonics
 from workflow.analyses.vibration.outcome import (
+    AT,
     FORCE_SWEEPS,
+    HARMONICS,
     LOOPS,
     NODES,
     RESONANCE,
+    Answers,
     Curves,
     Response,
     VibrationOutcome,
@@ -46,6 +51,7 @@ def _write_results(outcome: VibrationOutcome, run: Run[VibrationCase]) -> None:
         writer.put_contents(outcome.contents)
         limits = {name: outcome.numbers[name] for name in ("free", "stuck", "sliding")}
         writer.put("linear", outcome.linear, Along("frequency"), **limits)
+        writer.put("names", outcome.names)
         if outcome.contact is not None:
             writer.put("contact", outcome.contact)
         for number, response in enumerate(outcome.responses):
@@ -66,6 +72,11 @@ def _put_response(writer: ResultsWriter, place: str, response: Response) -> None
             writer.put(f"{place}/{kind}", datasets)
     for number, loop in enumerate(response.loops):
         writer.put(f"{place}/{LOOPS}/{number:05d}", loop.datasets, **loop.numbers)
+    if response.answers is not None:
+        writer.put(f"{place}/{AT}", response.answers.datasets)
+    for of, datasets in response.harmonics.items():
+        along = Along("frequency") if of == CURVE else None
+        writer.put(f"{place}/{HARMONICS}/{of}", datasets, along)
 
 
 def put_response_curves(writer: ResultsWriter, place: str, response: Response) -> None:
@@ -78,7 +89,7 @@ def put_response_curves(writer: ResultsWriter, place: str, response: Response) -
 
 
 def _write_tables(outcome: VibrationOutcome, folder: OutputFolder) -> None:
-    """Responses, loops (the finest of each force), backbone and force sweeps as CSV."""
+    """Responses, their harmonics, loops (the finest), backbone and force sweeps as CSV."""
     for number, response in enumerate(outcome.responses):
         under = f"under {response.force:g} N"
         path = folder.reserve(f"frf_{number:05d}.csv", f"response {under}, over frequency")
@@ -86,6 +97,12 @@ def _write_tables(outcome: VibrationOutcome, folder: OutputFolder) -> None:
         if response.loops:
             path = folder.reserve(f"loop_{number:05d}.csv", f"loop of the joints {under}")
             write_curves(path, response.loops[-1].datasets)
+        if response.answers is not None:
+            path = folder.reserve(f"at_{number:05d}.csv", f"motions {under}, as asked for")
+            write_curves(path, response.answers.datasets)
+        what = f"harmonics of places and joints {under}, at resonance and as asked for"
+        path = folder.reserve(f"harmonics_{number:05d}.csv", what)
+        write_harmonics(path, outcome.names, response)
     if outcome.backbone is not None:
         path = folder.reserve(f"{BACKBONE}.csv", "phase resonance, over the force")
         write_curves(path, outcome.backbone.datasets)
@@ -115,6 +132,8 @@ def _response_summary(response: Response) -> dict[str, Any]:
     summary = {"force": response.force, **response.numbers}
     if response.loops:
         summary[LOOPS] = [dict(loop.numbers) for loop in response.loops]
+    if response.answers is not None:
+        summary[AT] = [dict(numbers) for numbers in response.answers.numbers]
     return summary
 
 
@@ -124,6 +143,8 @@ def _lines(outcome: VibrationOutcome) -> Iterator[str]:
         yield f"  {_response_line(response, outcome.labels[-1])}"
         for loop in response.loops[-1:]:
             yield f"    {_loop_line(loop)}"
+        if response.answers is not None:
+            yield from _answer_lines(response.answers, outcome.labels[-1])
     if outcome.backbone is not None:
         yield f"  {_backbone_line(outcome.backbone)}"
 
@@ -142,6 +163,20 @@ def _response_line(response: Response, label: str) -> str:
     return ", ".join(parts) + (
         f"; {counted(len(numbers['folds']), 'fold')}" if numbers["folds"] else ""
     )
+
+
+def _answer_lines(answers: Answers, label: str) -> Iterator[str]:
+    """A line for each motion at a frequency that was asked for."""
+    for numbers in answers.numbers:
+        at = f"    at {numbers['frequency']:g} Hz"
+        if numbers["message"]:
+            yield f"{at}: {numbers['message']}"
+        for motion in numbers["motions"]:
+            yield (
+                f"{at}: {label} moves {TO_MICRONS * motion['amplitude']:.4g} um, "
+                f"phase {degrees(motion['phase']):.4g} deg, "
+                f"{motion['energy_per_cycle']:.4g} mJ a cycle, error {motion['error']:.1e}"
+            )
 
 
 def _loop_line(loop: Curves) -> str:

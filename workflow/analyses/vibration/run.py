@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from contextlib import AbstractContextManager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from fe_models.dynamics.harmonics import HarmonicBalanceError
 from fe_models.dynamics.receptance import ReceptanceError
 from sa_solver.steps import Steps
 from wear.joints.parameters import JointError
+from workflow.analyses.vibration.answers import answers_under
 from workflow.analyses.vibration.case import VibrationCase
+from workflow.analyses.vibration.harmonics import CURVE, harmonics_along, names_of
 from workflow.analyses.vibration.model import VibrationModel
 from workflow.analyses.vibration.outcome import Response, VibrationOutcome, trend
 from workflow.analyses.vibration.response import backbone_of, force_sweep, response_under
@@ -52,7 +54,11 @@ def _outcome(case: VibrationCase, reporter: Reporter, steps: Steps) -> Vibration
         for force in case.forces:
             with curves.next(f"{force:g} N"), reporter.stage("response"):
                 response, branch = response_under(case, model, force, reporter, steps)
-            responses.append(response)
+                answers, of_answers = answers_under(case, model, branch, reporter, steps)
+                harmonics = {**response.harmonics, **of_answers}
+                if case.harmonics_along_curves:
+                    harmonics[CURVE] = harmonics_along(model.rig, branch, reporter)
+            responses.append(replace(response, answers=answers, harmonics=harmonics))
             if case.backbone and backbone is None:
                 # From the least force on which there is a phase resonance.
                 with curves.next("backbone"), reporter.stage("backbone"):
@@ -63,6 +69,7 @@ def _outcome(case: VibrationCase, reporter: Reporter, steps: Steps) -> Vibration
     return VibrationOutcome(
         case,
         model.rig.labels,
+        names_of(model.rig),
         tuple(responses),
         linear,
         numbers | _across(responses),
