@@ -18,6 +18,8 @@ NODES, RESONANCE, LOOPS = "nodes", "resonance", "loops"
 AT, HARMONICS = "at", "harmonics"
 # Motions along the force at a frequency.
 FORCE_SWEEPS = "force_sweeps"
+# Modes over their amplitude.
+MODES = "modes"
 
 
 @dataclass(frozen=True)
@@ -71,7 +73,7 @@ class VibrationOutcome:
     whose harmonics there are. ``linear`` are the limits of joints
     that are free and stuck, over frequency; ``contact`` is where joints are and how they rest, if
     they have places; ``backbone`` the curve of phase resonance and ``force_sweeps`` motions along
-    the force, if they were asked for. ``numbers`` go
+    the force, if they were asked for, ``modes`` curves over their amplitude. ``numbers`` go
     into the summary as they are.
     """
 
@@ -84,6 +86,7 @@ class VibrationOutcome:
     contact: Datasets | None = None
     backbone: Curves | None = None
     force_sweeps: tuple[Curves, ...] = ()
+    modes: tuple[Curves, ...] = ()
 
     @property
     def contents(self) -> Contents:
@@ -96,6 +99,7 @@ class VibrationOutcome:
             places=self.contact is not None,
             backbone=self.backbone is not None,
             at=bool(self.case.at),
+            modes=tuple(f"{number:05d}" for number in range(len(self.modes))),
         )
 
 
@@ -104,8 +108,8 @@ class Contents:
     """What ``results.h5`` of a vibration case holds.
 
     ``responses`` by force, and those of them with ``loops``. Joints with ``places`` have states
-    along every response, and the cycle at resonance. There may be a ``backbone``, and motions
-    ``at`` chosen frequencies.
+    along every response, and the cycle at resonance. There may be a ``backbone``, motions ``at``
+    chosen frequencies, and ``modes`` over their amplitude.
     """
 
     responses: tuple[str, ...]
@@ -113,6 +117,7 @@ class Contents:
     places: bool
     backbone: bool
     at: bool = False
+    modes: tuple[str, ...] = ()
 
 
 def trend(values: Sequence[float]) -> float:

@@ -7,7 +7,7 @@ from functools import partial
 from typing import Any
 
 from workflow.analyses.vibration.case import VibrationCase
-from workflow.analyses.vibration.outcome import AT
+from workflow.analyses.vibration.outcome import AT, MODES
 from workflow.shell.analysis import Summary
 from workflow.shell.quantities import CurvesOf, Quantity
 from workflow.shell.summary import estimate, told
@@ -38,11 +38,17 @@ ANSWER = {
     "energy_per_cycle": ("N mm", "energy dissipated in a cycle", ""),
 }
 LOOP_WITH_ERROR = "energy", "stroke"
+# Of a mode over its amplitude.
+MODE = {
+    "linear_frequency": ("Hz", "frequency of the linear mode", ""),
+    "most_damped": ("1", "largest damping ratio", "%"),
+}
 # What runs are compared by, beside the numbers.
 CURVES = (
     CurvesOf("amplitude", "responses/*/frequency", "responses/*/amplitude", logarithmic=True),
     CurvesOf("loop", "responses/*/loops/-1/displacement", "responses/*/loops/-1/force"),
     CurvesOf("phase resonance", "backbone/force", "backbone/frequency"),
+    CurvesOf("mode", "modes/*/amplitude", "modes/*/frequency"),
 )
 
 
@@ -63,7 +69,12 @@ def main_results(case: VibrationCase, summary: Summary) -> list[Quantity]:
             ),
         )
     )
-    return told(summary, [*limits, *responses])
+    modes = (
+        quantity
+        for number, mode in enumerate(summary.get(MODES, ()))
+        for quantity in _of_mode(f"mode {mode['mode']}", f"{MODES}.{number}", summary)
+    )
+    return told(summary, [*limits, *responses, *modes])
 
 
 def of_response(group: str, path: str, summary: Summary) -> Iterator[Quantity]:
@@ -73,6 +84,11 @@ def of_response(group: str, path: str, summary: Summary) -> Iterator[Quantity]:
 
 def _of_loop(group: str, path: str, summary: Summary) -> Iterator[Quantity]:
     return _of(group, path, LOOP, LOOP_WITH_ERROR, estimate(summary, f"{path}.error", ERROR))
+
+
+def _of_mode(group: str, path: str, summary: Summary) -> Iterator[Quantity]:
+    error = estimate(summary, f"{path}.error", ERROR)
+    return _of(group, path, MODE, ("most_damped",), error)
 
 
 def _of_answers(

@@ -13,6 +13,7 @@ from workflow.analyses.vibration.outcome import (
     FORCE_SWEEPS,
     HARMONICS,
     LOOPS,
+    MODES,
     NODES,
     RESONANCE,
     Answers,
@@ -63,6 +64,9 @@ def _write_results(outcome: VibrationOutcome, run: Run[VibrationCase]) -> None:
         for number, sweep in enumerate(outcome.force_sweeps):
             place = f"{FORCE_SWEEPS}/{number:05d}"
             writer.put(place, sweep.datasets, Along("force"), **sweep.numbers)
+        for number, mode in enumerate(outcome.modes):
+            place = f"{MODES}/{number:05d}"
+            writer.put(place, mode.datasets, Along("modal_amplitude"), **mode.numbers)
 
 
 def _put_response(writer: ResultsWriter, place: str, response: Response) -> None:
@@ -109,6 +113,10 @@ def _write_tables(outcome: VibrationOutcome, folder: OutputFolder) -> None:
     for number, sweep in enumerate(outcome.force_sweeps):
         what = f"response at {sweep.numbers['frequency']:g} Hz, over the force"
         write_curves(folder.reserve(f"force_sweep_{number:05d}.csv", what), sweep.datasets)
+    for mode in outcome.modes:
+        what = f"mode {mode.numbers['mode']}, over its amplitude"
+        path = folder.reserve(f"mode_{mode.numbers['mode']:05d}.csv", what)
+        write_curves(path, mode.datasets)
 
 
 # --- summary ------------------------------------------------------------------------------------
@@ -125,6 +133,8 @@ def _summary(outcome: VibrationOutcome) -> dict[str, Any]:
         summary[BACKBONE] = {"points": points, **outcome.backbone.numbers}
     if outcome.force_sweeps:
         summary[FORCE_SWEEPS] = [dict(sweep.numbers) for sweep in outcome.force_sweeps]
+    if outcome.modes:
+        summary[MODES] = [dict(mode.numbers) for mode in outcome.modes]
     return summary
 
 
@@ -147,6 +157,8 @@ def _lines(outcome: VibrationOutcome) -> Iterator[str]:
             yield from _answer_lines(response.answers, outcome.labels[-1])
     if outcome.backbone is not None:
         yield f"  {_backbone_line(outcome.backbone)}"
+    for mode in outcome.modes:
+        yield f"  {_mode_line(mode)}"
 
 
 def _response_line(response: Response, label: str) -> str:
@@ -195,3 +207,14 @@ def _backbone_line(backbone: Curves) -> str:
         backbone.datasets[name].values[[0, -1]] for name in ("frequency", "force")
     )
     return f"phase resonance: {first:.5g} Hz under {low:g} N, {last:.5g} Hz under {high:g} N"
+
+
+def _mode_line(mode: Curves) -> str:
+    numbers = mode.numbers
+    least, largest = mode.datasets["amplitude"].values[[0, -1]]
+    first, last = numbers["frequency"]
+    return (
+        f"mode {numbers['mode']}: {first:.5g} Hz at {TO_MICRONS * least:.3g} um, {last:.5g} Hz at "
+        f"{TO_MICRONS * largest:.3g} um, damping up to {numbers['most_damped']:.2%}, "
+        f"error {numbers['error']:.1e}"
+    )

@@ -14,6 +14,7 @@ from workflow.analyses.vibration.answers import answers_under
 from workflow.analyses.vibration.case import VibrationCase
 from workflow.analyses.vibration.harmonics import CURVE, harmonics_along, names_of
 from workflow.analyses.vibration.model import VibrationModel
+from workflow.analyses.vibration.modes import mode_of
 from workflow.analyses.vibration.outcome import Response, VibrationOutcome, trend
 from workflow.analyses.vibration.response import backbone_of, force_sweep, response_under
 from workflow.analyses.vibration.results import write_vibration_output
@@ -48,7 +49,9 @@ def _outcome(case: VibrationCase, reporter: Reporter, steps: Steps) -> Vibration
     responses: list[Response] = []
     backbone = None
     sweeps = []
-    count = len(case.forces) + case.backbone + len(case.force_sweeps)
+    modes = []
+    numbered = () if case.modes is None else case.modes.numbers
+    count = len(case.forces) + case.backbone + len(case.force_sweeps) + len(numbered)
     curves = _Curves(count, reporter, growing=case.resolution.tolerance is not None)
     with reporter.course("vibration"):
         for force in case.forces:
@@ -66,6 +69,11 @@ def _outcome(case: VibrationCase, reporter: Reporter, steps: Steps) -> Vibration
         for frequency in case.force_sweeps:
             with curves.next(f"{frequency:g} Hz"), reporter.stage("force sweep"):
                 sweeps.append(force_sweep(case, model, frequency, reporter, steps))
+        for number in numbered:
+            with curves.next(f"mode {number}"), reporter.stage("mode"):
+                # As many harmonics as the largest force needed.
+                found = mode_of(case, number, model, branch.problem, reporter, steps)
+                modes.append(found)
     return VibrationOutcome(
         case,
         model.rig.labels,
@@ -76,6 +84,7 @@ def _outcome(case: VibrationCase, reporter: Reporter, steps: Steps) -> Vibration
         contact,
         backbone,
         tuple(sweeps),
+        tuple(modes),
     )
 
 

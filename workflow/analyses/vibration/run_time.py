@@ -31,6 +31,9 @@ def run_time(case: VibrationCase) -> RunTime:
     if case.backbone or case.force_sweeps:
         along = log(case.forces[-1] / case.forces[0])
         curves += (case.backbone + len(case.force_sweeps)) * along
+    if case.modes is not None:
+        least, largest = case.modes.amplitudes
+        curves += len(case.modes.numbers) * log(largest / least)
     points = POINTS * curves + ANSWER * len(case.at) * len(case.forces)
     return RunTime(structure_time(case), points * point_time(case))
 

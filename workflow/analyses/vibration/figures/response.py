@@ -11,6 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from workflow.analyses.vibration.figures.loops import loops
+from workflow.analyses.vibration.figures.modes import modes
 from workflow.analyses.vibration.figures.states import node_states, pad_states
 from workflow.analyses.vibration.outcome import AT, Contents
 from workflow.pictures.panels import (
@@ -38,6 +39,7 @@ def figures_of(contents: Contents) -> Figures:
     drawn = {
         "frequency_response": (frequency_response, True),
         "resonance": (resonance, len(contents.responses) > 1 or contents.backbone),
+        "modes": (modes, bool(contents.modes)),
         "loops": (loops, bool(contents.loops)),
         "node_states": (node_states, contents.places),
         "pad_states": (pad_states, contents.places),
