@@ -24,7 +24,14 @@ from wear.joints.periodic import PeriodicMarch, SettledCycle
 
 @dataclass(frozen=True)
 class JointGroup:
-    """So many ``joints`` of a ``law``."""
+    """So many ``joints`` of a ``law``.
+
+    Examples
+    --------
+    >>> from wear.joints import Jenkins, JointGroup
+    >>> JointGroup(Jenkins(stiffness=1e3, friction=0.5, normal_load=10.0), joints=4).joints
+    4
+    """
 
     law: Jenkins | BoucWen | MasingLaw | FrictionContact
     joints: int
