@@ -29,7 +29,7 @@ def friction_rig(
     upper: ReducedModel,
     masses: tuple[float, float],
     springs: tuple[float, float],
-    damping_ratio: float = 0.0,
+    damping_ratio: float | Array = 0.0,
 ) -> DynamicModel:
     """Both specimens and the rig, a joint of three directions at every pair of pad nodes.
 

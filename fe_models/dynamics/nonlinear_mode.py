@@ -278,7 +278,7 @@ class LinearMode:
             )
         place = elastic[number - 1]
         angular = float(np.sqrt(stuck.squares[place]))
-        ratio = float(stuck.damping[place]) / (2.0 * angular)
+        ratio = float(stuck.damping[place] + stuck.loss[place] / angular) / (2.0 * angular)
         return cls(angular / (2.0 * np.pi), ratio, stuck.at_points[:, place])
 
 

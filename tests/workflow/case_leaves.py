@@ -176,7 +176,15 @@ EVOLUTION = {
     for name in ("friction", "stiffness", "residual_stiffness", "normal_load")
 }
 GIVEN["joint"] = {"joint": JOINTS, **EVOLUTION, "reported": {ALWAYS: TOLD}}
-GIVEN["vibration_wear"] = GIVEN["friction_rig_wear"] = {}
+DASHPOTS = [{"points": "m1", "coefficient": 1}]
+DAMPING = {
+    "structure.damping.rayleigh": {
+        "factors": {"kind": "factors", "mass_factor": 1, "stiffness_factor": 1},
+        "ratios": {"kind": "ratios", "frequencies": [0.5, 2], "ratios": [0.5, 0.5]},
+    },
+    "structure.damping.dashpots": {ALWAYS: DASHPOTS},
+}
+GIVEN["vibration_wear"] = GIVEN["friction_rig_wear"] = DAMPING
 CONTACT = {"law": "friction_contact", **JOINT, "normal_load": 0, "normal_stiffness": 1e4}
 REDUCED = {
     "kind": "reduced",
@@ -197,11 +205,13 @@ FRICTION_RIG = {
 }
 GIVEN["vibration"] = {
     "structure": {"reduced": REDUCED, "friction_rig": FRICTION_RIG},
+    **DAMPING,
     "joint": JOINTS | {"friction_contact": CONTACT},
     "loops": {ALWAYS: {"frequency": "100 Hz"}},
 }
 GIVEN["rig"] = GIVEN["joint"] | {
     "structure": {"reduced": REDUCED},
+    **DAMPING,
     "joint": JOINTS | {"friction_contact": CONTACT},
     "ageing": {ALWAYS: {"cycles": 1000}},
     "excitation": {

@@ -25,7 +25,9 @@ def friction_rig_model(rig: FrictionRig, reporter: Reporter) -> RigModel:
         key, file = "structure.specimens", rig.specimens
         bodies = reduced_specimens(key, file, reporter, told, rig.target_distance)
     try:
-        model = friction_rig(*bodies.reduction.models, rig.masses, rig.springs, rig.damping_ratio)
+        model = friction_rig(
+            *bodies.reduction.models, rig.masses, rig.springs, np.array(rig.damping_ratio)
+        )
     except RigError as error:
         raise UserError(f"structure: {error}") from error
     face = bodies.face

@@ -189,6 +189,17 @@ class RigCase(TimeCase):
         return self
 
     @model_validator(mode="after")
+    def _is_damped_in_time(self) -> RigCase:
+        damping = self.structure.damping
+        if damping is not None and damping.loss_factor > 0.0:
+            raise disagreement(
+                f"{damping.loss_factor:g}: in steady vibration only; allowed: 0, and half of it as "
+                "structure.damping_ratio, which is the same at resonance",
+                "structure.damping.loss_factor",
+            )
+        return self
+
+    @model_validator(mode="after")
     def _has_the_directions(self) -> RigCase:
         if isinstance(self.joint, FrictionContactJoint) and isinstance(self.structure, Rig):
             raise disagreement(

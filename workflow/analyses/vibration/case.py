@@ -28,6 +28,7 @@ from workflow.case.source import Source
 
 MOST_ODD, HIGHEST = 100, 999
 ODD = (1, 3, 5, 7, 9, 11, 13, 15)
+Amplitude = Annotated[float, Quantity("mm", above=0.0, at_most=1e3)]
 Step = Annotated[float, Quantity("1", at_least=1e-12, at_most=10.0)]
 
 
@@ -159,6 +160,32 @@ class LoopsAt(Section):
         return self
 
 
+class NonlinearModes(Section):
+    """Modes with joints, over their amplitude: with neither a force nor a phase to choose."""
+
+    numbers: Annotated[tuple[Annotated[int, Whole(1, 1000)], ...], Field(min_length=1)] = entry(
+        "of the modes with joints as stiff as at rest, from the lowest, 1, on", [1], default=(1,)
+    )
+    amplitudes: tuple[Amplitude, Amplitude] = entry(
+        "least and largest, of what is looked at [mm]", ["0.1 um", "20 um"]
+    )
+
+    @model_validator(mode="after")
+    def _ascends(self) -> NonlinearModes:
+        if self.amplitudes[0] >= self.amplitudes[1]:
+            raise disagreement("not ascending; allowed: the least, then the largest", "amplitudes")
+        if len(set(self.numbers)) < len(self.numbers):
+            raise disagreement("a mode twice; allowed: each once", "numbers")
+        return self
+
+    @property
+    def text(self) -> str:
+        """Which, and over what."""
+        least, largest = (1e3 * amplitude for amplitude in self.amplitudes)
+        modes = ", ".join(map(str, self.numbers))
+        return f"{modes}, at amplitudes of {least:g} to {largest:g} µm"
+
+
 class VibrationCaseBase(Case):
     """A structure under forces a sin(2π frequency t), for all frequencies of a span."""
 
@@ -267,10 +294,24 @@ class VibrationCase(DrivenMass):
         ["100 Hz"],
         default=(),
     )
+    at: Annotated[tuple[Frequency, ...], Field(max_length=100)] = entry(
+        "frequencies at which every motion under each force is solved for [Hz]",
+        ["100 Hz", "150 Hz"],
+        default=(),
+    )
+    harmonics_along_curves: StrictBool = entry(
+        "whether the harmonics of every point of the curves are written too, which may be large; "
+        "those at resonance, and of the motions that are solved for, always are",
+        False,
+        default=False,
+    )
     backbone: StrictBool = entry(
         "whether phase resonance, what is driven 90 degrees behind the force, is followed too",
         False,
         default=False,
+    )
+    modes: NonlinearModes | None = entry(
+        "whose frequency and damping are followed over the amplitude", default=None
     )
 
     @property
@@ -318,14 +359,20 @@ class VibrationCase(DrivenMass):
             )
 
     @model_validator(mode="after")
-    def _loops_inside(self) -> VibrationCase:
+    def _looks_inside(self) -> VibrationCase:
         low, high = self.frequencies
-        if self.loops is not None and not low <= self.loops.frequency <= high:
-            raise disagreement(
-                f"{self.loops.frequency:g} Hz: outside; allowed: within frequencies, {low:g} to "
-                f"{high:g} Hz",
-                "loops.frequency",
-            )
+        looked_at = {f"at.{place}": frequency for place, frequency in enumerate(self.at)}
+        if self.loops is not None:
+            looked_at["loops.frequency"] = self.loops.frequency
+        for key, frequency in looked_at.items():
+            if not low <= frequency <= high:
+                raise disagreement(
+                    f"{frequency:g} Hz: outside; allowed: within frequencies, {low:g} to "
+                    f"{high:g} Hz",
+                    key,
+                )
+        if any(after <= before for before, after in pairwise(self.at)):
+            raise disagreement("not ascending; allowed: each frequency above the last", "at")
         return self
 
     def outline(self) -> list[tuple[str, str]]:
@@ -335,5 +382,7 @@ class VibrationCase(DrivenMass):
             ("joint", f"{joint.law}, {entries(joint)}"),
             ("forces", self.driving),
             ("method", self.resolved),
+            *([("motions at", f"{', '.join(f'{at:g}' for at in self.at)} Hz")] if self.at else []),
             *([] if self.loops is None else [("loops", self.loops.text)]),
+            *([] if self.modes is None else [("modes", self.modes.text)]),
         ]

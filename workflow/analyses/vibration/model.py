@@ -95,7 +95,8 @@ class VibrationModel:
     @property
     def undamped(self) -> bool:
         """Whether only the joints bound a resonance."""
-        return not self.problem.receptance.damping.any()
+        receptance = self.problem.receptance
+        return not (receptance.damping.any() or receptance.loss.any())
 
     @cached_property
     def _natural(self) -> dict[str, list[float]]:

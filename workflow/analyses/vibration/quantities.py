@@ -7,6 +7,7 @@ from functools import partial
 from typing import Any
 
 from workflow.analyses.vibration.case import VibrationCase
+from workflow.analyses.vibration.outcome import AT, MODES
 from workflow.shell.analysis import Summary
 from workflow.shell.quantities import CurvesOf, Quantity
 from workflow.shell.summary import estimate, told
@@ -30,12 +31,24 @@ LOOP = {
     "stiffness": ("N/mm", "stick slope of the loop", "N/um"),
     "friction": ("1", "friction coefficient of the loop", ""),
 }
+# Of a motion at a frequency that was asked for.
+ANSWER = {
+    "amplitude": ("mm", "amplitude", ""),
+    "phase": ("rad", "phase before the force", "deg"),
+    "energy_per_cycle": ("N mm", "energy dissipated in a cycle", ""),
+}
 LOOP_WITH_ERROR = "energy", "stroke"
+# Of a mode over its amplitude.
+MODE = {
+    "linear_frequency": ("Hz", "frequency of the linear mode", ""),
+    "most_damped": ("1", "largest damping ratio", "%"),
+}
 # What runs are compared by, beside the numbers.
 CURVES = (
     CurvesOf("amplitude", "responses/*/frequency", "responses/*/amplitude", logarithmic=True),
     CurvesOf("loop", "responses/*/loops/-1/displacement", "responses/*/loops/-1/force"),
     CurvesOf("phase resonance", "backbone/force", "backbone/frequency"),
+    CurvesOf("mode", "modes/*/amplitude", "modes/*/frequency"),
 )
 
 
@@ -51,9 +64,17 @@ def main_results(case: VibrationCase, summary: Summary) -> list[Quantity]:
         for quantity in (
             *of_response(f"under {response['force']:g} N", f"responses.{number}", summary),
             *_of_loop(f"under {response['force']:g} N", f"responses.{number}.loops.-1", summary),
+            *_of_answers(
+                f"under {response['force']:g} N", f"responses.{number}", response, summary
+            ),
         )
     )
-    return told(summary, [*limits, *responses])
+    modes = (
+        quantity
+        for number, mode in enumerate(summary.get(MODES, ()))
+        for quantity in _of_mode(f"mode {mode['mode']}", f"{MODES}.{number}", summary)
+    )
+    return told(summary, [*limits, *responses, *modes])
 
 
 def of_response(group: str, path: str, summary: Summary) -> Iterator[Quantity]:
@@ -63,6 +84,26 @@ def of_response(group: str, path: str, summary: Summary) -> Iterator[Quantity]:
 
 def _of_loop(group: str, path: str, summary: Summary) -> Iterator[Quantity]:
     return _of(group, path, LOOP, LOOP_WITH_ERROR, estimate(summary, f"{path}.error", ERROR))
+
+
+def _of_mode(group: str, path: str, summary: Summary) -> Iterator[Quantity]:
+    error = estimate(summary, f"{path}.error", ERROR)
+    return _of(group, path, MODE, ("most_damped",), error)
+
+
+def _of_answers(
+    group: str, path: str, response: Mapping[str, Any], summary: Summary
+) -> Iterator[Quantity]:
+    """Motions at the frequencies that were asked for: of several that coexist, each."""
+    for place, answer in enumerate(response.get(AT, ())):
+        count = len(answer["motions"])
+        for number in range(count):
+            of = f"{path}.{AT}.{place}.motions.{number}"
+            error = estimate(summary, f"{of}.error", ERROR)
+            which = f", motion {number + 1} of {count}" if count > 1 else ""
+            suffix = f" at {answer['frequency']:g} Hz{which}"
+            told = {name: (unit, text + suffix, as_) for name, (unit, text, as_) in ANSWER.items()}
+            yield from _of(group, of, told, WITH_ERROR, error)
 
 
 def _of(

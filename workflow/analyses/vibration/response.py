@@ -29,9 +29,10 @@ from sa_solver.types import Array
 from wear.joints.periodic import SEPARATED, SLIP
 from wear.moving import LARGE_STROKE
 from workflow.analyses.vibration.case import VibrationCase
+from workflow.analyses.vibration.harmonics import harmonics_of
 from workflow.analyses.vibration.loops import loop_of
 from workflow.analyses.vibration.model import VibrationModel
-from workflow.analyses.vibration.outcome import Curves, Response
+from workflow.analyses.vibration.outcome import RESONANCE, Curves, Response
 from workflow.errors import MethodFailed
 from workflow.shell.dataset import Dataset, Datasets
 from workflow.shell.reporter import Reporter
@@ -129,7 +130,7 @@ def response_under(
     peak = steps("resonance", lambda: _resonance(model, branch, curves))
     # The peak may have been found before the resolution grew.
     problem = branch.problem.refined(peak.resolution)
-    resonance = steps("accurate resonance", lambda: _accurate(problem, peak, accuracy))
+    resonance = steps("accurate resonance", lambda: accurate(problem, peak, accuracy))
     _warn_of_stroke(model, resonance, reporter)
     response = Response(
         force,
@@ -138,6 +139,7 @@ def response_under(
         nodes=_nodes(branch) if model.rig.pressing is not None else None,
         resonance=_cycle(resonance) if model.rig.pressing is not None else None,
         loops=_loops(case, model, branch, reporter, steps),
+        harmonics={RESONANCE: harmonics_of(model.rig, resonance)},
     )
     warn_of_error(f"{force:g} N: the motion", response.numbers["error"], case, reporter)
     return response, branch
@@ -206,7 +208,7 @@ def backbone_of(
         reporter.warn(f"backbone: {backbone.message}")
     if not backbone.solutions:
         return None
-    columns = _motion_columns(model, backbone.problem, backbone.solutions)
+    columns = motion_columns(model, backbone.problem, backbone.solutions)
     resonance = "of phase resonance: what is driven lags the force by 90 degrees"
     datasets = {
         "force": Dataset(backbone.forces, "N", "amplitude of the force"),
@@ -248,7 +250,7 @@ def _numbers(
 def _curves(model: VibrationModel, branch: ResponseBranch) -> dict[str, Dataset]:
     along = "frequency of the force, in the order of the curve"
     frequency = Dataset(branch.frequencies, "Hz", along)
-    return {"frequency": frequency, **_motion_columns(model, branch.problem, branch.solutions)}
+    return {"frequency": frequency, **motion_columns(model, branch.problem, branch.solutions)}
 
 
 def _of_the_last(amplitudes: Dataset) -> Dataset:
@@ -257,7 +259,7 @@ def _of_the_last(amplitudes: Dataset) -> Dataset:
     return Dataset(last, "mm", "half of the way to and fro of what is looked at")
 
 
-def _motion_columns(
+def motion_columns(
     model: VibrationModel, problem: HarmonicBalance, motions: Sequence[HarmonicSolution]
 ) -> dict[str, Dataset]:
     """What structure and joints do along a curve, ``(n,)`` each; amplitudes ``(n, k)``."""
@@ -369,7 +371,7 @@ def _resonance(model: VibrationModel, branch: ResponseBranch, curves: Datasets) 
     return top if top.converged and -search.fun > sizes[place] else best
 
 
-def _accurate(
+def accurate(
     problem: HarmonicBalance, motion: HarmonicSolution, accuracy: Accuracy | None
 ) -> HarmonicSolution:
     """The motion with its error; as accurate as asked for, if that is asked for."""

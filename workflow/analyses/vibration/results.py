@@ -3,14 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from math import degrees
 from typing import Any
 
 from workflow.analyses.vibration.case import VibrationCase
+from workflow.analyses.vibration.harmonics import CURVE, write_harmonics
 from workflow.analyses.vibration.outcome import (
+    AT,
     FORCE_SWEEPS,
+    HARMONICS,
     LOOPS,
+    MODES,
     NODES,
     RESONANCE,
+    Answers,
     Curves,
     Response,
     VibrationOutcome,
@@ -46,6 +52,7 @@ def _write_results(outcome: VibrationOutcome, run: Run[VibrationCase]) -> None:
         writer.put_contents(outcome.contents)
         limits = {name: outcome.numbers[name] for name in ("free", "stuck", "sliding")}
         writer.put("linear", outcome.linear, Along("frequency"), **limits)
+        writer.put("names", outcome.names)
         if outcome.contact is not None:
             writer.put("contact", outcome.contact)
         for number, response in enumerate(outcome.responses):
@@ -57,6 +64,9 @@ def _write_results(outcome: VibrationOutcome, run: Run[VibrationCase]) -> None:
         for number, sweep in enumerate(outcome.force_sweeps):
             place = f"{FORCE_SWEEPS}/{number:05d}"
             writer.put(place, sweep.datasets, Along("force"), **sweep.numbers)
+        for number, mode in enumerate(outcome.modes):
+            place = f"{MODES}/{number:05d}"
+            writer.put(place, mode.datasets, Along("modal_amplitude"), **mode.numbers)
 
 
 def _put_response(writer: ResultsWriter, place: str, response: Response) -> None:
@@ -66,6 +76,11 @@ def _put_response(writer: ResultsWriter, place: str, response: Response) -> None
             writer.put(f"{place}/{kind}", datasets)
     for number, loop in enumerate(response.loops):
         writer.put(f"{place}/{LOOPS}/{number:05d}", loop.datasets, **loop.numbers)
+    if response.answers is not None:
+        writer.put(f"{place}/{AT}", response.answers.datasets)
+    for of, datasets in response.harmonics.items():
+        along = Along("frequency") if of == CURVE else None
+        writer.put(f"{place}/{HARMONICS}/{of}", datasets, along)
 
 
 def put_response_curves(writer: ResultsWriter, place: str, response: Response) -> None:
@@ -78,7 +93,7 @@ def put_response_curves(writer: ResultsWriter, place: str, response: Response) -
 
 
 def _write_tables(outcome: VibrationOutcome, folder: OutputFolder) -> None:
-    """Responses, loops (the finest of each force), backbone and force sweeps as CSV."""
+    """Responses, their harmonics, loops (the finest), backbone and force sweeps as CSV."""
     for number, response in enumerate(outcome.responses):
         under = f"under {response.force:g} N"
         path = folder.reserve(f"frf_{number:05d}.csv", f"response {under}, over frequency")
@@ -86,12 +101,22 @@ def _write_tables(outcome: VibrationOutcome, folder: OutputFolder) -> None:
         if response.loops:
             path = folder.reserve(f"loop_{number:05d}.csv", f"loop of the joints {under}")
             write_curves(path, response.loops[-1].datasets)
+        if response.answers is not None:
+            path = folder.reserve(f"at_{number:05d}.csv", f"motions {under}, as asked for")
+            write_curves(path, response.answers.datasets)
+        what = f"harmonics of places and joints {under}, at resonance and as asked for"
+        path = folder.reserve(f"harmonics_{number:05d}.csv", what)
+        write_harmonics(path, outcome.names, response)
     if outcome.backbone is not None:
         path = folder.reserve(f"{BACKBONE}.csv", "phase resonance, over the force")
         write_curves(path, outcome.backbone.datasets)
     for number, sweep in enumerate(outcome.force_sweeps):
         what = f"response at {sweep.numbers['frequency']:g} Hz, over the force"
         write_curves(folder.reserve(f"force_sweep_{number:05d}.csv", what), sweep.datasets)
+    for mode in outcome.modes:
+        what = f"mode {mode.numbers['mode']}, over its amplitude"
+        path = folder.reserve(f"mode_{mode.numbers['mode']:05d}.csv", what)
+        write_curves(path, mode.datasets)
 
 
 # --- summary ------------------------------------------------------------------------------------
@@ -108,6 +133,8 @@ def _summary(outcome: VibrationOutcome) -> dict[str, Any]:
         summary[BACKBONE] = {"points": points, **outcome.backbone.numbers}
     if outcome.force_sweeps:
         summary[FORCE_SWEEPS] = [dict(sweep.numbers) for sweep in outcome.force_sweeps]
+    if outcome.modes:
+        summary[MODES] = [dict(mode.numbers) for mode in outcome.modes]
     return summary
 
 
@@ -115,6 +142,8 @@ def _response_summary(response: Response) -> dict[str, Any]:
     summary = {"force": response.force, **response.numbers}
     if response.loops:
         summary[LOOPS] = [dict(loop.numbers) for loop in response.loops]
+    if response.answers is not None:
+        summary[AT] = [dict(numbers) for numbers in response.answers.numbers]
     return summary
 
 
@@ -124,8 +153,12 @@ def _lines(outcome: VibrationOutcome) -> Iterator[str]:
         yield f"  {_response_line(response, outcome.labels[-1])}"
         for loop in response.loops[-1:]:
             yield f"    {_loop_line(loop)}"
+        if response.answers is not None:
+            yield from _answer_lines(response.answers, outcome.labels[-1])
     if outcome.backbone is not None:
         yield f"  {_backbone_line(outcome.backbone)}"
+    for mode in outcome.modes:
+        yield f"  {_mode_line(mode)}"
 
 
 def _response_line(response: Response, label: str) -> str:
@@ -144,6 +177,20 @@ def _response_line(response: Response, label: str) -> str:
     )
 
 
+def _answer_lines(answers: Answers, label: str) -> Iterator[str]:
+    """A line for each motion at a frequency that was asked for."""
+    for numbers in answers.numbers:
+        at = f"    at {numbers['frequency']:g} Hz"
+        if numbers["message"]:
+            yield f"{at}: {numbers['message']}"
+        for motion in numbers["motions"]:
+            yield (
+                f"{at}: {label} moves {TO_MICRONS * motion['amplitude']:.4g} um, "
+                f"phase {degrees(motion['phase']):.4g} deg, "
+                f"{motion['energy_per_cycle']:.4g} mJ a cycle, error {motion['error']:.1e}"
+            )
+
+
 def _loop_line(loop: Curves) -> str:
     numbers = loop.numbers
     lost = f"{numbers['energy']:.4g} mJ" if numbers["slip"] > 0.0 else "no slip"
@@ -160,3 +207,14 @@ def _backbone_line(backbone: Curves) -> str:
         backbone.datasets[name].values[[0, -1]] for name in ("frequency", "force")
     )
     return f"phase resonance: {first:.5g} Hz under {low:g} N, {last:.5g} Hz under {high:g} N"
+
+
+def _mode_line(mode: Curves) -> str:
+    numbers = mode.numbers
+    least, largest = mode.datasets["amplitude"].values[[0, -1]]
+    first, last = numbers["frequency"]
+    return (
+        f"mode {numbers['mode']}: {first:.5g} Hz at {TO_MICRONS * least:.3g} um, {last:.5g} Hz at "
+        f"{TO_MICRONS * largest:.3g} um, damping up to {numbers['most_damped']:.2%}, "
+        f"error {numbers['error']:.1e}"
+    )

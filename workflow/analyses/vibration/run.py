@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from contextlib import AbstractContextManager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from fe_models.dynamics.harmonics import HarmonicBalanceError
 from fe_models.dynamics.receptance import ReceptanceError
 from sa_solver.steps import Steps
 from wear.joints.parameters import JointError
+from workflow.analyses.vibration.answers import answers_under
 from workflow.analyses.vibration.case import VibrationCase
+from workflow.analyses.vibration.harmonics import CURVE, harmonics_along, names_of
 from workflow.analyses.vibration.model import VibrationModel
+from workflow.analyses.vibration.modes import mode_of
 from workflow.analyses.vibration.outcome import Response, VibrationOutcome, trend
 from workflow.analyses.vibration.response import backbone_of, force_sweep, response_under
 from workflow.analyses.vibration.results import write_vibration_output
@@ -46,13 +49,19 @@ def _outcome(case: VibrationCase, reporter: Reporter, steps: Steps) -> Vibration
     responses: list[Response] = []
     backbone = None
     sweeps = []
-    count = len(case.forces) + case.backbone + len(case.force_sweeps)
+    modes = []
+    numbered = () if case.modes is None else case.modes.numbers
+    count = len(case.forces) + case.backbone + len(case.force_sweeps) + len(numbered)
     curves = _Curves(count, reporter, growing=case.resolution.tolerance is not None)
     with reporter.course("vibration"):
         for force in case.forces:
             with curves.next(f"{force:g} N"), reporter.stage("response"):
                 response, branch = response_under(case, model, force, reporter, steps)
-            responses.append(response)
+                answers, of_answers = answers_under(case, model, branch, reporter, steps)
+                harmonics = {**response.harmonics, **of_answers}
+                if case.harmonics_along_curves:
+                    harmonics[CURVE] = harmonics_along(model.rig, branch, reporter)
+            responses.append(replace(response, answers=answers, harmonics=harmonics))
             if case.backbone and backbone is None:
                 # From the least force on which there is a phase resonance.
                 with curves.next("backbone"), reporter.stage("backbone"):
@@ -60,15 +69,22 @@ def _outcome(case: VibrationCase, reporter: Reporter, steps: Steps) -> Vibration
         for frequency in case.force_sweeps:
             with curves.next(f"{frequency:g} Hz"), reporter.stage("force sweep"):
                 sweeps.append(force_sweep(case, model, frequency, reporter, steps))
+        for number in numbered:
+            with curves.next(f"mode {number}"), reporter.stage("mode"):
+                # As many harmonics as the largest force needed.
+                found = mode_of(case, number, model, branch.problem, reporter, steps)
+                modes.append(found)
     return VibrationOutcome(
         case,
         model.rig.labels,
+        names_of(model.rig),
         tuple(responses),
         linear,
         numbers | _across(responses),
         contact,
         backbone,
         tuple(sweeps),
+        tuple(modes),
     )
 
 

@@ -11,8 +11,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from workflow.analyses.vibration.figures.loops import loops
+from workflow.analyses.vibration.figures.modes import modes
 from workflow.analyses.vibration.figures.states import node_states, pad_states
-from workflow.analyses.vibration.outcome import Contents
+from workflow.analyses.vibration.outcome import AT, Contents
 from workflow.pictures.panels import (
     Figures,
     legend_below,
@@ -28,6 +29,7 @@ MOST_CURVES = 8
 TO_PERCENT = 1e2
 LIMIT: dict[str, Any] = {"color": BLACK, "linewidth": 0.8}
 STYLES = {"free": ":", "stuck": "--"}
+ASKED: dict[str, Any] = {"markersize": 4.5, "markerfacecolor": "white"}
 # Room above the highest peak and below the lowest response, as factors.
 ABOVE, BELOW = 3.0, 0.5
 
@@ -37,6 +39,7 @@ def figures_of(contents: Contents) -> Figures:
     drawn = {
         "frequency_response": (frequency_response, True),
         "resonance": (resonance, len(contents.responses) > 1 or contents.backbone),
+        "modes": (modes, bool(contents.modes)),
         "loops": (loops, bool(contents.loops)),
         "node_states": (node_states, contents.places),
         "pad_states": (pad_states, contents.places),
@@ -76,6 +79,10 @@ def frequency_response(file: h5py.File, contents: Contents) -> Figure:
         peaks.append(TO_MICRONS * float(response.attrs["amplitude"]) / force)
         lows.append(size.min() / force)
         axis.plot(response.attrs["resonance"], peaks[-1], "o", color=colour, markersize=5)
+        if contents.at:
+            asked = response[AT]
+            sizes = TO_MICRONS * asked["amplitude"][:, -1] / force
+            axis.plot(asked["frequency"][()], sizes, "D", color=colour, **ASKED)
     _over_frequency(axis, file)
     axis.set_ylabel(f"amplitude of {_seen(file)} / force [µm/N]")
     axis.set_ylim(BELOW * min(lows), ABOVE * max(peaks))
