@@ -96,6 +96,7 @@ class VibrationOutcome:
             places=self.contact is not None,
             backbone=self.backbone is not None,
             at=bool(self.case.at),
+            engine=self.case.engine_order is not None,
         )
 
 
@@ -105,7 +106,7 @@ class Contents:
 
     ``responses`` by force, and those of them with ``loops``. Joints with ``places`` have states
     along every response, and the cycle at resonance. There may be a ``backbone``, and motions
-    ``at`` chosen frequencies.
+    ``at`` chosen frequencies; frequencies may be those of an ``engine``.
     """
 
     responses: tuple[str, ...]
@@ -113,6 +114,7 @@ class Contents:
     places: bool
     backbone: bool
     at: bool = False
+    engine: bool = False
 
 
 def trend(values: Sequence[float]) -> float:
