@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from fe_models.dynamics.damping import damped
+from fe_models.dynamics.ground_motion import Translation
 from fe_models.dynamics.rig import Link, lumped_rig, unit_force
 from workflow.analyses.rig.damping import Damping
 from workflow.analyses.rig.friction_rig import friction_rig_model
@@ -44,7 +45,8 @@ def row_of_masses(rig: Rig, driven: int = 1) -> RigModel:
         np.array(rig.damping_ratio),
     )
     driving = unit_force(model, f"m{driven}")
-    built = RigModel(model, driving, np.eye(len(names)), tuple(names))
+    along = Translation(np.ones(len(names)), model.mass.sum(axis=1))
+    built = RigModel(model, driving, np.eye(len(names)), tuple(names), translations={"x": along})
     return _damped(built, rig.damping)
 
 

@@ -4,14 +4,18 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Iterator
+from contextlib import suppress
 
 import numpy as np
 
+from fe_models.dynamics.ground_motion import Translation, translation_of
+from fe_models.dynamics.model import DynamicModel
 from fe_models.dynamics.rig import Link, RigError, reduced_rig, unit_force
 from fe_models.mesh import MeshError
 from fe_models.reduction import ReducedModel
-from sa_solver.types import Progress
+from sa_solver.types import Array, Progress
 from workflow.analyses.rig.place_names import PlaceNames, link_along
+from workflow.analyses.rig.places import Moved
 from workflow.analyses.rig.rig_model import RigModel
 from workflow.analyses.rig.structure import JointPlaces, ReducedBody
 from workflow.analyses.specimens.case import SpecimensCase
@@ -51,17 +55,36 @@ def reduced_rig_model(body: ReducedBody, directions: int, reporter: Reporter) ->
             points.springs(body),
             np.array(body.damping_ratio),
         )
-        driven, seen = (
-            np.sum(
-                [share * unit_force(model, name) for name, share in points.shared(moved, key)], 0
-            )
-            for moved, key in ((body.driven, "structure.driven"), (body.seen, "structure.seen"))
-        )
+        seen = _shape(model, points, body.seen, "structure.seen")
+        driven = np.zeros_like(seen)
+        if body.driven is not None:
+            driven = _shape(model, points, body.driven, "structure.driven")
     except RigError as error:
         raise UserError(f"structure: {error}") from error
     label = f"{body.seen.points} {body.seen.direction}"
     along = _along(directions, body)
-    return RigModel(model, driven, seen[None], (label,), directions, along, in_a_row=False)
+    return RigModel(
+        *(model, driven, seen[None], (label,), directions, along),
+        in_a_row=False,
+        translations=_translations(reduced, model),
+    )
+
+
+def _shape(model: DynamicModel, points: PlaceNames, moved: Moved, key: str) -> Array:
+    """Even shares ``(n,)`` of the displacements of points along a direction."""
+    shares = points.shared(moved, key)
+    return np.sum([share * unit_force(model, name) for name, share in shares], axis=0)
+
+
+def _translations(body: ReducedModel, model: DynamicModel) -> dict[str, Translation]:
+    """Those of the rig with the ground, none of a body that something else holds inside."""
+    found = {}
+    for axis in AXES:
+        with suppress(RigError):
+            rigid = np.zeros(len(model.mass))
+            rigid[: len(body.stiffness)] = translation_of(body, axis)
+            found[axis] = Translation(rigid, model.mass @ rigid)
+    return found
 
 
 def _along(directions: int, body: ReducedBody) -> int:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -10,6 +11,7 @@ import numpy as np
 import scipy.linalg as sl
 
 from fe_models.dynamics.excitation import CombinedForces, ConstantForce, ExcitationForce
+from fe_models.dynamics.ground_motion import Translation
 from fe_models.dynamics.model import DynamicModel
 from fe_models.dynamics.motion import Motion
 from fe_models.dynamics.receptance import RIGID
@@ -38,7 +40,7 @@ class RigModel:
     the load is the joints' own preload); ``stretch`` ``(n,)``, which takes displacements to the one
     that loops are drawn over, not the joints' mean; and of each joint its place ``places``
     ``(j, 2)`` on the contact plane [mm], the initial ``gap`` ``(j,)`` [mm] and ``area`` ``(j,)``
-    [mm²], empty elsewhere.
+    [mm²], empty elsewhere. ``translations`` are those with the ground, by direction.
     """
 
     model: DynamicModel
@@ -53,6 +55,7 @@ class RigModel:
     places: Array = field(default_factory=lambda: np.empty((0, 2)))
     gap: Array = field(default_factory=lambda: np.empty(0))
     area: Array = field(default_factory=lambda: np.empty(0))
+    translations: Mapping[str, Translation] = field(default_factory=dict)
 
     @property
     def joints(self) -> int:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 
 from pydantic import Field, model_validator
 
@@ -89,6 +89,8 @@ class AddedSpring(Against):
 class ReducedBody(Section):
     """A body on a few points and its lowest modes, with joints, masses and springs there."""
 
+    also_filled_in: ClassVar[tuple[str, ...]] = ("driven",)
+
     kind: Literal["reduced"] = entry("a Craig-Bampton model with joints at its points", "reduced")
     file: Annotated[str, CaseFile((".h5", YAML), (SpecimensCase,), "specimens")] = entry(
         "body_1.h5 or body_2.h5 of a specimens run; or the specimens case itself, whose body is "
@@ -103,7 +105,11 @@ class ReducedBody(Section):
     springs: tuple[AddedSpring, ...] = entry("added", default=())
     damping_ratio: DampingRatios = entry(f"without the joints, {OF_MODES}", 0.001)
     damping: Damping | None = entry("added to that of the modes", default=None)
-    driven: Moved = entry("points that share the force of the excitation evenly")
+    driven: Moved | None = entry(
+        "points that share the force of the excitation evenly; none where the excitation of a "
+        "steady vibration names its own",
+        default=None,
+    )
     seen: Moved = entry("points whose mean displacement is looked at")
 
     @model_validator(mode="after")
@@ -196,8 +202,17 @@ def structure_outline(structure: Rig | ReducedBody | FrictionRig) -> list[tuple[
 def driven_place(structure: Section, mass: int | None) -> str:
     """Where a force on a structure acts, in a few words."""
     if isinstance(structure, ReducedBody):
-        return f"{structure.driven.points} along {structure.driven.direction}"
+        driven = structure.driven
+        return "no place" if driven is None else f"{driven.points} along {driven.direction}"
     return f"mass {mass or 1}"
+
+
+def refuse_undriven(structure: Section) -> None:
+    """Refuse a reduced body that says nowhere where a force acts."""
+    if isinstance(structure, ReducedBody) and structure.driven is None:
+        raise disagreement(
+            "missing; allowed: points and direction of the force", "structure.driven", "structure"
+        )
 
 
 def refuse_missing_mass(structure: Section, mass: int | None, key: str, otherwise: str) -> None:

@@ -18,6 +18,7 @@ from workflow.analyses.rig.structure import (
     Rig,
     driven_place,
     refuse_missing_mass,
+    refuse_undriven,
     structure_outline,
 )
 from workflow.analyses.wear.case.evolution import PositiveEnergy, TotalEnergy
@@ -185,6 +186,7 @@ class RigCase(TimeCase):
     @model_validator(mode="after")
     def _drives_a_mass(self) -> RigCase:
         otherwise = "a reduced body; allowed: structure.driven"
+        refuse_undriven(self.structure)
         refuse_missing_mass(self.structure, self.excitation.mass, "excitation.mass", otherwise)
         return self
 

@@ -28,6 +28,7 @@ from workflow.shell.reporter import Reporter
 # Of the vibration: a motion that changes more as harmonics are added is another one.
 ANOTHER = 0.3
 # Told of each motion, beside its error.
+GROUND = ("absolute_amplitude",)
 TOLD = "phase", "energy_per_cycle", "damping", "slip", "separated"
 
 
@@ -46,10 +47,11 @@ def answers_under(
     if not case.at:
         return None, {}
     force, accuracy, control = branch.solutions[0].force, accuracy_of(case), step_control(case)
+    told = case.amount.told(force)
     every: list[HarmonicSolution] = []
     numbers: list[dict[str, Any]] = []
     for frequency in case.at:
-        reporter.doing(f"{force:g} N: motions at {frequency:g} Hz")
+        reporter.doing(f"{told}: motions at {frequency:g} Hz")
         found = motions_at(branch, frequency, control, steps)
         motions = [
             steps("accurate motion", partial(_accurate, branch, motion, accuracy))
@@ -58,12 +60,12 @@ def answers_under(
         ]
         message = _message(branch, frequency, found)
         if message:
-            reporter.warn(f"{force:g} N at {frequency:g} Hz: {message}")
-        told = [_numbers(model, branch, motion) for motion in motions]
-        for motion in told:
-            named = f"{force:g} N: the motion at {frequency:g} Hz"
+            reporter.warn(f"{told} at {frequency:g} Hz: {message}")
+        those = [_numbers(model, branch, motion) for motion in motions]
+        for motion in those:
+            named = f"{told}: the motion at {frequency:g} Hz"
             warn_of_error(named, motion["error"], case, reporter)
-        numbers.append({"frequency": frequency, "motions": told, "message": message})
+        numbers.append({"frequency": frequency, "motions": those, "message": message})
         every += motions
     harmonics: dict[str, Datasets] = {
         ANSWER.format(number): harmonics_of(model.rig, motion)
@@ -105,6 +107,7 @@ def _numbers(
     return {
         "amplitude": float(columns["amplitude"].values[0, -1]),
         **{name: float(columns[name].values[0]) for name in TOLD},
+        **{name: float(columns[name].values[0, -1]) for name in GROUND if name in columns},
         "error": motion.error.largest,
         "residual": motion.residual,
         "harmonics": list(motion.resolution.harmonics),
@@ -124,6 +127,7 @@ def _table(
     return {
         "frequency": Dataset(frequency, "Hz", "of the force; motions in the order of the curve"),
         "amplitude": seen,
+        **{name: columns[name] for name in GROUND if name in columns},
         **{name: columns[name] for name in TOLD},
         "error": Dataset(errors, "1", f"estimated error {said}"),
     }

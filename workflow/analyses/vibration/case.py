@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from math import radians
+from math import pi, radians
 from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import Field, StrictBool, model_validator
@@ -19,11 +19,13 @@ from workflow.analyses.rig.structure import (
     Rig,
     driven_place,
     refuse_missing_mass,
+    refuse_undriven,
     structure_outline,
 )
+from workflow.analyses.vibration.excitation import FORCE, LEVEL, Amount, VibrationExcitation
 from workflow.case.fields import Entry, Quantity, Whole
 from workflow.case.plain import entries, shares
-from workflow.case.sections import Case, Section, Title, disagreement, entry
+from workflow.case.sections import Case, Section, Title, disagreement, entry, one_of
 from workflow.case.source import Source
 
 MOST_ODD, HIGHEST = 100, 999
@@ -189,11 +191,25 @@ class NonlinearModes(Section):
 class VibrationCaseBase(Case):
     """A structure under forces a sin(2π frequency t), for all frequencies of a span."""
 
+    also_filled_in: ClassVar[tuple[str, ...]] = ("forces",)
+    in_schema: ClassVar[Mapping[str, Any]] = one_of("forces", "excitation")
+
     title: Title = entry("one line", "Forced response of a friction rig")
     analysis: Literal["vibration"] = entry("what is computed", "vibration")
     structure: Rig | ReducedBody | FrictionRig = entry("what holds the joints")
-    forces: Annotated[tuple[DrivingForce, ...], Field(min_length=1, max_length=100)] = entry(
-        "amplitudes, ascending, each followed through the frequencies [N]", ["10 N", "40 N"]
+    forces: Annotated[tuple[DrivingForce, ...], Field(min_length=1, max_length=100)] | None = entry(
+        "amplitudes, ascending, each followed through the frequencies [N]",
+        ["10 N", "40 N"],
+        default=None,
+    )
+    excitation: VibrationExcitation | None = entry(
+        "instead of forces and mass: forces at any places, records, motion of the ground",
+        default=None,
+    )
+    engine_order: Annotated[float, Quantity("1", above=0.0, at_most=1e3)] | None = entry(
+        "frequency over turns per second of an engine: answers are told over its speed too [1]",
+        4,
+        default=None,
     )
     frequencies: tuple[Frequency, Frequency] = entry(
         "lower and upper end [Hz]", ["20 Hz", "400 Hz"]
@@ -203,11 +219,59 @@ class VibrationCaseBase(Case):
 
     @model_validator(mode="after")
     def _ascending(self) -> VibrationCaseBase:
-        if any(after <= before for before, after in pairwise(self.forces)):
+        if any(after <= before for before, after in pairwise(self.forces or ())):
             raise disagreement("not ascending; allowed: each force above the last", "forces")
         if self.frequencies[0] >= self.frequencies[1]:
             raise disagreement("not ascending; allowed: lower, then upper end", "frequencies")
         return self
+
+    @model_validator(mode="after")
+    def _is_driven(self) -> VibrationCaseBase:
+        excitation, driven = self.excitation, getattr(self.structure, "driven", None)
+        if excitation is None:
+            if self.forces is None:
+                raise disagreement("missing; allowed: forces, or an excitation", "forces")
+            refuse_undriven(self.structure)
+            return self
+        if self.forces is not None:
+            raise disagreement(
+                "given beside an excitation; allowed: excitation.levels, by which it is multiplied",
+                *("forces", "excitation"),
+            )
+        if driven is not None:
+            raise disagreement(
+                "given beside an excitation, which names its places; allowed: one of them",
+                *("structure.driven", "excitation"),
+            )
+        harmonics = excitation.harmonics(self.resolution.harmonics[-1])
+        if 1 not in harmonics:
+            raise disagreement(
+                "no harmonic 1; allowed: one, frequencies being those of the slowest part",
+                "excitation",
+            )
+        if self.resolution.samples <= 2 * max(harmonics):
+            raise disagreement(
+                f"{self.resolution.samples}: too few for harmonic {max(harmonics)} of the "
+                f"excitation; allowed: above {2 * max(harmonics)}",
+                *("resolution.samples", "excitation"),
+            )
+        return self
+
+    @property
+    def amount(self) -> Amount:
+        """What motions are followed by: a force, or the level of an excitation."""
+        return FORCE if self.excitation is None else LEVEL
+
+    @property
+    def amounts(self) -> tuple[float, ...]:
+        """Forces [N], or levels of the excitation."""
+        return self.forces or () if self.excitation is None else self.excitation.levels
+
+    @property
+    def turning(self) -> float:
+        """Speed of the engine [rad/s] over the frequency [Hz]."""
+        assert self.engine_order is not None
+        return 2.0 * pi / self.engine_order
 
     @property
     def contacts(self) -> bool:
@@ -216,12 +280,16 @@ class VibrationCaseBase(Case):
 
     @property
     def harmonics(self) -> tuple[int, ...]:
-        """Those of the motion: contacts need harmonic 0 too."""
+        """Those of the motion: contacts need harmonic 0 too, an excitation those that it has."""
         return self.with_mean(self.resolution.harmonics)
 
     def with_mean(self, harmonics: Sequence[int]) -> tuple[int, ...]:
-        """Harmonics, with 0 where joints are contacts."""
-        return tuple(sorted({0, *harmonics} if self.contacts else harmonics))
+        """Harmonics and those of the excitation; with 0 for contacts, or even ones of it."""
+        excited: set[int] = set()
+        if self.excitation is not None:
+            excited = self.excitation.harmonics(self.resolution.harmonics[-1])
+        mean = self.contacts or any(order % 2 == 0 for order in excited)
+        return tuple(sorted({*harmonics, *excited} | ({0} if mean else set())))
 
     def doubts(self) -> Iterator[str]:
         stiffness = getattr(getattr(self, "joint", None), "stiffness", RIGID)
@@ -230,10 +298,21 @@ class VibrationCaseBase(Case):
     @property
     def driving(self) -> str:
         """Forces, where they act, and their frequencies, for an outline."""
-        forces = ", ".join(f"{force:g}" for force in self.forces)
         low, high = self.frequencies
+        if self.excitation is not None:
+            text = self.excitation.text(self.resolution.harmonics[-1])
+            return f"{text}, at {low:g} to {high:g} Hz{self._engine}"
+        forces = ", ".join(f"{force:g}" for force in self.amounts)
         place = driven_place(self.structure, self._driven_mass)
-        return f"{forces} N on {place}, at {low:g} to {high:g} Hz"
+        return f"{forces} N on {place}, at {low:g} to {high:g} Hz{self._engine}"
+
+    @property
+    def _engine(self) -> str:
+        """Of an engine order, for an outline."""
+        if self.engine_order is None:
+            return ""
+        low, high = (60.0 * frequency / self.engine_order for frequency in self.frequencies)
+        return f", engine order {self.engine_order:g}: {low:.5g} to {high:.5g} rpm"
 
     @property
     def resolved(self) -> str:
@@ -266,6 +345,12 @@ class DrivenMass(VibrationCaseBase):
     @model_validator(mode="after")
     def _drives_a_mass(self) -> DrivenMass:
         otherwise = f"{self.structure.kind}; allowed: for a rig"
+        if self.mass is not None and self.excitation is not None:
+            raise disagreement(
+                f"{self.mass}: given beside an excitation, which names its places; allowed: one of "
+                "them",
+                *("mass", "excitation"),
+            )
         refuse_missing_mass(self.structure, self.mass, "mass", otherwise)
         return self
 
@@ -320,10 +405,17 @@ class VibrationCase(DrivenMass):
 
     @model_validator(mode="after")
     def _joins_forces(self) -> VibrationCase:
-        if (self.backbone or self.force_sweeps) and len(self.forces) < 2:
+        if (self.backbone or self.force_sweeps) and len(self.amounts) < 2:
             raise disagreement(
-                "a single force; allowed: two or more, between which motions are followed",
+                f"a single {self.amount.name}; allowed: two or more, between which motions are "
+                "followed",
                 *("forces", "backbone", "force_sweeps"),
+            )
+        if self.backbone and self.excitation is not None and self.excitation.moves_by_a_way:
+            raise disagreement(
+                "true: with a displacement of the ground, whose forces change with the frequency; "
+                "allowed: a kind of base that is acceleration",
+                *("backbone", "excitation"),
             )
         return self
 

@@ -20,7 +20,7 @@ from workflow.shell.tables import DIGITS, heading, write_table
 
 # Group of the points of a curve, and of the motions at frequencies that were asked for.
 CURVE, ANSWER = "curve", "at_{:05d}"
-CONVENTION = "x(t) = sum of Re(c_k exp(i k 2 pi f t)), the force being a sine at t = 0"
+CONVENTION = "x(t) = sum of Re(c_k exp(i k 2 pi f t)), forces being sines at t = 0"
 MEGABYTE = 1e6
 
 
@@ -78,7 +78,9 @@ def _datasets(orders: Array, parts: tuple[ComplexArray, ...], along: str) -> dic
     places, moved, pulled = parts
     return {
         "harmonic": Dataset(orders, "1", "k"),
-        "displacement": Dataset(places, "mm", f"c_k of places, {along}: {CONVENTION}"),
+        "displacement": Dataset(
+            places, "mm", f"c_k of places against the ground, {along}: {CONVENTION}"
+        ),
         "joint_displacement": Dataset(moved, "mm", f"c_k of joints, {along}: {CONVENTION}"),
         "joint_force": Dataset(
             pulled, "N", f"c_k of what joints resist with, {along}: {CONVENTION}"
@@ -100,7 +102,7 @@ def write_harmonics(path: Path, names: Datasets, response: Response) -> None:
         if group != CURVE
         for row in _rows(group, datasets, names)
     ]
-    write_table(path, _columns(rows), DIGITS, note=CONVENTION)
+    write_table(path, _columns(rows), DIGITS, note=f"{CONVENTION}; against the ground")
 
 
 def _rows(group: str, datasets: Datasets, names: Datasets) -> Iterator[Mapping[str, Any]]:

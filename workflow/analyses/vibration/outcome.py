@@ -100,6 +100,7 @@ class VibrationOutcome:
             backbone=self.backbone is not None,
             at=bool(self.case.at),
             modes=tuple(f"{number:05d}" for number in range(len(self.modes))),
+            engine=self.case.engine_order is not None,
         )
 
 
@@ -109,7 +110,8 @@ class Contents:
 
     ``responses`` by force, and those of them with ``loops``. Joints with ``places`` have states
     along every response, and the cycle at resonance. There may be a ``backbone``, motions ``at``
-    chosen frequencies, and ``modes`` over their amplitude.
+    chosen frequencies, and ``modes`` over their amplitude; frequencies may be those of an
+    ``engine``.
     """
 
     responses: tuple[str, ...]
@@ -118,6 +120,7 @@ class Contents:
     backbone: bool
     at: bool = False
     modes: tuple[str, ...] = ()
+    engine: bool = False
 
 
 def trend(values: Sequence[float]) -> float:

@@ -23,6 +23,9 @@ from workflow.shell.analysis import Run
 from workflow.shell.reporter import Reporter
 from workflow.shell.steps import kept_steps
 
+# Of a record's force, a share above its highest harmonic that is warned of.
+LEFT_OUT = 0.05
+
 
 def run_vibration(run: Run[VibrationCase]) -> None:
     """Run a vibration case to its end.
@@ -45,17 +48,24 @@ def _outcome(case: VibrationCase, reporter: Reporter, steps: Steps) -> Vibration
     model = VibrationModel.of(case, reporter)
     with reporter.stage("rest and linear limits"):
         numbers, contact = model.numbers(), model.contact()
+        for number, share in enumerate(model.driving.left_out):
+            reporter.log(f"record {number + 1}: {share:.2%} above its highest harmonic left out")
+            if share > LEFT_OUT:
+                reporter.warn(
+                    f"excitation.records.{number}: {share:.1%} of its force is above the highest "
+                    "harmonic taken and left out: raise highest, or resolution.harmonics"
+                )
         linear = steps("linear limits", lambda: model.linear(case.frequencies))
     responses: list[Response] = []
     backbone = None
     sweeps = []
     modes = []
     numbered = () if case.modes is None else case.modes.numbers
-    count = len(case.forces) + case.backbone + len(case.force_sweeps) + len(numbered)
+    count = len(case.amounts) + case.backbone + len(case.force_sweeps) + len(numbered)
     curves = _Curves(count, reporter, growing=case.resolution.tolerance is not None)
     with reporter.course("vibration"):
-        for force in case.forces:
-            with curves.next(f"{force:g} N"), reporter.stage("response"):
+        for force in case.amounts:
+            with curves.next(case.amount.told(force)), reporter.stage("response"):
                 response, branch = response_under(case, model, force, reporter, steps)
                 answers, of_answers = answers_under(case, model, branch, reporter, steps)
                 harmonics = {**response.harmonics, **of_answers}
@@ -80,7 +90,7 @@ def _outcome(case: VibrationCase, reporter: Reporter, steps: Steps) -> Vibration
         names_of(model.rig),
         tuple(responses),
         linear,
-        numbers | _across(responses),
+        numbers | _across(case, responses),
         contact,
         backbone,
         tuple(sweeps),
@@ -113,11 +123,11 @@ class _Curves:
         return equal * (begun + 1) / (self.count + 1) if self.growing else equal
 
 
-def _across(responses: list[Response]) -> dict[str, Any]:
+def _across(case: VibrationCase, responses: list[Response]) -> dict[str, Any]:
     """What the forces show together: where the peak is lowest, and whether resonances move on."""
     resonances = [response.numbers["resonance"] for response in responses]
     lowest = min(responses, key=lambda response: response.numbers["receptance"])
     return {
-        "least_receptance_force": lowest.force,
+        f"least_receptance_{case.amount.name}": lowest.force,
         "trend": {"resonance": trend(resonances)},
     }

@@ -27,14 +27,14 @@ JOINTS = 100
 def run_time(case: VibrationCase) -> RunTime:
     """Of the structure, its linear limits, and all curves."""
     span = log(case.frequencies[1] / case.frequencies[0])
-    curves = len(case.forces) * span
+    curves = len(case.amounts) * span
     if case.backbone or case.force_sweeps:
-        along = log(case.forces[-1] / case.forces[0])
+        along = log(case.amounts[-1] / case.amounts[0])
         curves += (case.backbone + len(case.force_sweeps)) * along
     if case.modes is not None:
         least, largest = case.modes.amplitudes
         curves += len(case.modes.numbers) * log(largest / least)
-    points = POINTS * curves + ANSWER * len(case.at) * len(case.forces)
+    points = POINTS * curves + ANSWER * len(case.at) * len(case.amounts)
     return RunTime(structure_time(case), points * point_time(case))
 
 
