@@ -38,13 +38,15 @@ def along(names: tuple[str, ...], axis: str) -> Array:
 def translation_of(body: ReducedModel, axis: str) -> Array:
     """Coordinates ``(c + m,)`` of a body that moves by a unit along an axis, without modes.
 
-    Raises :class:`fe_models.dynamics.rig.RigError` for a body without names, or one that strains:
-    it is held by something that its kept displacements do not show.
+    Raises :class:`fe_models.dynamics.rig.RigError` for a body without names or displacements along
+    it, and for one that strains: something holds it that its kept displacements do not show.
     """
     if body.names is None:
         raise RigError("the reduced model has no names: reduce the body with them")
     rigid = np.zeros(len(body.stiffness))
     rigid[: len(body.kept)] = along(body.names, axis)
+    if not rigid.any():
+        raise RigError(f"the reduced body keeps no displacement along {axis}")
     strained = np.abs(body.stiffness @ rigid).max()
     if strained > FREE * np.abs(body.stiffness).max():
         raise RigError(

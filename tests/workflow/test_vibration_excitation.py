@@ -6,6 +6,7 @@ import h5py
 import numpy as np
 import pytest
 
+from fe_models.reduction import ReducedModel, save_reduced
 from tests.workflow.test_vibration_case import RIG, SAMPLED, STIFFNESS
 from tests.workflow.time_scenes import MASS, linear_rig, refused, run
 
@@ -186,3 +187,56 @@ def test_records_of_no_period_are_refused(tmp_path, rows, message):
     code, told = refused(tmp_path, RIG, "forces=", record)
     assert code == 2
     assert message in told
+
+
+BODY = """\
+title: Two masses as a body
+analysis: vibration
+structure:
+  kind: reduced
+  file: body.h5
+  joints: [{points: b, direction: x}]
+  springs: [{points: a, direction: x, stiffness: 1 N/um}]
+  damping_ratio: 0.1
+  seen: {points: b, direction: x}
+joint: {law: jenkins, normal_load: 100 N, friction: 10, stiffness: 10 N/um}
+excitation:
+  forces: [{points: b, amplitude: 5 N, phase: 60 deg}]
+  base: [{kind: displacement, amplitude: 20 um}]
+frequencies: [80 Hz, 84 Hz]
+resolution: {harmonics: 1}
+at: [83 Hz]
+output: {figures: false, paraview: false}
+"""
+
+
+def two_masses(held=0.0):
+    """The rig of the other tests without its first spring; one that holds it inside if wanted."""
+    none = np.zeros(0)
+    stiffness = 200e3 * np.array([[1.0, -1.0], [-1.0, 1.0]]) + np.diag([held, 0.0])
+    flat = np.zeros((2, 0))
+    return ReducedModel(np.arange(2), stiffness, MASS, flat, flat, none, ("a x", "b x"))
+
+
+def test_a_reduced_body_is_driven_at_its_points_and_by_its_ground(tmp_path):
+    save_reduced(tmp_path / "body.h5", two_masses())
+    summary = run(tmp_path, BODY)
+    ground = -0.02j
+    inertia = (2.0 * np.pi * AT) ** 2 * MASS.sum(axis=1) * ground
+    pulled = np.array([0.0, -5j * np.exp(1j * np.pi / 3.0)])
+    wanted = responses_to(inertia + pulled)[1]
+    (motion,) = summary["responses"][0]["at"][0]["motions"]
+    assert motion["amplitude"] == pytest.approx(abs(wanted), rel=SAMPLED + 1e-8)
+    assert motion["absolute_amplitude"] == pytest.approx(abs(wanted + ground), rel=SAMPLED + 1e-8)
+
+
+def test_a_body_needs_one_way_to_be_driven_and_no_hidden_support(tmp_path):
+    save_reduced(tmp_path / "body.h5", two_masses())
+    driven = "structure.driven={points: a, direction: x}"
+    code, told = refused(tmp_path, BODY, driven)
+    assert (code, "names its places; allowed: one of them" in told) == (2, True)
+    code, told = refused(tmp_path, BODY, "excitation=", "forces=[1 N]")
+    assert (code, "missing; allowed: points and direction of the force" in told) == (2, True)
+    save_reduced(tmp_path / "body.h5", two_masses(held=1e3))
+    code, told = refused(tmp_path, BODY)
+    assert (code, "excitation.base.0: the reduced body is held inside" in told) == (2, True)

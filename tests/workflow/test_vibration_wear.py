@@ -369,3 +369,54 @@ def test_the_worn_contact_is_shown_in_paraview(tmp_path):
     state = json.loads((tmp_path / "out" / "summary.json").read_text("utf-8"))["states"][-1]
     assert total(face, "depth [mm]") == pytest.approx(state["volume"], rel=1e-6)
     assert total(face, "cycle_energy [N/mm]") == pytest.approx(state["energy_per_cycle"], rel=1e-6)
+
+
+@pytest.mark.slow
+def test_an_excitation_of_one_force_wears_as_that_force(tmp_path):
+    """At the level by which the force is divided."""
+    few = ("wear.cycles=[20]", "frequencies=[60 Hz, 140 Hz]")
+    by_force, by_level = tmp_path / "force", tmp_path / "level"
+    wanted, found = (
+        _ended(folder, *few, *more)
+        for folder, more in (
+            (by_force, ("forces=[5 N]",)),
+            (
+                by_level,
+                (
+                    *("forces=", "wear.force=", "wear.level=150"),
+                    "excitation={levels: [10], forces: [{points: m1, amplitude: 0.5 N}]}",
+                ),
+            ),
+        )
+    )
+    for name in ("energy", "volume", "depth", "stroke", "stiffness"):
+        same = pytest.approx(wanted["states"][-1][name], rel=1e-9)
+        assert found["states"][-1][name] == same, name
+    response = found["states"][-1]["responses"][0]
+    assert response["level"] == 10.0
+    assert response["resonance"] == pytest.approx(
+        wanted["states"][-1]["responses"][0]["resonance"], rel=1e-9
+    )
+
+
+def _ended(folder, *settings):
+    """The summary of a run of the small case."""
+    folder.mkdir()
+    result = run(folder, *settings)
+    assert result.exit_code == 0, result.output
+    return json.loads((folder / "out" / "summary.json").read_text(encoding="utf-8"))
+
+
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [
+        (["wear.level=2"], "given with no excitation; allowed: force"),
+        (["wear.force="], "missing; allowed: force"),
+        (
+            ["forces=", "excitation={forces: [{points: m1, amplitude: 1 N}]}"],
+            "given with an excitation; allowed: level",
+        ),
+    ],
+)
+def test_what_wears_is_given_as_what_drives(tmp_path, settings, message):
+    assert message in refusal(tmp_path, *settings)

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
+
 import numpy as np
 
 from fe_models.dynamics.friction_rig import friction_rig, ground_inertia
 from fe_models.dynamics.ground_motion import Translation, along
 from fe_models.dynamics.rig import RigError, unit_force
-from workflow.analyses.rig.reduced_rig import reduced_specimens
+from fe_models.reduction import ReducedModel
+from workflow.analyses.rig.reduced_rig import AXES, reduced_specimens
 from workflow.analyses.rig.rig_model import RigModel
 from workflow.analyses.rig.structure import FrictionRig
 from workflow.errors import UserError
@@ -29,12 +32,6 @@ def friction_rig_model(rig: FrictionRig, reporter: Reporter) -> RigModel:
         specimens = bodies.reduction.models
         ratios = np.array(rig.damping_ratio)
         model = friction_rig(*specimens, rig.masses, rig.springs, ratios)
-        translations = {
-            axis: Translation(
-                along(model.names, axis), ground_inertia(*specimens, rig.masses, axis)
-            )
-            for axis in "xyz"
-        }
     except RigError as error:
         raise UserError(f"structure: {error}") from error
     face = bodies.face
@@ -50,5 +47,17 @@ def friction_rig_model(rig: FrictionRig, reporter: Reporter) -> RigModel:
         places=face.coordinates,
         gap=face.gap,
         area=face.nodal_areas,
-        translations=translations,
+        translations=_translations(rig, specimens, model.names),
     )
+
+
+def _translations(
+    rig: FrictionRig, specimens: tuple[ReducedModel, ReducedModel], names: tuple[str, ...]
+) -> dict[str, Translation]:
+    """Those of the rig with the ground, none of specimens that something else holds inside."""
+    found = {}
+    for axis in AXES:
+        with suppress(RigError):
+            inertia = ground_inertia(*specimens, rig.masses, axis)
+            found[axis] = Translation(along(names, axis), inertia)
+    return found

@@ -22,6 +22,7 @@ from workflow.analyses.rig.laws import LAWS, Law, shared_out
 from workflow.analyses.rig.rig_model import RigModel
 from workflow.analyses.rig.structure import FrictionRig
 from workflow.analyses.vibration.case import VibrationCase
+from workflow.analyses.vibration.excitation import FORCE
 from workflow.analyses.vibration.load import Driving, driving_of
 from workflow.analyses.vibration.memory import memory
 from workflow.errors import MethodFailed
@@ -153,7 +154,8 @@ class VibrationModel:
         free, stuck = np.concatenate([self._limits(part) for part in parts], axis=1)
         amount = self.driving.amount
         unit, _ = amount.receptance
-        size = f"amplitude of what is looked at over the {amount.name}"
+        first = "" if amount is FORCE else ", of harmonic 1"
+        size = f"amplitude of what is looked at over the {amount.name}{first}"
         return {
             "frequency": Dataset(frequency, "Hz", "frequency of the force"),
             "free": Dataset(free, unit, f"{size}, without the joints"),

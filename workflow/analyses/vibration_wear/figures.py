@@ -98,7 +98,7 @@ def frequency_response(file: h5py.File) -> Figure:
 
 def _amount(file: h5py.File) -> Amount:
     """What responses are to: forces, or levels of an excitation."""
-    return LEVEL if file.attrs["amount"] == LEVEL.name else FORCE
+    return LEVEL if file.attrs.get("amount") == LEVEL.name else FORCE
 
 
 def evolution(file: h5py.File, contents: Contents) -> Figure:
