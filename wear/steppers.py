@@ -28,10 +28,9 @@ import numpy as np
 
 from sa_solver.errors import InputError
 from sa_solver.types import Array
-from wear.stepping import WearingContact, WearState
 from wear.worn import Spent, State, WearStep, WornState
 
-FIRST_STEP, FIRST_SHARE = 8.0, 0.1
+FIRST_STEP, FIRST_SHARE = 8.0, 0.25
 """First automatic step over the explicit limit, and its largest share of the run: short enough to
 be accepted at 1 %, if not always, and steps may grow eightfold from one to the next."""
 
@@ -45,10 +44,6 @@ is wrong."""
 EARLY = 0.3
 """Share of the error at the end of a run that it may have at once: much of what the first steps
 miss, while the contact grows fastest, is pressed away later."""
-
-MOVING = 1.5
-"""What the order of steps of second order comes to where surfaces move over each other: between the
-second that they have at rest and the first of very short ones (:mod:`wear.stepping`)."""
 
 ROUNDING = 1e-9
 """Steps that add up to the cycles asked for but for this share leave none over."""
@@ -384,84 +379,56 @@ class ComparingStepper(ABC, Generic[State, Compared]):
         """A step, tried again until ``control`` agrees with its error."""
         contact, control, companion = contact_at(state), self.control, state.companion
         with_companion = contact if companion is state else contact_at(companion)
-        order = self._order(contact)
 
         def trial(cycles: float) -> _Trial[State]:
-            half, last = 0.5 * cycles, cycles >= left * (1.0 - ROUNDING)
-            first = self._advance(state, half, contact, contact_at, last)
-            second = self._advance(first.state, half, contact_at(first.state), contact_at, last)
-            after, spent = replace(second.state, order=order), first.spent + second.spent
-            if not self.alone:
-                whole = self._advance(companion, cycles, with_companion, contact_at, last)
-                after, spent = replace(after, coarse=whole.state), spent + whole.spent
+            last = cycles >= left * (1.0 - ROUNDING)
+            step = self._compared(state, cycles, (contact, with_companion), contact_at, last)
+            after = step.state
             shortest = 2.0 * _shortest(min(contact.stable_cycles(end) for end in (state, after)))
             fits, proposed = True, cycles
             if control is not None:
-                fits, change = _judged(control, state, after, max(left / cycles, 1.0))
+                to_go = max(left / cycles, 1.0)
+                fits, change = self._judged(contact, control, state, after, to_go)
                 proposed = max(cycles * float(np.clip(change, SHRINKAGE, GROWTH)), shortest)
-            step = WearStep(replace(after, next_cycles=proposed), cycles, replace(spent, steps=2))
+            step = replace(step, state=replace(after, next_cycles=proposed))
             return _Trial(step, fits, min(proposed, 0.5 * cycles), shortest)
 
-        longest = min(most, 2.0 / order * contact.comparable_cycles(state))
+        longest = min(most, 2.0 / self._order(contact) * contact.comparable_cycles(state))
         return _accepted(trial, longest if control is None else min(longest, state.next_cycles))
 
+    def _compared(
+        self,
+        state: State,
+        cycles: float,
+        contacts: tuple[Compared, Compared],
+        at: At[State, Compared],
+        last: bool,
+    ) -> WearStep[State]:
+        """Two steps of half the length and the companion's whole one, unless they go alone.
 
-# --- steps that solve the contact on the way ------------------------------------------------------
+        ``contacts`` are that of the state and that of its companion.
+        """
+        half, (contact, with_companion) = 0.5 * cycles, contacts
+        first = self._advance(state, half, contact, at, last)
+        second = self._advance(first.state, half, at(first.state), at, last)
+        after, spent = second.state, first.spent + second.spent
+        if not self.alone:
+            whole = self._advance(state.companion, cycles, with_companion, at, last)
+            after, spent = replace(after, coarse=whole.state), spent + whole.spent
+        after = replace(after, order=self._order(contact))
+        return WearStep(after, cycles, replace(spent, steps=2))
 
+    def _judged(
+        self, contact: Compared, control: ErrorControl, before: State, after: State, to_go: float
+    ) -> tuple[bool, float]:
+        """Whether the error after a step will do, and the change of length that fills what it may.
 
-ContactAt = Callable[[WearState], WearingContact]
-
-
-@dataclass(frozen=True)
-class ImplicitStepper(ComparingStepper[WearState, WearingContact]):
-    """Implicit Euler, in steps that ``control`` chooses, or as long as asked for without one.
-
-    These may go ``alone``: no companion tells their error then.
-    Where surfaces move over each other the last step is of second order: long ones of first order
-    wear edges at which pressure peaks, up to twice as high as what is left of it by short ones.
-    """
-
-    def _advance(
-        self, state: WearState, cycles: float, contact: WearingContact, at: ContactAt, last: bool
-    ) -> WearStep[WearState]:
-        if last and contact.sliding.passages is not None:
-            return _second_order(state, cycles, contact, at)
-        return contact.implicit_step(state, cycles)
-
-    def _order(self, contact: WearingContact) -> float:
-        return 1.0
-
-
-@dataclass(frozen=True)
-class SecondOrderStepper(ComparingStepper[WearState, WearingContact]):
-    """Second order, also where slip changes with wear; fields as in :class:`ImplicitStepper`."""
-
-    def _advance(
-        self, state: WearState, cycles: float, contact: WearingContact, at: ContactAt, last: bool
-    ) -> WearStep[WearState]:
-        return _second_order(state, cycles, contact, at)
-
-    def _order(self, contact: WearingContact) -> float:
-        return 2.0 if contact.sliding.passages is None else MOVING
+        ``to_go`` are the steps of this length to the end of the run, this one included.
+        """
+        return judged(control, before, after, to_go)
 
 
-def _second_order(
-    state: WearState, cycles: float, contact: WearingContact, contact_at: ContactAt
-) -> WearStep[WearState]:
-    """So many cycles by a step of second order, also where slip changes with wear.
-
-    A contact whose slips come from the half-space is worn once with those of the start, and again
-    with the mean of those and the ones at its end.
-    """
-    step = contact.second_order_step(state, cycles)
-    following = contact_at(step.state)
-    if following is contact:
-        return step
-    predicted, step = step, contact.midway(following).second_order_step(state, cycles)
-    return replace(step, spent=predicted.spent + step.spent)
-
-
-def _judged(
+def judged(
     control: ErrorControl, before: WornState, after: WornState, to_go: float
 ) -> tuple[bool, float]:
     """Whether the error after a step will do, and the change of length that fills what it may be.

@@ -10,15 +10,10 @@ from sa_solver.half_space import HalfSpace
 from sa_solver.normal import NormalContact
 from sa_solver.types import Array, ElasticPair, Grid, LoadHistory, Material
 from tests.marks import slow
+from wear.implicit import ImplicitStepper, SecondOrderStepper
 from wear.laws import EnergyLaw
 from wear.marching import advance_cycles
-from wear.steppers import (
-    ErrorControl,
-    ExplicitStepper,
-    ImplicitStepper,
-    SecondOrderStepper,
-    root_mean_square,
-)
+from wear.steppers import ErrorControl, ExplicitStepper, root_mean_square
 from wear.stepping import SlidingCycle, WearingContact, WearState
 from wear.worn import Spent, WearStep
 
