@@ -22,6 +22,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cache
 from typing import Any, Generic, Protocol, Self, TypeVar
 
 import numpy as np
@@ -373,12 +374,24 @@ class ComparingStepper(ABC, Generic[State, Compared]):
     def _order(self, contact: Compared) -> float:
         """Of the error in the length of the steps."""
 
+    def _longest(self, contact: Compared, state: State) -> float:
+        """How long a step may be to be compared."""
+        return 2.0 / self._order(contact) * contact.comparable_cycles(state)
+
+    def _share(self, most: float, longest: float) -> float:
+        """Cycles of a step of ``most`` cycles to come that may have the ``longest``."""
+        return min(most, longest)
+
     def step(
         self, state: State, most: float, left: float, contact_at: At[State, Compared]
     ) -> WearStep[State]:
         """A step, tried again until ``control`` agrees with its error."""
-        contact, control, companion = contact_at(state), self.control, state.companion
-        with_companion = contact if companion is state else contact_at(companion)
+        contact, control = contact_at(state), self.control
+
+        @cache
+        def with_companion() -> Compared:
+            companion = state.companion
+            return contact if companion is state else contact_at(companion)
 
         def trial(cycles: float) -> _Trial[State]:
             last = cycles >= left * (1.0 - ROUNDING)
@@ -391,29 +404,31 @@ class ComparingStepper(ABC, Generic[State, Compared]):
                 fits, change = self._judged(contact, control, state, after, to_go)
                 proposed = max(cycles * float(np.clip(change, SHRINKAGE, GROWTH)), shortest)
             step = replace(step, state=replace(after, next_cycles=proposed))
-            return _Trial(step, fits, min(proposed, 0.5 * cycles), shortest)
+            return _Trial(step, fits, self._share(most, min(proposed, 0.5 * cycles)), shortest)
 
-        longest = min(most, 2.0 / self._order(contact) * contact.comparable_cycles(state))
-        return _accepted(trial, longest if control is None else min(longest, state.next_cycles))
+        longest = self._longest(contact, state)
+        if control is not None:
+            longest = min(longest, state.next_cycles)
+        return _accepted(trial, self._share(most, longest))
 
     def _compared(
         self,
         state: State,
         cycles: float,
-        contacts: tuple[Compared, Compared],
+        contacts: tuple[Compared, Callable[[], Compared]],
         at: At[State, Compared],
         last: bool,
     ) -> WearStep[State]:
         """Two steps of half the length and the companion's whole one, unless they go alone.
 
-        ``contacts`` are that of the state and that of its companion.
+        ``contacts`` are that of the state and, to be asked for, that of its companion.
         """
         half, (contact, with_companion) = 0.5 * cycles, contacts
         first = self._advance(state, half, contact, at, last)
         second = self._advance(first.state, half, at(first.state), at, last)
         after, spent = second.state, first.spent + second.spent
         if not self.alone:
-            whole = self._advance(state.companion, cycles, with_companion, at, last)
+            whole = self._advance(state.companion, cycles, with_companion(), at, last)
             after, spent = replace(after, coarse=whole.state), spent + whole.spent
         after = replace(after, order=self._order(contact))
         return WearStep(after, cycles, replace(spent, steps=2))
