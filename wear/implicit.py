@@ -31,7 +31,7 @@ from wear.worn import Spent, WearStep
 
 ContactAt = Callable[[WearState], WearingContact]
 
-TO_AND_FRO = 1.5
+TO_AND_FRO = 1.25
 """What the order of implicit steps over unlike increments comes to: between the second of what
 these leave together and the first of each by itself."""
 
