@@ -31,7 +31,7 @@ from sa_solver.errors import InputError
 from sa_solver.types import Array
 from wear.worn import Spent, State, WearStep, WornState
 
-FIRST_STEP, FIRST_SHARE = 8.0, 0.25
+FIRST_STEP, FIRST_SHARE = 16.0, 0.25
 """First automatic step over the explicit limit, and its largest share of the run: short enough to
 be accepted at 1 %, if not always, and steps may grow eightfold from one to the next."""
 
