@@ -382,6 +382,10 @@ class ComparingStepper(ABC, Generic[State, Compared]):
         """Cycles of a step of ``most`` cycles to come that may have the ``longest``."""
         return min(most, longest)
 
+    def _following(self, contact: Compared, after: State, proposed: float, left: float) -> float:
+        """Cycles of the step that follows, of the ``left`` ones, if so many are ``proposed``."""
+        return proposed
+
     def step(
         self, state: State, most: float, left: float, contact_at: At[State, Compared]
     ) -> WearStep[State]:
@@ -400,10 +404,10 @@ class ComparingStepper(ABC, Generic[State, Compared]):
             shortest = 2.0 * _shortest(min(contact.stable_cycles(end) for end in (state, after)))
             fits, proposed = True, cycles
             if control is not None:
-                to_go = max(left / cycles, 1.0)
-                fits, change = self._judged(contact, control, state, after, to_go)
+                fits, change = self._judged(contact, control, (state, after), cycles, left)
                 proposed = max(cycles * float(np.clip(change, SHRINKAGE, GROWTH)), shortest)
-            step = replace(step, state=replace(after, next_cycles=proposed))
+            following = self._following(contact, after, proposed, left - cycles)
+            step = replace(step, state=replace(after, next_cycles=following))
             return _Trial(step, fits, self._share(most, min(proposed, 0.5 * cycles)), shortest)
 
         longest = self._longest(contact, state)
@@ -434,16 +438,21 @@ class ComparingStepper(ABC, Generic[State, Compared]):
         return WearStep(after, cycles, replace(spent, steps=2))
 
     def _judged(
-        self, contact: Compared, control: ErrorControl, before: State, after: State, to_go: float
+        self,
+        contact: Compared,
+        control: ErrorControl,
+        ends: tuple[State, State],
+        cycles: float,
+        left: float,
     ) -> tuple[bool, float]:
         """Whether the error after a step will do, and the change of length that fills what it may.
 
-        ``to_go`` are the steps of this length to the end of the run, this one included.
+        ``ends`` are the states before and after its ``cycles`` of the ``left`` ones.
         """
-        return judged(control, before, after, to_go)
+        return _judged(control, *ends, max(left / cycles, 1.0))
 
 
-def judged(
+def _judged(
     control: ErrorControl, before: WornState, after: WornState, to_go: float
 ) -> tuple[bool, float]:
     """Whether the error after a step will do, and the change of length that fills what it may be.
@@ -478,4 +487,9 @@ def judged(
 
 def first_cycles(contact: ComparedContact[Worn], state: Worn, total: float) -> float:
     """How far the first automatic step of a run of ``total`` cycles goes."""
-    return min(FIRST_STEP * contact.stable_cycles(state), FIRST_SHARE * total)
+    return in_pairs(min(FIRST_STEP * contact.stable_cycles(state), FIRST_SHARE * total), total)
+
+
+def in_pairs(longest: float, total: float) -> float:
+    """Cycles of steps, ``longest`` at most, of which an even number makes the ``total``."""
+    return total / (2.0 * float(np.ceil(0.5 * total / longest * (1.0 - ROUNDING))))

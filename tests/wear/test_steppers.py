@@ -172,7 +172,11 @@ def to_and_fro(state: WearState, cycles: float, contact_at) -> WearState:
 @pytest.mark.parametrize("contact_at", [unchanging, evolving])
 @pytest.mark.parametrize("lengths", [(1.0, 1.0, 2.0, 2.0), (1.0, 1.5, 2.0, 0.5), (2.0, 0.1, 1.0)])
 def test_the_companion_takes_steps_of_twice_the_length(lengths, contact_at) -> None:
-    """Out in one step, back in the next, whose length may differ; V = α E for both."""
+    """Out in one step, back in the next, whose length may differ; V = α E for both.
+
+    It guesses the slips half-way of two equal steps from those of the other, whose error of a
+    hundredth is all that comes in by that.
+    """
     unit, state, alone, coarse = 0.4 * LIMIT, waved(), waved(), waved()
     for cycles in lengths:
         state = ImplicitStepper().step(state, cycles * unit, 100.0 * unit, contact_at).state
@@ -180,10 +184,16 @@ def test_the_companion_takes_steps_of_twice_the_length(lengths, contact_at) -> N
     pairs = [sum(lengths)] if len(lengths) == 3 else [sum(lengths[:2]), sum(lengths[2:])]
     for pair in pairs:
         coarse = to_and_fro(coarse, pair * unit, contact_at)
-    for one, other in ((state, alone), (state.companion, coarse)):
-        np.testing.assert_allclose(one.surfaces.depths, other.surfaces.depths, rtol=1e-7)
-    assert state.companion.coarse is None
+    np.testing.assert_allclose(state.surfaces.depths, alone.surfaces.depths, rtol=1e-7)
     missed = np.subtract(state.companion.surfaces.depths, state.surfaces.depths)
+    guessed = contact_at is evolving and lengths[0] == lengths[1]
+    np.testing.assert_allclose(
+        state.companion.surfaces.depths,
+        coarse.surfaces.depths,
+        rtol=1e-7,
+        atol=0.01 * np.abs(missed).max() if guessed else 0.0,
+    )
+    assert state.companion.coarse is None
     np.testing.assert_allclose(state.errors, missed / (2.0**state.order - 1.0), atol=1e-18)
     volume = state.companion.surfaces.depth.sum() * GRID.cell_area
     assert volume == pytest.approx(3e-8 * state.companion.energy, rel=1e-10)
@@ -199,6 +209,18 @@ def test_the_last_of_an_odd_number_of_steps_is_two() -> None:
     np.testing.assert_allclose(
         step.state.companion.surfaces.depths, whole.surfaces.depths, rtol=1e-7
     )
+
+
+def test_a_companion_half_way_goes_on_where_increments_come_to_be_alike() -> None:
+    """It has worn as many cycles as the others, out only, and takes steps of its own from there."""
+    cycles = 0.4 * LIMIT
+    one = SlidingCycle(history(MEAN * np.ones(1), np.zeros(1)), np.full((1, *GRID.shape), 0.02))
+    alike = replace(CONSTANT, sliding=one)
+    half_way = ImplicitStepper().step(waved(), cycles, 10.0 * cycles, unchanging).state
+    after = ImplicitStepper().step(half_way, cycles, 10.0 * cycles, lambda _: alike).state
+    assert half_way.companion.coarse is not None and after.companion.coarse is None
+    own = alike.implicit_step(replace(half_way.companion, coarse=None), cycles).state
+    np.testing.assert_array_equal(after.companion.surfaces.depths, own.surfaces.depths)
 
 
 def test_steps_that_go_alone_are_the_same_without_their_companion() -> None:
@@ -263,7 +285,8 @@ def test_an_absolute_tolerance_is_a_depth() -> None:
         automatic(ImplicitStepper(control), cycles)
         for control in (ErrorControl(absolute=allowed), ErrorControl(relative=0.01))
     )
-    assert abs(absolute.spent.steps - relative.spent.steps) <= 2
+    # One step of the companion's more or less.
+    assert abs(absolute.spent.steps - relative.spent.steps) <= 4
     assert root_mean_square(absolute.state.surfaces.depth - exact, exact) < allowed
 
 
