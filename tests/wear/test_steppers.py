@@ -214,11 +214,12 @@ def test_the_last_of_an_odd_number_of_steps_is_two() -> None:
 def test_a_companion_half_way_goes_on_where_increments_come_to_be_alike() -> None:
     """It has worn as many cycles as the others, out only, and takes steps of its own from there."""
     cycles = 0.4 * LIMIT
-    one = SlidingCycle(history(MEAN * np.ones(1), np.zeros(1)), np.full((1, *GRID.shape), 0.02))
-    alike = replace(CONSTANT, sliding=one)
+    same = history(8.0 * MEAN * np.ones(3), np.zeros(3))
+    alike = replace(CONSTANT, sliding=SlidingCycle(same, np.full((3, *GRID.shape), 0.02)))
     half_way = ImplicitStepper().step(waved(), cycles, 10.0 * cycles, unchanging).state
     after = ImplicitStepper().step(half_way, cycles, 10.0 * cycles, lambda _: alike).state
-    assert half_way.companion.coarse is not None and after.companion.coarse is None
+    assert half_way.companion.coarse is not None
+    assert after.companion.coarse is None
     own = alike.implicit_step(replace(half_way.companion, coarse=None), cycles).state
     np.testing.assert_array_equal(after.companion.surfaces.depths, own.surfaces.depths)
 
