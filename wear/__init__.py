@@ -61,9 +61,9 @@ from typing import TYPE_CHECKING
 from sa_solver.lazy import lazy_names
 
 if TYPE_CHECKING:
+    from wear.contacts import Contacts
     from wear.coupled import (
         ConstantLoads,
-        Contacts,
         CoupledSettings,
         CoupledState,
         CoupledWear,
@@ -116,8 +116,9 @@ __all__ = [
 __getattr__, __dir__ = lazy_names(
     __name__,
     {
+        "contacts": ("Contacts",),
         "coupled": (
-            *("ConstantLoads", "Contacts", "CoupledSettings", "CoupledState"),
+            *("ConstantLoads", "CoupledSettings", "CoupledState"),
             *("CoupledWear", "JumpSize", "Observer", "Stop"),
         ),
         "evolution": ("EnergyTable",),

@@ -392,6 +392,10 @@ def _half(
 
 def _weights(problem: HarmonicBalance, output: Array | None) -> ComplexArray:
     """Weights ``(n,)`` whose product wᴴ x is the output displacement, relative to the force."""
+    if problem.load.inertial:
+        raise HarmonicBalanceError(
+            "a load that changes with the frequency: give a force or an acceleration that does not"
+        )
     wave = problem.load.waves.get(1)
     if wave is None or not np.any(wave):
         raise HarmonicBalanceError("the load has no harmonic 1: no phase is relative to it")

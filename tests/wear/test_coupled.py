@@ -22,10 +22,10 @@ from sa_solver.errors import InputError
 from sa_solver.types import Array, ElasticPair, Grid, LoadHistory, Material
 from tests.marks import slow
 from tests.oracles.worn_shapes import worn_cylinder
+from wear.contacts import Contacts
 from wear.coupled import (
     AT_STOP,
     ConstantLoads,
-    Contacts,
     CoupledSettings,
     CoupledState,
     CoupledWear,

@@ -5,7 +5,16 @@ from typing import get_args
 
 import pytest
 
-from tests.workflow.case_leaves import BOLTED, CAD, CONTACT, INTERFACE, REDUCED, SECTOR
+from tests.workflow.case_leaves import (
+    ALWAYS,
+    BOLTED,
+    CAD,
+    CONTACT,
+    EXCITED,
+    INTERFACE,
+    REDUCED,
+    SECTOR,
+)
 from workflow.case.sections import KINDS_ARE_NAMED_BY, sections_of
 from workflow.errors import CaseError
 from workflow.kinds import about, kinds, parse_case, template
@@ -29,6 +38,8 @@ NEEDS = {
     "  kind: friction_rig": [f"joint={CONTACT | {'normal_load': 60}}"],
     "  # size: 2 mm  # for CAD files only": CAD,
     "structure.cyclic": [SECTOR],
+    "  # instead of forces and mass, with wear.level": ["wear.force=", "wear.level=1"],
+    "wear.level": ["forces=", f"excitation={EXCITED['excitation'][ALWAYS]}"],
 }
 
 

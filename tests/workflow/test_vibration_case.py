@@ -46,7 +46,7 @@ def curves(folder, number=0):
     """The datasets of a force of a finished run."""
     with h5py.File(folder / "out" / "results.h5") as file:
         group = file[f"responses/{number:05d}"]
-        return {name: group[name][()] for name in group}
+        return {name: item[()] for name, item in group.items() if isinstance(item, h5py.Dataset)}
 
 
 # --- against closed forms -----------------------------------------------------------------------

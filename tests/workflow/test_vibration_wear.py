@@ -20,6 +20,7 @@ from wear.marching import advance_cycles
 from wear.steppers import ErrorControl, first_cycles
 from workflow.analyses.rig.building import row_of_masses
 from workflow.analyses.rig.structure import Rig
+from workflow.analyses.vibration.load import Driving
 from workflow.analyses.vibration_wear.case import VibrationWearCase
 from workflow.analyses.vibration_wear.vibrating_contact import VibratingContact
 from workflow.case.writing import dump_case
@@ -77,11 +78,16 @@ def refusal(folder, *settings, wear=WEAR):
     return " ".join(ended.stderr.split())
 
 
+def driven(rig):
+    """By a sine of 1 N on what the case drives."""
+    return Driving(PeriodicLoad({1: -1j * rig.driven}))
+
+
 def contact_in_rig(folder, force=75.0, frequency=100.0, wear=WEAR):
     (folder / "wear.yaml").write_text(wear, encoding="utf-8")
     rig = row_of_masses(Rig(kind="rig", masses=MASSES, springs=SPRINGS, damping_ratio=DAMPING))
     case = load_case(folder / "wear.yaml")
-    return rig, VibratingContact(case, rig, force, frequency, RESOLUTION)
+    return rig, VibratingContact(case, rig, driven(rig), force, frequency, RESOLUTION)
 
 
 def worn(contact, cycles, tolerance=0.1):
@@ -116,7 +122,9 @@ def test_friction_that_grows_within_a_few_cycles_is_followed(tmp_path):
     summary = json.loads((tmp_path / "out" / "summary.json").read_text(encoding="utf-8"))
     rig = row_of_masses(Rig(kind="rig", masses=MASSES, springs=SPRINGS, damping_ratio=0.01))
     resolution = Resolution((1, 3, 5), 64)
-    contact = VibratingContact(load_case(tmp_path / "wear.yaml"), rig, 75.0, 100.0, resolution)
+    contact = VibratingContact(
+        load_case(tmp_path / "wear.yaml"), rig, driven(rig), 75.0, 100.0, resolution
+    )
     state = contact.unworn()
     for _ in range(20):
         # In so few cycles the form does not change.

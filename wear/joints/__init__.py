@@ -6,6 +6,7 @@ The laws, all of :mod:`wear.joints.law`'s one interface
     - ``BoucWen``: a smooth way from sticking to sliding.
     - ``UniformIwan``, ``FourParameterIwan``: sliders in parallel, by Masing's rule.
     - ``FrictionContact``: a point in three dimensions, which may separate.
+    - ``MixedLaw``, ``JointGroup``: joints of several laws in one structure.
     - ``JointError``: parameters that a joint cannot have.
 
 Their marches
@@ -56,6 +57,7 @@ if TYPE_CHECKING:
     from wear.joints.jenkins import Jenkins
     from wear.joints.law import JointLaw, march_joints
     from wear.joints.measured_loops import measure_loops
+    from wear.joints.mixed import JointGroup, MixedLaw
     from wear.joints.parallel import ParallelSliders
     from wear.joints.parameters import JointError
     from wear.joints.periodic import PeriodicMarch
@@ -69,9 +71,11 @@ __all__ = [
     "Jenkins",
     "JointError",
     "JointEvolution",
+    "JointGroup",
     "JointLaw",
     "LinearEvolution",
     "LogarithmicEvolution",
+    "MixedLaw",
     "ParallelSliders",
     "PeriodicMarch",
     "TabulatedEvolution",
@@ -100,6 +104,7 @@ __getattr__, __dir__ = lazy_names(
         "jenkins": ("Jenkins",),
         "law": ("JointLaw", "march_joints"),
         "measured_loops": ("measure_loops",),
+        "mixed": ("JointGroup", "MixedLaw"),
         "parallel": ("ParallelSliders",),
         "parameters": ("JointError",),
         "periodic": ("PeriodicMarch",),

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from fe_models.dynamics.friction_rig import friction_rig
+from fe_models.dynamics.friction_rig import friction_rig, ground_inertia
+from fe_models.dynamics.ground_motion import Translation, along
 from fe_models.dynamics.rig import RigError, unit_force
 from workflow.analyses.rig.reduced_rig import reduced_specimens
 from workflow.analyses.rig.rig_model import RigModel
@@ -25,7 +26,15 @@ def friction_rig_model(rig: FrictionRig, reporter: Reporter) -> RigModel:
         key, file = "structure.specimens", rig.specimens
         bodies = reduced_specimens(key, file, reporter, told, rig.target_distance)
     try:
-        model = friction_rig(*bodies.reduction.models, rig.masses, rig.springs, rig.damping_ratio)
+        specimens = bodies.reduction.models
+        ratios = np.array(rig.damping_ratio)
+        model = friction_rig(*specimens, rig.masses, rig.springs, ratios)
+        translations = {
+            axis: Translation(
+                along(model.names, axis), ground_inertia(*specimens, rig.masses, axis)
+            )
+            for axis in "xyz"
+        }
     except RigError as error:
         raise UserError(f"structure: {error}") from error
     face = bodies.face
@@ -41,4 +50,5 @@ def friction_rig_model(rig: FrictionRig, reporter: Reporter) -> RigModel:
         places=face.coordinates,
         gap=face.gap,
         area=face.nodal_areas,
+        translations=translations,
     )

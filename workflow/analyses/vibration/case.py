@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from math import radians
+from math import pi, radians
 from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import Field, StrictBool, model_validator
@@ -19,15 +19,18 @@ from workflow.analyses.rig.structure import (
     Rig,
     driven_place,
     refuse_missing_mass,
+    refuse_undriven,
     structure_outline,
 )
+from workflow.analyses.vibration.excitation import FORCE, LEVEL, Amount, VibrationExcitation
 from workflow.case.fields import Entry, Quantity, Whole
 from workflow.case.plain import entries, shares
-from workflow.case.sections import Case, Section, Title, disagreement, entry
+from workflow.case.sections import Case, Section, Title, disagreement, entry, one_of
 from workflow.case.source import Source
 
 MOST_ODD, HIGHEST = 100, 999
 ODD = (1, 3, 5, 7, 9, 11, 13, 15)
+Amplitude = Annotated[float, Quantity("mm", above=0.0, at_most=1e3)]
 Step = Annotated[float, Quantity("1", at_least=1e-12, at_most=10.0)]
 
 
@@ -159,14 +162,54 @@ class LoopsAt(Section):
         return self
 
 
+class NonlinearModes(Section):
+    """Modes with joints, over their amplitude: with neither a force nor a phase to choose."""
+
+    numbers: Annotated[tuple[Annotated[int, Whole(1, 1000)], ...], Field(min_length=1)] = entry(
+        "of the modes with joints as stiff as at rest, from the lowest, 1, on", [1], default=(1,)
+    )
+    amplitudes: tuple[Amplitude, Amplitude] = entry(
+        "least and largest, of what is looked at [mm]", ["0.1 um", "20 um"]
+    )
+
+    @model_validator(mode="after")
+    def _ascends(self) -> NonlinearModes:
+        if self.amplitudes[0] >= self.amplitudes[1]:
+            raise disagreement("not ascending; allowed: the least, then the largest", "amplitudes")
+        if len(set(self.numbers)) < len(self.numbers):
+            raise disagreement("a mode twice; allowed: each once", "numbers")
+        return self
+
+    @property
+    def text(self) -> str:
+        """Which, and over what."""
+        least, largest = (1e3 * amplitude for amplitude in self.amplitudes)
+        modes = ", ".join(map(str, self.numbers))
+        return f"{modes}, at amplitudes of {least:g} to {largest:g} µm"
+
+
 class VibrationCaseBase(Case):
     """A structure under forces a sin(2π frequency t), for all frequencies of a span."""
+
+    also_filled_in: ClassVar[tuple[str, ...]] = ("forces",)
+    in_schema: ClassVar[Mapping[str, Any]] = one_of("forces", "excitation")
 
     title: Title = entry("one line", "Forced response of a friction rig")
     analysis: Literal["vibration"] = entry("what is computed", "vibration")
     structure: Rig | ReducedBody | FrictionRig = entry("what holds the joints")
-    forces: Annotated[tuple[DrivingForce, ...], Field(min_length=1, max_length=100)] = entry(
-        "amplitudes, ascending, each followed through the frequencies [N]", ["10 N", "40 N"]
+    forces: Annotated[tuple[DrivingForce, ...], Field(min_length=1, max_length=100)] | None = entry(
+        "amplitudes, ascending, each followed through the frequencies [N]",
+        ["10 N", "40 N"],
+        default=None,
+    )
+    excitation: VibrationExcitation | None = entry(
+        "instead of forces and mass: forces at any places, records, motion of the ground",
+        default=None,
+    )
+    engine_order: Annotated[float, Quantity("1", above=0.0, at_most=1e3)] | None = entry(
+        "frequency over turns per second of an engine: answers are told over its speed too [1]",
+        4,
+        default=None,
     )
     frequencies: tuple[Frequency, Frequency] = entry(
         "lower and upper end [Hz]", ["20 Hz", "400 Hz"]
@@ -176,11 +219,59 @@ class VibrationCaseBase(Case):
 
     @model_validator(mode="after")
     def _ascending(self) -> VibrationCaseBase:
-        if any(after <= before for before, after in pairwise(self.forces)):
+        if any(after <= before for before, after in pairwise(self.forces or ())):
             raise disagreement("not ascending; allowed: each force above the last", "forces")
         if self.frequencies[0] >= self.frequencies[1]:
             raise disagreement("not ascending; allowed: lower, then upper end", "frequencies")
         return self
+
+    @model_validator(mode="after")
+    def _is_driven(self) -> VibrationCaseBase:
+        excitation, driven = self.excitation, getattr(self.structure, "driven", None)
+        if excitation is None:
+            if self.forces is None:
+                raise disagreement("missing; allowed: forces, or an excitation", "forces")
+            refuse_undriven(self.structure)
+            return self
+        if self.forces is not None:
+            raise disagreement(
+                "given beside an excitation; allowed: excitation.levels, by which it is multiplied",
+                *("forces", "excitation"),
+            )
+        if driven is not None:
+            raise disagreement(
+                "given beside an excitation, which names its places; allowed: one of them",
+                *("structure.driven", "excitation"),
+            )
+        harmonics = excitation.harmonics(self.resolution.harmonics[-1])
+        if 1 not in harmonics:
+            raise disagreement(
+                "no harmonic 1; allowed: one, frequencies being those of the slowest part",
+                "excitation",
+            )
+        if self.resolution.samples <= 2 * max(harmonics):
+            raise disagreement(
+                f"{self.resolution.samples}: too few for harmonic {max(harmonics)} of the "
+                f"excitation; allowed: above {2 * max(harmonics)}",
+                *("resolution.samples", "excitation"),
+            )
+        return self
+
+    @property
+    def amount(self) -> Amount:
+        """What motions are followed by: a force, or the level of an excitation."""
+        return FORCE if self.excitation is None else LEVEL
+
+    @property
+    def amounts(self) -> tuple[float, ...]:
+        """Forces [N], or levels of the excitation."""
+        return self.forces or () if self.excitation is None else self.excitation.levels
+
+    @property
+    def turning(self) -> float:
+        """Speed of the engine [rad/s] over the frequency [Hz]."""
+        assert self.engine_order is not None
+        return 2.0 * pi / self.engine_order
 
     @property
     def contacts(self) -> bool:
@@ -189,12 +280,16 @@ class VibrationCaseBase(Case):
 
     @property
     def harmonics(self) -> tuple[int, ...]:
-        """Those of the motion: contacts need harmonic 0 too."""
+        """Those of the motion: contacts need harmonic 0 too, an excitation those that it has."""
         return self.with_mean(self.resolution.harmonics)
 
     def with_mean(self, harmonics: Sequence[int]) -> tuple[int, ...]:
-        """Harmonics, with 0 where joints are contacts."""
-        return tuple(sorted({0, *harmonics} if self.contacts else harmonics))
+        """Harmonics and those of the excitation; with 0 for contacts, or even ones of it."""
+        excited: set[int] = set()
+        if self.excitation is not None:
+            excited = self.excitation.harmonics(self.resolution.harmonics[-1])
+        mean = self.contacts or any(order % 2 == 0 for order in excited)
+        return tuple(sorted({*harmonics, *excited} | ({0} if mean else set())))
 
     def doubts(self) -> Iterator[str]:
         stiffness = getattr(getattr(self, "joint", None), "stiffness", RIGID)
@@ -203,10 +298,21 @@ class VibrationCaseBase(Case):
     @property
     def driving(self) -> str:
         """Forces, where they act, and their frequencies, for an outline."""
-        forces = ", ".join(f"{force:g}" for force in self.forces)
         low, high = self.frequencies
+        if self.excitation is not None:
+            text = self.excitation.text(self.resolution.harmonics[-1])
+            return f"{text}, at {low:g} to {high:g} Hz{self._engine}"
+        forces = ", ".join(f"{force:g}" for force in self.amounts)
         place = driven_place(self.structure, self._driven_mass)
-        return f"{forces} N on {place}, at {low:g} to {high:g} Hz"
+        return f"{forces} N on {place}, at {low:g} to {high:g} Hz{self._engine}"
+
+    @property
+    def _engine(self) -> str:
+        """Of an engine order, for an outline."""
+        if self.engine_order is None:
+            return ""
+        low, high = (60.0 * frequency / self.engine_order for frequency in self.frequencies)
+        return f", engine order {self.engine_order:g}: {low:.5g} to {high:.5g} rpm"
 
     @property
     def resolved(self) -> str:
@@ -239,6 +345,12 @@ class DrivenMass(VibrationCaseBase):
     @model_validator(mode="after")
     def _drives_a_mass(self) -> DrivenMass:
         otherwise = f"{self.structure.kind}; allowed: for a rig"
+        if self.mass is not None and self.excitation is not None:
+            raise disagreement(
+                f"{self.mass}: given beside an excitation, which names its places; allowed: one of "
+                "them",
+                *("mass", "excitation"),
+            )
         refuse_missing_mass(self.structure, self.mass, "mass", otherwise)
         return self
 
@@ -267,10 +379,24 @@ class VibrationCase(DrivenMass):
         ["100 Hz"],
         default=(),
     )
+    at: Annotated[tuple[Frequency, ...], Field(max_length=100)] = entry(
+        "frequencies at which every motion under each force is solved for [Hz]",
+        ["100 Hz", "150 Hz"],
+        default=(),
+    )
+    harmonics_along_curves: StrictBool = entry(
+        "whether the harmonics of every point of the curves are written too, which may be large; "
+        "those at resonance, and of the motions that are solved for, always are",
+        False,
+        default=False,
+    )
     backbone: StrictBool = entry(
         "whether phase resonance, what is driven 90 degrees behind the force, is followed too",
         False,
         default=False,
+    )
+    modes: NonlinearModes | None = entry(
+        "whose frequency and damping are followed over the amplitude", default=None
     )
 
     @property
@@ -279,10 +405,17 @@ class VibrationCase(DrivenMass):
 
     @model_validator(mode="after")
     def _joins_forces(self) -> VibrationCase:
-        if (self.backbone or self.force_sweeps) and len(self.forces) < 2:
+        if (self.backbone or self.force_sweeps) and len(self.amounts) < 2:
             raise disagreement(
-                "a single force; allowed: two or more, between which motions are followed",
+                f"a single {self.amount.name}; allowed: two or more, between which motions are "
+                "followed",
                 *("forces", "backbone", "force_sweeps"),
+            )
+        if self.backbone and self.excitation is not None and self.excitation.moves_by_a_way:
+            raise disagreement(
+                "true: with a displacement of the ground, whose forces change with the frequency; "
+                "allowed: a kind of base that is acceleration",
+                *("backbone", "excitation"),
             )
         return self
 
@@ -318,14 +451,20 @@ class VibrationCase(DrivenMass):
             )
 
     @model_validator(mode="after")
-    def _loops_inside(self) -> VibrationCase:
+    def _looks_inside(self) -> VibrationCase:
         low, high = self.frequencies
-        if self.loops is not None and not low <= self.loops.frequency <= high:
-            raise disagreement(
-                f"{self.loops.frequency:g} Hz: outside; allowed: within frequencies, {low:g} to "
-                f"{high:g} Hz",
-                "loops.frequency",
-            )
+        looked_at = {f"at.{place}": frequency for place, frequency in enumerate(self.at)}
+        if self.loops is not None:
+            looked_at["loops.frequency"] = self.loops.frequency
+        for key, frequency in looked_at.items():
+            if not low <= frequency <= high:
+                raise disagreement(
+                    f"{frequency:g} Hz: outside; allowed: within frequencies, {low:g} to "
+                    f"{high:g} Hz",
+                    key,
+                )
+        if any(after <= before for before, after in pairwise(self.at)):
+            raise disagreement("not ascending; allowed: each frequency above the last", "at")
         return self
 
     def outline(self) -> list[tuple[str, str]]:
@@ -335,5 +474,7 @@ class VibrationCase(DrivenMass):
             ("joint", f"{joint.law}, {entries(joint)}"),
             ("forces", self.driving),
             ("method", self.resolved),
+            *([("motions at", f"{', '.join(f'{at:g}' for at in self.at)} Hz")] if self.at else []),
             *([] if self.loops is None else [("loops", self.loops.text)]),
+            *([] if self.modes is None else [("modes", self.modes.text)]),
         ]

@@ -13,6 +13,8 @@ from workflow.shell.run_time import RunTime
 
 # Points of a curve, usually, where the frequency or the force grows by a factor of e.
 POINTS = 50
+# Points that a motion at a frequency is as dear as.
+ANSWER = 5
 # A point of a rig with one joint; the same where harmonics grow to a tolerance [s].
 POINT, GROWING_POINT = 5e-3, 3e-2
 # A point of so many unknowns, and the linear limits of so many directions, of joints [s].
@@ -25,11 +27,15 @@ JOINTS = 100
 def run_time(case: VibrationCase) -> RunTime:
     """Of the structure, its linear limits, and all curves."""
     span = log(case.frequencies[1] / case.frequencies[0])
-    curves = len(case.forces) * span
+    curves = len(case.amounts) * span
     if case.backbone or case.force_sweeps:
-        along = log(case.forces[-1] / case.forces[0])
+        along = log(case.amounts[-1] / case.amounts[0])
         curves += (case.backbone + len(case.force_sweeps)) * along
-    return RunTime(structure_time(case), POINTS * curves * point_time(case))
+    if case.modes is not None:
+        least, largest = case.modes.amplitudes
+        curves += len(case.modes.numbers) * log(largest / least)
+    points = POINTS * curves + ANSWER * len(case.at) * len(case.amounts)
+    return RunTime(structure_time(case), points * point_time(case))
 
 
 def structure_time(case: VibrationCaseBase) -> float:

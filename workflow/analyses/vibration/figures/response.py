@@ -10,9 +10,12 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from workflow.analyses.vibration.excitation import Amount, amount_in, told_in, under_in
+from workflow.analyses.vibration.figures.engine import engine_orders
 from workflow.analyses.vibration.figures.loops import loops
+from workflow.analyses.vibration.figures.modes import modes
 from workflow.analyses.vibration.figures.states import node_states, pad_states
-from workflow.analyses.vibration.outcome import Contents
+from workflow.analyses.vibration.outcome import AT, Contents
 from workflow.pictures.panels import (
     Figures,
     legend_below,
@@ -28,6 +31,7 @@ MOST_CURVES = 8
 TO_PERCENT = 1e2
 LIMIT: dict[str, Any] = {"color": BLACK, "linewidth": 0.8}
 STYLES = {"free": ":", "stuck": "--"}
+ASKED: dict[str, Any] = {"markersize": 4.5, "markerfacecolor": "white"}
 # Room above the highest peak and below the lowest response, as factors.
 ABOVE, BELOW = 3.0, 0.5
 
@@ -37,6 +41,8 @@ def figures_of(contents: Contents) -> Figures:
     drawn = {
         "frequency_response": (frequency_response, True),
         "resonance": (resonance, len(contents.responses) > 1 or contents.backbone),
+        "modes": (modes, bool(contents.modes)),
+        "engine_orders": (engine_orders, contents.engine),
         "loops": (loops, bool(contents.loops)),
         "node_states": (node_states, contents.places),
         "pad_states": (pad_states, contents.places),
@@ -53,8 +59,16 @@ def _shown(file: h5py.File, contents: Contents) -> list[tuple[h5py.Group, Any]]:
 
 
 def _seen(file: h5py.File) -> str:
-    """What the amplitude is of."""
-    return str(file.attrs["seen"][-1])
+    """What the amplitude is of; against the ground, where that moves."""
+    first, *_ = file["responses"].values()
+    against = " against the ground" if "absolute_amplitude" in first else ""
+    return f"{file.attrs['seen'][-1]}{against}"
+
+
+def _amount_of(file: h5py.File) -> Amount:
+    """What responses are to: forces, or levels of an excitation."""
+    first, *_ = file["responses"].values()
+    return amount_in(first.attrs)[0]
 
 
 # --- frequency response -------------------------------------------------------------------------
@@ -70,14 +84,20 @@ def frequency_response(file: h5py.File, contents: Contents) -> Figure:
         label = f"{name}: {frequency[receptance.argmax()]:.4g} Hz"
         axis.plot(frequency, receptance, style, label=label, **LIMIT)
     for response, colour in _shown(file, contents):
-        force, size = float(response.attrs["force"]), TO_MICRONS * response["amplitude"][:, -1]
-        label = f"{force:g} N: {response.attrs['resonance']:.4g} Hz"
+        _, force = amount_in(response.attrs)
+        size = TO_MICRONS * response["amplitude"][:, -1]
+        label = f"{told_in(response.attrs)}: {response.attrs['resonance']:.4g} Hz"
         axis.plot(response["frequency"][()], size / force, color=colour, label=label)
         peaks.append(TO_MICRONS * float(response.attrs["amplitude"]) / force)
         lows.append(size.min() / force)
         axis.plot(response.attrs["resonance"], peaks[-1], "o", color=colour, markersize=5)
+        if contents.at:
+            asked = response[AT]
+            sizes = TO_MICRONS * asked["amplitude"][:, -1] / force
+            axis.plot(asked["frequency"][()], sizes, "D", color=colour, **ASKED)
     _over_frequency(axis, file)
-    axis.set_ylabel(f"amplitude of {_seen(file)} / force [µm/N]")
+    amount = _amount_of(file)
+    axis.set_ylabel(f"amplitude of {_seen(file)} / {amount.name} [{amount.receptance[1]}]")
     axis.set_ylim(BELOW * min(lows), ABOVE * max(peaks))
     plain_ticks(axis.yaxis)
     legend_below(figure, [axis], columns=4, title="resonance")
@@ -97,10 +117,10 @@ def _title(file: h5py.File) -> str:
     responses = [file["responses"][name] for name in sorted(file["responses"])]
     first, last = responses[0].attrs, responses[-1].attrs
     if len(responses) == 1:
-        return f"Resonance at {first['resonance']:.4g} Hz under {first['force']:g} N"
+        return f"Resonance at {first['resonance']:.4g} Hz {under_in(first)}"
     return (
-        f"Resonance {first['resonance']:.4g} Hz under {first['force']:g} N, "
-        f"{last['resonance']:.4g} Hz under {last['force']:g} N"
+        f"Resonance {first['resonance']:.4g} Hz {under_in(first)}, "
+        f"{last['resonance']:.4g} Hz {under_in(last)}"
     )
 
 
@@ -117,12 +137,14 @@ def resonance(file: h5py.File, contents: Contents) -> Figure:
     bottom = figure.add_subplot(places[1, 1], sharex=top)
     if contents.backbone:
         for panel, name, factor in ((top, "frequency", 1.0), (bottom, "damping", TO_PERCENT)):
-            force, values = file["backbone/force"][()], factor * file["backbone"][name][()]
+            force = file["backbone"][_amount_of(file).name][()]
+            values = factor * file["backbone"][name][()]
             panel.plot(force, values, "--", color=BLACK, label="phase resonance")
     _draw_peaks(top, file, "resonance", 1.0, BLUE)
     _draw_peaks(bottom, file, "damping", TO_PERCENT, ORANGE)
     top.set_ylabel("resonance frequency [Hz]")
-    bottom.set(xlabel="force [N]", ylabel="damping ratio [%]", xscale="log")
+    amount = _amount_of(file)
+    bottom.set(xlabel=f"{amount.name} [{amount.unit}]", ylabel="damping ratio [%]", xscale="log")
     plain_ticks(bottom.xaxis)
     legend_below(figure, [axis, top], columns=5)
     return figure
@@ -130,8 +152,8 @@ def resonance(file: h5py.File, contents: Contents) -> Figure:
 
 def _draw_amplitudes(axis: Axes, file: h5py.File, contents: Contents) -> None:
     for response, colour in _shown(file, contents):
-        force, size = float(response.attrs["force"]), TO_MICRONS * response["amplitude"][:, -1]
-        look = {"color": colour, "label": f"{force:g} N", "linewidth": 1.4}
+        size = TO_MICRONS * response["amplitude"][:, -1]
+        look = {"color": colour, "label": told_in(response.attrs), "linewidth": 1.4}
         axis.plot(response["frequency"][()], size, **look)
     _over_frequency(axis, file)
     if contents.backbone:
@@ -146,7 +168,8 @@ def _draw_amplitudes(axis: Axes, file: h5py.File, contents: Contents) -> None:
 def _draw_peaks(axis: Axes, file: h5py.File, name: str, factor: float, colour: str) -> None:
     """The value at the peak of each response as a dot."""
     peaks = [response.attrs for response in file["responses"].values()]
-    forces, values = [peak["force"] for peak in peaks], [factor * peak[name] for peak in peaks]
+    forces = [amount_in(peak)[1] for peak in peaks]
+    values = [factor * peak[name] for peak in peaks]
     axis.plot(forces, values, "o", color=colour, label="largest amplitude")
     axis.set_ylim(0.0, HEADROOM * max(axis.dataLim.y1, 1e-300))
 
@@ -157,5 +180,5 @@ def _resonance_title(file: h5py.File) -> str:
     most = max(peaks, key=lambda peak: float(peak["damping"]))
     return (
         f"Resonance between {min(resonances):.4g} and {max(resonances):.4g} Hz; most damped "
-        f"under {most['force']:g} N: {TO_PERCENT * most['damping']:.3g} %"
+        f"{under_in(most)}: {TO_PERCENT * most['damping']:.3g} %"
     )

@@ -13,7 +13,8 @@ from typing import Any, Literal
 
 from fe_models.mesh import MeshError
 from sa_solver.normal import NormalContactError
-from wear.coupled import Contacts, CoupledSettings, CoupledState, CoupledWear, JumpSize
+from wear.contacts import Contacts
+from wear.coupled import CoupledSettings, CoupledState, CoupledWear, JumpSize
 from wear.implicit import ImplicitStepper
 from wear.interface import MotionError
 from wear.stepping import ContactFailure
