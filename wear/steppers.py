@@ -123,7 +123,7 @@ class ExplicitStepper:
     >>> print(f"{end.volume:.2e} mm^3/mm of {1e4 * 2 * 1e-4 * 0.04 * 50.0 / 3000.0:.2e}")
     1.33e-03 mm^3/mm of 1.33e-03
     >>> print(end.spent.steps, "steps")
-    119 steps
+    120 steps
     """
 
     fraction: float | None = None
