@@ -73,18 +73,13 @@ if TYPE_CHECKING:
     )
     from wear.evolution import EnergyTable
     from wear.face_loads import CycleLoads
+    from wear.implicit import ImplicitStepper, SecondOrderStepper
     from wear.interface import InterfaceContact, InterfaceSettings
     from wear.kinetics import linear_regime
     from wear.laws import ArchardLaw, EnergyAmplitudeLaw, EnergyLaw, EvolvingLaw, WearLaw
     from wear.life import findley, ruiz, smith_watson_topper
     from wear.link import CellNodes
-    from wear.steppers import (
-        ErrorControl,
-        ExplicitStepper,
-        HeunStepper,
-        ImplicitStepper,
-        SecondOrderStepper,
-    )
+    from wear.steppers import ErrorControl, ExplicitStepper, HeunStepper
     from wear.stepping import ContactFailure
 
 __all__ = [
@@ -128,15 +123,13 @@ __getattr__, __dir__ = lazy_names(
         ),
         "evolution": ("EnergyTable",),
         "face_loads": ("CycleLoads",),
+        "implicit": ("ImplicitStepper", "SecondOrderStepper"),
         "interface": ("InterfaceContact", "InterfaceSettings"),
         "kinetics": ("linear_regime",),
         "laws": ("ArchardLaw", "EnergyAmplitudeLaw", "EnergyLaw", "EvolvingLaw", "WearLaw"),
         "life": ("findley", "ruiz", "smith_watson_topper"),
         "link": ("CellNodes",),
-        "steppers": (
-            *("ErrorControl", "ExplicitStepper", "HeunStepper", "ImplicitStepper"),
-            "SecondOrderStepper",
-        ),
+        "steppers": ("ErrorControl", "ExplicitStepper", "HeunStepper"),
         "stepping": ("ContactFailure",),
     },
 )

@@ -342,7 +342,7 @@ class CoupledWear:
             shorter = cycles * self._share_to_stop(state, interfaces)
             if shorter == cycles or cycles <= 1.0:
                 break
-            cycles = max(1.0, shorter)
+            cycles = left = max(1.0, shorter)
         state = replace(state, interfaces=interfaces, spent=state.spent + spent)
         state, drift = self._follow_drift(state)
         return state.record(float(state.cycles[-1]) + cycles, self.contacts, drift)

@@ -36,10 +36,11 @@ from wear.coupled import (
 from wear.drive import Drive
 from wear.evolution import EnergyTable
 from wear.face_loads import CycleLoads
+from wear.implicit import ImplicitStepper
 from wear.interface import InterfaceContact, InterfaceSettings, InterfaceState, MotionError
 from wear.laws import EnergyLaw, EvolvingLaw
 from wear.link import CellNodes
-from wear.steppers import ErrorControl, ImplicitStepper
+from wear.steppers import ErrorControl
 from wear.stepping import ContactFailure
 
 BODY = Material(115e3, 0.29)

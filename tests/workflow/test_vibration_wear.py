@@ -14,9 +14,10 @@ from fe_models.dynamics.harmonics import Resolution
 from tests.workflow.conftest import invoke
 from tests.workflow.scenes import RIG_OF_THESIS
 from tests.workflow.shown_files import check_arrays, check_scene, total
+from wear.implicit import ImplicitStepper
 from wear.joints.periodic import PeriodicMarch
 from wear.marching import advance_cycles
-from wear.steppers import ErrorControl, ImplicitStepper, first_cycles
+from wear.steppers import ErrorControl, first_cycles
 from workflow.analyses.rig.building import row_of_masses
 from workflow.analyses.rig.structure import Rig
 from workflow.analyses.vibration.load import Driving
