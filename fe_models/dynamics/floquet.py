@@ -10,13 +10,14 @@ Neutral deviations, which neither grow nor die, are told by what joints are, not
 slider that sticks all period long may stand where it likes (its multiplier is 1), and it is a
 spring to all else; a structure that only sliders hold may be displaced as a whole.
 
-Two resolutions of the period tell the error of the multipliers; where one is no farther from the
-circle than that, nothing is said, or more times are taken.
+The error of the multipliers is told by half as many times of the period, and by a motion that is as
+far off as the given one may be. Where one is no farther from the circle than that, more times are
+taken, and in the end nothing is said.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -42,6 +43,8 @@ SAMPLES, DEEPEST = 128, 3
 FINER = 2
 # Multipliers that are told, and those below which one is of no account.
 TOLD, SMALL = 8, 1e-3
+# Estimates of error that a multiplier must be away from the circle.
+SURE = 2.0
 # Modes up to which all of a structure are taken; of more those slower than so many times the
 # highest harmonic of the motion. Times of a period of such a structure, and per highest harmonic.
 MOST_MODES, HIGHEST, LARGE_SAMPLES, PER_HARMONIC = 64, 3.0, 128, 4
@@ -62,6 +65,11 @@ class Stability:
     neutral: int
     error: float
     message: str
+
+    @property
+    def beyond(self) -> int:
+        """Multipliers beyond the circle, however near to it."""
+        return int((np.abs(self.multipliers) > 1.0).sum())
 
     @property
     def largest(self) -> float:
@@ -100,15 +108,17 @@ class Floquet:
             samples, deepest, finest = LARGE_SAMPLES, 0, 0
         while samples < PER_HARMONIC * motion.resolution.harmonics[-1]:
             samples *= 2
+        at = structure, motion.frequency
         for finer in range(finest + 1):
             times, deviations = self._marched(motion, SPLIT**finer * samples, deepest + finer)
             joints = ActiveJoints.of(deviations, structure)
-            at = structure, motion.frequency
             fine, shifts = multipliers_of(*at, times, deviations, joints)
             half = times.halved()
-            rough = self._deviations(motion, half)
-            coarse, _ = multipliers_of(*at, half, rough, joints)
-            told = _judged(fine, coarse, joints.neutral + shifts)
+            # Half as many times, and the same of a motion as far off as this one may be.
+            coarse, _ = multipliers_of(*at, half, self._deviations(motion, half), joints)
+            other = _displaced(motion)
+            moved, _ = multipliers_of(*at, half, self._deviations(other, half), joints)
+            told = _judged(fine, coarse, moved, joints.neutral + shifts)
             if told.verdict != "unknown":
                 break
         return told
@@ -134,20 +144,36 @@ class Floquet:
         return self._joints.linearise(motion.coefficients, basis, motion.resolution.lead)
 
 
-def _judged(fine: ComplexArray, coarse: ComplexArray, neutral: int) -> Stability:
-    """What a resolution of the period says, with the next coarser one as the measure of error."""
-    multipliers = fine[np.abs(fine) > SMALL]
-    errors = np.abs(multipliers[:, None] - np.append(coarse, 0.0)).min(axis=1)
-    beyond = np.abs(multipliers) - 1.0
-    unstable, undecided = beyond > errors, np.abs(beyond) <= errors
+def _displaced(motion: HarmonicSolution) -> HarmonicSolution:
+    """A motion whose vibration is larger by the error of the given one, or by what its harmonics
+    leave out where that is not known."""
+    share = motion.left_out if motion.error is None else motion.error.vibration
+    coefficients = (1.0 + share) * motion.coefficients
+    if motion.resolution.harmonics[0] == 0:
+        coefficients[:, 0] = motion.coefficients[:, 0]
+    return replace(motion, coefficients=coefficients)
+
+
+def _judged(
+    fine: ComplexArray, coarse: ComplexArray, moved: ComplexArray, neutral: int
+) -> Stability:
+    """What multipliers say, with those of half as many times, and of another motion at these.
+
+    What counts is how large the largest is, the second largest, and so on.
+    """
+    sizes, halved, other = (np.abs(multipliers) for multipliers in (fine, coarse, moved))
+    errors = np.abs(sizes - halved) + np.abs(other - halved)
+    beyond = sizes - 1.0
+    unstable, undecided = beyond > SURE * errors, np.abs(beyond) <= SURE * errors
     verdict: Verdict = "unstable" if unstable.any() else "stable"
     message = ""
     if undecided.any() and verdict == "stable":
         place = int(np.argmax(undecided))
         verdict = "unknown"
         message = (
-            f"a multiplier of size {abs(multipliers[place]):.6g} is nearer to 1 than its error "
+            f"a multiplier of size {sizes[place]:.6g} is as near to 1 as its error, "
             f"{errors[place]:.1g}"
         )
-    told, error = multipliers[:TOLD], float(errors[:1].sum())
+    told = fine[sizes > SMALL][:TOLD]
+    error = float(errors[:1].sum())
     return Stability(verdict, told, int(unstable.sum()), neutral, error, message)

@@ -22,6 +22,8 @@ from sa_solver.types import Array
 
 # Unknowns up to which loops are faster than calls of BLAS and LAPACK.
 FEW = 8
+# Of 1: what is left of a deviation that is forgotten.
+FORGOTTEN = 1e-100
 
 
 class StructureSteps(NamedTuple):
@@ -100,6 +102,7 @@ def monodromy(structure: StructureSteps, joints: JointSteps) -> Array:
         _add_moved(joints.by_end[step], moved, new_memory)
         # Whole forces again: those of springs in the structure are the joints'.
         _add_springs(1.0, springs, moved, force)
+        _forget(new_memory)
         state, new_state = new_state, state
         memory, new_memory = new_memory, memory
     return np.concatenate((state, memory))
@@ -123,6 +126,15 @@ def _add_row(share: float, row: Array, to: Array) -> None:
     if share != 0.0:
         for c in range(len(row)):
             to[c] += share * row[c]
+
+
+@njit(cache=True, nogil=True)
+def _forget(memory: Array) -> None:
+    """What has decayed below all rounding is nothing: numbers without all digits are slow."""
+    for row in memory:
+        for c in range(len(row)):
+            if abs(row[c]) < FORGOTTEN:
+                row[c] = 0.0
 
 
 @njit(cache=True, nogil=True)

@@ -12,7 +12,11 @@ from pydantic import Field, StrictBool, model_validator
 
 from workflow.analyses.rig.doubts import RIGID, about_modes
 from workflow.analyses.rig.excitation import DrivingForce, Frequency, MassNumber
-from workflow.analyses.rig.joint_sections import ContactLaw, FrictionContactJoint
+from workflow.analyses.rig.joint_sections import (
+    ElasticJoint,
+    FrictionContactJoint,
+    VibrationLaw,
+)
 from workflow.analyses.rig.structure import (
     FrictionRig,
     ReducedBody,
@@ -68,7 +72,7 @@ class MotionResolution(Section):
 
     harmonics: Annotated[Sequence[int], HarmonicNumbers()] = entry(
         "how many odd ones, or a list; those to begin with if there is a tolerance; for contacts "
-        "the mean, 0, is added",
+        "and what else moves the mean, 0 is added",
         8,
         default=ODD,
     )
@@ -188,16 +192,24 @@ class VibrationCaseBase(Case):
         return False
 
     @property
+    def moves_mean(self) -> bool:
+        """Whether joints may move the mean of a vibration: contacts do."""
+        return self.contacts
+
+    @property
     def harmonics(self) -> tuple[int, ...]:
-        """Those of the motion: contacts need harmonic 0 too."""
+        """Those of the motion: what moves the mean needs harmonic 0 too."""
         return self.with_mean(self.resolution.harmonics)
 
     def with_mean(self, harmonics: Sequence[int]) -> tuple[int, ...]:
-        """Harmonics, with 0 where joints are contacts."""
-        return tuple(sorted({0, *harmonics} if self.contacts else harmonics))
+        """Harmonics, with 0 where joints may move the mean."""
+        return tuple(sorted({0, *harmonics} if self.moves_mean else harmonics))
 
     def doubts(self) -> Iterator[str]:
-        stiffness = getattr(getattr(self, "joint", None), "stiffness", RIGID)
+        joint = getattr(self, "joint", None)
+        # Nonlinear springs may take a mode anywhere above that without them.
+        free = joint is None or isinstance(joint, ElasticJoint)
+        stiffness = RIGID if free else getattr(joint, "stiffness", RIGID)
         yield from about_modes("frequencies", self.frequencies, self.structure, stiffness)
 
     @property
@@ -259,7 +271,7 @@ class VibrationCase(DrivenMass):
     structure: Annotated[Rig | ReducedBody | FrictionRig, Field(discriminator="kind")] = entry(
         "what holds the joints"
     )
-    joint: ContactLaw = entry("its law and its parameters; of all joints together")
+    joint: VibrationLaw = entry("its law and its parameters; of all joints together")
     loops: LoopsAt | None = entry("of all joints together, at one frequency", default=None)
     force_sweeps: Annotated[tuple[Frequency, ...], Field(max_length=100)] = entry(
         "frequencies at which motions are followed along the force, from the least to the largest "
@@ -273,9 +285,31 @@ class VibrationCase(DrivenMass):
         default=False,
     )
 
+    stability: StrictBool | None = entry(
+        "whether it is found of every motion, and where it changes; without it, of structures of "
+        "up to 64 modes: with many contacts a motion takes seconds",
+        True,
+        default=None,
+    )
+
     @property
     def contacts(self) -> bool:
         return isinstance(self.joint, FrictionContactJoint)
+
+    @property
+    def moves_mean(self) -> bool:
+        elastic = isinstance(self.joint, ElasticJoint) and self.joint.moves_mean
+        return self.contacts or elastic
+
+    def doubts(self) -> Iterator[str]:
+        yield from super().doubts()
+        elastic, harmonics = isinstance(self.joint, ElasticJoint), self.harmonics
+        one_sided = elastic and self.moves_mean
+        if one_sided and not any(number % 2 == 0 for number in harmonics if number > 0):
+            yield (
+                f"resolution.harmonics: without even ones, which a joint of law {self.joint.law} "
+                "that is not alike on both sides has; list them, such as [0, 1, 2, 3, 4, 5]"
+            )
 
     @model_validator(mode="after")
     def _joins_forces(self) -> VibrationCase:

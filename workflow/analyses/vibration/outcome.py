@@ -14,6 +14,9 @@ from workflow.shell.dataset import Datasets
 
 # Groups of a response, beside its own curves.
 NODES, RESONANCE, LOOPS = "nodes", "resonance", "loops"
+# Where stability changes along a curve, and what is known of each.
+BIFURCATIONS = "bifurcations"
+Bifurcations = tuple[Mapping[str, Any], ...]
 # Motions along the force at a frequency.
 FORCE_SWEEPS = "force_sweeps"
 
@@ -22,11 +25,12 @@ FORCE_SWEEPS = "force_sweeps"
 class Curves:
     """``datasets`` by name, the first axis of each along the curve.
 
-    ``numbers`` are attributes beside them.
+    ``numbers`` are attributes beside them, ``bifurcations`` those of the curve.
     """
 
     datasets: Datasets
     numbers: Mapping[str, Any]
+    bifurcations: Bifurcations = ()
 
 
 @dataclass(frozen=True)
@@ -35,7 +39,7 @@ class Response:
 
     ``curves`` along the frequency, ``numbers`` for the summary; of joints with places ``nodes``,
     along the frequency too, and ``resonance``, along the cycle there; ``loops``, along a cycle, by
-    the resolutions in which they were found, the finest last.
+    the resolutions in which they were found, the finest last; ``bifurcations`` along the curve.
     """
 
     force: float
@@ -44,6 +48,7 @@ class Response:
     nodes: Datasets | None = None
     resonance: Datasets | None = None
     loops: tuple[Curves, ...] = ()
+    bifurcations: Bifurcations = ()
 
 
 @dataclass(frozen=True)

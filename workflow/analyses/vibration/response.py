@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from scipy.optimize import minimize_scalar
 
+from fe_models.dynamics.bifurcations import curve_by_force, curve_by_frequency, curve_by_phase
 from fe_models.dynamics.continuation import ContinuationControl
 from fe_models.dynamics.cycle_energy import damping_ratio
 from fe_models.dynamics.forced_response import (
@@ -32,6 +33,7 @@ from workflow.analyses.vibration.case import VibrationCase
 from workflow.analyses.vibration.loops import loop_of
 from workflow.analyses.vibration.model import VibrationModel
 from workflow.analyses.vibration.outcome import Curves, Response
+from workflow.analyses.vibration.stability import stability_along
 from workflow.errors import MethodFailed
 from workflow.shell.dataset import Dataset, Datasets
 from workflow.shell.reporter import Reporter
@@ -122,7 +124,17 @@ def response_under(
     if branch.message:
         unbounded = UNBOUNDED if model.undamped else ""
         reporter.warn(f"{force:g} N: {branch.message}{unbounded}")
-    curves = _curves(model, branch)
+    stability = stability_along(
+        case,
+        model,
+        f"{force:g} N",
+        curve_by_frequency(branch.problem, force),
+        branch.solutions,
+        partial(amplitude_of, model),
+        reporter,
+        steps,
+    )
+    curves = {**_curves(model, branch), **stability.columns}
     if int(np.argmax(curves["amplitude"].values[:, -1])) in (0, len(branch.solutions) - 1):
         reporter.warn(f"{force:g} N: no resonance, the largest motion is at an end of the curve")
     reporter.doing(f"{force:g} N: resonance")
@@ -131,13 +143,15 @@ def response_under(
     problem = branch.problem.refined(peak.resolution)
     resonance = steps("accurate resonance", lambda: _accurate(problem, peak, accuracy))
     _warn_of_stroke(model, resonance, reporter)
+    numbers = _numbers(model, branch, curves, problem.refined(resonance.resolution), resonance)
     response = Response(
         force,
         curves,
-        _numbers(model, branch, curves, problem.refined(resonance.resolution), resonance),
+        numbers | stability.numbers,
         nodes=_nodes(branch) if model.rig.pressing is not None else None,
         resonance=_cycle(resonance) if model.rig.pressing is not None else None,
         loops=_loops(case, model, branch, reporter, steps),
+        bifurcations=stability.bifurcations,
     )
     warn_of_error(f"{force:g} N: the motion", response.numbers["error"], case, reporter)
     return response, branch
@@ -175,6 +189,16 @@ def force_sweep(
         raise MethodFailed(f"no motion at {frequency:g} Hz: {branch.message}; change force_sweeps")
     if branch.message:
         reporter.warn(f"{frequency:g} Hz, along the force: {branch.message}")
+    stability = stability_along(
+        case,
+        model,
+        f"{frequency:g} Hz",
+        curve_by_force(branch.problem, frequency),
+        branch.solutions,
+        partial(amplitude_of, model),
+        reporter,
+        steps,
+    )
     curves = _curves(model, branch)
     shared = ("phase", "damping", "energy_per_cycle", "slip", "left_out")
     along = "amplitude of the force, in the order of the curve"
@@ -182,11 +206,12 @@ def force_sweep(
         "force": Dataset(branch.forces, "N", along),
         "amplitude": _of_the_last(curves["amplitude"]),
         **{name: curves[name] for name in shared},
+        **stability.columns,
     }
     folds = [float(branch.curve.parameters[place]) for place in branch.curve.folds]
     points = len(branch.solutions)
     numbers = {"frequency": frequency, "points": points, "folds": folds, "message": branch.message}
-    return Curves(datasets, numbers)
+    return Curves(datasets, numbers | stability.numbers, stability.bifurcations)
 
 
 def backbone_of(
@@ -206,6 +231,16 @@ def backbone_of(
         reporter.warn(f"backbone: {backbone.message}")
     if not backbone.solutions:
         return None
+    stability = stability_along(
+        case,
+        model,
+        "backbone",
+        curve_by_phase(backbone.problem, backbone.solutions[0]),
+        backbone.solutions,
+        partial(amplitude_of, model),
+        reporter,
+        steps,
+    )
     columns = _motion_columns(model, backbone.problem, backbone.solutions)
     resonance = "of phase resonance: what is driven lags the force by 90 degrees"
     datasets = {
@@ -213,8 +248,10 @@ def backbone_of(
         "frequency": Dataset(backbone.frequencies, "Hz", resonance),
         "amplitude": _of_the_last(columns["amplitude"]),
         **{name: columns[name] for name in ("damping", "energy_per_cycle", "slip")},
+        **stability.columns,
     }
-    return Curves(datasets, {"message": backbone.message})
+    numbers = {"message": backbone.message, **stability.numbers}
+    return Curves(datasets, numbers, stability.bifurcations)
 
 
 def _numbers(
@@ -293,6 +330,11 @@ def amplitudes_of(model: VibrationModel, solution: HarmonicSolution) -> Array:
     """Half of the way to and fro ``(k,)`` of what is seen [mm]."""
     seen = replace(solution, motion=solution.motion @ model.rig.seen.T)
     return np.asarray(0.5 * np.ptp(seen.displacement(TIMES), axis=0))
+
+
+def amplitude_of(model: VibrationModel, solution: HarmonicSolution) -> float:
+    """Of what is looked at [mm]."""
+    return float(amplitudes_of(model, solution)[-1])
 
 
 def _nodes(branch: ResponseBranch) -> dict[str, Dataset]:

@@ -2,25 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 from workflow.analyses.vibration.case import VibrationCase
 from workflow.analyses.vibration.outcome import (
+    BIFURCATIONS,
     FORCE_SWEEPS,
     LOOPS,
     NODES,
     RESONANCE,
+    Bifurcations,
     Curves,
     Response,
     VibrationOutcome,
 )
+from workflow.analyses.vibration.stability import COLUMNS, bifurcation_datasets
 from workflow.case.plain import counted
 from workflow.shell.analysis import Run
 from workflow.shell.folder import OutputFolder
 from workflow.shell.results import Along, ResultsWriter, run_results
 from workflow.shell.summary import finish
-from workflow.shell.tables import write_curves
+from workflow.shell.tables import DIGITS, heading, write_curves, write_table
 
 RESPONSES, BACKBONE = "responses", "backbone"
 TO_MICRONS, PER_MICRON = 1e3, 1e-3  # mm to µm, N/mm to N/µm
@@ -54,9 +57,11 @@ def _write_results(outcome: VibrationOutcome, run: Run[VibrationCase]) -> None:
             writer.put(
                 BACKBONE, outcome.backbone.datasets, Along("force"), **outcome.backbone.numbers
             )
+            _put_bifurcations(writer, BACKBONE, outcome.backbone.bifurcations)
         for number, sweep in enumerate(outcome.force_sweeps):
             place = f"{FORCE_SWEEPS}/{number:05d}"
             writer.put(place, sweep.datasets, Along("force"), **sweep.numbers)
+            _put_bifurcations(writer, place, sweep.bifurcations)
 
 
 def _put_response(writer: ResultsWriter, place: str, response: Response) -> None:
@@ -66,6 +71,15 @@ def _put_response(writer: ResultsWriter, place: str, response: Response) -> None
             writer.put(f"{place}/{kind}", datasets)
     for number, loop in enumerate(response.loops):
         writer.put(f"{place}/{LOOPS}/{number:05d}", loop.datasets, **loop.numbers)
+    _put_bifurcations(writer, place, response.bifurcations)
+
+
+def _put_bifurcations(writer: ResultsWriter, place: str, bifurcations: Bifurcations) -> None:
+    """Those of the curve at a place, if there are any."""
+    if bifurcations:
+        kinds = [str(found["kind"]) for found in bifurcations]
+        datasets = bifurcation_datasets(bifurcations)
+        writer.put(f"{place}/{BIFURCATIONS}", datasets, kind=kinds)
 
 
 def put_response_curves(writer: ResultsWriter, place: str, response: Response) -> None:
@@ -92,6 +106,27 @@ def _write_tables(outcome: VibrationOutcome, folder: OutputFolder) -> None:
     for number, sweep in enumerate(outcome.force_sweeps):
         what = f"response at {sweep.numbers['frequency']:g} Hz, over the force"
         write_curves(folder.reserve(f"force_sweep_{number:05d}.csv", what), sweep.datasets)
+    found = list(_every_bifurcation(outcome))
+    if found:
+        path = folder.reserve(f"{BIFURCATIONS}.csv", "where the stability of motions changes")
+        columns: dict[str, list[Any]] = {
+            "curve": [curve for curve, _ in found],
+            "kind": [each["kind"] for _, each in found],
+        }
+        for name, (unit, _) in COLUMNS.items():
+            columns[heading(name, unit)] = [each[name] for _, each in found]
+        write_table(path, columns, DIGITS)
+
+
+def _every_bifurcation(outcome: VibrationOutcome) -> Iterator[tuple[str, Mapping[str, Any]]]:
+    """All bifurcations, each with the name of the curve that it is on."""
+    for response in outcome.responses:
+        yield from ((f"{response.force:g} N", found) for found in response.bifurcations)
+    if outcome.backbone is not None:
+        yield from ((BACKBONE, found) for found in outcome.backbone.bifurcations)
+    for sweep in outcome.force_sweeps:
+        at = f"{sweep.numbers['frequency']:g} Hz"
+        yield from ((at, found) for found in sweep.bifurcations)
 
 
 # --- summary ------------------------------------------------------------------------------------
@@ -105,14 +140,23 @@ def _summary(outcome: VibrationOutcome) -> dict[str, Any]:
     }
     if outcome.backbone is not None:
         points = len(outcome.backbone.datasets["force"].values)
-        summary[BACKBONE] = {"points": points, **outcome.backbone.numbers}
+        summary[BACKBONE] = {"points": points, **_curve_summary(outcome.backbone)}
     if outcome.force_sweeps:
-        summary[FORCE_SWEEPS] = [dict(sweep.numbers) for sweep in outcome.force_sweeps]
+        summary[FORCE_SWEEPS] = [_curve_summary(sweep) for sweep in outcome.force_sweeps]
+    return summary
+
+
+def _curve_summary(curve: Curves) -> dict[str, Any]:
+    summary = dict(curve.numbers)
+    if curve.bifurcations:
+        summary[BIFURCATIONS] = [dict(found) for found in curve.bifurcations]
     return summary
 
 
 def _response_summary(response: Response) -> dict[str, Any]:
     summary = {"force": response.force, **response.numbers}
+    if response.bifurcations:
+        summary[BIFURCATIONS] = [dict(found) for found in response.bifurcations]
     if response.loops:
         summary[LOOPS] = [dict(loop.numbers) for loop in response.loops]
     return summary
@@ -139,9 +183,12 @@ def _response_line(response: Response, label: str) -> str:
         f"{numbers['points']} points",
         f"error {numbers['error']:.1e}",
     ]
-    return ", ".join(parts) + (
-        f"; {counted(len(numbers['folds']), 'fold')}" if numbers["folds"] else ""
-    )
+    said = []
+    if numbers["folds"]:
+        said.append(counted(len(numbers["folds"]), "fold"))
+    if numbers.get("unstable_points"):
+        said.append(f"{numbers['unstable_points']} of them unstable")
+    return "; ".join([", ".join(parts), *said])
 
 
 def _loop_line(loop: Curves) -> str:
