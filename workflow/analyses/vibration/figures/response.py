@@ -11,6 +11,11 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from workflow.analyses.vibration.figures.loops import loops
+from workflow.analyses.vibration.figures.stability import (
+    draw_motions,
+    explain_stability,
+    mark_bifurcations,
+)
 from workflow.analyses.vibration.figures.states import node_states, pad_states
 from workflow.analyses.vibration.outcome import Contents
 from workflow.pictures.panels import (
@@ -72,10 +77,14 @@ def frequency_response(file: h5py.File, contents: Contents) -> Figure:
     for response, colour in _shown(file, contents):
         force, size = float(response.attrs["force"]), TO_MICRONS * response["amplitude"][:, -1]
         label = f"{force:g} N: {response.attrs['resonance']:.4g} Hz"
-        axis.plot(response["frequency"][()], size / force, color=colour, label=label)
+        draw_motions(
+            axis, response, response["frequency"][()], size / force, color=colour, label=label
+        )
+        mark_bifurcations(axis, response, "frequency", TO_MICRONS / force, colour)
         peaks.append(TO_MICRONS * float(response.attrs["amplitude"]) / force)
         lows.append(size.min() / force)
         axis.plot(response.attrs["resonance"], peaks[-1], "o", color=colour, markersize=5)
+    explain_stability(axis, [response for response, _ in _shown(file, contents)])
     _over_frequency(axis, file)
     axis.set_ylabel(f"amplitude of {_seen(file)} / force [µm/N]")
     axis.set_ylim(BELOW * min(lows), ABOVE * max(peaks))
@@ -118,7 +127,7 @@ def resonance(file: h5py.File, contents: Contents) -> Figure:
     if contents.backbone:
         for panel, name, factor in ((top, "frequency", 1.0), (bottom, "damping", TO_PERCENT)):
             force, values = file["backbone/force"][()], factor * file["backbone"][name][()]
-            panel.plot(force, values, "--", color=BLACK, label="phase resonance")
+            panel.plot(force, values, color=BLACK, linewidth=1.0, label="phase resonance")
     _draw_peaks(top, file, "resonance", 1.0, BLUE)
     _draw_peaks(bottom, file, "damping", TO_PERCENT, ORANGE)
     top.set_ylabel("resonance frequency [Hz]")
@@ -132,12 +141,18 @@ def _draw_amplitudes(axis: Axes, file: h5py.File, contents: Contents) -> None:
     for response, colour in _shown(file, contents):
         force, size = float(response.attrs["force"]), TO_MICRONS * response["amplitude"][:, -1]
         look = {"color": colour, "label": f"{force:g} N", "linewidth": 1.4}
-        axis.plot(response["frequency"][()], size, **look)
+        draw_motions(axis, response, response["frequency"][()], size, **look)
+        mark_bifurcations(axis, response, "frequency", TO_MICRONS, colour)
+    drawn = [response for response, _ in _shown(file, contents)]
     _over_frequency(axis, file)
     if contents.backbone:
         backbone = file["backbone"]
-        look = {"color": BLACK, "label": "phase resonance", "zorder": 4}
-        axis.plot(backbone["frequency"][()], TO_MICRONS * backbone["amplitude"][()], "--", **look)
+        look = {"color": BLACK, "label": "phase resonance", "zorder": 4, "linewidth": 1.0}
+        size = TO_MICRONS * backbone["amplitude"][()]
+        draw_motions(axis, backbone, backbone["frequency"][()], size, **look)
+        mark_bifurcations(axis, backbone, "frequency", TO_MICRONS, BLACK)
+        drawn.append(backbone)
+    explain_stability(axis, drawn)
     axis.set_ylabel(f"amplitude of {_seen(file)} [µm]")
     axis.set_title("responses and backbone" if contents.backbone else "responses")
     plain_ticks(axis.yaxis)
