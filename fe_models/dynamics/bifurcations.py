@@ -118,7 +118,7 @@ def find_bifurcations(
     Where Newton's method does not find the curve between two points none is told there.
     """
     floquet = Floquet(curve.problem)
-    ways = [_Way(curve, *ends, floquet) for ends in pairwise(motions)]
+    ways = [Way(curve, *ends, floquet) for ends in pairwise(motions)]
     folds = {place: fold for place in _turns(curve, motions, ways) if (fold := ways[place].fold())}
     counts: dict[int, tuple[int, int]] = {}
     found = []
@@ -151,7 +151,7 @@ def _changes(stability: Sequence[Stability]) -> Iterator[int]:
 
 
 def _turns(
-    curve: FollowedCurve[L], motions: Sequence[HarmonicSolution], ways: Sequence[_Way[L]]
+    curve: FollowedCurve[L], motions: Sequence[HarmonicSolution], ways: Sequence[Way[L]]
 ) -> Iterator[int]:
     """Points between which and the next the curve turns back in its parameter."""
     steps = np.diff([curve.parameter_of(motion) for motion in motions])
@@ -186,7 +186,7 @@ class _Lost(Exception):
     """Newton's method does not find the curve."""
 
 
-class _Way(Generic[L]):
+class Way(Generic[L]):
     """The way from one motion of a curve to another, by shares of the chord between them."""
 
     def __init__(
