@@ -163,6 +163,16 @@ class LoopsAt(Section):
         return self
 
 
+class FurtherStart(Section):
+    """Where a branch is looked for that does not come from an end of the frequencies."""
+
+    force: DrivingForce = entry("one of forces [N]", "40 N")
+    frequency: Frequency = entry("of motions that may be on it [Hz]", "200 Hz")
+    amplitude: Annotated[float, Quantity("mm", above=0.0, at_most=1e3)] = entry(
+        "of what is looked at in such a motion, roughly [mm]", "50 um"
+    )
+
+
 class VibrationCaseBase(Case):
     """A structure under forces a sin(2π frequency t), for all frequencies of a span."""
 
@@ -285,6 +295,11 @@ class VibrationCase(DrivenMass):
         default=False,
     )
 
+    further_branches: Annotated[tuple[FurtherStart, ...], Field(max_length=100)] = entry(
+        "from where branches are looked for that no end of the frequencies leads to, as closed "
+        "ones; none: nowhere",
+        default=(),
+    )
     stability: StrictBool | None = entry(
         "whether it is found of every motion, and where it changes; without it, of structures of "
         "up to 64 modes: with many contacts a motion takes seconds",
@@ -318,6 +333,24 @@ class VibrationCase(DrivenMass):
                 "a single force; allowed: two or more, between which motions are followed",
                 *("forces", "backbone", "force_sweeps"),
             )
+        return self
+
+    @model_validator(mode="after")
+    def _further_from_its_own(self) -> VibrationCase:
+        low, high = self.frequencies
+        for number, start in enumerate(self.further_branches):
+            if start.force not in self.forces:
+                allowed = ", ".join(f"{force:g}" for force in self.forces)
+                raise disagreement(
+                    f"{start.force:g} N: not among forces; allowed: {allowed} N",
+                    f"further_branches.{number}.force",
+                )
+            if not low <= start.frequency <= high:
+                raise disagreement(
+                    f"{start.frequency:g} Hz: outside; allowed: within frequencies, {low:g} to "
+                    f"{high:g} Hz",
+                    f"further_branches.{number}.frequency",
+                )
         return self
 
     @model_validator(mode="after")

@@ -14,6 +14,8 @@ from workflow.shell.dataset import Datasets
 
 # Groups of a response, beside its own curves.
 NODES, RESONANCE, LOOPS = "nodes", "resonance", "loops"
+# Branches that no end of the frequencies leads to.
+FURTHER = "further_branches"
 # Where stability changes along a curve, and what is known of each.
 BIFURCATIONS = "bifurcations"
 Bifurcations = tuple[Mapping[str, Any], ...]
@@ -58,7 +60,7 @@ class VibrationOutcome:
     ``labels`` of what is seen, the last of which is looked at. ``linear`` are the limits of joints
     that are free and stuck, over frequency; ``contact`` is where joints are and how they rest, if
     they have places; ``backbone`` the curve of phase resonance and ``force_sweeps`` motions along
-    the force, if they were asked for. ``numbers`` go
+    the force, if they were asked for; ``further`` branches, as the responses. ``numbers`` go
     into the summary as they are.
     """
 
@@ -70,6 +72,7 @@ class VibrationOutcome:
     contact: Datasets | None = None
     backbone: Curves | None = None
     force_sweeps: tuple[Curves, ...] = ()
+    further: tuple[Curves, ...] = ()
 
     @property
     def contents(self) -> Contents:

@@ -20,6 +20,7 @@ from fe_models.dynamics.forced_response import (
     along_frequency,
     finer_resolution,
 )
+from fe_models.dynamics.further_branches import FurtherBranch
 from fe_models.dynamics.harmonic_balance import SAMPLES_PER_PERIOD, HarmonicBalance
 from fe_models.dynamics.harmonic_solution import HarmonicSolution
 from fe_models.dynamics.harmonics import Resolution
@@ -134,7 +135,7 @@ def response_under(
         reporter,
         steps,
     )
-    curves = {**_curves(model, branch), **stability.columns}
+    curves = {**curves_of(model, branch), **stability.columns}
     if int(np.argmax(curves["amplitude"].values[:, -1])) in (0, len(branch.solutions) - 1):
         reporter.warn(f"{force:g} N: no resonance, the largest motion is at an end of the curve")
     reporter.doing(f"{force:g} N: resonance")
@@ -199,7 +200,7 @@ def force_sweep(
         reporter,
         steps,
     )
-    curves = _curves(model, branch)
+    curves = curves_of(model, branch)
     shared = ("phase", "damping", "energy_per_cycle", "slip", "left_out")
     along = "amplitude of the force, in the order of the curve"
     datasets = {
@@ -282,7 +283,8 @@ def _numbers(
     }
 
 
-def _curves(model: VibrationModel, branch: ResponseBranch) -> dict[str, Dataset]:
+def curves_of(model: VibrationModel, branch: ResponseBranch | FurtherBranch) -> dict[str, Dataset]:
+    """What structure and joints do along a branch, over the frequency."""
     along = "frequency of the force, in the order of the curve"
     frequency = Dataset(branch.frequencies, "Hz", along)
     return {"frequency": frequency, **_motion_columns(model, branch.problem, branch.solutions)}

@@ -9,6 +9,7 @@ from workflow.analyses.vibration.case import VibrationCase
 from workflow.analyses.vibration.outcome import (
     BIFURCATIONS,
     FORCE_SWEEPS,
+    FURTHER,
     LOOPS,
     NODES,
     RESONANCE,
@@ -58,6 +59,10 @@ def _write_results(outcome: VibrationOutcome, run: Run[VibrationCase]) -> None:
                 BACKBONE, outcome.backbone.datasets, Along("force"), **outcome.backbone.numbers
             )
             _put_bifurcations(writer, BACKBONE, outcome.backbone.bifurcations)
+        for number, branch in enumerate(outcome.further):
+            place = f"{FURTHER}/{number:05d}"
+            writer.put(place, branch.datasets, Along("frequency"), **branch.numbers)
+            _put_bifurcations(writer, place, branch.bifurcations)
         for number, sweep in enumerate(outcome.force_sweeps):
             place = f"{FORCE_SWEEPS}/{number:05d}"
             writer.put(place, sweep.datasets, Along("force"), **sweep.numbers)
@@ -106,6 +111,9 @@ def _write_tables(outcome: VibrationOutcome, folder: OutputFolder) -> None:
     for number, sweep in enumerate(outcome.force_sweeps):
         what = f"response at {sweep.numbers['frequency']:g} Hz, over the force"
         write_curves(folder.reserve(f"force_sweep_{number:05d}.csv", what), sweep.datasets)
+    for number, branch in enumerate(outcome.further):
+        what = f"further branch under {branch.numbers['force']:g} N, over frequency"
+        write_curves(folder.reserve(f"further_branch_{number:05d}.csv", what), branch.datasets)
     found = list(_every_bifurcation(outcome))
     if found:
         path = folder.reserve(f"{BIFURCATIONS}.csv", "where the stability of motions changes")
@@ -122,6 +130,8 @@ def _every_bifurcation(outcome: VibrationOutcome) -> Iterator[tuple[str, Mapping
     """All bifurcations, each with the name of the curve that it is on."""
     for response in outcome.responses:
         yield from ((f"{response.force:g} N", found) for found in response.bifurcations)
+    for number, branch in enumerate(outcome.further):
+        yield from ((f"further branch {number}", found) for found in branch.bifurcations)
     if outcome.backbone is not None:
         yield from ((BACKBONE, found) for found in outcome.backbone.bifurcations)
     for sweep in outcome.force_sweeps:
@@ -143,6 +153,8 @@ def _summary(outcome: VibrationOutcome) -> dict[str, Any]:
         summary[BACKBONE] = {"points": points, **_curve_summary(outcome.backbone)}
     if outcome.force_sweeps:
         summary[FORCE_SWEEPS] = [_curve_summary(sweep) for sweep in outcome.force_sweeps]
+    if outcome.further:
+        summary[FURTHER] = [_curve_summary(branch) for branch in outcome.further]
     return summary
 
 
@@ -168,6 +180,8 @@ def _lines(outcome: VibrationOutcome) -> Iterator[str]:
         yield f"  {_response_line(response, outcome.labels[-1])}"
         for loop in response.loops[-1:]:
             yield f"    {_loop_line(loop)}"
+    for branch in outcome.further:
+        yield f"  {_further_line(branch)}"
     if outcome.backbone is not None:
         yield f"  {_backbone_line(outcome.backbone)}"
 
@@ -200,6 +214,19 @@ def _loop_line(loop: Curves) -> str:
     if numbers["friction"] is not None:
         text += f", friction {numbers['friction']:.3g}"
     return f"{text}, error {numbers['error']:.1e}"
+
+
+def _further_line(branch: Curves) -> str:
+    numbers = branch.numbers
+    if numbers["closed"]:
+        ends = ", closed"
+    else:
+        ends = ", which comes out on a known one" if numbers["joins"] else ""
+    return (
+        f"{numbers['force']:g} N: a further branch from {numbers['lowest_frequency']:.5g} to "
+        f"{numbers['highest_frequency']:.5g} Hz{ends}, at most "
+        f"{TO_MICRONS * numbers['largest_amplitude']:.4g} um"
+    )
 
 
 def _backbone_line(backbone: Curves) -> str:

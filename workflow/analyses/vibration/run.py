@@ -6,13 +6,16 @@ from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from typing import Any
 
+from fe_models.dynamics.forced_response import ResponseBranch
+from fe_models.dynamics.further_branches import FurtherBranch
 from fe_models.dynamics.harmonics import HarmonicBalanceError
 from fe_models.dynamics.receptance import ReceptanceError
 from sa_solver.steps import Steps
 from wear.joints.parameters import JointError
 from workflow.analyses.vibration.case import VibrationCase
+from workflow.analyses.vibration.further import further_from
 from workflow.analyses.vibration.model import VibrationModel
-from workflow.analyses.vibration.outcome import Response, VibrationOutcome, trend
+from workflow.analyses.vibration.outcome import Curves, Response, VibrationOutcome, trend
 from workflow.analyses.vibration.response import backbone_of, force_sweep, response_under
 from workflow.analyses.vibration.results import write_vibration_output
 from workflow.errors import UserError
@@ -45,7 +48,8 @@ def _outcome(case: VibrationCase, reporter: Reporter, steps: Steps) -> Vibration
         linear = steps("linear limits", lambda: model.linear(case.frequencies))
     responses: list[Response] = []
     backbone = None
-    sweeps = []
+    sweeps: list[Curves] = []
+    further: list[Curves] = []
     count = len(case.forces) + case.backbone + len(case.force_sweeps)
     curves = _Curves(count, reporter, growing=case.resolution.tolerance is not None)
     with reporter.course("vibration"):
@@ -53,6 +57,12 @@ def _outcome(case: VibrationCase, reporter: Reporter, steps: Steps) -> Vibration
             with curves.next(f"{force:g} N"), reporter.stage("response"):
                 response, branch = response_under(case, model, force, reporter, steps)
             responses.append(response)
+            known: list[ResponseBranch | FurtherBranch] = [branch]
+            for start in (start for start in case.further_branches if start.force == force):
+                with reporter.stage("further branches"):
+                    for other, found in further_from(case, model, start, known, reporter, steps):
+                        known.append(other)
+                        further.append(found)
             if case.backbone and backbone is None:
                 # From the least force on which there is a phase resonance.
                 with curves.next("backbone"), reporter.stage("backbone"):
@@ -69,6 +79,7 @@ def _outcome(case: VibrationCase, reporter: Reporter, steps: Steps) -> Vibration
         contact,
         backbone,
         tuple(sweeps),
+        tuple(further),
     )
 
 

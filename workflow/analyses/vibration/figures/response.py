@@ -17,7 +17,7 @@ from workflow.analyses.vibration.figures.stability import (
     mark_bifurcations,
 )
 from workflow.analyses.vibration.figures.states import node_states, pad_states
-from workflow.analyses.vibration.outcome import Contents
+from workflow.analyses.vibration.outcome import FURTHER, Contents
 from workflow.pictures.panels import (
     Figures,
     legend_below,
@@ -84,13 +84,32 @@ def frequency_response(file: h5py.File, contents: Contents) -> Figure:
         peaks.append(TO_MICRONS * float(response.attrs["amplitude"]) / force)
         lows.append(size.min() / force)
         axis.plot(response.attrs["resonance"], peaks[-1], "o", color=colour, markersize=5)
-    explain_stability(axis, [response for response, _ in _shown(file, contents)])
+    drawn = [response for response, _ in _shown(file, contents)]
+    drawn += _draw_further(axis, file, contents, over_force=True)
+    explain_stability(axis, drawn)
     _over_frequency(axis, file)
     axis.set_ylabel(f"amplitude of {_seen(file)} / force [µm/N]")
     axis.set_ylim(BELOW * min(lows), ABOVE * max(peaks))
     plain_ticks(axis.yaxis)
     legend_below(figure, [axis], columns=4, title="resonance")
     return figure
+
+
+def _draw_further(
+    axis: Axes, file: h5py.File, contents: Contents, *, over_force: bool
+) -> list[h5py.Group]:
+    """Branches beside the shown responses, in the colours of their forces; these branches."""
+    colours = {response.attrs["force"]: colour for response, colour in _shown(file, contents)}
+    branches = [
+        branch for branch in file.get(FURTHER, {}).values() if branch.attrs["force"] in colours
+    ]
+    for branch in branches:
+        force = float(branch.attrs["force"])
+        factor, colour = TO_MICRONS / (force if over_force else 1.0), colours[force]
+        size = factor * branch["amplitude"][:, -1]
+        draw_motions(axis, branch, branch["frequency"][()], size, color=colour, linewidth=1.4)
+        mark_bifurcations(axis, branch, "frequency", factor, colour)
+    return branches
 
 
 def _over_frequency(axis: Axes, file: h5py.File) -> None:
@@ -144,6 +163,7 @@ def _draw_amplitudes(axis: Axes, file: h5py.File, contents: Contents) -> None:
         draw_motions(axis, response, response["frequency"][()], size, **look)
         mark_bifurcations(axis, response, "frequency", TO_MICRONS, colour)
     drawn = [response for response, _ in _shown(file, contents)]
+    drawn += _draw_further(axis, file, contents, over_force=False)
     _over_frequency(axis, file)
     if contents.backbone:
         backbone = file["backbone"]

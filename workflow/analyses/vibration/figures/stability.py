@@ -14,7 +14,7 @@ from workflow.analyses.vibration.outcome import BIFURCATIONS
 from workflow.pictures.style import BLACK
 
 # How motions are drawn by what the column says of them: the lesser of two ends counts.
-LINES = {1: "-", 0: ":", -1: "--"}
+LINES: dict[int, Any] = {1: "-", 0: ":", -1: "--"}
 WORDS = {0: "stability unknown", -1: "unstable"}
 # Marks of bifurcations, and what they are called.
 MARKS = {
