@@ -45,6 +45,8 @@ FINER = 2
 TOLD, SMALL = 8, 1e-3
 # Estimates of error that a multiplier must be away from the circle.
 SURE = 2.0
+# Of a multiplier, by the steps of a period and the eigenvalues of their product.
+ROUNDING = 1e-9
 # Modes up to which all of a structure are taken; of more those slower than so many times the
 # highest harmonic of the motion. Times of a period of such a structure, and per highest harmonic.
 MOST_MODES, HIGHEST, LARGE_SAMPLES, PER_HARMONIC = 64, 3.0, 128, 4
@@ -78,16 +80,20 @@ class Stability:
 
 
 class Floquet:
-    """Stability of the motions of one problem."""
+    """Stability of the motions of one problem.
 
-    def __init__(self, problem: HarmonicBalance) -> None:
+    Of a structure of more than ``most_modes`` those are followed that a motion may move.
+    """
+
+    def __init__(self, problem: HarmonicBalance, most_modes: int = MOST_MODES) -> None:
+        self._most_modes = most_modes
         self._problem, self._joints = problem, problem.joints
         self._reduced: ModalStructure | None = None
 
     def _structure(self, motion: HarmonicSolution) -> ModalStructure:
         """All modes of a small structure; of a large one those that this motion may move."""
         problem = self._problem
-        if len(problem.receptance.squares) <= MOST_MODES:
+        if len(problem.receptance.squares) <= self._most_modes:
             return ModalStructure.whole(problem)
         highest = 2.0 * np.pi * motion.frequency * motion.resolution.harmonics[-1]
         count = modes_below(problem, HIGHEST * highest)
@@ -162,7 +168,7 @@ def _judged(
     What counts is how large the largest is, the second largest, and so on.
     """
     sizes, halved, other = (np.abs(multipliers) for multipliers in (fine, coarse, moved))
-    errors = np.abs(sizes - halved) + np.abs(other - halved)
+    errors = np.abs(sizes - halved) + np.abs(other - halved) + ROUNDING
     beyond = sizes - 1.0
     unstable, undecided = beyond > SURE * errors, np.abs(beyond) <= SURE * errors
     verdict: Verdict = "unstable" if unstable.any() else "stable"
