@@ -274,6 +274,10 @@ class PhaseResonance:
         share = np.clip(unknowns[-1] / self.scale, -np.log(FARTHEST), np.log(FARTHEST))
         return float(self.frequency * np.exp(share))
 
+    def place_of(self, frequency: float) -> float:
+        """The unknown that stands for a frequency [Hz]."""
+        return float(self.scale * np.log(frequency / self.frequency))
+
     def __call__(self, unknowns: Array, parameter: float) -> PhaseBalance:
         frequency = self.frequency_of(unknowns)
         balance = self.problem.evaluate(unknowns[:-1], frequency, parameter, "frequency")

@@ -6,6 +6,7 @@ The laws, all of :mod:`wear.joints.law`'s one interface
     - ``BoucWen``: a smooth way from sticking to sliding.
     - ``UniformIwan``, ``FourParameterIwan``: sliders in parallel, by Masing's rule.
     - ``FrictionContact``: a point in three dimensions, which may separate.
+    - ``PolynomialSpring``, ``ElasticStop``: without friction, nonlinear by themselves or by a gap.
     - ``MixedLaw``, ``JointGroup``: joints of several laws in one structure.
     - ``JointError``: parameters that a joint cannot have.
 
@@ -44,6 +45,7 @@ from sa_solver.lazy import lazy_names
 if TYPE_CHECKING:
     from wear.joints.ageing import long_test, steady_stroke
     from wear.joints.bouc_wen import BoucWen
+    from wear.joints.elastic import ElasticStop, PolynomialSpring
     from wear.joints.evolution import (
         ArrheniusEvolution,
         ExponentialEvolution,
@@ -65,6 +67,7 @@ if TYPE_CHECKING:
 __all__ = [
     "ArrheniusEvolution",
     "BoucWen",
+    "ElasticStop",
     "ExponentialEvolution",
     "FourParameterIwan",
     "FrictionContact",
@@ -78,6 +81,7 @@ __all__ = [
     "MixedLaw",
     "ParallelSliders",
     "PeriodicMarch",
+    "PolynomialSpring",
     "TabulatedEvolution",
     "UniformIwan",
     "long_test",
@@ -91,6 +95,7 @@ __getattr__, __dir__ = lazy_names(
     {
         "ageing": ("long_test", "steady_stroke"),
         "bouc_wen": ("BoucWen",),
+        "elastic": ("ElasticStop", "PolynomialSpring"),
         "evolution": (
             "ArrheniusEvolution",
             "ExponentialEvolution",

@@ -12,7 +12,7 @@ from fe_models.dynamics.ground_motion import Translation
 from fe_models.dynamics.rig import Link, lumped_rig, unit_force
 from workflow.analyses.rig.damping import Damping
 from workflow.analyses.rig.friction_rig import friction_rig_model
-from workflow.analyses.rig.joint_sections import FrictionContactJoint, Joint
+from workflow.analyses.rig.joint_sections import ElasticJoint, FrictionContactJoint, Joint
 from workflow.analyses.rig.reduced_rig import reduced_rig_model
 from workflow.analyses.rig.rig_model import RigModel
 from workflow.analyses.rig.structure import FrictionRig, ReducedBody, Rig
@@ -20,7 +20,10 @@ from workflow.shell.reporter import Reporter
 
 
 def rig_model(
-    structure: Rig | ReducedBody | FrictionRig, joint: Joint, mass: int | None, reporter: Reporter
+    structure: Rig | ReducedBody | FrictionRig,
+    joint: Joint | ElasticJoint,
+    mass: int | None,
+    reporter: Reporter,
 ) -> RigModel:
     """The rig with its joints, of masses in a row driven at the ``mass`` of this number.
 

@@ -17,6 +17,7 @@ from fe_models.dynamics.motion import Motion
 from fe_models.dynamics.receptance import RIGID
 from fe_models.dynamics.rig import natural_frequencies
 from sa_solver.types import Array, Indices
+from wear.joints.elastic import ElasticLaw
 from wear.joints.friction_contact import FrictionContact
 from workflow.analyses.rig.laws import Law
 from workflow.analyses.rig.place_names import PlaceNames
@@ -167,6 +168,8 @@ class RigModel:
         sliding = np.zeros_like(stuck)
         if isinstance(law, FrictionContact):
             sliding[:, 2, 2] = stuck[:, 2, 2]
+        elif isinstance(law, ElasticLaw):
+            sliding = stuck
         else:
             sliding[:, 0, 0] = law.residual_stiffness
         return {

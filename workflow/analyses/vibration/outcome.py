@@ -16,6 +16,11 @@ from workflow.shell.dataset import Datasets
 NODES, RESONANCE, LOOPS = "nodes", "resonance", "loops"
 # Motions at the frequencies that a case asks for, and what is known of motions by their harmonics.
 AT, HARMONICS = "at", "harmonics"
+# Branches that no end of the frequencies leads to.
+FURTHER = "further_branches"
+# Where stability changes along a curve, and what is known of each.
+BIFURCATIONS = "bifurcations"
+Bifurcations = tuple[Mapping[str, Any], ...]
 # Motions along the force at a frequency.
 FORCE_SWEEPS = "force_sweeps"
 # Modes over their amplitude.
@@ -26,11 +31,12 @@ MODES = "modes"
 class Curves:
     """``datasets`` by name, the first axis of each along the curve.
 
-    ``numbers`` are attributes beside them.
+    ``numbers`` are attributes beside them, ``bifurcations`` those of the curve.
     """
 
     datasets: Datasets
     numbers: Mapping[str, Any]
+    bifurcations: Bifurcations = ()
 
 
 @dataclass(frozen=True)
@@ -52,7 +58,7 @@ class Response:
     ``curves`` along the frequency, ``numbers`` for the summary; of joints with places ``nodes``,
     along the frequency too, and ``resonance``, along the cycle there; ``loops``, along a cycle, by
     the resolutions in which they were found, the finest last; ``answers`` at the frequencies
-    asked for; ``harmonics`` of motions, by what they are of.
+    asked for; ``harmonics`` of motions, by what they are of; ``bifurcations`` along the curve.
     """
 
     force: float
@@ -63,6 +69,7 @@ class Response:
     loops: tuple[Curves, ...] = ()
     answers: Answers | None = None
     harmonics: Mapping[str, Datasets] = field(default_factory=dict)
+    bifurcations: Bifurcations = ()
 
 
 @dataclass(frozen=True)
@@ -73,7 +80,8 @@ class VibrationOutcome:
     whose harmonics there are. ``linear`` are the limits of joints
     that are free and stuck, over frequency; ``contact`` is where joints are and how they rest, if
     they have places; ``backbone`` the curve of phase resonance and ``force_sweeps`` motions along
-    the force, if they were asked for, ``modes`` curves over their amplitude. ``numbers`` go
+    the force, if they were asked for, ``modes`` curves over their amplitude; ``further`` branches,
+    as the responses. ``numbers`` go
     into the summary as they are.
     """
 
@@ -87,6 +95,7 @@ class VibrationOutcome:
     backbone: Curves | None = None
     force_sweeps: tuple[Curves, ...] = ()
     modes: tuple[Curves, ...] = ()
+    further: tuple[Curves, ...] = ()
 
     @property
     def contents(self) -> Contents:

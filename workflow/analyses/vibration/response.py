@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from scipy.optimize import minimize_scalar
 
+from fe_models.dynamics.bifurcations import curve_by_force, curve_by_frequency, curve_by_phase
 from fe_models.dynamics.continuation import ContinuationControl
 from fe_models.dynamics.cycle_energy import damping_ratio
 from fe_models.dynamics.forced_response import (
@@ -19,9 +20,9 @@ from fe_models.dynamics.forced_response import (
     along_frequency,
     finer_resolution,
 )
-from fe_models.dynamics.harmonic_balance import SAMPLES_PER_PERIOD, HarmonicBalance
+from fe_models.dynamics.further_branches import FurtherBranch
+from fe_models.dynamics.harmonic_balance import HarmonicBalance
 from fe_models.dynamics.harmonic_solution import HarmonicSolution
-from fe_models.dynamics.harmonics import Resolution
 from fe_models.dynamics.phase_resonance import along_phase_resonance
 from fe_models.dynamics.resolution_error import resolution_error
 from sa_solver.steps import Steps
@@ -30,9 +31,10 @@ from wear.joints.periodic import SEPARATED, SLIP
 from wear.moving import LARGE_STROKE
 from workflow.analyses.vibration.case import VibrationCase
 from workflow.analyses.vibration.harmonics import harmonics_of
-from workflow.analyses.vibration.loops import loop_of
+from workflow.analyses.vibration.loops import loops_of
 from workflow.analyses.vibration.model import VibrationModel
 from workflow.analyses.vibration.outcome import RESONANCE, Curves, Response
+from workflow.analyses.vibration.stability import stability_along
 from workflow.errors import MethodFailed
 from workflow.shell.dataset import Dataset, Datasets
 from workflow.shell.reporter import Reporter
@@ -125,7 +127,17 @@ def response_under(
     if branch.message:
         unbounded = UNBOUNDED if model.undamped else ""
         reporter.warn(f"{told}: {branch.message}{unbounded}")
-    curves = _curves(case, model, branch)
+    stability = stability_along(
+        case,
+        model,
+        told,
+        curve_by_frequency(branch.problem, force),
+        branch.solutions,
+        partial(amplitude_of, model),
+        reporter,
+        steps,
+    )
+    curves = {**curves_of(case, model, branch), **stability.columns}
     if int(np.argmax(curves["amplitude"].values[:, -1])) in (0, len(branch.solutions) - 1):
         reporter.warn(f"{told}: no resonance, the largest motion is at an end of the curve")
     reporter.doing(f"{told}: resonance")
@@ -134,14 +146,16 @@ def response_under(
     problem = branch.problem.refined(peak.resolution)
     resonance = steps("accurate resonance", lambda: accurate(problem, peak, accuracy))
     _warn_of_stroke(model, told, resonance, reporter)
+    found = problem.refined(resonance.resolution)
     response = Response(
         force,
         curves,
-        _numbers(case, model, branch, curves, problem.refined(resonance.resolution), resonance),
+        _numbers(case, model, branch, curves, found, resonance) | stability.numbers,
         nodes=_nodes(branch) if model.rig.pressing is not None else None,
         resonance=_cycle(resonance) if model.rig.pressing is not None else None,
-        loops=_loops(case, model, branch, reporter, steps),
+        loops=loops_of(case, model, branch, reporter, steps),
         harmonics={RESONANCE: harmonics_of(model.rig, resonance)},
+        bifurcations=stability.bifurcations,
     )
     warn_of_error(f"{told}: the motion", response.numbers["error"], case, reporter)
     return response, branch
@@ -179,18 +193,29 @@ def force_sweep(
         raise MethodFailed(f"no motion at {frequency:g} Hz: {branch.message}; change force_sweeps")
     if branch.message:
         reporter.warn(f"{frequency:g} Hz, along the {case.amount.name}: {branch.message}")
-    curves = _curves(case, model, branch)
+    stability = stability_along(
+        case,
+        model,
+        f"{frequency:g} Hz",
+        curve_by_force(branch.problem, frequency),
+        branch.solutions,
+        partial(amplitude_of, model),
+        reporter,
+        steps,
+    )
+    curves = curves_of(case, model, branch)
     shared = ("phase", "damping", "energy_per_cycle", "slip", "left_out")
     along = f"{case.amount.description}, in the order of the curve"
     datasets = {
         case.amount.name: Dataset(branch.forces, case.amount.unit, along),
         "amplitude": _of_the_last(curves["amplitude"]),
         **{name: curves[name] for name in shared},
+        **stability.columns,
     }
     folds = [float(branch.curve.parameters[place]) for place in branch.curve.folds]
     points = len(branch.solutions)
     numbers = {"frequency": frequency, "points": points, "folds": folds, "message": branch.message}
-    return Curves(datasets, numbers)
+    return Curves(datasets, numbers | stability.numbers, stability.bifurcations)
 
 
 def backbone_of(
@@ -210,6 +235,16 @@ def backbone_of(
         reporter.warn(f"backbone: {backbone.message}")
     if not backbone.solutions:
         return None
+    stability = stability_along(
+        case,
+        model,
+        "backbone",
+        curve_by_phase(backbone.problem, backbone.solutions[0]),
+        backbone.solutions,
+        partial(amplitude_of, model),
+        reporter,
+        steps,
+    )
     columns = motion_columns(model, backbone.problem, backbone.solutions)
     resonance = "of phase resonance: what is driven lags the force by 90 degrees"
     datasets = {
@@ -217,8 +252,10 @@ def backbone_of(
         "frequency": Dataset(backbone.frequencies, "Hz", resonance),
         "amplitude": _of_the_last(columns["amplitude"]),
         **{name: columns[name] for name in ("damping", "energy_per_cycle", "slip")},
+        **stability.columns,
     }
-    return Curves(datasets, {"message": backbone.message})
+    numbers = {"message": backbone.message, **stability.numbers}
+    return Curves(datasets, numbers, stability.bifurcations)
 
 
 def _numbers(
@@ -264,9 +301,10 @@ def _beside(
     return numbers
 
 
-def _curves(
-    case: VibrationCase, model: VibrationModel, branch: ResponseBranch
+def curves_of(
+    case: VibrationCase, model: VibrationModel, branch: ResponseBranch | FurtherBranch
 ) -> dict[str, Dataset]:
+    """What structure and joints do along a branch, over the frequency."""
     along = "frequency of the force, in the order of the curve"
     frequencies = {"frequency": Dataset(branch.frequencies, "Hz", along)}
     if case.engine_order is not None:
@@ -326,6 +364,11 @@ def amplitudes_of(model: VibrationModel, solution: HarmonicSolution) -> Array:
     """Half of the way to and fro ``(k,)`` of what is seen [mm]."""
     seen = replace(solution, motion=solution.motion @ model.rig.seen.T)
     return np.asarray(0.5 * np.ptp(seen.displacement(TIMES), axis=0))
+
+
+def amplitude_of(model: VibrationModel, solution: HarmonicSolution) -> float:
+    """Of what is looked at [mm]."""
+    return float(amplitudes_of(model, solution)[-1])
 
 
 def _nodes(branch: ResponseBranch) -> dict[str, Dataset]:
@@ -419,42 +462,3 @@ def accurate(
         if not more_accurate.converged:
             return motion
         problem, motion = refined, more_accurate
-
-
-# --- loops --------------------------------------------------------------------------------------
-
-
-def _loops(
-    case: VibrationCase,
-    model: VibrationModel,
-    branch: ResponseBranch,
-    reporter: Reporter,
-    steps: Steps,
-) -> tuple[Curves, ...]:
-    """Loops at the frequency that the case asks for, a resolution after the other."""
-    if case.loops is None:
-        return ()
-    frequency = case.loops.frequency
-    nearest = int(np.abs(branch.frequencies - frequency).argmin())
-    start, loops = branch.solutions[nearest], []
-    told = case.amount.told(start.force)
-    for harmonics in case.loops.harmonics or (start.resolution.harmonics,):
-        every = case.with_mean(harmonics)
-        reporter.doing(f"{told}: loop at {frequency:g} Hz, {harmonics} harmonics")
-        samples = max(case.resolution.samples, SAMPLES_PER_PERIOD * every[-1])
-        problem = branch.problem.refined(Resolution(every, samples))
-        motion = steps("loop", partial(_known, problem, frequency, start))
-        if not motion.converged:
-            reporter.warn(f"{told}: no loop at {frequency:g} Hz: {motion.message}")
-            continue
-        loops.append(loop_of(model, motion, case.joint.normal_load))
-        start = motion
-    return tuple(loops)
-
-
-def _known(problem: HarmonicBalance, frequency: float, near: HarmonicSolution) -> HarmonicSolution:
-    """The motion at a frequency found from another one, with its error."""
-    motion = problem.solve(frequency, near.force, near)
-    if not motion.converged:
-        return motion
-    return replace(motion, error=resolution_error(problem, motion))

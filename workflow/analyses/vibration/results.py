@@ -11,23 +11,27 @@ from workflow.analyses.vibration.excitation import Amount
 from workflow.analyses.vibration.harmonics import CURVE, write_harmonics
 from workflow.analyses.vibration.outcome import (
     AT,
+    BIFURCATIONS,
     FORCE_SWEEPS,
+    FURTHER,
     HARMONICS,
     LOOPS,
     MODES,
     NODES,
     RESONANCE,
     Answers,
+    Bifurcations,
     Curves,
     Response,
     VibrationOutcome,
 )
+from workflow.analyses.vibration.stability import bifurcation_datasets, columns_for
 from workflow.case.plain import counted
 from workflow.shell.analysis import Run
 from workflow.shell.folder import OutputFolder
 from workflow.shell.results import Along, ResultsWriter, run_results
 from workflow.shell.summary import finish
-from workflow.shell.tables import write_curves
+from workflow.shell.tables import DIGITS, heading, write_curves, write_table
 
 RESPONSES, BACKBONE = "responses", "backbone"
 TO_MICRONS, PER_MICRON = 1e3, 1e-3  # mm to µm, N/mm to N/µm
@@ -67,9 +71,15 @@ def _write_results(outcome: VibrationOutcome, run: Run[VibrationCase]) -> None:
             _put_response(writer, f"{RESPONSES}/{number:05d}", case.amount, response)
         if outcome.backbone is not None:
             writer.put(BACKBONE, outcome.backbone.datasets, along, **outcome.backbone.numbers)
+            _put_bifurcations(writer, BACKBONE, outcome.backbone.bifurcations, case.amount)
+        for number, branch in enumerate(outcome.further):
+            place = f"{FURTHER}/{number:05d}"
+            writer.put(place, branch.datasets, Along("frequency"), **branch.numbers)
+            _put_bifurcations(writer, place, branch.bifurcations, case.amount)
         for number, sweep in enumerate(outcome.force_sweeps):
             place = f"{FORCE_SWEEPS}/{number:05d}"
             writer.put(place, sweep.datasets, along, **sweep.numbers)
+            _put_bifurcations(writer, place, sweep.bifurcations, case.amount)
         for number, mode in enumerate(outcome.modes):
             place = f"{MODES}/{number:05d}"
             writer.put(place, mode.datasets, Along("modal_amplitude"), **mode.numbers)
@@ -87,6 +97,17 @@ def _put_response(writer: ResultsWriter, place: str, amount: Amount, response: R
     for of, datasets in response.harmonics.items():
         along = Along("frequency") if of == CURVE else None
         writer.put(f"{place}/{HARMONICS}/{of}", datasets, along)
+    _put_bifurcations(writer, place, response.bifurcations, amount)
+
+
+def _put_bifurcations(
+    writer: ResultsWriter, place: str, bifurcations: Bifurcations, amount: Amount
+) -> None:
+    """Those of the curve at a place, if there are any."""
+    if bifurcations:
+        kinds = [str(found["kind"]) for found in bifurcations]
+        datasets = bifurcation_datasets(bifurcations, amount)
+        writer.put(f"{place}/{BIFURCATIONS}", datasets, kind=kinds)
 
 
 def put_response_curves(
@@ -127,6 +148,35 @@ def _write_tables(outcome: VibrationOutcome, folder: OutputFolder) -> None:
         what = f"mode {mode.numbers['mode']}, over its amplitude"
         path = folder.reserve(f"mode_{mode.numbers['mode']:05d}.csv", what)
         write_curves(path, mode.datasets)
+    amount = outcome.case.amount
+    for number, branch in enumerate(outcome.further):
+        what = f"further branch {amount.under(branch.numbers[amount.name])}, over frequency"
+        write_curves(folder.reserve(f"further_branch_{number:05d}.csv", what), branch.datasets)
+    found = list(_every_bifurcation(outcome))
+    if found:
+        path = folder.reserve(f"{BIFURCATIONS}.csv", "where the stability of motions changes")
+        columns: dict[str, list[Any]] = {
+            "curve": [curve for curve, _ in found],
+            "kind": [each["kind"] for _, each in found],
+        }
+        for name, (unit, _) in columns_for(amount).items():
+            columns[heading(name, unit)] = [each[name] for _, each in found]
+        write_table(path, columns, DIGITS)
+
+
+def _every_bifurcation(outcome: VibrationOutcome) -> Iterator[tuple[str, Mapping[str, Any]]]:
+    """All bifurcations, each with the name of the curve that it is on."""
+    for response in outcome.responses:
+        yield from (
+            (outcome.case.amount.told(response.force), found) for found in response.bifurcations
+        )
+    for number, branch in enumerate(outcome.further):
+        yield from ((f"further branch {number}", found) for found in branch.bifurcations)
+    if outcome.backbone is not None:
+        yield from ((BACKBONE, found) for found in outcome.backbone.bifurcations)
+    for sweep in outcome.force_sweeps:
+        at = f"{sweep.numbers['frequency']:g} Hz"
+        yield from ((at, found) for found in sweep.bifurcations)
 
 
 # --- summary ------------------------------------------------------------------------------------
@@ -142,16 +192,27 @@ def _summary(outcome: VibrationOutcome) -> dict[str, Any]:
     }
     if outcome.backbone is not None:
         points = len(outcome.backbone.datasets["frequency"].values)
-        summary[BACKBONE] = {"points": points, **outcome.backbone.numbers}
+        summary[BACKBONE] = {"points": points, **_curve_summary(outcome.backbone)}
     if outcome.force_sweeps:
-        summary[FORCE_SWEEPS] = [dict(sweep.numbers) for sweep in outcome.force_sweeps]
+        summary[FORCE_SWEEPS] = [_curve_summary(sweep) for sweep in outcome.force_sweeps]
+    if outcome.further:
+        summary[FURTHER] = [_curve_summary(branch) for branch in outcome.further]
     if outcome.modes:
         summary[MODES] = [dict(mode.numbers) for mode in outcome.modes]
     return summary
 
 
+def _curve_summary(curve: Curves) -> dict[str, Any]:
+    summary = dict(curve.numbers)
+    if curve.bifurcations:
+        summary[BIFURCATIONS] = [dict(found) for found in curve.bifurcations]
+    return summary
+
+
 def _response_summary(amount: Amount, response: Response) -> dict[str, Any]:
     summary = {amount.name: response.force, **response.numbers}
+    if response.bifurcations:
+        summary[BIFURCATIONS] = [dict(found) for found in response.bifurcations]
     if response.loops:
         summary[LOOPS] = [dict(loop.numbers) for loop in response.loops]
     if response.answers is not None:
@@ -167,6 +228,8 @@ def _lines(outcome: VibrationOutcome) -> Iterator[str]:
             yield f"    {_loop_line(loop)}"
         if response.answers is not None:
             yield from _answer_lines(response.answers, outcome.labels[-1])
+    for branch in outcome.further:
+        yield f"  {_further_line(outcome.case.amount, branch)}"
     if outcome.backbone is not None:
         yield f"  {_backbone_line(outcome.case.amount, outcome.backbone)}"
     for mode in outcome.modes:
@@ -184,9 +247,12 @@ def _response_line(case: VibrationCase, response: Response, label: str) -> str:
         f"{numbers['points']} points",
         f"error {numbers['error']:.1e}",
     ]
-    return ", ".join(parts) + (
-        f"; {counted(len(numbers['folds']), 'fold')}" if numbers["folds"] else ""
-    )
+    said = []
+    if numbers["folds"]:
+        said.append(counted(len(numbers["folds"]), "fold"))
+    if numbers.get("unstable_points"):
+        said.append(f"{numbers['unstable_points']} of them unstable")
+    return "; ".join([", ".join(parts), *said])
 
 
 def _beside(numbers: Mapping[str, Any]) -> str:
@@ -223,6 +289,20 @@ def _loop_line(loop: Curves) -> str:
     if numbers["friction"] is not None:
         text += f", friction {numbers['friction']:.3g}"
     return f"{text}, error {numbers['error']:.1e}"
+
+
+def _further_line(amount: Amount, branch: Curves) -> str:
+    numbers = branch.numbers
+    if numbers["closed"]:
+        ends = ", closed"
+    else:
+        ends = ", which comes out on a known one" if numbers["joins"] else ""
+    return (
+        f"{amount.told(numbers[amount.name])}: a further branch from "
+        f"{numbers['lowest_frequency']:.5g} to {numbers['highest_frequency']:.5g} Hz{ends}, "
+        "at most "
+        f"{TO_MICRONS * numbers['largest_amplitude']:.4g} um"
+    )
 
 
 def _backbone_line(amount: Amount, backbone: Curves) -> str:

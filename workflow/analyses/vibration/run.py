@@ -6,16 +6,19 @@ from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
 from typing import Any
 
+from fe_models.dynamics.forced_response import ResponseBranch
+from fe_models.dynamics.further_branches import FurtherBranch
 from fe_models.dynamics.harmonics import HarmonicBalanceError
 from fe_models.dynamics.receptance import ReceptanceError
 from sa_solver.steps import Steps
 from wear.joints.parameters import JointError
 from workflow.analyses.vibration.answers import answers_under
 from workflow.analyses.vibration.case import VibrationCase
+from workflow.analyses.vibration.further import further_from
 from workflow.analyses.vibration.harmonics import CURVE, harmonics_along, names_of
 from workflow.analyses.vibration.model import VibrationModel
 from workflow.analyses.vibration.modes import mode_of
-from workflow.analyses.vibration.outcome import Response, VibrationOutcome, trend
+from workflow.analyses.vibration.outcome import Curves, Response, VibrationOutcome, trend
 from workflow.analyses.vibration.response import backbone_of, force_sweep, response_under
 from workflow.analyses.vibration.results import write_vibration_output
 from workflow.errors import UserError
@@ -58,8 +61,9 @@ def _outcome(case: VibrationCase, reporter: Reporter, steps: Steps) -> Vibration
         linear = steps("linear limits", lambda: model.linear(case.frequencies))
     responses: list[Response] = []
     backbone = None
-    sweeps = []
-    modes = []
+    sweeps: list[Curves] = []
+    further: list[Curves] = []
+    modes: list[Curves] = []
     numbered = () if case.modes is None else case.modes.numbers
     count = len(case.amounts) + case.backbone + len(case.force_sweeps) + len(numbered)
     curves = _Curves(count, reporter, growing=case.resolution.tolerance is not None)
@@ -72,6 +76,12 @@ def _outcome(case: VibrationCase, reporter: Reporter, steps: Steps) -> Vibration
                 if case.harmonics_along_curves:
                     harmonics[CURVE] = harmonics_along(model.rig, branch, reporter)
             responses.append(replace(response, answers=answers, harmonics=harmonics))
+            known: list[ResponseBranch | FurtherBranch] = [branch]
+            for start in (start for start in case.further_branches if start.force == force):
+                with reporter.stage("further branches"):
+                    for other, found in further_from(case, model, start, known, reporter, steps):
+                        known.append(other)
+                        further.append(found)
             if case.backbone and backbone is None:
                 # From the least force on which there is a phase resonance.
                 with curves.next("backbone"), reporter.stage("backbone"):
@@ -95,6 +105,7 @@ def _outcome(case: VibrationCase, reporter: Reporter, steps: Steps) -> Vibration
         backbone,
         tuple(sweeps),
         tuple(modes),
+        tuple(further),
     )
 
 

@@ -14,8 +14,13 @@ from workflow.analyses.vibration.excitation import Amount, amount_in, told_in, u
 from workflow.analyses.vibration.figures.engine import engine_orders
 from workflow.analyses.vibration.figures.loops import loops
 from workflow.analyses.vibration.figures.modes import modes
+from workflow.analyses.vibration.figures.stability import (
+    draw_motions,
+    explain_stability,
+    mark_bifurcations,
+)
 from workflow.analyses.vibration.figures.states import node_states, pad_states
-from workflow.analyses.vibration.outcome import AT, Contents
+from workflow.analyses.vibration.outcome import AT, FURTHER, Contents
 from workflow.pictures.panels import (
     Figures,
     legend_below,
@@ -87,7 +92,10 @@ def frequency_response(file: h5py.File, contents: Contents) -> Figure:
         _, force = amount_in(response.attrs)
         size = TO_MICRONS * response["amplitude"][:, -1]
         label = f"{told_in(response.attrs)}: {response.attrs['resonance']:.4g} Hz"
-        axis.plot(response["frequency"][()], size / force, color=colour, label=label)
+        draw_motions(
+            axis, response, response["frequency"][()], size / force, color=colour, label=label
+        )
+        mark_bifurcations(axis, response, "frequency", TO_MICRONS / force, colour)
         peaks.append(TO_MICRONS * float(response.attrs["amplitude"]) / force)
         lows.append(size.min() / force)
         axis.plot(response.attrs["resonance"], peaks[-1], "o", color=colour, markersize=5)
@@ -95,6 +103,9 @@ def frequency_response(file: h5py.File, contents: Contents) -> Figure:
             asked = response[AT]
             sizes = TO_MICRONS * asked["amplitude"][:, -1] / force
             axis.plot(asked["frequency"][()], sizes, "D", color=colour, **ASKED)
+    drawn = [response for response, _ in _shown(file, contents)]
+    drawn += _draw_further(axis, file, contents, over_force=True)
+    explain_stability(axis, drawn)
     _over_frequency(axis, file)
     amount = _amount_of(file)
     axis.set_ylabel(f"amplitude of {_seen(file)} / {amount.name} [{amount.receptance[1]}]")
@@ -102,6 +113,24 @@ def frequency_response(file: h5py.File, contents: Contents) -> Figure:
     plain_ticks(axis.yaxis)
     legend_below(figure, [axis], columns=4, title="resonance")
     return figure
+
+
+def _draw_further(
+    axis: Axes, file: h5py.File, contents: Contents, *, over_force: bool
+) -> list[h5py.Group]:
+    """Branches beside the shown responses, in the colours of their forces; these branches."""
+    amount = _amount_of(file).name
+    colours = {response.attrs[amount]: colour for response, colour in _shown(file, contents)}
+    branches = [
+        branch for branch in file.get(FURTHER, {}).values() if branch.attrs[amount] in colours
+    ]
+    for branch in branches:
+        force = float(branch.attrs[amount])
+        factor, colour = TO_MICRONS / (force if over_force else 1.0), colours[force]
+        size = factor * branch["amplitude"][:, -1]
+        draw_motions(axis, branch, branch["frequency"][()], size, color=colour, linewidth=1.4)
+        mark_bifurcations(axis, branch, "frequency", factor, colour)
+    return branches
 
 
 def _over_frequency(axis: Axes, file: h5py.File) -> None:
@@ -139,7 +168,7 @@ def resonance(file: h5py.File, contents: Contents) -> Figure:
         for panel, name, factor in ((top, "frequency", 1.0), (bottom, "damping", TO_PERCENT)):
             force = file["backbone"][_amount_of(file).name][()]
             values = factor * file["backbone"][name][()]
-            panel.plot(force, values, "--", color=BLACK, label="phase resonance")
+            panel.plot(force, values, color=BLACK, linewidth=1.0, label="phase resonance")
     _draw_peaks(top, file, "resonance", 1.0, BLUE)
     _draw_peaks(bottom, file, "damping", TO_PERCENT, ORANGE)
     top.set_ylabel("resonance frequency [Hz]")
@@ -154,12 +183,19 @@ def _draw_amplitudes(axis: Axes, file: h5py.File, contents: Contents) -> None:
     for response, colour in _shown(file, contents):
         size = TO_MICRONS * response["amplitude"][:, -1]
         look = {"color": colour, "label": told_in(response.attrs), "linewidth": 1.4}
-        axis.plot(response["frequency"][()], size, **look)
+        draw_motions(axis, response, response["frequency"][()], size, **look)
+        mark_bifurcations(axis, response, "frequency", TO_MICRONS, colour)
+    drawn = [response for response, _ in _shown(file, contents)]
+    drawn += _draw_further(axis, file, contents, over_force=False)
     _over_frequency(axis, file)
     if contents.backbone:
         backbone = file["backbone"]
-        look = {"color": BLACK, "label": "phase resonance", "zorder": 4}
-        axis.plot(backbone["frequency"][()], TO_MICRONS * backbone["amplitude"][()], "--", **look)
+        look = {"color": BLACK, "label": "phase resonance", "zorder": 4, "linewidth": 1.0}
+        size = TO_MICRONS * backbone["amplitude"][()]
+        draw_motions(axis, backbone, backbone["frequency"][()], size, **look)
+        mark_bifurcations(axis, backbone, "frequency", TO_MICRONS, BLACK)
+        drawn.append(backbone)
+    explain_stability(axis, drawn)
     axis.set_ylabel(f"amplitude of {_seen(file)} [µm]")
     axis.set_title("responses and backbone" if contents.backbone else "responses")
     plain_ticks(axis.yaxis)
