@@ -302,7 +302,7 @@ class VibrationCase(DrivenMass):
     )
     stability: StrictBool | None = entry(
         "whether it is found of every motion, and where it changes; without it, of structures of "
-        "up to 64 modes: with many contacts a motion takes seconds",
+        "up to 64 modes and 12 directions of joints: with more a motion may take seconds",
         True,
         default=None,
     )
