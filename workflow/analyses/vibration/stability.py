@@ -41,9 +41,9 @@ NOT_LOOKED_FOR = CurveStability({}, {}, ())
 
 def looked_for(case: VibrationCase, model: VibrationModel) -> bool:
     """Whether stability is found: as the case says, or else where it is cheap."""
-    if case.stability is not None:
-        return case.stability
-    return Floquet(model.problem).cheap
+    if case.stability == "auto":
+        return Floquet(model.problem).cheap
+    return case.stability == "every"
 
 
 def stability_along(
