@@ -14,6 +14,7 @@ M x'' + C x' + K x = f(t) - Bᵀ F(B x), with joint laws F that are handed over,
 - ``motions_at``: all motions of a branch at a frequency
 - ``along_phase_resonance``: the backbone of a resonance
 - ``along_nonlinear_mode``, ``LinearMode``: frequency and damping of a mode against its amplitude
+- ``Floquet``: whether motions are stable
 - ``ContinuationControl``, ``Accuracy``: the steps along a branch, how fine its motions are
 - ``frequency_response``, ``ring_down``: what a hammer's blow shows
 
@@ -46,6 +47,7 @@ if TYPE_CHECKING:
         HarmonicForce,
         RecordedForce,
     )
+    from fe_models.dynamics.floquet import Floquet
     from fe_models.dynamics.forced_response import Accuracy, along_force, along_frequency
     from fe_models.dynamics.free_decay import ring_down
     from fe_models.dynamics.harmonic_balance import HarmonicBalance, PeriodicLoad
@@ -69,6 +71,7 @@ __all__ = [
     "ConstantForce",
     "ContinuationControl",
     "DynamicModel",
+    "Floquet",
     "HammerBlow",
     "HarmonicBalance",
     "HarmonicForce",
@@ -106,6 +109,7 @@ __getattr__, __dir__ = lazy_names(
             "HarmonicForce",
             "RecordedForce",
         ),
+        "floquet": ("Floquet",),
         "forced_response": (
             "Accuracy",
             "along_force",

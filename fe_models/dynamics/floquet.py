@@ -48,17 +48,18 @@ SURE = 2.0
 # Of a multiplier, by the steps of a period and the eigenvalues of their product.
 ROUNDING = 1e-9
 # Modes up to which all of a structure are taken; of more those slower than so many times the
-# highest harmonic of the motion. Times of a period of such a structure, and per highest harmonic.
-MOST_MODES, HIGHEST, LARGE_SAMPLES, PER_HARMONIC = 64, 3.0, 128, 4
+# highest harmonic of the motion. Times of a period of these, or with more directions of joints than
+# so many, and times per highest harmonic.
+MOST_MODES, HIGHEST, MOST_DIRECTIONS, LARGE_SAMPLES, PER_HARMONIC = 64, 3.0, 12, 128, 4
 
 
 @dataclass(frozen=True)
 class Stability:
-    """Whether deviations from a motion die out.
+    """Whether deviations from a motion die out: the ``verdict``.
 
     ``multipliers`` ``(k,)`` are the largest, by size, without the ``neutral`` ones, so many, which
     are 1 whatever the motion is; ``unstable`` of them are beyond the circle. ``error`` is that of
-    the largest. ``message`` says why nothing can be said, where the ``verdict`` is unknown.
+    the largest. ``message`` says why nothing can be said, where it is unknown.
     """
 
     verdict: Verdict
@@ -80,9 +81,30 @@ class Stability:
 
 
 class Floquet:
-    """Stability of the motions of one problem.
+    """Stability of the motions of one ``problem``.
 
     Of a structure of more than ``most_modes`` those are followed that a motion may move.
+
+    Examples
+    --------
+    A mass on a spring that hardens has three motions at 0.22 Hz, of which the middle one repels:
+
+    >>> import numpy as np
+    >>> from fe_models.dynamics import *
+    >>> from wear.joints import PeriodicMarch, PolynomialSpring
+    >>> rig = lumped_rig({"m": 1.0}, {Link("m"): 1.0}, [[Link("m")]], damping_ratio=0.05)
+    >>> joints = PeriodicMarch(PolynomialSpring(0.0, cubic=1.0))
+    >>> load = PeriodicLoad({1: unit_force(rig, "m")})
+    >>> problem = HarmonicBalance(rig, joints, load, Resolution((1, 3, 5), 64))
+    >>> branch = along_frequency(problem, 0.3, (0.1, 0.4))
+    >>> passes = np.flatnonzero(np.diff(np.sign(branch.frequencies - 0.22)))
+    >>> motions = [problem.solve(0.22, 0.3, branch.solutions[place]) for place in passes]
+    >>> floquet = Floquet(problem)
+    >>> for motion in motions:
+    ...     print(f"{abs(motion.amplitude(0)):.2f} mm:", floquet.stability(motion).verdict)
+    1.20 mm: stable
+    0.89 mm: unstable
+    0.36 mm: stable
     """
 
     def __init__(self, problem: HarmonicBalance, most_modes: int = MOST_MODES) -> None:
@@ -101,6 +123,12 @@ class Floquet:
             self._reduced = ModalStructure.reduced(problem, count)
         return self._reduced
 
+    @property
+    def cheap(self) -> bool:
+        """Whether it takes milliseconds for a motion; otherwise it may be seconds."""
+        modes, directions = len(self._problem.model.mass), len(self._problem.model.connection)
+        return modes <= self._most_modes and directions <= MOST_DIRECTIONS
+
     def stability(self, motion: HarmonicSolution) -> Stability:
         """Of a motion of the problem, at whatever resolution."""
         if not isinstance(self._joints, DeviatingJoints):
@@ -112,7 +140,7 @@ class Floquet:
             )
         structure = self._structure(motion)
         samples, deepest, finest = SAMPLES, DEEPEST, FINER
-        if structure.residual is not None:
+        if not self.cheap:
             # Of many joints one changes in every step: none of them is divided.
             samples, deepest, finest = LARGE_SAMPLES, 0, 0
         while samples < PER_HARMONIC * motion.resolution.harmonics[-1]:

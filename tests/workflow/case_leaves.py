@@ -214,12 +214,19 @@ FRICTION_RIG = {
     "springs": [1, 1],
     "damping_ratio": 0.1,
 }
+ELASTIC = {
+    "polynomial_spring": {"law": "polynomial_spring", "stiffness": "1 N/um"},
+    "elastic_stop": {"law": "elastic_stop", "stiffness": "10 N/um"},
+}
 GIVEN["vibration"] = {
     "structure": {"reduced": REDUCED, "friction_rig": FRICTION_RIG},
     **DAMPING,
     **EXCITED,
-    "joint": JOINTS | {"friction_contact": CONTACT},
+    "joint": JOINTS | {"friction_contact": CONTACT} | ELASTIC,
     "loops": {ALWAYS: {"frequency": "100 Hz"}},
+    "further_branches": {
+        ALWAYS: [{"force": "40 N", "frequency": "200 Hz", "amplitude": "50 um"}],
+    },
 }
 GIVEN["rig"] = GIVEN["joint"] | {
     "structure": {"reduced": REDUCED},

@@ -64,7 +64,7 @@ def test_a_further_branch_is_found_with_its_fold_and_drawn_dashed(tmp_path: Any)
 
 
 def test_without_stability_nothing_is_written(tmp_path: Any) -> None:
-    text = CASE.partition("further_branches")[0] + "stability: false\n"
+    text = CASE.partition("further_branches")[0] + "stability: none\n"
     summary = run(tmp_path, text)
     assert "unstable_points" not in summary["responses"][0]
     with h5py.File(tmp_path / "out" / "results.h5") as file:

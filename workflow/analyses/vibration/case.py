@@ -263,11 +263,11 @@ class VibrationCase(DrivenMass):
         "ones; none: nowhere",
         default=(),
     )
-    stability: StrictBool | None = entry(
-        "whether it is found of every motion, and where it changes; without it, of structures of "
-        "up to 64 modes: with many contacts a motion takes seconds",
-        True,
-        default=None,
+    stability: Literal["auto", "every", "none"] = entry(
+        "of which motions it is found, and where it changes; auto: of every one in structures of "
+        "up to 64 modes and 12 directions of joints, as with more one may take seconds",
+        "every",
+        default="auto",
     )
 
     @property

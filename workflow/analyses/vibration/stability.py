@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from fe_models.dynamics.bifurcations import Bifurcation, FollowedCurve, find_bifurcations
-from fe_models.dynamics.floquet import MOST_MODES, Floquet, Stability
+from fe_models.dynamics.floquet import Floquet, Stability
 from fe_models.dynamics.harmonic_solution import HarmonicSolution
 from sa_solver.steps import Steps
 from workflow.analyses.vibration.case import VibrationCase
@@ -42,9 +42,9 @@ NOT_LOOKED_FOR = CurveStability({}, {}, ())
 
 def looked_for(case: VibrationCase, model: VibrationModel) -> bool:
     """Whether stability is found: as the case says, or else where it is cheap."""
-    if case.stability is not None:
-        return case.stability
-    return len(model.rig.model.mass) <= MOST_MODES
+    if case.stability == "auto":
+        return Floquet(model.problem).cheap
+    return case.stability == "every"
 
 
 def stability_along(
