@@ -212,7 +212,9 @@ def _shifts(
     for maps in (deviations.tangent, deviations.by_start + deviations.by_end):
         resisted.extend(maps[:, joints.active] @ shapes[joints.active])
     rows = np.concatenate([part.reshape(-1, len(rigid)) for part in resisted])
-    _, sizes, directions = np.linalg.svd(rows, full_matrices=True)
+    # There are as many rows as increments times joints: their triangle has the same directions.
+    triangle = np.linalg.qr(rows, mode="r")
+    _, sizes, directions = np.linalg.svd(triangle, full_matrices=True)
     free = np.ones(len(rigid), bool)
     free[: len(sizes)] = sizes <= RESISTING * np.abs(rows).max(initial=1.0)
     shifts = np.zeros((size, int(free.sum())))

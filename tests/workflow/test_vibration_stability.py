@@ -1,13 +1,20 @@
 """Stability in vibration cases: columns, bifurcations, dashed curves, further branches."""
 
 import json
+import tracemalloc
 from typing import Any
 
 import h5py
 import numpy as np
 import pytest
 
+from fe_models.dynamics.floquet import Floquet
+from fe_models.dynamics.harmonic_balance import HarmonicBalance, PeriodicLoad
+from fe_models.dynamics.harmonics import Resolution
 from tests.workflow.conftest import invoke
+from tests.workflow.vibration_pad import block
+from wear.joints.friction_contact import FrictionContact
+from wear.joints.periodic import PeriodicMarch
 from workflow.analyses.vibration.figures.response import frequency_response
 from workflow.analyses.vibration.outcome import Contents
 
@@ -100,3 +107,18 @@ def test_a_stop_without_even_harmonics_is_doubted(tmp_path: Any) -> None:
     assert "without even ones" in invoke("check", path).output
     path.write_text(text.replace("harmonics: 3", "harmonics: [0, 1, 2, 3]"), encoding="utf-8")
     assert "without even ones" not in invoke("check", path).output
+
+
+def test_a_body_that_contacts_alone_hold_takes_little_memory() -> None:
+    """As many rows as increments times contacts tell what holds it."""
+    rig = block()
+    law = FrictionContact(1.8e3, 2.3e3, 0.5, gap=rig.gap)
+    load = PeriodicLoad({1: -1j * rig.driven}, 60.0 * rig.pressing)
+    problem = HarmonicBalance(rig.model, PeriodicMarch(law), load, Resolution((0, 1, 3), 32))
+    motion = problem.solve(600.0, 25.0)
+    tracemalloc.start()
+    told = Floquet(problem).stability(motion)
+    _, most = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert told.verdict == "stable"
+    assert most < 1e8
