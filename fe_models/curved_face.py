@@ -63,15 +63,15 @@ class Midsides:
 class Surface:
     """Heights over the frame of a face [mm]: of nodes ``(n,)`` and bulges of facets ``(m, edges)``.
 
-    Bulges are off by up to about ``error`` [mm], as far as the vertices tell; ``straight`` edges
-    have none because their surroundings are no quadratic. ``fitted`` is false where midsides say.
+    Bulges at a node are off by up to about what the fit through the nodes around it has ``left`` of
+    their heights ``(n,)`` [mm], None where midsides say; ``straight`` edges have none because their
+    surroundings are no quadratic.
     """
 
     heights: Array
     bulges: Array
-    error: float = 0.0
+    left: Array | None = None
     straight: int = 0
-    fitted: bool = False
 
     @classmethod
     def flat(cls, nodes: int, facets: Indices) -> Surface:
@@ -88,16 +88,25 @@ class Surface:
             return _fitted(points, facets)
         return cls(points[:, 2], _from_midsides(points, facets, midsides))
 
+    @property
+    def error(self) -> float:
+        """How far bulges are off anywhere, as far as the vertices tell [mm]."""
+        return 0.0 if self.left is None else float(self.left.max(initial=0.0))
+
     def part(self, nodes: Indices, facets: Mask) -> Surface:
         """On some nodes and facets alone."""
-        return replace(self, heights=self.heights[nodes], bulges=self.bulges[facets])
+        return self._with(nodes, self.bulges[facets])
 
     def mirrored(self, nodes: Indices, facets: int) -> Surface:
         """With its images: all ``nodes``, and so many facets, every image turned round."""
         bulges = self.bulges
         while len(bulges) < facets:
             bulges = np.concatenate([bulges, bulges[:, TURNED[bulges.shape[1]]]])
-        return replace(self, heights=self.heights[nodes], bulges=bulges)
+        return self._with(nodes, bulges)
+
+    def _with(self, nodes: Indices, bulges: Array) -> Surface:
+        left = None if self.left is None else self.left[nodes]
+        return replace(self, heights=self.heights[nodes], bulges=bulges, left=left)
 
     def over(self, coordinates: Array, facets: Indices, x: Array, y: Array) -> Array:
         """Height ``(nx, ny)`` [mm] at rising ``x`` ``(nx, 1)`` and ``y`` ``(1, ny)``; else NaN.
@@ -173,8 +182,7 @@ def _fitted(points: Array, facets: Indices) -> Surface:
     seen = bent & (residual > ROUNDING * np.linalg.norm(along, axis=2))
     kept = np.where(bent, 0.0, bulges)
     straight = len(np.unique(np.sort(pairs[seen], axis=1), axis=0))
-    error = float(residual.max(initial=0.0))
-    return Surface(points[:, 2], kept, error, straight, fitted=True)
+    return Surface(points[:, 2], kept, left, straight)
 
 
 def _quadratics(points: Array, facets: Indices) -> tuple[Array, Array]:

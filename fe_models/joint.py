@@ -31,6 +31,7 @@ from numpy.typing import NDArray
 from scipy.sparse.linalg import LinearOperator, eigsh
 
 from fe_models.blas_threads import one_thread
+from fe_models.condensation import Condensed
 from fe_models.symmetry import Mirror, SplitMatrix, symmetric_product
 from sa_solver.types import Array, Indices
 
@@ -40,9 +41,6 @@ RIGID_LIMIT = 1e-7
 RITZ_RESIDUAL = 1e-9
 # Share of the largest eigenvalue that makes the singular joint invertible for the Lanczos search.
 SPECTRUM_SHIFT = 1e-5
-
-# Stiffness and loads of a condensed body.
-Condensed = tuple[Array, Array]
 
 
 @dataclass(frozen=True)

@@ -243,6 +243,10 @@ class Interface(Face):
         """Vertices of body ``number``, 1 or 2, on its own face."""
         return (self.nodes_1, self.nodes_2)[number - 1]
 
+    def carried(self, field: Array) -> Array:
+        """A field ``(n_1, ...)`` of body 1's nodes at those of body 2 ``(n, ...)``."""
+        return field if self.projection is None else np.asarray(self.projection @ field)
+
 
 @dataclass(frozen=True)
 class StructureMesh:
@@ -271,8 +275,16 @@ class StructureMesh:
 
     def faces_of(self, place: int) -> list[tuple[Interface, int]]:
         """Contact faces of the body at a ``place``: interfaces, and which body of each it is."""
-        sides = (1, 2)
-        return [(i, s) for i in self.interfaces for s in sides if i.bodies[s - 1] == place]
+        return [(self.interfaces[number], side) for number, side in self.sides_of(place)]
+
+    def sides_of(self, place: int) -> list[tuple[int, int]]:
+        """As :meth:`faces_of`, the interfaces by their numbers from 0."""
+        return [
+            (number, side)
+            for number, interface in enumerate(self.interfaces)
+            for side in (1, 2)
+            if interface.bodies[side - 1] == place
+        ]
 
     def weighted(self, order: int) -> StructureMesh:
         """With faces that are ``weighted`` where elements are of second order."""

@@ -98,7 +98,8 @@ def mortar_projection(
         ProjectedFace(slave_points, slave_facets),
         ProjectedFace(master_points, master_facets),
     )
-    overlap = overlap_of(slave, master)
+    # Bulges are of degree 2, and ψ of degree 1.
+    overlap = overlap_of(slave, master, 2 if surfaces is None else 4)
     dual, integrals = _dual_functions(slave, overlap)
     areas = slave.scatter(integrals)
     covered = areas / slave.nodal_areas

@@ -58,10 +58,10 @@ def structure_motion(
     forces, count = structure.on_faces(force), len(structure.held[0])
     axes = structure.mesh.bodies[0].axes
     apart = relative[:, axes, :].transpose(2, 1, 0).reshape(-1, len(force))
-    projection, moved = structure.projection, np.zeros_like(forces)
+    moved = np.zeros_like(forces)
     followers = _followers(structure)
     found = _leaders(structure, followers, forces, apart, amplitudes, moved)
-    under = moved[:count] if projection is None else projection @ moved[:count]
+    under = structure.carried(moved[:count])
     moved[count:] = under + apart
     shown, loads = list(increments), amplitudes[increments].T
     displacements = []
@@ -119,9 +119,8 @@ def _leaders(
 
 def _relative(structure: Structure, moved: Array) -> Array:
     """Relative displacements ``(d n, ...)`` of those of all faces ``(places, ...)``."""
-    count, projection = len(structure.held[0]), structure.projection
-    under = moved[:count] if projection is None else projection @ moved[:count]
-    return np.asarray(moved[count:] - under)
+    count = len(structure.held[0])
+    return moved[count:] - structure.carried(moved[:count])
 
 
 def _known(structure: Structure, followers: set[int]) -> np.ndarray:

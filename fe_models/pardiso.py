@@ -62,6 +62,12 @@ def library() -> Any | None:
     return mkl
 
 
+def threads() -> int:
+    """Threads that MKL shares the work of a call from here among; 1 without it."""
+    mkl = library()
+    return 1 if mkl is None else int(mkl.MKL_Get_Max_Threads())
+
+
 def sharing(jobs: Sequence[Callable[[], T]]) -> list[Callable[[], T]]:
     """Jobs for threads side by side, which share those that MKL takes.
 

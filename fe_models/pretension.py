@@ -136,10 +136,8 @@ def bolt_section(structure: Structure, bolt: Pretension) -> BoltSection:
     body, axis = structure.bodies[place], bolt.axis / np.linalg.norm(bolt.axis)
     beyond = bolt.beyond(body.elastic)
     faces = [
-        (number, side, beyond[interface.nodes(side)])
-        for number, interface in enumerate(structure.mesh.interfaces)
-        for side in (1, 2)
-        if interface.bodies[side - 1] == place
+        (number, side, beyond[structure.mesh.interfaces[number].nodes(side)])
+        for number, side in structure.mesh.sides_of(place)
     ]
     for number, _, far in faces:
         if far.any() and not far.all():

@@ -76,8 +76,7 @@ class PrestressedStructure(Structure):
             body.at_interface(moved)
             for body, moved in zip(self.bodies, self.displacements, strict=True)
         )
-        projection = self.projection
-        return above - (below if projection is None else projection @ below)
+        return above - self.carried(below)
 
     def _rigid_motions(self) -> Array:
         """Orthonormal motions ``(d n, k)`` of the interfaces that body 2's supports leave free."""

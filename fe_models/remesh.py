@@ -132,8 +132,7 @@ def _unmeshed_gap(mesh: StructureMesh, interface: Interface) -> Array:
         interface.frame.coordinates(body.points[interface.nodes(number)])[:, 2]
         for number, body in enumerate((mesh.bodies[k] for k in interface.bodies), start=1)
     )
-    below = height_1 if interface.projection is None else interface.projection @ height_1
-    form = interface.gap - (height_2 - below)
+    form = interface.gap - (height_2 - interface.carried(height_1))
     if interface.bulged is not None:
         form -= interface.bulged
     form[np.abs(form) < MATCHING_TOLERANCE * np.ptp(interface.coordinates)] = 0.0

@@ -95,7 +95,6 @@ def set_nodes(elastic: ElasticBody, imported: ImportedMesh, group: str) -> Indic
 
 
 def _curved(body: Body, imported: ImportedMesh) -> Body:
-
     if body.name not in imported.midsides:
         return body
     edges = _edges(body)
@@ -110,8 +109,7 @@ def _unfolded(body: Body) -> Body:
     from fe_models.isoparametric import folded
 
     mesh, corners = body.mesh, len(body.mesh.t)
-    ends = mesh.edges if mesh.dim() == 3 else mesh.facets
-    middle = mesh.p[:, ends].mean(axis=1).T
+    middle = mesh.p.T[_edges(body)].mean(axis=1)
     on_surface = mesh.boundary_facets()
     if mesh.dim() == 3:
         on_surface = np.unique(mesh.f2e[:, on_surface])

@@ -172,8 +172,8 @@ def _face_expansions(structure: Structure, amplitudes: Array) -> tuple[tuple[Arr
             slopes = thermal_gradient(elastic, strains[place], nodes)
             along = np.einsum("a,ant->nt", interface.frame.axes[2], slopes)
             nodal = np.stack([strains[place][nodes], along])
-            if side == 1 and interface.projection is not None:
-                nodal = np.stack([interface.projection @ values for values in nodal])
+            if side == 1:
+                nodal = np.stack([interface.carried(values) for values in nodal])
             sides.append(nodal.transpose(2, 0, 1))
         found.append((sides[0], sides[1]))
     return tuple(found)

@@ -11,6 +11,7 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
+from fe_models.condensation import Keep, made_anew
 from fe_models.friction import LOAD_FLOOR, FrictionalJoint, FrictionState
 from fe_models.joint import JointResolvent, JointStiffness, join, join_halves
 from fe_models.mesh import Face, Interface, StructureMesh, in_space
@@ -144,16 +145,15 @@ class Structure:
 
         These are displacements of faces 1, interface by interface, and then of faces 2.
         """
-        d, sides = self.dimension, (1, 2)
-        order = [(i, side) for side in sides for i in range(len(self.mesh.interfaces))]
-        sizes = [d * len(self.mesh.interfaces[i].nodes(side)) for i, side in order]
+        d, faces = self.dimension, self.mesh.interfaces
+        order = [(i, side) for side in (1, 2) for i in range(len(faces))]
+        sizes = [d * len(faces[i].nodes(side)) for i, side in order]
         ends = np.cumsum(sizes)
         place = {
             key: np.arange(end - n, end) for key, n, end in zip(order, sizes, ends, strict=True)
         }
-        names = [interface.name for interface in self.mesh.interfaces]
         return tuple(
-            np.concatenate([place[names.index(i.name), s] for i, s in self.mesh.faces_of(number)])
+            np.concatenate([place[key] for key in self.mesh.sides_of(number)])
             for number in range(len(self.bodies))
         )
 
@@ -167,24 +167,27 @@ class Structure:
         return held[: self.dimension * faces_1], held[self.dimension * faces_1 :]
 
     def condense(
-        self, like: JointResolvent | None = None, progress: Progress = unseen
+        self,
+        like: JointResolvent | None = None,
+        progress: Progress = unseen,
+        keep: Keep = made_anew,
     ) -> JointStiffness:
         """Stiffness and loads of the joint on its interface displacements.
 
         ``like`` is a joint that differs little from this one and lends it its ρ. ``progress`` is
-        told the steps of it that are done.
+        told the steps of it that are done, ``keep`` may know bodies that were condensed before.
         """
         held_1, held_2 = self.held
         projection, held = self.projection, held_1.any() or held_2.any()
         if like is None and projection is None and not held and len(self.bodies) == 2:
-            halves = self._condense_halves(progress)
+            halves = self._condense_halves(progress, keep)
             if halves is not None:
                 return halves
         if held:
             every = sp.identity(len(held_2), format="csr") if projection is None else projection
             projection = every[~held_2][:, ~held_1]
         done = self._steps(progress)
-        condensed = self.at_once(*(partial(body.condense, done) for body in self.bodies))
+        condensed = self.at_once(*(partial(body.condense, done, keep) for body in self.bodies))
         among_free = np.cumsum(~np.concatenate(self.held)) - 1
         pairs = zip(self.bodies, self.places, strict=True)
         places = [among_free[place[~body.held]] for body, place in pairs]
@@ -196,7 +199,7 @@ class Structure:
         """Steps of a condensation: two of each body, and the joint of all."""
         return Tally(progress, 2 * len(self.bodies) + 1)
 
-    def _condense_halves(self, progress: Progress) -> JointStiffness | None:
+    def _condense_halves(self, progress: Progress, keep: Keep) -> JointStiffness | None:
         """As :meth:`condense`, by a mirror symmetry of two bodies; None if there is none."""
         body_1, body_2 = self.bodies
         for axis in body_1.elastic.body.axes:
@@ -208,8 +211,8 @@ class Structure:
                 continue
             done = self._steps(progress)
             halves_1, halves_2 = self.at_once(
-                partial(body_1.condense_halves, mirrors[0], on_1, done),
-                partial(body_2.condense_halves, mirrors[1], on_1, done),
+                partial(body_1.condense_halves, mirrors[0], on_1, done, keep),
+                partial(body_2.condense_halves, mirrors[1], on_1, done, keep),
             )
             if halves_1 is not None and halves_2 is not None:
                 joint = join_halves(halves_1, halves_2, on_1)
@@ -235,6 +238,11 @@ class Structure:
         blocks = [sp.identity(len(i)) if i.projection is None else i.projection for i in interfaces]
         components = sp.identity(self.dimension)
         return sp.kron(sp.block_diag(blocks), components, format="csr")
+
+    def carried(self, moved: Array) -> Array:
+        """Displacements ``(d n, ...)`` of faces 1 at faces 2's nodes, from ``(d n_1, ...)``."""
+        projection = self.projection
+        return moved if projection is None else np.asarray(projection @ moved)
 
     @property
     def held_faces(self) -> dict[str, float]:

@@ -11,13 +11,13 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.sparse.linalg import spsolve
 
+from fe_models.condensation import Condensed, Keep, condense_body, made_anew
 from fe_models.constraints import Constraints
 from fe_models.cyclic import Cuts
 from fe_models.elasticity import ElasticBody
 from fe_models.linear_solver import prepare
 from fe_models.mesh import Body, Interface
 from fe_models.recovery import StressRecovery
-from fe_models.reduction import reduce_body
 from fe_models.rigid_motions import rigid_body_modes, rigid_motions
 from fe_models.sector_recovery import SectorRecovery
 from fe_models.symmetry import Mirror, halves, mirror_of_nodes
@@ -43,8 +43,8 @@ class SupportedBody:
     displacements that each imposes on nodes that ``constraints`` hold; ``loaded`` are boundaries
     with tractions on them; ``thermal`` ``(vertices, cases)`` expansions of the vertices and
     ``jumps`` ``(d all, cases)`` shifts of a part of the body, which strain nothing
-    (:mod:`fe_models.pretension`): their forces are among the loads, and again what is the body's
-    ``own`` ``(d all, cases)`` of these. ``held`` ``(d n,)`` marks the
+    (:mod:`fe_models.pretension`). The forces of both are among the loads; ``own`` ``(d all,
+    cases)`` are those of the loads that do not act from outside. ``held`` ``(d n,)`` marks the
     interface displacements that are held at zero, as on a plane of symmetry. Raises ValueError if
     those of an interface node are constrained in any other way.
 
@@ -119,18 +119,18 @@ class SupportedBody:
             )
             self._springs = trace.springs(elastic, frames, self._free)
 
-    def condense(self, done: Callable[[], None] = lambda: None) -> tuple[Array, Array]:
+    def condense(
+        self, done: Callable[[], None] = lambda: None, keep: Keep = made_anew
+    ) -> Condensed:
         """Stiffness ``(k, k)`` and loads ``(k, cases)`` on the interface displacements not held.
 
         ``done`` is called with the stiffness of the body known, and with that of its interface.
         """
         stiffness, loads = self._reduced()
         done()
-        model = reduce_body(stiffness, None, self._interface, loads=loads)
+        condensed = condense_body(stiffness, loads, self._interface, keep)
         done()
-        if self._springs is None:
-            return model.static_stiffness, model.loads
-        return self._springs.removed(model.static_stiffness, model.loads)
+        return condensed if self._springs is None else self._springs.removed(*condensed)
 
     def mirror(self, axis: int) -> Mirror | None:
         """The mirror across a global ``axis`` of the displacements that supports leave.
@@ -161,8 +161,12 @@ class SupportedBody:
         return mirror.restricted(self._interface)
 
     def condense_halves(
-        self, mirror: Mirror, on_interface: Mirror, done: Callable[[], None] = lambda: None
-    ) -> tuple[tuple[Array, Array], ...] | None:
+        self,
+        mirror: Mirror,
+        on_interface: Mirror,
+        done: Callable[[], None] = lambda: None,
+        keep: Keep = made_anew,
+    ) -> tuple[Condensed, ...] | None:
         """As :meth:`condense`, but symmetric and antisymmetric displacements apart.
 
         The coordinates are those of the bases of ``on_interface``, the mirror there. ``done`` is
@@ -178,10 +182,10 @@ class SupportedBody:
         ):
             on_faces = basis[self._interface]
             kept = np.unique(on_faces.indices)
-            model = reduce_body(part, None, kept, loads=basis.T @ loads)
+            static, forces = condense_body(part, basis.T @ loads, kept, keep)
             # The same motions, in another order and some with the opposite sign.
             renamed = coordinates.T @ on_faces[:, kept]
-            half = renamed @ (renamed @ model.static_stiffness).T, renamed @ model.loads
+            half = renamed @ (renamed @ static).T, renamed @ forces
             if self._springs is not None:
                 half = self._springs.removed(*half, coordinates)
             condensed.append(half)

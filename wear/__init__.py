@@ -61,9 +61,9 @@ from typing import TYPE_CHECKING
 from sa_solver.lazy import lazy_names
 
 if TYPE_CHECKING:
+    from wear.contacts import Contacts
     from wear.coupled import (
         ConstantLoads,
-        Contacts,
         CoupledSettings,
         CoupledState,
         CoupledWear,
@@ -73,18 +73,13 @@ if TYPE_CHECKING:
     )
     from wear.evolution import EnergyTable
     from wear.face_loads import CycleLoads
+    from wear.implicit import ImplicitStepper, SecondOrderStepper
     from wear.interface import InterfaceContact, InterfaceSettings
     from wear.kinetics import linear_regime
     from wear.laws import ArchardLaw, EnergyAmplitudeLaw, EnergyLaw, EvolvingLaw, WearLaw
     from wear.life import findley, ruiz, smith_watson_topper
     from wear.link import CellNodes
-    from wear.steppers import (
-        ErrorControl,
-        ExplicitStepper,
-        HeunStepper,
-        ImplicitStepper,
-        SecondOrderStepper,
-    )
+    from wear.steppers import ErrorControl, ExplicitStepper, HeunStepper
     from wear.stepping import ContactFailure
 
 __all__ = [
@@ -121,21 +116,20 @@ __all__ = [
 __getattr__, __dir__ = lazy_names(
     __name__,
     {
+        "contacts": ("Contacts",),
         "coupled": (
-            *("ConstantLoads", "Contacts", "CoupledSettings", "CoupledState"),
+            *("ConstantLoads", "CoupledSettings", "CoupledState"),
             *("CoupledWear", "JumpSize", "Observer", "Stop"),
         ),
         "evolution": ("EnergyTable",),
         "face_loads": ("CycleLoads",),
+        "implicit": ("ImplicitStepper", "SecondOrderStepper"),
         "interface": ("InterfaceContact", "InterfaceSettings"),
         "kinetics": ("linear_regime",),
         "laws": ("ArchardLaw", "EnergyAmplitudeLaw", "EnergyLaw", "EvolvingLaw", "WearLaw"),
         "life": ("findley", "ruiz", "smith_watson_topper"),
         "link": ("CellNodes",),
-        "steppers": (
-            *("ErrorControl", "ExplicitStepper", "HeunStepper", "ImplicitStepper"),
-            "SecondOrderStepper",
-        ),
+        "steppers": ("ErrorControl", "ExplicitStepper", "HeunStepper"),
         "stepping": ("ContactFailure",),
     },
 )

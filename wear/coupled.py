@@ -12,20 +12,18 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext
 from dataclasses import dataclass, replace
-from typing import Any, Literal, Protocol, TypeVar
+from typing import Literal, Protocol
 
 import numpy as np
 
 from sa_solver.errors import InputError
 from sa_solver.ties import first_largest
 from sa_solver.types import Array, resultant_change
+from wear.contacts import KINETICS, Contacts
 from wear.face_loads import FaceLoads
-from wear.interface import FirstContact, InterfaceContact, InterfaceState, failures_of
+from wear.interface import FirstContact, InterfaceState
 from wear.steppers import ROUNDING
 from wear.worn import Spent
-
-KINETICS = ("depth_1", "depth_2", "volume_1", "volume_2", "energy")
-"""Columns of the kinetics of one interface, in mm, mm³ and N mm."""
 
 AT_STOP = 1e-3
 """How near to a stop a run must come: a jump that is to reach it is cut short to do so."""
@@ -35,7 +33,6 @@ RESPONSE = 0.5
 3 % with 7 % of it on the default dovetail in the plane."""
 
 Stage = Literal["contact, first cycle", "wear", "drift probe", "structural friction"]
-Same = TypeVar("Same")
 
 
 # --- what is given --------------------------------------------------------------------------------
@@ -178,55 +175,6 @@ class ConstantLoads:
         return np.array([h.loads.resultants[first_largest(h.loads.P)] for h in self.histories])
 
 
-class Contacts:
-    """The contacts of all interfaces, which wear one after the other in this process.
-
-    See :class:`wear.interface.InterfaceContact` for what each method does to one of them. Those of
-    a subclass may wear side by side: it answers :meth:`call`.
-    """
-
-    def __init__(self, contacts: Sequence[InterfaceContact]) -> None:
-        self.contacts = contacts
-
-    def call(self, method: str, *arguments: Sequence[Any]) -> list[Any]:
-        """Call a method of every contact, each with its own share of the ``arguments``."""
-        answers = []
-        for contact, *shares in zip(self.contacts, *arguments, strict=True):
-            with failures_of(contact.name):
-                answers.append(getattr(contact, method)(*shares))
-        return answers
-
-    def each(self, same: Same) -> list[Same]:
-        """The same for every contact."""
-        return [same] * len(self.contacts)
-
-    def begin(
-        self, histories: Sequence[FaceLoads], cycles: float
-    ) -> list[tuple[InterfaceState, FirstContact]]:
-        return self.call("begin", histories, self.each(cycles))
-
-    def jump(
-        self, states: Sequence[InterfaceState], cycles: float, left: float
-    ) -> list[tuple[InterfaceState, Spent]]:
-        return self.call("jump", states, self.each(cycles), self.each(left))
-
-    def follow(
-        self, states: Sequence[InterfaceState], histories: Sequence[FaceLoads]
-    ) -> list[tuple[InterfaceState, Spent]]:
-        triples = zip(self.contacts, states, histories, strict=True)
-        return [contact.follow(state, history) for contact, state, history in triples]
-
-    def moved(self, states: Sequence[InterfaceState]) -> list[float]:
-        return [c.moved(state) for c, state in zip(self.contacts, states, strict=True)]
-
-    def friction(self, states: Sequence[InterfaceState]) -> list[float]:
-        pairs = zip(self.contacts, states, strict=True)
-        return [contact.settings.friction(state.energy) for contact, state in pairs]
-
-    def nodal_depths(self, states: Sequence[InterfaceState]) -> list[Array]:
-        return [c.nodal_depth(state) for c, state in zip(self.contacts, states, strict=True)]
-
-
 # --- what comes out -------------------------------------------------------------------------------
 
 
@@ -236,9 +184,9 @@ class CoupledState:
 
     ``interfaces`` are the states of the contacts; ``cycles`` ``(j,)`` those at the end of every
     jump so far, the unworn state included; ``kinetics`` ``(j, interfaces, 5)`` has the columns
-    :data:`KINETICS`; ``solved_resultants`` ``(interfaces, 6)`` is the probe at the last solution of
-    the source; ``drift`` ``(j,)`` the drift found after each jump; ``solutions`` counts the
-    solutions, ``spent`` what the contacts have taken.
+    :data:`wear.contacts.KINETICS`; ``solved_resultants`` ``(interfaces, 6)`` is the probe at the
+    last solution of the source; ``drift`` ``(j,)`` the drift found after each jump; ``solutions``
+    counts the solutions, ``spent`` what the contacts have taken.
     """
 
     interfaces: tuple[InterfaceState, ...]
@@ -264,15 +212,12 @@ class CoupledState:
         """Volume that all bodies have lost [mm³]."""
         return _volume(self.kinetics[-1])
 
-    def record(
-        self, cycles: float, contacts: Sequence[InterfaceContact], drift: float
-    ) -> CoupledState:
+    def record(self, cycles: float, contacts: Contacts, drift: float) -> CoupledState:
         """The state with a row of kinetics added."""
-        row = _kinetics(self.interfaces, contacts)
         return replace(
             self,
             cycles=np.append(self.cycles, cycles),
-            kinetics=np.concatenate([self.kinetics, row[None]]),
+            kinetics=np.concatenate([self.kinetics, contacts.kinetics(self.interfaces)[None]]),
             drift=np.append(self.drift, drift),
         )
 
@@ -356,7 +301,7 @@ class CoupledWear:
             solutions=1,
             spent=sum((first.spent for _, first in begun), Spent()),
         )
-        return state.record(0.0, self.contacts.contacts, 0.0), [first for _, first in begun]
+        return state.record(0.0, self.contacts, 0.0), [first for _, first in begun]
 
     def march(self, state: CoupledState) -> Iterator[CoupledState]:
         """The states after every jump from ``state``, until cycles are over or a stop is met."""
@@ -397,10 +342,10 @@ class CoupledWear:
             shorter = cycles * self._share_to_stop(state, interfaces)
             if shorter == cycles or cycles <= 1.0:
                 break
-            cycles = max(1.0, shorter)
+            cycles = left = max(1.0, shorter)
         state = replace(state, interfaces=interfaces, spent=state.spent + spent)
         state, drift = self._follow_drift(state)
-        return state.record(float(state.cycles[-1]) + cycles, self.contacts.contacts, drift)
+        return state.record(float(state.cycles[-1]) + cycles, self.contacts, drift)
 
     def _jump_cycles(self, state: CoupledState) -> float:
         """Cycles of the next jump, by the size that is asked for at the present rates."""
@@ -429,7 +374,7 @@ class CoupledWear:
 
     def _share_to_stop(self, before: CoupledState, interfaces: Sequence[InterfaceState]) -> float:
         """Share of a jump at which it came to a stop that it went past; else 1."""
-        after, stop, share = _kinetics(interfaces, self.contacts.contacts), self.settings.stop, 1.0
+        after, stop, share = self.contacts.kinetics(interfaces), self.settings.stop, 1.0
         for limit, then, now in (
             (stop.depth, before.depth, _depth(after)),
             (stop.volume, before.volume, _volume(after)),
@@ -481,16 +426,6 @@ def _depth(kinetics: Array) -> float:
 def _volume(kinetics: Array) -> float:
     """Volume of all bodies [mm³] in a row of kinetics ``(interfaces, 5)``."""
     return float(kinetics[:, 2:4].sum(axis=1).sum())
-
-
-def _kinetics(interfaces: Sequence[InterfaceState], contacts: Sequence[InterfaceContact]) -> Array:
-    """Depths, volumes and energy of all interfaces ``(interfaces, 5)``."""
-    rows = []
-    for interface, contact in zip(interfaces, contacts, strict=True):
-        depths = interface.surfaces.depths
-        volumes = map(contact.volume, depths)
-        rows.append([*(float(depth.max()) for depth in depths), *volumes, interface.energy])
-    return np.array(rows)
 
 
 def _cycles_to(depth: float | None, volume: float | None, state: CoupledState) -> float:

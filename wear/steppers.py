@@ -22,16 +22,16 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cache
 from typing import Any, Generic, Protocol, Self, TypeVar
 
 import numpy as np
 
 from sa_solver.errors import InputError
 from sa_solver.types import Array
-from wear.stepping import WearingContact, WearState
 from wear.worn import Spent, State, WearStep, WornState
 
-FIRST_STEP, FIRST_SHARE = 8.0, 0.1
+FIRST_STEP, FIRST_SHARE = 16.0, 0.25
 """First automatic step over the explicit limit, and its largest share of the run: short enough to
 be accepted at 1 %, if not always, and steps may grow eightfold from one to the next."""
 
@@ -45,10 +45,6 @@ is wrong."""
 EARLY = 0.3
 """Share of the error at the end of a run that it may have at once: much of what the first steps
 miss, while the contact grows fastest, is pressed away later."""
-
-MOVING = 1.5
-"""What the order of steps of second order comes to where surfaces move over each other: between the
-second that they have at rest and the first of very short ones (:mod:`wear.stepping`)."""
 
 ROUNDING = 1e-9
 """Steps that add up to the cycles asked for but for this share leave none over."""
@@ -127,7 +123,7 @@ class ExplicitStepper:
     >>> print(f"{end.volume:.2e} mm^3/mm of {1e4 * 2 * 1e-4 * 0.04 * 50.0 / 3000.0:.2e}")
     1.33e-03 mm^3/mm of 1.33e-03
     >>> print(end.spent.steps, "steps")
-    126 steps
+    120 steps
     """
 
     fraction: float | None = None
@@ -378,87 +374,82 @@ class ComparingStepper(ABC, Generic[State, Compared]):
     def _order(self, contact: Compared) -> float:
         """Of the error in the length of the steps."""
 
+    def _longest(self, contact: Compared, state: State) -> float:
+        """How long a step may be to be compared."""
+        return 2.0 / self._order(contact) * contact.comparable_cycles(state)
+
+    def _share(self, most: float, longest: float) -> float:
+        """Cycles of a step of ``most`` cycles to come that may have the ``longest``."""
+        return min(most, longest)
+
+    def _following(self, contact: Compared, after: State, proposed: float, left: float) -> float:
+        """Cycles of the step that follows, of the ``left`` ones, if so many are ``proposed``."""
+        return proposed
+
     def step(
         self, state: State, most: float, left: float, contact_at: At[State, Compared]
     ) -> WearStep[State]:
         """A step, tried again until ``control`` agrees with its error."""
-        contact, control, companion = contact_at(state), self.control, state.companion
-        with_companion = contact if companion is state else contact_at(companion)
-        order = self._order(contact)
+        contact, control = contact_at(state), self.control
+
+        @cache
+        def with_companion() -> Compared:
+            companion = state.companion
+            return contact if companion is state else contact_at(companion)
 
         def trial(cycles: float) -> _Trial[State]:
-            half, last = 0.5 * cycles, cycles >= left * (1.0 - ROUNDING)
-            first = self._advance(state, half, contact, contact_at, last)
-            second = self._advance(first.state, half, contact_at(first.state), contact_at, last)
-            after, spent = replace(second.state, order=order), first.spent + second.spent
-            if not self.alone:
-                whole = self._advance(companion, cycles, with_companion, contact_at, last)
-                after, spent = replace(after, coarse=whole.state), spent + whole.spent
+            last = cycles >= left * (1.0 - ROUNDING)
+            step = self._compared(state, cycles, (contact, with_companion), contact_at, last)
+            after = step.state
             shortest = 2.0 * _shortest(min(contact.stable_cycles(end) for end in (state, after)))
             fits, proposed = True, cycles
             if control is not None:
-                fits, change = _judged(control, state, after, max(left / cycles, 1.0))
+                fits, change = self._judged(contact, control, (state, after), cycles, left)
                 proposed = max(cycles * float(np.clip(change, SHRINKAGE, GROWTH)), shortest)
-            step = WearStep(replace(after, next_cycles=proposed), cycles, replace(spent, steps=2))
-            return _Trial(step, fits, min(proposed, 0.5 * cycles), shortest)
+            following = self._following(contact, after, proposed, left - cycles)
+            step = replace(step, state=replace(after, next_cycles=following))
+            return _Trial(step, fits, self._share(most, min(proposed, 0.5 * cycles)), shortest)
 
-        longest = min(most, 2.0 / order * contact.comparable_cycles(state))
-        return _accepted(trial, longest if control is None else min(longest, state.next_cycles))
+        longest = self._longest(contact, state)
+        if control is not None:
+            longest = min(longest, state.next_cycles)
+        return _accepted(trial, self._share(most, longest))
 
+    def _compared(
+        self,
+        state: State,
+        cycles: float,
+        contacts: tuple[Compared, Callable[[], Compared]],
+        at: At[State, Compared],
+        last: bool,
+    ) -> WearStep[State]:
+        """Two steps of half the length and the companion's whole one, unless they go alone.
 
-# --- steps that solve the contact on the way ------------------------------------------------------
+        ``contacts`` are that of the state and, to be asked for, that of its companion.
+        """
+        half, (contact, with_companion) = 0.5 * cycles, contacts
+        first = self._advance(state, half, contact, at, last)
+        second = self._advance(first.state, half, at(first.state), at, last)
+        after, spent = second.state, first.spent + second.spent
+        if not self.alone:
+            whole = self._advance(state.companion, cycles, with_companion(), at, last)
+            after, spent = replace(after, coarse=whole.state), spent + whole.spent
+        after = replace(after, order=self._order(contact))
+        return WearStep(after, cycles, replace(spent, steps=2))
 
+    def _judged(
+        self,
+        contact: Compared,
+        control: ErrorControl,
+        ends: tuple[State, State],
+        cycles: float,
+        left: float,
+    ) -> tuple[bool, float]:
+        """Whether the error after a step will do, and the change of length that fills what it may.
 
-ContactAt = Callable[[WearState], WearingContact]
-
-
-@dataclass(frozen=True)
-class ImplicitStepper(ComparingStepper[WearState, WearingContact]):
-    """Implicit Euler, in steps that ``control`` chooses, or as long as asked for without one.
-
-    These may go ``alone``: no companion tells their error then.
-    Where surfaces move over each other the last step is of second order: long ones of first order
-    wear edges at which pressure peaks, up to twice as high as what is left of it by short ones.
-    """
-
-    def _advance(
-        self, state: WearState, cycles: float, contact: WearingContact, at: ContactAt, last: bool
-    ) -> WearStep[WearState]:
-        if last and contact.sliding.passages is not None:
-            return _second_order(state, cycles, contact, at)
-        return contact.implicit_step(state, cycles)
-
-    def _order(self, contact: WearingContact) -> float:
-        return 1.0
-
-
-@dataclass(frozen=True)
-class SecondOrderStepper(ComparingStepper[WearState, WearingContact]):
-    """Second order, also where slip changes with wear; fields as in :class:`ImplicitStepper`."""
-
-    def _advance(
-        self, state: WearState, cycles: float, contact: WearingContact, at: ContactAt, last: bool
-    ) -> WearStep[WearState]:
-        return _second_order(state, cycles, contact, at)
-
-    def _order(self, contact: WearingContact) -> float:
-        return 2.0 if contact.sliding.passages is None else MOVING
-
-
-def _second_order(
-    state: WearState, cycles: float, contact: WearingContact, contact_at: ContactAt
-) -> WearStep[WearState]:
-    """So many cycles by a step of second order, also where slip changes with wear.
-
-    A contact whose slips come from the half-space is worn once with those of the start, and again
-    with the mean of those and the ones at its end.
-    """
-    step = contact.second_order_step(state, cycles)
-    following = contact_at(step.state)
-    if following is contact:
-        return step
-    predicted, step = step, contact.midway(following).second_order_step(state, cycles)
-    return replace(step, spent=predicted.spent + step.spent)
+        ``ends`` are the states before and after its ``cycles`` of the ``left`` ones.
+        """
+        return _judged(control, *ends, max(left / cycles, 1.0))
 
 
 def _judged(
@@ -496,4 +487,9 @@ def _judged(
 
 def first_cycles(contact: ComparedContact[Worn], state: Worn, total: float) -> float:
     """How far the first automatic step of a run of ``total`` cycles goes."""
-    return min(FIRST_STEP * contact.stable_cycles(state), FIRST_SHARE * total)
+    return in_pairs(min(FIRST_STEP * contact.stable_cycles(state), FIRST_SHARE * total), total)
+
+
+def in_pairs(longest: float, total: float) -> float:
+    """Cycles of steps, ``longest`` at most, of which an even number makes the ``total``."""
+    return total / (2.0 * float(np.ceil(0.5 * total / longest * (1.0 - ROUNDING))))

@@ -256,13 +256,16 @@ class WearingContact:
             march.wear(t, solved, cycles)
         return march.step()
 
-    def implicit_step(self, state: WearState, cycles: float) -> WearStep[WearState]:
+    def implicit_step(
+        self, state: WearState, cycles: float, back: bool = False
+    ) -> WearStep[WearState]:
         """Wear ``cycles`` cycles, first order in them, each increment at the pressure it ends with.
 
-        Stable at any length, at given slips.
+        Increments wear in turn, or in reverse order if ``back``. Stable at any length, at given
+        slips.
         """
         march = _March(self, state, cycles)
-        for t in self.dissipating:
+        for t in reversed(self.dissipating) if back else self.dissipating:
             march.wear(t, march.solve(t, cycles), cycles)
         return march.step()
 

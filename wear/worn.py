@@ -35,7 +35,8 @@ class WornState:
     [mm] and ``volume_rate`` the volume of both bodies [mm³] worn per cycle of the last step;
     ``next_cycles`` how far a step that chooses its own length would go next. ``coarse`` is the
     state that steps of twice the length have led to, None before the first one and where none have
-    been taken; ``order`` that of the error of all these steps.
+    been taken, and that of one that is half-way where both have begun its step; ``order`` that of
+    the error of all these steps.
     """
 
     surfaces: Surfaces

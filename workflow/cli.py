@@ -253,10 +253,13 @@ def sweep(
 @cli.command()
 @click.argument("case", type=click.Path())
 @click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE", help="Change an entry.")
-def check(case: str, overrides: tuple[str, ...]) -> None:
+@click.option("--out", type=click.Path(path_type=Path), help="Folder for a picture of the faces.")
+@click.option("--force", is_flag=True, help="Overwrite what is there.")
+def check(case: str, overrides: tuple[str, ...], out: Path | None, force: bool) -> None:
     """Read CASE; say what it would run, and how long.
 
     Says what is given in plain units, what looks like a slip, and whether the memory is enough.
+    With --out the contact faces of a meshed structure are drawn: where they are, and how far apart.
     """
     from workflow.case.doubts import doubts_of
     from workflow.case.leaves import taken
@@ -272,6 +275,10 @@ def check(case: str, overrides: tuple[str, ...]) -> None:
         click.echo(_fitted(f"  {name:<10} {text}", indent=13))
     for doubt in doubts_of(loaded):
         click.echo(_fitted(f"doubt: {doubt}", indent=2))
+    if out is not None:
+        if analysis.draw_faces is None:
+            raise errors.UserError(f"{case}: has no faces to draw; allowed with --out: a wear case")
+        click.echo(str(analysis.draw_faces(loaded, case, out, force)))
 
 
 def _fitted(line: str, indent: int) -> str:

@@ -5,12 +5,16 @@ M x'' + C x' + K x = f(t) - Bᵀ F(B x), with joint laws F that are handed over,
 
 - ``DynamicModel``: mass, damping, stiffness and where the joints are
 - ``lumped_rig``, ``reduced_rig``, ``Link``: it, from masses, springs and a reduced body
+- ``damped``: it, with Rayleigh's damping, a loss factor or dashpots
 - ``unit_force``, ``natural_frequencies``: a force on one of its points; its modes
 - ``ConstantForce``, ``HarmonicForce``, ``HammerBlow``, ``RecordedForce``, ``CombinedForces``
 - ``integrate``, ``TimeStepControl``: the motion in time, by Newmark's average acceleration
 - ``HarmonicBalance``, ``PeriodicLoad``, ``Resolution``: periodic motions, by their harmonics
 - ``along_frequency``, ``along_force``: branches of them, folds included
+- ``motions_at``: all motions of a branch at a frequency
 - ``along_phase_resonance``: the backbone of a resonance
+- ``along_nonlinear_mode``, ``LinearMode``: frequency and damping of a mode against its amplitude
+- ``Floquet``: whether motions are stable
 - ``ContinuationControl``, ``Accuracy``: the steps along a branch, how fine its motions are
 - ``frequency_response``, ``ring_down``: what a hammer's blow shows
 
@@ -34,6 +38,8 @@ from sa_solver.lazy import lazy_names
 
 if TYPE_CHECKING:
     from fe_models.dynamics.continuation import ContinuationControl
+    from fe_models.dynamics.crossings import motions_at
+    from fe_models.dynamics.damping import damped
     from fe_models.dynamics.excitation import (
         CombinedForces,
         ConstantForce,
@@ -41,6 +47,7 @@ if TYPE_CHECKING:
         HarmonicForce,
         RecordedForce,
     )
+    from fe_models.dynamics.floquet import Floquet
     from fe_models.dynamics.forced_response import Accuracy, along_force, along_frequency
     from fe_models.dynamics.free_decay import ring_down
     from fe_models.dynamics.harmonic_balance import HarmonicBalance, PeriodicLoad
@@ -48,6 +55,7 @@ if TYPE_CHECKING:
     from fe_models.dynamics.impact_hammer import frequency_response
     from fe_models.dynamics.model import DynamicModel
     from fe_models.dynamics.newmark import TimeStepControl, integrate
+    from fe_models.dynamics.nonlinear_mode import LinearMode, along_nonlinear_mode
     from fe_models.dynamics.phase_resonance import along_phase_resonance
     from fe_models.dynamics.rig import (
         Link,
@@ -63,9 +71,11 @@ __all__ = [
     "ConstantForce",
     "ContinuationControl",
     "DynamicModel",
+    "Floquet",
     "HammerBlow",
     "HarmonicBalance",
     "HarmonicForce",
+    "LinearMode",
     "Link",
     "PeriodicLoad",
     "RecordedForce",
@@ -73,10 +83,13 @@ __all__ = [
     "TimeStepControl",
     "along_force",
     "along_frequency",
+    "along_nonlinear_mode",
     "along_phase_resonance",
+    "damped",
     "frequency_response",
     "integrate",
     "lumped_rig",
+    "motions_at",
     "natural_frequencies",
     "reduced_rig",
     "ring_down",
@@ -87,6 +100,8 @@ __getattr__, __dir__ = lazy_names(
     __name__,
     {
         "continuation": ("ContinuationControl",),
+        "crossings": ("motions_at",),
+        "damping": ("damped",),
         "excitation": (
             "CombinedForces",
             "ConstantForce",
@@ -94,6 +109,7 @@ __getattr__, __dir__ = lazy_names(
             "HarmonicForce",
             "RecordedForce",
         ),
+        "floquet": ("Floquet",),
         "forced_response": (
             "Accuracy",
             "along_force",
@@ -110,6 +126,10 @@ __getattr__, __dir__ = lazy_names(
         "newmark": (
             "TimeStepControl",
             "integrate",
+        ),
+        "nonlinear_mode": (
+            "LinearMode",
+            "along_nonlinear_mode",
         ),
         "phase_resonance": ("along_phase_resonance",),
         "rig": (

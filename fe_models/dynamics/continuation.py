@@ -227,7 +227,7 @@ def _try_steps(
     """Go on in a direction (in shares), by the longest of ever shorter steps that leads on."""
     step = min(point.step, control.most)
     while step >= control.least:
-        corrected = _correct(equations, point, step * direction, scaling, control)
+        corrected = correct(equations, point, step * direction, scaling, control)
         if corrected is not None:
             new, at, tangent = corrected
             cosine = min(max(float(tangent @ direction), -1.0), 1.0)
@@ -262,7 +262,7 @@ def _direction_beyond_corner(
     return np.asarray(-tangent[:, 0] / norm(tangent))
 
 
-def _correct(
+def correct(
     equations: Equations[L],
     point: CurvePoint,
     step: Array,
@@ -431,7 +431,7 @@ def _refound(
         beside = first_point(solution, point.parameter, upward, point.step)
         return _oriented(beside, point.orientation)
     step = control.least * scaling.direction(point)
-    across = _correct(equations, point, step, scaling, control)
+    across = correct(equations, point, step, scaling, control)
     if across is None:
         return point
     way = scaling.scaled(across[0].coordinates - point.coordinates)

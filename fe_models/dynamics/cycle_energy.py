@@ -1,7 +1,8 @@
 """Energies of a periodic motion: what is lost, what moves, and the damping that this amounts to.
 
 Over a period of a motion with the amplitudes x_k, in the sense of Re (...) exp(ikωt), the
-structure's own damping takes π ω Σ k² x_kᴴ C x_k; the joints say themselves what they take.
+structure's own damping takes π ω Σ k² x_kᴴ C x_k + π Σ k x_kᴴ D x_k; the joints say themselves
+what they take.
 With T the largest kinetic energy in the period, the equivalent damping ratio is
 
     ζ = (energy lost in the period) / (4π T),
@@ -45,8 +46,10 @@ def energy_damped(
 ) -> float:
     """What the structure's own damping takes of a motion ``(k, n)`` in a period [N mm]."""
     orders = np.array(harmonics, dtype=float)
-    of_harmonics = (motion.conj() * _times(motion, problem.model.damping)).real.sum(axis=1)
-    return 2.0 * np.pi**2 * frequency * float(orders**2 @ of_harmonics)
+    viscous = 2.0 * np.pi**2 * frequency * float(orders**2 @ _taken(motion, problem.model.damping))
+    if problem.model.structural is None:
+        return viscous
+    return viscous + np.pi * float(orders @ _taken(motion, problem.model.structural))
 
 
 def largest_kinetic_energy(problem: HarmonicBalance, solution: HarmonicSolution) -> float:
@@ -78,6 +81,11 @@ def damping_ratio(problem: HarmonicBalance, solution: HarmonicSolution) -> float
     kinetic = largest_kinetic_energy(problem, solution)
     lost = energy_lost(problem, solution)
     return lost / (4.0 * np.pi * kinetic) if kinetic > 0.0 else 0.0
+
+
+def _taken(motion: ComplexArray, damping: Array) -> Array:
+    """xᴴ C x ``(k,)`` of the harmonics of a motion."""
+    return np.asarray((motion.conj() * _times(motion, damping)).real.sum(axis=1))
 
 
 def _times(motion: ComplexArray, matrix: Array) -> ComplexArray:

@@ -128,7 +128,7 @@ def along_frequency(
     >>> print(f"{branch.first_amplitudes(0).max():.3f} mm of {1.0 / (2.0 * 0.02 * 1e3):.3f}")
     0.025 mm of 0.025
     """
-    along = _Along("frequency", force)
+    along = Along("frequency", force)
     return _branch(problem, along, span, start, upward, control, accuracy, steps)
 
 
@@ -161,12 +161,12 @@ def along_force(
     >>> print(share.round(2))
     [1. 1. 1. 1. 1. 1. 1. 1. 1. 1. 1. 1. 1. 1. 1. 1.]
     """
-    along = _Along("force", frequency)
+    along = Along("force", frequency)
     return _branch(problem, along, span, start, upward, control, accuracy, steps)
 
 
 @dataclass(frozen=True)
-class _Along:
+class Along:
     """What varies along a branch, and the value of the other."""
 
     varies: Literal["frequency", "force"]
@@ -181,10 +181,10 @@ class _Along:
         return (parameter, self.other) if self.varies == "frequency" else (self.other, parameter)
 
 
-class _Recorder:
+class BranchRecorder:
     """Describes every new point of a branch, and asks for finer equations where needed."""
 
-    def __init__(self, problem: HarmonicBalance, along: _Along, accuracy: Accuracy | None) -> None:
+    def __init__(self, problem: HarmonicBalance, along: Along, accuracy: Accuracy | None) -> None:
         self.problem, self._along, self._accuracy = problem, along, accuracy
         self.solutions: list[HarmonicSolution] = []
 
@@ -253,7 +253,7 @@ def finer_resolution(
 
 def _branch(
     problem: HarmonicBalance,
-    along: _Along,
+    along: Along,
     span: tuple[float, float],
     start: HarmonicSolution | ResponseBranch | None,
     upward: bool,
@@ -270,11 +270,11 @@ def _branch(
     control = control or ContinuationControl()
     end: float | None = span[1] if upward else span[0]
     if isinstance(start, ResponseBranch):
-        record, point = _Recorder(start.problem, along, accuracy), start.curve.points[-1]
+        record, point = BranchRecorder(start.problem, along, accuracy), start.curve.points[-1]
         # Which way it leads is in its last point.
         end = None
     else:
-        record = _Recorder(problem, along, accuracy)
+        record = BranchRecorder(problem, along, accuracy)
         first = _first(record, along, span[0 if upward else 1], start, upward, control, steps)
         if isinstance(first, str):
             return ResponseBranch((), SolutionCurve((), first), problem)
@@ -296,8 +296,8 @@ def _branch(
 
 
 def _first(
-    record: _Recorder,
-    along: _Along,
+    record: BranchRecorder,
+    along: Along,
     parameter: float,
     start: HarmonicSolution | None,
     upward: bool,

@@ -14,6 +14,7 @@ from __future__ import annotations
 import numpy as np
 import scipy.linalg as sl
 
+from fe_models.dynamics.ground_motion import translation_of
 from fe_models.dynamics.model import DynamicModel
 from fe_models.dynamics.rig import Link, RigError, connected_rig
 from fe_models.reduction import ReducedModel
@@ -29,7 +30,7 @@ def friction_rig(
     upper: ReducedModel,
     masses: tuple[float, float],
     springs: tuple[float, float],
-    damping_ratio: float = 0.0,
+    damping_ratio: float | Array = 0.0,
 ) -> DynamicModel:
     """Both specimens and the rig, a joint of three directions at every pair of pad nodes.
 
@@ -61,6 +62,25 @@ def friction_rig(
     )
 
 
+def ground_inertia(
+    lower: ReducedModel, upper: ReducedModel, masses: tuple[float, float], axis: str
+) -> Array:
+    """M r ``(n,)`` [t] of the rig that moves along an axis with its ground, the holders included.
+
+    Where the holders do not move against the ground, what joins their mass to that of the specimens
+    counts. Raises :class:`RigError` as :func:`friction_rig`.
+    """
+    moved = []
+    for body, label, holder in ((lower, "lower", None), (upper, "upper", HOLDER)):
+        tie, names = _tie(body, label, holder)
+        assert body.mass is not None
+        inertia = tie.T @ (body.mass @ translation_of(body, axis))
+        lumped = {"m2 x": masses[1], "m2 z": masses[1]}
+        held = [lumped.get(name, 0.0) * name.endswith(f" {axis}") for name in names]
+        moved.append(inertia + np.array(held))
+    return np.concatenate([*moved, [masses[0] * (axis == "x")]])
+
+
 def _by_node(names: list[str]) -> list[list[str]]:
     """Names of x, y and z of each node."""
     return [names[start : start + 3] for start in range(0, len(names), 3)]
@@ -71,8 +91,17 @@ def _held(
 ) -> tuple[Array, Array, list[str]]:
     """Mass and stiffness ``(c, c)`` of a body whose ring is held, or moves as its ``holder``.
 
-    The holder is named by direction; directions that it lacks are held. Also the names ``(c,)`` of
-    the displacements that are left: the holder's last.
+    Also the names ``(c,)`` of the displacements that are left: the holder's last.
+    """
+    tie, names = _tie(body, label, holder)
+    assert body.mass is not None
+    return tie.T @ body.mass @ tie, tie.T @ body.stiffness @ tie, names
+
+
+def _tie(body: ReducedModel, label: str, holder: dict[str, str] | None) -> tuple[Array, list[str]]:
+    """What the displacements that are left ``(c,)`` move of a body, ``(n, c)``, and their names.
+
+    The holder is named by direction; directions that it lacks are held.
     """
     if body.mass is None or body.names is None:
         raise RigError(f"the {label} specimen has no mass or no names: reduce it with both")
@@ -87,4 +116,4 @@ def _held(
         tie[: len(along), column] = np.logical_and(ring[: len(along)], along)
     every = [*body.names, *modes]
     names = [f"{label} {every[place]}" for place in free] + list(holder.values())
-    return tie.T @ body.mass @ tie, tie.T @ body.stiffness @ tie, names
+    return tie, names

@@ -1,6 +1,6 @@
 """Periodic motion of a structure with joints under periodic forces, by its harmonics.
 
-    M x'' + C x' + K x = f(t) - Bᵀ F(B x),   f(t) = s + a Re Σ w_k exp(ikωt)
+    M x'' + C x' + K x = f(t) - Bᵀ F(B x),   f(t) = s + a Re Σ (w_k + (kω)² v_k) exp(ikωt)
 
 The unknowns are the real Fourier coefficients of the joints' displacements u = B x: the structure
 answers exactly, harmonic by harmonic, by its receptances R_k between joints (alternating frequency
@@ -16,7 +16,7 @@ of kt R where they are stiff.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -54,7 +54,9 @@ class PeriodicLoad:
 
     ``waves`` gives the complex amplitudes ``(n,)`` of its harmonics, for a force of 1: with w the
     force is Re w exp(ikωt), so that -1j makes a sine. ``static`` ``(n,)`` does not grow with the
-    force.
+    force. ``inertial`` gives amplitudes ``(n,)`` [N s²] by harmonic that are multiplied by the
+    square of its angular frequency: those of a ground that moves by a given way X along a rigid
+    translation r are M r X, of displacements relative to the ground.
 
     Examples
     --------
@@ -76,13 +78,19 @@ class PeriodicLoad:
 
     waves: Mapping[int, ComplexArray]
     static: Array | None = None
+    inertial: Mapping[int, ComplexArray] = field(default_factory=dict)
+
+    @property
+    def harmonics(self) -> set[int]:
+        """Those of the force."""
+        return {*self.waves, *self.inertial}
 
 
 @dataclass(frozen=True)
 class Balance:
     """The equations at one motion: what is left of them ``(n,)``, and derivatives when asked for.
 
-    ``over`` is what varies, frequency or force; ``steady`` the structure at this frequency,
+    ``over`` is what varies, frequency or ``force``; ``steady`` the structure at this frequency,
     ``on_modes`` ``(k, n)`` the forces on its modes, ``vibration`` ``(k, n)`` their motion without
     the mean, ``cycle`` what the joints do, ``size`` the norm of the terms that balance, and
     ``relative`` what is left over it.
@@ -90,6 +98,7 @@ class Balance:
 
     problem: HarmonicBalance
     over: str
+    force: float
     steady: SteadyMotion
     on_modes: ComplexArray
     vibration: ComplexArray
@@ -117,8 +126,11 @@ class Balance:
         """∂r/∂λ ``(n,)``."""
         problem, steady = self.problem, self.steady
         if self.over == "force":
-            return -problem.transfer.at_joints(steady.respond(problem.wave))
+            wave = problem.wave_at(steady.angular)
+            return -problem.transfer.at_joints(steady.respond(wave))
         forces = steady.stiffness_slope(self.vibration)
+        if problem.load.inertial:
+            forces -= self.force * (2.0 * steady.angular)[:, None] * problem.inertial
         forces *= problem.turning[:, None]
         return problem.transfer.at_joints(steady.vibrate(forces))
 
@@ -153,13 +165,15 @@ class HarmonicBalance:
         receptance: Receptance | None = None,
         rest: Rest | None = None,
     ) -> None:
-        missing = sorted(set(load.waves) - set(resolution.harmonics))
+        missing = sorted(load.harmonics - set(resolution.harmonics))
         static = load.static is not None and np.any(load.static)
         if missing or (static and resolution.harmonics[0] != 0):
             raise HarmonicBalanceError(
                 f"the load has harmonics {missing or [0]} that the motion has not: add them"
             )
-        forces = [*load.waves.values(), *([] if load.static is None else [load.static])]
+        forces = [*load.waves.values(), *load.inertial.values()]
+        if load.static is not None:
+            forces.append(load.static)
         if not all(np.isfinite(force).all() for force in forces):
             raise HarmonicBalanceError("a force of the load is not a number: give finite ones")
         self.model, self.joints, self.load, self.resolution = model, joints, load, resolution
@@ -169,15 +183,31 @@ class HarmonicBalance:
         # 2π k: angular frequencies per Hz.
         self.turning = 2.0 * np.pi * self.orders
         # Forces on the modes (k, n): those that grow with the force, and the others.
-        self.wave = np.zeros((len(self.orders), len(model.mass)), dtype=complex)
-        for harmonic, wave in load.waves.items():
-            self.wave[resolution.harmonics.index(harmonic)] = wave @ self.receptance.at_points
+        self.wave, self.inertial = (self._on_modes(part) for part in (load.waves, load.inertial))
         self._constant = np.zeros_like(self.wave)
         if load.static is not None and static:
             self._constant[0] = load.static @ self.receptance.at_points
         self.rest = rest or Rest(model, self.receptance, joints, self._constant[0].real)
         self._neglected = _neglected(resolution)
         self._richer: HarmonicBalance | None = None
+
+    def _on_modes(self, waves: Mapping[int, ComplexArray]) -> ComplexArray:
+        """Amplitudes on the modes ``(k, n)`` of those on the structure, by harmonic."""
+        on_modes = np.zeros((len(self.orders), len(self.model.mass)), dtype=complex)
+        for harmonic, wave in waves.items():
+            on_modes[self.resolution.harmonics.index(harmonic)] = wave @ self.receptance.at_points
+        return on_modes
+
+    def wave_at(self, angular: Array) -> ComplexArray:
+        """The force on the modes ``(k, n)`` at angular frequencies ``(k,)`` of its harmonics."""
+        if not self.load.inertial:
+            return self.wave
+        return np.asarray(self.wave + np.square(angular)[:, None] * self.inertial)
+
+    def first_wave(self, angular: Array) -> ComplexArray:
+        """Harmonic 1 of the force on the modes ``(f, n)`` at angular frequencies ``(f,)``."""
+        first = self.resolution.harmonics.index(1)
+        return np.asarray(self.wave[first] + np.square(angular)[:, None] * self.inertial[first])
 
     @property
     def size(self) -> int:
@@ -345,15 +375,25 @@ class HarmonicBalance:
             self._richer = self.refined(Resolution(every, samples))
         return self._richer
 
-    def evaluate(self, unknowns: Array, frequency: float, force: float, over: str) -> Balance:
-        """The equations; ``over`` is what varies in their derivatives, frequency or force."""
+    def evaluate(
+        self,
+        unknowns: Array,
+        frequency: float,
+        force: float,
+        over: str,
+        steady: SteadyMotion | None = None,
+    ) -> Balance:
+        """The equations; ``over`` is what varies in their derivatives, frequency or force.
+
+        ``steady`` is the structure at this frequency, if it is damped otherwise than it is.
+        """
         resolution = self.resolution
         coefficients = self.transfer.shaped(unknowns)
         cycle = self.joints.settle(
             coefficients, resolution.basis, resolution.weights, resolution.lead
         )
-        steady = self.receptance.at(frequency * self.turning)
-        on_modes = self._constant + force * self.wave
+        steady = steady or self.receptance.at(frequency * self.turning)
+        on_modes = self._constant + force * self.wave_at(steady.angular)
         on_modes -= self.transfer.on_modes(cycle.force, unknowns)
         vibration = steady.vibrate(on_modes)
         response = self.transfer.at_joints(vibration)
@@ -364,7 +404,9 @@ class HarmonicBalance:
         size = self._size(coefficients, response, cycle)
         residual = unknowns - response
         relative = relative_norm(residual, size)
-        return Balance(self, over, steady, on_modes, vibration, cycle, residual, size, relative)
+        return Balance(
+            self, over, force, steady, on_modes, vibration, cycle, residual, size, relative
+        )
 
     @cached_property
     def _mean_by_load(self) -> Array:

@@ -7,7 +7,7 @@ for harmonic 0, and cos kωt, sin kωt for each other harmonic k.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 from numba import njit
@@ -17,6 +17,13 @@ from sa_solver.types import Array
 
 ComplexArray = np.ndarray
 """Complex amplitudes."""
+
+
+@lru_cache(maxsize=8)
+def _waves(samples: int) -> tuple[Array, Array]:
+    """Cosine and sine at equal times in a period."""
+    turns = np.arange(samples) * (2.0 * np.pi / samples)
+    return np.cos(turns), np.sin(turns)
 
 
 def by_function(coefficients: Array) -> Array:
@@ -84,12 +91,16 @@ class Resolution:
 
     def functions(self, samples: int) -> Array:
         """The functions of time ``(t, m)`` at equal times in a period, from its beginning on."""
-        values = np.empty((samples, self.size))
-        times = np.outer(np.arange(samples), self.harmonics) % samples
-        turns = np.arange(samples) * (2.0 * np.pi / samples)
+        return self.functions_at(np.arange(samples), samples)
+
+    def functions_at(self, times: np.ndarray, samples: int) -> Array:
+        """The same at some of these times alone, by their numbers ``(t,)``."""
+        values = np.empty((len(times), self.size))
+        at = np.outer(times, self.harmonics) % samples
         cosine, sine = self.places
-        values[:, cosine] = np.cos(turns)[times]
-        values[:, sine[sine >= 0]] = np.sin(turns)[times[:, sine >= 0]]
+        cosines, sines = _waves(samples)
+        values[:, cosine] = cosines[at]
+        values[:, sine[sine >= 0]] = sines[at[:, sine >= 0]]
         return values
 
     @cached_property

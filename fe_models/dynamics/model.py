@@ -14,7 +14,9 @@ class DynamicModel:
 
     ``connection`` ``(j d, n)`` is B: it takes displacements of the structure to those of its ``j``
     joints of ``d`` directions, one joint after the other. ``names`` ``(n,)`` are those of the
-    degrees of freedom.
+    degrees of freedom. ``structural`` ``(n, n)`` D [N/mm], None for none, is damping in phase with
+    the velocity that does not grow with it: in steady vibration the stiffness is K + iD. There is
+    none in time.
 
     Examples
     --------
@@ -33,6 +35,7 @@ class DynamicModel:
     stiffness: Array
     connection: Array
     names: tuple[str, ...]
+    structural: Array | None = None
 
 
 class IncrementResponse(Protocol):

@@ -104,7 +104,8 @@ def integrate(
     ``duration`` [s]. A motion that has not been found to the end says so in its ``message``. Each
     of the ``steps`` marches many steps in time; ``reached`` is told after each what share of the
     work is done.
-    Raises ``ValueError`` if joints and connection do not have the same directions.
+    Raises ``ValueError`` if joints and connection do not have the same directions, or the model has
+    structural damping, which there is in steady vibration only.
 
     Examples
     --------
@@ -120,6 +121,8 @@ def integrate(
     >>> print(motion.energies.balance_error < 1e-12)
     True
     """
+    if model.structural is not None:
+        raise ValueError("structural damping is not known in time: give damping of the modes")
     laws = joints if joints is not None else _FreeJoints()
     if len(model.connection) % laws.directions:
         raise ValueError(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 
@@ -25,6 +25,40 @@ class Cycle(Protocol):
     def dissipated(self) -> Array: ...
     @property
     def change(self) -> Array: ...
+
+
+class Deviations(Protocol):
+    """What joints make of small deviations: :class:`wear.joints.linearised.LinearisedMarch` is one.
+
+    From each of ``t`` times of a period to the next, deviations of what ``j`` joints remember
+    ``(p,)`` and of their displacements ``(d,)`` go on as δs_end = A δs + E δu + D δu_end, and their
+    forces are S δs_end + T δu_end: ``kept`` A, ``by_start`` E, ``by_end`` D ``(t, j, ...)``,
+    ``pull`` S ``(j, d, p)`` and ``tangent`` T. ``regimes`` ``(t, j)`` tell what joints do.
+    """
+
+    @property
+    def kept(self) -> Array: ...
+    @property
+    def by_start(self) -> Array: ...
+    @property
+    def by_end(self) -> Array: ...
+    @property
+    def pull(self) -> Array: ...
+    @property
+    def tangent(self) -> Array: ...
+    @property
+    def regimes(self) -> np.ndarray: ...
+
+
+@runtime_checkable
+class DeviatingJoints(Protocol):
+    """:class:`PeriodicJoints` that also know what becomes of small deviations from their period.
+
+    Without them nothing can be said of the stability of a motion. The times of ``basis`` ascend
+    from the beginning of the period; the last increment leads back to it.
+    """
+
+    def linearise(self, coefficients: Array, basis: Array, lead: Array) -> Deviations: ...
 
 
 class PeriodicJoints(Protocol):

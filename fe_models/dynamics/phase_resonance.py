@@ -274,6 +274,10 @@ class PhaseResonance:
         share = np.clip(unknowns[-1] / self.scale, -np.log(FARTHEST), np.log(FARTHEST))
         return float(self.frequency * np.exp(share))
 
+    def place_of(self, frequency: float) -> float:
+        """The unknown that stands for a frequency [Hz]."""
+        return float(self.scale * np.log(frequency / self.frequency))
+
     def __call__(self, unknowns: Array, parameter: float) -> PhaseBalance:
         frequency = self.frequency_of(unknowns)
         balance = self.problem.evaluate(unknowns[:-1], frequency, parameter, "frequency")
@@ -392,6 +396,10 @@ def _half(
 
 def _weights(problem: HarmonicBalance, output: Array | None) -> ComplexArray:
     """Weights ``(n,)`` whose product wᴴ x is the output displacement, relative to the force."""
+    if problem.load.inertial:
+        raise HarmonicBalanceError(
+            "a load that changes with the frequency: give a force or an acceleration that does not"
+        )
     wave = problem.load.waves.get(1)
     if wave is None or not np.any(wave):
         raise HarmonicBalanceError("the load has no harmonic 1: no phase is relative to it")

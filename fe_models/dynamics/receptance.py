@@ -1,8 +1,8 @@
-"""Steady motion of a structure under harmonic forces: (K + iωC - ω²M)⁻¹, by its modes.
+"""Steady motion of a structure under harmonic forces: (K + iD + iωC - ω²M)⁻¹, by its modes.
 
 In the coordinates of its modes without joints the structure is diagonal if its damping is that of
 the modes, and small otherwise: none is left out. Complex amplitudes x stand for Re x exp(iωt), and
-``k`` frequencies ω [rad/s] ascend from 0 or above.
+``k`` frequencies ω [rad/s] ascend from 0 or above; structural damping D is not there at 0.
 
 At ω = 0 a structure that only its joints hold is singular. It is then solved with springs of one
 stiffness κ, ``held``, in every direction of the joints, and whoever uses it takes κ times the
@@ -10,6 +10,8 @@ joints' displacement off their force: the same equations, but regular.
 """
 
 from __future__ import annotations
+
+from copy import copy
 
 import numpy as np
 import scipy.linalg as sl
@@ -48,15 +50,16 @@ class SteadyMotion:
         # The first frequency that is not 0.
         self._moving = int(angular[0] == 0.0)
         moving, damping, squares = angular[self._moving :], structure.damping, structure.squares
+        loss = structure.loss
         # Whether damping mixes the modes: then their stiffnesses are matrices (k, n, n), and
         # otherwise their flexibilities are numbers (k, n).
         self._mixed = damping.ndim == 2
         if not self._mixed:
-            self._flexibility = _flexibilities(moving, squares, damping)
+            self._flexibility = _flexibilities(moving, squares, damping, loss)
         else:
             turning = moving[:, None, None]
             inertia = np.diag(squares) - turning * turning * np.eye(len(squares))
-            self._stiffness = inertia + 1j * turning * damping
+            self._stiffness = inertia + 1j * (turning * damping + loss)
 
     def respond(self, force: ComplexArray) -> ComplexArray:
         """Displacements under forces; held at ω = 0."""
@@ -79,7 +82,7 @@ class SteadyMotion:
         return response
 
     def stiffness_slope(self, motion: ComplexArray) -> ComplexArray:
-        """∂(K + iωC - ω²M)/∂ω x: forces that a motion needs more per rad/s."""
+        """∂(K + iD + iωC - ω²M)/∂ω x: forces that a motion needs more per rad/s."""
         damping = self.structure.damping
         if not self._mixed:
             return _stiffness_slopes(motion, self.angular, damping)
@@ -128,14 +131,21 @@ def _stiffness_slopes(motion: ComplexArray, angular: Array, damping: Array) -> C
 
 
 @njit(cache=True)
-def _flexibilities(angular: Array, squares: Array, damping: Array) -> ComplexArray:
-    """1 / (ω_n² - ω² + iω c_n) ``(k, n)``."""
+def _flexibilities(angular: Array, squares: Array, damping: Array, loss: Array) -> ComplexArray:
+    """1 / (ω_n² - ω² + i (ω c_n + d_n)) ``(k, n)``."""
     flexibilities = np.empty((len(angular), len(squares)), np.complex128)
     for k in range(len(angular)):
         for n in range(len(squares)):
-            stiffness = complex(squares[n] - angular[k] * angular[k], angular[k] * damping[n])
+            lagging = angular[k] * damping[n] + loss[n]
+            stiffness = complex(squares[n] - angular[k] * angular[k], lagging)
             flexibilities[k, n] = 1.0 / stiffness
     return flexibilities
+
+
+def _is_diagonal(damping: Array) -> bool:
+    """Whether damping ``(n, n)`` does not mix the modes."""
+    between_modes = np.abs(damping - np.diag(np.diag(damping))).max()
+    return bool(between_modes <= DIAGONAL * np.abs(damping).max())
 
 
 class Receptance:
@@ -156,11 +166,14 @@ class Receptance:
         rigid = squares < RIGID * squares[-1]
         self.squares = np.where(rigid, 0.0, squares)
         damping = shapes.T @ model.damping @ shapes
-        of_modes = np.diag(damping).copy()
-        between_modes = np.abs(damping - np.diag(of_modes)).max()
-        diagonal = not mixed or between_modes <= DIAGONAL * np.abs(damping).max()
-        # (n,), or (n, n) where it mixes the modes.
-        self.damping = of_modes if diagonal else damping
+        loss = np.zeros_like(damping)
+        if model.structural is not None:
+            loss = shapes.T @ model.structural @ shapes
+        diagonal = not mixed or (_is_diagonal(damping) and _is_diagonal(loss))
+        # Viscous and structural (n,), or (n, n) where one of them mixes the modes.
+        self.damping, self.loss = (
+            np.diag(part).copy() if diagonal else part for part in (damping, loss)
+        )
         self.held = self._holding_stiffness() if rigid.any() else 0.0
         try:
             self.static_factors = sl.cho_factor(
@@ -180,6 +193,13 @@ class Receptance:
     def at(self, angular: Array) -> SteadyMotion:
         """The structure at ``k`` frequencies [rad/s]."""
         return SteadyMotion(self, angular)
+
+    def less_damped(self, rate: float) -> Receptance:
+        """The structure with C - ``rate`` M [1/s] in the place of its damping."""
+        other = copy(self)
+        share = np.eye(len(self.squares)) if self.damping.ndim == 2 else 1.0
+        other.damping = self.damping - rate * share
+        return other
 
     def displacement(self, motion: ComplexArray) -> ComplexArray:
         """That of the structure ``(k, n)`` by a motion of its modes."""

@@ -55,8 +55,9 @@ def lumped_rig(
 ) -> DynamicModel:
     """Masses [t] and springs [N/mm] that move along one line, with joints.
 
-    Every joint is one link per direction. ``damping_ratio`` is one, or that of each mode ``(n,)``.
-    Raises :class:`RigError` for a name that is not a mass, or a mass that is not above zero.
+    Every joint is one link per direction. ``damping_ratio`` is one, or that of each mode ``(n,)``,
+    from the lowest on; of fewer the last is that of all beyond. Raises :class:`RigError` for a name
+    that is not a mass, or a mass that is not above zero.
 
     Examples
     --------
@@ -88,9 +89,9 @@ def reduced_rig(
     ``names`` ``(c,)`` are those of its kept displacements; its modes follow as ``mode 1`` ... A
     mass of another name is a further point. Every joint is one link per direction, its
     displacement the second's minus the first's. ``damping_ratio`` is one, or that of each mode
-    ``(n,)`` of the rig; a damping matrix of the body comes to it. Raises :class:`RigError` for a
-    model without mass, for names that are not as many as the kept displacements, and as
-    :func:`lumped_rig`.
+    ``(n,)`` of the rig, as of :func:`lumped_rig`; a damping matrix of the body comes to it. Raises
+    :class:`RigError` for a model without mass, for names that are not as many as the kept
+    displacements, and as :func:`lumped_rig`.
 
     Examples
     --------
@@ -149,7 +150,7 @@ def connected_rig(
         place = _place(every, name)
         mass[place, place] += value
     for link, value in springs.items():
-        stretch = _stretch(every, link)
+        stretch = stretch_of(every, link)
         stiffness += value * np.outer(stretch, stretch)
     return DynamicModel(
         mass=mass,
@@ -163,18 +164,23 @@ def connected_rig(
 def modal_damping(mass: Array, stiffness: Array, ratio: float | Array) -> Array:
     """C = M Φ diag(2 ζ ω) Φᵀ M ``(n, n)`` with ``ratio`` ζ of all modes, or of each ``(n,)``.
 
-    Rigid motions (ω = 0) are not damped. Raises :class:`RigError` if the mass is not positive
-    definite, or a ratio is below zero.
+    Of fewer ratios, from the lowest mode on, the last is that of all modes beyond. Rigid motions
+    (ω = 0) are modes too, and are not damped. Raises :class:`RigError` if the mass is not positive
+    definite, or a ratio is below zero, or there are more of them than modes.
     """
     if np.any(np.asarray(ratio) < 0.0):
         raise RigError(f"damping ratio {np.min(ratio):g}: give 0 or more")
+    given = np.atleast_1d(ratio)
+    if not 0 < len(given) <= len(mass):
+        raise RigError(f"{len(given)} damping ratios for {len(mass)} modes: give one for each")
     try:
         squares, shapes = sl.eigh(stiffness, mass)
     except np.linalg.LinAlgError:
         raise RigError("the mass matrix is not positive definite: give every point mass") from None
     angular = np.sqrt(np.maximum(squares, 0.0))
     moved = mass @ shapes
-    return np.asarray((moved * (2.0 * np.asarray(ratio) * angular)) @ moved.T)
+    ratios = np.pad(given, (0, len(mass) - len(given)), mode="edge")
+    return np.asarray((moved * (2.0 * ratios * angular)) @ moved.T)
 
 
 def natural_frequencies(model: DynamicModel, joint_stiffness: float | Array = 0.0) -> Array:
@@ -229,11 +235,11 @@ def _connection(names: tuple[str, ...], joints: Sequence[Sequence[Link]]) -> Arr
     """B ``(j d, n)``. All joints have the same directions."""
     if len({len(joint) for joint in joints}) > 1:
         raise RigError("joints of different numbers of directions: give all the same")
-    rows = [_stretch(names, link) for joint in joints for link in joint]
+    rows = [stretch_of(names, link) for joint in joints for link in joint]
     return np.array(rows).reshape(len(rows), len(names))
 
 
-def _stretch(names: tuple[str, ...], link: Link) -> Array:
+def stretch_of(names: tuple[str, ...], link: Link) -> Array:
     """The row that takes the displacements of all points to the stretch of a link."""
     row = np.zeros(len(names))
     for name, sign in ((link.second, 1.0), (link.first, -1.0)):

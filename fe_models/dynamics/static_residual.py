@@ -37,7 +37,8 @@ class ResidualReceptance:
         count = modes_that_move(structure, float(angular[-1]))
         turning, at_rest = angular[:, None], angular == 0.0
         squares, damping = structure.squares[:count], structure.damping[:count]
-        stiffness = squares - turning * turning + 1j * (turning * damping)
+        loss = structure.loss[:count]
+        stiffness = squares - turning * turning + 1j * (turning * damping + loss)
         stiffness[at_rest] = 1.0
         # (k, l): no mode moves where the forces are constant.
         self._flexibility = np.where(at_rest[:, None], 0.0, 1.0 / stiffness)

@@ -55,9 +55,8 @@ def _plane_stress(scopes: list[Scope]) -> list[str]:
     for scope in scopes:
         for element in scope.elements.values():
             if PLANE_STRESS.fullmatch(element.kind) and dimension_of(scope) == 2:
-                place = element.place
                 return [
-                    f"{place.path.name}:{place.line}: {element.kind} of plane stress; bodies in "
+                    f"{element.place.short}: {element.kind} of plane stress; bodies in "
                     "the plane are in plane strain"
                 ]
     return []

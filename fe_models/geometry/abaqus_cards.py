@@ -20,6 +20,11 @@ class SourceLine(NamedTuple):
     def __str__(self) -> str:
         return f"{self.path}:{self.line}"
 
+    @property
+    def short(self) -> str:
+        """With the name of the file alone."""
+        return f"{self.path.name}:{self.line}"
+
 
 class DataLine(NamedTuple):
     """A data line: its fields without blanks, and where it stands."""

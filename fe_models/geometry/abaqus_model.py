@@ -211,7 +211,7 @@ def told(card: Card) -> str:
     parameters = [f"{key.lower()}={value}" if value else key.lower() for key, value in given]
     data = [", ".join(row.fields) for row in card.rows[:1]] + ["..."] * (len(card.rows) > 1)
     head = ", ".join([f"*{card.keyword.lower()}", *parameters])
-    return f"{card.place.path.name}:{card.place.line}: {head}{': ' * bool(data)}{' '.join(data)}"
+    return f"{card.place.short}: {head}{': ' * bool(data)}{' '.join(data)}"
 
 
 def _range(place: SourceLine, fields: list[str]) -> range:

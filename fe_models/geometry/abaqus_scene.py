@@ -29,6 +29,7 @@ from fe_models.geometry.scope import Scope, existing
 from fe_models.mesh import MeshError
 
 AXES = "xyz"
+UNITS: dict[str, Vector] = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 # Displacements that a named boundary condition holds, of those that solids have.
 NAMED = {
     "ENCASTRE": "xyz", "PINNED": "xyz", "XSYMM": "x", "YSYMM": "y", "ZSYMM": "z", "XASYMM": "yz",
@@ -39,7 +40,11 @@ KINDS = {
     "CLOAD": ("force",), "DSLOAD": ("pressure", "traction"), "DLOAD": ("acceleration", "rotation"),
     "BOUNDARY": ("displacement",),
 }  # fmt: skip
-
+# Parameters of supports and loads whose data lines mean something else.
+OTHERWISE = {
+    "ORIENTATION": "along the axes of an orientation", "FIXED": "held where it has come to",
+    "SUBMODEL": "as another model moves", "USER": "by a subroutine",
+}  # fmt: skip
 
 # What reading a line raises: nothing of it keeps a mesh from being read.
 WRONG = (NotTakenError, MeshError, IndexError, KeyError, ValueError)
@@ -65,6 +70,7 @@ class _Reader:
         self.supports: list[SaidSupport] = []
         self.loads: dict[tuple[str, str, str], SaidLoad] = {}
         self.factors: dict[tuple[str, str, str], dict[int, float]] = {}
+        self.ended: set[tuple[int, str]] = set()
         self.ignored: list[str] = []
         self._material = self._interaction = ""
         self._handlers: dict[str, Callable[[Card], None]] = {
@@ -84,11 +90,11 @@ class _Reader:
 
     def scene(self) -> Scene:
         for scope, card in self.model.said:
-            if card.keyword == "SOLIDSECTION":
-                self.sections.append((scope, card))
-                continue
             handler = self._handlers.get(card.keyword)
             try:
+                if card.keyword == "SOLIDSECTION":
+                    self._section(scope, card)
+                    continue
                 if handler is None:
                     raise NotTakenError("not part of a case")
                 handler(card)
@@ -112,15 +118,17 @@ class _Reader:
 
         def handler(card: Card) -> None:
             if card.parameters.get("OP", "").upper() == "NEW" and self.step:
-                self._end_loads(KINDS[card.keyword])
+                self._end_loads(card)
+            for parameter, why in OTHERWISE.items():
+                if parameter in card.parameters:
+                    raise NotTakenError(why)
             if amplitude := card.parameters.get("AMPLITUDE"):
                 self.ignored.append(
                     _ignored(card, f"amplitude {amplitude}: loads grow evenly over a leg")
                 )
             for row in card.rows:
-                line = f"{row.place.path.name}:{row.place.line}"
                 try:
-                    take(card, row, line)
+                    take(card, row, row.place.short)
                 except WRONG as error:
                     one = replace(card, place=row.place, rows=[row])
                     self.ignored.append(_ignored(one, error))
@@ -132,13 +140,18 @@ class _Reader:
 
     # --- materials and contacts -----------------------------------------------------------------
 
+    def _section(self, scope: Scope, card: Card) -> None:
+        self.sections.append((scope, card))
+        thickness = card.rows[0].fields[0] if card.rows else ""
+        if thickness and real(card.rows[0].place, thickness) != 1.0:
+            # On plane bodies; those in space have none.
+            raise NotTakenError(f"thickness of {thickness}: forces in the plane are per length")
+
     def _name_material(self, card: Card) -> None:
         self._material = card.name("NAME").upper()
         self.properties[self._material] = {}
 
     def _elastic(self, card: Card) -> None:
-        if card.parameters.get("TYPE", "ISOTROPIC").upper() != "ISOTROPIC":
-            raise NotTakenError("bodies are isotropic")
         young, poisson = self._first(card, 2)
         self.properties[self._material] |= {"young": young, "poisson": poisson}
 
@@ -147,6 +160,8 @@ class _Reader:
 
     def _first(self, card: Card, count: int) -> list[float]:
         """Numbers of the first data line; more lines are for other temperatures."""
+        if not card.parameters.get("TYPE", "ISO").upper().startswith("ISO"):
+            raise NotTakenError("bodies are isotropic")
         if not card.rows or not self._material:
             raise NotTakenError("of no material, or without numbers")
         if len(card.rows) > 1:
@@ -158,6 +173,8 @@ class _Reader:
         self._interaction = card.name("NAME").upper()
 
     def _slip(self, card: Card) -> None:
+        if self.step:
+            raise NotTakenError("friction that changes in a step")
         if not card.rows:
             raise NotTakenError("without a coefficient")
         row = card.rows[0]
@@ -169,7 +186,7 @@ class _Reader:
                 raise NotTakenError("a surface with itself")
             faces = self._group(row.fields[0]), self._group(row.fields[1])
             interaction = card.parameters.get("INTERACTION", "")
-            self.pairs.append((faces, interaction, f"{row.place.path.name}:{row.place.line}"))
+            self.pairs.append((faces, interaction, row.place.short))
 
     def _materials(self) -> dict[str, dict[str, float]]:
         """Constants of the bodies all of whose elements are of one material."""
@@ -222,23 +239,24 @@ class _Reader:
         raise NotTakenError(f"no set or surface {text}")
 
     def _held(self, card: Card, row: DataLine, line: str) -> None:
-        group, first = self._group(row.fields[0]), row.fields[1].upper()
-        if first in NAMED:
-            self.supports.append(SaidSupport(group, NAMED[first], line))
-            return
-        low = int(real(row.place, first))
-        high = int(real(row.place, row.fields[2])) if len(row.fields) > 2 and row.fields[2] else low
-        axes = "".join(AXES[k - 1] for k in range(low, high + 1) if 1 <= k <= 3)
-        value = real(row.place, row.fields[3]) if len(row.fields) > 3 else 0.0
-        if not axes:
-            return  # rotations, of which solids have none
-        if value == 0.0:
-            if self.step > 1:
-                self.ignored.append(f"{line}: {group} is held from the beginning, not from there")
-            self.supports.append(SaidSupport(group, axes, line))
-            return
+        kind = card.parameters.get("TYPE", "DISPLACEMENT").upper()
+        if kind != "DISPLACEMENT":
+            raise NotTakenError(f"of type {kind}: allowed: displacements")
+        group = self._group(row.fields[0])
+        axes, value = _moved(row)
+        held = ""
         for axis in axes:
-            self._load("displacement", group, _along(axis, value), line)
+            # What has been moved before goes back.
+            if value or _key("displacement", group, UNITS[axis]) in self.loads:
+                self._load("displacement", group, value, line, UNITS[axis])
+            else:
+                held += axis
+        before = {axis for s in self.supports if s.group == group for axis in s.axes}
+        if set(held) <= before:
+            return
+        if self.step > 1:
+            self.ignored.append(f"{line}: {group} is held from the beginning, not from there")
+        self.supports.append(SaidSupport(group, held, line))
 
     def _force(self, card: Card, row: DataLine, line: str) -> None:
         group = self._group(row.fields[0])
@@ -248,7 +266,7 @@ class _Reader:
         if not 1 <= axis <= 3:
             raise NotTakenError("a moment on nodes, which solids do not take: allowed: forces")
         total = real(row.place, row.fields[2]) * self.sizes[group]
-        self._load("force", group, _along(AXES[axis - 1], total), line)
+        self._load("force", group, total, line, UNITS[AXES[axis - 1]])
 
     def _surface_load(self, card: Card, row: DataLine, line: str) -> None:
         group, kind = self._group(row.fields[0]), row.fields[1].upper()
@@ -256,7 +274,7 @@ class _Reader:
         if kind == "P":
             self._load("pressure", group, numbers[0], line)
         elif kind == "TRVEC" and len(numbers) == 4:
-            self._load("traction", group, _scaled(numbers[1:4], numbers[0]), line)
+            self._load("traction", group, numbers[0], line, _direction(numbers[1:4]))
         else:
             raise NotTakenError(f"a load of type {kind}: allowed: P, TRVEC")
 
@@ -265,27 +283,34 @@ class _Reader:
         numbers = [real(row.place, text) for text in row.fields[2:]]
         if kind == "GRAV" and len(numbers) == 4:
             # Bodies are pulled against the acceleration of their frame.
-            self._load("acceleration", "", _scaled(numbers[1:4], -numbers[0]), line)
+            self._load("acceleration", "", -numbers[0], line, _direction(numbers[1:4]))
         elif kind == "CENTRIF" and len(numbers) == 7:
-            axis = _scaled(numbers[4:7], math.sqrt(numbers[0]))
             x, y, z = numbers[1:4]
-            self._load("rotation", "", axis, line, (x, y, z))
+            speed, axis = math.sqrt(numbers[0]), _direction(numbers[4:7])
+            self._load("rotation", "", speed, line, axis, (x, y, z))
         else:
             raise NotTakenError(f"a load of type {kind}: allowed: GRAV, CENTRIF, or *Dsload")
+        if row.fields[0]:
+            self.ignored.append(f"{line}: acts on all bodies, not on {row.fields[0]} alone")
 
     def _load(
         self,
         kind: str,
         group: str,
-        value: float | Vector,
+        size: float,
         line: str,
+        along: Vector | None = None,
         through: Vector = (0.0, 0.0, 0.0),
     ) -> None:
-        """Keep a load; the same one in a later step goes on from there."""
+        """Keep a load, a pressure or one along a direction; the same one in a later step goes on
+        from there, and ends where it is none.
+        """
         if not self.step:
             raise NotTakenError("before the first step")
-        direction = "" if isinstance(value, float) else str([c != 0.0 for c in value])
-        key = kind, group, direction
+        key = _key(kind, group, along)
+        if not size and key not in self.loads:
+            return
+        value = size if along is None else _times(along, size)
         first = self.loads.setdefault(key, SaidLoad(kind, group, value, (), line, through))
         factor = _ratio(value, first.value)
         if factor is None:
@@ -295,10 +320,16 @@ class _Reader:
             factor += factors[self.step]
         factors[self.step] = factor
 
-    def _end_loads(self, kinds: tuple[str, ...]) -> None:
+    def _end_loads(self, card: Card) -> None:
+        """End those of the steps before: once in a step, each of whose cards may say op=new."""
+        if (self.step, card.keyword) in self.ended:
+            return
+        self.ended.add((self.step, card.keyword))
         for (kind, _, _), factors in self.factors.items():
-            if kind in kinds:
+            if kind in KINDS[card.keyword]:
                 factors[self.step] = 0.0
+        if card.keyword == "BOUNDARY" and self.supports:
+            self.ignored.append(_ignored(card, "what is held stays held, through all steps"))
 
     def _load_paths(self) -> Iterator[SaidLoad]:
         """Loads with their factors at the end of every step; they stay until they change."""
@@ -310,17 +341,35 @@ class _Reader:
             yield replace(load, path=tuple(path))
 
 
-def _along(axis: str, value: float) -> Vector:
-    x, y, z = (value * (axis == letter) for letter in AXES)
+def _moved(row: DataLine) -> tuple[str, float]:
+    """The axes that a line of *Boundary names, and how far it moves nodes along them.
+
+    No axes where it names rotations, of which solids have none.
+    """
+    first = row.fields[1].upper()
+    if first in NAMED:
+        return NAMED[first], 0.0
+    low = int(real(row.place, first))
+    high = int(real(row.place, row.fields[2])) if len(row.fields) > 2 and row.fields[2] else low
+    axes = "".join(AXES[k - 1] for k in range(low, high + 1) if 1 <= k <= 3)
+    return axes, real(row.place, row.fields[3]) if len(row.fields) > 3 else 0.0
+
+
+def _key(kind: str, group: str, along: Vector | None) -> tuple[str, str, str]:
+    """What tells a load from others: also the axes that it is along."""
+    return kind, group, "" if along is None else str([c != 0.0 for c in along])
+
+
+def _direction(vector: list[float]) -> Vector:
+    length = math.sqrt(sum(c * c for c in vector))
+    if not length:
+        raise NotTakenError("without a direction")
+    x, y, z = (c / length for c in vector)
     return x, y, z
 
 
-def _scaled(direction: list[float], size: float) -> Vector:
-    """A vector of that size along a direction."""
-    length = math.sqrt(sum(c * c for c in direction))
-    if not length:
-        raise NotTakenError("without a direction")
-    x, y, z = (size * c / length for c in direction)
+def _times(vector: Vector, size: float) -> Vector:
+    x, y, z = (size * c for c in vector)
     return x, y, z
 
 
@@ -329,10 +378,8 @@ def _ratio(value: float | Vector, first: float | Vector) -> float | None:
     if isinstance(value, float) or isinstance(first, float):
         assert isinstance(value, float)
         assert isinstance(first, float)
-        return value / first if first else None
+        return value / first
     square = sum(c * c for c in first)
-    if not square:
-        return None
     ratio = sum(a * b for a, b in zip(value, first, strict=True)) / square
     off = sum((a - ratio * b) ** 2 for a, b in zip(value, first, strict=True))
     return ratio if off <= 1e-12 * square else None

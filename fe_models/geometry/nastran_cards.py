@@ -144,6 +144,7 @@ def _filled(fields: list[str], width: int) -> list[str]:
 
 def told(entry: Entry) -> str:
     """An entry in a line: where it stands, and its fields."""
-    place = f"{entry.place.path.name}:{entry.place.line}"
     shown = ", ".join(text for text in entry.fields[:8])
-    return f"{place}: {entry.name}: {shown.rstrip(', ')}{' ...' * (len(entry.fields) > 8)}"
+    return (
+        f"{entry.place.short}: {entry.name}: {shown.rstrip(', ')}{' ...' * (len(entry.fields) > 8)}"
+    )

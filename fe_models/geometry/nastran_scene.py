@@ -12,6 +12,7 @@ import numpy as np
 
 from fe_models.geometry.grouped import GroupedMesh
 from fe_models.geometry.nastran_cards import Entry, told
+from fe_models.geometry.nastran_elements import SOLIDS
 from fe_models.geometry.nastran_groups import axes_of, held_name
 from fe_models.geometry.scene import NotTakenError, SaidContact, SaidLoad, SaidSupport, Scene
 from fe_models.mesh import MeshError
@@ -101,7 +102,7 @@ class _Reader:
         """Names of the bodies that have solids of a property."""
         numbers = [
             entry.whole(2)
-            for name in ("CTETRA", "CPYRAM", "CPYRA", "CPENTA", "CHEXA")
+            for name in SOLIDS
             for entry in self.of.get(name, [])
             if (entry.text(1) or entry.text(0)) == section
         ]
@@ -116,7 +117,7 @@ class _Reader:
                 continue
             source, target = (self._surface(entry.text(first + k)) for k in (0, 1))
             friction = entry.real(first + 2) if entry.text(first + 2) else None
-            self.contacts.append(SaidContact((source, target), friction, _place(entry)))
+            self.contacts.append(SaidContact((source, target), friction, entry.place.short))
 
     def _surface(self, number: str) -> str:
         for kind in ("bsurfs", "bsurf"):
@@ -144,7 +145,7 @@ class _Reader:
         if self.local.intersection(self.mesh.numbers[self.mesh.node_sets[group]].tolist()):
             raise NotTakenError(LOCAL)
         if all(support.group != group for support in self.supports):
-            self.supports.append(SaidSupport(group, axes, _place(entry)))
+            self.supports.append(SaidSupport(group, axes, entry.place.short))
 
     def _force(self, entry: Entry) -> None:
         if entry.text(2) not in ("", "0"):
@@ -157,7 +158,7 @@ class _Reader:
         for group, forces in self.forces.items():
             vectors = np.array([vector for _, vector in forces])
             x, y, z = vectors.sum(axis=0).tolist()
-            place = _place(forces[0][0])
+            place = forces[0][0].place.short
             if np.ptp(vectors, axis=0).any():
                 self.ignored.append(f"{place}: forces of {group} that differ: their sum is taken")
             yield SaidLoad("force", group, (x, y, z), (1.0,), place)
@@ -178,14 +179,14 @@ class _Reader:
             if any(value != size for _, value in pressures):
                 self.ignored.append(f"{told(entry)}: the pressures of its set differ")
                 continue
-            yield SaidLoad("pressure", group, size, (1.0,), _place(entry))
+            yield SaidLoad("pressure", group, size, (1.0,), entry.place.short)
 
     def _gravity(self, entry: Entry) -> None:
         if entry.text(1) not in ("", "0"):
             raise NotTakenError(LOCAL)
         # Bodies are pulled against the acceleration of their frame.
         x, y, z = (-entry.real(2) * entry.real(k) for k in (3, 4, 5))
-        self.loads.append(SaidLoad("acceleration", "", (x, y, z), (1.0,), _place(entry)))
+        self.loads.append(SaidLoad("acceleration", "", (x, y, z), (1.0,), entry.place.short))
 
     def _rotation(self, entry: Entry) -> None:
         if entry.text(2) not in ("", "0"):
@@ -196,7 +197,7 @@ class _Reader:
         axis = [2.0 * math.pi * entry.real(3) * entry.real(k) for k in (4, 5, 6)]
         x, y, z = axis
         a, b, c = through
-        self.loads.append(SaidLoad("rotation", "", (x, y, z), (1.0,), _place(entry), (a, b, c)))
+        self.loads.append(SaidLoad("rotation", "", (x, y, z), (1.0,), entry.place.short, (a, b, c)))
 
 
 def _constants(entry: Entry) -> dict[str, float]:
@@ -213,7 +214,3 @@ def _constants(entry: Entry) -> dict[str, float]:
         if entry.real(index):
             known[name] = entry.real(index)
     return known
-
-
-def _place(entry: Entry) -> str:
-    return f"{entry.place.path.name}:{entry.place.line}"

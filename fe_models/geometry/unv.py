@@ -235,7 +235,7 @@ def _refuse_other_systems(dataset: Dataset) -> None:
 
 def _left(dataset: Dataset) -> str:
     """What a dataset says that is not read, in a line; empty if it says nothing."""
-    place = f"{dataset.place.path.name}:{dataset.place.line}"
+    place = dataset.place.short
     if dataset.number == HEADER:
         return ""
     if dataset.number == UNITS:
@@ -252,6 +252,5 @@ def _plane_kinds(scope: Scope) -> Iterator[str]:
     strain = {f"element type {kind}" for kind in PLANE_STRAIN}
     for element in scope.elements.values():
         if len(element.nodes) == CORNERS[element.shape] > 2 and element.kind not in strain:
-            place = f"{element.place.path.name}:{element.place.line}"
-            yield f"{place}: {element.kind}: bodies in the plane are in plane strain"
+            yield f"{element.place.short}: {element.kind}: bodies in the plane are in plane strain"
             return

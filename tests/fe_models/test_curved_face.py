@@ -59,7 +59,6 @@ def test_a_circle_through_its_nodes_alone():
     facetted = straight(points, facets).over(points[:, :2], facets, x, ROW)[:, 0]
     error, before = (abs(h - sunk(x[:, 0])).max() for h in (height, facetted))
     assert error < 0.05 * before
-    assert surface.fitted
     assert surface.straight == 0
     assert 0.1 * error < surface.error < 3.0 * error
 
@@ -77,7 +76,7 @@ def test_a_sphere_through_its_nodes_or_midsides(known: bool, left: float):
         for s in (surface, straight(points, facets))
     )
     assert error < left * before
-    assert surface.fitted is not known
+    assert (surface.left is None) is known
 
 
 def test_beside_the_face_nothing_is_known():
@@ -143,6 +142,16 @@ def test_the_gap_knows_what_facets_leave(turned: bool):
     )
     assert known.areas @ known.gap == pytest.approx(exact, rel=3e-4)
     assert abs(bare.areas @ bare.gap / exact - 1.0) > 0.01
+
+
+def test_the_bulge_of_an_edge_at_each_corner_in_closed_form():
+    """∫ψ_i 4 b λ_1 λ_2 with ψ_i = 4 λ_i - 1, over a third of the area: 0.6 b, 0.6 b and -0.2 b."""
+    corners, facet = np.array([[0.0, 0.0, 0.0], [1.0, 0.2, 0.0], [0.3, 0.9, 0.0]]), np.arange(3)
+    around = np.array([[-9.0, -9.0, 0.0], [9.0, -9.0, 0.0], [0.0, 9.0, 0.0]])
+    bulging = Surface(np.zeros(3), np.array([[0.01, 0.0, 0.0]]))
+    surfaces = bulging, straight(around, facet[None])
+    gap = mortar_projection(corners, facet[None], around, facet[None], surfaces).gap
+    np.testing.assert_allclose(gap, [0.006, 0.006, -0.002], rtol=1e-10)
 
 
 # --- midside nodes of files -----------------------------------------------------------------------

@@ -14,7 +14,6 @@ from fe_models.applied_loads import (
 )
 from fe_models.elasticity import ElasticBody
 from fe_models.friction import FrictionalJoint
-from fe_models.geometry.imported import ImportedMesh
 from fe_models.imported_structure import (
     ContactPair,
     Support,
@@ -26,19 +25,13 @@ from fe_models.remesh import element_volumes
 from fe_models.structure import CLOSED, MOST_CYCLES
 from sa_solver.types import Material
 from tests.fe_models.conftest import stress_state
+from tests.fe_models.imported_blocks import BODIES, block_and_pad, imported
 from tests.mirrored_blocks import along, mirrored, with_faces
 
 STEEL = Material(200e3, 0.3, 7.8e-9)
-BODIES = "lower", "upper"
 PAIR = ContactPair("foot", BODIES, ["top"], ["bottom"], np.array([1.0, 0.0, 0.0]))
 MU = 0.5
 Y = np.array([0.0, 1.0, 0.0])
-
-
-def imported(lower, upper, points=None):
-    bodies = {"lower": Body("lower", lower), "upper": Body("upper", upper)}
-    numbers = {name: np.arange(body.mesh.nvertices) for name, body in bodies.items()}
-    return ImportedMesh(bodies, numbers, {"lower": {}, "upper": {}} | (points or {}))
 
 
 def built(mesh, supports, loads, order=1, pair=PAIR):
@@ -63,23 +56,6 @@ def precise(monkeypatch):
 
 PRESSED = [Pressure("lid", 50.0), BoundaryForce("lid", np.array([60.0, 0.0, 0.0]))]
 PATH = np.array([[1.0, 0.0], [1.0, 1.0], [1.0, -1.0]])
-
-
-def block_and_pad(full, match):
-    """A pad on a wider block, half of it (y > 0) or all; meshes match on the face or do not."""
-    x, z = along((-2, -1, 1), (-1, 1, 4), (1, 2, 1)), along((-2, 0, 2))
-    lower = MeshTet.init_tensor(x, along((0, 1, 2), (1, 2, 1)), z)
-    across = along((-1, 1, 4)) if match else along((-1, 1, 3))
-    deep = along((0, 1, 2)) if match else along((0, 1, 3))
-    upper = MeshTet.init_tensor(across, deep, along((0, 1, 2)))
-    if full:
-        lower, upper = mirrored(lower, 1), mirrored(upper, 1)
-    top = lower.facets_satisfying(
-        lambda p: np.isclose(p[2], 0.0) & (np.abs(p[0]) < 1.0) & (np.abs(p[1]) < 1.0)
-    )
-    lower = with_faces(lower, {"base": (2, -2.0), "plane": (1, 0.0)}).with_boundaries({"top": top})
-    upper = with_faces(upper, {"bottom": (2, 0.0), "lid": (2, 1.0), "plane": (1, 0.0)})
-    return imported(lower, upper)
 
 
 @pytest.mark.parametrize("match", [True, False])

@@ -8,7 +8,6 @@ from fe_models.applied_loads import BoundaryForce, Displacement, RemoteDisplacem
 from fe_models.constraints import Constraints
 from fe_models.elasticity import ElasticBody
 from fe_models.friction import FrictionalJoint
-from fe_models.geometry.imported import ImportedMesh
 from fe_models.imported_structure import (
     ContactPair,
     Support,
@@ -21,8 +20,9 @@ from fe_models.linear_solver import prepare
 from fe_models.mesh import Body, MeshError
 from fe_models.rigid_motions import rigid_motions
 from sa_solver.types import Material
+from tests.fe_models.imported_blocks import BODIES, block_and_pad, imported
 from tests.marks import slow
-from tests.mirrored_blocks import along, mirrored, with_faces
+from tests.mirrored_blocks import along, with_faces
 
 STEEL = Material(200e3, 0.3)
 NONE, ALL = np.zeros(6, bool), np.ones(6, bool)
@@ -249,26 +249,9 @@ def test_a_mean_that_a_rigid_edge_takes_part_in(first):
 # --- in a structure -------------------------------------------------------------------------------
 
 
-def pair_of_blocks(full):
-    """A pad on a block, half of them (y > 0) or all."""
-    x = along((-2, -1, 1), (-1, 1, 4), (1, 2, 1))
-    lower = MeshTet.init_tensor(x, along((0, 1, 2), (1, 2, 1)), along((-2, 0, 2)))
-    upper = MeshTet.init_tensor(along((-1, 1, 3)), along((0, 1, 3)), along((0, 1, 2)))
-    if full:
-        lower, upper = mirrored(lower, 1), mirrored(upper, 1)
-    top = lower.facets_satisfying(
-        lambda p: np.isclose(p[2], 0.0) & (np.abs(p[0]) < 1.0) & (np.abs(p[1]) < 1.0)
-    )
-    lower = with_faces(lower, {"base": (2, -2.0), "plane": (1, 0.0)}).with_boundaries({"top": top})
-    upper = with_faces(upper, {"bottom": (2, 0.0), "lid": (2, 1.0), "plane": (1, 0.0)})
-    bodies = {"lower": Body("lower", lower), "upper": Body("upper", upper)}
-    numbers = {name: np.arange(body.mesh.nvertices) for name, body in bodies.items()}
-    return ImportedMesh(bodies, numbers, {"lower": {}, "upper": {}})
-
-
 def joined(imported, supports, loads, order=1):
-    pair = ContactPair("foot", ("lower", "upper"), ["top"], ["bottom"], np.array([1.0, 0.0, 0.0]))
-    mesh = imported_mesh(imported, ("lower", "upper"), [pair], supports)
+    pair = ContactPair("foot", BODIES, ["top"], ["bottom"], np.array([1.0, 0.0, 0.0]))
+    mesh = imported_mesh(imported, BODIES, [pair], supports)
     return imported_structure(mesh, imported, (STEEL, STEEL), supports, loads, order)
 
 
@@ -298,7 +281,7 @@ def test_half_model_equals_the_full_one(order, rigid):
         at = np.array([0.0, 0.0 if whole or rigid else 0.5, 6.0])
         free = NONE if whole or rigid else odd
         loads = [remote(motion, rigid, free, "lid", at) for motion in motions]
-        cycles.append(cycle_of(joined(pair_of_blocks(whole), supports, loads, order)))
+        cycles.append(cycle_of(joined(block_and_pad(whole, False), supports, loads, order)))
     half, full = cycles
     (one,), (two,) = half.histories, full.histories
     largest = two.loads.P.max()
@@ -314,7 +297,7 @@ def test_contact_carries_what_the_point_does(rigid):
     at = np.array([0.3, -0.2, 5.0])
     force, moment = np.array([20.0, -5.0, -200.0]), np.array([30.0, 20.0, 10.0])
     structure = joined(
-        pair_of_blocks(True), [BASE], [BoundaryForce("lid", force, at, moment, rigid)]
+        block_and_pad(True, False), [BASE], [BoundaryForce("lid", force, at, moment, rigid)]
     )
     cycle = cycle_of(structure, np.array([[1.0], [0.9]]))
     assert cycle.equilibrium.max() < 1e-7
@@ -351,28 +334,26 @@ def lid(motion, at=AT):
     ],
 )
 def test_ties_that_cannot_be_are_refused(supports, loads, wrong):
-    imported = pair_of_blocks(True)
-    upper = imported.bodies["upper"].mesh
-    imported.bodies["upper"] = Body("upper", with_faces(upper, {"side": (0, 1.0)}))
+    blocks = block_and_pad(True, False)
+    upper = blocks.bodies["upper"].mesh
+    blocks.bodies["upper"] = Body("upper", with_faces(upper, {"side": (0, 1.0)}))
     with pytest.raises(MeshError, match=wrong):
-        joined(imported, [BASE, *supports], loads)
+        joined(blocks, [BASE, *supports], loads)
 
 
 def test_a_rotation_out_of_the_plane_is_refused():
     lower = MeshTri.init_tensor(along((-2, 2, 4)), along((-1, 0, 1)))
     upper = MeshTri.init_tensor(along((-1, 1, 2)), along((0, 1, 1)))
-    bodies = {
-        "lower": Body("lower", with_faces(lower, {"base": (1, -1.0), "top": (1, 0.0)})),
-        "upper": Body("upper", with_faces(upper, {"bottom": (1, 0.0), "lid": (1, 1.0)})),
-    }
-    numbers = {name: np.arange(body.mesh.nvertices) for name, body in bodies.items()}
-    imported = ImportedMesh(bodies, numbers, {"lower": {}, "upper": {}})
+    blocks = imported(
+        with_faces(lower, {"base": (1, -1.0), "top": (1, 0.0)}),
+        with_faces(upper, {"bottom": (1, 0.0), "lid": (1, 1.0)}),
+    )
     for motion, wrong in (
         ([0, 0, 0, 1e-3, 0, 0], "a rotation about x or z"),
         ([0, 1e-3, 0, 0, 0, 0], "a load along y"),
     ):
         with pytest.raises(MeshError, match=wrong):
-            check_load(imported, list(bodies.values()), remote(motion, True, boundary="lid"))
+            check_load(blocks, list(blocks.bodies.values()), remote(motion, True, boundary="lid"))
 
 
 @pytest.mark.parametrize("rigid", [True, slow(False)])

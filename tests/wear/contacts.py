@@ -8,10 +8,10 @@ import numpy as np
 
 from sa_solver.types import Array, ElasticPair, Grid, Material
 from wear.drive import Drive
+from wear.implicit import ImplicitStepper
 from wear.interface import InterfaceContact, InterfaceSettings
 from wear.laws import EnergyLaw
 from wear.link import CellNodes
-from wear.steppers import ImplicitStepper
 
 BODY, STEEL = Material(115e3, 0.29), Material(200e3, 0.3)
 PAIR = ElasticPair(BODY, BODY)

@@ -22,10 +22,10 @@ from sa_solver.errors import InputError
 from sa_solver.types import Array, ElasticPair, Grid, LoadHistory, Material
 from tests.marks import slow
 from tests.oracles.worn_shapes import worn_cylinder
+from wear.contacts import Contacts
 from wear.coupled import (
     AT_STOP,
     ConstantLoads,
-    Contacts,
     CoupledSettings,
     CoupledState,
     CoupledWear,
@@ -36,10 +36,11 @@ from wear.coupled import (
 from wear.drive import Drive
 from wear.evolution import EnergyTable
 from wear.face_loads import CycleLoads
+from wear.implicit import ImplicitStepper
 from wear.interface import InterfaceContact, InterfaceSettings, InterfaceState, MotionError
 from wear.laws import EnergyLaw, EvolvingLaw
 from wear.link import CellNodes
-from wear.steppers import ErrorControl, ImplicitStepper
+from wear.steppers import ErrorControl
 from wear.stepping import ContactFailure
 
 BODY = Material(115e3, 0.29)

@@ -13,10 +13,10 @@ from sa_solver.types import Array, ElasticPair, Frame, Grid, LoadHistory, Materi
 from tests.oracles.elastic_layer import layer_compliance, press
 from wear.drive import Drive
 from wear.face_loads import CycleLoads
+from wear.implicit import ImplicitStepper
 from wear.interface import FirstContact, InterfaceContact, InterfaceSettings
 from wear.laws import EnergyLaw
 from wear.link import linked
-from wear.steppers import ImplicitStepper
 
 BODY, RIGID = Material(100e3, 0.3), Material(np.inf, 0.3)
 # A face of 10 mm and a cylinder that touches 5 of them, in N/mm and mm.

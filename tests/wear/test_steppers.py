@@ -10,15 +10,10 @@ from sa_solver.half_space import HalfSpace
 from sa_solver.normal import NormalContact
 from sa_solver.types import Array, ElasticPair, Grid, LoadHistory, Material
 from tests.marks import slow
+from wear.implicit import ImplicitStepper, SecondOrderStepper
 from wear.laws import EnergyLaw
 from wear.marching import advance_cycles
-from wear.steppers import (
-    ErrorControl,
-    ExplicitStepper,
-    ImplicitStepper,
-    SecondOrderStepper,
-    root_mean_square,
-)
+from wear.steppers import ErrorControl, ExplicitStepper, root_mean_square
 from wear.stepping import SlidingCycle, WearingContact, WearState
 from wear.worn import Spent, WearStep
 
@@ -82,8 +77,8 @@ LIMIT = CONSTANT.stable_cycles(waved())
     [
         (ExplicitStepper(), 1, 12, unchanging),
         (ExplicitStepper(), 1, 12, evolving),
-        (ImplicitStepper(), 1, 6, unchanging),
-        (ImplicitStepper(), 1, 6, evolving),
+        (ImplicitStepper(), 1.5, 6, unchanging),
+        (ImplicitStepper(), 1.5, 6, evolving),
         (SecondOrderStepper(), 2, 4, unchanging),
         slow(SecondOrderStepper(), 2, 4, evolving),
     ],
@@ -166,29 +161,72 @@ def test_automatic_steps_meet_their_tolerance_and_grow_fewer_with_it(kind) -> No
     assert steps == sorted(set(steps))
 
 
-def test_the_companion_takes_steps_of_twice_the_length() -> None:
-    """Both run on from their own surfaces; V = α E for the companion as for the state."""
-    cycles = 0.4 * LIMIT
-    state = waved()
-    for _ in range(3):
-        state = ImplicitStepper().step(state, cycles, cycles, unchanging).state
-    ends = []
-    for count in (6, 3):
-        alone = waved()
-        for _ in range(count):
-            alone = CONSTANT.implicit_step(alone, 3.0 * cycles / count).state
-        ends.append(alone.surfaces)
-    np.testing.assert_array_equal(state.surfaces.depths, ends[0].depths)
-    np.testing.assert_array_equal(state.companion.surfaces.depths, ends[1].depths)
-    difference = np.subtract(ends[1].depths, ends[0].depths)
-    np.testing.assert_allclose(state.errors, difference, atol=1e-18)
+def to_and_fro(state: WearState, cycles: float, contact_at) -> WearState:
+    """Over all increments and back; slips half-way hold for all of it."""
+    out = contact_at(state).implicit_step(state, 0.5 * cycles, back=True)
+    middle = contact_at(out.state)
+    out = middle.implicit_step(state, 0.5 * cycles, back=True)
+    return middle.implicit_step(out.state, 0.5 * cycles).state
+
+
+@pytest.mark.parametrize("contact_at", [unchanging, evolving])
+@pytest.mark.parametrize("lengths", [(1.0, 1.0, 2.0, 2.0), (1.0, 1.5, 2.0, 0.5), (2.0, 0.1, 1.0)])
+def test_the_companion_takes_steps_of_twice_the_length(lengths, contact_at) -> None:
+    """Out in one step, back in the next, whose length may differ; V = α E for both.
+
+    It guesses the slips half-way of two equal steps from those of the other, whose error of a
+    hundredth is all that comes in by that.
+    """
+    unit, state, alone, coarse = 0.4 * LIMIT, waved(), waved(), waved()
+    for cycles in lengths:
+        state = ImplicitStepper().step(state, cycles * unit, 100.0 * unit, contact_at).state
+        alone = to_and_fro(alone, cycles * unit, contact_at)
+    pairs = [sum(lengths)] if len(lengths) == 3 else [sum(lengths[:2]), sum(lengths[2:])]
+    for pair in pairs:
+        coarse = to_and_fro(coarse, pair * unit, contact_at)
+    np.testing.assert_allclose(state.surfaces.depths, alone.surfaces.depths, rtol=1e-7)
+    missed = np.subtract(state.companion.surfaces.depths, state.surfaces.depths)
+    guessed = contact_at is evolving and lengths[0] == lengths[1]
+    np.testing.assert_allclose(
+        state.companion.surfaces.depths,
+        coarse.surfaces.depths,
+        rtol=1e-7,
+        atol=0.01 * np.abs(missed).max() if guessed else 0.0,
+    )
+    assert state.companion.coarse is None
+    np.testing.assert_allclose(state.errors, missed / (2.0**state.order - 1.0), atol=1e-18)
     volume = state.companion.surfaces.depth.sum() * GRID.cell_area
     assert volume == pytest.approx(3e-8 * state.companion.energy, rel=1e-10)
 
 
+def test_the_last_of_an_odd_number_of_steps_is_two() -> None:
+    """So that it is compared as well, with one of its length."""
+    state, cycles = waved(), 0.4 * LIMIT
+    step = ImplicitStepper().step(state, cycles, cycles, unchanging)
+    fine = to_and_fro(to_and_fro(state, 0.5 * cycles, unchanging), 0.5 * cycles, unchanging)
+    whole = to_and_fro(state, cycles, unchanging)
+    np.testing.assert_allclose(step.state.surfaces.depths, fine.surfaces.depths, rtol=1e-7)
+    np.testing.assert_allclose(
+        step.state.companion.surfaces.depths, whole.surfaces.depths, rtol=1e-7
+    )
+
+
+def test_a_companion_half_way_goes_on_where_increments_come_to_be_alike() -> None:
+    """It has worn as many cycles as the others, out only, and takes steps of its own from there."""
+    cycles = 0.4 * LIMIT
+    same = history(8.0 * MEAN * np.ones(3), np.zeros(3))
+    alike = replace(CONSTANT, sliding=SlidingCycle(same, np.full((3, *GRID.shape), 0.02)))
+    half_way = ImplicitStepper().step(waved(), cycles, 10.0 * cycles, unchanging).state
+    after = ImplicitStepper().step(half_way, cycles, 10.0 * cycles, lambda _: alike).state
+    assert half_way.companion.coarse is not None
+    assert after.companion.coarse is None
+    own = alike.implicit_step(replace(half_way.companion, coarse=None), cycles).state
+    np.testing.assert_array_equal(after.companion.surfaces.depths, own.surfaces.depths)
+
+
 def test_steps_that_go_alone_are_the_same_without_their_companion() -> None:
     compared, alone = (
-        advance_cycles(ImplicitStepper(alone=one), waved(), LIMIT, LIMIT, evolving)
+        advance_cycles(ImplicitStepper(alone=one), waved(), LIMIT, 2.0 * LIMIT, evolving)
         for one in (False, True)
     )
     assert compared.state.coarse is not None
@@ -197,7 +235,7 @@ def test_steps_that_go_alone_are_the_same_without_their_companion() -> None:
         alone.state.surfaces.depths, compared.state.surfaces.depths, strict=True
     ):
         np.testing.assert_array_equal(ours, theirs)
-    assert 3 * alone.spent.contact_solves == 2 * compared.spent.contact_solves
+    assert alone.spent.contact_solves < compared.spent.contact_solves
 
 
 @pytest.mark.parametrize("kind", [ImplicitStepper, slow(SecondOrderStepper)])
@@ -248,7 +286,8 @@ def test_an_absolute_tolerance_is_a_depth() -> None:
         automatic(ImplicitStepper(control), cycles)
         for control in (ErrorControl(absolute=allowed), ErrorControl(relative=0.01))
     )
-    assert abs(absolute.spent.steps - relative.spent.steps) <= 2
+    # One step of the companion's more or less.
+    assert abs(absolute.spent.steps - relative.spent.steps) <= 4
     assert root_mean_square(absolute.state.surfaces.depth - exact, exact) < allowed
 
 

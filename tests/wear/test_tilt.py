@@ -16,14 +16,9 @@ from tests.wear.contacts import BODY, COEFFICIENT, FRICTION, PAIR, STEEL
 from wear.drive import Drive
 from wear.face_loads import CycleLoads
 from wear.full_cycle import march_cycle
+from wear.implicit import ImplicitStepper, SecondOrderStepper
 from wear.interface import InterfaceContact
-from wear.steppers import (
-    ErrorControl,
-    ExplicitStepper,
-    ImplicitStepper,
-    SecondOrderStepper,
-    root_mean_square,
-)
+from wear.steppers import ErrorControl, ExplicitStepper, root_mean_square
 from wear.stepping import WearState
 
 RADIUS, SOLVED = 6.0, 1e-8

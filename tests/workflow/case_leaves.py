@@ -176,7 +176,26 @@ EVOLUTION = {
     for name in ("friction", "stiffness", "residual_stiffness", "normal_load")
 }
 GIVEN["joint"] = {"joint": JOINTS, **EVOLUTION, "reported": {ALWAYS: TOLD}}
-GIVEN["vibration_wear"] = GIVEN["friction_rig_wear"] = {}
+DASHPOTS = [{"points": "m1", "coefficient": 1}]
+DAMPING = {
+    "structure.damping.rayleigh": {
+        "factors": {"kind": "factors", "mass_factor": 1, "stiffness_factor": 1},
+        "ratios": {"kind": "ratios", "frequencies": [0.5, 2], "ratios": [0.5, 0.5]},
+    },
+    "structure.damping.dashpots": {ALWAYS: DASHPOTS},
+}
+# What takes the place of the template's forces, and of the one that wears.
+PULLED = {"points": "m1", "amplitude": 1}
+EXCITED = {
+    "excitation": {ALWAYS: {"forces": [PULLED]}},
+    "excitation.records": {ALWAYS: [{"points": "m1", "file": "period.csv"}]},
+    "excitation.base": {
+        kind: [{"kind": kind, "amplitude": 1}] for kind in ("displacement", "acceleration")
+    },
+}
+WORN_SO = ["forces=", "wear.force=", "wear.level=1"]
+SHAKEN = {"vibration": ["forces="], "vibration_wear": WORN_SO, "friction_rig_wear": WORN_SO}
+GIVEN["vibration_wear"] = GIVEN["friction_rig_wear"] = DAMPING | EXCITED
 CONTACT = {"law": "friction_contact", **JOINT, "normal_load": 0, "normal_stiffness": 1e4}
 REDUCED = {
     "kind": "reduced",
@@ -203,15 +222,25 @@ FRICTION_RIG = {
     "springs": [1, 1],
     "damping_ratio": 0.1,
 }
+ELASTIC = {
+    "polynomial_spring": {"law": "polynomial_spring", "stiffness": "1 N/um"},
+    "elastic_stop": {"law": "elastic_stop", "stiffness": "10 N/um"},
+}
 GIVEN["vibration"] = {
     "structure": {"reduced": REDUCED, "matrices": MATRICES, "friction_rig": FRICTION_RIG},
     "structure.driven": {"load": {"load": 1}},
-    "joint": JOINTS | {"friction_contact": CONTACT},
+    **DAMPING,
+    **EXCITED,
+    "joint": JOINTS | {"friction_contact": CONTACT} | ELASTIC,
     "loops": {ALWAYS: {"frequency": "100 Hz"}},
+    "further_branches": {
+        ALWAYS: [{"force": "40 N", "frequency": "200 Hz", "amplitude": "50 um"}],
+    },
 }
 GIVEN["rig"] = GIVEN["joint"] | {
     "structure": {"reduced": REDUCED, "matrices": MATRICES},
     "structure.driven": {"load": {"load": 1}},
+    **DAMPING,
     "joint": JOINTS | {"friction_contact": CONTACT},
     "ageing": {ALWAYS: {"cycles": 1000}},
     "excitation": {
@@ -280,6 +309,7 @@ class Leaf:
             if self.key.startswith(f"{section}."):
                 chosen = [given[tag] for tag in (*self.tags, ALWAYS) if tag in given]
                 overrides += [f"{section}={value}" for value in chosen[:1]]
+        overrides += self._shaken
         if self.key.startswith("structure.other_bodies."):
             overrides.append(f"structure.contacts={BOLTED}")
         if self.key.startswith("structure.cyclic."):
@@ -293,6 +323,15 @@ class Leaf:
         if "friction_rig" in self.tags:
             overrides.append(f"joint={CONTACT | {'normal_load': 60}}")
         return overrides
+
+    @property
+    def _shaken(self) -> list[str]:
+        """What an excitation of a steady vibration takes the place of."""
+        if self.key.startswith("excitation."):
+            return SHAKEN.get(self.kind, [])
+        if self.key == "wear.level":
+            return [f"excitation={EXCITED['excitation'][ALWAYS]}", *SHAKEN[self.kind]]
+        return []
 
     @property
     def is_list(self) -> bool:

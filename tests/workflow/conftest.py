@@ -318,6 +318,8 @@ def folders(tmp_path_factory: pytest.TempPathFactory, template_files: Path) -> d
         np.save(made[kind] / "gap.npy", np.zeros(CELLS.get(kind, (0, 0))))
         (made[kind] / "history.csv").write_text("P,Qx\n1,0\n1,0.1\n", encoding="utf-8")
         (made[kind] / "force.csv").write_text("time,force\n0,0\n1,5\n", encoding="utf-8")
+        period = "phase [deg],force\n0,0\n90,5\n270,-5\n360,0\n"
+        (made[kind] / "period.csv").write_text(period, encoding="utf-8")
         shutil.copy(CASES / "specimens_coarse.yaml", made[kind] / "specimens.yaml")
         save_reduced(made[kind] / "body_2.h5", BODY)
         write_matrices_of_templates(made[kind])

@@ -1,5 +1,6 @@
 """A cylinder and a ball that are meshed, pressed on a plane: Hertz, whatever the file is."""
 
+import re
 from itertools import pairwise
 from pathlib import Path
 
@@ -26,6 +27,7 @@ PEAK = {
     2: HertzCylinder(FORCE, RADIUS, MODULUS).peak_pressure,
     3: HertzSphere(FORCE, RADIUS, MODULUS).peak_pressure,
 }
+FORM = "vertices alone tell the form"
 GRID = {2: (512, 1), 3: (128, 128)}
 
 
@@ -166,6 +168,28 @@ def test_hertz_of_a_mesh_that_is_coarser_than_the_contact(tmp_path, dimension: i
     assert summary["sole"]["peak_pressure"]["unworn"] == pytest.approx(PEAK[dimension], rel=0.015)
     told = [line for line in summary["warnings"] if line.startswith("sole: ")]
     assert any("the peak load is carried by" in line for line in told), told
+    assert not any(FORM in line for line in told), told
+
+
+@pytest.mark.slow
+def test_vertices_that_are_off_their_surface_are_told(tmp_path):
+    """What their form may do to the peak pressure is no less than what it does."""
+    case = pressed(tmp_path, 2, 1)
+    with gmsh_model("moved") as gmsh:
+        gmsh.open(str(tmp_path / "bodies.msh"))
+        tags, points, _ = gmsh.model.mesh.getNodes()
+        points = points.reshape(-1, 3)
+        height = RADIUS - np.sqrt(RADIUS**2 - np.clip(points[:, 0], -5.0, 5.0) ** 2)
+        arc = (np.abs(points[:, 1] - height) < 1e-9) & (np.abs(points[:, 0]) > 1e-9)
+        off = 2e-4 * np.random.default_rng(0).uniform(-1.0, 1.0, arc.sum())
+        for tag, (x, y, z), up in zip(tags[arc], points[arc], off, strict=True):
+            gmsh.model.mesh.setNode(int(tag), [x, y + up, z], [])
+        gmsh.write(str(tmp_path / "bodies.msh"))
+    summary = run(case, tmp_path / "out")
+    (told,) = [line for line in summary["warnings"] if FORM in line]
+    share = float(re.search(r"may be (\d+)%", told)[1]) / 100.0
+    true = abs(summary["sole"]["peak_pressure"]["unworn"] / PEAK[2] - 1.0)
+    assert 0.02 < true < share < 10.0 * true
 
 
 def test_a_check_says_how_a_face_is_curved(tmp_path):

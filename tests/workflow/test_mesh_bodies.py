@@ -7,7 +7,7 @@ from skfem import MeshTri
 
 from fe_models.mesh import Body, StructureMesh, write_msh
 from tests.workflow.commands import invoke
-from tests.workflow.mesh_scenes import STEEL, refused, run, write_case
+from tests.workflow.mesh_scenes import STEEL, edit, refused, run, write_case
 
 pytestmark = pytest.mark.usefixtures("reads_here")
 
@@ -92,6 +92,28 @@ def test_each_contact_wears_by_its_own_terms(strips, tmp_path):
     peaks = numbers["structure"]["peak_stress"]["worn"]
     assert set(peaks) == set(LAYERS)
     assert numbers["structure"]["equilibrium_error"] < 1e-6
+
+
+@pytest.mark.slow
+def test_bodies_that_stay_as_they_are_are_condensed_once(strips, tmp_path, monkeypatch):
+    """Another shim: base and pad come from the cache, and nothing is another number for it."""
+    # A load more, which acts on the shim alone.
+    warm = "{kind: temperature, body: shim, change: 10 K, path: [0, 1, 1, 1, 1]}"
+
+    def bodies():
+        return {path.name for path in folder.glob("body-*.h5")}
+
+    folder = tmp_path / "used"
+    monkeypatch.setenv("FRETSCALE_CACHE", str(folder))
+    run(strips, tmp_path / "first")
+    first = bodies()
+    assert len(first) == 3
+    edit(strips, "  loads:\n", f"  loads:\n  - {warm}\n")
+    edit(strips, "young: 70 GPa", "young: 71 GPa\n      expansion: 2.3e-5 1/K")
+    found = run(strips, tmp_path / "second")
+    assert len(bodies() - first) == 1
+    monkeypatch.setenv("FRETSCALE_CACHE", str(tmp_path / "new"))
+    assert run(strips, tmp_path / "third")["upper"] == found["upper"]
 
 
 def test_check_tells_bodies_and_terms(strips):

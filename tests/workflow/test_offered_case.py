@@ -8,7 +8,7 @@ from ruamel.yaml import YAML
 
 from fe_models.gmsh_session import gmsh_model
 from tests.workflow.commands import invoke
-from tests.workflow.mesh_scenes import ASSEMBLY, BLOCKS, TO_AND_FRO, cube, run, write_case
+from tests.workflow.mesh_scenes import ASSEMBLY, BLOCKS, TO_AND_FRO, WEAR, cube, run, write_case
 from workflow.commands.offered_case import TO_FILL
 
 pytestmark = pytest.mark.usefixtures("reads_here")
@@ -54,13 +54,6 @@ Foot-1.foot_nodes, 4, 7.
 *Restart, write
 *End Step
 """
-WEAR = {
-    "law": "energy",
-    "body_1": {"coefficient": "1e3 um^3/J"},
-    "body_2": {"coefficient": "1e3 um^3/J"},
-    "cycles": 1e3,
-    "step": {"kind": "implicit", "cycles": 500},
-}
 
 
 def deck(folder, model=MODEL):
@@ -191,6 +184,64 @@ def test_loads_of_every_kind(tmp_path):
                for line in ignored)  # fmt: skip
 
 
+def loads_of_steps(folder, *steps):
+    """Loads that are offered of steps, by kind and group, and what is told."""
+    model = MODEL[: MODEL.index("*Step")]
+    text = "".join(f"*Step\n*Static\n{step}*End Step\n" for step in steps)
+    case, ignored = offered(deck(folder, model + text))
+    return {(load["kind"], load["group"]): load for load in case["structure"]["loads"]}, ignored
+
+
+def test_several_cards_of_a_step_end_the_loads_before_them_once(tmp_path):
+    """As CAE writes them, each with op=NEW: what the first says does not end with the second."""
+    high, low = "Foot-1.foot_high", "Foot-1.foot_low"
+    loads, _ = loads_of_steps(
+        tmp_path,
+        f"*Dsload\n{high}, P, 40.\n{low}, P, 8.\n",
+        f"*Dsload, op=NEW\n{high}, P, 20.\n*Dsload, op=NEW\nFoot-1.foot_cut, P, 5.\n",
+    )
+    assert loads["pressure", "foot_high"]["path"] == [1, 0.5, 0]
+    assert loads["pressure", "foot_low"]["path"] == [1, 0, 0]
+    assert loads["pressure", "foot_cut"]["path"] == [0, 1, 0]
+
+
+def test_loads_of_nothing_end_those_before_them(tmp_path):
+    """A face that is moved goes back where a later step says zero; it is held by nothing new."""
+    high, nodes = "Foot-1.foot_high", "Foot-1.foot_nodes"
+    loads, ignored = loads_of_steps(
+        tmp_path,
+        f"*Dsload\n{high}, P, 0.\n*Cload\n{nodes}, 1, 2.\n{nodes}, 3, 0.\n"
+        f"*Boundary\n{high}, 1, 1, 0.01\n",
+        f"*Dsload\n{high}, P, 40.\n*Cload\n{nodes}, 1, 0.\n*Boundary\n{high}, 1, 1, 0.\n",
+    )
+    assert loads["pressure", "foot_high"]["path"] == [0, 1, 0]
+    assert loads["force", "foot_nodes"]["path"] == [1, 0, 0]
+    assert loads["force", "foot_nodes"]["force"] == [18, 0, 0]  # on 9 nodes
+    assert loads["displacement", "foot_high"]["path"] == [1, 0, 0]
+    assert not any("from the beginning" in line for line in ignored)
+
+
+def test_friction_that_a_file_does_not_give_is_asked_for(tmp_path):
+    """A contact without friction has none in Abaqus: the one of another contact is not its own."""
+    pair = "*Contact Pair, interaction=dry, type=SURFACE TO SURFACE\n"
+    smooth = "*Surface Interaction, name=smooth\n1.,\n*Contact Pair, interaction=smooth\n"
+    faces = "Foot-1.foot_cut, Base-1.base_cut\n"
+    model = MODEL.replace(pair, smooth + faces + pair)
+    case, _ = offered(deck(tmp_path, model))
+    one, two = case["structure"]["contacts"]
+    assert one["friction"] == {"coefficient": TO_FILL}
+    assert "friction" not in two
+    assert case["friction"] == {"coefficient": 0.55}
+
+
+def test_a_load_to_fill_in_has_a_factor_for_each_leg(tmp_path):
+    model = MODEL[: MODEL.index("*Step")] + "*Step\n*Static\n*End Step\n" * 2
+    case, _ = offered(deck(tmp_path, model))
+    (load,) = case["structure"]["loads"]
+    assert load["path"] == [1, 1, 0]
+    assert len(case["load_path"]["increments"]) == 3
+
+
 @pytest.mark.parametrize(
     ("old", "new", "told"),
     [
@@ -200,6 +251,19 @@ def test_loads_of_every_kind(tmp_path):
         ("Foot-1.foot_low, Base", "Foot-1.foot_low, Foot-1.foot_high\nFoot-1.foot_low, Base",
          "body Foot-1 touches itself"),
         ("Foot-1.foot_high, P, 40.", "Foot-1.foot_high, HP, 40., 1., 2.", "a load of type HP"),
+        ("*Expansion\n1.2e-05,", "*Expansion, type=ORTHO\n1e-5, 2e-5, 3e-5", "are isotropic"),
+        ("*Step, name=Push\n", "*Step, name=Push\n*Change Friction, interaction=dry\n*Friction\n"
+         "0.1,\n", "friction that changes in a step"),
+        ("*Dsload\nFoot-1.foot_high, TRVEC", "*Dsload, orientation=Ori\nFoot-1.foot_high, TRVEC",
+         "along the axes of an orientation"),
+        ("*Dsload\nFoot-1.foot_high, TRVEC", "*Boundary, type=VELOCITY\nFoot-1.foot_high, 1, 1, 2.",
+         "of type VELOCITY: allowed: displacements"),
+        ("*Dsload\nFoot-1.foot_high, TRVEC", "*Boundary, fixed\nFoot-1.foot_high, 1\n*Dsload\n"
+         "Foot-1.foot_high, TRVEC", "held where it has come to"),
+        ("*Dsload\nFoot-1.foot_high, TRVEC", "*Boundary, op=NEW\nBase-1.base_nodes, ENCASTRE\n"
+         "*Dsload\nFoot-1.foot_high, TRVEC", "what is held stays held"),
+        ("*Cload\n", "*Dload\nFoot-1.foot_nodes, GRAV, 9810., 0., 0., -1.\n*Cload\n",
+         "acts on all bodies, not on Foot-1.foot_nodes alone"),
         ("Base-1.base_nodes, ENCASTRE", "Base-1.base_nodes, ENCASTRE\nBase-1.gone, 1",
          "no set or surface Base-1.gone"),
         ("*Static\n*Dsload\nFoot-1.foot_high, P", "*Static\n*Dsload\n\nFoot-1.foot_high\n"
@@ -210,6 +274,15 @@ def test_what_is_not_taken_is_told(tmp_path, old, new, told):
     assert old in MODEL
     _, ignored = offered(deck(tmp_path, MODEL.replace(old, new, 1)))
     assert any(told in line for line in ignored), ignored
+
+
+def test_a_thickness_is_told(tmp_path):
+    """Forces of the file are those on it, and of a case on a millimetre."""
+    path = deck(tmp_path)
+    path.write_text(path.read_text("utf-8").replace("Steel\n,\n", "Steel\n2.5,\n", 1), "utf-8")
+    case, ignored = offered(path)
+    assert any("thickness of 2.5: forces in the plane are per length" in line for line in ignored)
+    assert case["materials"]["body_1"]["young"] == 206843.5
 
 
 def test_files_that_say_nothing_leave_more_to_fill_in(tmp_path):

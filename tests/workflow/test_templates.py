@@ -6,11 +6,13 @@ from typing import get_args
 import pytest
 
 from tests.workflow.case_leaves import (
+    ALWAYS,
     APART,
     APART_MATRICES,
     BOLTED,
     CAD,
     CONTACT,
+    EXCITED,
     INTERFACE,
     REDUCED,
     SECTOR,
@@ -41,6 +43,8 @@ NEEDS = {
     **{f"structure.matrices.{part}": [APART] for part in APART_MATRICES},
     "structure.retained": ["structure.modes=20"],
     "structure.modes": ["structure.retained=[pad, ring, tip]"],
+    "  # instead of forces and mass, with wear.level": ["wear.force=", "wear.level=1"],
+    "wear.level": ["forces=", f"excitation={EXCITED['excitation'][ALWAYS]}"],
 }
 
 

@@ -96,7 +96,7 @@ def test_every_dataset_has_its_unit_and_description(results: h5py.File) -> None:
 
     results.visititems(check)
     response = set(results["responses/00001"])
-    assert response == {*CURVES, "nodes", "resonance", "loops"}
+    assert response == {*CURVES, "nodes", "resonance", "loops", "harmonics"}
     groups = {name: set(results[name]) for name in ("contact", "backbone", "linear")}
     groups |= {name: set(results[f"responses/00001/{name}"]) for name in ("nodes", "resonance")}
     assert groups == {

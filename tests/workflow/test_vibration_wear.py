@@ -14,11 +14,13 @@ from fe_models.dynamics.harmonics import Resolution
 from tests.workflow.conftest import invoke
 from tests.workflow.scenes import RIG_OF_THESIS
 from tests.workflow.shown_files import check_arrays, check_scene, total
+from wear.implicit import ImplicitStepper
 from wear.joints.periodic import PeriodicMarch
 from wear.marching import advance_cycles
-from wear.steppers import ErrorControl, ImplicitStepper, first_cycles
+from wear.steppers import ErrorControl, first_cycles
 from workflow.analyses.rig.building import row_of_masses
 from workflow.analyses.rig.structure import Rig
+from workflow.analyses.vibration.load import Driving
 from workflow.analyses.vibration_wear.case import VibrationWearCase
 from workflow.analyses.vibration_wear.vibrating_contact import VibratingContact
 from workflow.case.writing import dump_case
@@ -76,11 +78,16 @@ def refusal(folder, *settings, wear=WEAR):
     return " ".join(ended.stderr.split())
 
 
+def driven(rig):
+    """By a sine of 1 N on what the case drives."""
+    return Driving(PeriodicLoad({1: -1j * rig.driven}))
+
+
 def contact_in_rig(folder, force=75.0, frequency=100.0, wear=WEAR):
     (folder / "wear.yaml").write_text(wear, encoding="utf-8")
     rig = row_of_masses(Rig(kind="rig", masses=MASSES, springs=SPRINGS, damping_ratio=DAMPING))
     case = load_case(folder / "wear.yaml")
-    return rig, VibratingContact(case, rig, force, frequency, RESOLUTION)
+    return rig, VibratingContact(case, rig, driven(rig), force, frequency, RESOLUTION)
 
 
 def worn(contact, cycles, tolerance=0.1):
@@ -115,7 +122,9 @@ def test_friction_that_grows_within_a_few_cycles_is_followed(tmp_path):
     summary = json.loads((tmp_path / "out" / "summary.json").read_text(encoding="utf-8"))
     rig = row_of_masses(Rig(kind="rig", masses=MASSES, springs=SPRINGS, damping_ratio=0.01))
     resolution = Resolution((1, 3, 5), 64)
-    contact = VibratingContact(load_case(tmp_path / "wear.yaml"), rig, 75.0, 100.0, resolution)
+    contact = VibratingContact(
+        load_case(tmp_path / "wear.yaml"), rig, driven(rig), 75.0, 100.0, resolution
+    )
     state = contact.unworn()
     for _ in range(20):
         # In so few cycles the form does not change.
@@ -361,3 +370,54 @@ def test_the_worn_contact_is_shown_in_paraview(tmp_path):
     state = json.loads((tmp_path / "out" / "summary.json").read_text("utf-8"))["states"][-1]
     assert total(face, "depth [mm]") == pytest.approx(state["volume"], rel=1e-6)
     assert total(face, "cycle_energy [N/mm]") == pytest.approx(state["energy_per_cycle"], rel=1e-6)
+
+
+@pytest.mark.slow
+def test_an_excitation_of_one_force_wears_as_that_force(tmp_path):
+    """At the level by which the force is divided."""
+    few = ("wear.cycles=[20]", "frequencies=[60 Hz, 140 Hz]")
+    by_force, by_level = tmp_path / "force", tmp_path / "level"
+    wanted, found = (
+        _ended(folder, *few, *more)
+        for folder, more in (
+            (by_force, ("forces=[5 N]",)),
+            (
+                by_level,
+                (
+                    *("forces=", "wear.force=", "wear.level=150"),
+                    "excitation={levels: [10], forces: [{points: m1, amplitude: 0.5 N}]}",
+                ),
+            ),
+        )
+    )
+    for name in ("energy", "volume", "depth", "stroke", "stiffness"):
+        same = pytest.approx(wanted["states"][-1][name], rel=1e-9)
+        assert found["states"][-1][name] == same, name
+    response = found["states"][-1]["responses"][0]
+    assert response["level"] == 10.0
+    assert response["resonance"] == pytest.approx(
+        wanted["states"][-1]["responses"][0]["resonance"], rel=1e-9
+    )
+
+
+def _ended(folder, *settings):
+    """The summary of a run of the small case."""
+    folder.mkdir()
+    result = run(folder, *settings)
+    assert result.exit_code == 0, result.output
+    return json.loads((folder / "out" / "summary.json").read_text(encoding="utf-8"))
+
+
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [
+        (["wear.level=2"], "given with no excitation; allowed: force"),
+        (["wear.force="], "missing; allowed: force"),
+        (
+            ["forces=", "excitation={forces: [{points: m1, amplitude: 1 N}]}"],
+            "given with an excitation; allowed: level",
+        ),
+    ],
+)
+def test_what_wears_is_given_as_what_drives(tmp_path, settings, message):
+    assert message in refusal(tmp_path, *settings)

@@ -6,6 +6,8 @@ The laws, all of :mod:`wear.joints.law`'s one interface
     - ``BoucWen``: a smooth way from sticking to sliding.
     - ``UniformIwan``, ``FourParameterIwan``: sliders in parallel, by Masing's rule.
     - ``FrictionContact``: a point in three dimensions, which may separate.
+    - ``PolynomialSpring``, ``ElasticStop``: without friction, nonlinear by themselves or by a gap.
+    - ``MixedLaw``, ``JointGroup``: joints of several laws in one structure.
     - ``JointError``: parameters that a joint cannot have.
 
 Their marches
@@ -43,6 +45,7 @@ from sa_solver.lazy import lazy_names
 if TYPE_CHECKING:
     from wear.joints.ageing import long_test, steady_stroke
     from wear.joints.bouc_wen import BoucWen
+    from wear.joints.elastic import ElasticStop, PolynomialSpring
     from wear.joints.evolution import (
         ArrheniusEvolution,
         ExponentialEvolution,
@@ -56,6 +59,7 @@ if TYPE_CHECKING:
     from wear.joints.jenkins import Jenkins
     from wear.joints.law import JointLaw, march_joints
     from wear.joints.measured_loops import measure_loops
+    from wear.joints.mixed import JointGroup, MixedLaw
     from wear.joints.parallel import ParallelSliders
     from wear.joints.parameters import JointError
     from wear.joints.periodic import PeriodicMarch
@@ -63,17 +67,21 @@ if TYPE_CHECKING:
 __all__ = [
     "ArrheniusEvolution",
     "BoucWen",
+    "ElasticStop",
     "ExponentialEvolution",
     "FourParameterIwan",
     "FrictionContact",
     "Jenkins",
     "JointError",
     "JointEvolution",
+    "JointGroup",
     "JointLaw",
     "LinearEvolution",
     "LogarithmicEvolution",
+    "MixedLaw",
     "ParallelSliders",
     "PeriodicMarch",
+    "PolynomialSpring",
     "TabulatedEvolution",
     "UniformIwan",
     "long_test",
@@ -87,6 +95,7 @@ __getattr__, __dir__ = lazy_names(
     {
         "ageing": ("long_test", "steady_stroke"),
         "bouc_wen": ("BoucWen",),
+        "elastic": ("ElasticStop", "PolynomialSpring"),
         "evolution": (
             "ArrheniusEvolution",
             "ExponentialEvolution",
@@ -100,6 +109,7 @@ __getattr__, __dir__ = lazy_names(
         "jenkins": ("Jenkins",),
         "law": ("JointLaw", "march_joints"),
         "measured_loops": ("measure_loops",),
+        "mixed": ("JointGroup", "MixedLaw"),
         "parallel": ("ParallelSliders",),
         "parameters": ("JointError",),
         "periodic": ("PeriodicMarch",),

@@ -27,8 +27,17 @@ import numpy as np
 
 from sa_solver.types import Array
 from wear.joints.bouc_wen import BoucWen
+from wear.joints.elastic import ElasticLaw, settle_elastic
 from wear.joints.friction_contact import FrictionContact
 from wear.joints.jenkins import Jenkins
+from wear.joints.linearised import (
+    LinearisedMarch,
+    Maps,
+    linearise_contacts,
+    linearise_curves,
+    linearise_elastic,
+    linearise_sliders,
+)
 from wear.joints.masing import MasingLaw
 from wear.joints.parameters import JointError
 from wear.joints.periodic_contact import (
@@ -51,6 +60,8 @@ STICK, SLIP, SEPARATED = 0, 1, 2
 stiffness that it may lose is left."""
 
 SettlingKernel = Callable[[Period, DrivenJoints], None]
+# Numbers that joints of so many directions remember, and the march that says what becomes of them.
+MEMORY = {1: (1, linearise_sliders), 3: (2, linearise_contacts)}
 
 
 class Kernels(NamedTuple):
@@ -115,7 +126,7 @@ class PeriodicMarch:
     [ 50.   -31.88] of [ 50.   -31.83]
     """
 
-    law: Jenkins | BoucWen | MasingLaw | FrictionContact
+    law: Jenkins | BoucWen | MasingLaw | FrictionContact | ElasticLaw
     threads: int = 1
 
     @property
@@ -134,18 +145,8 @@ class PeriodicMarch:
         lead = basis[:1] if lead is None else lead
         self._require(coefficients, basis, weights, lead)
         joints, size, directions = coefficients.shape
-        kernels, parameters = self._kernels
-        if len(parameters) < joints:
-            parameters = np.repeat(parameters, joints, axis=0)
-        points, of_points = (joints, len(basis)), () if directions == 1 else (directions,)
-        force, states = np.empty(points + of_points), np.empty(points, np.int8)
-        jacobian = np.empty((joints, size, *of_points, size, *of_points))
-        lost, change, settled = np.empty(joints), np.empty(joints), np.empty((joints, 4))
-        path = (basis @ coefficients).reshape(force.shape)
-        before = (lead @ coefficients).reshape(joints, len(lead), *of_points)
-        driven = DrivenJoints(
-            parameters, path, before, force, states, jacobian, lost, change, settled
-        )
+        kernels = self._kernels[0]
+        driven = self._driven(coefficients, basis, lead, size)
         period = Period(basis, weights, lead)
 
         def written(by: SettlingKernel | None, result: Array) -> Array:
@@ -154,15 +155,64 @@ class PeriodicMarch:
             return result
 
         self._march(kernels.settle, period, driven)
-        samples = force.reshape(joints, len(basis), directions)
-        slopes = jacobian.reshape(joints, size, directions, size, directions)
+        samples = driven.force.reshape(joints, len(basis), directions)
+        slopes = driven.jacobian.reshape(joints, size, directions, size, directions)
         return SettledCycle(
             weights @ samples,
             samples.transpose(1, 0, 2),
-            states.T,
-            change,
+            driven.states.T,
+            driven.change,
             partial(written, kernels.differentiate, slopes),
-            partial(written, kernels.dissipate, lost),
+            partial(written, kernels.dissipate, driven.dissipated),
+        )
+
+    def linearise(self, coefficients: Array, basis: Array, lead: Array) -> LinearisedMarch:
+        """What small deviations from the settled period do, increment by increment.
+
+        Arguments as those of :meth:`settle`; the times of ``basis``, which ascend from the
+        beginning of the period, need not be equally far apart.
+        """
+        joints, _, directions = coefficients.shape
+        self._require(coefficients, basis, basis.T, lead)
+        driven = self._driven(coefficients, basis, lead, 0)
+        law, samples = self.law, len(basis)
+        if isinstance(law, MasingLaw):
+            nothing = Maps.room(samples, joints, 1, 1)
+            maps = Maps.room(
+                samples, joints, 1 + 2 * linearise_curves(len(lead), driven, nothing), 1
+            )
+            linearise_curves(len(lead), driven, maps)
+            return LinearisedMarch(*maps)
+        remembered, linearise = MEMORY[directions]
+        if isinstance(law, ElasticLaw):
+            remembered, linearise = 0, linearise_elastic
+        else:
+            self._kernels[0].settle(Period(basis, basis.T, lead), driven)
+        maps = Maps.room(samples, joints, remembered, directions)
+        linearise(driven, maps)
+        return LinearisedMarch(*maps)
+
+    def _driven(
+        self, coefficients: Array, basis: Array, lead: Array, functions: int
+    ) -> DrivenJoints:
+        """Joints to be marched, with room for derivatives by so many functions of time."""
+        joints, _, directions = coefficients.shape
+        parameters = self._kernels[1]
+        if len(parameters) < joints:
+            parameters = np.repeat(parameters, joints, axis=0)
+        points, of_points = (joints, len(basis)), () if directions == 1 else (directions,)
+        path = (basis @ coefficients).reshape(points + of_points)
+        before = (lead @ coefficients).reshape(joints, len(lead), *of_points)
+        return DrivenJoints(
+            parameters,
+            path,
+            before,
+            np.empty(path.shape),
+            np.empty(points, np.int8),
+            np.empty((joints, functions, *of_points, functions, *of_points)),
+            np.empty(joints),
+            np.empty(joints),
+            np.empty((joints, 4)),
         )
 
     @cached_property
@@ -174,6 +224,8 @@ class PeriodicMarch:
             return contacts, law.parameters
         if isinstance(law, MasingLaw):
             return Kernels(settle_curves, None, None), law.parameters
+        if isinstance(law, ElasticLaw):
+            return Kernels(settle_elastic, None, None), law.parameters
         sliders = Kernels(settle_sliders, differentiate_sliders, None)
         if isinstance(law, Jenkins):
             return sliders, np.insert(law.parameters, 0, JENKINS, axis=1)

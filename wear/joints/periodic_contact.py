@@ -94,7 +94,7 @@ def _to_the_limit(a: Kept) -> Kept:
 
 
 @compiled(nogil=True, error_model="numpy")
-def _sticks(of_x: ForceSlopes, of_y: ForceSlopes) -> bool:
+def sticks_throughout(of_x: ForceSlopes, of_y: ForceSlopes) -> bool:
     """Whether a contact keeps its stretch, and what is added to it."""
     off = of_x.force_y != 0.0 or of_y.force_x != 0.0
     return of_x.force_x == 1.0 and of_y.force_y == 1.0 and not off
@@ -121,8 +121,10 @@ def _state_of(contact: Contact, x: float, y: float, normal: float) -> int:
 
 
 @compiled(nogil=True, error_model="numpy")
-def _increment(contact: Contact, stretch: Stretch, path: Array, start: int, end: int) -> ForcePath:
-    """That between two points of a path ``(t, 3)``."""
+def increment_of(
+    contact: Contact, stretch: Stretch, path: Array, start: int, end: int
+) -> ForcePath:
+    """The straight path between two points of a path ``(t, 3)``."""
     return path_of(
         contact,
         stretch.x,
@@ -135,11 +137,11 @@ def _increment(contact: Contact, stretch: Stretch, path: Array, start: int, end:
 
 
 @compiled(nogil=True, error_model="numpy")
-def _lead_in(contact: Contact, before: Array) -> Stretch:
+def led_in(contact: Contact, before: Array) -> Stretch:
     """Stretch at the first sample, to which a contact is driven from rest."""
     stretch, points = Stretch(0.0, 0.0), from_rest(before)
     for i in range(len(before)):
-        x, y = advance_force(_increment(contact, stretch, points, i, i + 1))
+        x, y = advance_force(increment_of(contact, stretch, points, i, i + 1))
         stretch = Stretch(x / contact.stiffness, y / contact.stiffness)
     return stretch
 
@@ -156,7 +158,7 @@ def _plain_round(
     samples, force, states = len(path), record.force, record.states
     for step in range(1, samples + 1):
         at = step if step < samples else 0
-        x, y = advance_force(_increment(contact, stretch, path, step - 1, at))
+        x, y = advance_force(increment_of(contact, stretch, path, step - 1, at))
         if x == force[at, 0] and y == force[at, 1]:
             return ended
         stretch = Stretch(x / contact.stiffness, y / contact.stiffness)
@@ -172,9 +174,9 @@ def _chained_round(contact: Contact, stretch: Stretch, path: Array) -> Kept:
     samples, kept = len(path), Kept(1.0, 0.0, 0.0, 1.0)
     for step in range(1, samples + 1):
         at = step if step < samples else 0
-        x, y, of_x, of_y = advance_slopes(_increment(contact, stretch, path, step - 1, at))
+        x, y, of_x, of_y = advance_slopes(increment_of(contact, stretch, path, step - 1, at))
         stretch = Stretch(x / contact.stiffness, y / contact.stiffness)
-        if not _sticks(of_x, of_y):
+        if not sticks_throughout(of_x, of_y):
             kept = _chain(of_x, of_y, kept)
     return kept
 
@@ -309,10 +311,10 @@ def _carried(
     sticks, kept = True, Kept(1.0, 0.0, 0.0, 1.0)
     limit_slope = contact.friction * contact.normal_stiffness / contact.stiffness
     for to in range(1, len(points)):
-        x, y, of_x, of_y = advance_slopes(_increment(contact, stretch, points, to - 1, to))
+        x, y, of_x, of_y = advance_slopes(increment_of(contact, stretch, points, to - 1, to))
         stretch = Stretch(x / contact.stiffness, y / contact.stiffness)
         _carry(of_x, of_y, limit_slope, derivatives, to)
-        if not _sticks(of_x, of_y):
+        if not sticks_throughout(of_x, of_y):
             sticks = False
             kept = _chain(of_x, of_y, kept)
         for entry, value in enumerate(kept):
@@ -426,7 +428,7 @@ def settle_contacts(period: Period, joints: DrivenJoints) -> None:
     for j in range(len(joints.parameters)):
         contact, path, settled = contact_of(joints.parameters[j]), joints.path[j], joints.settled[j]
         record = ContactRecord(joints.force[j], joints.states[j])
-        stretch = _lead_in(contact, joints.before[j])
+        stretch = led_in(contact, joints.before[j])
         # Most contacts of a pad: in closed form.
         state = _unchanging(contact, stretch, path)
         missing = 0.0
@@ -473,7 +475,7 @@ def energies_of_contacts(period: Period, joints: DrivenJoints) -> None:
         if settled[3] == MARCHED:
             for step in range(len(path)):
                 at = (step + 1) % len(path)
-                increment = _increment(contact, stretch, path, step, at)
+                increment = increment_of(contact, stretch, path, step, at)
                 x, y = advance_force(increment)
                 lost += energy_lost(increment) / contact.stiffness
                 stretch = Stretch(x / contact.stiffness, y / contact.stiffness)

@@ -82,13 +82,16 @@ class Slider(NamedTuple):
 
 
 @compiled(nogil=True, error_model="numpy")
-def _slider_of(joint: Array) -> Slider:
+def slider_of(joint: Array) -> Slider:
+    """The joint of a row of parameters, without its residual stiffness."""
     exponent, gain = (0.0, 0.0) if joint[0] == JENKINS else (joint[4], joint[5])
     return Slider(joint[0], joint[1], joint[3], exponent, gain)
 
 
 @compiled(nogil=True, error_model="numpy")
-def _move(joint: Slider, stretch: float, increment: float) -> tuple[float, float, float, float]:
+def move_slider(
+    joint: Slider, stretch: float, increment: float
+) -> tuple[float, float, float, float]:
     """One increment: stretch at its end, derivatives by stretch and increment, energy lost."""
     spring, limit = joint.spring, joint.limit
     if joint.kind == JENKINS:
@@ -115,7 +118,7 @@ def _lead_in(joint: Slider, before: Array) -> float:
     """Stretch at the first sample, to which it is driven from rest."""
     stretch, here = 0.0, 0.0
     for there in before:
-        stretch, _, _, _ = _move(joint, stretch, there - here)
+        stretch, _, _, _ = move_slider(joint, stretch, there - here)
         here = there
     return stretch
 
@@ -131,7 +134,7 @@ def _round(
     samples, total, lost = len(path), 1.0, 0.0
     for step in range(1, samples + 1):
         at = step if step < samples else 0
-        stretch, kept, follows, loss = _move(joint, stretch, path[at] - path[step - 1])
+        stretch, kept, follows, loss = move_slider(joint, stretch, path[at] - path[step - 1])
         total *= kept
         lost += loss
         force[at] = joint.spring * stretch
@@ -175,7 +178,7 @@ def settle_sliders(period: Period, joints: DrivenJoints) -> None:
     sample and number of periods.
     """
     for j in range(len(joints.parameters)):
-        slider, path, force = _slider_of(joints.parameters[j]), joints.path[j], joints.force[j]
+        slider, path, force = slider_of(joints.parameters[j]), joints.path[j], joints.force[j]
         stretch, periods, lost, missing = _settle_slider(
             slider, _lead_in(slider, joints.before[j]), path, force, joints.states[j]
         )
@@ -199,7 +202,7 @@ def _carried(
     kept[0] = 1.0
     for to in range(1, len(gradient)):
         at = to if to < len(path) else 0
-        stretch, left, follows, _ = _move(joint, stretch, path[at] - path[to - 1])
+        stretch, left, follows, _ = move_slider(joint, stretch, path[at] - path[to - 1])
         kept[to] = left * kept[to - 1]
         for c in range(functions.shape[1]):
             step = functions[at, c] - functions[to - 1, c]
@@ -243,7 +246,7 @@ def differentiate_sliders(period: Period, joints: DrivenJoints) -> None:
     beside = np.any(joints.parameters[:, 2] != 0.0)
     shares = np.dot(period.weights, period.basis) if beside else np.zeros((size, size))
     for j in range(len(joints.parameters)):
-        joint, slider, path = joints.parameters[j], _slider_of(joints.parameters[j]), joints.path[j]
+        joint, slider, path = joints.parameters[j], slider_of(joints.parameters[j]), joints.path[j]
         gradient[0] = 0.0
         _carried(slider, joints.settled[j, 0], path, period.basis, gradient, kept)
         if not _repeat(gradient, kept):

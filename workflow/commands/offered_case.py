@@ -252,8 +252,9 @@ class _Offered:
             yield f"      x: {_numbers(self._sliding(face.normal))}  # where body 2 would slide"
             if owners != self.bodies[:2]:
                 yield f"      bodies: [{', '.join(map(_text, owners))}]"
-            if pair.friction is not None and pair.friction != self._coefficient:
-                yield f"      friction: {{coefficient: {_number(pair.friction)}}}"
+            if pair.friction != self._coefficient:
+                own = TO_FILL if pair.friction is None else _number(pair.friction)
+                yield f"      friction: {{coefficient: {own}}}"
 
     def _held(self) -> Iterator[str]:
         if not self.supports:
@@ -265,7 +266,8 @@ class _Offered:
 
     def _loaded(self) -> Iterator[str]:
         if not self.loads:
-            yield (f"    - {{kind: pressure, group: {TO_FILL}, pressure: {TO_FILL}, path: [1, 0]}}")
+            path = _numbers([1.0] * self._steps + [0.0])
+            yield f"    - {{kind: pressure, group: {TO_FILL}, pressure: {TO_FILL}, path: {path}}}"
         for load in self.loads:
             path = _numbers([*load.path, 0.0])
             group = f"group: {_text(load.group)}, " * bool(load.group)
@@ -293,11 +295,15 @@ class _Offered:
         known = self._coefficient
         yield f"friction: {{coefficient: {TO_FILL if known is None else _number(known)}}}"
 
+    @property
+    def _steps(self) -> int:
+        """Legs of the load path before the one back."""
+        return max(self.scene.steps, 1)
+
     def _legs(self) -> Iterator[str]:
-        steps = max(self.scene.steps, 1)
         yield "load_path:  # a leg for every step of the file, and one back: make it your cycle"
-        yield f"  increments: {_numbers([INCREMENTS] * (steps + 1))}"
-        yield f"  peak_leg: {steps}"
+        yield f"  increments: {_numbers([INCREMENTS] * (self._steps + 1))}"
+        yield f"  peak_leg: {self._steps}"
 
 
 def _value(load: SaidLoad) -> str:

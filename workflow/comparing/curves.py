@@ -13,7 +13,11 @@ from workflow.shell.quantities import ANY, LAST, CurvesOf
 from workflow.shell.results import grid_of
 
 # Attributes of a group that say what its number stands for, in words.
-TELLING = {"force": "under {:g} N", "normal_force": "under {:g} N"}
+TELLING = {
+    "force": "under {:g} N",
+    "level": "at level {:g}",
+    "normal_force": "under {:g} N",
+}
 
 
 @dataclass(frozen=True)

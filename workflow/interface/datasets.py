@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 # What tells numbered groups apart: the first that all have; else their number.
-TOLD_APART_BY = ("cycles", "increment", "force", "energy", "frequency")
+TOLD_APART_BY = ("cycles", "increment", "force", "level", "energy", "frequency")
 NUMBER = "number"
 
 

@@ -118,7 +118,7 @@ class Analysis(Generic[AnyCase]):
     over each other where runs are compared.
     ``choose`` gives the case with the settings that it leaves open, and a record of why.
     ``write_loads`` solves the structure of a case alone and writes the loads of its contacts into a
-    folder, None where there is no structure.
+    folder, ``draw_faces`` draws the faces of these into one; None where there is no structure.
     """
 
     name: str
@@ -134,3 +134,4 @@ class Analysis(Generic[AnyCase]):
     choose: Callable[[AnyCase], tuple[AnyCase, dict[str, Any] | None]] = as_written
     comparison: Comparison[AnyCase] = Comparison()
     write_loads: Callable[[AnyCase, str, Path, bool], Sequence[str]] | None = None
+    draw_faces: Callable[[AnyCase, str, Path, bool], Path] | None = None

@@ -9,6 +9,7 @@ import hashlib
 import logging
 import os
 import re
+from collections.abc import Callable, Sequence
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -18,6 +19,7 @@ from platformdirs import user_cache_path
 
 import fe_models
 import sa_solver
+from fe_models.condensation import Condensed
 from fe_models.joint import JointResolvent
 from fe_models.structure import FIELDS, CycleSolution, Structure
 from fe_models.symmetry import Mirror, SplitMatrix
@@ -26,7 +28,8 @@ from workflow.shell.store import DamagedFile, read_arrays, write_arrays
 
 LOG = logging.getLogger(__name__)
 
-# Files are pruned, least recently used first, above this size; one default dovetail takes 67 MB.
+# Files are pruned, least recently used first, above this size; one default dovetail takes 67 MB for
+# its joint and 133 MB for its bodies.
 LARGEST_CACHE = 4 * 1024**3
 # Files by what is in them and the hash of what they were made from.
 NAME = re.compile(r"[a-z]+-[0-9a-f]{32}\.h5")
@@ -78,6 +81,22 @@ def save_joint(key: str, joint: JointResolvent) -> None:
     else:
         arrays["inverse"] = inverse
     _save(f"joint-{key}", arrays, {"rho": joint.rho, "rigid_modes": joint.rigid_modes})
+
+
+def keep_body(made_from: Sequence[np.ndarray], make: Callable[[], Condensed]) -> Condensed:
+    """A condensed body, found by all arrays that it is made from, or made and kept."""
+    name = f"body-{content_key(*(_digest(array) for array in made_from))}"
+    if (kept := _load(name)) is not None:
+        return kept[0]["stiffness"], kept[0]["loads"]
+    stiffness, loads = make()
+    _save(name, {"stiffness": stiffness, "loads": loads}, {})
+    return stiffness, loads
+
+
+def _digest(array: np.ndarray) -> tuple[str, tuple[int, ...], str]:
+    """What an array is: kind and shape of its numbers, and a hash of them."""
+    bits = hashlib.sha256(np.ascontiguousarray(array).data)
+    return array.dtype.str, array.shape, bits.hexdigest()
 
 
 def load_cycle(key: str, structure: Structure, friction: float | Array) -> CycleSolution | None:

@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
+from dataclasses import replace
+
 import numpy as np
 
+from fe_models.dynamics.damping import damped
+from fe_models.dynamics.ground_motion import Translation
 from fe_models.dynamics.rig import Link, lumped_rig, unit_force
+from workflow.analyses.rig.damping import Damping
 from workflow.analyses.rig.friction_rig import friction_rig_model
-from workflow.analyses.rig.joint_sections import FrictionContactJoint, Joint
+from workflow.analyses.rig.joint_sections import ElasticJoint, FrictionContactJoint, Joint
 from workflow.analyses.rig.reduced_rig import reduced_rig_model
 from workflow.analyses.rig.rig_model import RigModel
 from workflow.analyses.rig.structure import FrictionRig, JointedBody, Rig
@@ -14,7 +20,10 @@ from workflow.shell.reporter import Reporter
 
 
 def rig_model(
-    structure: Rig | JointedBody | FrictionRig, joint: Joint, mass: int | None, reporter: Reporter
+    structure: Rig | JointedBody | FrictionRig,
+    joint: Joint | ElasticJoint,
+    mass: int | None,
+    reporter: Reporter,
 ) -> RigModel:
     """The rig with its joints, of masses in a row driven at the ``mass`` of this number.
 
@@ -22,9 +31,9 @@ def rig_model(
     """
     if isinstance(structure, JointedBody):
         directions = 3 if isinstance(joint, FrictionContactJoint) else 1
-        return reduced_rig_model(structure, directions, reporter)
+        return _damped(reduced_rig_model(structure, directions, reporter), structure.damping)
     if isinstance(structure, FrictionRig):
-        return friction_rig_model(structure, reporter)
+        return _damped(friction_rig_model(structure, reporter), structure.damping)
     return row_of_masses(structure, mass or 1)
 
 
@@ -36,7 +45,25 @@ def row_of_masses(rig: Rig, driven: int = 1) -> RigModel:
         dict(zip(names, rig.masses, strict=True)),
         dict(zip(links, rig.springs, strict=True)),
         [[Link(names[-1])]],
-        rig.damping_ratio,
+        np.array(rig.damping_ratio),
     )
     driving = unit_force(model, f"m{driven}")
-    return RigModel(model, driving, np.eye(len(names)), tuple(names))
+    along = Translation(np.ones(len(names)), model.mass.sum(axis=1))
+    built = RigModel(model, driving, np.eye(len(names)), tuple(names), translations={"x": along})
+    return _damped(built, rig.damping)
+
+
+def _damped(rig: RigModel, damping: Damping | None) -> RigModel:
+    """A rig with the damping that it has beside that of its modes.
+
+    Raises UserError for dashpots at places that there are not.
+    """
+    if damping is None:
+        return rig
+    dashpots: defaultdict[Link, float] = defaultdict(float)
+    for number, dashpot in enumerate(damping.dashpots):
+        links = rig.place_names.links(dashpot, f"structure.damping.dashpots.{number}")
+        for link in links:
+            dashpots[link] += dashpot.coefficient / len(links)
+    factors = (0.0, 0.0) if damping.rayleigh is None else damping.rayleigh.factors
+    return replace(rig, model=damped(rig.model, *factors, damping.loss_factor, dashpots))

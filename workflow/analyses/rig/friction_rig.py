@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
+
 import numpy as np
 
-from fe_models.dynamics.friction_rig import friction_rig
+from fe_models.dynamics.friction_rig import friction_rig, ground_inertia
+from fe_models.dynamics.ground_motion import Translation, along
 from fe_models.dynamics.rig import RigError, unit_force
-from workflow.analyses.rig.reduced_rig import reduced_specimens
+from fe_models.reduction import ReducedModel
+from workflow.analyses.rig.reduced_rig import AXES, reduced_specimens
 from workflow.analyses.rig.rig_model import RigModel
 from workflow.analyses.rig.structure import FrictionRig
 from workflow.errors import UserError
@@ -25,7 +29,9 @@ def friction_rig_model(rig: FrictionRig, reporter: Reporter) -> RigModel:
         key, file = "structure.specimens", rig.specimens
         bodies = reduced_specimens(key, file, reporter, told, rig.target_distance)
     try:
-        model = friction_rig(*bodies.reduction.models, rig.masses, rig.springs, rig.damping_ratio)
+        specimens = bodies.reduction.models
+        ratios = np.array(rig.damping_ratio)
+        model = friction_rig(*specimens, rig.masses, rig.springs, ratios)
     except RigError as error:
         raise UserError(f"structure: {error}") from error
     face = bodies.face
@@ -41,4 +47,17 @@ def friction_rig_model(rig: FrictionRig, reporter: Reporter) -> RigModel:
         places=face.coordinates,
         gap=face.gap,
         area=face.nodal_areas,
+        translations=_translations(rig, specimens, model.names),
     )
+
+
+def _translations(
+    rig: FrictionRig, specimens: tuple[ReducedModel, ReducedModel], names: tuple[str, ...]
+) -> dict[str, Translation]:
+    """Those of the rig with the ground, none of specimens that something else holds inside."""
+    found = {}
+    for axis in AXES:
+        with suppress(RigError):
+            inertia = ground_inertia(*specimens, rig.masses, axis)
+            found[axis] = Translation(along(names, axis), inertia)
+    return found

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field, StrictBool, model_validator
 
 from workflow.case.fields import Quantity
 from workflow.case.sections import Section, disagreement, entry
@@ -121,7 +121,66 @@ class FrictionContactJoint(Joint):
         return self
 
 
+class ElasticJoint(Section):
+    """A joint without friction, along one direction."""
+
+    law: str
+
+    @property
+    def normal_load(self) -> float:
+        """Nothing presses it."""
+        return 0.0
+
+    @property
+    def moves_mean(self) -> bool:
+        """Whether a vibration about 0 has a mean, and even harmonics."""
+        return False
+
+
+class PolynomialSpringJoint(ElasticJoint):
+    """A spring whose force is a polynomial of its displacement."""
+
+    law: Literal["polynomial_spring"] = entry("a nonlinear spring", "polynomial_spring")
+    stiffness: Annotated[float, Quantity("N/mm", at_least=-1e12, at_most=1e12)] = entry(
+        "of small motions: may be 0 or below [N/mm]", "1 N/um"
+    )
+    quadratic: Annotated[float, Quantity("N/mm^2", at_least=-1e15, at_most=1e15)] = entry(
+        "force over displacement squared [N/mm^2]", "0 N/mm^2", default=0.0
+    )
+    cubic: Annotated[float, Quantity("N/mm^3", at_least=-1e18, at_most=1e18)] = entry(
+        "force over its third power: above 0 hardens [N/mm^3]", "1e5 N/mm^3", default=0.0
+    )
+    quartic: Annotated[float, Quantity("N/mm^4", at_least=-1e21, at_most=1e21)] = entry(
+        "force over its fourth power [N/mm^4]", "0 N/mm^4", default=0.0
+    )
+    quintic: Annotated[float, Quantity("N/mm^5", at_least=-1e24, at_most=1e24)] = entry(
+        "force over its fifth power [N/mm^5]", "0 N/mm^5", default=0.0
+    )
+
+    @property
+    def moves_mean(self) -> bool:
+        return self.quadratic != 0.0 or self.quartic != 0.0
+
+
+class ElasticStopJoint(ElasticJoint):
+    """A spring that is met where a gap is closed."""
+
+    law: Literal["elastic_stop"] = entry("a spring behind a gap", "elastic_stop")
+    stiffness: JointStiffness = entry("once the gap is closed [N/mm]", "10 N/um")
+    gap: Gap = entry("until it is met [mm]", "20 um", default=0.0)
+    two_sided: StrictBool = entry("whether there is one on either side", False, default=False)
+
+    @property
+    def moves_mean(self) -> bool:
+        return not self.two_sided
+
+
 UniaxialJoint = BoucWenJoint | JenkinsJoint | UniformIwanJoint | FourParameterIwanJoint
 JointLaw = Annotated[UniaxialJoint, Field(discriminator="law")]
 # Those of a structure that moves in three directions too.
 ContactLaw = Annotated[UniaxialJoint | FrictionContactJoint, Field(discriminator="law")]
+# Those of steady vibrations, in which joints need not wear.
+VibrationLaw = Annotated[
+    UniaxialJoint | FrictionContactJoint | PolynomialSpringJoint | ElasticStopJoint,
+    Field(discriminator="law"),
+]

@@ -14,8 +14,9 @@ import numpy as np
 from pydantic import Discriminator, Tag, model_validator
 
 from sa_solver.types import Array
+from workflow.analyses.rig.places import Moved
 from workflow.analyses.rig.point_kinds import known, matching
-from workflow.analyses.rig.structure import JointedBody, Moved
+from workflow.analyses.rig.structure import JointedBody
 from workflow.analyses.rig.unknowns_file import AXES, given_unknowns
 from workflow.case.fields import File, Quantity, Text, Whole, shown, split_dataset
 from workflow.case.input_files import InputFileError, open_hdf5
@@ -235,7 +236,11 @@ class MatrixBody(JointedBody, Matrices):
 
     in_schema: ClassVar[Mapping[str, Any]] = together("retained", "modes")
 
-    driven: Driven = entry("points that share the force of the excitation evenly")  # type: ignore[assignment]
+    driven: Driven | None = entry(  # type: ignore[assignment]
+        "points that share the force of the excitation evenly, or a load; none where the "
+        "excitation of a steady vibration names its own",
+        default=None,
+    )
 
     @model_validator(mode="after")
     def _modes_of_retained(self) -> MatrixBody:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections import Counter, defaultdict
+from collections import defaultdict
 from collections.abc import Iterator
+from contextlib import suppress
 
 import numpy as np
 import scipy.linalg as sl
 
+from fe_models.dynamics.ground_motion import Translation, translation_of
 from fe_models.dynamics.model import DynamicModel
 from fe_models.dynamics.receptance import RIGID
 from fe_models.dynamics.rig import Link, RigError, reduced_rig, unit_force
@@ -17,8 +19,10 @@ from fe_models.mesh import MeshError
 from fe_models.reduction import STEPS, ReducedModel
 from sa_solver.types import Array, Progress, Tally
 from workflow.analyses.rig.matrix_body import LoadCase, MatrixBody
+from workflow.analyses.rig.place_names import PlaceNames, link_along
+from workflow.analyses.rig.places import Moved
 from workflow.analyses.rig.rig_model import RigModel
-from workflow.analyses.rig.structure import Against, JointedBody, JointPlaces, Moved, ReducedBody
+from workflow.analyses.rig.structure import JointedBody, JointPlaces, ReducedBody
 from workflow.analyses.specimens.case import SpecimensCase
 from workflow.analyses.specimens.memory import memory
 from workflow.analyses.specimens.model import SpecimensModel
@@ -46,44 +50,66 @@ def reduced_rig_model(body: JointedBody, directions: int, reporter: Reporter) ->
 
 def _rig_on(reduced: ReducedModel, body: JointedBody, directions: int) -> RigModel:
     """The rig on a reduced model."""
-    points = _Points(reduced)
+    if reduced.names is None:
+        raise UserError(
+            "structure.file: a model whose kept displacements have no names; allowed: one of a "
+            "specimens run, or written with names"
+        )
+    points = _Points(reduced.names)
     joints = [
         joint
         for number, places in enumerate(body.joints)
-        for joint in points.joints(places, directions, f"joints.{number}")
+        for joint in points.joints(places, directions, f"structure.joints.{number}")
     ]
     try:
         model = reduced_rig(
             reduced,
-            points.names,
+            reduced.names,
             joints,
             points.masses(body),
             points.springs(body),
-            body.damping_ratio,
+            np.array(body.damping_ratio),
         )
         driven = _driven(body, reduced, model, points)
-        seen = _shape(model, points, body.seen, "seen")
+        seen = _shape(model, points, body.seen, "structure.seen")
     except RigError as error:
         raise UserError(f"structure: {error}") from error
     label = f"{body.seen.points} {body.seen.direction}"
     along = _along(directions, body)
-    return RigModel(model, driven, seen[None], (label,), directions, along, in_a_row=False)
+    return RigModel(
+        *(model, driven, seen[None], (label,), directions, along),
+        in_a_row=False,
+        translations=_translations(reduced, model),
+    )
+
+
+def _shape(model: DynamicModel, points: PlaceNames, moved: Moved, key: str) -> Array:
+    """Even shares ``(n,)`` of the displacements of points along a direction."""
+    shares = points.shared(moved, key)
+    return np.sum([share * unit_force(model, name) for name, share in shares], axis=0)
+
+
+def _translations(body: ReducedModel, model: DynamicModel) -> dict[str, Translation]:
+    """Those of the rig with the ground, none of a body that something else holds inside."""
+    found = {}
+    for axis in AXES:
+        with suppress(RigError):
+            rigid = np.zeros(len(model.mass))
+            rigid[: len(body.stiffness)] = translation_of(body, axis)
+            found[axis] = Translation(rigid, model.mass @ rigid)
+    return found
 
 
 def _driven(
     body: JointedBody, reduced: ReducedModel, model: DynamicModel, points: _Points
 ) -> Array:
-    """Forces ``(n,)`` of an excitation of 1 N."""
-    driven: Moved | LoadCase = body.driven
+    """Forces ``(n,)`` of an excitation of 1 N, none where nothing is driven here."""
+    driven: Moved | LoadCase | None = body.driven
+    if driven is None:
+        return np.zeros(len(model.mass))
     if isinstance(driven, Moved):
-        return _shape(model, points, driven, "driven")
+        return _shape(model, points, driven, "structure.driven")
     return reduced.loads[:, driven.load - 1]
-
-
-def _shape(model: DynamicModel, points: _Points, moved: Moved, key: str) -> Array:
-    """Even shares ``(n,)`` of the displacements of points along a direction."""
-    shares = points.shared(moved, key)
-    return np.sum([share * unit_force(model, name) for name, share in shares], axis=0)
 
 
 def _along(directions: int, body: JointedBody) -> int:
@@ -190,62 +216,20 @@ def reduced_specimens(
 # --- its points ---------------------------------------------------------------------------------
 
 
-class _Points:
+class _Points(PlaceNames):
     """The kept points of a body by name, and what is put there."""
-
-    def __init__(self, reduced: ReducedModel) -> None:
-        if reduced.names is None:
-            raise UserError(
-                "structure.file: a model whose kept displacements have no names; allowed: one of a "
-                "specimens run, or written with names"
-            )
-        self.names = reduced.names
-        # Each once, in order.
-        self._points = list(dict.fromkeys(name.rpartition(" ")[0] for name in self.names))
-
-    def of(self, wanted: str, key: str) -> list[str]:
-        """The point of that name, or all of that kind."""
-        if wanted in self._points:
-            return [wanted]
-        matching = [point for point in self._points if _kind(point) == wanted]
-        if not matching:
-            kinds = Counter(map(_kind, self._points))
-            known = [f"{kind}, {kind} 1 to {kind} {count}" for kind, count in kinds.items() if kind]
-            known += [point for point in self._points if not _kind(point)]
-            raise UserError(
-                f"structure.{key}: '{wanted}': no such point; allowed: {', '.join(known)}"
-            )
-        return matching
-
-    def pairs(self, connection: Against, key: str) -> list[tuple[str, str | None]]:
-        """Each point and that against which it moves, None for the ground."""
-        points = self.of(connection.points, f"{key}.points")
-        if connection.against is None:
-            return [(point, None) for point in points]
-        opposites = self.of(connection.against, f"{key}.against")
-        if len(opposites) == 1:
-            opposites *= len(points)
-        if len(opposites) != len(points):
-            raise UserError(
-                f"structure.{key}.against: {len(opposites)} points for {len(points)}; allowed: as "
-                "many, or one"
-            )
-        for point, opposite in zip(points, opposites, strict=True):
-            if point == opposite:
-                raise UserError(f"structure.{key}.against: {point} against itself; allowed: others")
-        return list(zip(points, opposites, strict=True))
 
     def joints(self, places: JointPlaces, directions: int, key: str) -> Iterator[list[Link]]:
         """The links of every joint: that along its direction; three with it as the last."""
         across = _across(places.direction) if directions > 1 else []
         for point, opposite in self.pairs(places, key):
-            yield [_link(point, opposite, axis) for axis in (*across, places.direction)]
+            yield [link_along(point, opposite, axis) for axis in (*across, places.direction)]
 
     def masses(self, body: JointedBody) -> dict[str, float]:
         """Masses added to displacements [t]."""
         added: defaultdict[str, float] = defaultdict(float)
         for number, point_mass in enumerate(body.masses):
-            points = self.of(point_mass.points, f"masses.{number}.points")
+            points = self.of(point_mass.points, f"structure.masses.{number}.points")
             for name in self.names:
                 point, _, direction = name.rpartition(" ")
                 # Not to rotations.
@@ -257,26 +241,8 @@ class _Points:
         """Springs added between displacements [N/mm]."""
         added: defaultdict[Link, float] = defaultdict(float)
         for number, spring in enumerate(body.springs):
-            pairs = self.pairs(spring, f"springs.{number}")
+            pairs = self.pairs(spring, f"structure.springs.{number}")
             for point, opposite in pairs:
-                added[_link(point, opposite, spring.direction)] += spring.stiffness / len(pairs)
+                link = link_along(point, opposite, spring.direction)
+                added[link] += spring.stiffness / len(pairs)
         return added
-
-    def shared(self, moved: Moved, key: str) -> list[tuple[str, float]]:
-        """Displacements along a direction, and the even share of each with its sign."""
-        points = self.of(moved.points, f"{key}.points")
-        sign = -1.0 if moved.direction.startswith("-") else 1.0
-        return [(f"{point} {moved.direction[-1]}", sign / len(points)) for point in points]
-
-
-def _kind(point: str) -> str:
-    """What a point's name begins with, before its number; nothing where it has none."""
-    kind, _, number = point.rpartition(" ")
-    return kind if number.isdecimal() else ""
-
-
-def _link(point: str, opposite: str | None, direction: str) -> Link:
-    """What stretches when a point moves in a direction, from another or the ground."""
-    axis = direction[-1]
-    ends = f"{point} {axis}", None if opposite is None else f"{opposite} {axis}"
-    return Link(*reversed(ends)) if direction.startswith("-") else Link(*ends)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -9,16 +11,21 @@ import numpy as np
 import scipy.linalg as sl
 
 from fe_models.dynamics.excitation import CombinedForces, ConstantForce, ExcitationForce
+from fe_models.dynamics.ground_motion import Translation
 from fe_models.dynamics.model import DynamicModel
 from fe_models.dynamics.motion import Motion
 from fe_models.dynamics.receptance import RIGID
 from fe_models.dynamics.rig import natural_frequencies
-from sa_solver.types import Array
+from sa_solver.types import Array, Indices
+from wear.joints.elastic import ElasticLaw
 from wear.joints.friction_contact import FrictionContact
 from workflow.analyses.rig.laws import Law
+from workflow.analyses.rig.place_names import PlaceNames
 
 # Natural frequencies that are reported, from the lowest on: those of a row of masses, all.
 MOST_FREQUENCIES = 20
+# Names of displacements that are those of modes, whichever body has them.
+MODE = r"(.* )?mode \d+"
 
 
 @dataclass(frozen=True)
@@ -34,7 +41,7 @@ class RigModel:
     the load is the joints' own preload); ``stretch`` ``(n,)``, which takes displacements to the one
     that loops are drawn over, not the joints' mean; and of each joint its place ``places``
     ``(j, 2)`` on the contact plane [mm], the initial ``gap`` ``(j,)`` [mm] and ``area`` ``(j,)``
-    [mm²], empty elsewhere.
+    [mm²], empty elsewhere. ``translations`` are those with the ground, by direction.
     """
 
     model: DynamicModel
@@ -49,11 +56,38 @@ class RigModel:
     places: Array = field(default_factory=lambda: np.empty((0, 2)))
     gap: Array = field(default_factory=lambda: np.empty(0))
     area: Array = field(default_factory=lambda: np.empty(0))
+    translations: Mapping[str, Translation] = field(default_factory=dict)
 
     @property
     def joints(self) -> int:
         """How many there are."""
         return len(self.model.connection) // self.directions
+
+    @property
+    def retained(self) -> Indices:
+        """The displacements of places ``(p,)``: all but the modes of reduced bodies."""
+        modal = [re.fullmatch(MODE, name) is not None for name in self.model.names]
+        return np.flatnonzero(np.logical_not(modal))
+
+    @property
+    def place_names(self) -> PlaceNames:
+        """Its places as a case names them: masses in a row move along x."""
+        names = [self.model.names[place] for place in self.retained]
+        if not self.in_a_row:
+            return PlaceNames(names)
+        along = {f"{name} x": name for name in names}
+        return PlaceNames(list(along), along)
+
+    @property
+    def stretched(self) -> list[str]:
+        """What every direction of every joint stretches by ``(j d,)``, such as ``m2 - m1``."""
+        return [
+            " - ".join(
+                "+".join(self.model.names[place] for place in np.flatnonzero(side)) or "ground"
+                for side in ((row > 0.0, row < 0.0) if (row < 0.0).any() else (row > 0.0,))
+            )
+            for row in self.model.connection
+        ]
 
     @property
     def still(self) -> Array:
@@ -118,8 +152,11 @@ class RigModel:
         squares, shapes = sl.eigh(stiffness, self.model.mass)
         # Modes of a structure that moves freely have no damping ratio.
         lowest = np.flatnonzero(squares > RIGID * squares[-1])[:MOST_FREQUENCIES]
+        angular = np.sqrt(squares[lowest])
         lost = np.einsum("nm,nm->m", shapes, self.model.damping @ shapes)[lowest]
-        ratios: list[float] = (0.5 * lost / np.sqrt(squares[lowest])).tolist()
+        if self.model.structural is not None:
+            lost += np.einsum("nm,nm->m", shapes, self.model.structural @ shapes)[lowest] / angular
+        ratios: list[float] = (0.5 * lost / angular).tolist()
         return ratios
 
     def modes(self, law: Law, rest: Array | None = None) -> dict[str, list[float]]:
@@ -131,6 +168,8 @@ class RigModel:
         sliding = np.zeros_like(stuck)
         if isinstance(law, FrictionContact):
             sliding[:, 2, 2] = stuck[:, 2, 2]
+        elif isinstance(law, ElasticLaw):
+            sliding = stuck
         else:
             sliding[:, 0, 0] = law.residual_stiffness
         return {

@@ -5,16 +5,17 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 
 from pydantic import Field, model_validator
 
+from workflow.analyses.rig.damping import OF_MODES, Damping, DampingRatios, damping_text
+from workflow.analyses.rig.places import Against, Direction, Moved, Points
 from workflow.analyses.specimens.case import SpecimensCase
 from workflow.case.fields import Quantity, Whole
 from workflow.case.input_files import InputFileError, open_hdf5
 from workflow.case.loading import YAML, CaseFile, outline_of
-from workflow.case.plain import shares
-from workflow.case.sections import Length, Section, Title, disagreement, entry
+from workflow.case.sections import Length, Section, disagreement, entry
 
 if TYPE_CHECKING:
     from fe_models.reduction import ReducedModel
@@ -23,8 +24,6 @@ if TYPE_CHECKING:
 OF_SPECIMENS = {"structure": "specimens", "material": "material", "wear law": "wear law"}
 Mass = Annotated[float, Quantity("t", above=0.0, at_most=1e3, range_text="above 0 to 1e6 kg")]
 Spring = Annotated[float, Quantity("N/mm", at_least=0.0, at_most=1e12, range_text="0 to 1e6 kN/um")]
-DampingRatio = Annotated[float, Quantity("1", at_least=0.0, below=1.0)]
-Direction = Literal["x", "y", "z", "-x", "-y", "-z"]
 
 
 class Rig(Section):
@@ -38,7 +37,18 @@ class Rig(Section):
         "each between its mass and the one before, or the ground [N/mm]",
         ["1.4 N/um", "273 N/um"],
     )
-    damping_ratio: DampingRatio = entry("of every mode without the joint [1]", 0.001)
+    damping_ratio: DampingRatios = entry(f"without the joint, {OF_MODES}", 0.001)
+    damping: Damping | None = entry("added to that of the modes", default=None)
+
+    @model_validator(mode="after")
+    def _damps_its_own(self) -> Rig:
+        count = len(self.masses)
+        if len(self.damping_ratio) > count:
+            raise disagreement(
+                f"{len(self.damping_ratio)} ratios for {count} modes; allowed: as many or fewer",
+                "damping_ratio",
+            )
+        return self
 
     @model_validator(mode="after")
     def _a_spring_per_mass(self) -> Rig:
@@ -53,26 +63,6 @@ class Rig(Section):
     def text(self) -> str:
         """The rig in a few words."""
         return f"rig of {_on_springs(self.masses, self.springs)}"
-
-
-class Points(Section):
-    """Kept points of a reduced body."""
-
-    points: Title = entry("one, such as pad 17, or all of a kind, such as pad", "pad")
-
-
-class Moved(Points):
-    """Kept points of a reduced body, and a direction."""
-
-    direction: Direction = entry("x, y, z, -x, -y or -z", "x")
-
-
-class Against(Moved):
-    """What connects kept points with others or with the ground."""
-
-    against: Title | None = entry(
-        "other points, as many, or one for all; without it the ground", "ring", default=None
-    )
 
 
 class JointPlaces(Against):
@@ -114,11 +104,18 @@ class StoredBody(Section):
 class JointedBody(Section, ABC):
     """A body with joints, masses and springs at its points."""
 
+    also_filled_in: ClassVar[tuple[str, ...]] = ("driven",)
+
     joints: tuple[JointPlaces, ...] = entry("where they are", min_length=1)
     masses: tuple[AddedMass, ...] = entry("added, moving in x, y and z", default=())
     springs: tuple[AddedSpring, ...] = entry("added", default=())
-    damping_ratio: DampingRatio = entry("of every mode without the joints [1]", 0.001)
-    driven: Moved = entry("points that share the force of the excitation evenly")
+    damping_ratio: DampingRatios = entry(f"without the joints, {OF_MODES}", 0.001)
+    damping: Damping | None = entry("added to that of the modes", default=None)
+    driven: Moved | None = entry(
+        "points that share the force of the excitation evenly; none where the excitation of a "
+        "steady vibration names its own",
+        default=None,
+    )
     seen: Moved = entry("points whose mean displacement is looked at")
 
     @property
@@ -129,7 +126,8 @@ class JointedBody(Section, ABC):
     @property
     def driven_place(self) -> str:
         """Where the force of an excitation acts, in a few words."""
-        return f"{self.driven.points} along {self.driven.direction}"
+        driven = self.driven
+        return "no place" if driven is None else f"{driven.points} along {driven.direction}"
 
     @property
     def added(self) -> str:
@@ -194,7 +192,8 @@ class FrictionRig(Section):
         "from the ground to the first mass, and on to the second [N/mm]",
         ["1.3469e3 N/mm", "273e3 N/mm"],
     )
-    damping_ratio: DampingRatio = entry("of every mode with the contact open [1]", 0.001)
+    damping_ratio: DampingRatios = entry(f"with the contact open, {OF_MODES}", 0.001)
+    damping: Damping | None = entry("added to that of the modes", default=None)
     target_distance: Length = entry(
         "from the contact plane to where a laser looks at each specimen [mm]", "1 mm", default=1.0
     )
@@ -223,7 +222,7 @@ def _on_springs(masses: Sequence[float], springs: Sequence[float]) -> str:
 
 def structure_outline(structure: Rig | JointedBody | FrictionRig) -> list[tuple[str, str]]:
     """What holds the joints, and the bodies that another case describes."""
-    damping = f"damping ratio {shares(structure.damping_ratio)}"
+    damping = damping_text(structure.damping_ratio, structure.damping)
     below = [] if isinstance(structure, Rig) else structure.outline()
     return [("structure", f"{structure.text}, {damping}"), *below]
 
@@ -233,6 +232,14 @@ def driven_place(structure: Section, mass: int | None) -> str:
     if isinstance(structure, JointedBody):
         return structure.driven_place
     return f"mass {mass or 1}"
+
+
+def refuse_undriven(structure: Section) -> None:
+    """Refuse a reduced body that says nowhere where a force acts."""
+    if isinstance(structure, JointedBody) and structure.driven is None:
+        raise disagreement(
+            "missing; allowed: points and direction of the force", "structure.driven", "structure"
+        )
 
 
 def refuse_missing_mass(structure: Section, mass: int | None, key: str, otherwise: str) -> None:

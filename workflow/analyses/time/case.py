@@ -19,6 +19,7 @@ from workflow.analyses.rig.structure import (
     Rig,
     driven_place,
     refuse_missing_mass,
+    refuse_undriven,
     structure_outline,
 )
 from workflow.analyses.wear.case.evolution import PositiveEnergy, TotalEnergy
@@ -186,7 +187,19 @@ class RigCase(TimeCase):
     @model_validator(mode="after")
     def _drives_a_mass(self) -> RigCase:
         otherwise = "a reduced body; allowed: structure.driven"
+        refuse_undriven(self.structure)
         refuse_missing_mass(self.structure, self.excitation.mass, "excitation.mass", otherwise)
+        return self
+
+    @model_validator(mode="after")
+    def _is_damped_in_time(self) -> RigCase:
+        damping = self.structure.damping
+        if damping is not None and damping.loss_factor > 0.0:
+            raise disagreement(
+                f"{damping.loss_factor:g}: in steady vibration only; allowed: 0, and half of it as "
+                "structure.damping_ratio, which is the same at resonance",
+                "structure.damping.loss_factor",
+            )
         return self
 
     @model_validator(mode="after")

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from wear.joints import evolution as forms
+from wear.joints.elastic import ElasticLaw
 from wear.joints.evolution import JointEvolution, WearFunction
 from wear.joints.friction_contact import FrictionContact
 from workflow.analyses.rig import joint_evolution as given
@@ -38,7 +39,7 @@ class JointModel:
     @property
     def line_law(self) -> LineLaw:
         """The law of a joint alone, which has one direction."""
-        assert not isinstance(self.law, FrictionContact)
+        assert not isinstance(self.law, FrictionContact | ElasticLaw)
         return self.law
 
     def at(self, energy: float) -> Law:

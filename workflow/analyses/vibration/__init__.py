@@ -23,7 +23,7 @@ def _run(run: Run[VibrationCase]) -> None:
 
 
 def _quantities(case: VibrationCase, summary: Summary) -> list[str]:
-    count = len(case.forces)
+    count = len(case.amounts)
     return [f"responses.{n}.{moved}" for n, moved in product(range(count), MOTIONS)]
 
 

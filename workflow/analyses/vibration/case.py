@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import pairwise
-from math import radians
+from math import pi
 from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import Field, StrictBool, model_validator
 
 from workflow.analyses.rig.doubts import RIGID, about_matrices, about_modes
 from workflow.analyses.rig.excitation import DrivingForce, Frequency, MassNumber
-from workflow.analyses.rig.joint_sections import ContactLaw, FrictionContactJoint
+from workflow.analyses.rig.joint_sections import (
+    ElasticJoint,
+    FrictionContactJoint,
+    VibrationLaw,
+)
 from workflow.analyses.rig.matrix_body import MatrixBody
 from workflow.analyses.rig.structure import (
     FrictionRig,
@@ -20,154 +23,45 @@ from workflow.analyses.rig.structure import (
     Rig,
     driven_place,
     refuse_missing_mass,
+    refuse_undriven,
     structure_outline,
 )
-from workflow.case.fields import Entry, Quantity, Whole
+from workflow.analyses.vibration.excitation import FORCE, LEVEL, Amount, VibrationExcitation
+from workflow.analyses.vibration.sections import (
+    Continuation,
+    FurtherStart,
+    LoopsAt,
+    MotionResolution,
+    NonlinearModes,
+)
+from workflow.case.fields import Quantity
 from workflow.case.plain import entries, shares
-from workflow.case.sections import Case, Section, Title, disagreement, entry
+from workflow.case.sections import Case, Title, disagreement, entry, one_of
 from workflow.case.source import Source
-
-MOST_ODD, HIGHEST = 100, 999
-ODD = (1, 3, 5, 7, 9, 11, 13, 15)
-Step = Annotated[float, Quantity("1", at_least=1e-12, at_most=10.0)]
-
-
-@dataclass(frozen=True)
-class HarmonicNumbers(Entry):
-    """How many odd harmonics from the first on, or the harmonics themselves: read as these."""
-
-    @property
-    def allowed(self) -> str:
-        return (
-            f"how many odd harmonics, 1 to {MOST_ODD}, or harmonics from 0 to {HIGHEST}, "
-            "ascending, 1 among them, such as [1, 3, 5]"
-        )
-
-    def parse(self, value: object) -> tuple[int, ...]:
-        if isinstance(value, list | tuple):
-            if not all(type(number) is int and 0 <= number <= HIGHEST for number in value):
-                raise self.refusal(value, "not all of them harmonics")
-            if any(after <= before for before, after in pairwise(value)):
-                raise self.refusal(value, "not ascending, each once")
-            if 1 not in value:
-                raise self.refusal(value, "without harmonic 1")
-            return tuple(value)
-        if type(value) is not int:
-            raise self.refusal(value, "not harmonics")
-        if not 1 <= value <= MOST_ODD:
-            raise self.refusal(value, "out of range")
-        return tuple(range(1, 2 * value, 2))
-
-    def json_schema(self) -> dict[str, Any]:
-        harmonic = {"type": "integer", "minimum": 0, "maximum": HIGHEST}
-        number = {"type": "integer", "minimum": 1, "maximum": MOST_ODD}
-        return {"anyOf": [number, {"type": "array", "items": harmonic, "minItems": 1}]}
-
-
-class MotionResolution(Section):
-    """Harmonics of the motion, and samples of a period in which the joint's force is found."""
-
-    harmonics: Annotated[Sequence[int], HarmonicNumbers()] = entry(
-        "how many odd ones, or a list; those to begin with if there is a tolerance; for contacts "
-        "the mean, 0, is added",
-        8,
-        default=ODD,
-    )
-    samples: Annotated[int, Whole(8, 65536)] = entry(
-        "of a period, more than two for each period of the highest harmonic", 256, default=256
-    )
-    tolerance: Annotated[float, Quantity("1", at_least=1e-8, at_most=0.1)] | None = entry(
-        "of the joint's vibration, to which harmonics and samples grow; without it they stay [1]",
-        "1 %",
-        default=None,
-    )
-
-    @model_validator(mode="after")
-    def _shows_the_highest(self) -> MotionResolution:
-        highest = self.harmonics[-1]
-        if self.samples <= 2 * highest:
-            raise disagreement(
-                f"{self.samples}: too few for harmonic {highest}; allowed: above {2 * highest}, "
-                "better ten times as many as the harmonic",
-                *("samples", "harmonics"),
-            )
-        return self
-
-
-class Continuation(Section):
-    """How a curve of motions is followed: steps are shares of the motion and of the frequency."""
-
-    first_step: Step = entry("with which a curve begins [1]", 0.02, default=0.02)
-    shortest_step: Step = entry("at which the curve is given up [1]", 1e-6, default=1e-6)
-    longest_step: Step = entry("shorter ones draw a smoother curve [1]", 0.1, default=0.1)
-    iterations: Annotated[int, Whole(1, 50)] = entry(
-        "of Newton's method that are wanted in a step: with more it shrinks", 4, default=4
-    )
-    most_iterations: Annotated[int, Whole(1, 100)] = entry(
-        "after which a step is halved", 8, default=8
-    )
-    largest_angle: Annotated[
-        float, Quantity("rad", above=0.0, at_most=1.6, range_text="above 0 to 90 deg")
-    ] = entry("by which the curve may turn in a step [rad]", "30 deg", default=radians(30.0))
-    most_points: Annotated[int, Whole(2, 1_000_000)] = entry("of one curve", 2000, default=2000)
-    tolerance: Annotated[float, Quantity("1", at_least=1e-13, at_most=1e-3)] = entry(
-        "of the balance of forces at every point [1]", 1e-10, default=1e-10
-    )
-    start: Literal["lower", "upper"] = entry(
-        "end of the frequencies from which the curve is followed, lower or upper",
-        "lower",
-        default="lower",
-    )
-
-    @model_validator(mode="after")
-    def _steps_ascend(self) -> Continuation:
-        if not self.shortest_step <= self.first_step <= self.longest_step:
-            raise disagreement(
-                f"{self.first_step:g}: not between the shortest and the longest step; allowed: "
-                f"{self.shortest_step:g} to {self.longest_step:g}",
-                *("first_step", "shortest_step", "longest_step"),
-            )
-        return self
-
-
-class LoopsAt(Section):
-    """Loops of the joints at one frequency, under each force."""
-
-    frequency: Frequency = entry("of the force [Hz]", "100 Hz")
-    harmonics: Annotated[
-        tuple[Annotated[Sequence[int], HarmonicNumbers()], ...], Field(max_length=10)
-    ] = entry(
-        "resolutions in which each loop is found, the finest last, such as [5, 15] odd harmonics; "
-        "none: that of the motion",
-        [5, 15],
-        default=(),
-    )
-
-    @property
-    def text(self) -> str:
-        """Where they are found, and how finely."""
-        highest = " and to ".join(str(harmonics[-1]) for harmonics in self.harmonics)
-        return f"at {self.frequency:g} Hz" + (f", harmonics to {highest}" if highest else "")
-
-    @model_validator(mode="after")
-    def _finer_and_finer(self) -> LoopsAt:
-        if any(after[-1] <= before[-1] for before, after in pairwise(self.harmonics)):
-            raise disagreement(
-                "not finer and finer; allowed: each with a higher last harmonic than the one "
-                "before",
-                "harmonics",
-            )
-        return self
 
 
 class VibrationCaseBase(Case):
     """A structure under forces a sin(2π frequency t), for all frequencies of a span."""
 
+    also_filled_in: ClassVar[tuple[str, ...]] = ("forces",)
+    in_schema: ClassVar[Mapping[str, Any]] = one_of("forces", "excitation")
+
     title: Title = entry("one line", "Forced response of a friction rig")
     analysis: Literal["vibration"] = entry("what is computed", "vibration")
     structure: Rig | ReducedBody | MatrixBody | FrictionRig = entry("what holds the joints")
-    forces: Annotated[tuple[DrivingForce, ...], Field(min_length=1, max_length=100)] = entry(
-        "amplitudes, ascending, each followed through the frequencies [N]", ["10 N", "40 N"]
+    forces: Annotated[tuple[DrivingForce, ...], Field(min_length=1, max_length=100)] | None = entry(
+        "amplitudes, ascending, each followed through the frequencies [N]",
+        ["10 N", "40 N"],
+        default=None,
+    )
+    excitation: VibrationExcitation | None = entry(
+        "instead of forces and mass: forces at any places, records, motion of the ground",
+        default=None,
+    )
+    engine_order: Annotated[float, Quantity("1", above=0.0, at_most=1e3)] | None = entry(
+        "frequency over turns per second of an engine: answers are told over its speed too [1]",
+        4,
+        default=None,
     )
     frequencies: tuple[Frequency, Frequency] = entry(
         "lower and upper end [Hz]", ["20 Hz", "400 Hz"]
@@ -177,11 +71,59 @@ class VibrationCaseBase(Case):
 
     @model_validator(mode="after")
     def _ascending(self) -> VibrationCaseBase:
-        if any(after <= before for before, after in pairwise(self.forces)):
+        if any(after <= before for before, after in pairwise(self.forces or ())):
             raise disagreement("not ascending; allowed: each force above the last", "forces")
         if self.frequencies[0] >= self.frequencies[1]:
             raise disagreement("not ascending; allowed: lower, then upper end", "frequencies")
         return self
+
+    @model_validator(mode="after")
+    def _is_driven(self) -> VibrationCaseBase:
+        excitation, driven = self.excitation, getattr(self.structure, "driven", None)
+        if excitation is None:
+            if self.forces is None:
+                raise disagreement("missing; allowed: forces, or an excitation", "forces")
+            refuse_undriven(self.structure)
+            return self
+        if self.forces is not None:
+            raise disagreement(
+                "given beside an excitation; allowed: excitation.levels, by which it is multiplied",
+                *("forces", "excitation"),
+            )
+        if driven is not None:
+            raise disagreement(
+                "given beside an excitation, which names its places; allowed: one of them",
+                *("structure.driven", "excitation"),
+            )
+        harmonics = excitation.harmonics(self.resolution.harmonics[-1])
+        if 1 not in harmonics:
+            raise disagreement(
+                "no harmonic 1; allowed: one, frequencies being those of the slowest part",
+                "excitation",
+            )
+        if self.resolution.samples <= 2 * max(harmonics):
+            raise disagreement(
+                f"{self.resolution.samples}: too few for harmonic {max(harmonics)} of the "
+                f"excitation; allowed: above {2 * max(harmonics)}",
+                *("resolution.samples", "excitation"),
+            )
+        return self
+
+    @property
+    def amount(self) -> Amount:
+        """What motions are followed by: a force, or the level of an excitation."""
+        return FORCE if self.excitation is None else LEVEL
+
+    @property
+    def amounts(self) -> tuple[float, ...]:
+        """Forces [N], or levels of the excitation."""
+        return self.forces or () if self.excitation is None else self.excitation.levels
+
+    @property
+    def turning(self) -> float:
+        """Speed of the engine [rad/s] over the frequency [Hz]."""
+        assert self.engine_order is not None
+        return 2.0 * pi / self.engine_order
 
     @property
     def contacts(self) -> bool:
@@ -189,26 +131,49 @@ class VibrationCaseBase(Case):
         return False
 
     @property
+    def moves_mean(self) -> bool:
+        """Whether joints may move the mean of a vibration: contacts do."""
+        return self.contacts
+
+    @property
     def harmonics(self) -> tuple[int, ...]:
-        """Those of the motion: contacts need harmonic 0 too."""
+        """Those of the motion: 0 too where the mean moves, and those that an excitation has."""
         return self.with_mean(self.resolution.harmonics)
 
     def with_mean(self, harmonics: Sequence[int]) -> tuple[int, ...]:
-        """Harmonics, with 0 where joints are contacts."""
-        return tuple(sorted({0, *harmonics} if self.contacts else harmonics))
+        """Harmonics and those of the excitation; with 0 where joints or it move the mean."""
+        excited: set[int] = set()
+        if self.excitation is not None:
+            excited = self.excitation.harmonics(self.resolution.harmonics[-1])
+        mean = self.moves_mean or any(order % 2 == 0 for order in excited)
+        return tuple(sorted({*harmonics, *excited} | ({0} if mean else set())))
 
     def doubts(self) -> Iterator[str]:
-        stiffness = getattr(getattr(self, "joint", None), "stiffness", RIGID)
+        joint = getattr(self, "joint", None)
+        # Nonlinear springs may take a mode anywhere above that without them.
+        free = joint is None or isinstance(joint, ElasticJoint)
+        stiffness = RIGID if free else getattr(joint, "stiffness", RIGID)
         yield from about_modes("frequencies", self.frequencies, self.structure, stiffness)
         yield from about_matrices(self.structure, self.frequencies[1] * self.harmonics[-1])
 
     @property
     def driving(self) -> str:
         """Forces, where they act, and their frequencies, for an outline."""
-        forces = ", ".join(f"{force:g}" for force in self.forces)
         low, high = self.frequencies
+        if self.excitation is not None:
+            text = self.excitation.text(self.resolution.harmonics[-1])
+            return f"{text}, at {low:g} to {high:g} Hz{self._engine}"
+        forces = ", ".join(f"{force:g}" for force in self.amounts)
         place = driven_place(self.structure, self._driven_mass)
-        return f"{forces} N on {place}, at {low:g} to {high:g} Hz"
+        return f"{forces} N on {place}, at {low:g} to {high:g} Hz{self._engine}"
+
+    @property
+    def _engine(self) -> str:
+        """Of an engine order, for an outline."""
+        if self.engine_order is None:
+            return ""
+        low, high = (60.0 * frequency / self.engine_order for frequency in self.frequencies)
+        return f", engine order {self.engine_order:g}: {low:.5g} to {high:.5g} rpm"
 
     @property
     def resolved(self) -> str:
@@ -241,6 +206,12 @@ class DrivenMass(VibrationCaseBase):
     @model_validator(mode="after")
     def _drives_a_mass(self) -> DrivenMass:
         otherwise = f"{self.structure.kind}; allowed: for a rig"
+        if self.mass is not None and self.excitation is not None:
+            raise disagreement(
+                f"{self.mass}: given beside an excitation, which names its places; allowed: one of "
+                "them",
+                *("mass", "excitation"),
+            )
         refuse_missing_mass(self.structure, self.mass, "mass", otherwise)
         return self
 
@@ -261,7 +232,7 @@ class VibrationCase(DrivenMass):
     structure: Annotated[
         Rig | ReducedBody | MatrixBody | FrictionRig, Field(discriminator="kind")
     ] = entry("what holds the joints")
-    joint: ContactLaw = entry("its law and its parameters; of all joints together")
+    joint: VibrationLaw = entry("its law and its parameters; of all joints together")
     loops: LoopsAt | None = entry("of all joints together, at one frequency", default=None)
     force_sweeps: Annotated[tuple[Frequency, ...], Field(max_length=100)] = entry(
         "frequencies at which motions are followed along the force, from the least to the largest "
@@ -269,23 +240,90 @@ class VibrationCase(DrivenMass):
         ["100 Hz"],
         default=(),
     )
+    at: Annotated[tuple[Frequency, ...], Field(max_length=100)] = entry(
+        "frequencies at which every motion under each force is solved for [Hz]",
+        ["100 Hz", "150 Hz"],
+        default=(),
+    )
+    harmonics_along_curves: StrictBool = entry(
+        "whether the harmonics of every point of the curves are written too, which may be large; "
+        "those at resonance, and of the motions that are solved for, always are",
+        False,
+        default=False,
+    )
     backbone: StrictBool = entry(
         "whether phase resonance, what is driven 90 degrees behind the force, is followed too",
         False,
         default=False,
+    )
+    modes: NonlinearModes | None = entry(
+        "whose frequency and damping are followed over the amplitude", default=None
+    )
+
+    further_branches: Annotated[tuple[FurtherStart, ...], Field(max_length=100)] = entry(
+        "from where branches are looked for that no end of the frequencies leads to, as closed "
+        "ones; none: nowhere",
+        default=(),
+    )
+    stability: Literal["auto", "every", "none"] = entry(
+        "of which motions it is found, and where it changes; auto: of every one in structures of "
+        "up to 64 modes and 12 directions of joints, as with more one may take a second",
+        "every",
+        default="auto",
     )
 
     @property
     def contacts(self) -> bool:
         return isinstance(self.joint, FrictionContactJoint)
 
+    @property
+    def moves_mean(self) -> bool:
+        elastic = isinstance(self.joint, ElasticJoint) and self.joint.moves_mean
+        return self.contacts or elastic
+
+    def doubts(self) -> Iterator[str]:
+        yield from super().doubts()
+        elastic, harmonics = isinstance(self.joint, ElasticJoint), self.harmonics
+        one_sided = elastic and self.moves_mean
+        if one_sided and not any(number % 2 == 0 for number in harmonics if number > 0):
+            yield (
+                f"resolution.harmonics: without even ones, which a joint of law {self.joint.law} "
+                "that is not alike on both sides has; list them, such as [0, 1, 2, 3, 4, 5]"
+            )
+
     @model_validator(mode="after")
     def _joins_forces(self) -> VibrationCase:
-        if (self.backbone or self.force_sweeps) and len(self.forces) < 2:
+        if (self.backbone or self.force_sweeps) and len(self.amounts) < 2:
             raise disagreement(
-                "a single force; allowed: two or more, between which motions are followed",
+                f"a single {self.amount.name}; allowed: two or more, between which motions are "
+                "followed",
                 *("forces", "backbone", "force_sweeps"),
             )
+        if self.backbone and self.excitation is not None and self.excitation.moves_by_a_way:
+            raise disagreement(
+                "true: with a displacement of the ground, whose forces change with the frequency; "
+                "allowed: a kind of base that is acceleration",
+                *("backbone", "excitation"),
+            )
+        return self
+
+    @model_validator(mode="after")
+    def _further_from_its_own(self) -> VibrationCase:
+        low, high = self.frequencies
+        for number, start in enumerate(self.further_branches):
+            if start.force not in self.amounts:
+                allowed = ", ".join(map(self.amount.told, self.amounts))
+                raise disagreement(
+                    f"{self.amount.told(start.force)}: not among those of the case; allowed: "
+                    f"{allowed}",
+                    f"further_branches.{number}.force",
+                )
+            if not low <= start.frequency <= high:
+                raise disagreement(
+                    f"{start.frequency:g} Hz: outside; allowed: within frequencies, {low:g} to "
+                    f"{high:g} Hz",
+                    f"further_branches.{number}.frequency",
+                )
         return self
 
     @model_validator(mode="after")
@@ -320,14 +358,20 @@ class VibrationCase(DrivenMass):
             )
 
     @model_validator(mode="after")
-    def _loops_inside(self) -> VibrationCase:
+    def _looks_inside(self) -> VibrationCase:
         low, high = self.frequencies
-        if self.loops is not None and not low <= self.loops.frequency <= high:
-            raise disagreement(
-                f"{self.loops.frequency:g} Hz: outside; allowed: within frequencies, {low:g} to "
-                f"{high:g} Hz",
-                "loops.frequency",
-            )
+        looked_at = {f"at.{place}": frequency for place, frequency in enumerate(self.at)}
+        if self.loops is not None:
+            looked_at["loops.frequency"] = self.loops.frequency
+        for key, frequency in looked_at.items():
+            if not low <= frequency <= high:
+                raise disagreement(
+                    f"{frequency:g} Hz: outside; allowed: within frequencies, {low:g} to "
+                    f"{high:g} Hz",
+                    key,
+                )
+        if any(after <= before for before, after in pairwise(self.at)):
+            raise disagreement("not ascending; allowed: each frequency above the last", "at")
         return self
 
     def outline(self) -> list[tuple[str, str]]:
@@ -337,5 +381,7 @@ class VibrationCase(DrivenMass):
             ("joint", f"{joint.law}, {entries(joint)}"),
             ("forces", self.driving),
             ("method", self.resolved),
+            *([("motions at", f"{', '.join(f'{at:g}' for at in self.at)} Hz")] if self.at else []),
             *([] if self.loops is None else [("loops", self.loops.text)]),
+            *([] if self.modes is None else [("modes", self.modes.text)]),
         ]

@@ -1,27 +1,71 @@
-"""The loop of all joints together in a periodic motion, with its stick slope and friction."""
+"""Loops of all joints together in periodic motions, with their stick slope and friction."""
 
 from __future__ import annotations
 
 from contextlib import suppress
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
+from fe_models.dynamics.forced_response import ResponseBranch
+from fe_models.dynamics.harmonic_balance import SAMPLES_PER_PERIOD, HarmonicBalance
 from fe_models.dynamics.harmonic_solution import HarmonicSolution
+from fe_models.dynamics.harmonics import Resolution
+from fe_models.dynamics.resolution_error import resolution_error
+from sa_solver.steps import Steps
 from sa_solver.types import Array
 from wear.joints.friction_contact import FrictionContact
 from wear.joints.jenkins import Jenkins
 from wear.joints.loop_record import MeasuredLoopError
 from wear.joints.measured_loops import measure_loops
 from wear.joints.periodic import SLIP, STICK
+from workflow.analyses.vibration.case import VibrationCase
 from workflow.analyses.vibration.model import VibrationModel
 from workflow.analyses.vibration.outcome import Curves
 from workflow.shell.dataset import Dataset
+from workflow.shell.reporter import Reporter
 
 # A loop is that of stuck joints where it loses less than this share of stroke times force range.
 STUCK_LOOP = 1e-4
 # Times that a loop is repeated: the record then holds whole cycles wherever it begins.
 REPEATED = 3
+
+
+def loops_of(
+    case: VibrationCase,
+    model: VibrationModel,
+    branch: ResponseBranch,
+    reporter: Reporter,
+    steps: Steps,
+) -> tuple[Curves, ...]:
+    """Loops at the frequency that the case asks for, a resolution after the other."""
+    if case.loops is None:
+        return ()
+    frequency = case.loops.frequency
+    nearest = int(np.abs(branch.frequencies - frequency).argmin())
+    start, loops = branch.solutions[nearest], []
+    told = case.amount.told(start.force)
+    for harmonics in case.loops.harmonics or (start.resolution.harmonics,):
+        every = case.with_mean(harmonics)
+        reporter.doing(f"{told}: loop at {frequency:g} Hz, {harmonics} harmonics")
+        samples = max(case.resolution.samples, SAMPLES_PER_PERIOD * every[-1])
+        problem = branch.problem.refined(Resolution(every, samples))
+        motion = steps("loop", partial(_known, problem, frequency, start))
+        if not motion.converged:
+            reporter.warn(f"{told}: no loop at {frequency:g} Hz: {motion.message}")
+            continue
+        loops.append(loop_of(model, motion, case.joint.normal_load))
+        start = motion
+    return tuple(loops)
+
+
+def _known(problem: HarmonicBalance, frequency: float, near: HarmonicSolution) -> HarmonicSolution:
+    """The motion at a frequency found from another one, with its error."""
+    motion = problem.solve(frequency, near.force, near)
+    if not motion.converged:
+        return motion
+    return replace(motion, error=resolution_error(problem, motion))
 
 
 def loop_of(model: VibrationModel, motion: HarmonicSolution, load: float) -> Curves:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from workflow.analyses.rig.matrix_body import MatrixBody
-from workflow.analyses.vibration.case import VibrationCaseBase
+from workflow.analyses.vibration.case import VibrationCase, VibrationCaseBase
 from workflow.shell.memory import Memory
 
 # Points of a forced response, of each of which the samples of the joints' forces and the motion are
@@ -21,6 +21,8 @@ def memory(case: VibrationCaseBase, displacements: int = 0, joints: int = 1) -> 
     motion = functions * (displacements + joints * directions)
     slopes = joints * (functions * directions) ** 2
     samples = case.resolution.samples * joints * (directions + 1)
+    if isinstance(case, VibrationCase) and case.harmonics_along_curves:
+        motion *= 2
     motions = Memory(
         CURVE_POINTS * (samples + motion) + SLOPES * slopes,
         "lower resolution.samples or resolution.harmonics",

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import scipy.linalg as sl
 
-from fe_models.dynamics.harmonic_balance import HarmonicBalance, PeriodicLoad
+from fe_models.dynamics.harmonic_balance import HarmonicBalance
 from fe_models.dynamics.harmonic_solution import HarmonicSolution
 from fe_models.dynamics.harmonics import Resolution
 from fe_models.dynamics.receptance import Receptance
@@ -22,6 +22,8 @@ from workflow.analyses.rig.laws import LAWS, Law, shared_out
 from workflow.analyses.rig.rig_model import RigModel
 from workflow.analyses.rig.structure import FrictionRig
 from workflow.analyses.vibration.case import VibrationCase
+from workflow.analyses.vibration.excitation import FORCE
+from workflow.analyses.vibration.load import Driving, driving_of
 from workflow.analyses.vibration.memory import memory
 from workflow.errors import MethodFailed
 from workflow.shell.dataset import Dataset
@@ -40,11 +42,12 @@ JOINTS_PER_THREAD, MOST_THREADS = 16, 8
 
 @dataclass(frozen=True)
 class VibrationModel:
-    """A structure, the ``law`` of each of its joints, and the forces on it."""
+    """A structure, the ``law`` of each of its joints, and what drives it."""
 
     rig: RigModel
     law: Law
     problem: HarmonicBalance
+    driving: Driving
 
     @classmethod
     def of(cls, case: VibrationCase, reporter: Reporter) -> VibrationModel:
@@ -56,14 +59,14 @@ class VibrationModel:
         static = rig.preload(law)
         if rig.pressing is not None:
             static = case.joint.normal_load * rig.pressing
+        driving = driving_of(case, rig)
         problem = HarmonicBalance(
             rig.model,
             PeriodicMarch(law, threads),
-            # The force is a sine: Re (-i) exp(iωt).
-            PeriodicLoad({1: -1j * rig.driven}, static if static.any() else None),
+            replace(driving.load, static=static if static.any() else None),
             Resolution(case.harmonics, case.resolution.samples),
         )
-        return cls(rig, law, problem)
+        return cls(rig, law, problem, driving)
 
     @cached_property
     def rest(self) -> HarmonicSolution:
@@ -95,7 +98,8 @@ class VibrationModel:
     @property
     def undamped(self) -> bool:
         """Whether only the joints bound a resonance."""
-        return not self.problem.receptance.damping.any()
+        receptance = self.problem.receptance
+        return not (receptance.damping.any() or receptance.loss.any())
 
     @cached_property
     def _natural(self) -> dict[str, list[float]]:
@@ -109,6 +113,8 @@ class VibrationModel:
             **self._natural,
             "damping_stuck": rig.stuck_damping(self.law, self.resting),
         }
+        if self.driving.left_out:
+            numbers["left_out_of_records"] = list(self.driving.left_out)
         if self.rig.pressing is not None:
             numbers["touching"] = int(self.touching.sum())
             numbers["joints"] = self.rig.joints
@@ -132,9 +138,10 @@ class VibrationModel:
         }
 
     def linear(self, span: tuple[float, float]) -> dict[str, Dataset]:
-        """Amplitude over force of what is looked at, with the joints free, and stuck.
+        """Amplitude over force, or level, of what is looked at, with the joints free, and stuck.
 
-        At the natural frequencies too; without damping, where these have no bound, beside them.
+        That of harmonic 1. At the natural frequencies too; without damping, where these have no
+        bound, beside them.
         """
         natural = np.array([*self._natural["free"], *self._natural["stuck"]])
         if self.undamped:
@@ -145,11 +152,14 @@ class VibrationModel:
         frequency = np.union1d(np.geomspace(*span, points), inside)
         parts = np.array_split(frequency, -(-len(frequency) // AT_ONCE))
         free, stuck = np.concatenate([self._limits(part) for part in parts], axis=1)
-        size = "amplitude of what is looked at over the force"
+        amount = self.driving.amount
+        unit, _ = amount.receptance
+        first = "" if amount is FORCE else ", of harmonic 1"
+        size = f"amplitude of what is looked at over the {amount.name}{first}"
         return {
             "frequency": Dataset(frequency, "Hz", "frequency of the force"),
-            "free": Dataset(free, "mm/N", f"{size}, without the joints"),
-            "stuck": Dataset(stuck, "mm/N", f"{size}, all joints stuck"),
+            "free": Dataset(free, unit, f"{size}, without the joints"),
+            "stuck": Dataset(stuck, unit, f"{size}, all joints stuck"),
         }
 
     def _limits(self, frequency: Array) -> Array:
@@ -171,13 +181,14 @@ class VibrationModel:
         return float((along.sum() / opened).real)
 
     def _moved(self, frequency: Array) -> tuple[Array, Array, Array]:
-        """Motion of all points under a force of 1 N ``(f, n)``, joints free, and stuck, and the
-        forces of these ``(f, m)``: k u, with u = (1 + R k)⁻¹ u_free.
+        """Motion of all points under harmonic 1 of the load ``(f, n)``, joints free, and stuck, and
+        the forces of these ``(f, m)``: k u, with u = (1 + R k)⁻¹ u_free.
         """
         receptance: Receptance = self.problem.receptance
-        steady = receptance.at(2.0 * np.pi * frequency)
-        force = self.rig.driven @ receptance.at_points
-        moved = steady.respond(np.broadcast_to(force, (len(frequency), len(force))) + 0j)
+        angular = 2.0 * np.pi * frequency
+        steady = receptance.at(angular)
+        # Turned so that a sine is real.
+        moved = steady.respond(1j * self.problem.first_wave(angular))
         tangent = sl.block_diag(*self.rig.stuck(self.law, self.resting))
         free = moved @ receptance.at_joints.T
         coupled = np.eye(len(tangent)) + steady.between_joints() @ tangent

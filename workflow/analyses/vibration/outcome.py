@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import Any
 
@@ -14,19 +14,41 @@ from workflow.shell.dataset import Datasets
 
 # Groups of a response, beside its own curves.
 NODES, RESONANCE, LOOPS = "nodes", "resonance", "loops"
+# Motions at the frequencies that a case asks for, and what is known of motions by their harmonics.
+AT, HARMONICS = "at", "harmonics"
+# Branches that no end of the frequencies leads to.
+FURTHER = "further_branches"
+# Where stability changes along a curve, and what is known of each.
+BIFURCATIONS = "bifurcations"
+Bifurcations = tuple[Mapping[str, Any], ...]
 # Motions along the force at a frequency.
 FORCE_SWEEPS = "force_sweeps"
+# Modes over their amplitude.
+MODES = "modes"
 
 
 @dataclass(frozen=True)
 class Curves:
     """``datasets`` by name, the first axis of each along the curve.
 
-    ``numbers`` are attributes beside them.
+    ``numbers`` are attributes beside them, ``bifurcations`` those of the curve.
     """
 
     datasets: Datasets
     numbers: Mapping[str, Any]
+    bifurcations: Bifurcations = ()
+
+
+@dataclass(frozen=True)
+class Answers:
+    """The motions under a force at the frequencies that a case asks for.
+
+    ``datasets`` by name, a row for each motion, by frequency and in the order of the curve.
+    ``numbers`` are those of each frequency, for the summary.
+    """
+
+    datasets: Datasets
+    numbers: tuple[Mapping[str, Any], ...]
 
 
 @dataclass(frozen=True)
@@ -35,7 +57,8 @@ class Response:
 
     ``curves`` along the frequency, ``numbers`` for the summary; of joints with places ``nodes``,
     along the frequency too, and ``resonance``, along the cycle there; ``loops``, along a cycle, by
-    the resolutions in which they were found, the finest last.
+    the resolutions in which they were found, the finest last; ``answers`` at the frequencies
+    asked for; ``harmonics`` of motions, by what they are of; ``bifurcations`` along the curve.
     """
 
     force: float
@@ -44,27 +67,35 @@ class Response:
     nodes: Datasets | None = None
     resonance: Datasets | None = None
     loops: tuple[Curves, ...] = ()
+    answers: Answers | None = None
+    harmonics: Mapping[str, Datasets] = field(default_factory=dict)
+    bifurcations: Bifurcations = ()
 
 
 @dataclass(frozen=True)
 class VibrationOutcome:
     """Everything a vibration case has found.
 
-    ``labels`` of what is seen, the last of which is looked at. ``linear`` are the limits of joints
+    ``labels`` of what is seen, the last of which is looked at; ``names`` of the places and joints
+    whose harmonics there are. ``linear`` are the limits of joints
     that are free and stuck, over frequency; ``contact`` is where joints are and how they rest, if
     they have places; ``backbone`` the curve of phase resonance and ``force_sweeps`` motions along
-    the force, if they were asked for. ``numbers`` go
+    the force, if they were asked for, ``modes`` curves over their amplitude; ``further`` branches,
+    as the responses. ``numbers`` go
     into the summary as they are.
     """
 
     case: VibrationCase
     labels: tuple[str, ...]
+    names: Datasets
     responses: tuple[Response, ...]
     linear: Datasets
     numbers: Mapping[str, Any]
     contact: Datasets | None = None
     backbone: Curves | None = None
     force_sweeps: tuple[Curves, ...] = ()
+    modes: tuple[Curves, ...] = ()
+    further: tuple[Curves, ...] = ()
 
     @property
     def contents(self) -> Contents:
@@ -76,6 +107,9 @@ class VibrationOutcome:
             loops=tuple(loops),
             places=self.contact is not None,
             backbone=self.backbone is not None,
+            at=bool(self.case.at),
+            modes=tuple(f"{number:05d}" for number in range(len(self.modes))),
+            engine=self.case.engine_order is not None,
         )
 
 
@@ -84,13 +118,18 @@ class Contents:
     """What ``results.h5`` of a vibration case holds.
 
     ``responses`` by force, and those of them with ``loops``. Joints with ``places`` have states
-    along every response, and the cycle at resonance. There may be a ``backbone``.
+    along every response, and the cycle at resonance. There may be a ``backbone``, motions ``at``
+    chosen frequencies, and ``modes`` over their amplitude; frequencies may be those of an
+    ``engine``.
     """
 
     responses: tuple[str, ...]
     loops: tuple[str, ...]
     places: bool
     backbone: bool
+    at: bool = False
+    modes: tuple[str, ...] = ()
+    engine: bool = False
 
 
 def trend(values: Sequence[float]) -> float:

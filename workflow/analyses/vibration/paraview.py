@@ -19,6 +19,7 @@ import h5py
 import numpy as np
 
 from sa_solver.types import Array
+from workflow.analyses.vibration.excitation import amount_in
 from workflow.analyses.vibration.outcome import Contents
 from workflow.analyses.vibration.pad_nodes import rows_and_columns
 from workflow.pictures.view import FIRST, Scene, Shown, View, write_view
@@ -50,7 +51,7 @@ def write_vibration(contents: Contents, file: h5py.File, folder: Path) -> list[P
 
 def _write_view(contents: Contents, file: h5py.File, folder: Path) -> Path:
     """The script that shows the cycle under the largest force."""
-    largest = max(contents.responses, key=lambda n: float(file["responses"][n].attrs["force"]))
+    largest = max(contents.responses, key=lambda n: amount_in(file["responses"][n].attrs)[1])
     series, motion = f"cycle_{largest}.pvd", "vibration [mm]"
     views = [
         View("Contact pressure", [Shown(series, "pressure [MPa]", motion)]),

@@ -7,11 +7,13 @@ from functools import partial
 from typing import Any
 
 from workflow.analyses.vibration.case import VibrationCase
+from workflow.analyses.vibration.excitation import LEVEL, amount_in, under_in
+from workflow.analyses.vibration.outcome import AT, MODES
 from workflow.shell.analysis import Summary
 from workflow.shell.quantities import CurvesOf, Quantity
 from workflow.shell.summary import estimate, told
 
-LINEAR = "linear limits"
+LINEAR, RECORDS = "linear limits", "left_out_of_records"
 ERROR = "joints' vibration or energy lost, by harmonics and samples"
 # Of the motion at resonance: unit, text, everyday unit.
 NUMBERS = {
@@ -23,19 +25,37 @@ NUMBERS = {
     "slip": ("1", "share of the cycle in which joints slip", "%"),
 }
 # A resonance's frequency hardly depends on the amplitude: the error is that of the motion.
-WITH_ERROR = "amplitude", "receptance", "energy_per_cycle"
+WITH_ERROR = "amplitude", "absolute_amplitude", "receptance", "energy_per_cycle"
 LOOP = {
     "energy": ("N mm", "energy of the loop", ""),
     "stroke": ("mm", "stroke of the loop", ""),
     "stiffness": ("N/mm", "stick slope of the loop", "N/um"),
     "friction": ("1", "friction coefficient of the loop", ""),
 }
+# Where the ground moves, or the frequency is that of an engine.
+BESIDE = {
+    "absolute_amplitude": ("mm", "absolute amplitude at resonance", ""),
+    "speed": ("rad/s", "speed of the engine at resonance", "rpm"),
+}
+# Of a motion at a frequency that was asked for.
+ANSWER = {
+    "amplitude": ("mm", "amplitude", ""),
+    "absolute_amplitude": ("mm", "absolute amplitude", ""),
+    "phase": ("rad", "phase before the force", "deg"),
+    "energy_per_cycle": ("N mm", "energy dissipated in a cycle", ""),
+}
 LOOP_WITH_ERROR = "energy", "stroke"
+# Of a mode over its amplitude.
+MODE = {
+    "linear_frequency": ("Hz", "frequency of the linear mode", ""),
+    "most_damped": ("1", "largest damping ratio", "%"),
+}
 # What runs are compared by, beside the numbers.
 CURVES = (
     CurvesOf("amplitude", "responses/*/frequency", "responses/*/amplitude", logarithmic=True),
     CurvesOf("loop", "responses/*/loops/-1/displacement", "responses/*/loops/-1/force"),
     CurvesOf("phase resonance", "backbone/force", "backbone/frequency"),
+    CurvesOf("mode", "modes/*/amplitude", "modes/*/frequency"),
 )
 
 
@@ -45,24 +65,63 @@ def main_results(case: VibrationCase, summary: Summary) -> list[Quantity]:
         Quantity(LINEAR, f"first natural frequency, joints {state}", f"{state}.0", "Hz")
         for state in ("stuck", "sliding", "free")
     )
+    records = (
+        Quantity("excitation", f"left out of record {number + 1}", f"{RECORDS}.{number}", "1")
+        for number in range(len(summary.get(RECORDS, ())))
+    )
     responses = (
         quantity
         for number, response in enumerate(summary["responses"])
         for quantity in (
-            *of_response(f"under {response['force']:g} N", f"responses.{number}", summary),
-            *_of_loop(f"under {response['force']:g} N", f"responses.{number}.loops.-1", summary),
+            *of_response(under_in(response), f"responses.{number}", response, summary),
+            *_of_loop(under_in(response), f"responses.{number}.loops.-1", summary),
+            *_of_answers(under_in(response), f"responses.{number}", response, summary),
         )
     )
-    return told(summary, [*limits, *responses])
+    modes = (
+        quantity
+        for number, mode in enumerate(summary.get(MODES, ()))
+        for quantity in _of_mode(f"mode {mode['mode']}", f"{MODES}.{number}", summary)
+    )
+    return told(summary, [*limits, *records, *responses, *modes])
 
 
-def of_response(group: str, path: str, summary: Summary) -> Iterator[Quantity]:
-    """The response to a force, which is at a ``path`` of the summary."""
-    return _of(group, path, NUMBERS, WITH_ERROR, estimate(summary, f"{path}.error", ERROR))
+def of_response(
+    group: str, path: str, response: Mapping[str, Any], summary: Summary
+) -> Iterator[Quantity]:
+    """The response to a force or level, which is at a ``path`` of the summary."""
+    numbers = NUMBERS | {name: told for name, told in BESIDE.items() if name in response}
+    if amount_in(response)[0] is LEVEL:
+        numbers |= {"receptance": ("mm", "amplitude over level at resonance", "")}
+    return _of(group, path, numbers, WITH_ERROR, estimate(summary, f"{path}.error", ERROR))
 
 
 def _of_loop(group: str, path: str, summary: Summary) -> Iterator[Quantity]:
     return _of(group, path, LOOP, LOOP_WITH_ERROR, estimate(summary, f"{path}.error", ERROR))
+
+
+def _of_mode(group: str, path: str, summary: Summary) -> Iterator[Quantity]:
+    error = estimate(summary, f"{path}.error", ERROR)
+    return _of(group, path, MODE, ("most_damped",), error)
+
+
+def _of_answers(
+    group: str, path: str, response: Mapping[str, Any], summary: Summary
+) -> Iterator[Quantity]:
+    """Motions at the frequencies that were asked for: of several that coexist, each."""
+    for place, answer in enumerate(response.get(AT, ())):
+        count = len(answer["motions"])
+        for number in range(count):
+            of = f"{path}.{AT}.{place}.motions.{number}"
+            error = estimate(summary, f"{of}.error", ERROR)
+            which = f", motion {number + 1} of {count}" if count > 1 else ""
+            suffix = f" at {answer['frequency']:g} Hz{which}"
+            told = {
+                name: (unit, text + suffix, everyday)
+                for name, (unit, text, everyday) in ANSWER.items()
+                if name in answer["motions"][number]
+            }
+            yield from _of(group, of, told, WITH_ERROR, error)
 
 
 def _of(

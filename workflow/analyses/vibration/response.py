@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from scipy.optimize import minimize_scalar
 
+from fe_models.dynamics.bifurcations import curve_by_force, curve_by_frequency, curve_by_phase
 from fe_models.dynamics.continuation import ContinuationControl
 from fe_models.dynamics.cycle_energy import damping_ratio
 from fe_models.dynamics.forced_response import (
@@ -19,9 +20,9 @@ from fe_models.dynamics.forced_response import (
     along_frequency,
     finer_resolution,
 )
-from fe_models.dynamics.harmonic_balance import SAMPLES_PER_PERIOD, HarmonicBalance
+from fe_models.dynamics.further_branches import FurtherBranch
+from fe_models.dynamics.harmonic_balance import HarmonicBalance
 from fe_models.dynamics.harmonic_solution import HarmonicSolution
-from fe_models.dynamics.harmonics import Resolution
 from fe_models.dynamics.phase_resonance import along_phase_resonance
 from fe_models.dynamics.resolution_error import resolution_error
 from sa_solver.steps import Steps
@@ -29,9 +30,11 @@ from sa_solver.types import Array
 from wear.joints.periodic import SEPARATED, SLIP
 from wear.moving import LARGE_STROKE
 from workflow.analyses.vibration.case import VibrationCase
-from workflow.analyses.vibration.loops import loop_of
+from workflow.analyses.vibration.harmonics import harmonics_of
+from workflow.analyses.vibration.loops import loops_of
 from workflow.analyses.vibration.model import VibrationModel
-from workflow.analyses.vibration.outcome import Curves, Response
+from workflow.analyses.vibration.outcome import RESONANCE, Curves, Response
+from workflow.analyses.vibration.stability import stability_along
 from workflow.errors import MethodFailed
 from workflow.shell.dataset import Dataset, Datasets
 from workflow.shell.reporter import Reporter
@@ -108,6 +111,7 @@ def response_under(
     told as a warning.
     """
     accuracy, upward = accuracy_of(case), case.continuation.start == "lower"
+    told = case.amount.told(force)
     branch = along_frequency(
         model.problem,
         force,
@@ -118,28 +122,42 @@ def response_under(
         steps=steps,
     )
     if not branch.solutions:
-        raise MethodFailed(f"no motion under {force:g} N: {branch.message}; change frequencies")
+        where = case.amount.under(force)
+        raise MethodFailed(f"no motion {where}: {branch.message}; change frequencies")
     if branch.message:
         unbounded = UNBOUNDED if model.undamped else ""
-        reporter.warn(f"{force:g} N: {branch.message}{unbounded}")
-    curves = _curves(model, branch)
+        reporter.warn(f"{told}: {branch.message}{unbounded}")
+    stability = stability_along(
+        case,
+        model,
+        told,
+        curve_by_frequency(branch.problem, force),
+        branch.solutions,
+        partial(amplitude_of, model),
+        reporter,
+        steps,
+    )
+    curves = {**curves_of(case, model, branch), **stability.columns}
     if int(np.argmax(curves["amplitude"].values[:, -1])) in (0, len(branch.solutions) - 1):
-        reporter.warn(f"{force:g} N: no resonance, the largest motion is at an end of the curve")
-    reporter.doing(f"{force:g} N: resonance")
+        reporter.warn(f"{told}: no resonance, the largest motion is at an end of the curve")
+    reporter.doing(f"{told}: resonance")
     peak = steps("resonance", lambda: _resonance(model, branch, curves))
     # The peak may have been found before the resolution grew.
     problem = branch.problem.refined(peak.resolution)
-    resonance = steps("accurate resonance", lambda: _accurate(problem, peak, accuracy))
-    _warn_of_stroke(model, resonance, reporter)
+    resonance = steps("accurate resonance", lambda: accurate(problem, peak, accuracy))
+    _warn_of_stroke(model, told, resonance, reporter)
+    found = problem.refined(resonance.resolution)
     response = Response(
         force,
         curves,
-        _numbers(model, branch, curves, problem.refined(resonance.resolution), resonance),
+        _numbers(case, model, branch, curves, found, resonance) | stability.numbers,
         nodes=_nodes(branch) if model.rig.pressing is not None else None,
         resonance=_cycle(resonance) if model.rig.pressing is not None else None,
-        loops=_loops(case, model, branch, reporter, steps),
+        loops=loops_of(case, model, branch, reporter, steps),
+        harmonics={RESONANCE: harmonics_of(model.rig, resonance)},
+        bifurcations=stability.bifurcations,
     )
-    warn_of_error(f"{force:g} N: the motion", response.numbers["error"], case, reporter)
+    warn_of_error(f"{told}: the motion", response.numbers["error"], case, reporter)
     return response, branch
 
 
@@ -166,27 +184,38 @@ def force_sweep(
     Raises MethodFailed where there is none under the least. A curve that ends before the largest is
     told as a warning.
     """
-    span = case.forces[0], case.forces[-1]
-    control = step_control(case, progress_along(span, True, "N", reporter))
+    span = case.amounts[0], case.amounts[-1]
+    control = step_control(case, progress_along(span, True, case.amount.unit, reporter))
     branch = along_force(
         model.problem, frequency, span, control=control, accuracy=accuracy_of(case), steps=steps
     )
     if not branch.solutions:
         raise MethodFailed(f"no motion at {frequency:g} Hz: {branch.message}; change force_sweeps")
     if branch.message:
-        reporter.warn(f"{frequency:g} Hz, along the force: {branch.message}")
-    curves = _curves(model, branch)
+        reporter.warn(f"{frequency:g} Hz, along the {case.amount.name}: {branch.message}")
+    stability = stability_along(
+        case,
+        model,
+        f"{frequency:g} Hz",
+        curve_by_force(branch.problem, frequency),
+        branch.solutions,
+        partial(amplitude_of, model),
+        reporter,
+        steps,
+    )
+    curves = curves_of(case, model, branch)
     shared = ("phase", "damping", "energy_per_cycle", "slip", "left_out")
-    along = "amplitude of the force, in the order of the curve"
+    along = f"{case.amount.description}, in the order of the curve"
     datasets = {
-        "force": Dataset(branch.forces, "N", along),
+        case.amount.name: Dataset(branch.forces, case.amount.unit, along),
         "amplitude": _of_the_last(curves["amplitude"]),
         **{name: curves[name] for name in shared},
+        **stability.columns,
     }
     folds = [float(branch.curve.parameters[place]) for place in branch.curve.folds]
     points = len(branch.solutions)
     numbers = {"frequency": frequency, "points": points, "folds": folds, "message": branch.message}
-    return Curves(datasets, numbers)
+    return Curves(datasets, numbers | stability.numbers, stability.bifurcations)
 
 
 def backbone_of(
@@ -197,8 +226,8 @@ def backbone_of(
     steps: Steps,
 ) -> Curves | None:
     """The curve of phase resonance through all forces, from the motions under one of them."""
-    span = case.forces[0], case.forces[-1]
-    control = step_control(case, progress_along(span, True, "N", reporter))
+    span = case.amounts[0], case.amounts[-1]
+    control = step_control(case, progress_along(span, True, case.amount.unit, reporter))
     backbone = along_phase_resonance(
         model.problem, branch, span, control=control, accuracy=accuracy_of(case), steps=steps
     )
@@ -206,18 +235,31 @@ def backbone_of(
         reporter.warn(f"backbone: {backbone.message}")
     if not backbone.solutions:
         return None
-    columns = _motion_columns(model, backbone.problem, backbone.solutions)
+    stability = stability_along(
+        case,
+        model,
+        "backbone",
+        curve_by_phase(backbone.problem, backbone.solutions[0]),
+        backbone.solutions,
+        partial(amplitude_of, model),
+        reporter,
+        steps,
+    )
+    columns = motion_columns(model, backbone.problem, backbone.solutions)
     resonance = "of phase resonance: what is driven lags the force by 90 degrees"
     datasets = {
-        "force": Dataset(backbone.forces, "N", "amplitude of the force"),
+        case.amount.name: Dataset(backbone.forces, case.amount.unit, case.amount.description),
         "frequency": Dataset(backbone.frequencies, "Hz", resonance),
         "amplitude": _of_the_last(columns["amplitude"]),
         **{name: columns[name] for name in ("damping", "energy_per_cycle", "slip")},
+        **stability.columns,
     }
-    return Curves(datasets, {"message": backbone.message})
+    numbers = {"message": backbone.message, **stability.numbers}
+    return Curves(datasets, numbers, stability.bifurcations)
 
 
 def _numbers(
+    case: VibrationCase,
     model: VibrationModel,
     branch: ResponseBranch,
     curves: Datasets,
@@ -242,13 +284,33 @@ def _numbers(
         "harmonics": list(resolution.harmonics),
         "samples": resolution.samples,
         "message": branch.message,
+        **_beside(case, model, resonance),
     }
 
 
-def _curves(model: VibrationModel, branch: ResponseBranch) -> dict[str, Dataset]:
+def _beside(
+    case: VibrationCase, model: VibrationModel, resonance: HarmonicSolution
+) -> dict[str, float]:
+    """Of a moving ground and of an engine what there is to tell."""
+    numbers = {}
+    if model.driving.ground:
+        absolute = amplitudes_of(model, model.driving.absolute(resonance))
+        numbers["absolute_amplitude"] = float(absolute[-1])
+    if case.engine_order is not None:
+        numbers["speed"] = case.turning * resonance.frequency
+    return numbers
+
+
+def curves_of(
+    case: VibrationCase, model: VibrationModel, branch: ResponseBranch | FurtherBranch
+) -> dict[str, Dataset]:
+    """What structure and joints do along a branch, over the frequency."""
     along = "frequency of the force, in the order of the curve"
-    frequency = Dataset(branch.frequencies, "Hz", along)
-    return {"frequency": frequency, **_motion_columns(model, branch.problem, branch.solutions)}
+    frequencies = {"frequency": Dataset(branch.frequencies, "Hz", along)}
+    if case.engine_order is not None:
+        speed = case.turning * branch.frequencies
+        frequencies["speed"] = Dataset(speed, "rad/s", "of the engine, by its order")
+    return {**frequencies, **motion_columns(model, branch.problem, branch.solutions)}
 
 
 def _of_the_last(amplitudes: Dataset) -> Dataset:
@@ -257,7 +319,7 @@ def _of_the_last(amplitudes: Dataset) -> Dataset:
     return Dataset(last, "mm", "half of the way to and fro of what is looked at")
 
 
-def _motion_columns(
+def motion_columns(
     model: VibrationModel, problem: HarmonicBalance, motions: Sequence[HarmonicSolution]
 ) -> dict[str, Dataset]:
     """What structure and joints do along a curve, ``(n,)`` each; amplitudes ``(n, k)``."""
@@ -265,15 +327,24 @@ def _motion_columns(
     def column(of: Callable[[HarmonicSolution], Array | float], unit: str, what: str) -> Dataset:
         return Dataset(np.array([of(motion) for motion in motions]), unit, what)
 
+    moving = bool(model.driving.ground)
     seen = "half of the way to and fro of what is seen, the last looked at"
-    lag = "of harmonic 1 of what is looked at before the force"
+    relative = f"{seen}, relative to the moving ground" if moving else seen
+    lag = "of harmonic 1 of what is looked at before the force, or before a sine at t = 0"
     lost = "energy lost in a cycle over 4π times the largest kinetic energy"
     slips = "share of the cycle in which a joint slips, mean of those that touch at rest"
     apart = "share of the cycle in which they are apart"
     beyond = "estimated share of the joints' vibration in harmonics left out"
     energy = "energy that the joints dissipate in a cycle"
+    absolute = {}
+    if moving:
+        of_all = f"{seen}, that of the ground included"
+        absolute["absolute_amplitude"] = column(
+            lambda motion: amplitudes_of(model, model.driving.absolute(motion)), "mm", of_all
+        )
     return {
-        "amplitude": column(lambda motion: amplitudes_of(model, motion), "mm", seen),
+        "amplitude": column(lambda motion: amplitudes_of(model, motion), "mm", relative),
+        **absolute,
         "phase": column(lambda motion: _phase(motion, model.rig.seen[-1]), "rad", lag),
         "energy_per_cycle": column(lambda motion: motion.cycle.dissipated.sum(), "N mm", energy),
         "damping": column(lambda motion: damping_ratio(problem, motion), "1", lost),
@@ -284,7 +355,7 @@ def _motion_columns(
 
 
 def _phase(solution: HarmonicSolution, seen: Array) -> float:
-    """Angle of harmonic 1 over that of the force, -i."""
+    """Angle of harmonic 1 over that of a sine, -i."""
     first = solution.motion[solution.resolution.harmonics.index(1)] @ seen
     return float(np.angle(1j * first))
 
@@ -293,6 +364,11 @@ def amplitudes_of(model: VibrationModel, solution: HarmonicSolution) -> Array:
     """Half of the way to and fro ``(k,)`` of what is seen [mm]."""
     seen = replace(solution, motion=solution.motion @ model.rig.seen.T)
     return np.asarray(0.5 * np.ptp(seen.displacement(TIMES), axis=0))
+
+
+def amplitude_of(model: VibrationModel, solution: HarmonicSolution) -> float:
+    """Of what is looked at [mm]."""
+    return float(amplitudes_of(model, solution)[-1])
 
 
 def _nodes(branch: ResponseBranch) -> dict[str, Dataset]:
@@ -322,7 +398,9 @@ def _cycle(solution: HarmonicSolution) -> dict[str, Dataset]:
     }
 
 
-def _warn_of_stroke(model: VibrationModel, motion: HarmonicSolution, reporter: Reporter) -> None:
+def _warn_of_stroke(
+    model: VibrationModel, told: str, motion: HarmonicSolution, reporter: Reporter
+) -> None:
     """Warn where contacts move further than contacts of fixed pairs of nodes may."""
     if model.rig.pressing is None:
         return
@@ -333,7 +411,7 @@ def _warn_of_stroke(model: VibrationModel, motion: HarmonicSolution, reporter: R
     )
     if stroke > LARGE_STROKE * width:
         reporter.warn(
-            f"{motion.force:g} N: at resonance the pads slide over each other by {stroke:.3g} mm, "
+            f"{told}: at resonance the pads slide over each other by {stroke:.3g} mm, "
             f"more than {LARGE_STROKE:.0%} of their width: that other nodes meet is neglected"
         )
 
@@ -369,7 +447,7 @@ def _resonance(model: VibrationModel, branch: ResponseBranch, curves: Datasets) 
     return top if top.converged and -search.fun > sizes[place] else best
 
 
-def _accurate(
+def accurate(
     problem: HarmonicBalance, motion: HarmonicSolution, accuracy: Accuracy | None
 ) -> HarmonicSolution:
     """The motion with its error; as accurate as asked for, if that is asked for."""
@@ -384,41 +462,3 @@ def _accurate(
         if not more_accurate.converged:
             return motion
         problem, motion = refined, more_accurate
-
-
-# --- loops --------------------------------------------------------------------------------------
-
-
-def _loops(
-    case: VibrationCase,
-    model: VibrationModel,
-    branch: ResponseBranch,
-    reporter: Reporter,
-    steps: Steps,
-) -> tuple[Curves, ...]:
-    """Loops at the frequency that the case asks for, a resolution after the other."""
-    if case.loops is None:
-        return ()
-    frequency = case.loops.frequency
-    nearest = int(np.abs(branch.frequencies - frequency).argmin())
-    start, loops = branch.solutions[nearest], []
-    for harmonics in case.loops.harmonics or (start.resolution.harmonics,):
-        every = case.with_mean(harmonics)
-        reporter.doing(f"{start.force:g} N: loop at {frequency:g} Hz, {harmonics} harmonics")
-        samples = max(case.resolution.samples, SAMPLES_PER_PERIOD * every[-1])
-        problem = branch.problem.refined(Resolution(every, samples))
-        motion = steps("loop", partial(_known, problem, frequency, start))
-        if not motion.converged:
-            reporter.warn(f"{start.force:g} N: no loop at {frequency:g} Hz: {motion.message}")
-            continue
-        loops.append(loop_of(model, motion, case.joint.normal_load))
-        start = motion
-    return tuple(loops)
-
-
-def _known(problem: HarmonicBalance, frequency: float, near: HarmonicSolution) -> HarmonicSolution:
-    """The motion at a frequency found from another one, with its error."""
-    motion = problem.solve(frequency, near.force, near)
-    if not motion.converged:
-        return motion
-    return replace(motion, error=resolution_error(problem, motion))

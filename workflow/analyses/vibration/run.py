@@ -3,22 +3,31 @@
 from __future__ import annotations
 
 from contextlib import AbstractContextManager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
+from fe_models.dynamics.forced_response import ResponseBranch
+from fe_models.dynamics.further_branches import FurtherBranch
 from fe_models.dynamics.harmonics import HarmonicBalanceError
 from fe_models.dynamics.receptance import ReceptanceError
 from sa_solver.steps import Steps
 from wear.joints.parameters import JointError
+from workflow.analyses.vibration.answers import answers_under
 from workflow.analyses.vibration.case import VibrationCase
+from workflow.analyses.vibration.further import further_from
+from workflow.analyses.vibration.harmonics import CURVE, harmonics_along, names_of
 from workflow.analyses.vibration.model import VibrationModel
-from workflow.analyses.vibration.outcome import Response, VibrationOutcome, trend
+from workflow.analyses.vibration.modes import mode_of
+from workflow.analyses.vibration.outcome import Curves, Response, VibrationOutcome, trend
 from workflow.analyses.vibration.response import backbone_of, force_sweep, response_under
 from workflow.analyses.vibration.results import write_vibration_output
 from workflow.errors import UserError
 from workflow.shell.analysis import Run
 from workflow.shell.reporter import Reporter
 from workflow.shell.steps import kept_steps
+
+# Of a record's force, a share above its highest harmonic that is warned of.
+LEFT_OUT = 0.05
 
 
 def run_vibration(run: Run[VibrationCase]) -> None:
@@ -42,17 +51,37 @@ def _outcome(case: VibrationCase, reporter: Reporter, steps: Steps) -> Vibration
     model = VibrationModel.of(case, reporter)
     with reporter.stage("rest and linear limits"):
         numbers, contact = model.numbers(), model.contact()
+        for number, share in enumerate(model.driving.left_out):
+            reporter.log(f"record {number + 1}: {share:.2%} above its highest harmonic left out")
+            if share > LEFT_OUT:
+                reporter.warn(
+                    f"excitation.records.{number}: {share:.1%} of its force is above the highest "
+                    "harmonic taken and left out: raise highest, or resolution.harmonics"
+                )
         linear = steps("linear limits", lambda: model.linear(case.frequencies))
     responses: list[Response] = []
     backbone = None
-    sweeps = []
-    count = len(case.forces) + case.backbone + len(case.force_sweeps)
+    sweeps: list[Curves] = []
+    further: list[Curves] = []
+    modes: list[Curves] = []
+    numbered = () if case.modes is None else case.modes.numbers
+    count = len(case.amounts) + case.backbone + len(case.force_sweeps) + len(numbered)
     curves = _Curves(count, reporter, growing=case.resolution.tolerance is not None)
     with reporter.course("vibration"):
-        for force in case.forces:
-            with curves.next(f"{force:g} N"), reporter.stage("response"):
+        for force in case.amounts:
+            with curves.next(case.amount.told(force)), reporter.stage("response"):
                 response, branch = response_under(case, model, force, reporter, steps)
-            responses.append(response)
+                answers, of_answers = answers_under(case, model, branch, reporter, steps)
+                harmonics = {**response.harmonics, **of_answers}
+                if case.harmonics_along_curves:
+                    harmonics[CURVE] = harmonics_along(model.rig, branch, reporter)
+            responses.append(replace(response, answers=answers, harmonics=harmonics))
+            known: list[ResponseBranch | FurtherBranch] = [branch]
+            for start in (start for start in case.further_branches if start.force == force):
+                with reporter.stage("further branches"):
+                    for other, found in further_from(case, model, start, known, reporter, steps):
+                        known.append(other)
+                        further.append(found)
             if case.backbone and backbone is None:
                 # From the least force on which there is a phase resonance.
                 with curves.next("backbone"), reporter.stage("backbone"):
@@ -60,15 +89,23 @@ def _outcome(case: VibrationCase, reporter: Reporter, steps: Steps) -> Vibration
         for frequency in case.force_sweeps:
             with curves.next(f"{frequency:g} Hz"), reporter.stage("force sweep"):
                 sweeps.append(force_sweep(case, model, frequency, reporter, steps))
+        for number in numbered:
+            with curves.next(f"mode {number}"), reporter.stage("mode"):
+                # As many harmonics as the largest force needed.
+                found = mode_of(case, number, model, branch.problem, reporter, steps)
+                modes.append(found)
     return VibrationOutcome(
         case,
         model.rig.labels,
+        names_of(model.rig),
         tuple(responses),
         linear,
-        numbers | _across(responses),
+        numbers | _across(case, responses),
         contact,
         backbone,
         tuple(sweeps),
+        tuple(modes),
+        tuple(further),
     )
 
 
@@ -97,11 +134,11 @@ class _Curves:
         return equal * (begun + 1) / (self.count + 1) if self.growing else equal
 
 
-def _across(responses: list[Response]) -> dict[str, Any]:
+def _across(case: VibrationCase, responses: list[Response]) -> dict[str, Any]:
     """What the forces show together: where the peak is lowest, and whether resonances move on."""
     resonances = [response.numbers["resonance"] for response in responses]
     lowest = min(responses, key=lambda response: response.numbers["receptance"])
     return {
-        "least_receptance_force": lowest.force,
+        f"least_receptance_{case.amount.name}": lowest.force,
         "trend": {"resonance": trend(resonances)},
     }

@@ -14,11 +14,15 @@ from workflow.shell.run_time import RunTime
 
 # Points of a curve, usually, where the frequency or the force grows by a factor of e.
 POINTS = 50
+# Points that a motion at a frequency is as dear as.
+ANSWER = 5
 # A point of a rig with one joint; the same where harmonics grow to a tolerance [s].
 POINT, GROWING_POINT = 5e-3, 3e-2
 # A point of so many unknowns, and the linear limits of so many directions, of joints [s].
 MANY, MANY_UNKNOWNS, MANY_POWER = 0.37, 4000.0, 1.5
 LIMITS, DIRECTIONS, CUBE = 25.0, 363.0, 3
+# Times that of modes that dashpots mix: each harmonic is a solution of all of them.
+MIXED = 40.0
 # Joints of a reduced body whose points are not counted.
 JOINTS = 100
 
@@ -26,11 +30,15 @@ JOINTS = 100
 def run_time(case: VibrationCase) -> RunTime:
     """Of the structure, its linear limits, and all curves."""
     span = log(case.frequencies[1] / case.frequencies[0])
-    curves = len(case.forces) * span
+    curves = len(case.amounts) * span
     if case.backbone or case.force_sweeps:
-        along = log(case.forces[-1] / case.forces[0])
+        along = log(case.amounts[-1] / case.amounts[0])
         curves += (case.backbone + len(case.force_sweeps)) * along
-    return RunTime(structure_time(case), POINTS * curves * point_time(case))
+    if case.modes is not None:
+        least, largest = case.modes.amplitudes
+        curves += len(case.modes.numbers) * log(largest / least)
+    points = POINTS * curves + ANSWER * len(case.at) * len(case.amounts)
+    return RunTime(structure_time(case), points * point_time(case))
 
 
 def structure_time(case: VibrationCaseBase) -> float:
@@ -48,8 +56,11 @@ def structure_time(case: VibrationCaseBase) -> float:
 def point_time(case: VibrationCaseBase) -> float:
     """Of a point of a curve [s]."""
     unknowns = _directions(case) * 2 * len(case.harmonics)
+    damping, mixed = case.structure.damping, 1.0
+    if damping is not None and damping.dashpots and not isinstance(case.structure, Rig):
+        mixed = MIXED
     one = POINT if case.resolution.tolerance is None else GROWING_POINT
-    return one + float(MANY * (unknowns / MANY_UNKNOWNS) ** MANY_POWER)
+    return one + mixed * float(MANY * (unknowns / MANY_UNKNOWNS) ** MANY_POWER)
 
 
 def _directions(case: VibrationCaseBase) -> int:

@@ -19,6 +19,7 @@ from workflow.analyses.rig.joint_sections import (
 )
 from workflow.analyses.rig.structure import FrictionRig, Rig, structure_outline
 from workflow.analyses.vibration.case import DrivenMass, VibrationCase, VibrationCaseBase, wears
+from workflow.analyses.vibration.excitation import Level, VibrationExcitation
 from workflow.analyses.wear.case.sections import Cycles, PressingForce
 from workflow.analyses.wear.structures.bodies.case import BodiesWearCase, Reciprocation
 from workflow.case.fields import Quantity
@@ -73,7 +74,12 @@ class WornContact(Section):
 class WearByVibration(Section):
     """The force under which the contact wears, and the cycles after which responses are found."""
 
-    force: DrivingForce = entry("amplitude [N]", "75 N")
+    also_filled_in: ClassVar[tuple[str, ...]] = ("force",)
+
+    force: DrivingForce | None = entry("amplitude [N]", "75 N", default=None)
+    level: Level | None = entry(
+        "instead of force: by which the excitation is multiplied [1]", 1, default=None
+    )
     frequency: Frequency = entry("of the force [Hz]", "100 Hz")
     cycles: Annotated[tuple[Cycles, ...], Field(min_length=1, max_length=100)] = entry(
         "so many in all, ascending; before the first of them the contact is unworn [1]",
@@ -115,17 +121,42 @@ class VibrationWearCaseBase(VibrationCaseBase):
 
     title: Title = entry("one line", "Forced response of a friction rig as it wears")
     structure: Rig | FrictionRig = entry("what holds the contact")
+    excitation: VibrationExcitation | None = entry(
+        "instead of forces and mass, with wear.level: forces at any places, records, motion of the "
+        "ground",
+        default=None,
+    )
     wear: WearByVibration = entry("how the contact wears")
 
     @classmethod
     def suits(cls, source: Source) -> bool:
         return wears(source)
 
+    @model_validator(mode="after")
+    def _wears_by_the_same(self) -> VibrationWearCaseBase:
+        names = ("level", "force") if self.excitation is not None else ("force", "level")
+        wanted, other = names
+        if getattr(self.wear, other) is not None:
+            beside = "an" if self.excitation is not None else "no"
+            raise disagreement(
+                f"given with {beside} excitation; allowed: {wanted}", f"wear.{other}", "excitation"
+            )
+        if getattr(self.wear, wanted) is None:
+            raise disagreement(f"missing; allowed: {wanted}", f"wear.{wanted}", "wear")
+        return self
+
+    @property
+    def wearing(self) -> float:
+        """The force [N], or the level, under which the contact wears."""
+        amount = self.wear.force if self.excitation is None else self.wear.level
+        assert amount is not None
+        return amount
+
     def outline(self) -> list[tuple[str, str]]:
         structure, wear = self.structure, self.wear
         return [
             *structure_outline(structure),
-            ("worn by", f"{wear.force:g} N at {wear.frequency:g} Hz"),
+            ("worn by", f"{self.amount.told(self.wearing)} at {wear.frequency:g} Hz"),
             ("states", f"unworn and after {'; '.join(map(times, wear.cycles))} cycles"),
             ("forces", self.driving),
             ("method", self.resolved),

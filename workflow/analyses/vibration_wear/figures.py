@@ -12,6 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from sa_solver.types import Array, Indices
+from workflow.analyses.vibration.excitation import FORCE, LEVEL, Amount
 from workflow.analyses.vibration.pad_nodes import rows_and_columns
 from workflow.analyses.vibration_wear.outcome import (
     CONTACT,
@@ -76,7 +77,7 @@ def figures_of(contents: Contents) -> Figures:
 
 def frequency_response(file: h5py.File) -> Figure:
     """Amplitude of the last mass over the force, a panel per force, a curve per state."""
-    forces = list(file.attrs["forces"])
+    forces, amount = list(file.attrs["forces"]), _amount(file)
     shown = spread(range(len(forces)), MOST_FORCES)
     figure = new_figure(_change(file, *STUCK), 4.0 * len(shown) + 0.5)
     panels = figure.subplots(len(shown), 1, sharex=True, squeeze=False)[:, 0]
@@ -86,12 +87,18 @@ def frequency_response(file: h5py.File) -> Figure:
             receptance = TO_MICRONS * response["amplitude"][:, -1] / forces[place]
             label = f"{_cycles(state)}: {response.attrs['resonance']:.4g} Hz"
             axis.plot(response["frequency"][()], receptance, color=colour, label=label)
-        axis.set(title=f"{forces[place]:g} N", ylabel="amplitude / force [µm/N]", yscale="log")
+        over = f"amplitude / {amount.name} [{amount.receptance[1]}]"
+        axis.set(title=amount.told(forces[place]), ylabel=over, yscale="log")
         legend_beside(axis, "cycles: resonance")
     panels[-1].set(xlabel="frequency [Hz]", xscale="log")
     for side in (panels[-1].xaxis, *(axis.yaxis for axis in panels)):
         plain_ticks(side)
     return figure
+
+
+def _amount(file: h5py.File) -> Amount:
+    """What responses are to: forces, or levels of an excitation."""
+    return LEVEL if file.attrs.get("amount") == LEVEL.name else FORCE
 
 
 def evolution(file: h5py.File, contents: Contents) -> Figure:
@@ -106,7 +113,7 @@ def evolution(file: h5py.File, contents: Contents) -> Figure:
     frequency.plot(place, history["stuck"][:, 0], "k--", label="stuck")
     columns = spread(range(len(forces)), len(FORCE_COLOURS))
     for column, colour in zip(columns, FORCE_COLOURS, strict=False):
-        label = f"{forces[column]:g} N"
+        label = _amount(file).told(forces[column])
         frequency.plot(place, history["resonance"][:, column], "o-", color=colour, label=label)
     frequency.set_ylabel("resonance [Hz]")
     legend_below(figure, [frequency], title="resonance")

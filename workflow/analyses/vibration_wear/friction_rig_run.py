@@ -40,7 +40,7 @@ def wear_specimens(
     wear = case.wear
     unworn = VibrationModel.of(case.unworn, reporter)
     specimens = load_case(case.structure.specimens, [SpecimensCase])
-    pads = WearingPads(unworn, specimens.laws, wear.force, wear.frequency)
+    pads = WearingPads(unworn, specimens.laws, case.wearing, wear.frequency, case.amount)
     state = pads.begin()
     with reporter.stage("wear"):
         pads.at(state)

@@ -21,6 +21,7 @@ from wear.moving import LARGE_STROKE
 from wear.steppers import first_cycles
 from wear.stepping import WearState
 from workflow.analyses.rig.building import row_of_masses
+from workflow.analyses.vibration.load import driving_of
 from workflow.analyses.vibration.loops import closed
 from workflow.analyses.vibration.model import VibrationModel
 from workflow.analyses.vibration.outcome import Response
@@ -61,8 +62,9 @@ def wear_half_space(
     """
     bodies = load_case(case.contact.file, [BodiesWearCase])
     rig, wear = row_of_masses(case.structure, case.mass or 1), case.wear
-    resolution = Resolution(tuple(case.resolution.harmonics), case.resolution.samples)
-    contact = VibratingContact(bodies, rig, wear.force, wear.frequency, resolution)
+    resolution = Resolution(case.harmonics, case.resolution.samples)
+    driving = driving_of(case, rig)
+    contact = VibratingContact(bodies, rig, driving, case.wearing, wear.frequency, resolution)
     stepper = SubcyclingStepper(stepper_of(bodies.wear), contact.alike_cycles, steps)
     with reporter.stage("contact, first cycle"):
         state = contact.unworn()
@@ -109,7 +111,9 @@ class _Description:
         case = self.case.with_joint(load, friction, stiffness)
         resolution = Resolution(case.harmonics, case.resolution.samples)
         problem = self.contact.problem(cycle.sliders, resolution)
-        model = VibrationModel(rig, Jenkins(stiffness, friction, load), problem)
+        model = VibrationModel(
+            rig, Jenkins(stiffness, friction, load), problem, self.contact.driving
+        )
         error, responses = responses_to_all(case, model, cycle.motion, self.reporter, self.steps)
         return error, responses, {"free": rig.free(), **rig.modes(model.law)}
 

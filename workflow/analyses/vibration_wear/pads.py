@@ -22,6 +22,7 @@ from wear.laws import WearLaw
 from wear.nodes import NodalContact, NodalState
 from wear.stepping import ContactFailure
 from wear.surfaces import Surfaces
+from workflow.analyses.vibration.excitation import FORCE, Amount
 from workflow.analyses.vibration.model import VibrationModel
 
 # Pads of the last states: those before and after a step.
@@ -106,15 +107,17 @@ class PadCycle:
 
 @dataclass(frozen=True)
 class WearingPads:
-    """Pads that wear under a ``force`` [N] at a ``frequency`` [Hz].
+    """Pads that wear under a ``force`` [N], or level, at a ``frequency`` [Hz].
 
-    ``unworn`` is the rig before, ``laws`` are those of body 1 and body 2.
+    ``amount`` says which it is. ``unworn`` is the rig before, ``laws`` are those of body 1 and
+    body 2.
     """
 
     unworn: VibrationModel
     laws: tuple[WearLaw, WearLaw]
     force: float
     frequency: float
+    amount: Amount = FORCE
     _solved: deque[tuple[Surfaces, PadCycle]] = field(
         init=False, default_factory=lambda: deque(maxlen=KEPT)
     )
@@ -137,7 +140,8 @@ class WearingPads:
         motion = model.problem.solve(self.frequency, self.force, start)
         if not motion.converged:
             raise ContactFailure(
-                f"no motion under {self.force:g} N at {self.frequency:g} Hz: {motion.message}"
+                f"no motion {self.amount.under(self.force)} at {self.frequency:g} Hz: "
+                f"{motion.message}"
             )
         cycle = PadCycle(model, motion)
         self._solved.append((state.surfaces, cycle))
@@ -162,4 +166,4 @@ def worn_model(unworn: VibrationModel, depth: Array) -> VibrationModel:
         problem.resolution,
         problem.receptance,
     )
-    return VibrationModel(replace(rig, gap=gap), law, worn)
+    return VibrationModel(replace(rig, gap=gap), law, worn, unworn.driving)

@@ -7,6 +7,7 @@ from functools import partial
 from itertools import chain
 from typing import Any
 
+from workflow.analyses.vibration.excitation import under_in
 from workflow.analyses.vibration.quantities import of_response
 from workflow.analyses.vibration_wear.case import FrictionRigWearCase, VibrationWearCase
 from workflow.case.plain import times
@@ -67,8 +68,8 @@ def _of_state(number: int, state: Summary, summary: Summary) -> Iterator[Quantit
         known = _error(name, place, summary)
         yield of(text, f"{place}.{name}", unit, everyday=everyday, **known)
     for force, response in enumerate(state["responses"]):
-        under = f"{group}, under {response['force']:g} N"
-        yield from of_response(under, f"{place}.responses.{force}", summary)
+        under = f"{group}, {under_in(response)}"
+        yield from of_response(under, f"{place}.responses.{force}", response, summary)
 
 
 def _error(name: str, place: str, summary: Summary) -> dict[str, Any]:

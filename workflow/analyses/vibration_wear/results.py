@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from workflow.analyses.vibration.excitation import Amount
 from workflow.analyses.vibration.outcome import trend
 from workflow.analyses.vibration.results import put_response_curves
 from workflow.analyses.vibration_wear.case import FrictionRigWearCase, VibrationWearCase
@@ -39,7 +40,11 @@ def write_vibration_wear_output(outcome: VibrationWearOutcome, run: VibrationWea
         _write_results(outcome, run)
         _write_tables(outcome, folder)
     run.draw(_contents(outcome))
-    finish(run, _summary(outcome), (f"  {_line(state)}" for state in outcome.states))
+    finish(
+        run,
+        _summary(outcome),
+        (f"  {_line(outcome.case.amount, state)}" for state in outcome.states),
+    )
 
 
 # --- results ------------------------------------------------------------------------------------
@@ -51,7 +56,11 @@ def _contents(outcome: VibrationWearOutcome) -> Contents:
 
 def _write_results(outcome: VibrationWearOutcome, run: VibrationWearRun) -> None:
     case = outcome.case
-    attributes = {"analysis": case.analysis, "forces": list(case.forces)}
+    attributes = {
+        "analysis": case.analysis,
+        "forces": list(case.amounts),
+        "amount": case.amount.name,
+    }
     with run_results(run, case, attributes) as writer:
         writer.put_contents(_contents(outcome))
         if outcome.grid is not None:
@@ -66,7 +75,8 @@ def _write_results(outcome: VibrationWearOutcome, run: VibrationWearRun) -> None
             for group, datasets in state.fields.items():
                 writer.put(f"{place}/{group}", datasets, on)
             for force, response in enumerate(state.responses):
-                put_response_curves(writer, f"{place}/{RESPONSES}/{force:05d}", response)
+                where = f"{place}/{RESPONSES}/{force:05d}"
+                put_response_curves(writer, where, case.amount, response)
 
 
 # --- tables -------------------------------------------------------------------------------------
@@ -74,11 +84,11 @@ def _write_results(outcome: VibrationWearOutcome, run: VibrationWearRun) -> None
 
 def _write_tables(outcome: VibrationWearOutcome, folder: OutputFolder) -> None:
     """The evolution, and the responses of every state to every force, as CSV in base units."""
-    what = "contact and resonances, over the cycles"
+    under, what = outcome.case.amount.under, "contact and resonances, over the cycles"
     write_curves(folder.reserve(f"{EVOLUTION}.csv", what), outcome.evolution)
     for number, state in enumerate(outcome.states):
         for force, response in enumerate(state.responses):
-            what = f"response under {response.force:g} N after {state.cycles:g} cycles"
+            what = f"response {under(response.force)} after {state.cycles:g} cycles"
             path = folder.reserve(f"frf_{number:05d}_{force:05d}.csv", f"{what}, over frequency")
             write_curves(path, response.curves)
 
@@ -91,7 +101,7 @@ def _summary(outcome: VibrationWearOutcome) -> dict[str, Any]:
     energy = last["energy"]
     return {
         "volume_per_energy": last["volume"] / energy if energy > 0.0 else 0.0,
-        "states": [_of_state(state) for state in states],
+        "states": [_of_state(outcome.case.amount, state) for state in states],
         "trend": {
             name: trend([state.numbers[name] for state in states])
             for name in TRENDS
@@ -101,18 +111,18 @@ def _summary(outcome: VibrationWearOutcome) -> dict[str, Any]:
     }
 
 
-def _of_state(state: WornState) -> dict[str, Any]:
-    responses = [{"force": response.force, **response.numbers} for response in state.responses]
+def _of_state(amount: Amount, state: WornState) -> dict[str, Any]:
+    responses = [{amount.name: response.force, **response.numbers} for response in state.responses]
     # JSON has no NaN.
     numbers = {name: value for name, value in state.numbers.items() if value == value}
     return {**numbers, RESPONSES: responses}
 
 
-def _line(state: WornState) -> str:
+def _line(amount: Amount, state: WornState) -> str:
     """A state in a line."""
     numbers = state.numbers
     resonances = ", ".join(
-        f"{response.numbers['resonance']:.4g} Hz under {response.force:g} N"
+        f"{response.numbers['resonance']:.4g} Hz {amount.under(response.force)}"
         for response in state.responses
     )
     stiffness = PER_MICRON * numbers["stiffness"]

@@ -16,5 +16,5 @@ def run_time(case: VibrationWearCase | FrictionRigWearCase) -> RunTime:
     """Of the structure, and of the wear to every state and the curves in it."""
     span = log(case.frequencies[1] / case.frequencies[0])
     states = len(case.wear.cycles) + 1
-    points = states * (WEAR + POINTS * span * len(case.forces))
+    points = states * (WEAR + POINTS * span * len(case.amounts))
     return RunTime(structure_time(case), points * point_time(case))

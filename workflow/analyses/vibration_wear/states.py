@@ -78,6 +78,6 @@ def responses_to_all(
     with reporter.stage("response"):
         responses = [
             response_under(case, model, force, reporter, steps)[0]
-            for force in reporter.parts(case.forces, "{:g} N".format)
+            for force in reporter.parts(case.amounts, case.amount.told)
         ]
     return error, tuple(responses)

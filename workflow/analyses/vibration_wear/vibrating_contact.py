@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fe_models.dynamics.harmonic_balance import HarmonicBalance, PeriodicLoad
+from fe_models.dynamics.harmonic_balance import HarmonicBalance
 from fe_models.dynamics.harmonic_solution import HarmonicSolution
 from fe_models.dynamics.harmonics import Resolution
 from fe_models.dynamics.receptance import Receptance
@@ -29,6 +29,7 @@ from wear.joints.jenkins import Jenkins
 from wear.joints.parallel import ParallelSliders
 from wear.stepping import ContactFailure, SlidingCycle, WearingContact, WearState
 from workflow.analyses.rig.rig_model import RigModel
+from workflow.analyses.vibration.load import Driving
 from workflow.analyses.wear.structures.bodies.case import (
     BodiesWearCase,
     Reciprocation,
@@ -88,19 +89,20 @@ class ContactCycle:
 class VibratingContact:
     """The contact of a ``case`` in a ``rig`` whose joint it is.
 
-    It wears under a ``force`` [N] at a ``frequency`` [Hz], whose motion is found at a
-    ``resolution``.
+    It wears under a ``force`` [N], or level, of what is ``driving`` it at a ``frequency`` [Hz];
+    its motion is found at a ``resolution``.
     """
 
     def __init__(
         self,
         case: BodiesWearCase,
         rig: RigModel,
+        driving: Driving,
         force: float,
         frequency: float,
         resolution: Resolution,
     ) -> None:
-        self._case, self.rig = case, rig
+        self._case, self.rig, self.driving = case, rig, driving
         self._force, self._frequency, self._resolution = force, frequency, resolution
         self.grid = Grid.covering(case.contact.size, case.contact.grid)
         pair = ElasticPair(case.material(1), case.material(2))
@@ -161,8 +163,7 @@ class VibratingContact:
         return HarmonicBalance(
             self.rig.model,
             ParallelSliders(sliders),
-            # The force is a sine: Re (-i) exp(iωt).
-            PeriodicLoad({1: -1j * self.rig.driven}),
+            self.driving.load,
             resolution,
             self._receptance,
         )
@@ -213,7 +214,8 @@ class VibratingContact:
         motion = problem.solve(self._frequency, self._force, start)
         if not motion.converged:
             raise ContactFailure(
-                f"no motion under {self._force:g} N at {self._frequency:g} Hz: {motion.message}"
+                f"no motion {self.driving.amount.under(self._force)} at "
+                f"{self._frequency:g} Hz: {motion.message}"
             )
         return motion
 

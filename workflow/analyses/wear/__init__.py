@@ -28,6 +28,12 @@ def _write_loads(case: WearCase, name: str, out: Path, force: bool) -> Sequence[
     return export_resultants(case, name, out, force)
 
 
+def _draw_faces(case: WearCase, name: str, out: Path, force: bool) -> Path:
+    from workflow.analyses.wear.contact_faces import draw_faces
+
+    return draw_faces(case, name, out, force)
+
+
 def _pictures() -> Pictures:
     # Plots take a second to load: where they are drawn.
     from workflow.analyses.wear.figures.wear import figures_of
@@ -51,4 +57,5 @@ ANALYSIS = Analysis(
     choose=lambda case: structure_of(case).choose(case),
     comparison=COMPARISON,
     write_loads=_write_loads,
+    draw_faces=_draw_faces,
 )

@@ -11,15 +11,10 @@ from fe_models.transfer import FaceTransfer
 from sa_solver.half_space import HalfSpace
 from sa_solver.normal import NormalContact
 from sa_solver.types import Array, ElasticPair, Grid, LoadHistory
+from wear.implicit import ImplicitStepper, SecondOrderStepper
 from wear.interface import InterfaceContact, InterfaceSettings, InterfaceState
 from wear.link import Link
-from wear.steppers import (
-    ErrorControl,
-    ExplicitStepper,
-    ImplicitStepper,
-    SecondOrderStepper,
-    Stepper,
-)
+from wear.steppers import ErrorControl, ExplicitStepper, Stepper
 from wear.stepping import WearingContact, WearState
 from workflow.analyses.wear.case.base import ContactTerms, WearCase
 from workflow.analyses.wear.case.sections import ContactStress, Duration

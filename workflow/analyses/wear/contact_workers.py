@@ -8,7 +8,8 @@ from functools import partial
 from typing import Any
 
 from sa_solver.types import Tally
-from wear.coupled import Contacts, CoupledState
+from wear.contacts import Contacts
+from wear.coupled import CoupledState
 from wear.face_loads import FaceLoads
 from wear.interface import FirstContact, InterfaceState
 from wear.tractions import ContactFields, CycleTractions

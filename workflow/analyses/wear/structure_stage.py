@@ -30,7 +30,14 @@ from workflow.analyses.wear.case.sections import Nonlinearity
 from workflow.analyses.wear.heard import Heard
 from workflow.analyses.wear.load_source import BODIES, ContactFace, UserFace
 from workflow.errors import MethodFailed
-from workflow.shell.cache import content_key, load_cycle, load_joint, save_cycle, save_joint
+from workflow.shell.cache import (
+    content_key,
+    keep_body,
+    load_cycle,
+    load_joint,
+    save_cycle,
+    save_joint,
+)
 from workflow.shell.reporter import Reporter
 
 Solved = TypeVar("Solved", CycleSolution, FrictionState)
@@ -160,7 +167,7 @@ class StructureStage(Heard):
         joint = load_joint(key)
         self.from_cache = joint is not None
         if joint is None:
-            joint = self._linear.condense(progress=self._progress).resolvent()
+            joint = self._linear.condense(progress=self._progress, keep=keep_body).resolvent()
             save_joint(key, joint)
         return joint
 

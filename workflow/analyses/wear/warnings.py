@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from fe_models.mesh import Face, Interface
 from fe_models.structure import CLOSED, InterfaceHistory
-from sa_solver.types import LoadHistory
+from sa_solver.types import ElasticPair, LoadHistory, Mask
 from wear.coupled import CoupledState
 from wear.interface import FirstContact
 from workflow.analyses.wear.case.base import WearCase
@@ -23,6 +24,9 @@ from workflow.shell.reporter import Reporter
 OUT_OF_BALANCE = 1e-3
 # Nodes across a contact that carry its load, at least, for slips that are more than the mesh's.
 FEWEST_NODES = 5
+# What may be unknown of a contact's form, in pressure over its peak: on a cylinder whose vertices
+# were moved at random, 3 to 8 times what that did.
+FORM_SHARE = 0.1
 # Energies of structure and half-space over a cycle that differ by more indicate different slips.
 ENERGIES_APART = 0.25
 # How much less the half-space with its own friction may dissipate than the nodes, which slip in
@@ -56,6 +60,7 @@ def warn_of_structure(stage: StructureStage, reporter: Reporter) -> None:
             reporter.warn(f"{name} is open at peak load: its pressure and stress there are none")
         else:
             _warn_of_few_nodes(history, stage, reporter)
+            _warn_of_form(history, stage, reporter)
 
 
 def _warn_of_few_nodes(
@@ -66,12 +71,45 @@ def _warn_of_few_nodes(
     pressed = int(np.count_nonzero(history.force[stage.peak, 2] > 0.0))
     least = FEWEST_NODES if face.line else FEWEST_NODES**2
     if pressed < min(least, len(face)):
-        size = np.median(face.facet_sizes if face.line else np.sqrt(2.0 * face.facet_sizes))
         reporter.warn(
             f"{face.name}: the peak load is carried by {counted(pressed, 'node')} of a mesh of "
-            f"{size:.2g} mm, where {least} tell a contact from a point: its slip and tilt are the "
-            f"mesh's; {stage.model.finer}"
+            f"{_mesh_size(face):.2g} mm, where {least} tell a contact from a point: its slip and "
+            f"tilt are the mesh's; {stage.model.finer}"
         )
+
+
+def _warn_of_form(history: InterfaceHistory, stage: StructureStage, reporter: Reporter) -> None:
+    """A contact on faces that its mesh knows no better than pressure can tell."""
+    face = history.interface
+    assert isinstance(face, Interface)
+    pressed = history.force[stage.peak, 2] > 0.0
+    unsure = form_left(face, pressed)
+    bodies = (stage.structure.bodies[place].elastic.material for place in face.bodies)
+    # Waves of twice an element on a half-space: p = π E* height / wavelength (Johnson, 13.2).
+    waves = np.pi * ElasticPair(*bodies).contact_modulus * unsure / (2.0 * _mesh_size(face))
+    share = float(waves / history.pressure[stage.peak].max())
+    if share > FORM_SHARE:
+        reporter.warn(
+            f"{face.name}: vertices alone tell the form of its faces to {1e3 * unsure:.2g} µm, "
+            f"which may be {share:.0%} of its peak pressure; give the bodies as CAD, or with "
+            "midside nodes"
+        )
+
+
+def form_left(face: Interface, pressed: Mask) -> float:
+    """How far the surfaces of both bodies may be off under the nodes ``pressed`` ``(n,)`` [mm]."""
+    below = pressed if face.projection is None else face.projection.T @ pressed > 0.0
+    left = 0.0
+    for number, nodes in ((1, below), (2, pressed)):
+        surface = face.face(number).surface
+        if surface is not None and surface.left is not None:
+            left += float(surface.left[nodes].max(initial=0.0))
+    return left
+
+
+def _mesh_size(face: Face) -> float:
+    """Of the facets of a face, along their sides [mm]."""
+    return float(np.median(face.facet_sizes if face.line else np.sqrt(2.0 * face.facet_sizes)))
 
 
 def warn_of_file(source: ResultantsSource, reporter: Reporter) -> None:

@@ -10,6 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from sa_solver.types import Array
+from workflow.analyses.vibration.excitation import told_in, under_in
 from workflow.analyses.vibration.outcome import Contents
 from workflow.pictures.panels import legend_below, new_figure, shaded
 from workflow.pictures.scales import PER_MICRON, TO_MICRONS
@@ -36,7 +37,7 @@ def loops(file: h5py.File, contents: Contents) -> Figure:
         for coarse in _resolutions(response)[:-1]:
             left.plot(*_curve(coarse, "expansion"), color=colour, **COARSE)
         left.plot(*_curve(_finest(response)), color=colour)
-        _draw_branch(right, _finest(response), colour, f"{response.attrs['force']:g} N")
+        _draw_branch(right, _finest(response), colour, told_in(response.attrs))
     _bound(right, [_finest(response) for response in shown])
     _label(left, right, shown[0])
     legend_below(figure, [right], columns=3, title="excitation: stick slope (dashed)")
@@ -123,4 +124,4 @@ def _lost(response: h5py.Group) -> str:
     """Energy of a loop, in words."""
     loop = _finest(response).attrs
     energy = f"{loop['energy']:.3g} mJ" if loop["slip"] > 0.0 else "nothing"
-    return f"{energy} under {response.attrs['force']:g} N"
+    return f"{energy} {under_in(response.attrs)}"

@@ -10,9 +10,17 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from workflow.analyses.vibration.excitation import Amount, amount_in, told_in, under_in
+from workflow.analyses.vibration.figures.engine import engine_orders
 from workflow.analyses.vibration.figures.loops import loops
+from workflow.analyses.vibration.figures.modes import modes
+from workflow.analyses.vibration.figures.stability import (
+    draw_motions,
+    explain_stability,
+    mark_bifurcations,
+)
 from workflow.analyses.vibration.figures.states import node_states, pad_states
-from workflow.analyses.vibration.outcome import Contents
+from workflow.analyses.vibration.outcome import AT, FURTHER, Contents
 from workflow.pictures.panels import (
     Figures,
     legend_below,
@@ -28,6 +36,7 @@ MOST_CURVES = 8
 TO_PERCENT = 1e2
 LIMIT: dict[str, Any] = {"color": BLACK, "linewidth": 0.8}
 STYLES = {"free": ":", "stuck": "--"}
+ASKED: dict[str, Any] = {"markersize": 4.5, "markerfacecolor": "white"}
 # Room above the highest peak and below the lowest response, as factors.
 ABOVE, BELOW = 3.0, 0.5
 
@@ -37,6 +46,8 @@ def figures_of(contents: Contents) -> Figures:
     drawn = {
         "frequency_response": (frequency_response, True),
         "resonance": (resonance, len(contents.responses) > 1 or contents.backbone),
+        "modes": (modes, bool(contents.modes)),
+        "engine_orders": (engine_orders, contents.engine),
         "loops": (loops, bool(contents.loops)),
         "node_states": (node_states, contents.places),
         "pad_states": (pad_states, contents.places),
@@ -53,8 +64,16 @@ def _shown(file: h5py.File, contents: Contents) -> list[tuple[h5py.Group, Any]]:
 
 
 def _seen(file: h5py.File) -> str:
-    """What the amplitude is of."""
-    return str(file.attrs["seen"][-1])
+    """What the amplitude is of; against the ground, where that moves."""
+    first, *_ = file["responses"].values()
+    against = " against the ground" if "absolute_amplitude" in first else ""
+    return f"{file.attrs['seen'][-1]}{against}"
+
+
+def _amount_of(file: h5py.File) -> Amount:
+    """What responses are to: forces, or levels of an excitation."""
+    first, *_ = file["responses"].values()
+    return amount_in(first.attrs)[0]
 
 
 # --- frequency response -------------------------------------------------------------------------
@@ -70,18 +89,48 @@ def frequency_response(file: h5py.File, contents: Contents) -> Figure:
         label = f"{name}: {frequency[receptance.argmax()]:.4g} Hz"
         axis.plot(frequency, receptance, style, label=label, **LIMIT)
     for response, colour in _shown(file, contents):
-        force, size = float(response.attrs["force"]), TO_MICRONS * response["amplitude"][:, -1]
-        label = f"{force:g} N: {response.attrs['resonance']:.4g} Hz"
-        axis.plot(response["frequency"][()], size / force, color=colour, label=label)
+        _, force = amount_in(response.attrs)
+        size = TO_MICRONS * response["amplitude"][:, -1]
+        label = f"{told_in(response.attrs)}: {response.attrs['resonance']:.4g} Hz"
+        draw_motions(
+            axis, response, response["frequency"][()], size / force, color=colour, label=label
+        )
+        mark_bifurcations(axis, response, "frequency", TO_MICRONS / force, colour)
         peaks.append(TO_MICRONS * float(response.attrs["amplitude"]) / force)
         lows.append(size.min() / force)
         axis.plot(response.attrs["resonance"], peaks[-1], "o", color=colour, markersize=5)
+        if contents.at:
+            asked = response[AT]
+            sizes = TO_MICRONS * asked["amplitude"][:, -1] / force
+            axis.plot(asked["frequency"][()], sizes, "D", color=colour, **ASKED)
+    drawn = [response for response, _ in _shown(file, contents)]
+    drawn += _draw_further(axis, file, contents, over_force=True)
+    explain_stability(axis, drawn)
     _over_frequency(axis, file)
-    axis.set_ylabel(f"amplitude of {_seen(file)} / force [µm/N]")
+    amount = _amount_of(file)
+    axis.set_ylabel(f"amplitude of {_seen(file)} / {amount.name} [{amount.receptance[1]}]")
     axis.set_ylim(BELOW * min(lows), ABOVE * max(peaks))
     plain_ticks(axis.yaxis)
     legend_below(figure, [axis], columns=4, title="resonance")
     return figure
+
+
+def _draw_further(
+    axis: Axes, file: h5py.File, contents: Contents, *, over_force: bool
+) -> list[h5py.Group]:
+    """Branches beside the shown responses, in the colours of their forces; these branches."""
+    amount = _amount_of(file).name
+    colours = {response.attrs[amount]: colour for response, colour in _shown(file, contents)}
+    branches = [
+        branch for branch in file.get(FURTHER, {}).values() if branch.attrs[amount] in colours
+    ]
+    for branch in branches:
+        force = float(branch.attrs[amount])
+        factor, colour = TO_MICRONS / (force if over_force else 1.0), colours[force]
+        size = factor * branch["amplitude"][:, -1]
+        draw_motions(axis, branch, branch["frequency"][()], size, color=colour, linewidth=1.4)
+        mark_bifurcations(axis, branch, "frequency", factor, colour)
+    return branches
 
 
 def _over_frequency(axis: Axes, file: h5py.File) -> None:
@@ -97,10 +146,10 @@ def _title(file: h5py.File) -> str:
     responses = [file["responses"][name] for name in sorted(file["responses"])]
     first, last = responses[0].attrs, responses[-1].attrs
     if len(responses) == 1:
-        return f"Resonance at {first['resonance']:.4g} Hz under {first['force']:g} N"
+        return f"Resonance at {first['resonance']:.4g} Hz {under_in(first)}"
     return (
-        f"Resonance {first['resonance']:.4g} Hz under {first['force']:g} N, "
-        f"{last['resonance']:.4g} Hz under {last['force']:g} N"
+        f"Resonance {first['resonance']:.4g} Hz {under_in(first)}, "
+        f"{last['resonance']:.4g} Hz {under_in(last)}"
     )
 
 
@@ -117,12 +166,14 @@ def resonance(file: h5py.File, contents: Contents) -> Figure:
     bottom = figure.add_subplot(places[1, 1], sharex=top)
     if contents.backbone:
         for panel, name, factor in ((top, "frequency", 1.0), (bottom, "damping", TO_PERCENT)):
-            force, values = file["backbone/force"][()], factor * file["backbone"][name][()]
-            panel.plot(force, values, "--", color=BLACK, label="phase resonance")
+            force = file["backbone"][_amount_of(file).name][()]
+            values = factor * file["backbone"][name][()]
+            panel.plot(force, values, color=BLACK, linewidth=1.0, label="phase resonance")
     _draw_peaks(top, file, "resonance", 1.0, BLUE)
     _draw_peaks(bottom, file, "damping", TO_PERCENT, ORANGE)
     top.set_ylabel("resonance frequency [Hz]")
-    bottom.set(xlabel="force [N]", ylabel="damping ratio [%]", xscale="log")
+    amount = _amount_of(file)
+    bottom.set(xlabel=f"{amount.name} [{amount.unit}]", ylabel="damping ratio [%]", xscale="log")
     plain_ticks(bottom.xaxis)
     legend_below(figure, [axis, top], columns=5)
     return figure
@@ -130,14 +181,21 @@ def resonance(file: h5py.File, contents: Contents) -> Figure:
 
 def _draw_amplitudes(axis: Axes, file: h5py.File, contents: Contents) -> None:
     for response, colour in _shown(file, contents):
-        force, size = float(response.attrs["force"]), TO_MICRONS * response["amplitude"][:, -1]
-        look = {"color": colour, "label": f"{force:g} N", "linewidth": 1.4}
-        axis.plot(response["frequency"][()], size, **look)
+        size = TO_MICRONS * response["amplitude"][:, -1]
+        look = {"color": colour, "label": told_in(response.attrs), "linewidth": 1.4}
+        draw_motions(axis, response, response["frequency"][()], size, **look)
+        mark_bifurcations(axis, response, "frequency", TO_MICRONS, colour)
+    drawn = [response for response, _ in _shown(file, contents)]
+    drawn += _draw_further(axis, file, contents, over_force=False)
     _over_frequency(axis, file)
     if contents.backbone:
         backbone = file["backbone"]
-        look = {"color": BLACK, "label": "phase resonance", "zorder": 4}
-        axis.plot(backbone["frequency"][()], TO_MICRONS * backbone["amplitude"][()], "--", **look)
+        look = {"color": BLACK, "label": "phase resonance", "zorder": 4, "linewidth": 1.0}
+        size = TO_MICRONS * backbone["amplitude"][()]
+        draw_motions(axis, backbone, backbone["frequency"][()], size, **look)
+        mark_bifurcations(axis, backbone, "frequency", TO_MICRONS, BLACK)
+        drawn.append(backbone)
+    explain_stability(axis, drawn)
     axis.set_ylabel(f"amplitude of {_seen(file)} [µm]")
     axis.set_title("responses and backbone" if contents.backbone else "responses")
     plain_ticks(axis.yaxis)
@@ -146,7 +204,8 @@ def _draw_amplitudes(axis: Axes, file: h5py.File, contents: Contents) -> None:
 def _draw_peaks(axis: Axes, file: h5py.File, name: str, factor: float, colour: str) -> None:
     """The value at the peak of each response as a dot."""
     peaks = [response.attrs for response in file["responses"].values()]
-    forces, values = [peak["force"] for peak in peaks], [factor * peak[name] for peak in peaks]
+    forces = [amount_in(peak)[1] for peak in peaks]
+    values = [factor * peak[name] for peak in peaks]
     axis.plot(forces, values, "o", color=colour, label="largest amplitude")
     axis.set_ylim(0.0, HEADROOM * max(axis.dataLim.y1, 1e-300))
 
@@ -157,5 +216,5 @@ def _resonance_title(file: h5py.File) -> str:
     most = max(peaks, key=lambda peak: float(peak["damping"]))
     return (
         f"Resonance between {min(resonances):.4g} and {max(resonances):.4g} Hz; most damped "
-        f"under {most['force']:g} N: {TO_PERCENT * most['damping']:.3g} %"
+        f"{under_in(most)}: {TO_PERCENT * most['damping']:.3g} %"
     )

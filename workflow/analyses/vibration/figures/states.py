@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
 from sa_solver.types import Array, Indices
+from workflow.analyses.vibration.excitation import amount_in, told_in, under_in
 from workflow.analyses.vibration.outcome import Contents
 from workflow.analyses.vibration.pad_nodes import rows_and_columns
 from workflow.pictures.panels import new_figure, plain_ticks, spread
@@ -58,14 +59,16 @@ def node_states(file: h5py.File, contents: Contents) -> Figure:
     distance = np.hypot(file["contact/x"][()], file["contact/y"][()])
     order = np.argsort(distance, kind="stable")
     for (top, bottom), response in zip(panels.T, shown, strict=True):
-        receptance = TO_MICRONS * response["amplitude"][:, -1] / response.attrs["force"]
+        amount, force = amount_in(response.attrs)
+        receptance = TO_MICRONS * response["amplitude"][:, -1] / force
         top.plot(response["frequency"][()], receptance)
         _draw_over_frequency(bottom, response, order)
         for axis in (top, bottom):
             axis.axvline(response.attrs["resonance"], color=BLACK, linestyle=":", linewidth=1.2)
-        top.set_title(f"{response.attrs['force']:g} N: {response.attrs['resonance']:.4g} Hz")
+        top.set_title(f"{told_in(response.attrs)}: {response.attrs['resonance']:.4g} Hz")
         bottom.set_xlabel("frequency [Hz]")
-    panels[0, 0].set(xscale="log", yscale="log", ylabel="amplitude / force [µm/N]")
+    over = f"amplitude / {amount.name} [{amount.receptance[1]}]"
+    panels[0, 0].set(xscale="log", yscale="log", ylabel=over)
     for side in (bottom.xaxis, panels[0, 0].yaxis):
         plain_ticks(side)
     panels[1, 0].set_ylabel("nodes by distance from the middle [mm]")
@@ -84,9 +87,9 @@ def pad_states(file: h5py.File, contents: Contents) -> Figure:
     for row, (name, factor) in zip(panels, OCTAVES.items(), strict=True):
         for axis, response in zip(row, shown, strict=True):
             place = _point_near(response, factor * float(response.attrs["resonance"]))
-            frequency, force = response["frequency"][place], response.attrs["force"]
+            frequency = response["frequency"][place]
             _draw_pad(axis, file["contact"], _kinds(response)[place])
-            axis.set_title(f"{force:g} N, {frequency:.4g} Hz", fontsize="small")
+            axis.set_title(f"{told_in(response.attrs)}, {frequency:.4g} Hz", fontsize="small")
         row[0].set_ylabel(f"{name}\ny [mm]")
     for axis in panels[-1]:
         axis.set_xlabel("x [mm]")
@@ -110,7 +113,7 @@ def _title(shown: list[h5py.Group]) -> str:
         kinds = _kinds(response)[_point_near(response, float(response.attrs["resonance"]))]
         touching = int((kinds != OPEN).sum())
         sticking = int((kinds == STICKS).sum())
-        texts.append(f"{sticking} of {touching} under {response.attrs['force']:g} N")
+        texts.append(f"{sticking} of {touching} {under_in(response.attrs)}")
     return f"Nodes that touch and only stick at the peak: {', '.join(texts)}"
 
 

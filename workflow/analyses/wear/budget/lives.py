@@ -13,9 +13,10 @@ from typing import Any, Literal
 
 from fe_models.mesh import MeshError
 from sa_solver.normal import NormalContactError
-from wear.coupled import Contacts, CoupledSettings, CoupledState, CoupledWear, JumpSize
+from wear.contacts import Contacts
+from wear.coupled import CoupledSettings, CoupledState, CoupledWear, JumpSize
+from wear.implicit import ImplicitStepper
 from wear.interface import MotionError
-from wear.steppers import ImplicitStepper
 from wear.stepping import ContactFailure
 from workflow.analyses.wear.case.base import WearCase
 from workflow.analyses.wear.case.sections import ContactStress, Life, Step

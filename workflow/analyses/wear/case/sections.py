@@ -303,6 +303,12 @@ class Nonlinearity(Section):
         default=False,
     )
 
+    @property
+    def asked(self) -> tuple[str, ...]:
+        """The entries that ask for more than a linear structure."""
+        beyond = {"stiffness": self.stiffness != "linear", "check": self.check}
+        return tuple(key for key, asks in beyond.items() if asks)
+
 
 class Coupling(Section):
     """How often the worn surfaces go back to the structure."""

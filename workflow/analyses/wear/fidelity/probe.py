@@ -14,9 +14,9 @@ import numpy as np
 from sa_solver.half_space import HalfSpace
 from sa_solver.normal import NormalContact
 from sa_solver.types import Array, ElasticPair, Grid, LoadHistory, resultant_change
-from wear.coupled import Contacts
+from wear.contacts import Contacts
+from wear.implicit import ImplicitStepper
 from wear.marching import advance_cycles
-from wear.steppers import ImplicitStepper
 from wear.stepping import SlidingCycle, WearingContact, WearState
 from wear.tractions import acting_slip
 from workflow.analyses.wear.budget.lives import STEPS, TOLERANCE, live, shortened, worn_by

@@ -302,15 +302,13 @@ class MeshCase(FiniteElementCase):
 
     @model_validator(mode="after")
     def _is_linear_with_others(self) -> MeshCase:
-        kinds = {"stiffness": self.nonlinearity.stiffness != "linear"}
-        kinds["check"] = self.nonlinearity.check
-        for key, wanted in kinds.items():
-            if wanted and self.structure.other_bodies:
-                raise disagreement(
-                    "known of two bodies, the first of them held; allowed: leave it out, or no "
-                    "structure.other_bodies",
-                    f"nonlinearity.{key}",
-                )
+        asked = self.nonlinearity.asked
+        if asked and self.structure.other_bodies:
+            raise disagreement(
+                "known of two bodies, the first of them held; allowed: leave it out, or no "
+                "structure.other_bodies",
+                *(f"nonlinearity.{key}" for key in asked),
+            )
         return self
 
     @model_validator(mode="after")

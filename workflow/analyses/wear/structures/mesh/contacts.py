@@ -11,7 +11,7 @@ from workflow.analyses.wear.case.evolution import EvolvingFriction
 from workflow.analyses.wear.case.gaps import Gap
 from workflow.analyses.wear.case.sections import Density, Laws, Solid, TwoBodies
 from workflow.analyses.wear.case.worn_bodies import BodyWear, wearing
-from workflow.analyses.wear.structures.mesh.load import Component, Name
+from workflow.analyses.wear.structures.mesh.load import Direction, Name
 from workflow.analyses.wear.structures.mesh.temperatures import Expansion
 from workflow.case.fields import OrAlone
 from workflow.case.sections import FaceCells, Section, disagreement, entry
@@ -58,7 +58,7 @@ class ContactPair(Section):
     name: Name = entry("of the interface in all results", "pad")
     face_1: Faces = entry("boundary of body 1, or several that are one face together", "disk_top")
     face_2: Faces = entry("boundary of body 2, or several", "blade_foot")
-    x: tuple[Component, Component, Component] = entry(
+    x: Direction = entry(
         "direction in which body 2 would slide under the load; x of the interface frame [1]",
         [1.0, 0.0, 0.0],
     )
@@ -77,12 +77,6 @@ class ContactPair(Section):
     grid: FaceCells | None = entry(
         "cells along x, along y of this contact; without it contact.grid", [64, 64], default=None
     )
-
-    @model_validator(mode="after")
-    def _has_direction(self) -> ContactPair:
-        if not any(self.x):
-            raise disagreement("no direction; allowed: one that is not zero", "x")
-        return self
 
     @model_validator(mode="after")
     def _has_two_bodies(self) -> ContactPair:

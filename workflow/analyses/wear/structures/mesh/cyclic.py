@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Protocol
 import numpy as np
 from pydantic import model_validator
 
-from workflow.analyses.wear.structures.mesh.load import Component, Coordinate, Name
+from workflow.analyses.wear.structures.mesh.load import Coordinate, Direction, Name
 from workflow.case.fields import OrAlone, Whole
 from workflow.case.sections import Section, disagreement, entry
 
@@ -35,17 +35,13 @@ class CyclicCuts(Section):
     low: Boundaries = entry("boundary of one cut of a body, or several that are one", "disk_low")
     high: Boundaries = entry("boundary of its other cut, or several", "disk_high")
     sectors: Annotated[int, Whole(2, 10_000)] = entry("equal ones that the wheel has", 24)
-    axis: tuple[Component, Component, Component] = entry(
-        "direction of the axis [1]", [0.0, 1.0, 0.0], default=(0.0, 1.0, 0.0)
-    )
+    axis: Direction = entry("direction of the axis [1]", [0.0, 1.0, 0.0], default=(0.0, 1.0, 0.0))
     through: tuple[Coordinate, Coordinate, Coordinate] = entry(
         "a point on the axis [mm]", [0.0, 0.0, 0.0], default=(0.0, 0.0, 0.0)
     )
 
     @model_validator(mode="after")
     def _is_complete(self) -> CyclicCuts:
-        if not any(self.axis):
-            raise disagreement("no direction; allowed: one that is not zero", "axis")
         for key in ("low", "high"):
             if not getattr(self, key):
                 raise disagreement("none; allowed: a boundary, or several", key)

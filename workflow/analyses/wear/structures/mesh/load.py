@@ -5,6 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Annotated
 
+from pydantic import AfterValidator
+from pydantic_core import PydanticCustomError
+
 from workflow.case.fields import Quantity, Text
 from workflow.case.plain import entries
 from workflow.case.sections import Section, entry
@@ -13,6 +16,15 @@ Name = Annotated[str, Text()]
 Factor = Annotated[float, Quantity("1", at_least=-1e6, at_most=1e6)]
 Coordinate = Annotated[float, Quantity("mm", at_least=-1e6, at_most=1e6)]
 Component = Annotated[float, Quantity("1", at_least=-1e6, at_most=1e6)]
+
+
+def _directed(components: tuple[float, ...]) -> tuple[float, ...]:
+    if not any(components):
+        raise PydanticCustomError("entry", "no direction; allowed: one that is not zero")
+    return components
+
+
+Direction = Annotated[tuple[Component, Component, Component], AfterValidator(_directed)]
 
 # Entries that say where a load acts, and the word before each.
 PLACES = (("group", "on"), ("body", "of"), ("axis", "about"), ("through", "through"), ("at", "at"))

@@ -9,8 +9,8 @@ from pydantic import Field, model_validator
 
 from workflow.analyses.wear.structures.mesh.load import (
     KINDS,
-    Component,
     Coordinate,
+    Direction,
     MeshLoad,
     Name,
 )
@@ -190,19 +190,11 @@ class RotationLoad(MeshLoad):
     """Rotation of both bodies; its path is that of the speed, whose square the forces follow."""
 
     kind: Literal["rotation"] = entry(KINDS, "rotation")
-    axis: tuple[Component, Component, Component] = entry(
-        "direction of the axis [1]", [0.0, 1.0, 0.0]
-    )
+    axis: Direction = entry("direction of the axis [1]", [0.0, 1.0, 0.0])
     through: tuple[Coordinate, Coordinate, Coordinate] = entry(
         "a point on the axis [mm]", [0.0, 0.0, 0.0]
     )
     speed: AngularSpeed = entry("[rad/s]", "6000 rpm")
-
-    @model_validator(mode="after")
-    def _has_axis(self) -> RotationLoad:
-        if not any(self.axis):
-            raise disagreement("no direction; allowed: one that is not zero", "axis")
-        return self
 
     def described(self) -> fe.Rotation:
         """As the structure takes it."""

@@ -12,8 +12,8 @@ from workflow.analyses.wear.case.sections import Nonlinearity, PressingForce
 from workflow.analyses.wear.structures.mesh.legs import Legs
 from workflow.analyses.wear.structures.mesh.load import (
     KINDS,
-    Component,
     Coordinate,
+    Direction,
     MeshLoad,
     Name,
 )
@@ -34,15 +34,7 @@ class BoltLoad(MeshLoad):
     through: tuple[Coordinate, Coordinate, Coordinate] = entry(
         "a point of the shank: it is cut there, across the axis [mm]", [0.0, 0.0, "2 mm"]
     )
-    axis: tuple[Component, Component, Component] = entry(
-        "direction of the bolt [1]", [0.0, 0.0, 1.0]
-    )
-
-    @model_validator(mode="after")
-    def _has_direction(self) -> BoltLoad:
-        if not any(self.axis):
-            raise disagreement("no direction; allowed: one that is not zero", "axis")
-        return self
+    axis: Direction = entry("direction of the bolt [1]", [0.0, 0.0, 1.0])
 
     @property
     def tension(self) -> float | None:
@@ -115,7 +107,7 @@ def check_bolts(loads: Sequence[MeshLoad], path: Legs, nonlinearity: Nonlinearit
                 "load_path.cycle_from",
                 "load_path",
             )
-    if bolts and (nonlinearity.check or nonlinearity.stiffness != "linear"):
+    if bolts and nonlinearity.asked:
         raise disagreement(
             "bolts are tightened, as in linear structures; allowed: stiffness: linear without a "
             "check",

@@ -117,7 +117,7 @@ def check_temperatures(
                 "allowed: kind: temperature, or a mesh file",
                 f"structure.loads.{index}.kind",
             )
-    if heating and (nonlinearity.check or nonlinearity.stiffness != "linear"):
+    if heating and nonlinearity.asked:
         raise disagreement(
             "temperatures change, whose strains are those of linear structures; allowed: "
             "stiffness: linear without a check",

@@ -1,0 +1,276 @@
+"""Bifurcations on a curve of periodic motions: where their stability changes, and where it folds.
+
+Between two points the curve is followed along the chord, across which Newton's method leads back to
+it. Where multipliers leave the unit circle the one that does so is brought to it there, and says
+what happens: at 1 the curve folds, or another one branches off, as where a motion loses its
+symmetry; at -1 the period doubles; a pair elsewhere is a Neimark-Sacker bifurcation (Seydel 2010,
+*Practical Bifurcation and Stability Analysis*, 3rd ed., section 7.4).
+
+Folds are found by the curve itself, where it turns: the multiplier of a motion of few harmonics is
+1 nearby. Joints that begin to touch or to slip may take multipliers past the circle in a jump.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Generic, Literal
+
+import numpy as np
+from scipy.optimize import brentq
+
+from fe_models.dynamics.continuation import ContinuationControl, CurvePoint, Scaling, correct
+from fe_models.dynamics.floquet import Floquet, Stability
+from fe_models.dynamics.harmonic_balance import Balance, HarmonicBalance
+from fe_models.dynamics.harmonic_solution import HarmonicSolution
+from fe_models.dynamics.newton import Equations, L
+from fe_models.dynamics.phase_resonance import PhaseBalance, PhaseResonance
+from sa_solver.types import Array
+
+Kind = Literal["fold", "branching", "period_doubling", "neimark_sacker", "jump"]
+# Share of the way between two points to which a bifurcation is located.
+LOCATED = 1e-5
+# Distance of a multiplier from the circle at a bifurcation beyond which it has jumped past it.
+NEAR = 2e-2
+# Angle [rad] from 1 or -1 up to which one on the circle is taken as real: two that meet there part
+# along it as the root of how far they are past it.
+REAL = 2e-2
+
+
+@dataclass(frozen=True)
+class Bifurcation:
+    """A ``motion`` of a ``kind``, between two points of a curve of which one comes ``after`` so
+    many others.
+
+    ``multiplier`` is the one that passes the circle there; of a fold, the nearest to 1.
+    ``unstable`` is how many are beyond the circle at the points before and after.
+    """
+
+    kind: Kind
+    motion: HarmonicSolution
+    multiplier: complex
+    after: int
+    unstable: tuple[int, int]
+
+
+@dataclass(frozen=True)
+class FollowedCurve(Generic[L]):
+    """The ``equations`` of a curve of motions of a ``problem``, and how motions are points of it.
+
+    ``unknowns_of`` and ``parameter_of`` a motion; ``motion_of`` unknowns, a parameter and the
+    equations there; steps are shares of what unknowns differ from the ``origin`` ``(n,)``.
+    """
+
+    problem: HarmonicBalance
+    equations: Equations[L]
+    origin: Array
+    unknowns_of: Callable[[HarmonicSolution], Array]
+    parameter_of: Callable[[HarmonicSolution], float]
+    motion_of: Callable[[Array, float, L], HarmonicSolution]
+
+
+def curve_by_frequency(problem: HarmonicBalance, force: float) -> FollowedCurve[Balance]:
+    """Motions under a force, along the frequency."""
+    return FollowedCurve(
+        problem,
+        problem.by_frequency(force),
+        problem.guess(None),
+        problem.guess,
+        lambda motion: motion.frequency,
+        lambda unknowns, frequency, at: problem.describe(unknowns, at, frequency, force),
+    )
+
+
+def curve_by_force(problem: HarmonicBalance, frequency: float) -> FollowedCurve[Balance]:
+    """Motions at a frequency [Hz], along the force."""
+    return FollowedCurve(
+        problem,
+        problem.by_force(frequency),
+        problem.guess(None),
+        problem.guess,
+        lambda motion: motion.force,
+        lambda unknowns, force, at: problem.describe(unknowns, at, frequency, force),
+    )
+
+
+def curve_by_phase(problem: HarmonicBalance, near: HarmonicSolution) -> FollowedCurve[PhaseBalance]:
+    """Phase resonances, along the force; frequencies are counted from that of one of them."""
+    equations = PhaseResonance.near(problem, near)
+
+    def unknowns_of(motion: HarmonicSolution) -> Array:
+        return np.append(problem.guess(motion), equations.place_of(motion.frequency))
+
+    def motion_of(unknowns: Array, force: float, at: PhaseBalance) -> HarmonicSolution:
+        return problem.describe(unknowns[:-1], at.balance, at.frequency, force)
+
+    origin = np.append(problem.guess(None), 0.0)
+    return FollowedCurve(
+        problem, equations, origin, unknowns_of, lambda motion: motion.force, motion_of
+    )
+
+
+def find_bifurcations(
+    curve: FollowedCurve[L], motions: Sequence[HarmonicSolution], stability: Sequence[Stability]
+) -> tuple[Bifurcation, ...]:
+    """Those between ``motions`` of a curve, in their order, of which the ``stability`` is known.
+
+    Where Newton's method does not find the curve between two points none is told there.
+    """
+    floquet = Floquet(curve.problem)
+    ways = [Way(curve, *ends, floquet) for ends in pairwise(motions)]
+    folds = {place: fold for place in _turns(curve, motions, ways) if (fold := ways[place].fold())}
+    counts: dict[int, tuple[int, int]] = {}
+    found = []
+    for place in _changes(stability):
+        before, after = stability[place].beyond, stability[place + 1].beyond
+        for motion, multiplier in ways[place].passages(before, after):
+            kind = _kind_of(multiplier)
+            beside = [at for at in (place, place - 1, place + 1) if at in folds]
+            if beside and kind in ("branching", "jump"):
+                counts[beside[0]] = before, after
+            else:
+                found.append(Bifurcation(kind, motion, multiplier, place, (before, after)))
+    for place, (motion, multiplier) in folds.items():
+        same = stability[place].beyond, stability[place + 1].beyond
+        found.append(Bifurcation("fold", motion, multiplier, place, counts.get(place, same)))
+    return tuple(sorted(found, key=lambda bifurcation: bifurcation.after))
+
+
+def _changes(stability: Sequence[Stability]) -> Iterator[int]:
+    """Points between which and the next the number of multipliers beyond the circle changes.
+
+    Where several that are not known lie between two that are, only if it does between these.
+    """
+    known = [place for place, at in enumerate(stability) if at.verdict != "unknown"]
+    for first, last in pairwise(known):
+        if stability[first].beyond != stability[last].beyond:
+            for place in range(first, last):
+                if stability[place].beyond != stability[place + 1].beyond:
+                    yield place
+
+
+def _turns(
+    curve: FollowedCurve[L], motions: Sequence[HarmonicSolution], ways: Sequence[Way[L]]
+) -> Iterator[int]:
+    """Points between which and the next the curve turns back in its parameter."""
+    steps = np.diff([curve.parameter_of(motion) for motion in motions])
+    for place in range(1, len(steps)):
+        if steps[place - 1] * steps[place] < 0.0:
+            # On which side of the farthest point it turns is told by its direction there.
+            ahead = ways[place].at(0.0)
+            turned = ahead is not None and ahead.turning * steps[place] > 0.0
+            yield place - 1 if turned else place
+
+
+def _kind_of(multiplier: complex) -> Kind:
+    """What happens where a multiplier passes the circle."""
+    if abs(abs(multiplier) - 1.0) > NEAR:
+        return "jump"
+    angle = abs(np.angle(multiplier))
+    if angle <= REAL:
+        return "branching"
+    return "period_doubling" if np.pi - angle <= REAL else "neimark_sacker"
+
+
+@dataclass(frozen=True)
+class _Place(Generic[L]):
+    """A point of the curve, the equations there, and its direction along the parameter."""
+
+    point: CurvePoint
+    equations: L
+    turning: float
+
+
+class _Lost(Exception):
+    """Newton's method does not find the curve."""
+
+
+class Way(Generic[L]):
+    """The way from one motion of a curve to another, by shares of the chord between them."""
+
+    def __init__(
+        self,
+        curve: FollowedCurve[L],
+        start: HarmonicSolution,
+        end: HarmonicSolution,
+        floquet: Floquet,
+    ) -> None:
+        self._curve, self._ends, self._floquet = curve, (start, end), floquet
+        self._places: dict[float, _Place[L] | None] = {}
+        self._known: dict[float, Stability] = {}
+
+    def at(self, share: float) -> _Place[L] | None:
+        """The point across the chord at a share of it; None where there is none."""
+        if share not in self._places:
+            self._places[share] = self._found(share)
+        return self._places[share]
+
+    def fold(self) -> tuple[HarmonicSolution, complex] | None:
+        """Where the curve turns, and the multiplier nearest to 1."""
+        share = self._root(lambda share: self._require(share).turning)
+        if share is None:
+            return None
+        multipliers = self._stability(share).multipliers
+        nearest = min(multipliers, key=lambda value: float(abs(value - 1.0)), default=0.0)
+        return self._motion(share), complex(nearest)
+
+    def passages(self, before: int, after: int) -> Iterator[tuple[HarmonicSolution, complex]]:
+        """Where multipliers, of which so many are beyond the circle, pass it, one or a pair."""
+        number, last = min(before, after), max(before, after)
+        while number < last:
+
+            def distance(share: float, number: int = number) -> float:
+                multipliers = self._stability(share).multipliers
+                return float(abs(multipliers[number])) - 1.0 if number < len(multipliers) else -1.0
+
+            share = self._root(distance)
+            if share is None:
+                return
+            multiplier = complex(self._stability(share).multipliers[number])
+            yield self._motion(share), multiplier
+            number += 2 if _kind_of(multiplier) == "neimark_sacker" else 1
+
+    def _root(self, function: Callable[[float], float]) -> float | None:
+        """The share at which a function of it passes zero, None where it does not."""
+        try:
+            if function(0.0) * function(1.0) > 0.0:
+                return None
+            return float(brentq(function, 0.0, 1.0, xtol=LOCATED))
+        except _Lost:
+            return None
+
+    def _motion(self, share: float) -> HarmonicSolution:
+        place = self._require(share)
+        unknowns, parameter = place.point.unknowns, place.point.parameter
+        return self._curve.motion_of(unknowns, parameter, place.equations)
+
+    def _stability(self, share: float) -> Stability:
+        if share not in self._known:
+            self._known[share] = self._floquet.stability(self._motion(share))
+        return self._known[share]
+
+    def _require(self, share: float) -> _Place[L]:
+        place = self.at(share)
+        if place is None:
+            raise _Lost
+        return place
+
+    def _found(self, share: float) -> _Place[L] | None:
+        curve = self._curve
+        start, end = (
+            np.append(curve.unknowns_of(motion), curve.parameter_of(motion))
+            for motion in self._ends
+        )
+        chord = end - start
+        # A step as long as the chord, from where it leads to this share of it.
+        begin = start + (share - 1.0) * chord
+        point = CurvePoint(begin[:-1], float(begin[-1]), chord, 1.0, 0, 0, 0.0)
+        scaling = Scaling(abs(float(end[-1])), curve.origin, curve.problem.rounding)
+        scaling.adapt(CurvePoint(start[:-1], float(start[-1]), chord, 1.0, 0, 0, 0.0))
+        step = scaling.scaled(chord)
+        corrected = correct(curve.equations, point, step, scaling, ContinuationControl())
+        if corrected is None:
+            return None
+        new, at, tangent = corrected
+        return _Place(new, at, float(tangent[-1]))

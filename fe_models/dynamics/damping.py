@@ -1,0 +1,84 @@
+"""Damping of a structure without its joints, beside that of its modes.
+
+Rayleigh's C = α M + β K, dashpots between two points or to the ground, and structural damping:
+its force is in phase with the velocity but does not grow with the frequency. At every harmonic
+k > 0 the stiffness is K + iD, with D = η K for one loss factor η. It is known in steady vibration
+only: in time it is not causal (Crandall 1970, J. Sound Vib. 11, 3,
+doi:10.1016/S0022-460X(70)80105-5).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from fe_models.dynamics.model import DynamicModel
+from fe_models.dynamics.rig import Link, RigError, stretch_of
+from sa_solver.types import Array
+
+
+def damped(
+    model: DynamicModel,
+    mass_factor: float = 0.0,
+    stiffness_factor: float = 0.0,
+    loss_factor: float = 0.0,
+    dashpots: Mapping[Link, float] | None = None,
+) -> DynamicModel:
+    """A model with more damping: C + α M + β K + Σ c g gᵀ, and D + η K.
+
+    ``mass_factor`` α [1/s], ``stiffness_factor`` β [s], ``loss_factor`` η, ``dashpots`` c [N s/mm]
+    by what stretches them. M and K are those of the structure without joints. Raises
+    :class:`RigError` for a factor or a dashpot below zero, and for names of no point.
+
+    Examples
+    --------
+    At resonance a loss factor η leaves F / (η k) of an amplitude:
+
+    >>> import numpy as np
+    >>> from fe_models.dynamics import *
+    >>> from wear.joints import Jenkins, PeriodicMarch
+    >>> rig = damped(lumped_rig({"m": 1e-3}, {Link("m"): 1e3}, [[Link("m")]]), loss_factor=0.05)
+    >>> load = PeriodicLoad({1: -1j * unit_force(rig, "m")})
+    >>> free = PeriodicMarch(Jenkins(stiffness=1e3, friction=0.0, normal_load=10.0))
+    >>> problem = HarmonicBalance(rig, free, load, Resolution((1,), 64))
+    >>> motion = problem.solve(natural_frequencies(rig)[0], force=2.0)
+    >>> print(f"{abs(motion.amplitude(0)):.4f} mm of {2.0 / (0.05 * 1e3):.4f}")
+    0.0400 mm of 0.0400
+    """
+    dashpots = dashpots or {}
+    if min(mass_factor, stiffness_factor, loss_factor, *dashpots.values(), 0.0) < 0.0:
+        raise RigError("damping below zero, which feeds vibrations: give 0 or more")
+    damping = model.damping + mass_factor * model.mass + stiffness_factor * model.stiffness
+    for link, coefficient in dashpots.items():
+        stretch = stretch_of(model.names, link)
+        damping = damping + coefficient * np.outer(stretch, stretch)
+    structural = model.structural
+    if loss_factor > 0.0:
+        of_stiffness = loss_factor * model.stiffness
+        structural = of_stiffness if structural is None else structural + of_stiffness
+    return replace(model, damping=damping, structural=structural)
+
+
+def rayleigh_factors(frequencies: Array, ratios: Array) -> tuple[float, float]:
+    """α [1/s] and β [s] by which modes of two ``frequencies`` [Hz] have two damping ``ratios``.
+
+    2 ζ = α / ω + β ω. One of them is below zero where the ratios differ by more than their
+    frequencies do.
+
+    Examples
+    --------
+    Ratios as the frequencies are damping by stiffness alone:
+
+    >>> import numpy as np
+    >>> from fe_models.dynamics.damping import rayleigh_factors
+    >>> alpha, beta = rayleigh_factors(np.array([50.0, 100.0]), np.array([0.01, 0.02]))
+    >>> print(f"{alpha:.9f} {2.0 * 0.01 / (100.0 * np.pi) / beta:.9f}")
+    0.000000000 1.000000000
+    """
+    angular = 2.0 * np.pi * np.asarray(frequencies)
+    alpha, beta = np.linalg.solve(
+        np.stack([1.0 / angular, angular], axis=1), 2.0 * np.asarray(ratios)
+    )
+    return float(alpha), float(beta)

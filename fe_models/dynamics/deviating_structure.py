@@ -1,0 +1,252 @@
+"""A structure with joints whose small deviations are followed: its modes, and what joints do to it.
+
+Of a large structure the low modes move, and all others answer as at rest, with the joints as stiff
+as they are there: with a finely meshed contact that is nearly all of them. Joints that do as these
+springs do then have no part in it. What is left out this way is seen by taking more modes.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fe_models.dynamics.harmonic_balance import HarmonicBalance
+from fe_models.dynamics.harmonics import ComplexArray
+from fe_models.dynamics.linear_steps import linear_steps
+from fe_models.dynamics.monodromy import JointSteps, StructureSteps, monodromy
+from fe_models.dynamics.period_times import PeriodTimes
+from fe_models.dynamics.periodic_joints import Deviations
+from sa_solver.types import Array
+
+# Sets of springs, at most, that joints are taken as in the steps of a period.
+MOST_SETS = 8
+# Share of the largest stiffness of joints that is rounding.
+RESISTING = 1e-10
+
+
+@dataclass(frozen=True)
+class ModalStructure:
+    """Modes ``(n,)`` of the natural frequencies' ``squares`` with their ``damping`` ``(n, n)``.
+
+    ``at_joints`` ``(j d, n)`` are their displacements there, with springs ``reference``
+    ``(j, d, d)`` for joints. Modes left out answer forces of joints at once, by ``residual``
+    ``(j d, j d)``; without any it is None.
+    """
+
+    squares: Array
+    damping: Array
+    at_joints: Array
+    reference: Array
+    residual: Array | None
+
+    @classmethod
+    def whole(cls, problem: HarmonicBalance) -> ModalStructure:
+        """All modes, without joints."""
+        receptance, directions = problem.receptance, problem.joints.directions
+        damping = receptance.damping
+        damping = damping if damping.ndim == 2 else np.diag(damping)
+        joints = len(receptance.at_joints) // directions
+        nothing = np.zeros((joints, directions, directions))
+        return cls(receptance.squares, damping, receptance.at_joints, nothing, None)
+
+    @classmethod
+    def reduced(cls, problem: HarmonicBalance, count: int) -> ModalStructure:
+        """So many low modes, with joints as stiff as at rest."""
+        stuck = problem.rest.stuck
+        stiffened, shapes = stuck.stiffened, stuck.stiffened.at_points[:, :count]
+        return cls(
+            stiffened.squares[:count],
+            # Not only that of each mode: damping is that of the structure without joints.
+            shapes.T @ problem.model.damping @ shapes,
+            stiffened.at_joints[:, :count],
+            stuck.tangents,
+            stiffened.residual_flexibility(count),
+        )
+
+    def rates(self, stiffness: Array, scale: Array) -> Array:
+        """A ``(s, 2 n, 2 n)`` for sets of ``stiffness`` ``(s, n, n)``.
+
+        Displacements are in units of velocities, by a ``scale`` ``(n,)`` [rad/s]: then rates are of
+        about one size.
+        """
+        count = len(scale)
+        rates = np.zeros((len(stiffness), 2 * count, 2 * count))
+        rates[:, :count, count:] = np.diag(scale)
+        rates[:, count:, :count] = -stiffness / scale
+        rates[:, count:, count:] = -self.damping
+        return rates
+
+
+def modes_below(problem: HarmonicBalance, angular: float) -> int:
+    """How many modes, with joints as stiff as at rest, are slower than that [rad/s]."""
+    return int(np.searchsorted(problem.rest.stuck.stiffened.squares, angular**2)) or 1
+
+
+@dataclass(frozen=True)
+class ActiveJoints:
+    """Joints that are followed, by number ``(a,)``, and what is known of all.
+
+    Those that are ``constant`` ``(j,)`` all period long are the ``springs`` ``(j, d, d)``, less
+    those that the structure has. Of what active joints remember some is ``changed`` ``(a p,)`` in
+    the period; what is not, and where other sliders are, is ``neutral``: so many numbers.
+    """
+
+    active: np.ndarray
+    constant: np.ndarray
+    springs: Array
+    changed: np.ndarray
+    neutral: int
+
+    @classmethod
+    def of(cls, deviations: Deviations, structure: ModalStructure) -> ActiveJoints:
+        """Those of a period."""
+        kept, starts, ends = deviations.kept, deviations.by_start, deviations.by_end
+        same = _all(deviations.tangent == deviations.tangent[0]) & _all(ends == ends[0])
+        holds = same & _all(kept == np.eye(kept.shape[2])) & _all(starts == -ends)
+        nothing = _all(kept == 0.0) & _all(starts == 0.0) & _all(ends == 0.0)
+        constant = holds | (same & nothing)
+        springs = deviations.tangent[0] + deviations.pull @ ends[0] - structure.reference
+        springs[~constant] = 0.0
+        followed = ~constant
+        if structure.residual is not None:
+            # Modes left out depend on them: they are joints that remember nothing.
+            followed |= springs.any(axis=(1, 2))
+        active = np.flatnonzero(followed)
+        # What is not changed remembers what was before all periods, as an open turning point.
+        never = (kept[:, active] == np.eye(kept.shape[2])).all(axis=(0, 3))
+        for maps in (starts, ends):
+            never &= (maps[:, active] == 0.0).all(axis=(0, 3))
+        never[constant[active]] = False
+        neutral = int((holds & ~nothing).sum()) * kept.shape[2] + int(never.sum())
+        return cls(active, constant, springs, ~never.ravel(), neutral)
+
+    def steps(self, deviations: Deviations, structure: ModalStructure) -> JointSteps:
+        """Their maps, with forces less those of springs that the structure has."""
+        active = self.active
+        kept, starts, ends = (
+            maps[:, active] for maps in (deviations.kept, deviations.by_start, deviations.by_end)
+        )
+        tangent = deviations.tangent[:, active] - structure.reference[active]
+        springs = self.constant[active]
+        for maps in (kept, starts, ends):
+            maps[:, springs] = 0.0
+        tangent[:, springs] = self.springs[active][springs]
+        kinds = np.zeros(len(kept), np.int64)
+        return JointSteps(kinds, kept, starts, ends, deviations.pull[active], tangent)
+
+
+def multipliers_of(
+    structure: ModalStructure,
+    frequency: float,
+    times: PeriodTimes,
+    deviations: Deviations,
+    joints: ActiveJoints,
+) -> tuple[ComplexArray, int]:
+    """Multipliers by size at a frequency [Hz], without neutral ones, and how many displacements of
+    the whole structure are neutral too."""
+    matrix = _matrix(structure, frequency, times, deviations, joints)
+    # What a joint never changes is 1 by itself: a row and a column of it.
+    changed = np.concatenate([np.ones(2 * len(structure.squares), bool), joints.changed])
+    matrix = matrix[changed][:, changed]
+    shifts = _shifts(structure, deviations, joints, len(matrix))
+    if shifts.shape[1]:
+        # On what is left of the space beside them: it has all other eigenvalues.
+        rest = np.linalg.qr(shifts, mode="complete")[0][:, shifts.shape[1] :]
+        matrix = rest.T @ matrix @ rest
+    multipliers = np.linalg.eigvals(matrix)
+    return multipliers[np.argsort(-np.abs(multipliers), kind="stable")], shifts.shape[1]
+
+
+def _matrix(
+    structure: ModalStructure,
+    frequency: float,
+    times: PeriodTimes,
+    deviations: Deviations,
+    joints: ActiveJoints,
+) -> Array:
+    """The monodromy matrix."""
+    stiffness = np.diag(structure.squares)[None]
+    scale = np.sqrt(np.maximum(structure.squares, (2.0 * np.pi * frequency) ** 2))
+    if structure.residual is None and joints.constant.any():
+        stiffness = stiffness + _projected(joints.springs[None], structure.at_joints)
+    if len(joints.active) == 0:
+        nothing = np.empty((2 * len(scale), 0))
+        rates = structure.rates(stiffness, scale)
+        return linear_steps(rates, nothing, 1.0 / frequency, 1).forward[0, 0]
+    directions, levels = deviations.tangent.shape[2], times.deepest + 1
+    places = (joints.active[:, None] * directions + np.arange(directions)).ravel()
+    at_joints = structure.at_joints[places]
+    maps = joints.steps(deviations, structure)
+    if structure.residual is None:
+        residual = np.zeros((len(places), len(places)))
+        kinds, alike = _alike(maps)
+        stiffness = stiffness + _projected(alike, at_joints)
+    else:
+        residual = structure.residual[np.ix_(places, places)]
+        kinds, alike = maps.kinds, np.zeros((1, *maps.tangent.shape[1:]))
+    rates = structure.rates(stiffness, scale)
+    inputs = np.vstack([np.zeros_like(at_joints.T), -at_joints.T])
+    steps = linear_steps(rates, inputs, 1.0 / (frequency * times.samples), levels)
+    in_steps = StructureSteps(
+        steps.forward.reshape(-1, *rates.shape[1:]),
+        steps.by_start.reshape(-1, *inputs.shape),
+        steps.by_end.reshape(-1, *inputs.shape),
+        np.repeat(alike, levels, axis=0),
+        np.hstack([at_joints / scale, np.zeros_like(at_joints)]),
+        residual,
+    )
+    return np.asarray(monodromy(in_steps, maps._replace(kinds=levels * kinds + times.levels)))
+
+
+def _shifts(
+    structure: ModalStructure, deviations: Deviations, joints: ActiveJoints, size: int
+) -> Array:
+    """Deviations ``(size, s)`` that stay as they are: where only sliders hold the structure, it
+    may be displaced as a whole."""
+    rigid = np.flatnonzero(structure.squares == 0.0)
+    if len(rigid) == 0:
+        return np.empty((size, 0))
+    shapes = structure.at_joints[:, rigid].reshape(len(joints.springs), -1, len(rigid))
+    resisted = [joints.springs @ shapes]
+    for maps in (deviations.tangent, deviations.by_start + deviations.by_end):
+        resisted.extend(maps[:, joints.active] @ shapes[joints.active])
+    rows = np.concatenate([part.reshape(-1, len(rigid)) for part in resisted])
+    # There are as many rows as increments times joints: their triangle has the same directions.
+    triangle = np.linalg.qr(rows, mode="r")
+    _, sizes, directions = np.linalg.svd(triangle, full_matrices=True)
+    free = np.ones(len(rigid), bool)
+    free[: len(sizes)] = sizes <= RESISTING * np.abs(rows).max(initial=1.0)
+    shifts = np.zeros((size, int(free.sum())))
+    shifts[rigid] = directions[free].T
+    return shifts
+
+
+def _projected(tangents: Array, at_joints: Array) -> Array:
+    """Stiffness ``(s, n, n)`` of sets of springs ``(s, j, d, d)`` in terms of modes."""
+    by_joint = at_joints.reshape(*tangents.shape[1:3], -1)
+    pulled = (tangents @ by_joint).reshape(len(tangents), *at_joints.shape)
+    return np.asarray(at_joints.T @ pulled)
+
+
+def _alike(joints: JointSteps) -> tuple[np.ndarray, Array]:
+    """For each increment the number of a set of springs, and these sets ``(s, a, d, d)``, each near
+    to what the joints are in its increments.
+
+    Joints that stick, slip and part have few; others are told apart by their stiffness.
+    """
+    slopes = joints.tangent + joints.pull @ joints.by_end
+    sums = slopes.reshape(len(slopes), -1).sum(axis=1)
+    _, kinds = np.unique(sums, return_inverse=True)
+    if kinds.max() >= MOST_SETS:
+        share = (sums - sums.min()) / np.ptp(sums)
+        _, kinds = np.unique(np.rint(share * (MOST_SETS - 1)), return_inverse=True)
+    counts = np.bincount(kinds)
+    sets = np.zeros((len(counts), *slopes.shape[1:]))
+    np.add.at(sets, kinds, slopes)
+    return kinds, sets / counts[:, None, None, None]
+
+
+def _all(condition: np.ndarray) -> np.ndarray:
+    """Joints ``(j,)`` for which a condition ``(t, j, ...)`` holds throughout."""
+    return np.asarray(condition.all(axis=(0, *range(2, condition.ndim))))

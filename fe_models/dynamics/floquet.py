@@ -1,0 +1,221 @@
+"""Stability of periodic motions of structures with joints: Floquet's multipliers.
+
+A small deviation from a periodic motion is multiplied in a period by the monodromy matrix; where
+all its eigenvalues, the multipliers, lie within the unit circle, deviations die out (Nayfeh and
+Balachandran 1995, *Applied Nonlinear Dynamics*, section 3.2). The state that deviates is that of
+the structure and of all that joints remember: of hysteretic joints Hill's determinant, made of the
+Jacobian of harmonic balance, knows only the steady loop, as if sliders came back by themselves.
+
+Neutral deviations, which neither grow nor die, are told by what joints are, not by a tolerance: a
+slider that sticks all period long may stand where it likes (its multiplier is 1), and it is a
+spring to all else; a structure that only sliders hold may be displaced as a whole.
+
+The error of the multipliers is told by half as many times of the period, and by a motion that is as
+far off as the given one may be. Where one is no farther from the circle than that, more times are
+taken, and in the end nothing is said.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+
+from fe_models.dynamics.deviating_structure import (
+    ActiveJoints,
+    ModalStructure,
+    modes_below,
+    multipliers_of,
+)
+from fe_models.dynamics.harmonic_balance import HarmonicBalance
+from fe_models.dynamics.harmonic_solution import HarmonicSolution
+from fe_models.dynamics.harmonics import ComplexArray
+from fe_models.dynamics.linear_steps import SPLIT
+from fe_models.dynamics.period_times import PeriodTimes
+from fe_models.dynamics.periodic_joints import DeviatingJoints, Deviations
+
+Verdict = Literal["stable", "unstable", "unknown"]
+# Times of a period at first, at least: so many steps of equal length, which then are divided in
+# four, so often, where a joint changes what it does.
+SAMPLES, DEEPEST = 128, 3
+# Where multipliers are nearer to the circle than their error, so often four times as many times.
+FINER = 2
+# Multipliers that are told, and those below which one is of no account.
+TOLD, SMALL = 8, 1e-3
+# Estimates of error that a multiplier must be away from the circle.
+SURE = 2.0
+# Of a multiplier, by the steps of a period and the eigenvalues of their product.
+ROUNDING = 1e-9
+# Modes up to which all of a structure are taken; of more those slower than so many times the
+# highest harmonic of the motion. Times of a period of these, or with more directions of joints than
+# so many, and times per highest harmonic.
+MOST_MODES, HIGHEST, MOST_DIRECTIONS, LARGE_SAMPLES, PER_HARMONIC = 64, 3.0, 12, 128, 4
+
+
+@dataclass(frozen=True)
+class Stability:
+    """Whether deviations from a motion die out: the ``verdict``.
+
+    ``multipliers`` ``(k,)`` are the largest, by size, without the ``neutral`` ones, so many, which
+    are 1 whatever the motion is; ``unstable`` of them are beyond the circle. ``error`` is that of
+    the largest. ``message`` says why nothing can be said, where it is unknown.
+    """
+
+    verdict: Verdict
+    multipliers: ComplexArray
+    unstable: int
+    neutral: int
+    error: float
+    message: str
+
+    @property
+    def beyond(self) -> int:
+        """Multipliers beyond the circle, however near to it."""
+        return int((np.abs(self.multipliers) > 1.0).sum())
+
+    @property
+    def largest(self) -> float:
+        """Size of the largest multiplier; 0 without any."""
+        return float(abs(self.multipliers[0])) if len(self.multipliers) else 0.0
+
+
+class Floquet:
+    """Stability of the motions of one ``problem``.
+
+    Of a structure of more than ``most_modes`` those are followed that a motion may move.
+
+    Examples
+    --------
+    A mass on a spring that hardens has three motions at 0.22 Hz, of which the middle one repels:
+
+    >>> import numpy as np
+    >>> from fe_models.dynamics import *
+    >>> from wear.joints import PeriodicMarch, PolynomialSpring
+    >>> rig = lumped_rig({"m": 1.0}, {Link("m"): 1.0}, [[Link("m")]], damping_ratio=0.05)
+    >>> joints = PeriodicMarch(PolynomialSpring(0.0, cubic=1.0))
+    >>> load = PeriodicLoad({1: unit_force(rig, "m")})
+    >>> problem = HarmonicBalance(rig, joints, load, Resolution((1, 3, 5), 64))
+    >>> branch = along_frequency(problem, 0.3, (0.1, 0.4))
+    >>> passes = np.flatnonzero(np.diff(np.sign(branch.frequencies - 0.22)))
+    >>> motions = [problem.solve(0.22, 0.3, branch.solutions[place]) for place in passes]
+    >>> floquet = Floquet(problem)
+    >>> for motion in motions:
+    ...     print(f"{abs(motion.amplitude(0)):.2f} mm:", floquet.stability(motion).verdict)
+    1.20 mm: stable
+    0.89 mm: unstable
+    0.36 mm: stable
+    """
+
+    def __init__(self, problem: HarmonicBalance, most_modes: int = MOST_MODES) -> None:
+        self._most_modes = most_modes
+        self._problem, self._joints = problem, problem.joints
+        self._reduced: ModalStructure | None = None
+
+    def _structure(self, motion: HarmonicSolution) -> ModalStructure:
+        """All modes of a small structure; of a large one those that this motion may move."""
+        problem = self._problem
+        if len(problem.receptance.squares) <= self._most_modes:
+            return ModalStructure.whole(problem)
+        highest = 2.0 * np.pi * motion.frequency * motion.resolution.harmonics[-1]
+        count = modes_below(problem, HIGHEST * highest)
+        if self._reduced is None or count != len(self._reduced.squares):
+            self._reduced = ModalStructure.reduced(problem, count)
+        return self._reduced
+
+    @property
+    def cheap(self) -> bool:
+        """Whether it takes milliseconds for a motion; otherwise it may be seconds."""
+        modes, directions = len(self._problem.model.mass), len(self._problem.model.connection)
+        return modes <= self._most_modes and directions <= MOST_DIRECTIONS
+
+    def stability(self, motion: HarmonicSolution) -> Stability:
+        """Of a motion of the problem, at whatever resolution."""
+        if not isinstance(self._joints, DeviatingJoints):
+            return _unknown("the joints do not tell what becomes of small deviations")
+        if self._problem.model.structural is not None:
+            return _unknown(
+                "a loss factor is of harmonics, and of no deviation in time: half of it as damping "
+                "ratio is the same at resonance"
+            )
+        structure = self._structure(motion)
+        samples, deepest, finest = SAMPLES, DEEPEST, FINER
+        if not self.cheap:
+            # Of many joints one changes in every step: none of them is divided.
+            samples, deepest, finest = LARGE_SAMPLES, 0, 0
+        while samples < PER_HARMONIC * motion.resolution.harmonics[-1]:
+            samples *= 2
+        at = structure, motion.frequency
+        for finer in range(finest + 1):
+            times, deviations = self._marched(motion, SPLIT**finer * samples, deepest + finer)
+            joints = ActiveJoints.of(deviations, structure)
+            fine, shifts = multipliers_of(*at, times, deviations, joints)
+            half = times.halved()
+            # Half as many times, and the same of a motion as far off as this one may be.
+            coarse, _ = multipliers_of(*at, half, self._deviations(motion, half), joints)
+            other = _displaced(motion)
+            moved, _ = multipliers_of(*at, half, self._deviations(other, half), joints)
+            told = _judged(fine, coarse, moved, joints.neutral + shifts)
+            if told.verdict != "unknown":
+                break
+        return told
+
+    def _marched(
+        self, motion: HarmonicSolution, samples: int, deepest: int
+    ) -> tuple[PeriodTimes, Deviations]:
+        """What joints make of deviations, in short steps where they change what they do."""
+        times = PeriodTimes.even(samples, deepest)
+        while True:
+            deviations = self._deviations(motion, times)
+            regimes = deviations.regimes
+            changes = (regimes != np.roll(regimes, -1, axis=0)).any(axis=1)
+            # It changes in this step or, where the motion turns, in the next.
+            marked = changes | np.roll(changes, 1)
+            if not (marked & (times.levels < deepest)).any():
+                return times, deviations
+            times = times.divided(marked)
+
+    def _deviations(self, motion: HarmonicSolution, times: PeriodTimes) -> Deviations:
+        assert isinstance(self._joints, DeviatingJoints)
+        basis = motion.resolution.functions_at(times.starts, times.parts)
+        return self._joints.linearise(motion.coefficients, basis, motion.resolution.lead)
+
+
+def _unknown(message: str) -> Stability:
+    """Nothing can be said."""
+    return Stability("unknown", np.empty(0, dtype=complex), 0, 0, np.inf, message)
+
+
+def _displaced(motion: HarmonicSolution) -> HarmonicSolution:
+    """A motion whose vibration is larger by the error of the given one, or by what its harmonics
+    leave out where that is not known."""
+    share = motion.left_out if motion.error is None else motion.error.vibration
+    coefficients = (1.0 + share) * motion.coefficients
+    if motion.resolution.harmonics[0] == 0:
+        coefficients[:, 0] = motion.coefficients[:, 0]
+    return replace(motion, coefficients=coefficients)
+
+
+def _judged(
+    fine: ComplexArray, coarse: ComplexArray, moved: ComplexArray, neutral: int
+) -> Stability:
+    """What multipliers say, with those of half as many times, and of another motion at these.
+
+    What counts is how large the largest is, the second largest, and so on.
+    """
+    sizes, halved, other = (np.abs(multipliers) for multipliers in (fine, coarse, moved))
+    errors = np.abs(sizes - halved) + np.abs(other - halved) + ROUNDING
+    beyond = sizes - 1.0
+    unstable, undecided = beyond > SURE * errors, np.abs(beyond) <= SURE * errors
+    verdict: Verdict = "unstable" if unstable.any() else "stable"
+    message = ""
+    if undecided.any() and verdict == "stable":
+        place = int(np.argmax(undecided))
+        verdict = "unknown"
+        message = (
+            f"a multiplier of size {sizes[place]:.6g} is as near to 1 as its error, "
+            f"{errors[place]:.1g}"
+        )
+    told = fine[sizes > SMALL][:TOLD]
+    error = float(errors[:1].sum())
+    return Stability(verdict, told, int(unstable.sum()), neutral, error, message)

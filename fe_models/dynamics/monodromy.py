@@ -1,0 +1,238 @@
+"""What a period makes of small deviations from a periodic motion: the monodromy matrix.
+
+The state is that of the structure and all that its joints remember. The structure is stepped
+exactly under forces that change linearly from one time to the next, the joints by their own maps;
+within a step the displacements u of the joints are those under which both agree,
+
+    u = (what the structure does without the forces at the end) - G F,   F = (T + S D) u + ...
+
+Springs near to what the joints are in a step are taken as parts of the structure in it, and off the
+joints' forces: where joints are these springs nothing is left of the error, which is of second
+order in the steps, and of first order in those in which a joint changes what it does.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from sa_solver.types import Array
+
+# Unknowns up to which loops are faster than calls of BLAS and LAPACK.
+FEW = 8
+# Of 1: what is left of a deviation that is forgotten.
+FORGOTTEN = 1e-100
+
+
+class StructureSteps(NamedTuple):
+    """The structure's ``k`` numbers, in ``v`` kinds of steps under forces of ``m`` directions.
+
+    ``forward`` ``(v, k, k)``, ``by_start`` and ``by_end`` ``(v, k, m)``, with the ``springs``
+    ``(v, a, d, d)`` of joints in it; displacements of joints ``at_joints`` ``(m, k)`` by these
+    numbers, and ``residual`` ``(m, m)`` by forces, at once.
+    """
+
+    forward: Array
+    by_start: Array
+    by_end: Array
+    springs: Array
+    at_joints: Array
+    residual: Array
+
+
+class JointSteps(NamedTuple):
+    """The maps of ``t`` increments of ``a`` joints; ``kinds`` ``(t,)`` are those of the steps.
+
+    The others as in :class:`fe_models.dynamics.periodic_joints.Deviations`.
+    """
+
+    kinds: np.ndarray
+    kept: Array
+    by_start: Array
+    by_end: Array
+    pull: Array
+    tangent: Array
+
+
+@njit(cache=True, nogil=True)
+def monodromy(structure: StructureSteps, joints: JointSteps) -> Array:
+    """The matrix ``(k + a p, k + a p)``: numbers of the structure first, then memory by joint."""
+    own = structure.forward.shape[1]
+    count, remembered, directions = joints.by_end.shape[1:]
+    forces, size = count * directions, own + count * remembered
+    state, memory = np.zeros((own, size)), np.zeros((count * remembered, size))
+    for row in range(own):
+        state[row, row] = 1.0
+    for number in range(count * remembered):
+        memory[number, own + number] = 1.0
+    compliance = np.empty((len(structure.forward), forces, forces))
+    for kind in range(len(compliance)):
+        compliance[kind] = structure.residual
+        _add_product(-1.0, structure.at_joints, structure.by_end[kind], compliance[kind])
+    new_state, new_memory = np.empty_like(state), np.empty_like(memory)
+    force, moved = np.empty((forces, size)), np.zeros((forces, size))
+    slopes, matrix = np.empty((count, directions, directions)), np.empty((forces, forces))
+    # Displacements at the beginning: those of the structure, less what forces do at once.
+    _memory_forces(joints, memory, force)
+    _add_product(1.0, structure.at_joints, state, moved)
+    _add_product(-1.0, structure.residual, force, moved)
+    slopes[:] = joints.tangent[-1]
+    _solve(_coupled(structure.residual, slopes, matrix), moved)
+    _add_springs(1.0, joints.tangent[-1], moved, force)
+    for step in range(len(joints.kinds)):
+        kind = joints.kinds[step]
+        springs = structure.springs[kind]
+        _add_springs(-1.0, springs, moved, force)
+        new_state[:] = 0.0
+        _add_product(1.0, structure.forward[kind], state, new_state)
+        _add_product(1.0, structure.by_start[kind], force, new_state)
+        new_memory[:] = 0.0
+        _add_kept(joints.kept[step], memory, new_memory)
+        _add_moved(joints.by_start[step], moved, new_memory)
+        _memory_forces(joints, new_memory, force)
+        moved[:] = 0.0
+        _add_product(1.0, structure.at_joints, new_state, moved)
+        _add_product(-1.0, compliance[kind], force, moved)
+        _slopes(joints, step, springs, slopes)
+        _solve(_coupled(compliance[kind], slopes, matrix), moved)
+        _add_springs(1.0, slopes, moved, force)
+        _add_product(1.0, structure.by_end[kind], force, new_state)
+        _add_moved(joints.by_end[step], moved, new_memory)
+        # Whole forces again: those of springs in the structure are the joints'.
+        _add_springs(1.0, springs, moved, force)
+        _forget(new_memory)
+        state, new_state = new_state, state
+        memory, new_memory = new_memory, memory
+    return np.concatenate((state, memory))
+
+
+@njit(cache=True, nogil=True)
+def _add_product(factor: float, matrix: Array, rows: Array, to: Array) -> None:
+    """factor matrix @ rows, added."""
+    if len(matrix) > FEW:
+        to += factor * np.dot(matrix, rows)
+        return
+    for i in range(matrix.shape[0]):
+        for k in range(matrix.shape[1]):
+            share = factor * matrix[i, k]
+            for c in range(rows.shape[1]):
+                to[i, c] += share * rows[k, c]
+
+
+@njit(cache=True, nogil=True)
+def _add_row(share: float, row: Array, to: Array) -> None:
+    if share != 0.0:
+        for c in range(len(row)):
+            to[c] += share * row[c]
+
+
+@njit(cache=True, nogil=True)
+def _forget(memory: Array) -> None:
+    """What has decayed below all rounding is nothing: numbers without all digits are slow."""
+    for row in memory:
+        for c in range(len(row)):
+            if abs(row[c]) < FORGOTTEN:
+                row[c] = 0.0
+
+
+@njit(cache=True, nogil=True)
+def _add_kept(kept: Array, memory: Array, to: Array) -> None:
+    """A s ``(a p, n)``, added."""
+    count, remembered, _ = kept.shape
+    for joint in range(count):
+        first = joint * remembered
+        for i in range(remembered):
+            for k in range(remembered):
+                _add_row(kept[joint, i, k], memory[first + k], to[first + i])
+
+
+@njit(cache=True, nogil=True)
+def _add_moved(maps: Array, moved: Array, to: Array) -> None:
+    """E u or D u ``(a p, n)``, added."""
+    count, remembered, directions = maps.shape
+    for joint in range(count):
+        for i in range(remembered):
+            for k in range(directions):
+                row = joint * remembered + i
+                _add_row(maps[joint, i, k], moved[joint * directions + k], to[row])
+
+
+@njit(cache=True, nogil=True)
+def _memory_forces(joints: JointSteps, memory: Array, force: Array) -> None:
+    """S s ``(a d, n)``."""
+    count, directions, remembered = joints.pull.shape
+    force[:] = 0.0
+    for joint in range(count):
+        for i in range(directions):
+            for k in range(remembered):
+                row = memory[joint * remembered + k]
+                _add_row(joints.pull[joint, i, k], row, force[joint * directions + i])
+
+
+@njit(cache=True, nogil=True)
+def _add_springs(factor: float, springs: Array, moved: Array, force: Array) -> None:
+    """Forces ``(a d, n)`` of springs ``(a, d, d)``, added."""
+    count, directions, _ = springs.shape
+    for joint in range(count):
+        first = joint * directions
+        for i in range(directions):
+            for k in range(directions):
+                _add_row(factor * springs[joint, i, k], moved[first + k], force[first + i])
+
+
+@njit(cache=True, nogil=True)
+def _slopes(joints: JointSteps, step: int, springs: Array, slopes: Array) -> None:
+    """T + S D less springs that the structure has, ``(a, d, d)``."""
+    count, directions, remembered = joints.pull.shape
+    for joint in range(count):
+        for i in range(directions):
+            for k in range(directions):
+                slope = joints.tangent[step, joint, i, k] - springs[joint, i, k]
+                for number in range(remembered):
+                    pull = joints.pull[joint, i, number]
+                    slope += pull * joints.by_end[step, joint, number, k]
+                slopes[joint, i, k] = slope
+
+
+@njit(cache=True, nogil=True)
+def _coupled(compliance: Array, slopes: Array, matrix: Array) -> Array:
+    """1 + G times block-diagonal slopes, in ``matrix``."""
+    count, directions, _ = slopes.shape
+    matrix[:] = 0.0
+    for row in range(len(matrix)):
+        matrix[row, row] = 1.0
+        for joint in range(count):
+            first = joint * directions
+            for k in range(directions):
+                for i in range(directions):
+                    share = compliance[row, first + i] * slopes[joint, i, k]
+                    matrix[row, first + k] += share
+    return matrix
+
+
+@njit(cache=True, nogil=True)
+def _solve(matrix: Array, rhs: Array) -> None:
+    """Make of ``rhs`` matrix⁻¹ rhs; the matrix may be overwritten."""
+    size = len(matrix)
+    if size > FEW:
+        rhs[:] = np.linalg.solve(matrix, rhs)
+        return
+    for column in range(size):
+        pivot = column + np.argmax(np.abs(matrix[column:, column]))
+        for c in range(size):
+            matrix[column, c], matrix[pivot, c] = matrix[pivot, c], matrix[column, c]
+        for c in range(rhs.shape[1]):
+            rhs[column, c], rhs[pivot, c] = rhs[pivot, c], rhs[column, c]
+        inverse = 1.0 / matrix[column, column]
+        for c in range(size):
+            matrix[column, c] *= inverse
+        for c in range(rhs.shape[1]):
+            rhs[column, c] *= inverse
+        for row in range(size):
+            share = matrix[row, column]
+            if row != column and share != 0.0:
+                for c in range(size):
+                    matrix[row, c] -= share * matrix[column, c]
+                _add_row(-share, rhs[column], rhs[row])

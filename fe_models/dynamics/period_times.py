@@ -1,0 +1,46 @@
+"""Times of a period: steps of equal length, some of which are divided in four, again and again."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fe_models.dynamics.linear_steps import SPLIT
+
+
+@dataclass(frozen=True)
+class PeriodTimes:
+    """Steps that begin at ``starts`` ``(t,)``, as ``parts`` of the period, of ``levels`` ``(t,)``.
+
+    Of level 0 are ``samples`` steps; one of each next level is a quarter as long, until the
+    ``deepest``.
+    """
+
+    starts: np.ndarray
+    levels: np.ndarray
+    samples: int
+    deepest: int
+
+    @classmethod
+    def even(cls, samples: int, deepest: int) -> PeriodTimes:
+        """Steps of equal length, as many as there are samples."""
+        starts = SPLIT**deepest * np.arange(samples)
+        return cls(starts, np.zeros(samples, np.int64), samples, deepest)
+
+    @property
+    def parts(self) -> int:
+        """In which times are counted."""
+        return int(self.samples * SPLIT**self.deepest)
+
+    def divided(self, marked: np.ndarray) -> PeriodTimes:
+        """With the ``marked`` ``(t,)`` steps in four, if they are not of the deepest level."""
+        pieces = np.where(marked & (self.levels < self.deepest), SPLIT, 1)
+        levels = np.repeat(self.levels + (pieces > 1), pieces)
+        within = np.arange(len(levels)) - np.repeat(np.cumsum(pieces) - pieces, pieces)
+        starts = np.repeat(self.starts, pieces) + within * SPLIT ** (self.deepest - levels)
+        return PeriodTimes(starts, levels, self.samples, self.deepest)
+
+    def halved(self) -> PeriodTimes:
+        """With every step twice as long: those of a level come in pairs."""
+        return PeriodTimes(self.starts[::2] // 2, self.levels[::2], self.samples // 2, self.deepest)

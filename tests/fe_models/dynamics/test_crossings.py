@@ -1,0 +1,89 @@
+"""All motions of a branch at a frequency, against the roots of Duffing's cubic."""
+
+import numpy as np
+import pytest
+
+from fe_models.dynamics import crossings
+from fe_models.dynamics.crossings import motions_at
+from fe_models.dynamics.forced_response import along_frequency
+from fe_models.dynamics.harmonic_balance import HarmonicBalance, PeriodicLoad
+from fe_models.dynamics.harmonics import Resolution
+from fe_models.dynamics.rig import Link, lumped_rig, unit_force
+from tests.oracles.cubic_springs import CubicSprings
+
+MASS, STIFFNESS, RATIO, CUBIC, FORCE = 1e-3, 1e3, 0.02, 2e4, 10.0
+DAMPING = 2.0 * RATIO * np.sqrt(MASS * STIFFNESS)
+
+
+def amplitudes(frequency):
+    """In one harmonic: A² ((k - m ω² + 3/4 k3 A²)² + (c ω)²) = F²."""
+    angular = 2.0 * np.pi * frequency
+    linear, cubic = STIFFNESS - MASS * angular**2, 0.75 * CUBIC
+    resisting = linear**2 + (DAMPING * angular) ** 2
+    roots = np.roots([cubic**2, 2.0 * linear * cubic, resisting, -(FORCE**2)])
+    real = roots[(np.abs(roots.imag) < 1e-7 * np.abs(roots)) & (roots.real > 0.0)]
+    return np.sort(np.sqrt(real.real))
+
+
+def fold(inside, outside):
+    """The frequency [Hz] between two at which two of three motions cease, by halving."""
+    while abs(outside - inside) > 1e-9:
+        middle = 0.5 * (inside + outside)
+        if len(amplitudes(middle)) == 3:
+            inside = middle
+        else:
+            outside = middle
+    return inside
+
+
+@pytest.fixture(scope="module")
+def branch():
+    rig = lumped_rig({"m": MASS}, {Link("m"): STIFFNESS}, [[Link("m")]], damping_ratio=RATIO)
+    load = PeriodicLoad({1: -1j * unit_force(rig, "m")})
+    problem = HarmonicBalance(rig, CubicSprings(CUBIC), load, Resolution((1,), 64))
+    found = along_frequency(problem, FORCE, (100.0, 400.0))
+    assert len(found.curve.folds) == 2
+    return found
+
+
+def sizes(branch, frequency):
+    motions = motions_at(branch, frequency)
+    assert all(motion.converged and motion.frequency == frequency for motion in motions)
+    assert all(motion.residual < 1e-10 for motion in motions)
+    return np.array([abs(motion.amplitude(0)) for motion in motions])
+
+
+@pytest.mark.parametrize("frequency", [100.0, 130.0, 187.87, 199.0, 230.0, 400.0])
+def test_every_coexisting_motion_is_found(branch, frequency):
+    wanted = amplitudes(frequency)
+    np.testing.assert_allclose(np.sort(sizes(branch, frequency)), wanted, rtol=1e-9)
+    assert len(wanted) == (3 if 176.0 < frequency < 200.0 else 1)
+
+
+def test_motions_are_in_the_order_of_the_curve(branch):
+    upper, middle, lower = sizes(branch, 190.0)
+    assert upper > middle > lower
+
+
+def test_folds_between_points_are_not_missed(branch):
+    """Beyond the farthest point of the curve, on either side of where it turns back."""
+    place = branch.curve.folds[0]
+    farthest = branch.frequencies[place : place + 2].max()
+    highest = fold(farthest, farthest + 1.0)
+    assert highest > farthest + 0.1
+    for frequency in (farthest, 0.5 * (farthest + highest), highest - 1e-5):
+        wanted = amplitudes(frequency)
+        assert len(wanted) == 3
+        np.testing.assert_allclose(np.sort(sizes(branch, frequency)), wanted, rtol=1e-6)
+    assert len(sizes(branch, highest + 1e-5)) == 1
+
+
+def test_where_newton_alone_goes_astray_the_chord_leads(branch, monkeypatch):
+    """Nothing that Newton's method finds at once is believed: planes across the chord cut it."""
+    monkeypatch.setattr(crossings._Chord, "along", lambda self, coordinates: False)
+    np.testing.assert_allclose(np.sort(sizes(branch, 190.0)), amplitudes(190.0), rtol=1e-9)
+
+
+def test_none_where_the_curve_does_not_get_to(branch):
+    assert motions_at(branch, 401.0) == ()
+    assert motions_at(branch, 99.0) == ()

@@ -1,0 +1,122 @@
+"""Damping beside that of the modes, against linear algebra and balances of energy."""
+
+import numpy as np
+import pytest
+import scipy.linalg as sl
+
+from fe_models.dynamics.cycle_energy import damping_ratio, energy_lost
+from fe_models.dynamics.damping import damped, rayleigh_factors
+from fe_models.dynamics.harmonic_balance import HarmonicBalance, PeriodicLoad
+from fe_models.dynamics.harmonics import Resolution
+from fe_models.dynamics.newmark import TimeStepControl, integrate
+from fe_models.dynamics.phase_resonance import along_phase_resonance
+from fe_models.dynamics.rig import Link, RigError, lumped_rig, natural_frequencies, unit_force
+from wear.joints.jenkins import Jenkins
+from wear.joints.periodic import PeriodicMarch
+
+MASSES = {"a": 1e-3, "b": 2e-3}
+SPRINGS = {Link("a"): 1e3, Link("b", "a"): 3e3}
+FREE = PeriodicMarch(Jenkins(stiffness=1e3, friction=0.0, normal_load=10.0))
+SLIDER = PeriodicMarch(Jenkins(stiffness=2e3, friction=0.5, normal_load=10.0))
+
+
+def two_masses(**damping):
+    return damped(lumped_rig(MASSES, SPRINGS, [[Link("b")]], 0.01), **damping)
+
+
+def problem(model, joints=FREE, harmonics=(1,), samples=256):
+    load = PeriodicLoad({1: -1j * unit_force(model, "a")})
+    return HarmonicBalance(model, joints, load, Resolution(harmonics, samples))
+
+
+@pytest.mark.parametrize(
+    "damping",
+    [
+        {"dashpots": {Link("a"): 0.1, Link("b", "a"): 0.3}},
+        {"mass_factor": 20.0, "stiffness_factor": 2e-5},
+        {"loss_factor": 0.03},
+        {"dashpots": {Link("b"): 0.2}, "loss_factor": 0.03},
+    ],
+)
+def test_linear_responses_are_those_of_the_matrices(damping):
+    """Damping that mixes the modes included; at rest structural damping does nothing."""
+    model = two_masses(**damping)
+    balance = problem(model, harmonics=(0, 1, 3))
+    structural = np.zeros((2, 2)) if model.structural is None else model.structural
+    for frequency in (30.0, 110.0, 320.0):
+        angular = 2.0 * np.pi * frequency
+        stiffness = model.stiffness + 1j * structural + 1j * angular * model.damping
+        wanted = np.linalg.solve(stiffness - angular**2 * model.mass, [-5j, 0.0])
+        motion = balance.solve(frequency, 5.0)
+        np.testing.assert_allclose(motion.motion[1], wanted, rtol=1e-10)
+        np.testing.assert_allclose(motion.motion[[0, 2]], 0.0, atol=1e-15)
+        work = np.pi * 5.0 * -motion.amplitude(0).real
+        assert energy_lost(balance, motion) == pytest.approx(work, rel=1e-9)
+
+
+def test_work_balances_losses_with_friction_and_a_loss_factor():
+    """Of a motion with harmonics; structural damping takes as much of each cycle, however fast."""
+    model = two_masses(loss_factor=0.05, dashpots={Link("b", "a"): 0.05})
+    balance = problem(model, SLIDER, harmonics=(1, 3, 5, 7), samples=4096)
+    motion = balance.solve(140.0, 20.0)
+    assert motion.converged
+    assert motion.cycle.dissipated[0] > 0.1
+    work = np.pi * 20.0 * -motion.amplitude(0).real
+    assert energy_lost(balance, motion) == pytest.approx(work, rel=1e-5)
+
+
+def test_derivatives_know_structural_damping():
+    model = two_masses(loss_factor=0.1, dashpots={Link("b"): 0.1})
+    balance = problem(model, SLIDER, harmonics=(0, 1, 3))
+    motion = balance.solve(140.0, 20.0)
+    unknowns, step = motion.coefficients.ravel(), 1e-5
+    at = balance.evaluate(unknowns, 140.0, 20.0, "frequency")
+    ahead, behind = (
+        balance.evaluate(unknowns, 140.0 + sign * step, 20.0, "frequency").residual
+        for sign in (1.0, -1.0)
+    )
+    np.testing.assert_allclose(at.slope, (ahead - behind) / (2.0 * step), rtol=1e-5, atol=1e-10)
+
+
+def test_equivalent_damping_is_half_the_loss_factor():
+    """At phase resonance of one mass without friction: amplitude F / (η k), ζ = η / 2."""
+    rig = lumped_rig({"m": 1e-3}, {Link("m"): 1e3}, [[Link("m")]])
+    load = PeriodicLoad({1: -1j * unit_force(rig, "m")})
+    balance = HarmonicBalance(damped(rig, loss_factor=0.04), FREE, load, Resolution((1,), 64))
+    start = balance.solve(158.0, 2.0)
+    backbone = along_phase_resonance(balance, start, (1.0, 4.0))
+    np.testing.assert_allclose(backbone.frequencies, natural_frequencies(rig)[0], rtol=1e-9)
+    np.testing.assert_allclose(
+        backbone.first_amplitudes(0), backbone.forces / (0.04 * 1e3), rtol=1e-9
+    )
+    assert damping_ratio(balance, backbone.solutions[0]) == pytest.approx(0.02, rel=1e-9)
+
+
+def test_ratios_of_modes_and_rayleighs():
+    model = lumped_rig(MASSES, SPRINGS, [[Link("b")]], np.array([0.01, 0.04]))
+    squares, shapes = sl.eigh(model.stiffness, model.mass)
+    of_modes = np.diag(shapes.T @ model.damping @ shapes) / (2.0 * np.sqrt(squares))
+    np.testing.assert_allclose(of_modes, [0.01, 0.04], rtol=1e-9)
+    one = lumped_rig(MASSES, SPRINGS, [[Link("b")]], np.array([0.02]))
+    np.testing.assert_allclose(
+        one.damping, lumped_rig(MASSES, SPRINGS, [[Link("b")]], 0.02).damping
+    )
+    frequencies = np.sqrt(squares) / (2.0 * np.pi)
+    alpha, beta = rayleigh_factors(frequencies, np.array([0.01, 0.02]))
+    none = lumped_rig(MASSES, SPRINGS, [[Link("b")]])
+    again = damped(none, mass_factor=alpha, stiffness_factor=beta).damping
+    ratios = np.diag(shapes.T @ again @ shapes) / (2.0 * np.sqrt(squares))
+    np.testing.assert_allclose(ratios, [0.01, 0.02], rtol=1e-9)
+
+
+def test_what_cannot_be_is_refused():
+    model = two_masses()
+    for wrong in ({"mass_factor": -1.0}, {"loss_factor": -0.1}, {"dashpots": {Link("a"): -1.0}}):
+        with pytest.raises(RigError, match="damping below zero"):
+            damped(model, **wrong)
+    with pytest.raises(RigError, match="no point 'c'"):
+        damped(model, dashpots={Link("c"): 1.0})
+    with pytest.raises(RigError, match="3 damping ratios for 2 modes"):
+        lumped_rig(MASSES, SPRINGS, [[Link("b")]], np.array([0.1, 0.1, 0.1]))
+    with pytest.raises(ValueError, match="structural damping is not known in time"):
+        integrate(two_masses(loss_factor=0.1), None, None, 0.1, TimeStepControl(1e-3))

@@ -1,0 +1,364 @@
+"""Stability of periodic motions against other methods: shooting, event-driven and Hill's."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from fe_models.dynamics import floquet
+from fe_models.dynamics.bifurcations import curve_by_force, curve_by_frequency, find_bifurcations
+from fe_models.dynamics.continuation import ContinuationControl
+from fe_models.dynamics.excitation import CombinedForces, ConstantForce, HarmonicForce
+from fe_models.dynamics.floquet import Floquet
+from fe_models.dynamics.forced_response import along_force, along_frequency
+from fe_models.dynamics.further_branches import further_branches, vibrating_starts
+from fe_models.dynamics.harmonic_balance import HarmonicBalance, PeriodicLoad
+from fe_models.dynamics.harmonics import Resolution
+from fe_models.dynamics.motion import Start
+from fe_models.dynamics.newmark import TimeStepControl, integrate
+from fe_models.dynamics.rig import Link, lumped_rig, unit_force
+from tests.fe_models.dynamics.harmonic_rigs import KT, LOAD, MU, balance, contact_rig, pressed, rig
+from tests.limits.contact_rigs import body
+from tests.oracles.event_driven import SliderJoints, integrate_exactly
+from tests.oracles.hill import hill_multipliers
+from wear.joints.elastic import ElasticStop, PolynomialSpring
+from wear.joints.friction_contact import FrictionContact
+from wear.joints.jenkins import Jenkins
+from wear.joints.periodic import PeriodicMarch
+
+TURN = 2.0 * np.pi
+FINE = ContinuationControl(most=0.05)
+# x'' + 0.1 x' + x + x³ = F cos ωt.
+DAMPING = 0.1
+
+
+def oscillator(law, harmonics, ratio=0.5 * DAMPING, samples=256, load=None):
+    """A mass of 1 on a spring of 1 and a joint, driven by cosines."""
+    model = lumped_rig({"m": 1.0}, {Link("m"): 1.0}, [[Link("m")]], damping_ratio=ratio)
+    load = load or PeriodicLoad({1: unit_force(model, "m")})
+    return HarmonicBalance(model, PeriodicMarch(law), load, Resolution(harmonics, samples))
+
+
+def duffing(highest=11, samples=128):
+    return oscillator(
+        PolynomialSpring(0.0, cubic=1.0), tuple(range(1, highest + 1, 2)), samples=samples
+    )
+
+
+def shot(force, slope, motion, amplitude, damping=DAMPING):
+    """Multipliers of a mass of 1 by shooting, for a spring's ``force`` and its ``slope``."""
+    omega = TURN * motion.frequency
+
+    def rates(time, y):
+        drive = amplitude * np.cos(omega * time)
+        held = slope(y[0])
+        return [
+            *(y[1], drive - damping * y[1] - force(y[0])),
+            *(y[3], -damping * y[3] - held * y[2], y[5], -damping * y[5] - held * y[4]),
+        ]
+
+    state = np.array([motion.displacement(1)[0, 0], motion.velocity(1)[0, 0]])
+    for _ in range(4):
+        begin = [*state, 1.0, 0.0, 0.0, 1.0]
+        end = solve_ivp(
+            rates, (0.0, TURN / omega), begin, "DOP853", rtol=1e-11, atol=1e-12, max_step=0.02
+        ).y[:, -1]
+        matrix = end[2:].reshape(2, 2).T
+        state = state - np.linalg.solve(matrix - np.eye(2), end[:2] - state)
+    multipliers = np.linalg.eigvals(matrix)
+    return multipliers[np.argsort(-np.abs(multipliers), kind="stable")]
+
+
+def agree(found, wanted, tolerance):
+    """Whether multipliers are the same, pairs in either order."""
+    for value in wanted:
+        assert np.abs(np.append(found, 0.0) - value).min() < tolerance, (found, wanted)
+
+
+@pytest.fixture(scope="module")
+def folded():
+    branch = along_frequency(duffing(), 0.3, (0.5 / TURN, 2.5 / TURN), control=FINE)
+    of = Floquet(branch.problem).stability
+    return branch, [of(motion) for motion in branch.solutions]
+
+
+def test_a_joint_that_sticks_is_a_spring_whose_slider_is_neutral():
+    """The multipliers are those of the linear structure, exactly, without the slider's own."""
+    problem = oscillator(Jenkins(3.0, 0.5, 1e3), (1, 3))
+    told = Floquet(problem).stability(problem.solve(0.3, 1.0))
+    exponent = complex(-0.5 * DAMPING, np.sqrt(4.0 - 0.25 * DAMPING**2))
+    assert (told.verdict, told.neutral) == ("stable", 1)
+    agree(told.multipliers, [np.exp(exponent / 0.3), np.exp(exponent.conjugate() / 0.3)], 1e-12)
+
+
+def test_duffing_against_shooting_and_liouville(folded):
+    """At motions of every kind; the product of all multipliers is what damping leaves."""
+    branch, known = folded
+    for place in range(10, len(known), 20):
+        motion, told = branch.solutions[place], known[place]
+        wanted = shot(lambda x: x + x**3, lambda x: 1.0 + 3.0 * x**2, motion, 0.3)
+        agree(told.multipliers, wanted, 3e-4)
+        lost = np.exp(-DAMPING / motion.frequency)
+        assert abs(np.prod(told.multipliers)) == pytest.approx(lost, rel=1e-4)
+        assert (told.verdict == "stable") == (abs(wanted[0]) < 1.0)
+
+
+def test_folds_of_duffing_are_where_the_curve_turns_and_a_multiplier_is_1(folded):
+    branch, known = folded
+    found = find_bifurcations(curve_by_frequency(branch.problem, 0.3), branch.solutions, known)
+    assert [each.kind for each in found] == ["fold", "fold"]
+    assert [each.unstable for each in found] == [(0, 1), (1, 0)]
+    for each in found:
+        assert each.multiplier == pytest.approx(1.0, abs=1e-4)
+    # Along the force the folds of the same motions are the same motions.
+    upper = found[0].motion
+    across = along_force(branch.problem, upper.frequency * 0.95, (0.01, 2.0), control=FINE)
+    of = Floquet(branch.problem).stability
+    stability = [of(motion) for motion in across.solutions]
+    curve = curve_by_force(branch.problem, upper.frequency * 0.95)
+    turned = find_bifurcations(curve, across.solutions, stability)
+    assert [each.kind for each in turned] == ["fold", "fold"]
+    assert all(each.multiplier == pytest.approx(1.0, abs=1e-4) for each in turned)
+
+
+def test_time_integration_on_both_sides_of_a_fold(folded):
+    """Started 1 % off, it stays by stable motions and leaves unstable ones."""
+    branch, known = folded
+    fold = branch.curve.folds[0]
+    for place in (fold - 8, fold + 12):
+        motion = branch.solutions[place]
+        omega = TURN * motion.frequency
+        begin = 1.01 * np.array([motion.displacement(1)[0, 0], motion.velocity(1)[0, 0]])
+        end = solve_ivp(
+            lambda t, y, w=omega: [
+                y[1],
+                0.3 * np.cos(w * t) - DAMPING * y[1] - y[0] - y[0] ** 3,
+            ],
+            (0.0, 60.0 * TURN / omega),
+            begin,
+            rtol=1e-9,
+        ).y[:, -1]
+        away = np.linalg.norm(end - begin / 1.01) / np.linalg.norm(begin)
+        assert (away < 1e-3) == (known[place].verdict == "stable")
+
+
+def test_hill_agrees_for_a_smooth_spring(folded):
+    """With deviations of all harmonics up to 15 the sorted exponents are those of the period."""
+    branch, known = folded
+    for place in range(10, len(known), 20):
+        hill = hill_multipliers(branch.problem, branch.solutions[place], 15, 256)
+        agree(known[place].multipliers, hill, 2e-3)
+
+
+def exact_period(model, joints, force, frequency, y):
+    """State (displacements, velocities, slider) after a period, from event to event."""
+    size = len(model.mass)
+    start = Start(displacement=y[:size], velocity=y[size:-1], joint_state=y[-1:, None])
+    period = 1.0 / frequency
+    motion = integrate_exactly(model, joints, force, period, period / 8, start)
+    return np.concatenate([motion.displacement[8], motion.velocity[8], motion.joint_state[0]])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("frequency", "amplitude"), [(180.0, 40.0), (210.0, 100.0)])
+def test_jenkins_against_event_driven_integration(frequency, amplitude):
+    """All multipliers, the slider's among them; Hill's method has other ones."""
+    model = rig(0.01)
+    problem = balance(model, harmonics=tuple(range(1, 60, 2)), samples=2048)
+    motion = problem.solve(frequency, amplitude)
+    displacement, velocity = motion.displacement(1)[0], motion.velocity(1)[0]
+    slider = model.connection @ displacement - motion.cycle.samples[0, :, 0] / KT
+    state, joints = (
+        np.concatenate([displacement, velocity, slider]),
+        SliderJoints(np.array([KT]), np.array([MU * LOAD]), np.zeros(1)),
+    )
+    force = HarmonicForce(unit_force(model, "m1"), amplitude, frequency)
+    steps = np.array([1e-9, 1e-9, 1e-6, 1e-6, 1e-9])
+    matrix = np.empty((5, 5))
+    for column, step in enumerate(steps):
+        away = step * np.eye(5)[column]
+        ends = [exact_period(model, joints, force, frequency, state + s * away) for s in (1, -1)]
+        matrix[:, column] = (ends[0] - ends[1]) / (2.0 * step)
+    exact = np.linalg.eigvals(matrix)
+    told = Floquet(problem).stability(motion)
+    assert (told.verdict, told.neutral) == ("stable", 0)
+    agree(told.multipliers, exact, 2e-3)
+    hill = hill_multipliers(problem, motion, 31, 512)
+    assert max(np.abs(hill - value).min() for value in exact) > 0.02
+
+
+def test_without_damping_nothing_is_said():
+    """Multipliers on the circle itself: what rounding makes of them is no verdict."""
+    model = contact_rig()
+    law = PeriodicMarch(FrictionContact(300.0, 400.0, 0.5, 10.0))
+    resolution = Resolution((0, 1, 2, 3), 128)
+    problem = HarmonicBalance(model, law, pressed(model, 10.0, 1.0, 1.0), resolution)
+    told = Floquet(problem).stability(problem.solve(40.0, 1.0))
+    assert told.verdict == "unknown"
+    assert told.largest == pytest.approx(1.0, abs=1e-9)
+    assert "as near to 1 as its error" in told.message
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("frequency", "state"), [(70.0, 2), (95.0, 1)])
+def test_a_contact_in_three_directions_against_fine_steps(frequency, state):
+    """Slip on the circle under a changing load, and loss of contact: a period of Newmark's method,
+    started nearby."""
+    model = body(normal=100.0, ratio=0.02)
+    law = FrictionContact(300.0, 400.0, 0.5, 10.0)
+    load = pressed(model, 10.0, 6.0, 3.0)
+    problem = HarmonicBalance(model, PeriodicMarch(law), load, Resolution(tuple(range(20)), 512))
+    motion = problem.solve(frequency, 1.0)
+    assert (motion.cycle.states == state).any()
+    told = Floquet(problem).stability(motion)
+    size, period = 3, 1.0 / frequency
+    force = CombinedForces(
+        (
+            HarmonicForce(
+                6.0 * unit_force(model, "x") + 3.0 * unit_force(model, "z"),
+                1.0,
+                frequency,
+                0.5 * np.pi,
+            ),
+            ConstantForce(10.0 * unit_force(model, "z")),
+        )
+    )
+    displacement, velocity = motion.displacement(1)[0], motion.velocity(1)[0]
+    stretch = motion.cycle.samples[0, 0, :2] / 300.0
+    state = np.concatenate([displacement, velocity, stretch])
+
+    def after(y):
+        joint = np.array([[y[6], y[7], y[2]]])
+        start = Start(displacement=y[:size], velocity=y[size:6], joint_state=joint)
+        end = integrate(model, law, force, period, TimeStepControl(period / 2000), start)
+        last = np.array([end.displacement[-1], end.velocity[-1]]).ravel()
+        return np.concatenate([last, end.joint_state[0, :2]])
+
+    assert np.abs(after(state)[:3] - state[:3]).max() < 2e-2 * np.abs(displacement).max()
+    matrix = np.empty((8, 8))
+    for column in range(8):
+        away = 1e-6 * np.abs(state[3:6] if 3 <= column < 6 else state[:3]).max() * np.eye(8)[column]
+        matrix[:, column] = (after(state + away) - after(state - away)) / (2.0 * away[column])
+    exact = np.linalg.eigvals(matrix)
+    assert told.verdict == "stable"
+    agree(told.multipliers, exact[np.abs(exact) > 0.05], 1e-2)
+
+
+@pytest.mark.slow
+def test_a_mass_on_a_stop_through_grazing():
+    """Before it touches the multipliers are those of the free mass; beyond, those of shooting."""
+    law = ElasticStop(stiffness=3.0, gap=1.0)
+    problem = oscillator(law, tuple(range(41)), ratio=0.05, samples=2048)
+    branch = along_frequency(problem, 0.4, (0.8 / TURN, 1.8 / TURN), control=FINE)
+    of = Floquet(problem).stability
+    told = [of(motion) for motion in branch.solutions]
+    touches = np.array([(motion.cycle.states != 2).any() for motion in branch.solutions])
+    assert 0 < touches.sum() < len(touches)
+    first = int(np.argmax(touches))
+    for place in (first - 1, first, first + 1, *np.flatnonzero(touches)[::15]):
+        motion = branch.solutions[place]
+        wanted = shot(
+            lambda x: x + 3.0 * max(x - 1.0, 0.0), lambda x: 1.0 + 3.0 * (x > 1.0), motion, 0.4
+        )
+        # Where the stop is just met, its time of contact is steep in the motion.
+        agree(told[place].multipliers, wanted, 5e-3 + 2.0 * told[place].error)
+
+
+@pytest.mark.slow
+def test_a_period_doubles_where_time_integration_says_so():
+    """Under a static load the symmetry is gone: from a multiplier of -1 on each second period is
+    the same."""
+    model = duffing().model
+    load = PeriodicLoad({1: unit_force(model, "m")}, static=1.5 * unit_force(model, "m"))
+    problem = oscillator(PolynomialSpring(0.0, cubic=1.0), tuple(range(13)), load=load)
+    branch = along_frequency(problem, 1.5, (0.8 / TURN, 1.3 / TURN), control=FINE)
+    of = Floquet(branch.problem).stability
+    known = [of(motion) for motion in branch.solutions]
+    found = find_bifurcations(curve_by_frequency(problem, 1.5), branch.solutions, known)
+    doubled = [each for each in found if each.kind == "period_doubling"]
+    assert [each.unstable for each in doubled] == [(0, 1), (1, 0)]
+    assert all(each.multiplier == pytest.approx(-1.0, abs=1e-5) for each in doubled)
+    inside = branch.solutions[(doubled[0].after + doubled[1].after + 1) // 2]
+    omega = TURN * inside.frequency
+    begin = [1.001 * inside.displacement(1)[0, 0], inside.velocity(1)[0, 0]]
+    periods = TURN / omega * np.array([200.0, 201.0, 202.0])
+    ends = solve_ivp(
+        lambda t, y: [y[1], 1.5 + 1.5 * np.cos(omega * t) - DAMPING * y[1] - y[0] - y[0] ** 3],
+        (0.0, periods[-1]),
+        begin,
+        t_eval=periods,
+        rtol=1e-10,
+        atol=1e-12,
+    ).y.T
+    assert np.abs(ends[2] - ends[0]).max() < 1e-4
+    assert np.abs(ends[1] - ends[0]).max() > 1e-2
+
+
+@pytest.mark.slow
+def test_motions_of_a_third_of_the_frequency_are_on_a_closed_branch():
+    """Duffing's subharmonic motions: no end of the span leads to them, and they close."""
+    model = lumped_rig({"m": 1.0}, {Link("m"): 1.0}, [[Link("m")]], damping_ratio=0.04)
+    load = PeriodicLoad({3: unit_force(model, "m")})
+    resolution = Resolution(tuple(range(1, 16, 2)), 128)
+    spring = PeriodicMarch(PolynomialSpring(0.0, cubic=1.0))
+    problem = HarmonicBalance(model, spring, load, resolution)
+    span = (0.7 / TURN, 6.0 / TURN)
+    branch = along_frequency(problem, 5.0, span, control=FINE)
+    assert branch.first_amplitudes(0).max() < 1e-9
+    at = 1.4 / TURN
+    starts = list(vibrating_starts(problem, at, 1.2, np.ones(1)))
+    found = further_branches(problem, 5.0, span, starts, at, [branch.solutions], control=FINE)
+    # The same motion, one, two and three periods of the force later, is another.
+    assert [each.closed for each in found] == [True] * 3
+    for each in found:
+        assert each.first_amplitudes(0).min() > 0.1
+        of = Floquet(problem).stability
+        verdicts = {of(motion).verdict for motion in each.solutions}
+        assert {"stable", "unstable"} <= verdicts
+    again = further_branches(
+        problem, 5.0, span, starts, at, [branch.solutions, *(each.solutions for each in found)]
+    )
+    assert again == ()
+
+
+def test_a_reduced_structure_tells_what_all_modes_do(monkeypatch):
+    """Of many modes few move: with those left out at rest the multipliers hardly change.
+
+    As times of the period are not divided where the slider slips, many are taken.
+    """
+    monkeypatch.setattr(floquet, "LARGE_SAMPLES", 2048)
+    names = [f"m{number}" for number in range(12)]
+    links = [Link(name, before) for name, before in zip(names, [None, *names], strict=False)]
+    model = lumped_rig(
+        dict.fromkeys(names, 1e-3), dict.fromkeys(links, 1e5), [[Link(names[-1])]], 0.01
+    )
+    law = Jenkins(5e4, 0.5, 4.0)
+    problem = HarmonicBalance(
+        model,
+        PeriodicMarch(law),
+        PeriodicLoad({1: unit_force(model, names[0])}),
+        Resolution((1, 3, 5, 7), 512),
+    )
+    motion = problem.solve(150.0, 40.0)
+    whole = Floquet(problem).stability(motion)
+    few = Floquet(problem, most_modes=0).stability(motion)
+    assert whole.verdict == few.verdict == "stable"
+    agree(few.multipliers[:4], whole.multipliers[:4], 2e-3)
+    assert np.any(motion.cycle.states == 1)
+
+
+def test_joints_that_tell_no_deviations_leave_it_unknown():
+    problem = duffing()
+    motion = problem.solve(0.2, 0.3)
+
+    class Silent:
+        directions = 1
+
+        def settle(self, *arguments):
+            return problem.joints.settle(*arguments)
+
+    silent = HarmonicBalance(problem.model, Silent(), problem.load, problem.resolution)
+    told = Floquet(silent).stability(replace(motion))
+    assert told.verdict == "unknown"
+    assert "do not tell" in told.message

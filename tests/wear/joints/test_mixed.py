@@ -1,0 +1,105 @@
+"""Joints of several laws in one structure, against each law by itself and against time."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from fe_models.dynamics.excitation import CombinedForces, ConstantForce, HarmonicForce
+from fe_models.dynamics.harmonic_balance import HarmonicBalance, PeriodicLoad
+from fe_models.dynamics.harmonics import Resolution
+from fe_models.dynamics.newmark import TimeStepControl, integrate
+from fe_models.dynamics.rig import Link, lumped_rig, unit_force
+from wear.joints.bouc_wen import BoucWen
+from wear.joints.friction_contact import FrictionContact
+from wear.joints.iwan import UniformIwan
+from wear.joints.jenkins import Jenkins
+from wear.joints.law import march_joints
+from wear.joints.mixed import JointGroup, MixedLaw
+from wear.joints.parameters import JointError
+from wear.joints.periodic import PeriodicMarch
+
+SLIDER = Jenkins(stiffness=1e3, friction=0.5, normal_load=10.0)
+IWAN = UniformIwan(stiffness=2e3, friction=0.4, normal_load=20.0)
+CONTACT = FrictionContact(stiffness=8e2, normal_stiffness=1.5e3, friction=0.3, normal_load=15.0)
+ALL = MixedLaw((JointGroup(IWAN, 2), JointGroup(CONTACT, 1), JointGroup(SLIDER, 1)))
+
+
+def path(steps=40, directions=3):
+    """Displacements of four joints, of which the ones along a line move in x alone."""
+    rng = np.random.default_rng(5)
+    moved = np.cumsum(0.004 * rng.standard_normal((steps, 4, directions)), axis=0)
+    moved[:, [0, 1, 3], 1:] = 0.0
+    return moved
+
+
+def test_each_group_does_what_it_does_alone():
+    """Through many turning points, which Iwan joints must remember."""
+    moved = path()
+    together = march_joints(ALL, ALL.rest(4), np.zeros((4, 3)), moved)
+    for group, rows in ALL.rows():
+        law, own = group.law, slice(group.law.directions)
+        alone = march_joints(
+            law, law.rest(group.joints), np.zeros((group.joints, law.directions)),
+            moved[:, rows, own],
+        )  # fmt: skip
+        np.testing.assert_array_equal(together.force[:, rows, own], alone.force)
+        np.testing.assert_array_equal(together.dissipated[:, rows], alone.dissipated)
+        assert not together.force[:, rows, law.directions :].any()
+
+
+def test_periods_of_groups_and_their_derivatives():
+    resolution = Resolution((0, 1, 3), 128)
+    rng = np.random.default_rng(2)
+    coefficients = 0.02 * rng.standard_normal((4, resolution.size, 3))
+    given = resolution.basis, resolution.weights, resolution.lead
+    cycle = ALL.march().settle(coefficients, *given)
+    for group, rows in ALL.rows():
+        own = slice(group.law.directions)
+        alone = PeriodicMarch(group.law).settle(
+            np.ascontiguousarray(coefficients[rows, :, own]), *given
+        )
+        np.testing.assert_array_equal(cycle.force[rows, :, own], alone.force)
+        np.testing.assert_array_equal(cycle.samples[:, rows, own], alone.samples)
+        np.testing.assert_array_equal(cycle.jacobian[rows, :, own, :, own], alone.jacobian)
+        np.testing.assert_array_equal(cycle.dissipated[rows], alone.dissipated)
+        np.testing.assert_array_equal(cycle.states[:, rows], alone.states)
+        assert not cycle.jacobian[rows, :, group.law.directions :].any()
+
+
+def test_a_line_of_sliders_stays_one():
+    """Groups along one direction have one."""
+    law = MixedLaw((JointGroup(SLIDER, 1), JointGroup(BoucWen(1e3, 0.5, 10.0), 1)))
+    assert law.directions == 1
+
+
+def test_balance_of_harmonics_is_the_motion_in_time():
+    """A contact and a slider on one mass, pressed and shaken until it repeats itself."""
+    model = lumped_rig(
+        {"x": 2e-3, "y": 2e-3, "z": 2e-3},
+        {Link("x"): 500.0, Link("y"): 700.0, Link("z"): 300.0},
+        # The slider is along x alone: nothing stretches its two other directions.
+        [[Link("x"), Link("y"), Link("z")], [Link("x"), Link(None), Link(None)]],
+        0.2,
+    )
+    law = MixedLaw((JointGroup(CONTACT, 1), JointGroup(SLIDER, 1)))
+    push, press = unit_force(model, "x") + 0.1 * unit_force(model, "z"), unit_force(model, "z")
+    frequency, force = 90.0, 14.0
+    # Joints at rest press each other: the load that balances them.
+    static = 15.0 * press
+    load = PeriodicLoad({1: -1j * push}, static)
+    problem = HarmonicBalance(model, law.march(), load, Resolution(tuple(range(22)), 512))
+    motion = problem.solve(frequency, force)
+    assert motion.converged
+    assert motion.cycle.dissipated.min() > 0.0
+    shaken = CombinedForces((HarmonicForce(push, force, frequency), ConstantForce(static)))
+    steps, periods = 400, 25
+    control = TimeStepControl(1.0 / (steps * frequency))
+    moved = integrate(model, law, shaken, periods / frequency, control).displacement[-steps - 1 :]
+    expected = motion.displacement(steps)
+    np.testing.assert_allclose(moved[:-1], expected, atol=3e-3 * np.abs(expected).max(), rtol=0.0)
+
+
+def test_numbers_of_joints_must_fit():
+    with pytest.raises(JointError, match="5 joints of groups that have 4"):
+        ALL.rest(5)

@@ -1,0 +1,167 @@
+"""Joints of several laws in one structure.
+
+A structure has joints of as many directions each. Those of laws along one direction have it as the
+first of three where others are contacts: along the two others, in which nothing moves them, they
+have no force.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from sa_solver.types import Array
+from wear.joints.bouc_wen import BoucWen
+from wear.joints.friction_contact import FrictionContact
+from wear.joints.jenkins import Jenkins
+from wear.joints.law import JointResponse, JointState
+from wear.joints.masing import MasingLaw
+from wear.joints.parameters import JointError
+from wear.joints.periodic import PeriodicMarch, SettledCycle
+
+
+@dataclass(frozen=True)
+class JointGroup:
+    """So many ``joints`` of a ``law``.
+
+    Examples
+    --------
+    >>> from wear.joints import Jenkins, JointGroup
+    >>> JointGroup(Jenkins(stiffness=1e3, friction=0.5, normal_load=10.0), joints=4).joints
+    4
+    """
+
+    law: Jenkins | BoucWen | MasingLaw | FrictionContact
+    joints: int
+
+
+@dataclass(frozen=True)
+class MixedLaw:
+    """The law of the joints of all ``groups``, one group after the other.
+
+    Examples
+    --------
+    A slider and a contact, which is pressed by 10 N and has not moved:
+
+    >>> import numpy as np
+    >>> from wear.joints import FrictionContact, Jenkins, JointGroup, MixedLaw
+    >>> slider = Jenkins(stiffness=1e3, friction=0.5, normal_load=10.0)
+    >>> contact = FrictionContact(1e3, 2e3, friction=0.5, normal_load=10.0)
+    >>> law = MixedLaw((JointGroup(slider, 1), JointGroup(contact, 1)))
+    >>> moved = np.array([[0.002, 0.0, 0.0], [0.002, 0.0, 0.001]])
+    >>> print(law.respond(law.rest(2), moved).force)
+    [[ 2.  0.  0.]
+     [ 2.  0. 12.]]
+    """
+
+    groups: tuple[JointGroup, ...]
+
+    @property
+    def directions(self) -> int:
+        """Of the group that has most."""
+        return max(group.law.directions for group in self.groups)
+
+    def rest(self, joints: int) -> JointState:
+        """State of all joints before they have moved; of laws that know less, with zeros behind.
+
+        Raises :class:`JointError` for another number of joints than the groups have.
+        """
+        self._require(joints)
+        return _stacked([group.law.rest(group.joints) for group in self.groups])
+
+    def respond(self, state: JointState, increment: Array) -> JointResponse:
+        """As :meth:`wear.joints.law.JointLaw.respond`."""
+        self._require(len(state))
+        count, d = len(state), self.directions
+        force, tangent, lost = np.zeros((count, d)), np.zeros((count, d, d)), np.zeros(count)
+        states = []
+        for group, rows in self.rows():
+            own = slice(group.law.directions)
+            part = group.law.respond(state[rows], increment[rows, own])
+            force[rows, own], tangent[rows, own, own] = part.force, part.tangent
+            lost[rows] = part.dissipated
+            states.append(part.state)
+        return JointResponse(force, tangent, _stacked(states), lost)
+
+    def march(self, threads: int = 1) -> MixedMarch:
+        """The joints over whole periods, ``threads`` shares of a group at once."""
+        return MixedMarch(self, tuple(PeriodicMarch(g.law, threads) for g in self.groups))
+
+    def rows(self) -> Iterator[tuple[JointGroup, slice]]:
+        """The groups, and where their joints are among all."""
+        end = 0
+        for group in self.groups:
+            begin, end = end, end + group.joints
+            yield group, slice(begin, end)
+
+    def _require(self, joints: int) -> None:
+        known = sum(group.joints for group in self.groups)
+        if joints != known:
+            raise JointError(f"{joints} joints of groups that have {known}: give as many")
+
+
+@dataclass(frozen=True)
+class MixedMarch:
+    """Joints of a mixed ``law`` over whole periods, group by group (:class:`PeriodicMarch`).
+
+    Examples
+    --------
+    Two sliders of their own laws, driven as 0.01 cos θ, have the energies of the closed form:
+
+    >>> import numpy as np
+    >>> from wear.joints import Jenkins, JointGroup, MixedLaw
+    >>> laws = [Jenkins(1e4, 0.5, load) for load in (100.0, 60.0)]
+    >>> time = 2.0 * np.pi * np.arange(64) / 64
+    >>> basis = np.stack([np.cos(time), np.sin(time)], axis=1)
+    >>> march = MixedLaw(tuple(JointGroup(law, 1) for law in laws)).march()
+    >>> cycle = march.settle(np.array([[[0.01], [0.0]]] * 2), basis, basis.T / 32)
+    >>> print(cycle.dissipated.round(6), [float(law.loop_energy(0.01)) for law in laws])
+    [1.   0.84] [1.0, 0.84]
+    """
+
+    law: MixedLaw
+    marches: tuple[PeriodicMarch, ...]
+
+    @property
+    def directions(self) -> int:
+        return self.law.directions
+
+    def settle(
+        self, coefficients: Array, basis: Array, weights: Array, lead: Array | None = None
+    ) -> SettledCycle:
+        """The settled period, as :meth:`PeriodicMarch.settle`."""
+        joints, size, d = coefficients.shape
+        rows = [rows for _, rows in self.law.rows()]
+        own = [slice(march.directions) for march in self.marches]
+        cycles = [
+            march.settle(np.ascontiguousarray(coefficients[at, :, along]), basis, weights, lead)
+            for march, at, along in zip(self.marches, rows, own, strict=True)
+        ]
+        force, samples = np.zeros((joints, size, d)), np.zeros((len(basis), joints, d))
+        for cycle, at, along in zip(cycles, rows, own, strict=True):
+            force[at, :, along], samples[:, at, along] = cycle.force, cycle.samples
+
+        def jacobian() -> Array:
+            whole = np.zeros((joints, size, d, size, d))
+            for cycle, at, along in zip(cycles, rows, own, strict=True):
+                whole[at, :, along, :, along] = cycle.jacobian
+            return whole
+
+        return SettledCycle(
+            force,
+            samples,
+            np.concatenate([cycle.states for cycle in cycles], axis=1),
+            np.concatenate([cycle.change for cycle in cycles]),
+            jacobian,
+            lambda: np.concatenate([cycle.dissipated for cycle in cycles]),
+        )
+
+
+def _stacked(states: Sequence[JointState]) -> JointState:
+    """States of all groups, as wide as the widest."""
+    widest = max(state.shape[1] for state in states)
+    return np.concatenate(
+        [np.pad(state, ((0, 0), (0, widest - state.shape[1]))) for state in states]
+    )

@@ -1,0 +1,84 @@
+"""The places of a vibrating structure by their names, and what acts there."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from fe_models.dynamics.rig import Link
+from workflow.analyses.rig.places import Against, Moved
+from workflow.analyses.rig.point_kinds import known, matching
+from workflow.errors import UserError
+
+
+class PlaceNames:
+    """Points such as ``pad 17`` of displacements ``names`` such as ``pad 17 x``.
+
+    ``known_as`` are those that the structure knows by another name. The ``key`` that an error names
+    is where a case says the point.
+    """
+
+    def __init__(self, names: Sequence[str], known_as: Mapping[str, str] | None = None) -> None:
+        self.names, self._known_as = tuple(names), known_as or {}
+        # Each once, in order.
+        self._points = list(dict.fromkeys(name.rpartition(" ")[0] for name in self.names))
+
+    def of(self, wanted: str, key: str) -> list[str]:
+        """The point of that name, or all of that kind. Raises UserError if there is none."""
+        found = matching(self._points, wanted)
+        if not found:
+            raise UserError(f"{key}: '{wanted}': no such point; allowed: {known(self._points)}")
+        return found
+
+    def pairs(self, connection: Against, key: str) -> list[tuple[str, str | None]]:
+        """Each point and that against which it moves, None for the ground."""
+        points = self.of(connection.points, f"{key}.points")
+        if connection.against is None:
+            return [(point, None) for point in points]
+        opposites = self.of(connection.against, f"{key}.against")
+        if len(opposites) == 1:
+            opposites *= len(points)
+        if len(opposites) != len(points):
+            raise UserError(
+                f"{key}.against: {len(opposites)} points for {len(points)}; allowed: as many, or "
+                "one"
+            )
+        for point, opposite in zip(points, opposites, strict=True):
+            if point == opposite:
+                raise UserError(f"{key}.against: {point} against itself; allowed: others")
+        return list(zip(points, opposites, strict=True))
+
+    def links(self, connection: Against, key: str) -> list[Link]:
+        """What stretches between each point and that against which it moves."""
+        pairs, axis = self.pairs(connection, key), connection.direction[-1]
+        for point in (end for pair in pairs for end in pair if end is not None):
+            self.moving(point, axis, f"{key}.direction")
+        every = (link_along(*pair, connection.direction) for pair in pairs)
+        return [Link(self._known(link.second), self._known(link.first)) for link in every]
+
+    def shared(self, moved: Moved, key: str) -> list[tuple[str, float]]:
+        """Displacements along a direction, and the even share of each with its sign."""
+        points, axis = self.of(moved.points, f"{key}.points"), moved.direction[-1]
+        sign = -1.0 if moved.direction.startswith("-") else 1.0
+        return [
+            (self.moving(point, axis, f"{key}.direction"), sign / len(points)) for point in points
+        ]
+
+    def moving(self, point: str, axis: str, key: str) -> str:
+        """The displacement of a point along an axis. Raises UserError if it has none."""
+        name = f"{point} {axis}"
+        if name not in self.names:
+            axes = [other for other in "xyz" if f"{point} {other}" in self.names]
+            raise UserError(
+                f"{key}: {point} does not move along {axis}; allowed: {', '.join(axes)}"
+            )
+        return self._known_as.get(name, name)
+
+    def _known(self, name: str | None) -> str | None:
+        return None if name is None else self._known_as.get(name, name)
+
+
+def link_along(point: str, opposite: str | None, direction: str) -> Link:
+    """What stretches when a point moves in a direction, from another or the ground."""
+    axis = direction[-1]
+    ends = f"{point} {axis}", None if opposite is None else f"{opposite} {axis}"
+    return Link(*reversed(ends)) if direction.startswith("-") else Link(*ends)

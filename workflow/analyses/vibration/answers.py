@@ -1,0 +1,133 @@
+"""Every motion under a force at the frequencies that a case asks for."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from fe_models.dynamics.crossings import motions_at
+from fe_models.dynamics.forced_response import Accuracy, ResponseBranch
+from fe_models.dynamics.harmonic_solution import HarmonicSolution
+from sa_solver.steps import Steps
+from workflow.analyses.vibration.case import VibrationCase
+from workflow.analyses.vibration.harmonics import ANSWER, harmonics_of
+from workflow.analyses.vibration.model import VibrationModel
+from workflow.analyses.vibration.outcome import Answers
+from workflow.analyses.vibration.response import (
+    accuracy_of,
+    accurate,
+    motion_columns,
+    step_control,
+    warn_of_error,
+)
+from workflow.shell.dataset import Dataset, Datasets
+from workflow.shell.reporter import Reporter
+
+# Of the vibration: a motion that changes more as harmonics are added is another one.
+ANOTHER = 0.3
+# Told of each motion, beside its error.
+GROUND = ("absolute_amplitude",)
+TOLD = "phase", "energy_per_cycle", "damping", "slip", "separated"
+
+
+def answers_under(
+    case: VibrationCase,
+    model: VibrationModel,
+    branch: ResponseBranch,
+    reporter: Reporter,
+    steps: Steps,
+) -> tuple[Answers | None, dict[str, Datasets]]:
+    """The motions of a branch at the frequencies of a case, and their harmonics by group.
+
+    None where the case asks for none. A frequency that the curve does not get to is told as a
+    warning, and so is a motion that is not found.
+    """
+    if not case.at:
+        return None, {}
+    force, accuracy, control = branch.solutions[0].force, accuracy_of(case), step_control(case)
+    told = case.amount.told(force)
+    every: list[HarmonicSolution] = []
+    numbers: list[dict[str, Any]] = []
+    for frequency in case.at:
+        reporter.doing(f"{told}: motions at {frequency:g} Hz")
+        found = motions_at(branch, frequency, control, steps)
+        motions = [
+            steps("accurate motion", partial(_accurate, branch, motion, accuracy))
+            for motion in found
+            if motion.converged
+        ]
+        message = _message(branch, frequency, found)
+        if message:
+            reporter.warn(f"{told} at {frequency:g} Hz: {message}")
+        those = [_numbers(model, branch, motion) for motion in motions]
+        for motion in those:
+            named = f"{told}: the motion at {frequency:g} Hz"
+            warn_of_error(named, motion["error"], case, reporter)
+        numbers.append({"frequency": frequency, "motions": those, "message": message})
+        every += motions
+    harmonics: dict[str, Datasets] = {
+        ANSWER.format(number): harmonics_of(model.rig, motion)
+        for number, motion in enumerate(every)
+    }
+    return Answers(_table(model, branch, every), tuple(numbers)), harmonics
+
+
+def _accurate(
+    branch: ResponseBranch, motion: HarmonicSolution, accuracy: Accuracy | None
+) -> HarmonicSolution:
+    """The motion with its error, as accurate as asked for; as it was where harmonics that are added
+    lead to another one."""
+    found = accurate(branch.problem, motion, accuracy)
+    problem = branch.problem.refined(found.resolution)
+    before = problem.resolution.adopt(motion.coefficients, motion.resolution)
+    size = problem.vibration(found.coefficients)
+    if problem.vibration(found.coefficients - before) <= ANOTHER * size:
+        return found
+    return accurate(branch.problem, motion, None)
+
+
+def _message(branch: ResponseBranch, frequency: float, found: tuple[HarmonicSolution, ...]) -> str:
+    """Why there is no motion, or not all; empty if there are all."""
+    lost = [motion.message for motion in found if not motion.converged]
+    if lost:
+        return f"a motion is not found: {lost[0]}"
+    if found:
+        return ""
+    low, high = branch.frequencies.min(), branch.frequencies.max()
+    return f"none: the curve, from {low:.6g} to {high:.6g} Hz, ends before"
+
+
+def _numbers(
+    model: VibrationModel, branch: ResponseBranch, motion: HarmonicSolution
+) -> dict[str, Any]:
+    columns = motion_columns(model, branch.problem, [motion])
+    assert motion.error is not None
+    return {
+        "amplitude": float(columns["amplitude"].values[0, -1]),
+        **{name: float(columns[name].values[0]) for name in TOLD},
+        **{name: float(columns[name].values[0, -1]) for name in GROUND if name in columns},
+        "error": motion.error.largest,
+        "residual": motion.residual,
+        "harmonics": list(motion.resolution.harmonics),
+        "samples": motion.resolution.samples,
+    }
+
+
+def _table(
+    model: VibrationModel, branch: ResponseBranch, motions: list[HarmonicSolution]
+) -> dict[str, Dataset]:
+    frequency = np.array([motion.frequency for motion in motions])
+    columns = motion_columns(model, branch.problem, motions)
+    errors = np.array([motion.error.largest for motion in motions if motion.error is not None])
+    amplitude = columns["amplitude"].values.reshape(-1, len(model.rig.seen))
+    seen = Dataset(amplitude, "mm", columns["amplitude"].description)
+    said = "of the joints' vibration or the energy lost, by harmonics and samples"
+    return {
+        "frequency": Dataset(frequency, "Hz", "of the force; motions in the order of the curve"),
+        "amplitude": seen,
+        **{name: columns[name] for name in GROUND if name in columns},
+        **{name: columns[name] for name in TOLD},
+        "error": Dataset(errors, "1", f"estimated error {said}"),
+    }

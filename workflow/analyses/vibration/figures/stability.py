@@ -1,0 +1,75 @@
+"""Curves of motions in figures: unstable parts dashed, and a mark where stability changes."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import h5py
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.lines import Line2D
+
+from sa_solver.types import Array
+from workflow.analyses.vibration.outcome import BIFURCATIONS
+from workflow.pictures.style import BLACK
+
+# How motions are drawn by what the column says of them: the lesser of two ends counts.
+LINES: dict[int, Any] = {1: "-", 0: ":", -1: "--"}
+WORDS = {0: "stability unknown", -1: "unstable"}
+# Marks of bifurcations, and what they are called.
+MARKS = {
+    "fold": ("s", "fold"),
+    "branching": ("^", "another branch leaves"),
+    "period_doubling": ("D", "period doubles"),
+    "neimark_sacker": ("*", "second frequency (Neimark-Sacker)"),
+    "jump": ("X", "joints change it at once"),
+}
+MARK: dict[str, Any] = {"markersize": 6, "linestyle": "none", "zorder": 5}
+
+
+def draw_motions(axis: Axes, group: h5py.Group, x: Array, y: Array, **look: Any) -> None:
+    """A curve of motions ``(n,)``, solid as far as nothing is said of their stability."""
+    if "stability" not in group:
+        axis.plot(x, y, "-", **look)
+        return
+    codes = group["stability"][()]
+    parts = np.minimum(codes[:-1], codes[1:]) if len(codes) > 1 else codes
+    label = look.pop("label", None)
+    for code, line in LINES.items():
+        for first, last in _runs(parts == code):
+            axis.plot(x[first : last + 1], y[first : last + 1], line, label=label, **look)
+            label = None
+
+
+def _runs(flags: np.ndarray) -> list[tuple[int, int]]:
+    """First and past-the-last index of each run of true ``flags``."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], flags.astype(int), [0]])))
+    return [(int(first), int(last)) for first, last in zip(edges[::2], edges[1::2], strict=True)]
+
+
+def mark_bifurcations(axis: Axes, group: h5py.Group, x: str, factor: float, colour: Any) -> None:
+    """Marks on the curve of a group, over frequency or force: amplitude times a factor."""
+    if BIFURCATIONS not in group:
+        return
+    found = group[BIFURCATIONS]
+    for kind, at, amplitude in zip(
+        found.attrs["kind"], found[x][()], found["amplitude"][()], strict=True
+    ):
+        axis.plot(at, factor * amplitude, MARKS[kind][0], color=colour, **MARK)
+
+
+def explain_stability(axis: Axes, groups: list[h5py.Group]) -> None:
+    """Entries of the legend for what is drawn of the stability of these curves."""
+    codes = {int(code) for group in groups if "stability" in group for code in group["stability"]}
+    for code, word in WORDS.items():
+        if code in codes:
+            axis.add_line(Line2D([], [], color=BLACK, linestyle=LINES[code], label=word))
+    kinds = {
+        kind
+        for group in groups
+        if BIFURCATIONS in group
+        for kind in group[BIFURCATIONS].attrs["kind"]
+    }
+    for kind, (mark, word) in MARKS.items():
+        if kind in kinds:
+            axis.add_line(Line2D([], [], color=BLACK, marker=mark, label=word, **MARK))

@@ -1,0 +1,102 @@
+"""Branches of motions under a force that no end of the frequencies leads to."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from fe_models.dynamics.bifurcations import curve_by_frequency
+from fe_models.dynamics.forced_response import ResponseBranch
+from fe_models.dynamics.further_branches import (
+    FurtherBranch,
+    further_branches,
+    vibrating_starts,
+)
+from sa_solver.steps import Steps
+from workflow.analyses.vibration.case import VibrationCase
+from workflow.analyses.vibration.model import VibrationModel
+from workflow.analyses.vibration.outcome import Curves
+from workflow.analyses.vibration.response import (
+    accuracy_of,
+    amplitude_of,
+    curves_of,
+    progress_along,
+    step_control,
+)
+from workflow.analyses.vibration.sections import FurtherStart
+from workflow.analyses.vibration.stability import stability_along
+from workflow.shell.reporter import Reporter
+
+
+def further_from(
+    case: VibrationCase,
+    model: VibrationModel,
+    start: FurtherStart,
+    known: Sequence[ResponseBranch | FurtherBranch],
+    reporter: Reporter,
+    steps: Steps,
+) -> list[tuple[FurtherBranch, Curves]]:
+    """Branches that a start leads to, beside those ``known`` under its force.
+
+    A start that leads to no other is told as a warning.
+    """
+    name = f"{case.amount.told(start.force)}, from {start.frequency:g} Hz"
+    problem = max((branch.problem for branch in known), key=lambda of: of.resolution.samples)
+    control = step_control(case, progress_along(case.frequencies, True, "Hz", reporter))
+    starts = vibrating_starts(problem, start.frequency, start.amplitude, model.rig.seen[-1])
+    found = further_branches(
+        problem,
+        start.force,
+        case.frequencies,
+        list(starts),
+        start.frequency,
+        [branch.solutions for branch in known],
+        control=control,
+        accuracy=accuracy_of(case),
+        steps=steps,
+    )
+    if not found:
+        reporter.warn(f"{name}: no further branch is found; known ones pass by, or nothing does")
+    return [(branch, _curves(case, model, branch, name, reporter, steps)) for branch in found]
+
+
+def _curves(
+    case: VibrationCase,
+    model: VibrationModel,
+    branch: FurtherBranch,
+    name: str,
+    reporter: Reporter,
+    steps: Steps,
+) -> Curves:
+    """What is kept of a branch."""
+    if branch.message:
+        reporter.warn(f"{name}: {branch.message}")
+    force = float(branch.forces[0])
+    stability = stability_along(
+        case,
+        model,
+        name,
+        curve_by_frequency(branch.problem, force),
+        branch.solutions,
+        partial(amplitude_of, model),
+        reporter,
+        steps,
+    )
+    curves = curves_of(case, model, branch)
+    sizes = curves["amplitude"].values[:, -1]
+    numbers: dict[str, Any] = {
+        case.amount.name: force,
+        "points": len(branch.solutions),
+        "lowest_frequency": float(branch.frequencies.min()),
+        "highest_frequency": float(branch.frequencies.max()),
+        "largest_amplitude": float(sizes.max()),
+        "frequency_of_largest": float(branch.frequencies[int(np.argmax(sizes))]),
+        "closed": branch.closed,
+        "joins": branch.joins,
+        "message": branch.message,
+        **stability.numbers,
+    }
+    return Curves({**curves, **stability.columns}, numbers, stability.bifurcations)

@@ -1,0 +1,117 @@
+"""The load of a vibration case on its rig, and where the ground is in a motion."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from fe_models.dynamics.harmonic_balance import PeriodicLoad
+from fe_models.dynamics.harmonic_solution import HarmonicSolution
+from fe_models.dynamics.harmonics import ComplexArray
+from fe_models.dynamics.rig import unit_force
+from sa_solver.types import Array
+from workflow.analyses.rig.places import Moved
+from workflow.analyses.rig.rig_model import RigModel
+from workflow.analyses.vibration.case import VibrationCaseBase
+from workflow.analyses.vibration.excitation import (
+    FORCE,
+    LEVEL,
+    Amount,
+    GroundDisplacement,
+    VibrationExcitation,
+    waves_of,
+)
+from workflow.errors import UserError
+
+
+@dataclass(frozen=True)
+class MovingGround:
+    """A harmonic of the ground's motion at level 1, along the translation ``rigid`` ``(n,)``.
+
+    ``amplitude`` is Re a exp(ikωt) of its displacement [mm], or of its acceleration [mm/s²] if it
+    is ``accelerated``.
+    """
+
+    harmonic: int
+    amplitude: complex
+    accelerated: bool
+    rigid: Array
+
+    def displacement(self, frequency: float) -> complex:
+        """Of the ground at a frequency [Hz]."""
+        angular = 2.0 * np.pi * frequency * self.harmonic
+        return -self.amplitude / angular**2 if self.accelerated else self.amplitude
+
+
+@dataclass(frozen=True)
+class Driving:
+    """The periodic ``load`` at level 1, but for what is static; and the ``ground`` that moves.
+
+    ``amount`` says whether it is at 1 N or at level 1; of each record the share above the highest
+    harmonic that is taken of it is ``left_out``.
+    """
+
+    load: PeriodicLoad
+    ground: tuple[MovingGround, ...] = ()
+    amount: Amount = FORCE
+    left_out: tuple[float, ...] = ()
+
+    def absolute(self, motion: HarmonicSolution) -> HarmonicSolution:
+        """A motion with the displacements that it has beside those relative to the ground."""
+        absolute = motion.motion.copy()
+        for moving in self.ground:
+            row = motion.resolution.harmonics.index(moving.harmonic)
+            absolute[row] += motion.force * moving.displacement(motion.frequency) * moving.rigid
+        return replace(motion, motion=absolute)
+
+
+def driving_of(case: VibrationCaseBase, rig: RigModel) -> Driving:
+    """What drives a rig. Raises UserError for places and directions that it has not."""
+    if case.excitation is None:
+        # The force is a sine: Re (-i) exp(iωt).
+        return Driving(PeriodicLoad({1: -1j * rig.driven}))
+    return _driven_by(case.excitation, rig, case.resolution.harmonics[-1])
+
+
+def _driven_by(excitation: VibrationExcitation, rig: RigModel, highest: int) -> Driving:
+    size = len(rig.model.mass)
+    waves: defaultdict[int, ComplexArray] = defaultdict(lambda: np.zeros(size, dtype=complex))
+    inertial: defaultdict[int, ComplexArray] = defaultdict(lambda: np.zeros(size, dtype=complex))
+    for number, force in enumerate(excitation.forces):
+        shape = _shape(rig, force, f"excitation.forces.{number}")
+        waves[force.harmonic] += force.wave * shape
+    for number, record in enumerate(excitation.records):
+        shape = _shape(rig, record, f"excitation.records.{number}")
+        for order, wave in waves_of(record, highest):
+            waves[order] += wave * shape
+    ground = []
+    for number, motion in enumerate(excitation.base):
+        if not rig.translations:
+            raise UserError(
+                f"excitation.base.{number}: the reduced body is held inside, and does not move "
+                "with the ground as a whole; allowed: a body reduced with what holds it among its "
+                "kept points, or forces"
+            )
+        if motion.direction not in rig.translations:
+            raise UserError(
+                f"excitation.base.{number}.direction: {motion.direction}: the structure does not "
+                f"move so; allowed: {', '.join(rig.translations)}"
+            )
+        along = rig.translations[motion.direction]
+        wave = complex(-1j * motion.amplitude * np.exp(1j * motion.phase))
+        accelerated = not isinstance(motion, GroundDisplacement)
+        if accelerated:
+            waves[motion.harmonic] -= wave * along.inertia
+        else:
+            inertial[motion.harmonic] += wave * along.inertia
+        ground.append(MovingGround(motion.harmonic, wave, accelerated, along.rigid))
+    load = PeriodicLoad(dict(waves), inertial=dict(inertial))
+    return Driving(load, tuple(ground), LEVEL, tuple(excitation.left_out(highest)))
+
+
+def _shape(rig: RigModel, place: Moved, key: str) -> Array:
+    """Forces ``(n,)`` of 1 N at a place."""
+    shares = rig.place_names.shared(place, key)
+    return np.sum([share * unit_force(rig.model, name) for name, share in shares], axis=0)

@@ -1,0 +1,113 @@
+"""Modes of a vibration case: their frequency and damping over the amplitude."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from fe_models.dynamics.harmonic_balance import HarmonicBalance
+from fe_models.dynamics.nonlinear_mode import LinearMode, ModeMotion, along_nonlinear_mode
+from sa_solver.steps import Steps
+from wear.joints.periodic import SLIP
+from workflow.analyses.vibration.case import VibrationCase
+from workflow.analyses.vibration.model import VibrationModel
+from workflow.analyses.vibration.outcome import Curves
+from workflow.analyses.vibration.response import (
+    LARGEST_ERROR,
+    amplitudes_of,
+    progress_along,
+    step_control,
+)
+from workflow.errors import MethodFailed
+from workflow.shell.dataset import Dataset
+from workflow.shell.reporter import Reporter
+
+# Of the largest motion of a mode: what is looked at does not take part in it.
+STILL = 1e-6
+# Share of the damping of a mode from which on its error counts: that of a mode with almost none is
+# of no use to anybody.
+LEAST_DAMPING = 1e-4
+
+
+def mode_of(
+    case: VibrationCase,
+    number: int,
+    model: VibrationModel,
+    problem: HarmonicBalance,
+    reporter: Reporter,
+    steps: Steps,
+) -> Curves:
+    """A mode over the amplitudes that are asked for, with the harmonics of the ``problem``.
+
+    Raises MethodFailed for a mode in which what is looked at stays still, or that is not found at
+    the least amplitude. One that ends before the largest is told as a warning.
+    """
+    assert case.modes is not None
+    linear = LinearMode.of(problem, number)
+    moved = abs(float(model.rig.seen[-1] @ linear.shape))
+    if moved <= STILL * np.abs(linear.shape).max():
+        raise MethodFailed(
+            f"modes: mode {number}, at {linear.frequency:.4g} Hz, does not move "
+            f"{model.rig.labels[-1]}, whose amplitude counts; look at another place, or leave the "
+            "mode out"
+        )
+    # Amplitudes of the mode by those of what is looked at, as the linear mode has them.
+    least, largest = (amplitude / moved for amplitude in case.modes.amplitudes)
+    control = step_control(case, progress_along((least, largest), True, "t^0.5 mm", reporter))
+    branch = along_nonlinear_mode(problem, linear, (least, largest), control, steps)
+    if not branch.motions:
+        raise MethodFailed(f"modes: mode {number}: {branch.message}")
+    if branch.message:
+        reporter.warn(f"mode {number}: {branch.message}")
+    error = max(map(_error, branch.motions))
+    if error > LARGEST_ERROR:
+        reporter.warn(
+            f"mode {number} has an error of {error:.1e}: give a resolution.tolerance, or more "
+            "resolution.harmonics and resolution.samples"
+        )
+    first, last = branch.motions[0], branch.motions[-1]
+    numbers: dict[str, Any] = {
+        "mode": number,
+        "linear_frequency": linear.frequency,
+        "linear_damping": linear.damping_ratio,
+        "frequency": [first.solution.frequency, last.solution.frequency],
+        "damping": [first.damping_ratio, last.damping_ratio],
+        "most_damped": float(branch.damping_ratios.max()),
+        "points": len(branch.motions),
+        "error": error,
+        "message": branch.message,
+    }
+    return Curves(_columns(model, branch.motions), numbers)
+
+
+def _error(motion: ModeMotion) -> float:
+    """The largest of vibration, frequency and damping, as a share."""
+    damping = motion.damping_error / max(abs(motion.damping_ratio), LEAST_DAMPING)
+    return max(motion.vibration_error, motion.frequency_error, damping)
+
+
+def _columns(model: VibrationModel, motions: tuple[ModeMotion, ...]) -> dict[str, Dataset]:
+    def column(values: list[float], unit: str, what: str) -> Dataset:
+        return Dataset(np.array(values), unit, what)
+
+    solutions = [motion.solution for motion in motions]
+    seen = "half of the way to and fro of what is looked at, in the order of the curve"
+    norm = "amplitude of the mode: norm of harmonic 1 by the mass"
+    fed = "of the mode, as a share of what is critical: energy lost over 2ω ∫ x'ᵀ M x' dt"
+    slips = "share of the cycle in which a joint slips, mean of those that touch at rest"
+    richer = "estimated error by harmonics and samples"
+    return {
+        "amplitude": column([float(amplitudes_of(model, s)[-1]) for s in solutions], "mm", seen),
+        "modal_amplitude": column([motion.amplitude for motion in motions], "t^0.5 mm", norm),
+        "frequency": column([s.frequency for s in solutions], "Hz", "of the mode"),
+        "damping": column([motion.damping_ratio for motion in motions], "1", fed),
+        "energy_per_cycle": column(
+            [float(s.cycle.dissipated.sum()) for s in solutions],
+            "N mm",
+            "energy that the joints dissipate in a cycle",
+        ),
+        "slip": column([model.time_share(s, SLIP) for s in solutions], "1", slips),
+        "frequency_error": column([m.frequency_error for m in motions], "1", richer),
+        "damping_error": column([m.damping_error for m in motions], "1", f"{richer}, of the ratio"),
+    }

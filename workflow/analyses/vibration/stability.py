@@ -1,0 +1,146 @@
+"""Which motions of a curve are stable, and where that changes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from fe_models.dynamics.bifurcations import Bifurcation, FollowedCurve, find_bifurcations
+from fe_models.dynamics.floquet import Floquet, Stability
+from fe_models.dynamics.harmonic_solution import HarmonicSolution
+from sa_solver.steps import Steps
+from workflow.analyses.vibration.case import VibrationCase
+from workflow.analyses.vibration.excitation import Amount
+from workflow.analyses.vibration.model import VibrationModel
+from workflow.shell.dataset import Dataset, Datasets
+from workflow.shell.reporter import Reporter
+
+# What the column says of a motion.
+CODES = {"stable": 1, "unknown": 0, "unstable": -1}
+# Motions whose stability is found in one step of a run.
+TOGETHER = 20
+
+
+@dataclass(frozen=True)
+class CurveStability:
+    """Of the motions of a curve: ``columns`` ``(n,)`` each, and its ``bifurcations``.
+
+    ``numbers`` are for the summary. All is empty where stability is not looked for.
+    """
+
+    columns: Datasets
+    numbers: dict[str, Any]
+    bifurcations: tuple[dict[str, Any], ...]
+
+
+NOT_LOOKED_FOR = CurveStability({}, {}, ())
+
+
+def looked_for(case: VibrationCase, model: VibrationModel) -> bool:
+    """Whether stability is found: as the case says, or else where it is cheap."""
+    if case.stability == "auto":
+        return Floquet(model.problem).cheap
+    return case.stability == "every"
+
+
+def stability_along(
+    case: VibrationCase,
+    model: VibrationModel,
+    name: str,
+    curve: FollowedCurve[Any],
+    motions: Sequence[HarmonicSolution],
+    amplitude: Callable[[HarmonicSolution], float],
+    reporter: Reporter,
+    steps: Steps,
+) -> CurveStability:
+    """The stability of motions along a curve of this ``name``, and its bifurcations.
+
+    ``amplitude`` of a motion [mm] is what these are told with.
+    """
+    if not looked_for(case, model):
+        return NOT_LOOKED_FOR
+    reporter.doing(f"{name}: stability")
+    floquet = Floquet(curve.problem)
+    known: list[Stability] = []
+    for first in range(0, len(motions), TOGETHER):
+        some = motions[first : first + TOGETHER]
+        known.extend(steps("stability", partial(_stability_of, floquet, tuple(some))))
+
+    def find() -> tuple[dict[str, Any], ...]:
+        found = find_bifurcations(curve, motions, known)
+        return tuple(_described(each, amplitude(each.motion), case.amount) for each in found)
+
+    bifurcations = steps("bifurcations", find)
+    unknown = [at for at in known if at.verdict == "unknown"]
+    if len(unknown) == len(known) and known:
+        reporter.warn(f"{name}: nothing is said of stability: {unknown[0].message}")
+    numbers = {
+        "unstable_points": sum(at.verdict == "unstable" for at in known),
+        "unknown_points": len(unknown),
+        "largest_multiplier": max((at.largest for at in known), default=0.0),
+    }
+    return CurveStability(_columns(known), numbers, bifurcations)
+
+
+def _stability_of(floquet: Floquet, motions: tuple[HarmonicSolution, ...]) -> tuple[Stability, ...]:
+    return tuple(floquet.stability(motion) for motion in motions)
+
+
+def _columns(known: Sequence[Stability]) -> dict[str, Dataset]:
+    of = "of a small deviation in a period"
+    return {
+        "stability": Dataset(
+            np.array([CODES[at.verdict] for at in known]), "1", "1 stable, -1 unstable, 0 unknown"
+        ),
+        "multiplier": Dataset(
+            np.array([at.largest for at in known]), "1", f"size of the largest multiplier {of}"
+        ),
+        "multiplier_error": Dataset(
+            np.array([at.error for at in known]), "1", "estimated, of the largest multiplier"
+        ),
+        "unstable_multipliers": Dataset(
+            np.array([at.unstable for at in known]), "1", f"multipliers {of} beyond 1, surely"
+        ),
+    }
+
+
+def _described(bifurcation: Bifurcation, amplitude: float, amount: Amount) -> dict[str, Any]:
+    """A bifurcation, of a motion of this amplitude [mm], for summary and tables."""
+    motion, multiplier = bifurcation.motion, bifurcation.multiplier
+    return {
+        "kind": bifurcation.kind,
+        "frequency": motion.frequency,
+        amount.name: motion.force,
+        "amplitude": amplitude,
+        "multiplier": abs(multiplier),
+        "multiplier_angle": float(abs(np.angle(multiplier))),
+        "unstable_before": bifurcation.unstable[0],
+        "unstable_after": bifurcation.unstable[1],
+    }
+
+
+def columns_for(amount: Amount) -> dict[str, tuple[str, str]]:
+    """What is known of a bifurcation beside its kind: unit, and what it is."""
+    return {
+        "frequency": ("Hz", "of the force"),
+        amount.name: (amount.unit, amount.description),
+        "amplitude": ("mm", "half of the way to and fro of what is looked at"),
+        "multiplier": ("1", "size of the one that passes the circle there"),
+        "multiplier_angle": ("rad", "its angle: 0 of a fold, pi where the period doubles"),
+        "unstable_before": ("1", "multipliers beyond the circle at the point before"),
+        "unstable_after": ("1", "and at the point after"),
+    }
+
+
+def bifurcation_datasets(
+    bifurcations: Sequence[Mapping[str, Any]], amount: Amount
+) -> dict[str, Dataset]:
+    """Columns ``(n,)`` of bifurcations, without their kinds."""
+    return {
+        name: Dataset(np.array([found[name] for found in bifurcations]), unit, what)
+        for name, (unit, what) in columns_for(amount).items()
+    }
