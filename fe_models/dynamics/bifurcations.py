@@ -26,6 +26,7 @@ from fe_models.dynamics.harmonic_balance import Balance, HarmonicBalance
 from fe_models.dynamics.harmonic_solution import HarmonicSolution
 from fe_models.dynamics.newton import Equations, L
 from fe_models.dynamics.phase_resonance import PhaseBalance, PhaseResonance
+from sa_solver.errors import ConvergenceError
 from sa_solver.types import Array
 
 Kind = Literal["fold", "branching", "period_doubling", "neimark_sacker", "jump"]
@@ -182,7 +183,7 @@ class _Place(Generic[L]):
     turning: float
 
 
-class _Lost(Exception):
+class _Lost(ConvergenceError):
     """Newton's method does not find the curve."""
 
 

@@ -30,6 +30,7 @@ from fe_models.dynamics.harmonic_solution import HarmonicSolution
 from fe_models.dynamics.harmonics import ComplexArray, HarmonicBalanceError
 from fe_models.dynamics.newton import NewtonControl, solve
 from fe_models.dynamics.receptance import Receptance
+from sa_solver.errors import FretscaleError
 from sa_solver.steps import COMPUTED, Steps
 from sa_solver.types import Array
 
@@ -137,7 +138,7 @@ def _shape(
     return np.asarray(amplitude / seen * (structure.at_joints @ motion))
 
 
-class _Returned(Exception):
+class _Returned(FretscaleError):
     """The curve has come round to its first point."""
 
 

@@ -233,6 +233,7 @@ GIVEN["vibration"] = {
     **EXCITED,
     "joint": JOINTS | {"friction_contact": CONTACT} | ELASTIC,
     "loops": {ALWAYS: {"frequency": "100 Hz"}},
+    "modes": {ALWAYS: {"amplitudes": ["0.1 um", "20 um"]}},
     "further_branches": {
         ALWAYS: [{"force": "40 N", "frequency": "200 Hz", "amplitude": "50 um"}],
     },

@@ -6,7 +6,7 @@ import shutil
 from collections.abc import Iterator
 from fnmatch import fnmatchcase
 from pathlib import Path
-from typing import get_origin
+from typing import Annotated, get_args, get_origin
 
 import numpy as np
 import pytest
@@ -171,7 +171,10 @@ def test_all_that_is_usual_is_usual_of_some_entry() -> None:
 def quantities_of(model: type[Section], path: str = "") -> Iterator[tuple[str, str | None]]:
     """Dotted paths of all quantities that a model may have, and their units."""
     for name, field in model.model_fields.items():
-        listed = "0." if get_origin(field.annotation) is tuple else ""
+        # A list may be left out: then it is one of several annotations.
+        either = (part for part in get_args(field.annotation) if get_origin(part) is Annotated)
+        several = (field.annotation, *(get_args(part)[0] for part in either))
+        listed = "0." if tuple in map(get_origin, several) else ""
         if isinstance(quantity := entry_of(field), Quantity):
             yield f"{path}{name}.{listed}".rstrip("."), quantity.unit
         for section in sections_of(field.annotation):

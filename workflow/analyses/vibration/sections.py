@@ -177,7 +177,7 @@ class NonlinearModes(Section):
 class FurtherStart(Section):
     """Where a branch is looked for that does not come from an end of the frequencies."""
 
-    force: DrivingForce = entry("one of forces [N], or of the excitation's levels", "40 N")
+    force: DrivingForce = entry("one of forces, or of the excitation's levels [N]", "40 N")
     frequency: Frequency = entry("of motions that may be on it [Hz]", "200 Hz")
     amplitude: Annotated[float, Quantity("mm", above=0.0, at_most=1e3)] = entry(
         "of what is looked at in such a motion, roughly [mm]", "50 um"
