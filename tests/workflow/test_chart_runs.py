@@ -316,7 +316,8 @@ def test_quantities_can_be_picked(
 
 @pytest.mark.slow
 def test_steppers_of_a_line_contact(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    """Implicit steps are of first order, those of second order better at the same length."""
+    """Implicit steps are of an order between the first and the second; those of second order are
+    better at the same length."""
     longer = ROLLER_WEAR.replace("  cycles: 4e4", "  cycles: 1e5")
     (tmp_path / "line.yaml").write_text(longer, encoding="utf-8")
     (tmp_path / "loads.csv").write_text(ROLLER_LOADS, encoding="utf-8")
@@ -330,7 +331,8 @@ def test_steppers_of_a_line_contact(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     errors = {rung.name: rung.error for rung in ladder.rungs}
     first = [errors[f"implicit, {count} jumps"] for count in (5, 10, 20)]
     for coarse, fine in pairwise(first):
-        assert np.log2(coarse / fine) == pytest.approx(1.0, abs=0.2)
+        # To and fro over unlike increments: see wear.implicit.
+        assert 0.8 < np.log2(coarse / fine) < 2.0
     assert errors["second order, 10 jumps"] < 0.1 * errors["implicit, 10 jumps"]
     assert [rung.name for rung in ladder.rungs if rung.point.baseline] == ["implicit, 10 jumps"]
     assert all(rung.point.cost.solves > 0 for rung in ladder.rungs)

@@ -40,8 +40,11 @@ def test_a_changed_function_is_compiled_into_those_that_call_it(tmp_path):
     shutil.copy(compiled.__file__, package)
     (package / "doubled.py").write_text(DOUBLED, encoding="utf-8")
     kept_beside = {name: value for name, value in os.environ.items() if name != "NUMBA_CACHE_DIR"}
-    for value in (3.0, 3.0, 5.0):
-        (package / "slope.py").write_text(SLOPE.format(value=value), encoding="utf-8")
+    for second, value in enumerate((3.0, 3.0, 5.0)):
+        slope = package / "slope.py"
+        slope.write_text(SLOPE.format(value=value), encoding="utf-8")
+        # Python tells a changed file of the same length by the second that it was written in.
+        os.utime(slope, (2 * second, 2 * second))
         ended = subprocess.run(
             [sys.executable, "-c", ASKED],
             cwd=tmp_path,
