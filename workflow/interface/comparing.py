@@ -49,8 +49,10 @@ def compare(*runs: AnyRun) -> Comparison:
     >>> balls.entries
     {'load_path.legs.0.P': ('200 N', '400 N')}
     >>> force = balls["normal force on body 2, P"]
-    >>> force.values, force.unit, force.differences
-    ((200.0, 400.0), 'N', (None, 1.0))
+    >>> [f"{value:.6g} {force.unit}" for value in force.values]
+    ['200 N', '400 N']
+    >>> f"{force.differences[1]:.2%}"
+    '100.00%'
     """
     folders = [run.folder if isinstance(run, Results) else Path(run) for run in runs]
     return Comparison(comparing.compare(folders))
