@@ -8,7 +8,8 @@ With T the largest kinetic energy in the period, the equivalent damping ratio is
     ζ = (energy lost in the period) / (4π T),
 
 which is that of an oscillator on a dashpot wherever its own resonance is driven: it then loses
-π c ω a², and T is m ω² a² / 2.
+π c ω a², and T is m ω² a² / 2. In a wave that travels round a ring the points of a sector do not
+move together: there T is twice the mean kinetic energy of the sector, the same for an oscillator.
 """
 
 from __future__ import annotations
@@ -46,15 +47,25 @@ def energy_damped(
 ) -> float:
     """What the structure's own damping takes of a motion ``(k, n)`` in a period [N mm]."""
     orders = np.array(harmonics, dtype=float)
-    viscous = 2.0 * np.pi**2 * frequency * float(orders**2 @ _taken(motion, problem.model.damping))
-    if problem.model.structural is None:
+    damping, structural = problem.model.damping, problem.model.structural
+    if problem.travels:
+        models = [problem.receptance.of(harmonic).model for harmonic in harmonics]
+        damping = np.array([model.damping for model in models])
+        if structural is not None:
+            structural = np.array([model.structural for model in models])
+    viscous = 2.0 * np.pi**2 * frequency * float(orders**2 @ _taken(motion, damping))
+    if structural is None:
         return viscous
-    return viscous + np.pi * float(orders @ _taken(motion, problem.model.structural))
+    return viscous + np.pi * float(orders @ _taken(motion, structural))
 
 
 def largest_kinetic_energy(problem: HarmonicBalance, solution: HarmonicSolution) -> float:
-    """Largest kinetic energy in the period [N mm]."""
+    """Largest kinetic energy in the period, in a wave twice the mean one [N mm]."""
     orders, mass = np.array(solution.resolution.harmonics), problem.model.mass
+    if problem.travels:
+        models = (problem.receptance.of(h).model for h in solution.resolution.harmonics)
+        moved = _taken(solution.motion, np.array([model.mass for model in models]))
+        return float(0.5 * (2.0 * np.pi * solution.frequency * orders) ** 2 @ moved)
     rates = 2j * np.pi * solution.frequency * orders[:, None] * solution.motion
     # Energy at the turn τ is a sum over pairs of harmonics: their masses, once for all times.
     moved = _times(rates, mass)
@@ -84,7 +95,9 @@ def damping_ratio(problem: HarmonicBalance, solution: HarmonicSolution) -> float
 
 
 def _taken(motion: ComplexArray, damping: Array) -> Array:
-    """xᴴ C x ``(k,)`` of the harmonics of a motion."""
+    """xᴴ C x ``(k,)`` of the harmonics of a motion, with one C or that of each ``(k, n, n)``."""
+    if damping.ndim == 3:
+        return np.asarray(np.einsum("km,kmn,kn->k", motion.conj(), damping, motion).real)
     return np.asarray((motion.conj() * _times(motion, damping)).real.sum(axis=1))
 
 

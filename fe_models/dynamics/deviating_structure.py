@@ -17,6 +17,7 @@ from fe_models.dynamics.linear_steps import linear_steps
 from fe_models.dynamics.monodromy import JointSteps, StructureSteps, monodromy
 from fe_models.dynamics.period_times import PeriodTimes
 from fe_models.dynamics.periodic_joints import Deviations
+from fe_models.dynamics.receptance import Receptance
 from sa_solver.types import Array
 
 # Sets of springs, at most, that joints are taken as in the steps of a period.
@@ -43,7 +44,11 @@ class ModalStructure:
     @classmethod
     def whole(cls, problem: HarmonicBalance) -> ModalStructure:
         """All modes, without joints."""
-        receptance, directions = problem.receptance, problem.joints.directions
+        return cls.without_joints(problem.alone, problem.joints.directions)
+
+    @classmethod
+    def without_joints(cls, receptance: Receptance, directions: int) -> ModalStructure:
+        """All modes of a structure on joints of so many directions."""
         damping = receptance.damping
         damping = damping if damping.ndim == 2 else np.diag(damping)
         joints = len(receptance.at_joints) // directions

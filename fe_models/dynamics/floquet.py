@@ -34,6 +34,8 @@ from fe_models.dynamics.harmonics import ComplexArray
 from fe_models.dynamics.linear_steps import SPLIT
 from fe_models.dynamics.period_times import PeriodTimes
 from fe_models.dynamics.periodic_joints import DeviatingJoints, Deviations
+from fe_models.dynamics.travelling_wave import WaveReceptance
+from fe_models.dynamics.whole_ring import JoinedDeviations, motion_of, ring_structure
 
 Verdict = Literal["stable", "unstable", "unknown"]
 # Times of a period at first, at least: so many steps of equal length, which then are divided in
@@ -51,6 +53,8 @@ ROUNDING = 1e-9
 # highest harmonic of the motion. Times of a period of these, or with more directions of joints than
 # so many, and times per highest harmonic.
 MOST_MODES, HIGHEST, MOST_DIRECTIONS, LARGE_SAMPLES, PER_HARMONIC = 64, 3.0, 12, 128, 4
+# Modes of all sectors of a ring, of which none is left out: more take minutes.
+MOST_OF_RING = 256
 
 
 @dataclass(frozen=True)
@@ -111,11 +115,18 @@ class Floquet:
         self._most_modes = most_modes
         self._problem, self._joints = problem, problem.joints
         self._reduced: ModalStructure | None = None
+        # Sectors in a wave are followed one by one: deviations need not travel as it does.
+        receptance = problem.receptance
+        self._sector = receptance.sector if isinstance(receptance, WaveReceptance) else None
+        self._sectors = 1 if self._sector is None else self._sector.ring.sectors
 
     def _structure(self, motion: HarmonicSolution) -> ModalStructure:
         """All modes of a small structure; of a large one those that this motion may move."""
         problem = self._problem
-        if len(problem.receptance.squares) <= self._most_modes:
+        if self._sector is not None:
+            self._reduced = self._reduced or ring_structure(self._sector, self._joints.directions)
+            return self._reduced
+        if len(problem.alone.squares) <= self._most_modes:
             return ModalStructure.whole(problem)
         highest = 2.0 * np.pi * motion.frequency * motion.resolution.harmonics[-1]
         count = modes_below(problem, HIGHEST * highest)
@@ -126,7 +137,10 @@ class Floquet:
     @property
     def cheap(self) -> bool:
         """Whether it takes milliseconds for a motion; otherwise it may be seconds."""
-        modes, directions = len(self._problem.model.mass), len(self._problem.model.connection)
+        modes, directions = (
+            self._sectors * len(part)
+            for part in (self._problem.model.mass, self._problem.model.connection)
+        )
         return modes <= self._most_modes and directions <= MOST_DIRECTIONS
 
     def stability(self, motion: HarmonicSolution) -> Stability:
@@ -137,6 +151,12 @@ class Floquet:
             return _unknown(
                 "a loss factor is of harmonics, and of no deviation in time: half of it as damping "
                 "ratio is the same at resonance"
+            )
+        modes = self._sectors * len(self._problem.model.mass)
+        if self._sector is not None and modes > MOST_OF_RING:
+            return _unknown(
+                f"it is a matter of all sectors of the ring, which have {modes} modes: more than "
+                f"{MOST_OF_RING}"
             )
         structure = self._structure(motion)
         samples, deepest, finest = SAMPLES, DEEPEST, FINER
@@ -178,7 +198,12 @@ class Floquet:
     def _deviations(self, motion: HarmonicSolution, times: PeriodTimes) -> Deviations:
         assert isinstance(self._joints, DeviatingJoints)
         basis = motion.resolution.functions_at(times.starts, times.parts)
-        return self._joints.linearise(motion.coefficients, basis, motion.resolution.lead)
+        lead, linearise = motion.resolution.lead, self._joints.linearise
+        if self._sector is None:
+            return linearise(motion.coefficients, basis, lead)
+        ring, sectors = self._sector.ring, range(self._sectors)
+        every = (motion_of(ring, motion, sector).coefficients for sector in sectors)
+        return JoinedDeviations.of([linearise(each, basis, lead) for each in every])
 
 
 def _unknown(message: str) -> Stability:

@@ -110,8 +110,8 @@ def vibrating_starts(
     first = problem.resolution.harmonics.index(1)
     angular = np.array([2.0 * np.pi * frequency])
     rest = problem.guess(None).reshape(problem.transfer.joints, problem.resolution.size, -1)
-    for structure in (problem.receptance, problem.rest.stuck.stiffened):
-        shape = _shape(structure, problem, angular, amplitude, output)
+    for structure in (problem.receptance, problem.stuck):
+        shape = _shape(structure.of(1), problem, angular, amplitude, output)
         for phase in 2.0 * np.pi * np.arange(PHASES) / PHASES:
             amplitudes = problem.resolution.amplitudes(rest)
             amplitudes[first] = np.exp(1j * phase) * shape
@@ -131,7 +131,7 @@ def _shape(
     if not problem.load.waves:
         raise HarmonicBalanceError("the load has no harmonics: give other starts")
     force = problem.load.waves[min(problem.load.waves)]
-    motion = structure.at(angular).respond((force @ structure.at_points)[None])[0]
+    motion = structure.at(angular).respond((force @ structure.at_points.conj())[None])[0]
     seen = abs(complex(output @ structure.at_points @ motion))
     if seen == 0.0:
         raise HarmonicBalanceError("what is looked at does not move: look at what does")

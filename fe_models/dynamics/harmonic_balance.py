@@ -35,10 +35,13 @@ from fe_models.dynamics.model import DynamicModel
 from fe_models.dynamics.newton import NewtonControl, NewtonSolution, solve
 from fe_models.dynamics.periodic_joints import Cycle, CycleRecord, PeriodicJoints
 from fe_models.dynamics.receptance import Receptance, SteadyMotion
+from fe_models.dynamics.sector import CyclicSector
 from fe_models.dynamics.sizes import norm, relative_norm
+from fe_models.dynamics.travelling_wave import WaveReceptance
 from sa_solver.types import Array
 
-# Unknowns up to which a matrix is assembled and factorised; beyond, products with it are cheaper.
+# Unknowns up to which a matrix is assembled and factorised; beyond, products with it are cheaper,
+# but for a sector in a wave, for which these are not written.
 DENSE = 400
 # Harmonics left out are looked for up to this multiple of the highest, and at least to this one.
 LOOK_BEYOND, LOOK_AT_LEAST = 2, 63
@@ -119,7 +122,7 @@ class Balance:
         products = HarmonicJacobian(
             problem.transfer, problem.rest, self.steady, self.cycle.jacobian
         )
-        return products.assembled() if problem.size <= DENSE else products
+        return products.assembled() if problem.size <= DENSE or problem.travels else products
 
     @cached_property
     def slope(self) -> Array:
@@ -162,7 +165,7 @@ class HarmonicBalance:
         joints: PeriodicJoints,
         load: PeriodicLoad,
         resolution: Resolution,
-        receptance: Receptance | None = None,
+        receptance: Receptance | WaveReceptance | None = None,
         rest: Rest | None = None,
     ) -> None:
         missing = sorted(load.harmonics - set(resolution.harmonics))
@@ -178,7 +181,7 @@ class HarmonicBalance:
             raise HarmonicBalanceError("a force of the load is not a number: give finite ones")
         self.model, self.joints, self.load, self.resolution = model, joints, load, resolution
         self.receptance = receptance or Receptance(model)
-        self.transfer = HarmonicTransfer(resolution, self.receptance, joints.directions)
+        self.transfer = _transfer(resolution, self.receptance, joints.directions)
         self.orders = np.array(resolution.harmonics, dtype=float)
         # 2π k: angular frequencies per Hz.
         self.turning = 2.0 * np.pi * self.orders
@@ -186,16 +189,31 @@ class HarmonicBalance:
         self.wave, self.inertial = (self._on_modes(part) for part in (load.waves, load.inertial))
         self._constant = np.zeros_like(self.wave)
         if load.static is not None and static:
-            self._constant[0] = load.static @ self.receptance.at_points
-        self.rest = rest or Rest(model, self.receptance, joints, self._constant[0].real)
+            self._constant[0] = load.static @ self.receptance.of(0).at_points
+        self.rest = rest or Rest(model, self.receptance.of(0), joints, self._constant[0].real)
         self._neglected = _neglected(resolution)
         self._richer: HarmonicBalance | None = None
+
+    @classmethod
+    def of_sector(
+        cls,
+        sector: CyclicSector,
+        joints: PeriodicJoints,
+        load: PeriodicLoad,
+        resolution: Resolution,
+    ) -> HarmonicBalance:
+        """That of a sector in a wave that travels round its ring, under a load that does.
+
+        ``load`` is that of sector 0 on its own unknowns, ``joints`` are of one sector.
+        """
+        return cls(sector.at(0), joints, load, resolution, WaveReceptance(sector))
 
     def _on_modes(self, waves: Mapping[int, ComplexArray]) -> ComplexArray:
         """Amplitudes on the modes ``(k, n)`` of those on the structure, by harmonic."""
         on_modes = np.zeros((len(self.orders), len(self.model.mass)), dtype=complex)
         for harmonic, wave in waves.items():
-            on_modes[self.resolution.harmonics.index(harmonic)] = wave @ self.receptance.at_points
+            row = self.resolution.harmonics.index(harmonic)
+            on_modes[row] = self.transfer.load_on_modes(wave, row)
         return on_modes
 
     def wave_at(self, angular: Array) -> ComplexArray:
@@ -296,7 +314,7 @@ class HarmonicBalance:
             force=force,
             resolution=self.resolution,
             coefficients=coefficients,
-            motion=self.receptance.displacement(at.motion),
+            motion=self.transfer.displacement(at.motion),
             cycle=record,
             iterations=iterations,
             residual=at.relative,
@@ -320,7 +338,7 @@ class HarmonicBalance:
         )
         orders, sizes = self._orders_left_out, []
         for transfer in self._left_out_by:
-            steady = transfer.receptance.at(2.0 * np.pi * frequency * orders)
+            steady = transfer.steady(2.0 * np.pi * frequency * orders)
             motion = steady.respond(transfer.modal(force.transpose(1, 0, 2)))
             sizes.append(neglected.sizes(transfer.shaped(transfer.at_joints(motion))))
         shares[orders] = np.maximum(*sizes)
@@ -335,9 +353,34 @@ class HarmonicBalance:
     @cached_property
     def _left_out_by(self) -> tuple[HarmonicTransfer, ...]:
         """What harmonics left out do with joints free, and as stiff as at rest."""
-        structures = self.receptance, self.rest.stuck.stiffened
+        structures = self.receptance, self.stuck
         directions = self.joints.directions
-        return tuple(HarmonicTransfer(self._neglected, of, directions) for of in structures)
+        return tuple(_transfer(self._neglected, of, directions) for of in structures)
+
+    @property
+    def travels(self) -> bool:
+        """Whether this is a sector in a wave that travels round its ring."""
+        return isinstance(self.receptance, WaveReceptance)
+
+    @property
+    def alone(self) -> Receptance:
+        """The structure, with the same modes in every harmonic.
+
+        Raises :class:`HarmonicBalanceError` for a sector in a wave, which has not.
+        """
+        if isinstance(self.receptance, WaveReceptance):
+            raise HarmonicBalanceError(
+                "a sector has other modes in every harmonic of a wave: only its response along "
+                "frequency or force is found"
+            )
+        return self.receptance
+
+    @property
+    def stuck(self) -> Receptance | WaveReceptance:
+        """The structure with joints as stiff as at rest."""
+        if isinstance(self.receptance, WaveReceptance):
+            return self.receptance.stuck(self.rest.stuck.tangents)
+        return self.rest.stuck.stiffened
 
     @cached_property
     def rounding(self) -> float:
@@ -392,7 +435,7 @@ class HarmonicBalance:
         cycle = self.joints.settle(
             coefficients, resolution.basis, resolution.weights, resolution.lead
         )
-        steady = steady or self.receptance.at(frequency * self.turning)
+        steady = steady or self.transfer.steady(frequency * self.turning)
         on_modes = self._constant + force * self.wave_at(steady.angular)
         on_modes -= self.transfer.on_modes(cycle.force, unknowns)
         vibration = steady.vibrate(on_modes)
@@ -411,9 +454,9 @@ class HarmonicBalance:
     @cached_property
     def _mean_by_load(self) -> Array:
         """Mean displacement ``(2, j, d)`` of the joints by the load alone, constant and growing."""
-        rest = self.receptance.respond_at_rest
+        at_rest = self.transfer.receptance
         loads = np.stack([self._constant[0].real, self.wave[0].real])
-        means = np.stack([rest(load) for load in loads]) @ self.receptance.at_joints.T
+        means = np.stack([at_rest.respond_at_rest(load) for load in loads]) @ at_rest.at_joints.T
         return means.reshape(2, self.transfer.joints, -1)
 
     def _size(self, coefficients: Array, response: Array, cycle: Cycle) -> float:
@@ -427,7 +470,7 @@ class HarmonicBalance:
             return norm(coefficients) + norm(response)
         first = int(self.transfer.held > 0.0)
         size = norm(coefficients[:, first:]) + norm(self.transfer.shaped(response)[:, first:])
-        by_joints = self.receptance.static_flexibility @ cycle.force[:, 0].ravel()
+        by_joints = self.transfer.receptance.static_flexibility @ cycle.force[:, 0].ravel()
         return size + norm(by_joints) + norm(self.rest.loaded)
 
 
@@ -447,6 +490,15 @@ class _ByForce:
 
     def __call__(self, unknowns: Array, parameter: float) -> Balance:
         return self.problem.evaluate(unknowns, self.frequency, parameter, "force")
+
+
+def _transfer(
+    resolution: Resolution, receptance: Receptance | WaveReceptance, directions: int
+) -> HarmonicTransfer:
+    """Between joints and modes: of a sector, those of every harmonic."""
+    if isinstance(receptance, WaveReceptance):
+        return receptance.transfer(resolution, directions)
+    return HarmonicTransfer(resolution, receptance, directions)
 
 
 def _neglected(resolution: Resolution) -> Resolution:

@@ -52,6 +52,18 @@ class HarmonicTransfer:
         """κ [N/mm], 0 where it is not needed."""
         return self.receptance.held if self.mean else 0.0
 
+    def steady(self, angular: Array) -> SteadyMotion:
+        """The structure at the angular frequencies ``(k,)`` of the harmonics [rad/s]."""
+        return self.receptance.at(angular)
+
+    def load_on_modes(self, load: ComplexArray, row: int) -> ComplexArray:
+        """Forces on the modes ``(n,)`` by those on the structure, of the harmonic of this row."""
+        return np.asarray(load @ self.receptance.at_points)
+
+    def displacement(self, motion: ComplexArray) -> ComplexArray:
+        """That of the structure ``(k, n)`` by a motion of its modes."""
+        return self.receptance.displacement(motion)
+
     def shaped(self, unknowns: Array) -> Array:
         """Coefficients ``(j, m, d)`` from all in a row."""
         return unknowns.reshape(self.joints, self.resolution.size, self.directions)

@@ -123,11 +123,9 @@ class ModeBalance:
         """Both equations by the unknowns of the joints ``(2, n)``, through their forces."""
         problem, first = self.equations.problem, self.equations.first
         # What joins displacements and forces of modes is symmetric.
-        alone = problem.receptance.less_damped(self._rate).at(np.array([self._angular]))
+        alone = problem.alone.less_damped(self._rate).at(np.array([self._angular]))
         per_force = np.concatenate([alone.vibrate(row[None]) for row in self._rows])
-        by_joint = (per_force @ problem.receptance.at_joints.T).reshape(
-            2, -1, problem.joints.directions
-        )
+        by_joint = (per_force @ problem.alone.at_joints.T).reshape(2, -1, problem.joints.directions)
         cosine, sine = (places[first] for places in problem.resolution.places)
         slopes = self.balance.cycle.jacobian
         by_motion = slopes[:, cosine] - 1j * slopes[:, sine]
@@ -191,7 +189,7 @@ class NonlinearMode:
     def __call__(self, unknowns: Array, parameter: float) -> ModeBalance:
         problem = self.problem
         frequency, ratio = self.frequency_of(unknowns), self.damping_ratio_of(unknowns)
-        fed = problem.receptance.less_damped(4.0 * np.pi * ratio * frequency)
+        fed = problem.alone.less_damped(4.0 * np.pi * ratio * frequency)
         balance = problem.evaluate(
             unknowns[:-2], frequency, 0.0, "frequency", fed.at(frequency * problem.turning)
         )
@@ -270,6 +268,8 @@ class LinearMode:
 
         Raises :class:`HarmonicBalanceError` for one that there is not.
         """
+        # A sector in a wave is refused.
+        _ = problem.alone
         stuck = problem.rest.stuck.stiffened
         elastic = np.flatnonzero(stuck.squares)
         if not 1 <= number <= len(elastic):
@@ -342,7 +342,7 @@ def _beginning(
     place = cosine[problem.resolution.harmonics.index(1)]
     moved = amplitude * problem.model.connection @ linear.shape
     unknowns[:, place] = moved.reshape(len(unknowns), -1)
-    reference = problem.receptance.at_points.T @ problem.model.mass @ linear.shape
+    reference = problem.alone.at_points.T @ problem.model.mass @ linear.shape
     scale = float(np.linalg.norm(moved)) or 1.0
     equations = NonlinearMode(problem, reference + 0j, linear.frequency, scale)
     return np.append(unknowns, [0.0, scale * linear.damping_ratio]), equations

@@ -116,7 +116,7 @@ class PhaseBalance:
     @cached_property
     def _steady(self) -> SteadyMotion:
         """The structure at harmonic 1."""
-        return self.equations.problem.receptance.at(np.array([2.0 * np.pi * self.frequency]))
+        return self.equations.problem.alone.at(np.array([2.0 * np.pi * self.frequency]))
 
     @cached_property
     def _per_force(self) -> ComplexArray:
@@ -127,7 +127,7 @@ class PhaseBalance:
     def _by_motion(self) -> ComplexArray:
         """x by the unknowns ``(n,)``, through the forces of the joints."""
         problem, first = self.equations.problem, self.equations.first
-        by_joint = problem.receptance.at_joints @ self._per_force
+        by_joint = problem.alone.at_joints @ self._per_force
         cosine, sine = (places[first] for places in problem.resolution.places)
         slopes = self.balance.cycle.jacobian
         by_motion = slopes[:, cosine] - 1j * slopes[:, sine]
@@ -267,7 +267,7 @@ class PhaseResonance:
     @cached_property
     def of_modes(self) -> ComplexArray:
         """x by the amplitudes of the modes at harmonic 1 ``(n,)``."""
-        return np.asarray(self.weights.conj() @ self.problem.receptance.at_points)
+        return np.asarray(self.weights.conj() @ self.problem.alone.at_points)
 
     def frequency_of(self, unknowns: Array) -> float:
         """[Hz]"""

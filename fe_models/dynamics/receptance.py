@@ -91,6 +91,7 @@ class SteadyMotion:
     def between_joints(self) -> ComplexArray:
         """Displacements of joints by forces on joints ``(k, j d, j d)`` [mm/N]; held at ω = 0."""
         at_joints, moving = self.structure.at_joints, self._moving
+        on_modes = at_joints.conj().T
         size = len(at_joints)
         between = np.empty((len(self.angular), size, size), dtype=complex)
         if moving:
@@ -100,11 +101,14 @@ class SteadyMotion:
                 _few_between_joints(self._flexibility, at_joints, between[moving:])
                 return between
             inverse = self._flexibility[:, None, :]
+            if np.iscomplexobj(at_joints):
+                between[moving:] = (at_joints * inverse) @ on_modes
+                return between
             # Two real products cost half of a complex one.
-            between.real[moving:] = (at_joints * inverse.real) @ at_joints.T
-            between.imag[moving:] = (at_joints * inverse.imag) @ at_joints.T
+            between.real[moving:] = (at_joints * inverse.real) @ on_modes
+            between.imag[moving:] = (at_joints * inverse.imag) @ on_modes
         else:
-            between[moving:] = at_joints @ np.linalg.solve(self._stiffness, at_joints.T)
+            between[moving:] = at_joints @ np.linalg.solve(self._stiffness, on_modes)
         return between
 
 
@@ -116,7 +120,7 @@ def _few_between_joints(flexibility: ComplexArray, at_joints: Array, between: Co
             for by in range(len(at_joints)):
                 response = 0.0j
                 for n in range(at_joints.shape[1]):
-                    response += flexibility[k, n] * (at_joints[to, n] * at_joints[by, n])
+                    response += flexibility[k, n] * (at_joints[to, n] * np.conj(at_joints[by, n]))
                 between[k, to, by] = response
 
 
@@ -151,7 +155,8 @@ def _is_diagonal(damping: Array) -> bool:
 class Receptance:
     """What harmonic forces do to a structure, in displacements and forces of its modes.
 
-    With ``mixed`` false, damping between different modes is left out.
+    With ``mixed`` false, damping between different modes is left out. Matrices may be Hermitian,
+    those of a sector in a wave: then shapes are complex.
     """
 
     def __init__(self, model: DynamicModel, *, mixed: bool = True) -> None:
@@ -161,23 +166,24 @@ class Receptance:
             raise ReceptanceError(
                 "the mass matrix is not positive definite: give every point mass"
             ) from None
+        self.model = model
         # Rows are points and joints, columns modes (n, n) and (j d, n).
         self.at_points, self.at_joints = shapes, model.connection @ shapes
         rigid = squares < RIGID * squares[-1]
         self.squares = np.where(rigid, 0.0, squares)
-        damping = shapes.T @ model.damping @ shapes
+        damping = shapes.conj().T @ model.damping @ shapes
         loss = np.zeros_like(damping)
         if model.structural is not None:
-            loss = shapes.T @ model.structural @ shapes
+            loss = shapes.conj().T @ model.structural @ shapes
         diagonal = not mixed or (_is_diagonal(damping) and _is_diagonal(loss))
         # Viscous and structural (n,), or (n, n) where one of them mixes the modes.
         self.damping, self.loss = (
-            np.diag(part).copy() if diagonal else part for part in (damping, loss)
+            np.diag(part).real.copy() if diagonal else part for part in (damping, loss)
         )
         self.held = self._holding_stiffness() if rigid.any() else 0.0
         try:
             self.static_factors = sl.cho_factor(
-                np.diag(self.squares) + self.held * self.at_joints.T @ self.at_joints
+                np.diag(self.squares) + self.held * self.at_joints.conj().T @ self.at_joints
             )
         except np.linalg.LinAlgError:
             raise ReceptanceError(
@@ -185,10 +191,14 @@ class Receptance:
             ) from None
         # Displacements of joints by constant forces on joints (j d, j d), held.
         self.static_flexibility = self.at_joints @ sl.cho_solve(
-            self.static_factors, self.at_joints.T
+            self.static_factors, self.at_joints.conj().T
         )
         # The last one asked for: along a branch it hardly changes.
         self._residuals: dict[int, Array] = {}
+
+    def of(self, harmonic: int) -> Receptance:
+        """That of a harmonic: the same for all."""
+        return self
 
     def at(self, angular: Array) -> SteadyMotion:
         """The structure at ``k`` frequencies [rad/s]."""
@@ -226,7 +236,7 @@ class Receptance:
         """κ, a share of what the structure opposes to its joints where it strains."""
         strained = self.squares > 0.0
         at_joints = self.at_joints[:, strained]
-        flexibility = float((np.square(at_joints) / self.squares[strained]).sum())
+        flexibility = float((np.abs(at_joints) ** 2 / self.squares[strained]).sum())
         if flexibility > 0.0:
             return HELD * len(at_joints) / flexibility
         return 1.0

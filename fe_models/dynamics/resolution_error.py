@@ -64,7 +64,7 @@ def _energy_error(
     frequency = solution.frequency * (1.0 + share)
     nearest = richer.evaluate(unknowns, frequency, solution.force, "frequency")
     dissipated = float(nearest.cycle.dissipated.sum())
-    motion = richer.receptance.displacement(nearest.motion)
+    motion = richer.transfer.displacement(nearest.motion)
     damped = energy_damped(richer, motion, richer.resolution.harmonics, frequency)
     difference = abs(dissipated - float(solution.cycle.dissipated.sum()))
     return difference / (dissipated + damped) if difference > 0.0 else 0.0

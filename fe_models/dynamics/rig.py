@@ -142,22 +142,35 @@ def connected_rig(
     As :func:`reduced_rig`, whatever the matrices come from.
     """
     every = names + tuple(name for name in masses if name not in names)
-    if len(set(every)) < len(every):
+    rig = undamped_rig(mass, stiffness, every, masses, springs, joints)
+    return replace(rig, damping=modal_damping(rig.mass, rig.stiffness, damping_ratio))
+
+
+def undamped_rig(
+    mass: Array,
+    stiffness: Array,
+    names: tuple[str, ...],
+    masses: Mapping[str, float],
+    springs: Mapping[Link, float],
+    joints: Sequence[Sequence[Link]],
+) -> DynamicModel:
+    """The same without damping, of all ``names``: matrices are of the first of them."""
+    if len(set(names)) < len(names):
         raise RigError("two points have the same name: give each its own")
-    added = len(every) - len(names)
+    added = len(names) - len(mass)
     mass, stiffness = (np.pad(matrix, (0, added)) for matrix in (mass, stiffness))
     for name, value in masses.items():
-        place = _place(every, name)
+        place = _place(names, name)
         mass[place, place] += value
     for link, value in springs.items():
-        stretch = stretch_of(every, link)
+        stretch = stretch_of(names, link)
         stiffness += value * np.outer(stretch, stretch)
     return DynamicModel(
         mass=mass,
-        damping=modal_damping(mass, stiffness, damping_ratio),
+        damping=np.zeros_like(mass),
         stiffness=stiffness,
-        connection=_connection(every, joints),
-        names=every,
+        connection=_connection(names, joints),
+        names=names,
     )
 
 
@@ -180,7 +193,7 @@ def modal_damping(mass: Array, stiffness: Array, ratio: float | Array) -> Array:
     angular = np.sqrt(np.maximum(squares, 0.0))
     moved = mass @ shapes
     ratios = np.pad(given, (0, len(mass) - len(given)), mode="edge")
-    return np.asarray((moved * (2.0 * ratios * angular)) @ moved.T)
+    return np.asarray((moved * (2.0 * ratios * angular)) @ moved.conj().T)
 
 
 def natural_frequencies(model: DynamicModel, joint_stiffness: float | Array = 0.0) -> Array:
@@ -207,7 +220,7 @@ def natural_frequencies(model: DynamicModel, joint_stiffness: float | Array = 0.
     else:
         springs = np.diag(np.broadcast_to(held, len(stretch)))
     squares = sl.eigh(
-        model.stiffness + stretch.T @ springs @ stretch, model.mass, eigvals_only=True
+        model.stiffness + stretch.conj().T @ springs @ stretch, model.mass, eigvals_only=True
     )
     return np.asarray(
         np.sqrt(np.where(squares < RIGID * squares[-1], 0.0, squares)) / (2.0 * np.pi)

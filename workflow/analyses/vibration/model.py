@@ -98,8 +98,13 @@ class VibrationModel:
     @property
     def undamped(self) -> bool:
         """Whether only the joints bound a resonance."""
-        receptance = self.problem.receptance
+        receptance = self._first
         return not (receptance.damping.any() or receptance.loss.any())
+
+    @property
+    def _first(self) -> Receptance:
+        """The structure at harmonic 1: of a sector at its nodal diameters."""
+        return self.problem.receptance.of(1)
 
     @cached_property
     def _natural(self) -> dict[str, list[float]]:
@@ -164,7 +169,7 @@ class VibrationModel:
 
     def _limits(self, frequency: Array) -> Array:
         """Amplitudes over force ``(2, f)`` [mm/N], joints free and stuck."""
-        seen = self.rig.seen[-1] @ self.problem.receptance.at_points
+        seen = self.rig.seen[-1] @ self._first.at_points
         moved, held, _ = self._moved(frequency)
         return np.abs(np.array([moved @ seen, held @ seen]))
 
@@ -177,14 +182,14 @@ class VibrationModel:
         assert self.rig.stretch is not None
         _, held, pulled = self._moved(np.array([frequency]))
         along = pulled.reshape(self.rig.joints, self.rig.directions)[:, self.rig.along]
-        opened = held[0] @ (self.rig.stretch @ self.problem.receptance.at_points)
+        opened = held[0] @ (self.rig.stretch @ self._first.at_points)
         return float((along.sum() / opened).real)
 
     def _moved(self, frequency: Array) -> tuple[Array, Array, Array]:
         """Motion of all points under harmonic 1 of the load ``(f, n)``, joints free, and stuck, and
         the forces of these ``(f, m)``: k u, with u = (1 + R k)⁻¹ u_free.
         """
-        receptance: Receptance = self.problem.receptance
+        receptance = self._first
         angular = 2.0 * np.pi * frequency
         steady = receptance.at(angular)
         # Turned so that a sine is real.
@@ -194,7 +199,7 @@ class VibrationModel:
         coupled = np.eye(len(tangent)) + steady.between_joints() @ tangent
         stuck = np.linalg.solve(coupled, free[..., None])[..., 0]
         pulled = stuck @ tangent.T
-        return moved, moved - steady.respond(pulled @ receptance.at_joints), pulled
+        return moved, moved - steady.respond(pulled @ receptance.at_joints.conj()), pulled
 
 
 def _law(case: VibrationCase, rig: RigModel) -> Law:
