@@ -13,6 +13,7 @@ from fe_models.dynamics.rig import Link, lumped_rig, unit_force
 from workflow.analyses.rig.damping import Damping
 from workflow.analyses.rig.friction_rig import friction_rig_model
 from workflow.analyses.rig.joint_sections import ElasticJoint, FrictionContactJoint, Joint
+from workflow.analyses.rig.place_names import PlaceNames
 from workflow.analyses.rig.reduced_rig import reduced_rig_model
 from workflow.analyses.rig.rig_model import RigModel
 from workflow.analyses.rig.structure import FrictionRig, JointedBody, Rig
@@ -24,14 +25,18 @@ def rig_model(
     joint: Joint | ElasticJoint,
     mass: int | None,
     reporter: Reporter,
+    engine_order: int = 1,
 ) -> RigModel:
     """The rig with its joints, of masses in a row driven at the ``mass`` of this number.
+
+    A sector of a ring is driven by an ``engine_order``.
 
     Raises UserError where its bodies cannot be what the case says.
     """
     if isinstance(structure, JointedBody):
         directions = 3 if isinstance(joint, FrictionContactJoint) else 1
-        return _damped(reduced_rig_model(structure, directions, reporter), structure.damping)
+        built = reduced_rig_model(structure, directions, reporter, engine_order)
+        return _damped(built, structure.damping)
     if isinstance(structure, FrictionRig):
         return _damped(friction_rig_model(structure, reporter), structure.damping)
     return row_of_masses(structure, mass or 1)
@@ -61,9 +66,15 @@ def _damped(rig: RigModel, damping: Damping | None) -> RigModel:
     if damping is None:
         return rig
     dashpots: defaultdict[Link, float] = defaultdict(float)
+    sector = rig.sector
+    names = rig.place_names if sector is None else PlaceNames(sector.model.names)
     for number, dashpot in enumerate(damping.dashpots):
-        links = rig.place_names.links(dashpot, f"structure.damping.dashpots.{number}")
+        links = names.links(dashpot, f"structure.damping.dashpots.{number}")
         for link in links:
             dashpots[link] += dashpot.coefficient / len(links)
     factors = (0.0, 0.0) if damping.rayleigh is None else damping.rayleigh.factors
-    return replace(rig, model=damped(rig.model, *factors, damping.loss_factor, dashpots))
+    more = *factors, damping.loss_factor, dashpots
+    if sector is None:
+        return replace(rig, model=damped(rig.model, *more))
+    sector = replace(sector, model=damped(sector.model, *more))
+    return replace(rig, model=sector.at(0), sector=sector)

@@ -14,7 +14,7 @@ import numpy as np
 from pydantic import Discriminator, Tag, model_validator
 
 from sa_solver.types import Array
-from workflow.analyses.rig.places import Moved
+from workflow.analyses.rig.places import NEXT, Moved
 from workflow.analyses.rig.point_kinds import known, matching
 from workflow.analyses.rig.structure import JointedBody
 from workflow.analyses.rig.unknowns_file import AXES, given_unknowns
@@ -277,8 +277,11 @@ class MatrixBody(JointedBody, Matrices):
         }
         for key, part in (sections | {"driven": self.driven, "seen": self.seen}).items():
             for end in ("points", "against"):
-                if getattr(part, end, None) is not None:
-                    wanted[f"{key}.{end}"] = getattr(part, end)
+                point = getattr(part, end, None)
+                if point is not None and self.ring is not None:
+                    point = point.removeprefix(NEXT)
+                if point is not None:
+                    wanted[f"{key}.{end}"] = point
         for key, point in wanted.items():
             there = self.points if key.startswith("retained.") else self.kept
             if not matching(there, point):

@@ -29,6 +29,10 @@ class PlaceNames:
             raise UserError(f"{key}: '{wanted}': no such point; allowed: {known(self._points)}")
         return found
 
+    def names_of(self, point: str) -> list[str]:
+        """The displacements of a point."""
+        return [name for name in self.names if name.rpartition(" ")[0] == point]
+
     def pairs(self, connection: Against, key: str) -> list[tuple[str, str | None]]:
         """Each point and that against which it moves, None for the ground."""
         points = self.of(connection.points, f"{key}.points")

@@ -13,6 +13,7 @@ from fe_models.dynamics.ground_motion import Translation, translation_of
 from fe_models.dynamics.model import DynamicModel
 from fe_models.dynamics.receptance import RIGID
 from fe_models.dynamics.rig import Link, RigError, reduced_rig, unit_force
+from fe_models.dynamics.sector import CyclicSector, reduced_sector
 from fe_models.matrices import MatrixError
 from fe_models.matrices.reduction import listed_names
 from fe_models.mesh import MeshError
@@ -21,7 +22,9 @@ from sa_solver.types import Array, Progress, Tally
 from workflow.analyses.rig.matrix_body import LoadCase, MatrixBody
 from workflow.analyses.rig.place_names import PlaceNames, link_along
 from workflow.analyses.rig.places import Moved
+from workflow.analyses.rig.point_body import PointBody
 from workflow.analyses.rig.rig_model import RigModel
+from workflow.analyses.rig.ring import with_next
 from workflow.analyses.rig.structure import JointedBody, JointPlaces, ReducedBody
 from workflow.analyses.specimens.case import SpecimensCase
 from workflow.analyses.specimens.memory import memory
@@ -33,44 +36,51 @@ from workflow.shell.reporter import Reporter
 AXES = "xyz"
 
 
-def reduced_rig_model(body: JointedBody, directions: int, reporter: Reporter) -> RigModel:
+def reduced_rig_model(
+    body: JointedBody, directions: int, reporter: Reporter, engine_order: int = 1
+) -> RigModel:
     """The rig that a reduced body makes, with joints of so many ``directions``, 1 or 3.
 
+    It may be a sector of a ring that is driven by an ``engine_order``.
     Raises UserError for a file without such a body, and for points that it does not have.
     """
     with reporter.stage("reduction", "steps") as told:
         reduced, massless = _reduced_body(body, reporter, told)
     try:
-        return _rig_on(reduced, body, directions)
+        return _rig_on(reduced, body, directions, engine_order)
     except UserError as error:
         if not massless:
             raise
         raise UserError(f"{error}{_told(massless)}") from error
 
 
-def _rig_on(reduced: ReducedModel, body: JointedBody, directions: int) -> RigModel:
+def _rig_on(
+    reduced: ReducedModel, body: JointedBody, directions: int, engine_order: int
+) -> RigModel:
     """The rig on a reduced model."""
     if reduced.names is None:
         raise UserError(
             "structure.file: a model whose kept displacements have no names; allowed: one of a "
             "specimens run, or written with names"
         )
-    points = _Points(reduced.names)
+    points, ring, sector = _Points(reduced.names), None, None
+    linked = points
+    if body.ring is not None:
+        ring = body.ring.of_order(engine_order, points)
+        linked = _Points(with_next(reduced.names))
     joints = [
         joint
         for number, places in enumerate(body.joints)
-        for joint in points.joints(places, directions, f"structure.joints.{number}")
+        for joint in linked.joints(places, directions, f"structure.joints.{number}")
     ]
+    added = points.masses(body), linked.springs(body), np.array(body.damping_ratio)
     try:
-        model = reduced_rig(
-            reduced,
-            reduced.names,
-            joints,
-            points.masses(body),
-            points.springs(body),
-            np.array(body.damping_ratio),
-        )
-        driven = _driven(body, reduced, model, points)
+        if ring is None:
+            model = reduced_rig(reduced, reduced.names, joints, *added)
+        else:
+            sector = reduced_sector(reduced, reduced.names, joints, ring, *added)
+            model, points = sector.at(0), _Points([n for n in points.names if n not in ring.ties])
+        driven = _driven(body, reduced, model, points, sector)
         seen = _shape(model, points, body.seen, "structure.seen")
     except RigError as error:
         raise UserError(f"structure: {error}") from error
@@ -79,7 +89,8 @@ def _rig_on(reduced: ReducedModel, body: JointedBody, directions: int) -> RigMod
     return RigModel(
         *(model, driven, seen[None], (label,), directions, along),
         in_a_row=False,
-        translations=_translations(reduced, model),
+        translations={} if sector is not None else _translations(reduced, model),
+        sector=sector,
     )
 
 
@@ -101,7 +112,11 @@ def _translations(body: ReducedModel, model: DynamicModel) -> dict[str, Translat
 
 
 def _driven(
-    body: JointedBody, reduced: ReducedModel, model: DynamicModel, points: _Points
+    body: JointedBody,
+    reduced: ReducedModel,
+    model: DynamicModel,
+    points: _Points,
+    sector: CyclicSector | None,
 ) -> Array:
     """Forces ``(n,)`` of an excitation of 1 N, none where nothing is driven here."""
     driven: Moved | LoadCase | None = body.driven
@@ -109,7 +124,12 @@ def _driven(
         return np.zeros(len(model.mass))
     if isinstance(driven, Moved):
         return _shape(model, points, driven, "structure.driven")
-    return reduced.loads[:, driven.load - 1]
+    load = reduced.loads[:, driven.load - 1]
+    if sector is None:
+        return load
+    # What is on a face on which the next sector begins acts there.
+    shared = np.pad(load, (0, len(sector.model.mass) - len(load)))
+    return sector.force(shared, sector.ring.shift(1))
 
 
 def _along(directions: int, body: JointedBody) -> int:
@@ -133,6 +153,8 @@ def _reduced_body(
     body: JointedBody, reporter: Reporter, progress: Progress
 ) -> tuple[ReducedModel, tuple[str, ...]]:
     """The model, and names of displacements without mass that are none of it."""
+    if isinstance(body, PointBody):
+        return body.body(), ()
     if isinstance(body, MatrixBody):
         return _of_matrices(body, reporter, progress)
     assert isinstance(body, ReducedBody)

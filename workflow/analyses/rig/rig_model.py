@@ -16,6 +16,7 @@ from fe_models.dynamics.model import DynamicModel
 from fe_models.dynamics.motion import Motion
 from fe_models.dynamics.receptance import RIGID
 from fe_models.dynamics.rig import natural_frequencies
+from fe_models.dynamics.sector import CyclicSector
 from sa_solver.types import Array, Indices
 from wear.joints.elastic import ElasticLaw
 from wear.joints.friction_contact import FrictionContact
@@ -42,6 +43,8 @@ class RigModel:
     that loops are drawn over, not the joints' mean; and of each joint its place ``places``
     ``(j, 2)`` on the contact plane [mm], the initial ``gap`` ``(j,)`` [mm] and ``area`` ``(j,)``
     [mm²], empty elsewhere. ``translations`` are those with the ground, by direction.
+
+    Of a ring ``sector`` is one, and ``model`` that of no nodal diameter.
     """
 
     model: DynamicModel
@@ -57,6 +60,19 @@ class RigModel:
     gap: Array = field(default_factory=lambda: np.empty(0))
     area: Array = field(default_factory=lambda: np.empty(0))
     translations: Mapping[str, Translation] = field(default_factory=dict)
+    sector: CyclicSector | None = None
+
+    @property
+    def linked(self) -> DynamicModel:
+        """With all that joints and dashpots may lead to, points of a next sector among it."""
+        return self.model if self.sector is None else self.sector.model
+
+    @property
+    def driven_so(self) -> DynamicModel:
+        """As harmonic 1 of the excitation drives it: of a sector at its nodal diameters."""
+        if self.sector is None:
+            return self.model
+        return self.sector.at(self.sector.ring.shift(1))
 
     @property
     def joints(self) -> int:
@@ -83,10 +99,10 @@ class RigModel:
         """What every direction of every joint stretches by ``(j d,)``, such as ``m2 - m1``."""
         return [
             " - ".join(
-                "+".join(self.model.names[place] for place in np.flatnonzero(side)) or "ground"
+                "+".join(self.linked.names[place] for place in np.flatnonzero(side)) or "ground"
                 for side in ((row > 0.0, row < 0.0) if (row < 0.0).any() else (row > 0.0,))
             )
-            for row in self.model.connection
+            for row in self.linked.connection
         ]
 
     @property
@@ -133,7 +149,7 @@ class RigModel:
 
     def free(self) -> list[float]:
         """The lowest natural frequencies without the joints [Hz]."""
-        return _lowest(natural_frequencies(self.model))
+        return _lowest(natural_frequencies(self.driven_so))
 
     def stuck(self, law: Law, rest: Array | None = None) -> Array:
         """Tangents ``(j, d, d)`` [N/mm] of joints that stick.
@@ -147,15 +163,15 @@ class RigModel:
 
     def stuck_damping(self, law: Law, rest: Array | None = None) -> list[float]:
         """Damping ratios of the lowest modes with all joints stuck: C is that of the open ones."""
-        held = sl.block_diag(*self.stuck(law, rest))
-        stiffness = self.model.stiffness + self.model.connection.T @ held @ self.model.connection
-        squares, shapes = sl.eigh(stiffness, self.model.mass)
+        held, model = sl.block_diag(*self.stuck(law, rest)), self.driven_so
+        stiffness = model.stiffness + model.connection.conj().T @ held @ model.connection
+        squares, shapes = sl.eigh(stiffness, model.mass)
         # Modes of a structure that moves freely have no damping ratio.
         lowest = np.flatnonzero(squares > RIGID * squares[-1])[:MOST_FREQUENCIES]
         angular = np.sqrt(squares[lowest])
-        lost = np.einsum("nm,nm->m", shapes, self.model.damping @ shapes)[lowest]
-        if self.model.structural is not None:
-            lost += np.einsum("nm,nm->m", shapes, self.model.structural @ shapes)[lowest] / angular
+        lost = _taken(shapes, model.damping)[lowest]
+        if model.structural is not None:
+            lost += _taken(shapes, model.structural)[lowest] / angular
         ratios: list[float] = (0.5 * lost / angular).tolist()
         return ratios
 
@@ -173,9 +189,14 @@ class RigModel:
         else:
             sliding[:, 0, 0] = law.residual_stiffness
         return {
-            "stuck": _lowest(natural_frequencies(self.model, stuck)),
-            "sliding": _lowest(natural_frequencies(self.model, sliding)),
+            "stuck": _lowest(natural_frequencies(self.driven_so, stuck)),
+            "sliding": _lowest(natural_frequencies(self.driven_so, sliding)),
         }
+
+
+def _taken(shapes: Array, damping: Array) -> Array:
+    """sᴴ C s ``(m,)`` of shapes ``(n, m)``."""
+    return np.asarray(np.einsum("nm,nm->m", shapes.conj(), damping @ shapes).real)
 
 
 def _lowest(frequencies: Array) -> list[float]:

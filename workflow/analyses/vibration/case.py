@@ -17,6 +17,8 @@ from workflow.analyses.rig.joint_sections import (
     VibrationLaw,
 )
 from workflow.analyses.rig.matrix_body import MatrixBody
+from workflow.analyses.rig.point_body import PointBody
+from workflow.analyses.rig.ring import RingOfSectors
 from workflow.analyses.rig.structure import (
     FrictionRig,
     ReducedBody,
@@ -48,7 +50,9 @@ class VibrationCaseBase(Case):
 
     title: Title = entry("one line", "Forced response of a friction rig")
     analysis: Literal["vibration"] = entry("what is computed", "vibration")
-    structure: Rig | ReducedBody | MatrixBody | FrictionRig = entry("what holds the joints")
+    structure: Rig | ReducedBody | MatrixBody | PointBody | FrictionRig = entry(
+        "what holds the joints"
+    )
     forces: Annotated[tuple[DrivingForce, ...], Field(min_length=1, max_length=100)] | None = entry(
         "amplitudes, ascending, each followed through the frequencies [N]",
         ["10 N", "40 N"],
@@ -108,6 +112,31 @@ class VibrationCaseBase(Case):
                 *("resolution.samples", "excitation"),
             )
         return self
+
+    @model_validator(mode="after")
+    def _drives_a_ring(self) -> VibrationCaseBase:
+        if self.ring is None:
+            return self
+        order = self.engine_order
+        if order is None or not order.is_integer():
+            given = "missing" if order is None else f"{order:g}: not a whole number"
+            raise disagreement(
+                f"{given}; allowed: with structure.ring, how often a turn drives each sector",
+                *("engine_order", "structure.ring"),
+            )
+        if self.excitation is not None and self.excitation.base:
+            raise disagreement(
+                "a ground that moves drives all sectors at once, not as an engine order does; "
+                "allowed: forces, or no structure.ring",
+                *("excitation.base", "structure.ring"),
+            )
+        return self
+
+    @property
+    def ring(self) -> RingOfSectors | None:
+        """The ring of which the structure is a sector."""
+        ring: RingOfSectors | None = getattr(self.structure, "ring", None)
+        return ring
 
     @property
     def amount(self) -> Amount:
@@ -230,7 +259,7 @@ class VibrationCase(DrivenMass):
         return not wears(source)
 
     structure: Annotated[
-        Rig | ReducedBody | MatrixBody | FrictionRig, Field(discriminator="kind")
+        Rig | ReducedBody | MatrixBody | PointBody | FrictionRig, Field(discriminator="kind")
     ] = entry("what holds the joints")
     joint: VibrationLaw = entry("its law and its parameters; of all joints together")
     loops: LoopsAt | None = entry("of all joints together, at one frequency", default=None)
@@ -308,6 +337,17 @@ class VibrationCase(DrivenMass):
         return self
 
     @model_validator(mode="after")
+    def _follows_a_wave(self) -> VibrationCase:
+        for name in ("backbone", "modes"):
+            if self.ring is not None and getattr(self, name):
+                raise disagreement(
+                    "given with a ring, of whose waves each harmonic has other modes; allowed: "
+                    "responses along frequencies and force_sweeps",
+                    *(name, "structure.ring"),
+                )
+        return self
+
+    @model_validator(mode="after")
     def _further_from_its_own(self) -> VibrationCase:
         low, high = self.frequencies
         for number, start in enumerate(self.further_branches):
@@ -374,6 +414,14 @@ class VibrationCase(DrivenMass):
             raise disagreement("not ascending; allowed: each frequency above the last", "at")
         return self
 
+    def _diameters(self, ring: RingOfSectors) -> str:
+        """Nodal diameters of harmonics, in words."""
+        assert self.engine_order is not None
+        found = ring.diameters(round(self.engine_order), self.harmonics)
+        told = (f"{abs(d)}{' backward' if d < 0 else ''}" for d in found)
+        each = zip(self.harmonics, told, strict=True)
+        return ", ".join(f"{diameters} in harmonic {harmonic}" for harmonic, diameters in each)
+
     def outline(self) -> list[tuple[str, str]]:
         structure, joint = self.structure, self.joint
         return [
@@ -381,6 +429,7 @@ class VibrationCase(DrivenMass):
             ("joint", f"{joint.law}, {entries(joint)}"),
             ("forces", self.driving),
             ("method", self.resolved),
+            *([] if self.ring is None else [("nodal diameters", self._diameters(self.ring))]),
             *([("motions at", f"{', '.join(f'{at:g}' for at in self.at)} Hz")] if self.at else []),
             *([] if self.loops is None else [("loops", self.loops.text)]),
             *([] if self.modes is None else [("modes", self.modes.text)]),

@@ -25,6 +25,8 @@ from workflow.analyses.vibration.case import VibrationCase
 from workflow.analyses.vibration.excitation import FORCE
 from workflow.analyses.vibration.load import Driving, driving_of
 from workflow.analyses.vibration.memory import memory
+from workflow.analyses.vibration.outcome import RING
+from workflow.analyses.vibration.ring import frequencies_by_diameters
 from workflow.errors import MethodFailed
 from workflow.shell.dataset import Dataset
 from workflow.shell.reporter import Reporter
@@ -52,7 +54,8 @@ class VibrationModel:
     @classmethod
     def of(cls, case: VibrationCase, reporter: Reporter) -> VibrationModel:
         """The model of a case. Raises UserError for a structure or joints that cannot be."""
-        rig = rig_model(case.structure, case.joint, case.mass, reporter)
+        order = round(case.engine_order or 1)
+        rig = rig_model(case.structure, case.joint, case.mass, reporter, order)
         memory(case, len(rig.model.mass), rig.joints).check()
         law = _law(case, rig)
         threads = max(1, min(rig.joints // JOINTS_PER_THREAD, os.cpu_count() or 1, MOST_THREADS))
@@ -60,12 +63,15 @@ class VibrationModel:
         if rig.pressing is not None:
             static = case.joint.normal_load * rig.pressing
         driving = driving_of(case, rig)
-        problem = HarmonicBalance(
-            rig.model,
+        of_joints = (
             PeriodicMarch(law, threads),
             replace(driving.load, static=static if static.any() else None),
             Resolution(case.harmonics, case.resolution.samples),
         )
+        if rig.sector is None:
+            problem = HarmonicBalance(rig.model, *of_joints)
+        else:
+            problem = HarmonicBalance.of_sector(rig.sector, *of_joints)
         return cls(rig, law, problem, driving)
 
     @cached_property
@@ -118,12 +124,22 @@ class VibrationModel:
             **self._natural,
             "damping_stuck": rig.stuck_damping(self.law, self.resting),
         }
+        if rig.sector is not None:
+            ring = rig.sector.ring
+            numbers[RING] = {"sectors": ring.sectors, "engine_order": ring.engine_order}
         if self.driving.left_out:
             numbers["left_out_of_records"] = list(self.driving.left_out)
         if self.rig.pressing is not None:
             numbers["touching"] = int(self.touching.sum())
             numbers["joints"] = self.rig.joints
         return numbers
+
+    def diameters(self) -> dict[str, Dataset] | None:
+        """Natural frequencies by nodal diameters, of a sector of a ring."""
+        sector = self.rig.sector
+        if sector is None:
+            return None
+        return frequencies_by_diameters(sector, self.rig.stuck(self.law, self.resting))
 
     def contact(self) -> dict[str, Dataset] | None:
         """Where joints are and how they rest, if they have places."""

@@ -16,6 +16,10 @@ from workflow.shell.dataset import Datasets
 NODES, RESONANCE, LOOPS = "nodes", "resonance", "loops"
 # Motions at the frequencies that a case asks for, and what is known of motions by their harmonics.
 AT, HARMONICS = "at", "harmonics"
+# Natural frequencies by nodal diameters.
+DIAMETERS = "nodal_diameters"
+# What a ring is, in the summary.
+RING = "ring"
 # Branches that no end of the frequencies leads to.
 FURTHER = "further_branches"
 # Where stability changes along a curve, and what is known of each.
@@ -81,8 +85,8 @@ class VibrationOutcome:
     that are free and stuck, over frequency; ``contact`` is where joints are and how they rest, if
     they have places; ``backbone`` the curve of phase resonance and ``force_sweeps`` motions along
     the force, if they were asked for, ``modes`` curves over their amplitude; ``further`` branches,
-    as the responses. ``numbers`` go
-    into the summary as they are.
+    as the responses; ``diameters`` natural frequencies of a ring, if the body is a sector of one.
+    ``numbers`` go into the summary as they are.
     """
 
     case: VibrationCase
@@ -96,6 +100,7 @@ class VibrationOutcome:
     force_sweeps: tuple[Curves, ...] = ()
     modes: tuple[Curves, ...] = ()
     further: tuple[Curves, ...] = ()
+    diameters: Datasets | None = None
 
     @property
     def contents(self) -> Contents:
@@ -110,6 +115,7 @@ class VibrationOutcome:
             at=bool(self.case.at),
             modes=tuple(f"{number:05d}" for number in range(len(self.modes))),
             engine=self.case.engine_order is not None,
+            diameters=self.diameters is not None,
         )
 
 
@@ -120,7 +126,7 @@ class Contents:
     ``responses`` by force, and those of them with ``loops``. Joints with ``places`` have states
     along every response, and the cycle at resonance. There may be a ``backbone``, motions ``at``
     chosen frequencies, and ``modes`` over their amplitude; frequencies may be those of an
-    ``engine``.
+    ``engine``. A ring has natural frequencies by nodal ``diameters``.
     """
 
     responses: tuple[str, ...]
@@ -130,6 +136,7 @@ class Contents:
     at: bool = False
     modes: tuple[str, ...] = ()
     engine: bool = False
+    diameters: bool = False
 
 
 def trend(values: Sequence[float]) -> float:

@@ -33,7 +33,7 @@ from workflow.analyses.vibration.case import VibrationCase
 from workflow.analyses.vibration.harmonics import harmonics_of
 from workflow.analyses.vibration.loops import loops_of
 from workflow.analyses.vibration.model import VibrationModel
-from workflow.analyses.vibration.outcome import RESONANCE, Curves, Response
+from workflow.analyses.vibration.outcome import DIAMETERS, RESONANCE, Curves, Response
 from workflow.analyses.vibration.stability import stability_along
 from workflow.errors import MethodFailed
 from workflow.shell.dataset import Dataset, Datasets
@@ -290,14 +290,17 @@ def _numbers(
 
 def _beside(
     case: VibrationCase, model: VibrationModel, resonance: HarmonicSolution
-) -> dict[str, float]:
-    """Of a moving ground and of an engine what there is to tell."""
-    numbers = {}
+) -> dict[str, Any]:
+    """Of a moving ground, an engine and a ring what there is to tell."""
+    numbers: dict[str, Any] = {}
     if model.driving.ground:
         absolute = amplitudes_of(model, model.driving.absolute(resonance))
         numbers["absolute_amplitude"] = float(absolute[-1])
     if case.engine_order is not None:
         numbers["speed"] = case.turning * resonance.frequency
+    if model.rig.sector is not None:
+        ring, harmonics = model.rig.sector.ring, resonance.resolution.harmonics
+        numbers[DIAMETERS] = [ring.diameters(harmonic) for harmonic in harmonics]
     return numbers
 
 

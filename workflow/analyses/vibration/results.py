@@ -12,6 +12,7 @@ from workflow.analyses.vibration.harmonics import CURVE, write_harmonics
 from workflow.analyses.vibration.outcome import (
     AT,
     BIFURCATIONS,
+    DIAMETERS,
     FORCE_SWEEPS,
     FURTHER,
     HARMONICS,
@@ -19,6 +20,7 @@ from workflow.analyses.vibration.outcome import (
     MODES,
     NODES,
     RESONANCE,
+    RING,
     Answers,
     Bifurcations,
     Curves,
@@ -65,6 +67,9 @@ def _write_results(outcome: VibrationOutcome, run: Run[VibrationCase]) -> None:
         limits = {name: outcome.numbers[name] for name in ("free", "stuck", "sliding")}
         writer.put("linear", outcome.linear, Along("frequency"), **limits)
         writer.put("names", outcome.names)
+        if outcome.diameters is not None:
+            ring = outcome.numbers[RING]
+            writer.put(DIAMETERS, outcome.diameters, Along("diameters"), **ring)
         if outcome.contact is not None:
             writer.put("contact", outcome.contact)
         for number, response in enumerate(outcome.responses):
@@ -122,20 +127,11 @@ def put_response_curves(
 
 
 def _write_tables(outcome: VibrationOutcome, folder: OutputFolder) -> None:
-    """Responses, their harmonics, loops (the finest), backbone and force sweeps as CSV."""
-    for number, response in enumerate(outcome.responses):
-        under = f"{outcome.case.amount.under(response.force)}"
-        path = folder.reserve(f"frf_{number:05d}.csv", f"response {under}, over frequency")
-        write_curves(path, response.curves)
-        if response.loops:
-            path = folder.reserve(f"loop_{number:05d}.csv", f"loop of the joints {under}")
-            write_curves(path, response.loops[-1].datasets)
-        if response.answers is not None:
-            path = folder.reserve(f"at_{number:05d}.csv", f"motions {under}, as asked for")
-            write_curves(path, response.answers.datasets)
-        what = f"harmonics of places and joints {under}, at resonance and as asked for"
-        path = folder.reserve(f"harmonics_{number:05d}.csv", what)
-        write_harmonics(path, outcome.names, response)
+    """Responses, backbone, force sweeps and what else there is as CSV."""
+    _write_responses(outcome, folder)
+    if outcome.diameters is not None:
+        path = folder.reserve(f"{DIAMETERS}.csv", "natural frequencies, over nodal diameters")
+        write_curves(path, outcome.diameters)
     if outcome.backbone is not None:
         path = folder.reserve(
             f"{BACKBONE}.csv", f"phase resonance, over the {outcome.case.amount.name}"
@@ -162,6 +158,23 @@ def _write_tables(outcome: VibrationOutcome, folder: OutputFolder) -> None:
         for name, (unit, _) in columns_for(amount).items():
             columns[heading(name, unit)] = [each[name] for _, each in found]
         write_table(path, columns, DIGITS)
+
+
+def _write_responses(outcome: VibrationOutcome, folder: OutputFolder) -> None:
+    """Responses, their harmonics and loops, the finest, and motions as asked for."""
+    for number, response in enumerate(outcome.responses):
+        under = f"{outcome.case.amount.under(response.force)}"
+        path = folder.reserve(f"frf_{number:05d}.csv", f"response {under}, over frequency")
+        write_curves(path, response.curves)
+        if response.loops:
+            path = folder.reserve(f"loop_{number:05d}.csv", f"loop of the joints {under}")
+            write_curves(path, response.loops[-1].datasets)
+        if response.answers is not None:
+            path = folder.reserve(f"at_{number:05d}.csv", f"motions {under}, as asked for")
+            write_curves(path, response.answers.datasets)
+        what = f"harmonics of places and joints {under}, at resonance and as asked for"
+        path = folder.reserve(f"harmonics_{number:05d}.csv", what)
+        write_harmonics(path, outcome.names, response)
 
 
 def _every_bifurcation(outcome: VibrationOutcome) -> Iterator[tuple[str, Mapping[str, Any]]]:

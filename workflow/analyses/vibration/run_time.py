@@ -5,6 +5,7 @@ from __future__ import annotations
 from math import log
 
 from workflow.analyses.rig.matrix_body import MatrixBody
+from workflow.analyses.rig.point_body import PointBody
 from workflow.analyses.rig.structure import FrictionRig, ReducedBody, Rig
 from workflow.analyses.specimens.case import SpecimensCase
 from workflow.analyses.specimens.run_time import reduction_of
@@ -68,7 +69,7 @@ def _directions(case: VibrationCaseBase) -> int:
     if isinstance(case.structure, Rig):
         return 1
     joints = JOINTS
-    if isinstance(case.structure, MatrixBody):
+    if isinstance(case.structure, MatrixBody | PointBody):
         joints = case.structure.joint_count
     if isinstance(case.structure, FrictionRig):
         file = case.structure.specimens

@@ -14,6 +14,7 @@ from workflow.analyses.vibration.excitation import Amount, amount_in, told_in, u
 from workflow.analyses.vibration.figures.engine import engine_orders
 from workflow.analyses.vibration.figures.loops import loops
 from workflow.analyses.vibration.figures.modes import modes
+from workflow.analyses.vibration.figures.ring import nodal_diameters
 from workflow.analyses.vibration.figures.stability import (
     draw_motions,
     explain_stability,
@@ -48,6 +49,7 @@ def figures_of(contents: Contents) -> Figures:
         "resonance": (resonance, len(contents.responses) > 1 or contents.backbone),
         "modes": (modes, bool(contents.modes)),
         "engine_orders": (engine_orders, contents.engine),
+        "nodal_diameters": (nodal_diameters, contents.diameters),
         "loops": (loops, bool(contents.loops)),
         "node_states": (node_states, contents.places),
         "pad_states": (pad_states, contents.places),

@@ -1,0 +1,81 @@
+"""A body that is one of the like sectors of a ring, as a case gives it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Annotated
+
+from workflow.analyses.rig.places import NEXT, Direction
+from workflow.case.fields import Whole
+from workflow.case.sections import Section, Title, entry
+from workflow.errors import UserError
+
+if TYPE_CHECKING:
+    from fe_models.dynamics.sector import Ring
+    from workflow.analyses.rig.place_names import PlaceNames
+
+
+class CutFace(Section):
+    """Points of a sector that are points of the next one."""
+
+    points: Title = entry("of the face on which the sector ends, such as right", "right")
+    next_points: Title = entry("of the next sector, as many, which they are", "left")
+
+
+class RingOfSectors(Section):
+    """Like sectors in a ring, of which the body is one; a wave travels round them."""
+
+    sectors: Annotated[int, Whole(2, 1000)] = entry(
+        "of the ring; the next one meets the force of the engine order later", 24
+    )
+    faces: tuple[CutFace, ...] = entry("on which sectors are cut from each other", default=())
+    axis: Direction | None = entry(
+        "about which each sector is turned by 360 deg over their number from the one before, by "
+        "the right hand: x, y, z, -x, -y or -z; without it the axes of points turn with their "
+        "sector, as radial and tangential ones",
+        "z",
+        default=None,
+    )
+
+    @property
+    def text(self) -> str:
+        """The ring in a few words."""
+        turned = "" if self.axis is None else f" about {self.axis}"
+        return f"one of {self.sectors} sectors{turned}"
+
+    def diameters(self, engine_order: int, harmonics: Sequence[int]) -> list[int]:
+        """Nodal diameters of harmonics, below zero where the wave travels from the next sector."""
+        from fe_models.dynamics.sector import Ring
+
+        return list(map(Ring(self.sectors, engine_order).diameters, harmonics))
+
+    def of_order(self, engine_order: int, names: PlaceNames) -> Ring:
+        """The ring under an engine order, of a sector with these places.
+
+        Raises UserError for faces that do not fit each other.
+        """
+        from fe_models.dynamics.sector import Ring
+
+        ties: dict[str, str] = {}
+        for number, face in enumerate(self.faces):
+            key = f"structure.ring.faces.{number}"
+            here = names.of(face.points, f"{key}.points")
+            there = names.of(face.next_points, f"{key}.next_points")
+            if len(here) != len(there):
+                raise UserError(
+                    f"{key}.next_points: {len(there)} points for {len(here)}; allowed: as many"
+                )
+            for point, other in zip(here, there, strict=True):
+                moving = {name.rpartition(" ")[2] for name in names.names_of(point)}
+                if moving != {name.rpartition(" ")[2] for name in names.names_of(other)}:
+                    raise UserError(
+                        f"{key}.points: {point} does not move as {other} does; allowed: points "
+                        "that move in the same directions"
+                    )
+                ties |= {f"{point} {axis}": f"{other} {axis}" for axis in moving}
+        return Ring(self.sectors, engine_order, ties, self.axis)
+
+
+def with_next(names: tuple[str, ...]) -> tuple[str, ...]:
+    """Names of a sector's displacements, and of those of the next."""
+    return (*names, *(f"{NEXT}{name}" for name in names))
