@@ -215,6 +215,13 @@ MATRICES = {
     "springs": [{"points": "tip", "direction": "x", "stiffness": 1}],
     "driven": {"points": "tip", "direction": "x"},
 }
+POINTS = {
+    **{name: value for name, value in REDUCED.items() if name != "file"},
+    "kind": "points",
+    "points": [{"name": "ring", "mass": 1}, {"name": "pad", "mass": 1}],
+    "directions": "x",
+}
+FACES = [{"points": "pad", "next_points": "ring"}]
 FRICTION_RIG = {
     "kind": "friction_rig",
     "specimens": "specimens_rig.yaml",
@@ -227,11 +234,17 @@ ELASTIC = {
     "elastic_stop": {"law": "elastic_stop", "stiffness": "10 N/um"},
 }
 GIVEN["vibration"] = {
-    "structure": {"reduced": REDUCED, "matrices": MATRICES, "friction_rig": FRICTION_RIG},
+    "structure": {
+        "reduced": REDUCED,
+        "matrices": MATRICES,
+        "points": POINTS,
+        "friction_rig": FRICTION_RIG,
+    },
     "structure.driven": {"load": {"load": 1}},
     **DAMPING,
     **EXCITED,
     "joint": JOINTS | {"friction_contact": CONTACT} | ELASTIC,
+    "ring": {ALWAYS: {"sectors": 24, "faces": FACES}},
     "loops": {ALWAYS: {"frequency": "100 Hz"}},
     "modes": {ALWAYS: {"amplitudes": ["0.1 um", "20 um"]}},
     "further_branches": {
@@ -255,6 +268,8 @@ GIVEN["rig"] = GIVEN["joint"] | {
         "recorded": {"kind": "recorded", "file": "force.csv"},
     },
 }
+# What a ring asks for beside itself.
+RING = [f"structure={POINTS}", "engine_order=4"]
 # A CAD file in the place of the template's mesh; gmsh writes no names into it.
 CAD = [
     "structure.file=joint.step",
@@ -313,6 +328,8 @@ class Leaf:
         overrides += self._shaken
         if self.key.startswith("structure.other_bodies."):
             overrides.append(f"structure.contacts={BOLTED}")
+        if self.key.startswith("ring."):
+            overrides += RING
         if self.key.startswith("structure.cyclic."):
             overrides.append(SECTOR)
         if "legs" in self.tags:

@@ -15,6 +15,7 @@ from tests.workflow.case_leaves import (
     EXCITED,
     INTERFACE,
     REDUCED,
+    RING,
     SECTOR,
 )
 from workflow.case.sections import KINDS_ARE_NAMED_BY, sections_of
@@ -44,6 +45,7 @@ NEEDS = {
     "structure.retained": ["structure.modes=20"],
     "structure.modes": ["structure.retained=[pad, ring, tip]"],
     "  # instead of forces and mass, with wear.level": ["wear.force=", "wear.level=1"],
+    "ring": RING,
     "wear.level": ["forces=", f"excitation={EXCITED['excitation'][ALWAYS]}"],
 }
 

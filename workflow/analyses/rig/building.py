@@ -16,6 +16,7 @@ from workflow.analyses.rig.joint_sections import ElasticJoint, FrictionContactJo
 from workflow.analyses.rig.place_names import PlaceNames
 from workflow.analyses.rig.reduced_rig import reduced_rig_model
 from workflow.analyses.rig.rig_model import RigModel
+from workflow.analyses.rig.ring import RingOfSectors
 from workflow.analyses.rig.structure import FrictionRig, JointedBody, Rig
 from workflow.shell.reporter import Reporter
 
@@ -25,17 +26,18 @@ def rig_model(
     joint: Joint | ElasticJoint,
     mass: int | None,
     reporter: Reporter,
+    ring: RingOfSectors | None = None,
     engine_order: int = 1,
 ) -> RigModel:
     """The rig with its joints, of masses in a row driven at the ``mass`` of this number.
 
-    A sector of a ring is driven by an ``engine_order``.
+    A sector of a ``ring`` is driven by an ``engine_order``.
 
     Raises UserError where its bodies cannot be what the case says.
     """
     if isinstance(structure, JointedBody):
         directions = 3 if isinstance(joint, FrictionContactJoint) else 1
-        built = reduced_rig_model(structure, directions, reporter, engine_order)
+        built = reduced_rig_model(structure, directions, reporter, ring, engine_order)
         return _damped(built, structure.damping)
     if isinstance(structure, FrictionRig):
         return _damped(friction_rig_model(structure, reporter), structure.damping)

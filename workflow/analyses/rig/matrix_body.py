@@ -278,10 +278,9 @@ class MatrixBody(JointedBody, Matrices):
         for key, part in (sections | {"driven": self.driven, "seen": self.seen}).items():
             for end in ("points", "against"):
                 point = getattr(part, end, None)
-                if point is not None and self.ring is not None:
-                    point = point.removeprefix(NEXT)
                 if point is not None:
-                    wanted[f"{key}.{end}"] = point
+                    # That there is a next sector is known where joints are made.
+                    wanted[f"{key}.{end}"] = point.removeprefix(NEXT)
         for key, point in wanted.items():
             there = self.points if key.startswith("retained.") else self.kept
             if not matching(there, point):
@@ -306,7 +305,9 @@ class MatrixBody(JointedBody, Matrices):
     @property
     def joint_count(self) -> int:
         """How many joints there are."""
-        return sum(len(matching(self.kept, joint.points)) for joint in self.joints)
+        return sum(
+            len(matching(self.kept, joint.points.removeprefix(NEXT))) for joint in self.joints
+        )
 
     @property
     def laden(self) -> dict[str, float]:

@@ -7,65 +7,73 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import numpy as np
 from pydantic import Field, model_validator
 
+from workflow.analyses.rig.places import NEXT
 from workflow.analyses.rig.point_kinds import matching
-from workflow.analyses.rig.structure import JointedBody
-from workflow.case.plain import counted
-from workflow.case.sections import Title, disagreement, entry
+from workflow.analyses.rig.structure import JointedBody, Mass
+from workflow.case.sections import Section, Title, disagreement, entry
 
 if TYPE_CHECKING:
     from fe_models.reduction import ReducedModel
+
+
+class PointMass(Section):
+    """A point with mass."""
+
+    name: Title = entry("by which joints, springs and forces know it", "m1")
+    mass: Mass = entry("in every direction in which it moves [t]", "1.2 kg")
 
 
 class PointBody(JointedBody):
     """Masses at points, with joints and springs between them, or to the ground."""
 
     kind: Literal["points"] = entry("masses at points", "points")
-    points: Annotated[tuple[Title, ...], Field(min_length=1, max_length=100)] = entry(
-        "their names", ["disk", "blade"]
+    points: Annotated[tuple[PointMass, ...], Field(min_length=1, max_length=100)] = entry(
+        "their names and masses"
     )
-    directions: Annotated[tuple[Literal["x", "y", "z"], ...], Field(min_length=1, max_length=3)] = (
-        entry("in which all of them move: x, y, z", ["x"])
+    directions: Literal["x", "y", "z", "xy", "xz", "yz", "xyz"] = entry(
+        "in which all of them move: one, two, or xyz", "x"
     )
 
     @model_validator(mode="after")
     def _names_them_once(self) -> PointBody:
-        for name, given in (("points", self.points), ("directions", self.directions)):
-            twice = [each for each in given if given.count(each) > 1]
-            if twice:
-                raise disagreement(f"{twice[0]}: given twice; allowed: each once", name)
+        names = self.point_names
+        twice = [name for name in names if names.count(name) > 1]
+        if twice:
+            raise disagreement(f"{twice[0]}: given twice; allowed: each once", "points")
         return self
 
-    @model_validator(mode="after")
-    def _gives_them_mass(self) -> PointBody:
-        heavy = {point for mass in self.masses for point in matching(self.points, mass.points)}
-        light = [point for point in self.points if point not in heavy]
-        if light:
-            raise disagreement(
-                f"{light[0]}: without a mass; allowed: one for each of points", "masses", "points"
-            )
-        return self
+    @property
+    def point_names(self) -> tuple[str, ...]:
+        """Of the points."""
+        return tuple(point.name for point in self.points)
 
     @property
     def names(self) -> tuple[str, ...]:
         """Of displacements."""
-        return tuple(f"{point} {axis}" for point in self.points for axis in self.directions)
+        return tuple(f"{point} {axis}" for point in self.point_names for axis in self.directions)
 
     def body(self) -> ReducedModel:
-        """The points, without what is added to them: neither mass nor stiffness."""
+        """The masses, that nothing holds."""
         from fe_models.reduction import ReducedModel
 
         size = len(self.names)
-        nothing, none = np.zeros((size, size)), np.zeros((size, 0))
+        masses = np.repeat([point.mass for point in self.points], len(self.directions))
+        none = np.zeros((size, 0))
         return ReducedModel(
-            np.arange(size), nothing, nothing, none, none, np.zeros(0), names=self.names
+            *(np.arange(size), np.zeros((size, size)), np.diag(masses)),
+            *(none, none, np.zeros(0)),
+            names=self.names,
         )
 
     @property
     def joint_count(self) -> int:
         """How many joints there are."""
-        return sum(len(matching(self.points, joint.points)) for joint in self.joints)
+        return sum(
+            len(matching(self.point_names, joint.points.removeprefix(NEXT)))
+            for joint in self.joints
+        )
 
     @property
     def text(self) -> str:
-        along = ", ".join(self.directions)
-        return f"{counted(len(self.points), 'point')} that move along {along}, {self.added}"
+        points = ", ".join(f"{1e3 * point.mass:g} kg at {point.name}" for point in self.points)
+        return f"{points}, moving along {', '.join(self.directions)}, {self.added}"

@@ -24,7 +24,7 @@ from workflow.analyses.rig.place_names import PlaceNames, link_along
 from workflow.analyses.rig.places import Moved
 from workflow.analyses.rig.point_body import PointBody
 from workflow.analyses.rig.rig_model import RigModel
-from workflow.analyses.rig.ring import with_next
+from workflow.analyses.rig.ring import RingOfSectors, with_next
 from workflow.analyses.rig.structure import JointedBody, JointPlaces, ReducedBody
 from workflow.analyses.specimens.case import SpecimensCase
 from workflow.analyses.specimens.memory import memory
@@ -37,17 +37,21 @@ AXES = "xyz"
 
 
 def reduced_rig_model(
-    body: JointedBody, directions: int, reporter: Reporter, engine_order: int = 1
+    body: JointedBody,
+    directions: int,
+    reporter: Reporter,
+    ring: RingOfSectors | None = None,
+    engine_order: int = 1,
 ) -> RigModel:
     """The rig that a reduced body makes, with joints of so many ``directions``, 1 or 3.
 
-    It may be a sector of a ring that is driven by an ``engine_order``.
+    It may be a sector of a ``ring`` that is driven by an ``engine_order``.
     Raises UserError for a file without such a body, and for points that it does not have.
     """
     with reporter.stage("reduction", "steps") as told:
         reduced, massless = _reduced_body(body, reporter, told)
     try:
-        return _rig_on(reduced, body, directions, engine_order)
+        return _rig_on(reduced, body, directions, ring, engine_order)
     except UserError as error:
         if not massless:
             raise
@@ -55,7 +59,11 @@ def reduced_rig_model(
 
 
 def _rig_on(
-    reduced: ReducedModel, body: JointedBody, directions: int, engine_order: int
+    reduced: ReducedModel,
+    body: JointedBody,
+    directions: int,
+    of_ring: RingOfSectors | None,
+    engine_order: int,
 ) -> RigModel:
     """The rig on a reduced model."""
     if reduced.names is None:
@@ -65,8 +73,8 @@ def _rig_on(
         )
     points, ring, sector = _Points(reduced.names), None, None
     linked = points
-    if body.ring is not None:
-        ring = body.ring.of_order(engine_order, points)
+    if of_ring is not None:
+        ring = of_ring.of_order(engine_order, points)
         linked = _Points(with_next(reduced.names))
     joints = [
         joint

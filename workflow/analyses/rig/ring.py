@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
-from workflow.analyses.rig.places import NEXT, Direction
+from workflow.analyses.rig.places import NEXT
 from workflow.case.fields import Whole
 from workflow.case.sections import Section, Title, entry
 from workflow.errors import UserError
@@ -29,10 +29,10 @@ class RingOfSectors(Section):
         "of the ring; the next one meets the force of the engine order later", 24
     )
     faces: tuple[CutFace, ...] = entry("on which sectors are cut from each other", default=())
-    axis: Direction | None = entry(
-        "about which each sector is turned by 360 deg over their number from the one before, by "
-        "the right hand: x, y, z, -x, -y or -z; without it the axes of points turn with their "
-        "sector, as radial and tangential ones",
+    axis: Literal["x", "y", "z", "-x", "-y", "-z", "turning"] | None = entry(
+        "x, y, z, -x, -y or -z: about which the next sector is turned, by the right hand, by 360 "
+        "deg over their number; or turning: the axes of points turn with their sector, as radial "
+        "and tangential ones, and those of masses at points",
         "z",
         default=None,
     )
@@ -40,8 +40,13 @@ class RingOfSectors(Section):
     @property
     def text(self) -> str:
         """The ring in a few words."""
-        turned = "" if self.axis is None else f" about {self.axis}"
+        turned = "" if self._about is None else f", turned about {self._about}"
         return f"one of {self.sectors} sectors{turned}"
+
+    @property
+    def _about(self) -> str | None:
+        """The axis about which sectors are turned, none of points whose axes turn with them."""
+        return None if self.axis == "turning" else self.axis
 
     def diameters(self, engine_order: int, harmonics: Sequence[int]) -> list[int]:
         """Nodal diameters of harmonics, below zero where the wave travels from the next sector."""
@@ -58,7 +63,7 @@ class RingOfSectors(Section):
 
         ties: dict[str, str] = {}
         for number, face in enumerate(self.faces):
-            key = f"structure.ring.faces.{number}"
+            key = f"ring.faces.{number}"
             here = names.of(face.points, f"{key}.points")
             there = names.of(face.next_points, f"{key}.next_points")
             if len(here) != len(there):
@@ -73,7 +78,7 @@ class RingOfSectors(Section):
                         "that move in the same directions"
                     )
                 ties |= {f"{point} {axis}": f"{other} {axis}" for axis in moving}
-        return Ring(self.sectors, engine_order, ties, self.axis)
+        return Ring(self.sectors, engine_order, ties, self._about)
 
 
 def with_next(names: tuple[str, ...]) -> tuple[str, ...]:

@@ -11,7 +11,6 @@ from pydantic import Field, model_validator
 
 from workflow.analyses.rig.damping import OF_MODES, Damping, DampingRatios, damping_text
 from workflow.analyses.rig.places import Against, Direction, Moved, Points
-from workflow.analyses.rig.ring import RingOfSectors
 from workflow.analyses.specimens.case import SpecimensCase
 from workflow.case.fields import Quantity, Whole
 from workflow.case.input_files import InputFileError, open_hdf5
@@ -108,11 +107,6 @@ class JointedBody(Section, ABC):
     also_filled_in: ClassVar[tuple[str, ...]] = ("driven",)
 
     joints: tuple[JointPlaces, ...] = entry("where they are", min_length=1)
-    ring: RingOfSectors | None = entry(
-        "of which the body is one sector, driven by an engine order: a wave that travels round; in "
-        "steady vibration only",
-        default=None,
-    )
     masses: tuple[AddedMass, ...] = entry("added, moving in x, y and z", default=())
     springs: tuple[AddedSpring, ...] = entry("added", default=())
     damping_ratio: DampingRatios = entry(f"without the joints, {OF_MODES}", 0.001)
@@ -230,9 +224,7 @@ def structure_outline(structure: Rig | JointedBody | FrictionRig) -> list[tuple[
     """What holds the joints, and the bodies that another case describes."""
     damping = damping_text(structure.damping_ratio, structure.damping)
     below = [] if isinstance(structure, Rig) else structure.outline()
-    ring = getattr(structure, "ring", None)
-    rows = [] if ring is None else [("ring", ring.text)]
-    return [("structure", f"{structure.text}, {damping}"), *rows, *below]
+    return [("structure", f"{structure.text}, {damping}"), *below]
 
 
 def driven_place(structure: Section, mass: int | None) -> str:

@@ -192,14 +192,6 @@ class RigCase(TimeCase):
         return self
 
     @model_validator(mode="after")
-    def _is_no_sector(self) -> RigCase:
-        if getattr(self.structure, "ring", None) is not None:
-            raise disagreement(
-                "given for a motion in time; allowed: in steady vibration", "structure.ring"
-            )
-        return self
-
-    @model_validator(mode="after")
     def _is_damped_in_time(self) -> RigCase:
         damping = self.structure.damping
         if damping is not None and damping.loss_factor > 0.0:

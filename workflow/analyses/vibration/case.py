@@ -113,31 +113,6 @@ class VibrationCaseBase(Case):
             )
         return self
 
-    @model_validator(mode="after")
-    def _drives_a_ring(self) -> VibrationCaseBase:
-        if self.ring is None:
-            return self
-        order = self.engine_order
-        if order is None or not order.is_integer():
-            given = "missing" if order is None else f"{order:g}: not a whole number"
-            raise disagreement(
-                f"{given}; allowed: with structure.ring, how often a turn drives each sector",
-                *("engine_order", "structure.ring"),
-            )
-        if self.excitation is not None and self.excitation.base:
-            raise disagreement(
-                "a ground that moves drives all sectors at once, not as an engine order does; "
-                "allowed: forces, or no structure.ring",
-                *("excitation.base", "structure.ring"),
-            )
-        return self
-
-    @property
-    def ring(self) -> RingOfSectors | None:
-        """The ring of which the structure is a sector."""
-        ring: RingOfSectors | None = getattr(self.structure, "ring", None)
-        return ring
-
     @property
     def amount(self) -> Amount:
         """What motions are followed by: a force, or the level of an excitation."""
@@ -261,7 +236,13 @@ class VibrationCase(DrivenMass):
     structure: Annotated[
         Rig | ReducedBody | MatrixBody | PointBody | FrictionRig, Field(discriminator="kind")
     ] = entry("what holds the joints")
-    joint: VibrationLaw = entry("its law and its parameters; of all joints together")
+    joint: VibrationLaw = entry(
+        "its law and its parameters; of all joints together, of those of one sector of a ring"
+    )
+    ring: RingOfSectors | None = entry(
+        "of like sectors, of which the structure is one: a wave of the engine order travels round",
+        default=None,
+    )
     loops: LoopsAt | None = entry("of all joints together, at one frequency", default=None)
     force_sweeps: Annotated[tuple[Frequency, ...], Field(max_length=100)] = entry(
         "frequencies at which motions are followed along the force, from the least to the largest "
@@ -337,14 +318,46 @@ class VibrationCase(DrivenMass):
         return self
 
     @model_validator(mode="after")
+    def _is_a_sector(self) -> VibrationCase:
+        if self.ring is None:
+            return self
+        structure, order = self.structure, self.engine_order
+        if isinstance(structure, Rig | FrictionRig):
+            raise disagreement(
+                f"given with a structure of kind {structure.kind}; allowed: with points, reduced "
+                "or matrices",
+                *("ring", "structure.kind"),
+            )
+        if self.ring.axis is None and not isinstance(structure, PointBody):
+            raise disagreement(
+                "missing; allowed: x, y, z, -x, -y, -z, or turning if the axes of points turn with "
+                "their sector",
+                *("ring.axis", "ring"),
+            )
+        if order is None or not order.is_integer():
+            given = "missing" if order is None else f"{order:g}"
+            raise disagreement(
+                f"{given}; allowed: with a ring, a whole number", "engine_order", "ring"
+            )
+        return self
+
+    @model_validator(mode="after")
     def _follows_a_wave(self) -> VibrationCase:
+        if self.ring is None:
+            return self
         for name in ("backbone", "modes"):
-            if self.ring is not None and getattr(self, name):
+            if getattr(self, name):
                 raise disagreement(
-                    "given with a ring, of whose waves each harmonic has other modes; allowed: "
-                    "responses along frequencies and force_sweeps",
-                    *(name, "structure.ring"),
+                    "given with a ring, in whose waves every harmonic has modes of its own; "
+                    "allowed: responses along frequencies, and force_sweeps",
+                    *(name, "ring"),
                 )
+        if self.excitation is not None and self.excitation.base:
+            raise disagreement(
+                "a ground that moves drives all sectors at once, not as an engine order does; "
+                "allowed: forces and records",
+                *("excitation.base", "ring"),
+            )
         return self
 
     @model_validator(mode="after")
@@ -414,22 +427,24 @@ class VibrationCase(DrivenMass):
             raise disagreement("not ascending; allowed: each frequency above the last", "at")
         return self
 
-    def _diameters(self, ring: RingOfSectors) -> str:
-        """Nodal diameters of harmonics, in words."""
+    def _waves(self, ring: RingOfSectors) -> str:
+        """The ring, and nodal diameters of harmonics, in words."""
         assert self.engine_order is not None
         found = ring.diameters(round(self.engine_order), self.harmonics)
-        told = (f"{abs(d)}{' backward' if d < 0 else ''}" for d in found)
-        each = zip(self.harmonics, told, strict=True)
-        return ", ".join(f"{diameters} in harmonic {harmonic}" for harmonic, diameters in each)
+        each = (
+            f"{harmonic} has {abs(diameters)}{' backward' if diameters < 0 else ''}"
+            for harmonic, diameters in zip(self.harmonics, found, strict=True)
+        )
+        return f"{ring.text}; nodal diameters: harmonic {', '.join(each)}"
 
     def outline(self) -> list[tuple[str, str]]:
         structure, joint = self.structure, self.joint
         return [
             *structure_outline(structure),
+            *([] if self.ring is None else [("ring", self._waves(self.ring))]),
             ("joint", f"{joint.law}, {entries(joint)}"),
             ("forces", self.driving),
             ("method", self.resolved),
-            *([] if self.ring is None else [("nodal diameters", self._diameters(self.ring))]),
             *([("motions at", f"{', '.join(f'{at:g}' for at in self.at)} Hz")] if self.at else []),
             *([] if self.loops is None else [("loops", self.loops.text)]),
             *([] if self.modes is None else [("modes", self.modes.text)]),

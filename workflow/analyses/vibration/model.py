@@ -55,7 +55,7 @@ class VibrationModel:
     def of(cls, case: VibrationCase, reporter: Reporter) -> VibrationModel:
         """The model of a case. Raises UserError for a structure or joints that cannot be."""
         order = round(case.engine_order or 1)
-        rig = rig_model(case.structure, case.joint, case.mass, reporter, order)
+        rig = rig_model(case.structure, case.joint, case.mass, reporter, case.ring, order)
         memory(case, len(rig.model.mass), rig.joints).check()
         law = _law(case, rig)
         threads = max(1, min(rig.joints // JOINTS_PER_THREAD, os.cpu_count() or 1, MOST_THREADS))
