@@ -75,7 +75,7 @@ def _rig_on(
     linked = points
     if of_ring is not None:
         ring = of_ring.of_order(engine_order, points)
-        linked = _Points(with_next(reduced.names))
+        linked = _Points(with_next(reduced.names, ring))
     joints = [
         joint
         for number, places in enumerate(body.joints)

@@ -81,6 +81,6 @@ class RingOfSectors(Section):
         return Ring(self.sectors, engine_order, ties, self._about)
 
 
-def with_next(names: tuple[str, ...]) -> tuple[str, ...]:
-    """Names of a sector's displacements, and of those of the next."""
-    return (*names, *(f"{NEXT}{name}" for name in names))
+def with_next(names: tuple[str, ...], ring: Ring) -> tuple[str, ...]:
+    """Names of a sector's displacements, and of those of the next that are not its own."""
+    return (*names, *(f"{NEXT}{name}" for name in names if name not in ring.ties))

@@ -324,9 +324,8 @@ class VibrationCase(DrivenMass):
         structure, order = self.structure, self.engine_order
         if isinstance(structure, Rig | FrictionRig):
             raise disagreement(
-                f"given with a structure of kind {structure.kind}; allowed: with points, reduced "
-                "or matrices",
-                *("ring", "structure.kind"),
+                f"{structure.kind}: no sector of a ring; allowed: points, reduced or matrices",
+                *("structure.kind", "ring"),
             )
         if self.ring.axis is None and not isinstance(structure, PointBody):
             raise disagreement(
