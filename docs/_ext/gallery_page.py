@@ -35,7 +35,8 @@ HEADINGS = {
         *("rig_hammer_7N", "rig_hammer_60N", "rig_computed_wear", "rig_reduced"),
     ),
     "Joints that shake": (
-        *("rig_two_dof", "rig_harmonic_balance", "rig_wear_vibration", "rig_wear_specimens"),
+        *("rig_two_dof", "ring_of_blades", "rig_harmonic_balance"),
+        *("rig_wear_vibration", "rig_wear_specimens"),
     ),
 }
 INTRODUCTION = """\

@@ -197,6 +197,7 @@ def test_runs_of_every_kind_tell_how_far_they_are(
         ("rig_harmonic_balance", 400),
         ("rig_reduced", 18),
         ("rig_two_dof", 50),
+        ("ring_of_blades", 8),
         ("rig_wear_specimens", 170),
         ("rig_wear_vibration", 62),
         ("specimens_rig", 28),
