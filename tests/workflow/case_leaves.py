@@ -244,7 +244,7 @@ GIVEN["vibration"] = {
     **DAMPING,
     **EXCITED,
     "joint": JOINTS | {"friction_contact": CONTACT} | ELASTIC,
-    "ring": {ALWAYS: {"sectors": 24, "faces": FACES}},
+    "ring": {ALWAYS: {"sectors": 24, "axis": "turning", "faces": FACES}},
     "loops": {ALWAYS: {"frequency": "100 Hz"}},
     "modes": {ALWAYS: {"amplitudes": ["0.1 um", "20 um"]}},
     "further_branches": {

@@ -136,6 +136,7 @@ def test_blades_are_told_by_their_nodal_diameters(tmp_path):
             ["structure={kind: rig, masses: [1 kg], springs: [1], damping_ratio: 0}"],
             "rig: no sector of a ring; allowed: points, reduced or matrices",
         ),
+        (["ring.axis="], "ring.axis=: nothing: not known; allowed: 'x', 'y'"),
         (["ring.sectors=1"], "1: out of range; allowed: a whole number from 2 to 1000"),
         (["structure.points.0.name=blade"], "structure.points: blade: given twice"),
     ],
@@ -164,8 +165,3 @@ def test_places_that_a_sector_has_not_are_refused(tmp_path, settings, message):
     code, told = refused(tmp_path, BLADES, *settings)
     assert code == 2
     assert message in told
-
-
-def test_matrices_say_whether_their_axes_turn(rim):
-    with pytest.raises(CaseError, match="missing; allowed: x, y, z, -x"):
-        parse_case(RIM, str(rim[0] / "case.yaml"), ["ring.axis="])

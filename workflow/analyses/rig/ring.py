@@ -28,14 +28,13 @@ class RingOfSectors(Section):
     sectors: Annotated[int, Whole(2, 1000)] = entry(
         "of the ring; the next one meets the force of the engine order later", 24
     )
-    faces: tuple[CutFace, ...] = entry("on which sectors are cut from each other", default=())
-    axis: Literal["x", "y", "z", "-x", "-y", "-z", "turning"] | None = entry(
-        "x, y, z, -x, -y or -z: about which the next sector is turned, by the right hand, by 360 "
-        "deg over their number; or turning: the axes of points turn with their sector, as radial "
-        "and tangential ones, and those of masses at points",
-        "z",
-        default=None,
+    axis: Literal["x", "y", "z", "-x", "-y", "-z", "turning"] = entry(
+        "about which the next sector is turned, by the right hand, by 360 deg over their number: "
+        "x, y, z, -x, -y or -z; or turning: the axes of points turn with their sector, as radial "
+        "and tangential ones",
+        "turning",
     )
+    faces: tuple[CutFace, ...] = entry("on which sectors are cut from each other", default=())
 
     @property
     def text(self) -> str:

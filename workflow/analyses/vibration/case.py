@@ -327,12 +327,6 @@ class VibrationCase(DrivenMass):
                 f"{structure.kind}: no sector of a ring; allowed: points, reduced or matrices",
                 *("structure.kind", "ring"),
             )
-        if self.ring.axis is None and not isinstance(structure, PointBody):
-            raise disagreement(
-                "missing; allowed: x, y, z, -x, -y, -z, or turning if the axes of points turn with "
-                "their sector",
-                *("ring.axis", "ring"),
-            )
         if order is None or not order.is_integer():
             given = "missing" if order is None else f"{order:g}"
             raise disagreement(
@@ -426,8 +420,11 @@ class VibrationCase(DrivenMass):
             raise disagreement("not ascending; allowed: each frequency above the last", "at")
         return self
 
-    def _waves(self, ring: RingOfSectors) -> str:
+    @property
+    def waves(self) -> str:
         """The ring, and nodal diameters of harmonics, in words."""
+        ring = self.ring
+        assert ring is not None
         assert self.engine_order is not None
         found = ring.diameters(round(self.engine_order), self.harmonics)
         each = (
@@ -440,7 +437,7 @@ class VibrationCase(DrivenMass):
         structure, joint = self.structure, self.joint
         return [
             *structure_outline(structure),
-            *([] if self.ring is None else [("ring", self._waves(self.ring))]),
+            *([] if self.ring is None else [("ring", self.waves)]),
             ("joint", f"{joint.law}, {entries(joint)}"),
             ("forces", self.driving),
             ("method", self.resolved),

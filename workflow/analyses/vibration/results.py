@@ -235,6 +235,8 @@ def _response_summary(amount: Amount, response: Response) -> dict[str, Any]:
 
 def _lines(outcome: VibrationOutcome) -> Iterator[str]:
     """The end of the run in a few lines."""
+    if outcome.case.ring is not None:
+        yield f"  {outcome.case.waves}"
     for response in outcome.responses:
         yield f"  {_response_line(outcome.case, response, outcome.labels[-1])}"
         for loop in response.loops[-1:]:

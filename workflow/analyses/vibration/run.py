@@ -58,7 +58,7 @@ def _outcome(case: VibrationCase, reporter: Reporter, steps: Steps) -> Vibration
                     f"excitation.records.{number}: {share:.1%} of its force is above the highest "
                     "harmonic taken and left out: raise highest, or resolution.harmonics"
                 )
-        diameters = steps("nodal diameters", model.diameters)
+        diameters = model.diameters()
         linear = steps("linear limits", lambda: model.linear(case.frequencies))
     responses: list[Response] = []
     backbone = None
