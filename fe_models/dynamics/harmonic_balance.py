@@ -370,8 +370,8 @@ class HarmonicBalance:
         """
         if isinstance(self.receptance, WaveReceptance):
             raise HarmonicBalanceError(
-                "a sector has other modes in every harmonic of a wave: only its response along "
-                "frequency or force is found"
+                "a sector has other modes in every harmonic of a wave: only its responses and "
+                "phase resonance are found"
             )
         return self.receptance
 

@@ -116,18 +116,19 @@ class PhaseBalance:
     @cached_property
     def _steady(self) -> SteadyMotion:
         """The structure at harmonic 1."""
-        return self.equations.problem.alone.at(np.array([2.0 * np.pi * self.frequency]))
+        first = self.equations.problem.receptance.of(1)
+        return first.at(np.array([2.0 * np.pi * self.frequency]))
 
     @cached_property
     def _per_force(self) -> ComplexArray:
-        """x by forces on the modes ``(n,)``: what joins them is symmetric."""
-        return np.asarray(self._steady.respond(self.equations.of_modes[None])[0])
+        """x by forces on the modes ``(n,)``."""
+        return np.asarray(self._steady.per_force(self.equations.of_modes[None])[0])
 
     @property
     def _by_motion(self) -> ComplexArray:
         """x by the unknowns ``(n,)``, through the forces of the joints."""
         problem, first = self.equations.problem, self.equations.first
-        by_joint = problem.alone.at_joints @ self._per_force
+        by_joint = problem.receptance.of(1).at_joints.conj() @ self._per_force
         cosine, sine = (places[first] for places in problem.resolution.places)
         slopes = self.balance.cycle.jacobian
         by_motion = slopes[:, cosine] - 1j * slopes[:, sine]
@@ -267,7 +268,7 @@ class PhaseResonance:
     @cached_property
     def of_modes(self) -> ComplexArray:
         """x by the amplitudes of the modes at harmonic 1 ``(n,)``."""
-        return np.asarray(self.weights.conj() @ self.problem.alone.at_points)
+        return np.asarray(self.weights.conj() @ self.problem.receptance.of(1).at_points)
 
     def frequency_of(self, unknowns: Array) -> float:
         """[Hz]"""

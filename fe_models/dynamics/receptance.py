@@ -81,6 +81,13 @@ class SteadyMotion:
             response[moving:] = np.linalg.solve(self._stiffness, force[moving:, :, None])[..., 0]
         return response
 
+    def per_force(self, weights: ComplexArray) -> ComplexArray:
+        """wᵀ x per force on the modes ``(k, n)``, of ``weights`` w ``(k, n)`` at ω > 0."""
+        if not self._mixed:
+            return np.asarray(weights * self._flexibility)
+        turned = self._stiffness.transpose(0, 2, 1)
+        return np.asarray(np.linalg.solve(turned, weights[..., None])[..., 0])
+
     def stiffness_slope(self, motion: ComplexArray) -> ComplexArray:
         """∂(K + iD + iωC - ω²M)/∂ω x: forces that a motion needs more per rad/s."""
         damping = self.structure.damping

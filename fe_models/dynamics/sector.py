@@ -44,7 +44,7 @@ class Ring:
     Engine order 5 on 12 blades: the wave of harmonic 1 has 5 nodal diameters, harmonic 2 has 2 and
     travels backward, as 10 is 2 less than all.
 
-    >>> from fe_models.dynamics.sector import Ring
+    >>> from fe_models.dynamics import Ring
     >>> ring = Ring(sectors=12, engine_order=5)
     >>> print([ring.diameters(harmonic) for harmonic in (0, 1, 2, 3)])
     [0, 5, -2, 3]
@@ -189,8 +189,7 @@ def lumped_sector(
     d nodal diameters ω² = (k + 4 k sin²(π d/N)) / m
 
     >>> import numpy as np
-    >>> from fe_models.dynamics import Link, natural_frequencies
-    >>> from fe_models.dynamics.sector import Ring, lumped_sector
+    >>> from fe_models.dynamics import Link, Ring, lumped_sector, natural_frequencies
     >>> springs = {Link("a"): 1e3, Link("next a", "a"): 1e3}
     >>> sector = lumped_sector({"a": 1e-3}, springs, [[Link("a")]], Ring(6, engine_order=1))
     >>> found = [2.0 * np.pi * natural_frequencies(sector.at(d))[0] for d in range(4)]

@@ -122,7 +122,6 @@ def test_blades_are_told_by_their_nodal_diameters(tmp_path):
     [
         (["engine_order="], "engine_order=: missing; allowed: with a ring, a whole number"),
         (["engine_order=2.5"], "2.5: 2.5; allowed: with a ring, a whole number"),
-        (["backbone=true"], "backbone=true: given with a ring"),
         (["modes={amplitudes: [1 um, 2 um]}"], "}: given with a ring"),
         (
             [

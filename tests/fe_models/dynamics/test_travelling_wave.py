@@ -12,6 +12,7 @@ from fe_models.dynamics.harmonic_balance import HarmonicBalance, PeriodicLoad
 from fe_models.dynamics.harmonics import HarmonicBalanceError, Resolution
 from fe_models.dynamics.model import DynamicModel
 from fe_models.dynamics.nonlinear_mode import LinearMode
+from fe_models.dynamics.phase_resonance import PhaseResonance, along_phase_resonance
 from fe_models.dynamics.resolution_error import resolution_error
 from fe_models.dynamics.rig import Link, RigError, lumped_rig, natural_frequencies
 from fe_models.dynamics.sector import Ring, lumped_sector, reduced_sector
@@ -123,6 +124,22 @@ def test_slopes_of_a_wave_are_those_by_differences(wave_and_ring):
     assert np.allclose(at.slope, slope, rtol=1e-5, atol=1e-9 * np.abs(slope).max())
     stronger = wave.evaluate(unknowns, 120.0, 16.0, "force")
     assert np.allclose(stronger.slope, stronger.residual - at.residual, rtol=1e-9, atol=1e-15)
+
+
+def test_phase_resonance_is_that_of_all_sectors(wave_and_ring):
+    wave, ring = wave_and_ring
+    blade, start = np.array([0.0, 1.0]), wave.solve(160.0, 15.0)
+    equations = PhaseResonance.near(wave, start, blade)
+    unknowns = np.append(start.coefficients.ravel(), 0.01 * equations.scale)
+    along = np.random.default_rng(3).normal(size=len(unknowns))
+    near = [equations(unknowns + s * 1e-9 * along, 15.0).residual for s in (-1.0, 1.0)]
+    product = equations(unknowns, 15.0).jacobian @ along
+    assert np.allclose(product, (near[1] - near[0]) / 2e-9, rtol=1e-4, atol=1e-4)
+    backbone = along_phase_resonance(wave, start, (14.5, 15.5), blade)
+    assert not backbone.message
+    for motion in backbone.solutions[:: len(backbone.solutions) - 1]:
+        every = ring.solve(motion.frequency, motion.force)
+        assert every.amplitude(1) == pytest.approx(-abs(every.amplitude(1)), rel=1e-6)
 
 
 def test_stability_is_that_of_all_sectors():
@@ -239,7 +256,7 @@ def test_what_a_travelling_wave_is_not_is_refused():
     load = PeriodicLoad({1: np.array([0.0, 1.0])})
     wave = HarmonicBalance.of_sector(sector, PeriodicMarch(SLIDER), load, Resolution((1,), 64))
     for use in (lambda: LinearMode.of(wave, 1), lambda: wave.alone):
-        with pytest.raises(HarmonicBalanceError, match="only its response"):
+        with pytest.raises(HarmonicBalanceError, match="only its responses"):
             use()
     with pytest.raises(RigError, match="2 sectors or more"):
         Ring(1, 1)

@@ -338,13 +338,12 @@ class VibrationCase(DrivenMass):
     def _follows_a_wave(self) -> VibrationCase:
         if self.ring is None:
             return self
-        for name in ("backbone", "modes"):
-            if getattr(self, name):
-                raise disagreement(
-                    "given with a ring, in whose waves every harmonic has modes of its own; "
-                    "allowed: responses along frequencies, and force_sweeps",
-                    *(name, "ring"),
-                )
+        if self.modes is not None:
+            raise disagreement(
+                "given with a ring, in whose waves every harmonic has modes of its own; allowed: "
+                "backbone, and responses",
+                *("modes", "ring"),
+            )
         if self.excitation is not None and self.excitation.base:
             raise disagreement(
                 "a ground that moves drives all sectors at once, not as an engine order does; "
