@@ -14,8 +14,8 @@ M x'' + C x' + K x = f(t) - Bᵀ F(B x), with joint laws F that are handed over,
 - ``motions_at``: all motions of a branch at a frequency
 - ``along_phase_resonance``: the backbone of a resonance
 - ``along_nonlinear_mode``, ``LinearMode``: frequency and damping of a mode against its amplitude
-- ``lumped_sector``, ``reduced_sector``, ``Ring``: one sector of a ring, for
-  ``HarmonicBalance.of_sector``
+- ``HarmonicBalance.of_sector``, with :mod:`fe_models.dynamics.sector`: one sector of a ring in a
+  wave that travels round
 - ``Floquet``: whether motions are stable
 - ``ContinuationControl``, ``Accuracy``: the steps along a branch, how fine its motions are
 - ``frequency_response``, ``ring_down``: what a hammer's blow shows
@@ -66,7 +66,6 @@ if TYPE_CHECKING:
         reduced_rig,
         unit_force,
     )
-    from fe_models.dynamics.sector import Ring, lumped_sector, reduced_sector
 
 __all__ = [
     "Accuracy",
@@ -83,7 +82,6 @@ __all__ = [
     "PeriodicLoad",
     "RecordedForce",
     "Resolution",
-    "Ring",
     "TimeStepControl",
     "along_force",
     "along_frequency",
@@ -93,11 +91,9 @@ __all__ = [
     "frequency_response",
     "integrate",
     "lumped_rig",
-    "lumped_sector",
     "motions_at",
     "natural_frequencies",
     "reduced_rig",
-    "reduced_sector",
     "ring_down",
     "unit_force",
 ]
@@ -144,11 +140,6 @@ __getattr__, __dir__ = lazy_names(
             "natural_frequencies",
             "reduced_rig",
             "unit_force",
-        ),
-        "sector": (
-            "Ring",
-            "lumped_sector",
-            "reduced_sector",
         ),
     },
 )

@@ -44,7 +44,7 @@ class Ring:
     Engine order 5 on 12 blades: the wave of harmonic 1 has 5 nodal diameters, harmonic 2 has 2 and
     travels backward, as 10 is 2 less than all.
 
-    >>> from fe_models.dynamics import Ring
+    >>> from fe_models.dynamics.sector import Ring
     >>> ring = Ring(sectors=12, engine_order=5)
     >>> print([ring.diameters(harmonic) for harmonic in (0, 1, 2, 3)])
     [0, 5, -2, 3]
@@ -189,7 +189,8 @@ def lumped_sector(
     d nodal diameters ω² = (k + 4 k sin²(π d/N)) / m
 
     >>> import numpy as np
-    >>> from fe_models.dynamics import Link, Ring, lumped_sector, natural_frequencies
+    >>> from fe_models.dynamics import Link, natural_frequencies
+    >>> from fe_models.dynamics.sector import Ring, lumped_sector
     >>> springs = {Link("a"): 1e3, Link("next a", "a"): 1e3}
     >>> sector = lumped_sector({"a": 1e-3}, springs, [[Link("a")]], Ring(6, engine_order=1))
     >>> found = [2.0 * np.pi * natural_frequencies(sector.at(d))[0] for d in range(4)]
@@ -216,6 +217,23 @@ def reduced_sector(
     ``names`` ``(c,)`` are those of its kept displacements, the cut faces among them; points of the
     next sector are ``next ...``. Otherwise as :func:`fe_models.dynamics.reduced_rig`. Raises
     :class:`RigError` for ties of names that there are not, and as that.
+
+    Examples
+    --------
+    A rod between two masses, of which the second is the first of the next sector: with one nodal
+    diameter in four sectors a mass m has ω² = 4 k/m sin²(π/4)
+
+    >>> import numpy as np
+    >>> from fe_models import ReducedModel
+    >>> from fe_models.dynamics import natural_frequencies
+    >>> from fe_models.dynamics.sector import Ring, reduced_sector
+    >>> rod, halves = 1e3 * np.array([[1.0, -1.0], [-1.0, 1.0]]), 1e-3 * np.diag([0.5, 0.5])
+    >>> none = np.zeros((2, 0))
+    >>> body = ReducedModel(np.arange(2), rod, halves, none, none, np.zeros(0))
+    >>> ring = Ring(4, engine_order=1, ties={"right x": "left x"})
+    >>> sector = reduced_sector(body, ("left x", "right x"), [], ring)
+    >>> print((2.0 * np.pi * natural_frequencies(sector.at(1))).round(2))
+    [1414.21]
     """
     if reduced.mass is None:
         raise RigError("the reduced model has no mass: reduce the body with its mass matrix")

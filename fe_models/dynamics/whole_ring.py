@@ -69,6 +69,7 @@ def motion_of(ring: Ring, motion: HarmonicSolution, sector: int) -> HarmonicSolu
 
     >>> import numpy as np
     >>> from fe_models.dynamics import *
+    >>> from fe_models.dynamics.sector import Ring, lumped_sector
     >>> from fe_models.dynamics.whole_ring import motion_of
     >>> from wear.joints import Jenkins, PeriodicMarch
     >>> sector = lumped_sector({"a": 1e-3}, {Link("a"): 1e3}, [[Link("a")]], Ring(4, 1), 0.01)
