@@ -65,9 +65,10 @@ class Rest:
         Newton's method. Where joints are open, nothing may hold the structure: a spring added to
         each joint, ever softer, then lets it go as far as it must to close them.
         """
-        if not self._load.any():
-            return np.zeros(self._shape)
         compliance, held = self._receptance.static_flexibility, self._receptance.held
+        if not (self._load.any() and compliance.any()):
+            # Joints from sector to sector are not moved by what is the same in all.
+            return np.zeros(self._shape)
         displacement = np.zeros(len(compliance))
         softest = 1.0 / float(np.diagonal(compliance).mean())
         previous, added = np.inf, 10.0 * SOFT * softest

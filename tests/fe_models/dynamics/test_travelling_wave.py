@@ -155,6 +155,18 @@ def test_stability_is_that_of_all_sectors():
         assert np.allclose(np.abs(one.multipliers), np.abs(every.multipliers), atol=1e-8)
 
 
+def test_what_is_the_same_in_all_sectors_moves_no_joint_between_them():
+    sector = lumped_sector(MASSES, SPRINGS, JOINTS[:1], Ring(SECTORS, ORDER), 0.01)
+    load = PeriodicLoad({1: np.array([0.0, -1j])}, static=STATIC)
+    resolution = Resolution((0, 1, 3), 256)
+    motion = HarmonicBalance.of_sector(sector, PeriodicMarch(SLIDER), load, resolution).solve(
+        150.0, 15.0
+    )
+    assert motion.converged
+    # Springs from the ground to the disk and on to the blade.
+    assert motion.amplitude(1, harmonic=0) == pytest.approx(3.0 / 1e3 + 3.0 / 3e3, rel=1e-9)
+
+
 def test_a_ring_too_large_says_nothing_of_its_stability():
     sector = lumped_sector({"a": 1e-3}, {Link("a"): 1e3}, [[Link("a")]], Ring(300, 7), 0.01)
     load = PeriodicLoad({1: np.ones(1)})
