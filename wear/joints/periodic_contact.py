@@ -10,6 +10,7 @@ repeats and only if it is asked for: what a period makes of 0, and (1 - A)⁻¹ 
 beginning. So does the energy.
 
 Increments take and give numbers: rows of arrays, handed to functions, take four times as long.
+Arrays are written number by number, as in :mod:`wear.joints.periodic_sliders`.
 """
 
 from __future__ import annotations
@@ -20,6 +21,12 @@ import numpy as np
 
 from sa_solver.types import Array
 from wear.joints.compiled import compiled
+from wear.joints.contact_slopes import (
+    copy_gradient,
+    project,
+    project_normal,
+    project_stuck,
+)
 from wear.joints.friction_path import (
     Contact,
     ForcePath,
@@ -38,8 +45,9 @@ from wear.joints.periodic_sliders import (
     REPEATED,
     DrivenJoints,
     Period,
-    from_rest,
+    largest,
     relative_change,
+    rows_from_rest,
 )
 
 # A force below the circle by no more than this share of it slips: rounding.
@@ -139,7 +147,7 @@ def increment_of(
 @compiled(nogil=True, error_model="numpy")
 def led_in(contact: Contact, before: Array) -> Stretch:
     """Stretch at the first sample, to which a contact is driven from rest."""
-    stretch, points = Stretch(0.0, 0.0), from_rest(before)
+    stretch, points = Stretch(0.0, 0.0), rows_from_rest(before)
     for i in range(len(before)):
         x, y = advance_force(increment_of(contact, stretch, points, i, i + 1))
         stretch = Stretch(x / contact.stiffness, y / contact.stiffness)
@@ -226,7 +234,7 @@ def _settle_contact(
 
     ``settled`` becomes the stretch ``(2,)`` at the start of the last period, and the number of it.
     """
-    span = max(np.max(np.abs(path[:, 0])), np.max(np.abs(path[:, 1])))
+    span = max(largest(path[:, 0]), largest(path[:, 1]))
     change, end = 0.0, stretch
     record.force[:] = np.nan
     for number in range(MAX_PERIODS):
@@ -265,15 +273,21 @@ class Derivatives(NamedTuple):
 def _along(functions: Array) -> Derivatives:
     """Room for derivatives through points with these functions of time."""
     points, size = functions.shape
-    steps = functions[1:] - functions[:-1]
+    steps = np.empty((points - 1, size))
+    for t in range(points - 1):
+        for c in range(size):
+            steps[t, c] = functions[t + 1, c] - functions[t, c]
     return Derivatives(functions, steps, np.zeros((points, 2, 3, size)), np.empty((points, 4)))
 
 
 @compiled(nogil=True, error_model="numpy")
 def _round_trip(points: Array) -> Array:
-    """Samples ``(t, ...)`` and the first of them again."""
-    closed = np.empty((len(points) + 1, points.shape[1]))
-    closed[:-1], closed[-1] = points, points[0]
+    """Samples ``(t, n)`` and the first of them again."""
+    samples, size = points.shape
+    closed = np.empty((samples + 1, size))
+    for t in range(samples + 1):
+        for c in range(size):
+            closed[t, c] = points[t % samples, c]
     return closed
 
 
@@ -330,9 +344,12 @@ def _repeat(derivatives: Derivatives) -> bool:
     a = Kept(xx, xy, yx, yy)
     if _left_to_change(a) < FORGETTING:
         return False
-    share, first, last = _to_the_limit(a), gradient[0], gradient[-1].copy()
-    first[0] = share.xx * last[0] + share.xy * last[1]
-    first[1] = share.yx * last[0] + share.yy * last[1]
+    share, first, last = _to_the_limit(a), gradient[0], gradient[-1]
+    for direction in range(3):
+        for c in range(first.shape[2]):
+            x, y = last[0, direction, c], last[1, direction, c]
+            first[0, direction, c] = share.xx * x + share.xy * y
+            first[1, direction, c] = share.yx * x + share.yy * y
     for t in range(1, len(gradient)):
         xx, xy, yx, yy = kept[t, 0], kept[t, 1], kept[t, 2], kept[t, 3]
         if max(abs(xx), abs(xy), abs(yx), abs(yy)) < FORGOTTEN:
@@ -363,59 +380,19 @@ def _differentiate(
     _, sticks = _carried(contact, Stretch(settled[0], settled[1]), points, derivatives)
     if _repeat(derivatives):
         return sticks
-    stretch, _ = _carried(contact, Stretch(0.0, 0.0), from_rest(before), way_in)
-    gradient[-1] = way_in.gradient[-1]
+    stretch, _ = _carried(contact, Stretch(0.0, 0.0), rows_from_rest(before), way_in)
+    copy_gradient(way_in.gradient[-1], gradient[-1])
     for _ in range(int(settled[2])):
-        gradient[0] = gradient[-1]
+        copy_gradient(gradient[-1], gradient[0])
         stretch, sticks = _carried(contact, stretch, points, derivatives)
-    gradient[0] = gradient[-1]
+    copy_gradient(gradient[-1], gradient[0])
     return sticks
 
 
 @compiled(nogil=True, error_model="numpy")
-def _project_stuck(
-    stiffness: float, period: Period, shares: Array, first: Array, jacobian: Array
-) -> None:
-    """Tangential part of the derivative where all samples stick.
-
-    The stretch at a sample is that at the first one and the displacement since; ``first``
-    ``(2, 3, m)`` is its derivative there.
-    """
-    basis, weights = period.basis, period.weights
-    size = basis.shape[1]
-    for row in range(size):
-        weight = np.sum(weights[row])
-        for direction in range(2):
-            for by in range(3):
-                for c in range(size):
-                    slope = weight * first[direction, by, c]
-                    if by == direction:
-                        slope += shares[row, c] - weight * basis[0, c]
-                    jacobian[row, direction, c, by] = stiffness * slope
-
-
-@compiled(nogil=True, error_model="numpy")
-def _project(stiffness: float, weights: Array, gradient: Array, jacobian: Array) -> None:
-    """Tangential part of the derivative."""
-    size, samples = weights.shape
-    gradient[0] = gradient[-1]
-    flat = gradient[:-1].reshape(samples, 6 * size)
-    slopes = np.dot(weights, flat).reshape(size, 2, 3, size)
-    jacobian[:, :2] = stiffness * slopes.transpose(0, 1, 3, 2)
-
-
-@compiled(nogil=True, error_model="numpy")
-def _project_normal(
-    stiffness: float, period: Period, shares: Array, states: Array, jacobian: Array
-) -> None:
-    """Normal part of the derivative: kn as long as there is contact."""
-    pressed = shares
-    if np.any(states == 2):
-        touching = period.basis.copy()
-        touching[states == 2] = 0.0
-        pressed = np.dot(period.weights, touching)
-    jacobian[:, 2] = 0.0
-    jacobian[:, 2, :, 2] = stiffness * pressed
+def _largest_of(force: Array) -> float:
+    """The largest component of forces ``(t, 3)``."""
+    return max(largest(force[:, 0]), largest(force[:, 1]), largest(force[:, 2]))
 
 
 @compiled(nogil=True, error_model="numpy")
@@ -438,14 +415,14 @@ def settle_contacts(period: Period, joints: DrivenJoints) -> None:
         else:
             settled[3] = MARCHED
             missing = _settle_contact(contact, stretch, path, settled, record)
-        joints.change[j] = relative_change(missing, record.force)
+        joints.change[j] = relative_change(missing, _largest_of(record.force))
 
 
 @compiled(nogil=True, error_model="numpy")
 def differentiate_contacts(period: Period, joints: DrivenJoints) -> None:
     """Write the derivatives of contacts that have settled."""
     shares = np.dot(period.weights, period.basis)
-    way_in, derivatives = _along(from_rest(period.lead)), _along(_round_trip(period.basis))
+    way_in, derivatives = _along(rows_from_rest(period.lead)), _along(_round_trip(period.basis))
     for j in range(len(joints.parameters)):
         contact, settled = contact_of(joints.parameters[j]), joints.settled[j]
         jacobian = joints.jacobian[j]
@@ -454,16 +431,16 @@ def differentiate_contacts(period: Period, joints: DrivenJoints) -> None:
             continue
         before, first, sticks = joints.before[j], derivatives.gradient[0], True
         if settled[3] == STUCK:
-            _carried(contact, Stretch(0.0, 0.0), from_rest(before), way_in)
-            first[:] = way_in.gradient[-1]
+            _carried(contact, Stretch(0.0, 0.0), rows_from_rest(before), way_in)
+            copy_gradient(way_in.gradient[-1], first)
         else:
             driven = joints.path[j], before, settled
             sticks = _differentiate(contact, driven, way_in, derivatives)
         if sticks:
-            _project_stuck(contact.stiffness, period, shares, first, jacobian)
+            project_stuck(contact.stiffness, period, shares, first, jacobian)
         else:
-            _project(contact.stiffness, period.weights, derivatives.gradient, jacobian)
-        _project_normal(contact.normal_stiffness, period, shares, joints.states[j], jacobian)
+            project(contact.stiffness, period.weights, derivatives.gradient, jacobian)
+        project_normal(contact.normal_stiffness, period, shares, joints.states[j], jacobian)
 
 
 @compiled(nogil=True, error_model="numpy")

@@ -5,6 +5,9 @@ force K z + kr u. Its derivative comes after that, along the period that repeats
 asked for, as that of contacts does. A joint of spread sliders remembers turning points, which are
 samples: the derivatives of displacement and force there are kept in a stack beside the one of the
 law itself.
+
+Arrays are written number by number: a row or a sum of arrays that is assigned as a whole takes
+hundreds of times as long to compile as the loop, and a first march takes seconds by that.
 """
 
 from __future__ import annotations
@@ -69,6 +72,30 @@ class DrivenJoints(NamedTuple):
     dissipated: Array
     change: Array
     settled: Array
+
+
+@compiled(nogil=True, error_model="numpy")
+def largest(values: Array) -> float:
+    """The largest magnitude of some numbers ``(n,)``."""
+    found = 0.0
+    for value in values:
+        found = max(found, abs(value))
+    return found
+
+
+@compiled(nogil=True, error_model="numpy")
+def rows_from_rest(rows: Array) -> Array:
+    """Rows ``(n, m)`` with one of zeros before them."""
+    points = np.zeros((len(rows) + 1, rows.shape[1]))
+    for i in range(len(rows)):
+        _copy(rows[i], points[i + 1])
+    return points
+
+
+@compiled(nogil=True, error_model="numpy")
+def _copy(row: Array, to: Array) -> None:
+    for c in range(len(row)):
+        to[c] = row[c]
 
 
 class Slider(NamedTuple):
@@ -148,7 +175,7 @@ def _settle_slider(
 ) -> tuple[float, int, float, float]:
     """March until the stretch repeats: that at the start of the last period, the number of it,
     energy lost, and last change of the stretch."""
-    repeated = REPEATED * min(joint.limit / joint.spring, np.max(np.abs(path)))
+    repeated = REPEATED * min(joint.limit / joint.spring, largest(path))
     start, period, lost, change = stretch, 0, 0.0, 0.0
     while period < MAX_PERIODS:
         start, period = stretch, period + 1
@@ -164,10 +191,9 @@ def _settle_slider(
 
 
 @compiled(nogil=True, error_model="numpy")
-def relative_change(change: float, force: Array) -> float:
+def relative_change(change: float, largest_force: float) -> float:
     """A change of force over the largest force."""
-    largest = np.max(np.abs(force))
-    return abs(change) / largest if largest > 0.0 else 0.0
+    return abs(change) / largest_force if largest_force > 0.0 else 0.0
 
 
 @compiled(nogil=True, error_model="numpy")
@@ -183,7 +209,7 @@ def settle_sliders(period: Period, joints: DrivenJoints) -> None:
             slider, _lead_in(slider, joints.before[j]), path, force, joints.states[j]
         )
         joints.settled[j, 0], joints.settled[j, 1], joints.dissipated[j] = stretch, periods, lost
-        joints.change[j] = relative_change(slider.spring * missing, force)
+        joints.change[j] = relative_change(slider.spring * missing, largest(force))
         residual = joints.parameters[j, 2]
         for t in range(len(path)):
             force[t] += residual * path[t]
@@ -211,10 +237,11 @@ def _carried(
 
 
 @compiled(nogil=True, error_model="numpy")
-def from_rest(rows: Array) -> Array:
-    """Rows with one of zeros before them."""
-    points = np.zeros((len(rows) + 1, *rows.shape[1:]))
-    points[1:] = rows
+def _from_rest(numbers: Array) -> Array:
+    """Numbers ``(n,)`` with 0 before them."""
+    points = np.zeros(len(numbers) + 1)
+    for i in range(len(numbers)):
+        points[i + 1] = numbers[i]
     return points
 
 
@@ -223,7 +250,9 @@ def _repeat(gradient: Array, kept: Array) -> bool:
     """Make the gradient of 0 that of a period that repeats; whether it forgets enough for that."""
     if 1.0 - kept[-1] <= FORGETTING:
         return False
-    first = gradient[-1] / (1.0 - kept[-1])
+    first = np.empty(gradient.shape[1])
+    for c in range(len(first)):
+        first[c] = gradient[-1, c] / (1.0 - kept[-1])
     for t in range(len(kept)):
         if kept[t] == 0.0:
             break
@@ -239,27 +268,30 @@ def differentiate_sliders(period: Period, joints: DrivenJoints) -> None:
     A joint that forgets too little of how it began carries the derivative from there.
     """
     samples, size = period.basis.shape
-    way_in = from_rest(period.lead)
+    way_in = rows_from_rest(period.lead)
     gradient, kept = np.empty((samples + 1, size)), np.empty(samples + 1)
     entering, forgotten = np.zeros((len(way_in), size)), np.empty(len(way_in))
     # Needed for residual stiffness only: for one joint as much work as all the rest.
-    beside = np.any(joints.parameters[:, 2] != 0.0)
+    beside = largest(joints.parameters[:, 2]) > 0.0
     shares = np.dot(period.weights, period.basis) if beside else np.zeros((size, size))
     for j in range(len(joints.parameters)):
         joint, slider, path = joints.parameters[j], slider_of(joints.parameters[j]), joints.path[j]
         gradient[0] = 0.0
         _carried(slider, joints.settled[j, 0], path, period.basis, gradient, kept)
         if not _repeat(gradient, kept):
-            before = from_rest(joints.before[j])
+            before = _from_rest(joints.before[j])
             stretch = _carried(slider, 0.0, before, way_in, entering, forgotten)
-            gradient[-1] = entering[-1]
+            _copy(entering[-1], gradient[-1])
             for _ in range(int(joints.settled[j, 1])):
-                gradient[0] = gradient[-1]
+                _copy(gradient[-1], gradient[0])
                 stretch = _carried(slider, stretch, path, period.basis, gradient, kept)
-        gradient[0] = gradient[-1]
-        joints.jacobian[j] = slider.spring * np.dot(period.weights, gradient[:-1])
-        if beside:
-            joints.jacobian[j] += joint[2] * shares
+        _copy(gradient[-1], gradient[0])
+        slopes = np.dot(period.weights, gradient[:-1])
+        for row in range(size):
+            for c in range(size):
+                joints.jacobian[j, row, c] = slider.spring * slopes[row, c]
+                if beside:
+                    joints.jacobian[j, row, c] += joint[2] * shares[row, c]
 
 
 class OpenLoops(NamedTuple):
@@ -284,7 +316,8 @@ def _follow_curve(
     increment = end - memory[DISPLACEMENT]
     depth = int(memory[DEPTH])
     if increment != 0.0 and turns(memory, depth, memory[DISPLACEMENT] + increment):
-        places[depth], forces[depth] = here, gradient
+        _copy(here, places[depth])
+        _copy(gradient, forces[depth])
     force, slope, lost = advance_masing(
         (joint[0], joint[2], joint[3], joint[4]), 0.0, memory, increment
     )
@@ -324,9 +357,13 @@ def settle_curves(period: Period, joints: DrivenJoints) -> None:
                 at = step if step < samples else 0
                 here, there = basis[step - 1], basis[at]
                 force[at], left, lost = _follow_curve(joint, loops, here, there, path[at], gradient)
-                gradients[at] = gradient
+                _copy(gradient, gradients[at])
                 joints.dissipated[j] += lost
                 joints.states[j, at] = 1 if left < LEFT_IN_SLIP else 0
-            joints.change[j] = relative_change(force[0] - start, force)
-        force += joint[1] * path
-        joints.jacobian[j] = np.dot(period.weights, gradients) + joint[1] * shares
+            joints.change[j] = relative_change(force[0] - start, largest(force))
+        for t in range(samples):
+            force[t] += joint[1] * path[t]
+        slopes = np.dot(period.weights, gradients)
+        for row in range(size):
+            for c in range(size):
+                joints.jacobian[j, row, c] = slopes[row, c] + joint[1] * shares[row, c]
