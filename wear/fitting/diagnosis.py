@@ -1,0 +1,181 @@
+"""What residuals say against a fit: waves, outliers, two groups of data, files that disagree.
+
+Bounds of a fit are right for data that scatter independently about the model. Each test here has a
+level of about one false alarm in a thousand fits of such data.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.special import chdtri, fdtrc, ndtri, stdtrit
+
+from sa_solver.types import Array, Indices, Mask
+from wear.fitting.least_squares import Fit
+
+ALARM = 1e-3
+"""Of good data, fits in which a test speaks up."""
+
+FEWEST = 6
+"""Data of a series to judge it by."""
+
+SAMPLES, SEED = 4000, 0
+"""Normal samples that a split into two groups is held against, always the same."""
+
+SMALLEST_GROUP = 2
+"""Data in the smaller one of two groups: one alone is an outlier."""
+
+MOST_NAMED = 5
+"""Data of a list in a message."""
+
+
+@dataclass(frozen=True)
+class Doubt:
+    """Something that the data of a series say against the fit: ``text``, and the ``data`` meant."""
+
+    series: str
+    text: str
+    data: tuple[int, ...] = ()
+
+
+def diagnose(fit: Fit, order: Array, files: Indices | None = None) -> list[Doubt]:
+    """What residuals say against a fit.
+
+    ``order`` ``(n,)`` is what the data of each series are sorted by, such as their energy, and
+    ``files`` ``(n,)`` the number of the file that each is of.
+
+    Examples
+    --------
+    Volumes of two materials under one line: two groups of residuals, which are told.
+
+    >>> import numpy as np
+    >>> from wear.fitting import VolumeData, VolumeLaw, diagnose, fit, volume_problem
+    >>> energy = np.linspace(1e6, 8e6, 16)
+    >>> coefficient = np.where(np.arange(16) % 4 < 2, 1e-9, 2e-9)
+    >>> mixed = VolumeData("both", energy, coefficient * energy)
+    >>> found = fit(volume_problem([mixed], VolumeLaw()).problem)
+    >>> for doubt in diagnose(found, energy):
+    ...     print(doubt.text.partition(":")[0])
+    residuals are of two groups, 8 and 8
+    """
+    doubts = []
+    residuals = fit.standardised
+    for place, series in enumerate(fit.problem.series):
+        here = np.flatnonzero(fit.problem.places == place)
+        if len(here) < FEWEST or fit.freedom < FEWEST // 2 or _is_exact(fit, here):
+            continue
+        found = _of_series(fit, here, residuals, order, files)
+        doubts += [Doubt(series.name, text, tuple(map(int, data))) for text, data in found]
+    if fit.known and fit.freedom * fit.excess**2 > _largest_chi_square(fit.freedom):
+        text = f"data scatter {fit.excess:.2g} times as much as their standard deviations say"
+        doubts.append(
+            Doubt("", f"{text}: the model, or these, are wrong, and the bounds too small")
+        )
+    return doubts
+
+
+def _is_exact(fit: Fit, here: Indices) -> bool:
+    """Whether the model meets the data but for rounding."""
+    size = np.abs(fit.problem.data[here]).max()
+    return bool(np.abs(fit.residuals[here]).max() <= 1e-9 * size)
+
+
+def _of_series(
+    fit: Fit, here: Indices, residuals: Array, order: Array, files: Indices | None
+) -> list[tuple[str, Indices]]:
+    found = []
+    groups = _two_groups(residuals[here], fit.fitted[here])
+    if groups is not None:
+        sizes = f"{len(groups) - np.count_nonzero(groups)} and {np.count_nonzero(groups)}"
+        text = f"residuals are of two groups, {sizes}: data of two materials or tests in one?"
+        found.append((text, here[groups]))
+    elif len(wild := _outliers(fit, here, residuals)):
+        found.append(("far from all others: outliers?", wild))
+    sorted_here = here[np.argsort(order[here], kind="stable")]
+    if groups is None and _goes_in_waves(residuals[sorted_here]):
+        text = (
+            "residuals go in waves: the function does not follow the data, or these are not "
+            "independent; bounds are too small"
+        )
+        found.append((text, here[:0]))
+    if groups is None and files is not None and _files_differ(residuals[here], files[here]):
+        found.append(("files lie apart from each other by more than their scatter", here[:0]))
+    return found
+
+
+def _two_groups(residuals: Array, fitted: Array) -> Mask | None:
+    """Which residuals are of the upper one of two groups, if there are two.
+
+    As they are, or over the fitted values, as of two slopes. What is left within two groups, of the
+    sum of squares, is held against that of normal samples.
+    """
+    for values in (residuals, residuals / np.where(fitted == 0.0, np.inf, fitted)):
+        ratio, limit = _best_split(values[None, :])
+        others, _ = _best_split(_samples(len(values)))
+        if ratio[0] < np.quantile(others, ALARM):
+            upper: Mask = values > limit[0]
+            return upper
+    return None
+
+
+def _samples(count: int) -> Array:
+    return np.random.default_rng(SEED).standard_normal((SAMPLES, count))
+
+
+def _best_split(values: Array) -> tuple[Array, Array]:
+    """Least sum of squares within two groups over that of all, and where they part, ``(m,)``.
+
+    Of samples ``(m, n)``; each group has :data:`SMALLEST_GROUP` or more.
+    """
+    ordered = np.sort(values - values.mean(axis=1, keepdims=True), axis=1)
+    count = ordered.shape[1]
+    below = np.cumsum(ordered, axis=1)[:, SMALLEST_GROUP - 1 : count - SMALLEST_GROUP]
+    sizes = np.arange(SMALLEST_GROUP, count - SMALLEST_GROUP + 1)
+    # Two means m, -m n1/n2: what lies between the groups.
+    between = below**2 * count / (sizes * (count - sizes))
+    best = between.argmax(axis=1)
+    rows = np.arange(len(ordered))
+    total = np.sum(ordered**2, axis=1)
+    place = best + SMALLEST_GROUP - 1
+    limit = 0.5 * (ordered[rows, place] + ordered[rows, place + 1]) + values.mean(axis=1)
+    return 1.0 - between[rows, best] / np.where(total > 0.0, total, 1.0), limit
+
+
+def _outliers(fit: Fit, here: Indices, residuals: Array) -> Indices:
+    """Data whose residual, without itself in the scatter, would come once in a thousand fits."""
+    freedom = fit.freedom
+    values = residuals[here]
+    if not fit.known and freedom > 1:
+        rest = np.maximum(freedom - values**2, 1e-9)
+        values = values * np.sqrt((freedom - 1) / rest)
+    level = 1.0 - 0.5 * ALARM / len(here)
+    limit = ndtri(level) if fit.known else stdtrit(max(freedom - 1, 1), level)
+    return np.asarray(here[np.abs(values) > limit])
+
+
+def _goes_in_waves(residuals: Array) -> bool:
+    """Whether neighbours are alike: von Neumann 1941, Ann. Math. Stat. 12, 367."""
+    count = len(residuals)
+    ratio = np.sum(np.diff(residuals) ** 2) / np.sum(residuals**2)
+    spread = np.sqrt(4.0 * (count - 2.0) / (count**2 - 1.0))
+    return bool((2.0 - ratio) / spread > ndtri(1.0 - ALARM))
+
+
+def _files_differ(residuals: Array, files: Indices) -> bool:
+    """Whether means of files differ by more than the scatter within them: a test of variances."""
+    names, numbers = np.unique(files, return_inverse=True)
+    count, groups = len(residuals), len(names)
+    if groups < 2 or count <= groups:
+        return False
+    sizes = np.bincount(numbers)
+    means = np.bincount(numbers, residuals) / sizes
+    between = np.sum(sizes * (means - residuals.mean()) ** 2) / (groups - 1)
+    within = np.sum((residuals - means[numbers]) ** 2) / (count - groups)
+    if within == 0.0:
+        return bool(between > 0.0)
+    return bool(fdtrc(groups - 1, count - groups, between / within) < ALARM)
+
+
+def _largest_chi_square(freedom: int) -> float:
+    return float(chdtri(freedom, ALARM))
