@@ -63,11 +63,12 @@ def diagnose(fit: Fit, order: Array, files: Indices | None = None) -> list[Doubt
     residuals = fit.standardised
     for place, series in enumerate(fit.problem.series):
         here = np.flatnonzero(fit.problem.places == place)
-        if len(here) < FEWEST or fit.freedom < FEWEST // 2 or _is_exact(fit, here):
+        if len(here) < FEWEST or fit.freedoms[place] < FEWEST // 2 or _is_exact(fit, here):
             continue
-        found = _of_series(fit, here, residuals, order, files)
+        found = _of_series(fit, place, residuals, order, files)
         doubts += [Doubt(series.name, text, tuple(map(int, data))) for text, data in found]
-    if fit.known and fit.freedom * fit.excess**2 > _largest_chi_square(fit.freedom):
+    freedom = float(fit.freedoms.sum())
+    if fit.known and freedom * fit.excess**2 > chdtri(freedom, ALARM):
         text = f"data scatter {fit.excess:.2g} times as much as their standard deviations say"
         doubts.append(
             Doubt("", f"{text}: the model, or these, are wrong, and the bounds too small")
@@ -82,15 +83,15 @@ def _is_exact(fit: Fit, here: Indices) -> bool:
 
 
 def _of_series(
-    fit: Fit, here: Indices, residuals: Array, order: Array, files: Indices | None
+    fit: Fit, place: int, residuals: Array, order: Array, files: Indices | None
 ) -> list[tuple[str, Indices]]:
-    found = []
+    found, here = [], np.flatnonzero(fit.problem.places == place)
     groups = _two_groups(residuals[here], fit.fitted[here])
     if groups is not None:
         sizes = f"{len(groups) - np.count_nonzero(groups)} and {np.count_nonzero(groups)}"
         text = f"residuals are of two groups, {sizes}: data of two materials or tests in one?"
         found.append((text, here[groups]))
-    elif len(wild := _outliers(fit, here, residuals)):
+    elif len(wild := here[_are_outliers(fit, place, residuals[here])]):
         found.append(("far from all others: outliers?", wild))
     sorted_here = here[np.argsort(order[here], kind="stable")]
     if groups is None and _goes_in_waves(residuals[sorted_here]):
@@ -142,16 +143,15 @@ def _best_split(values: Array) -> tuple[Array, Array]:
     return 1.0 - between[rows, best] / np.where(total > 0.0, total, 1.0), limit
 
 
-def _outliers(fit: Fit, here: Indices, residuals: Array) -> Indices:
-    """Data whose residual, without itself in the scatter, would come once in a thousand fits."""
-    freedom = fit.freedom
-    values = residuals[here]
-    if not fit.known and freedom > 1:
+def _are_outliers(fit: Fit, place: int, values: Array) -> Mask:
+    """Which residuals, without themselves in the scatter, would come once in a thousand fits."""
+    freedom = float(fit.freedoms[place])
+    if fit.problem.series[place].deviations is None:
         rest = np.maximum(freedom - values**2, 1e-9)
-        values = values * np.sqrt((freedom - 1) / rest)
-    level = 1.0 - 0.5 * ALARM / len(here)
-    limit = ndtri(level) if fit.known else stdtrit(max(freedom - 1, 1), level)
-    return np.asarray(here[np.abs(values) > limit])
+        values = values * np.sqrt((freedom - 1.0) / rest)
+    level = 1.0 - 0.5 * ALARM / len(values)
+    limit = ndtri(level) if fit.known else stdtrit(freedom - 1.0, level)
+    return np.asarray(np.abs(values) > limit)
 
 
 def _goes_in_waves(residuals: Array) -> bool:
@@ -175,7 +175,3 @@ def _files_differ(residuals: Array, files: Indices) -> bool:
     if within == 0.0:
         return bool(between > 0.0)
     return bool(fdtrc(groups - 1, count - groups, between / within) < ALARM)
-
-
-def _largest_chi_square(freedom: int) -> float:
-    return float(chdtri(freedom, ALARM))

@@ -6,8 +6,9 @@ they decide (the sum of their leverages); with several series that share paramet
 anew until it stays, the iterated least squares of Carroll and Ruppert 1988, *Transformation and
 Weighting in Regression*, chapter 2. For a single series the covariance then is the usual
 s² (JᵀJ)⁻¹, J the Jacobian at the solution (Bates and Watts 1988, *Nonlinear Regression Analysis*,
-chapter 2), and bounds of 95 % are Student's, with as many degrees of freedom as there are data
-more than parameters; with given standard deviations they are the normal ones.
+chapter 2), and bounds of 95 % are Student's, with n - p degrees of freedom. A parameter that
+several series decide has those of Satterthwaite 1946, Biometrics 2, 110: 1/f = Σ (share of the
+variance)² / f of the series. With given standard deviations bounds are the normal ones.
 
 Energies and rates go over powers of ten: they are fitted as logarithms, so that their bounds are
 factors. All bounds are linear ones: right where the model bends little within them.
@@ -52,11 +53,11 @@ class Fit:
 
     ``values`` ``(p,)`` are those of all its parameters, also of what is not determined; which are,
     ``estimates`` say. ``covariance`` ``(p, p)`` is that of the fitted ones (logarithms where these
-    are fitted), without directions that nothing decides. ``fitted`` and ``residuals`` ``(n,)``,
-    ``deviations`` ``(n,)`` of the data, and their ``leverages`` ``(n,)``. ``freedom`` are data
-    less parameters, ``quantile`` what standard deviations are multiplied with for 95 %.
-    ``reached`` of the ``tried`` starts ended here. ``known`` says whether all deviations were
-    given.
+    are fitted), without directions that nothing decides, and ``parts`` ``(k, p, p)`` what each
+    series brings to it. ``fitted`` and ``residuals`` ``(n,)``, ``deviations`` ``(n,)`` of the data,
+    and their ``leverages`` ``(n,)``. ``freedoms`` ``(k,)`` are the data of each series less the
+    parameters that they decide. ``reached`` of the ``tried`` starts ended here. ``known`` says
+    whether all deviations were given.
 
     Examples
     --------
@@ -75,16 +76,20 @@ class Fit:
     problem: FitProblem
     values: Array
     estimates: tuple[Estimate, ...]
-    covariance: Array
+    parts: Array
     fitted: Array
     residuals: Array
     deviations: Array
     leverages: Array
-    freedom: int
-    quantile: float
+    freedoms: Array
     reached: int
     tried: int
     known: bool
+
+    @property
+    def covariance(self) -> Array:
+        """Of the fitted parameters ``(p, p)``."""
+        return np.asarray(self.parts.sum(axis=0))
 
     @property
     def correlation(self) -> Array:
@@ -110,7 +115,8 @@ class Fit:
         """Scatter over that of the given deviations: 1 where they are right; NaN for none given."""
         if not self.known:
             return float("nan")
-        return float(np.sqrt(np.sum((self.residuals / self.deviations) ** 2) / self.freedom))
+        squares = np.sum((self.residuals / self.deviations) ** 2)
+        return float(np.sqrt(squares / self.freedoms.sum()))
 
     def band(self, predict: Callable[[Array], Array]) -> Array:
         """Half the width ``(m,)`` of the 95 % band of what ``predict`` says of the parameters.
@@ -129,8 +135,23 @@ class Fit:
             lengths = [_within(self.problem, inner + way * moved)[place] for way in (1.0, -1.0)]
             columns.append((ends[0] - ends[1]) / (lengths[0] - lengths[1]))
         slopes = np.stack(columns, axis=-1)
-        variance = np.einsum("mi,ij,mj->m", slopes, self.covariance, slopes)
-        return np.asarray(self.quantile * np.sqrt(np.maximum(variance, 0.0)))
+        terms = np.maximum(np.einsum("mi,kij,mj->mk", slopes, self.parts, slopes), 0.0)
+        widths = [
+            np.sqrt(one.sum()) * quantile_of(one, self.problem, self.freedoms) for one in terms
+        ]
+        return np.array(widths)
+
+
+def quantile_of(terms: Array, problem: FitProblem, freedoms: Array) -> float:
+    """What a standard deviation is multiplied with for 95 %.
+
+    ``terms`` ``(k,)`` are those of the series in the variance, ``freedoms`` ``(k,)`` theirs; given
+    deviations have no scatter of their own.
+    """
+    tail, total = 0.5 * (1.0 + LEVEL), float(terms.sum())
+    found = np.array([series.deviations is None for series in problem.series])
+    inverse = np.sum((terms[found] / total) ** 2 / freedoms[found]) if total > 0.0 else 0.0
+    return float(stdtrit(1.0 / inverse, tail) if inverse > 0.0 else ndtri(tail))
 
 
 def _steps(inner: Array) -> Array:
@@ -173,30 +194,31 @@ def fit(problem: FitProblem) -> Fit:
     residuals = problem.data - fitted
     free = ~held
     inverse, kernel = inverse_of(jacobian * free)
-    covariance = inverse @ inverse.T
     leverages = np.einsum("ij,ji->i", jacobian * free, inverse)
-    # The sum of leverages is the number of directions that the data decide.
-    freedom = len(problem.data) - round(float(leverages.sum()))
+    masks = [problem.places == k for k in range(len(problem.series))]
+    parts = np.stack([inverse[:, here] @ inverse[:, here].T for here in masks])
+    # The sum of leverages is the number of parameters that the data of a series decide.
+    freedoms = np.array([here.sum() - leverages[here].sum() for here in masks])
     known = all(series.deviations is not None for series in problem.series)
-    tail = 0.5 * (1.0 + LEVEL)
-    quantile = float(ndtri(tail) if known else stdtrit(freedom, tail))
     values = problem.outer(inner)
     alone = [
-        estimate_at(problem, place, values, inverse, kernel, held, jacobian, quantile)
+        estimate_at(
+            *(problem, place, values, inverse, kernel, held, jacobian),
+            quantile_of(parts[:, place, place], problem, freedoms),
+        )
         for place in range(len(values))
     ]
-    estimates = tuple(led_astray(alone, place, covariance) for place in range(len(values)))
+    estimates = tuple(led_astray(alone, place, parts.sum(axis=0)) for place in range(len(values)))
     return Fit(
         problem=problem,
         values=values,
         estimates=estimates,
-        covariance=covariance,
+        parts=parts,
         fitted=fitted,
         residuals=residuals,
         deviations=deviations,
         leverages=leverages,
-        freedom=freedom,
-        quantile=quantile,
+        freedoms=freedoms,
         reached=reached,
         tried=len(problem.starts),
         known=known,

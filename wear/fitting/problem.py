@@ -61,8 +61,8 @@ class Series:
 class FitProblem:
     """What is free, what was measured, and the model between them.
 
-    ``predict`` takes the values ``(p,)`` of the ``unknowns`` to all data ``(n,)``, one series after
-    the other. ``starts`` are values ``(p,)`` to begin with, tried in their order.
+    ``predict`` takes the values ``(p,)`` of the ``unknowns`` to all data ``(n,)``, one of the
+    ``series`` after the other. ``starts`` are values ``(p,)`` to begin with, tried in their order.
 
     Examples
     --------

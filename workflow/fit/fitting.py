@@ -1,0 +1,283 @@
+"""From the file of a fit to its result: data, problem, solution, and what speaks against it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from sa_solver.types import Array
+from wear.fitting import (
+    Estimate,
+    EvolutionData,
+    Fit,
+    FitError,
+    VolumeData,
+    VolumeLaw,
+    diagnose,
+    evolution_problem,
+    fit,
+    volume_problem,
+)
+from workflow.case.sections import Section
+from workflow.case.units import to_base
+from workflow.errors import CaseError, UserError
+from workflow.fit.measured import Column, read_columns
+from workflow.fit.schema import FREE, FitInput, JointFit, WearFit
+
+# Columns of the parameters of a joint.
+MEASURED = {
+    "friction": "mu",
+    "stiffness": "kt",
+    "residual_stiffness": "residual_stiffness",
+    "normal_load": "P",
+}
+INITIAL = "initial"
+# Units in which parameters are told: those of a joint at first, and all others.
+JOINT_UNITS = {
+    "friction": "1",
+    "stiffness": "N/um",
+    "residual_stiffness": "N/um",
+    "normal_load": "N",
+}
+UNITS = {
+    "rate": "1/J",
+    "second_rate": "1/J",
+    "scale": "J",
+    "slope": "1/J",
+    "coefficient": "um^3/J",
+    "threshold": "J",
+    "intercept": "um^3",
+}
+VOLUMES = {"volume": "both", "volume_1": "body_1", "volume_2": "body_2"}
+# From here on a single value decides a parameter, and its scatter is anybody's guess.
+ALONE = 0.9
+# Places in a message.
+MOST_NAMED = 5
+# Points of a curve in the figure.
+DRAWN = 300
+# Law of the worn volume: power of the amplitude.
+POWERS = {"energy": 0.0, "energy_amplitude": 1.0, "amplitude_power": None}
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A free parameter: its ``path`` in a case, the ``unit`` it is told in, and its estimate."""
+
+    path: str
+    unit: str
+    estimate: Estimate
+
+    def shown(self, number: float) -> float:
+        """A number of the base unit in the one that it is told in."""
+        return number / (1.0 if self.unit == "1" else to_base(f"1 {self.unit}", None))
+
+
+@dataclass(frozen=True)
+class FittedSeries:
+    """One kind of data: what it is called, what was measured, and where.
+
+    ``curve`` takes energies ``(m,)`` to what all values of the parameters make of them; None where
+    it depends on more.
+    """
+
+    name: str
+    unit: str
+    column: Column
+    curve: Callable[[Array], Callable[[Array], Array]] | None
+
+    def energies(self) -> Array:
+        """Where its curve is drawn ``(m,)``: within the data, beyond which nothing is known."""
+        return np.linspace(self.column.energy.min(), self.column.energy.max(), DRAWN)
+
+
+@dataclass(frozen=True)
+class Fitted:
+    """The result: the fit, its parameters by their paths in a case, data, and ``doubts``."""
+
+    given: FitInput
+    fit: Fit
+    parameters: tuple[Parameter, ...]
+    series: tuple[FittedSeries, ...]
+    doubts: tuple[str, ...]
+
+    @property
+    def places(self) -> tuple[str, ...]:
+        """``file:line`` of all data ``(n,)``."""
+        return tuple(place for series in self.series for place in series.column.places)
+
+    @property
+    def by_path(self) -> dict[str, Parameter]:
+        """The parameters by their paths."""
+        return {parameter.path: parameter for parameter in self.parameters}
+
+
+def run_fit(given: FitInput) -> Fitted:
+    """Fit what the file of a fit names.
+
+    Raises CaseError and InputFileError with file and line, UserError for data that allow no fit,
+    ConvergenceError where no start leads to a solution.
+    """
+    if isinstance(given.file, JointFit):
+        return _joint(given, given.file)
+    return _wear(given, given.file)
+
+
+def _solved(
+    given: FitInput,
+    fitted: Fit,
+    paths: Sequence[tuple[str, str]],
+    series: Sequence[FittedSeries],
+    notes: Sequence[str],
+) -> Fitted:
+    parameters = tuple(
+        Parameter(path, unit, estimate)
+        for (path, unit), estimate in zip(paths, fitted.estimates, strict=True)
+    )
+    order = np.concatenate([one.column.energy for one in series])
+    files = np.concatenate([one.column.files for one in series])
+    places = [place for one in series for place in one.column.places]
+    doubts = list(notes)
+    for doubt in diagnose(fitted, order, files):
+        named = ", ".join(places[k] for k in doubt.data[:MOST_NAMED])
+        more = " ..." if len(doubt.data) > MOST_NAMED else ""
+        where = f" ({named}{more})" if named else ""
+        doubts.append(": ".join(part for part in (doubt.series, doubt.text + where) if part))
+    doubts += [
+        f"{parameter.path}: rests on one value, {places[e.heaviest]}; more there would tell"
+        for parameter in parameters
+        if (e := parameter.estimate).determined and e.heaviest_share > ALONE
+    ]
+    if fitted.reached < fitted.tried:
+        doubts.append(
+            f"{fitted.tried - fitted.reached} of {fitted.tried} starts ended at a worse fit: "
+            "there are others that look like a best one"
+        )
+    return Fitted(given, fitted, parameters, tuple(series), tuple(doubts))
+
+
+# --- joints -------------------------------------------------------------------------------------
+
+
+def _joint(given: FitInput, file: JointFit) -> Fitted:
+    names = [MEASURED[name] for name in file.evolution.given]
+    columns = read_columns(file.measurements, names, beside=("residual_stiffness",), ascending=True)
+    for name in file.evolution.given:
+        if MEASURED[name] not in columns:
+            place = given.source.where(("evolution", name))[1]
+            raise CaseError(
+                f"{place}: evolution.{name}: no file has its column {MEASURED[name]}; allowed: "
+                "one that has, or columns that names it"
+            )
+    columns, notes = _without_residual(file, columns)
+    data = [
+        _evolution_data(file, name, section, columns[MEASURED[name]])
+        for name, section in file.evolution.given.items()
+    ]
+    try:
+        problem = evolution_problem(data, file.shared)
+        fitted = fit(problem.problem)
+    except FitError as error:
+        raise UserError(f"{given.name}: {error}") from error
+    series = [
+        FittedSeries(
+            one.name,
+            JOINT_UNITS[one.name],
+            columns[MEASURED[one.name]],
+            lambda energy, one=one: problem.curve(one, energy),  # type: ignore[misc]
+        )
+        for one in problem.data
+    ]
+    paths = [_joint_path(unknown.name) for unknown in problem.problem.unknowns]
+    return _solved(given, fitted, paths, series, notes)
+
+
+def _evolution_data(file: JointFit, name: str, section: Section, column: Column) -> EvolutionData:
+    """The data of a parameter of the joint, and what of its function is held."""
+    entries = {INITIAL: getattr(file.joint, name), **section.model_dump(exclude={"kind"})}
+    held = {key: float(value) for key, value in entries.items() if value != FREE}
+    return EvolutionData(
+        name,
+        column.energy,
+        column.values,
+        str(section.kind),  # type: ignore[attr-defined]
+        held,
+        column.deviations,
+    )
+
+
+def _joint_path(name: str) -> tuple[str, str]:
+    """Path in a case and unit of a parameter of :func:`evolution_problem`."""
+    of, _, parameter = name.rpartition(".")
+    if parameter == INITIAL:
+        return f"joint.{of}", JOINT_UNITS[of]
+    where = f"evolution.{of}.{parameter}" if of else f"evolution.{parameter}"
+    return where, UNITS.get(parameter, "1")
+
+
+def _without_residual(
+    file: JointFit, columns: dict[str, Column]
+) -> tuple[dict[str, Column], list[str]]:
+    """The columns with a stiffness as the law has it, and what to say of that."""
+    if file.law == "bouc_wen" or "kt" not in columns:
+        return columns, []
+    kt = columns["kt"]
+    residual = kt.others.get("residual_stiffness")
+    if residual is None:
+        note = (
+            f"kt has no residual_stiffness beside it and is taken for the stiffness of {file.law} "
+            "as it is: right where nothing of it is left when all slides"
+        )
+        return columns, [note]
+    alone = Column(kt.energy, kt.values - residual, kt.deviations, kt.others, kt.places, kt.files)
+    return {**columns, "kt": alone}, []
+
+
+# --- wear ---------------------------------------------------------------------------------------
+
+
+def _wear(given: FitInput, file: WearFit) -> Fitted:
+    columns = read_columns(file.measurements, list(VOLUMES), beside=("amplitude",))
+    if "volume" in columns and len(columns) > 1:
+        raise UserError(
+            f"{given.name}: volume beside volume_1 or volume_2; allowed: that of both bodies, or "
+            "those of each"
+        )
+    reference = file.wear.reference_amplitude
+    law = VolumeLaw(file.wear.offset, POWERS[file.wear.law], reference or 1.0)
+    data = []
+    for name, column in columns.items():
+        amplitude = column.others.get("amplitude")
+        if law.uses_amplitude and amplitude is None:
+            raise UserError(
+                f"{column.places[0].rpartition(':')[0]}: no column amplitude, which law: "
+                f"{file.wear.law} needs; allowed: half the stroke of every test"
+            )
+        body = VolumeData(VOLUMES[name], column.energy, column.values, amplitude, column.deviations)
+        data.append(body)
+    try:
+        problem = volume_problem(data, law)
+        fitted = fit(problem.problem)
+    except FitError as error:
+        raise UserError(f"{given.name}: {error}") from error
+    series = [
+        FittedSeries(
+            f"worn volume of {one.name.replace('_', ' ')}",
+            "mm^3",
+            column,
+            None
+            if law.uses_amplitude
+            else lambda energy, one=one: problem.curve(one, energy, None),  # type: ignore[misc]
+        )
+        for one, column in zip(problem.data, columns.values(), strict=True)
+    ]
+    paths = [_wear_path(unknown.name) for unknown in problem.problem.unknowns]
+    return _solved(given, fitted, paths, series, [])
+
+
+def _wear_path(name: str) -> tuple[str, str]:
+    """Path and unit of a parameter of :func:`volume_problem`."""
+    of, _, parameter = name.rpartition(".")
+    where = ".".join(part for part in ("wear", of, parameter) if part)
+    return where, UNITS.get(parameter, "1")
