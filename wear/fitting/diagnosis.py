@@ -1,4 +1,4 @@
-"""What residuals say against a fit: waves, outliers, two groups of data, files that disagree.
+"""What residuals say against a fit: waves, outliers, two groups, files that disagree.
 
 Bounds of a fit are right for data that scatter independently about the model. Each test here has a
 level of about one false alarm in a thousand fits of such data.
@@ -7,6 +7,7 @@ level of about one false alarm in a thousand fits of such data.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from scipy.special import chdtri, fdtrc, ndtri, stdtrit
@@ -100,7 +101,10 @@ def _of_series(
             "independent; bounds are too small"
         )
         found.append((text, here[:0]))
-    if groups is None and files is not None and _files_differ(residuals[here], files[here]):
+    if groups is None and _scatter_grows(residuals[here], fit.fitted[here]):
+        text = "scatter grows with the value: give standard deviations that do, or bounds are wrong"
+        found.append((text, here[:0]))
+    if files is not None and _files_differ(residuals[here], files[here]):
         found.append(("files lie apart from each other by more than their scatter", here[:0]))
     return found
 
@@ -113,15 +117,17 @@ def _two_groups(residuals: Array, fitted: Array) -> Mask | None:
     """
     for values in (residuals, residuals / np.where(fitted == 0.0, np.inf, fitted)):
         ratio, limit = _best_split(values[None, :])
-        others, _ = _best_split(_samples(len(values)))
-        if ratio[0] < np.quantile(others, ALARM):
+        if ratio[0] < _smallest_split(len(values)):
             upper: Mask = values > limit[0]
             return upper
     return None
 
 
-def _samples(count: int) -> Array:
-    return np.random.default_rng(SEED).standard_normal((SAMPLES, count))
+@cache
+def _smallest_split(count: int) -> float:
+    """What a share within two groups is below in few normal samples of so many."""
+    samples = np.random.default_rng(SEED).standard_normal((SAMPLES, count))
+    return float(np.quantile(_best_split(samples)[0], ALARM))
 
 
 def _best_split(values: Array) -> tuple[Array, Array]:
@@ -160,6 +166,14 @@ def _goes_in_waves(residuals: Array) -> bool:
     ratio = np.sum(np.diff(residuals) ** 2) / np.sum(residuals**2)
     spread = np.sqrt(4.0 * (count - 2.0) / (count**2 - 1.0))
     return bool((2.0 - ratio) / spread > ndtri(1.0 - ALARM))
+
+
+def _scatter_grows(residuals: Array, fitted: Array) -> bool:
+    """Whether large values scatter more: Spearman's rank correlation with the residuals' size."""
+    count = len(residuals)
+    ranks = [np.argsort(np.argsort(np.abs(one), kind="stable")) for one in (residuals, fitted)]
+    correlation = np.corrcoef(ranks[0], ranks[1])[0, 1]
+    return bool(correlation * np.sqrt(count - 1.0) > ndtri(1.0 - ALARM))
 
 
 def _files_differ(residuals: Array, files: Indices) -> bool:

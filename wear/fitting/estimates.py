@@ -39,7 +39,9 @@ class Estimate:
     ``deviation`` and ``bounds`` of 95 %; of what is not determined these are NaN, and ``doubt``
     says why. The deviation of a ``logarithmic`` one is its value times that of the logarithm.
     ``shares`` ``(k,)`` are those of the series in its variance, which add up to 1, and ``heaviest``
-    the datum with the largest share of its own, ``heaviest_share``.
+    the datum with the largest share of its own, ``heaviest_share``. ``quantile`` is what the
+    deviation is multiplied with for linear bounds; where the model bends within these, which
+    ``straight`` then denies, bounds are those of the profile (:mod:`wear.fitting.profiles`).
 
     Examples
     --------
@@ -67,6 +69,8 @@ class Estimate:
     heaviest: int
     heaviest_share: float
     logarithmic: bool
+    quantile: float
+    straight: bool = True
 
     @property
     def determined(self) -> bool:
@@ -106,7 +110,7 @@ def estimate_at(
         bounds = value - quantile * deviation, value + quantile * deviation
     doubt = _doubt(problem, place, values, kernel, held, jacobian)
     if not doubt:
-        doubt = _width(unknown, value, bounds)
+        doubt = width_doubt(unknown, value, bounds)
     if doubt:
         deviation, bounds = np.nan, (np.nan, np.nan)
     heaviest = int(np.argmax(terms))
@@ -120,16 +124,20 @@ def estimate_at(
         heaviest=heaviest,
         heaviest_share=float(terms[heaviest]) / total if total > 0.0 else 0.0,
         logarithmic=unknown.logarithmic,
+        quantile=quantile,
     )
 
 
-def _width(unknown: Unknown, value: float, bounds: tuple[float, float]) -> str:
+def width_doubt(unknown: Unknown, value: float, bounds: tuple[float, float]) -> str:
     """Why bounds are too wide to tell anything, empty if they are not."""
+    lower, upper = bounds
     if unknown.logarithmic:
-        if bounds[1] > value * np.exp(DECADE):
-            return "known no better than to a decade"
-    elif bounds[1] - value > max(abs(value), unknown.size):
-        return f"between {bounds[0]:.2g} and {bounds[1]:.2g}"
+        factor = np.exp(DECADE)
+        return (
+            "" if upper <= value * factor and lower >= value / factor else "no closer than a decade"
+        )
+    if max(upper - value, value - lower) > max(abs(value), unknown.size):
+        return f"95 % from {lower:.2g} to {upper:.2g}"
     return ""
 
 
@@ -154,12 +162,15 @@ def _doubt(
     unknown = problem.unknowns[place]
     if held[place]:
         lower = values[place] - unknown.lower <= unknown.upper - values[place]
-        return f"at its {'lower' if lower else 'upper'} bound {values[place]:.6g}"
+        side, at = ("lower", unknown.lower) if lower else ("upper", unknown.upper)
+        return f"at its {side} bound, {at:.6g}"
     if kernel[place] <= ALIKE:
         return ""
-    others = [problem.unknowns[k].name for k in np.flatnonzero(kernel > ALIKE) if k != place]
-    if not others:
+    lengths = np.linalg.norm(jacobian, axis=0)
+    if lengths[place] == 0.0:
         return "the data do not depend on it"
+    tied = (kernel > ALIKE) & (lengths > 0.0)
+    others = [problem.unknowns[k].name for k in np.flatnonzero(tied) if k != place]
     for name, how in _only_together(problem, values, jacobian).get(unknown.name, ()):
         return f"only its {how} {name} counts"
     return f"only together with {', '.join(others)}"

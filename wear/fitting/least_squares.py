@@ -11,7 +11,8 @@ several series decide has those of Satterthwaite 1946, Biometrics 2, 110: 1/f = 
 variance)² / f of the series. With given standard deviations bounds are the normal ones.
 
 Energies and rates go over powers of ten: they are fitted as logarithms, so that their bounds are
-factors. All bounds are linear ones: right where the model bends little within them.
+factors. Bounds are linear at first; each is held, all else fitted anew, and replaced by where the
+misfit rises as it should if it does not there (:mod:`wear.fitting.profiles`).
 """
 
 from __future__ import annotations
@@ -20,19 +21,24 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import least_squares
 from scipy.special import ndtri, stdtrit
 
 from sa_solver.errors import ConvergenceError
 from sa_solver.types import Array, Mask
 from wear.fitting.estimates import RANK, Estimate, estimate_at, inverse_of, led_astray
 from wear.fitting.problem import FitError, FitProblem
+from wear.fitting.profiles import profiled
+from wear.fitting.solving import solve
 
 LEVEL = 0.95
 """Of all bounds."""
 
-AT_BOUND = 1e-4
-"""Distance from a bound at which it counts as reached, in sizes of the parameter."""
+NEAR = 0.1
+"""A bound holds a parameter that is so near to it that the data could hardly tell, in deviations of
+the data, ..."""
+
+PUSHED = 1e-3
+"""... and that they push against it: the misfit falls by so much for a step of one deviation."""
 
 SETTLED, MOST_ROUNDS = 1e-6, 100
 """Relative change of the scatter at which it counts as found, and rounds before giving up."""
@@ -40,11 +46,11 @@ SETTLED, MOST_ROUNDS = 1e-6, 100
 EXACT = 1e-12
 """Scatter of data that a model meets exactly, in their largest value."""
 
+ROUNDING = 1e-9
+"""Residuals of a model that meets a series, in its largest value."""
+
 SAME_MINIMUM = 1e-4
 """Costs that differ by less, relatively, are of one minimum."""
-
-TOLERANCE = 1e-12
-"""Of the solver, relative: the solution is then exact beside any bound of it."""
 
 
 @dataclass(frozen=True)
@@ -189,9 +195,9 @@ def fit(problem: FitProblem) -> Fit:
     _check(problem)
     best, reached = _best(problem)
     deviations, inner, jacobian = _weighted(problem, best)
-    held = _at_bounds(problem, inner, jacobian)
     fitted = problem.predict(problem.outer(inner))
     residuals = problem.data - fitted
+    held = _at_bounds(problem, inner, jacobian, -residuals / deviations)
     free = ~held
     inverse, kernel = inverse_of(jacobian * free)
     leverages = np.einsum("ij,ji->i", jacobian * free, inverse)
@@ -208,6 +214,8 @@ def fit(problem: FitProblem) -> Fit:
         )
         for place in range(len(values))
     ]
+    if not _is_exact(problem, residuals):
+        alone = profiled(problem, inner, deviations, alone)
     estimates = tuple(led_astray(alone, place, parts.sum(axis=0)) for place in range(len(values)))
     return Fit(
         problem=problem,
@@ -222,6 +230,16 @@ def fit(problem: FitProblem) -> Fit:
         reached=reached,
         tried=len(problem.starts),
         known=known,
+    )
+
+
+def _is_exact(problem: FitProblem, residuals: Array) -> bool:
+    """Whether a series is met but for rounding: its scatter then is anything."""
+    sizes = [np.abs(series.values).max() for series in problem.series]
+    left = [np.abs(residuals[problem.places == k]).max() for k in range(len(sizes))]
+    return any(
+        one <= ROUNDING * size and series.deviations is None
+        for one, size, series in zip(left, sizes, problem.series, strict=True)
     )
 
 
@@ -248,7 +266,7 @@ def _check(problem: FitProblem) -> None:
 def _best(problem: FitProblem) -> tuple[Array, int]:
     """The lowest end of all starts, fitted values ``(p,)``, and how many of them ended there."""
     deviations = _first_deviations(problem)
-    ends = [_solve(problem, problem.inner(start), deviations) for start in problem.starts]
+    ends = [solve(problem, problem.inner(start), deviations) for start in problem.starts]
     found = [end for end in ends if end is not None]
     if not found:
         raise ConvergenceError(
@@ -258,37 +276,6 @@ def _best(problem: FitProblem) -> tuple[Array, int]:
     floor = 0.5 * len(problem.data) * EXACT**2
     same = [cost - least[1] <= SAME_MINIMUM * least[1] + floor for _, cost, _ in found]
     return least[0], sum(same)
-
-
-def _solve(
-    problem: FitProblem, start: Array, deviations: Array
-) -> tuple[Array, float, Array] | None:
-    """Where one start leads: fitted values ``(p,)``, cost, Jacobian ``(n, p)`` of the residuals."""
-    lower, upper = problem.bounds
-
-    def residuals(inner: Array) -> Array:
-        return np.asarray((problem.predict(problem.outer(inner)) - problem.data) / deviations)
-
-    inner = np.clip(start, lower, upper)
-    if not np.isfinite(residuals(inner)).all():
-        return None
-    solved = least_squares(
-        residuals,
-        inner,
-        jac="3-point",
-        bounds=(lower, upper),
-        x_scale=_sizes(problem, inner),
-        ftol=TOLERANCE,
-        xtol=TOLERANCE,
-        gtol=TOLERANCE,
-    )
-    return solved.x, float(solved.cost), solved.jac
-
-
-def _sizes(problem: FitProblem, inner: Array) -> Array:
-    """What a change of a parameter is measured by ``(p,)``."""
-    sizes = np.maximum(np.abs(inner), [unknown.size for unknown in problem.unknowns])
-    return np.where(problem.logarithmic | (sizes == 0.0), 1.0, sizes)
 
 
 def _first_deviations(problem: FitProblem) -> Array:
@@ -308,7 +295,7 @@ def _weighted(problem: FitProblem, best: Array) -> tuple[Array, Array, Array]:
     deviations = _first_deviations(problem)
     inner = best
     for _ in range(MOST_ROUNDS):
-        solved = _solve(problem, inner, deviations)
+        solved = solve(problem, inner, deviations)
         if solved is None:  # pragma: no cover - it was finite before
             break
         inner, _, jacobian = solved
@@ -327,7 +314,7 @@ def _weighted(problem: FitProblem, best: Array) -> tuple[Array, Array, Array]:
 def _scatter(problem: FitProblem, inner: Array, jacobian: Array, deviations: Array) -> Array:
     """Deviations ``(n,)`` of the data: given ones, or of each series as its residuals have it."""
     residuals = problem.predict(problem.outer(inner)) - problem.data
-    free = ~_at_bounds(problem, inner, jacobian)
+    free = ~_at_bounds(problem, inner, jacobian, residuals / deviations)
     inverse, _ = inverse_of(jacobian * free)
     leverages = np.einsum("ij,ji->i", jacobian * free, inverse)
     found = deviations.copy()
@@ -346,9 +333,14 @@ def _scatter(problem: FitProblem, inner: Array, jacobian: Array, deviations: Arr
     return found
 
 
-def _at_bounds(problem: FitProblem, inner: Array, jacobian: Array) -> Mask:
-    """Which parameters a bound holds ``(p,)``."""
-    size = _sizes(problem, inner)
+def _at_bounds(problem: FitProblem, inner: Array, jacobian: Array, residuals: Array) -> Mask:
+    """Which parameters a bound holds ``(p,)``: near it, and pushed against it by the data.
+
+    ``residuals`` ``(n,)`` are fitted less measured, over the deviations.
+    """
     lower, upper = problem.bounds
-    near = (inner - lower <= AT_BOUND * size) | (upper - inner <= AT_BOUND * size)
-    return np.asarray(near)
+    lengths = np.linalg.norm(jacobian, axis=0)
+    push = -(jacobian.T @ residuals)
+    strong = np.abs(push) > PUSHED * lengths
+    nearest = np.where(push < 0.0, inner - lower, upper - inner)
+    return np.asarray(strong & (nearest <= NEAR / np.where(strong, lengths, 1.0)))

@@ -23,6 +23,10 @@ ROW, REST = 3.0, 1.3
 LEAST, LINES = 3.0, 1.96
 # Energies over such a range are spread by their logarithm.
 DECADES = 1e3
+# Points of a curve, and the first after no energy, over the smallest of the data.
+POINTS, EARLIEST = 200, 1e-6
+# Left of no energy, over the smallest of the data.
+MARGIN = 0.2
 
 
 def write_figure(fitted: Fitted, path: Path) -> None:
@@ -100,10 +104,14 @@ def _draw_residuals(axis: Axes, series: FittedSeries, residuals: Array) -> None:
 
 def _label_energy(axis: Axes, series: FittedSeries) -> None:
     axis.set_xlabel("dissipated energy [J]")
+    energy = TO_JOULES * series.column.energy
     if _is_wide(series):
-        smallest = series.column.energy[series.column.energy > 0.0].min()
+        smallest = energy[energy > 0.0].min()
         # Linear up to the first of them, so that no energy has its place too.
-        axis.set_xscale("symlog", linthresh=TO_JOULES * smallest)
+        axis.set_xscale("symlog", linthresh=smallest)
+        axis.set_xlim(
+            -MARGIN * smallest if energy.min() == 0.0 else smallest / 2.0, 2.0 * energy.max()
+        )
 
 
 def _is_wide(series: FittedSeries) -> bool:
@@ -112,13 +120,15 @@ def _is_wide(series: FittedSeries) -> bool:
 
 
 def _spread(series: FittedSeries) -> Array:
-    """Energies of the curve, as dense as they are drawn."""
-    energies = series.energies()
+    """Energies of the curve ``(m,)``, as they are drawn: none beyond the data."""
+    energy = series.column.energy
     if not _is_wide(series):
-        return energies
-    smallest = series.column.energy[series.column.energy > 0.0].min()
-    wide = np.geomspace(smallest, energies[-1], len(energies))
-    return np.append(energies[0], wide) if energies[0] == 0.0 else wide
+        return np.linspace(energy.min(), energy.max(), POINTS)
+    smallest = energy[energy > 0.0].min()
+    wide = np.geomspace(smallest, energy.max(), POINTS)
+    if energy.min() > 0.0:
+        return wide
+    return np.concatenate([np.zeros(1), np.geomspace(EARLIEST * smallest, smallest, POINTS), wide])
 
 
 def _scale(series: FittedSeries) -> tuple[float, str]:

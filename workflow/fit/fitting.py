@@ -55,8 +55,6 @@ VOLUMES = {"volume": "both", "volume_1": "body_1", "volume_2": "body_2"}
 ALONE = 0.9
 # Places in a message.
 MOST_NAMED = 5
-# Points of a curve in the figure.
-DRAWN = 300
 # Law of the worn volume: power of the amplitude.
 POWERS = {"energy": 0.0, "energy_amplitude": 1.0, "amplitude_power": None}
 
@@ -86,10 +84,6 @@ class FittedSeries:
     unit: str
     column: Column
     curve: Callable[[Array], Callable[[Array], Array]] | None
-
-    def energies(self) -> Array:
-        """Where its curve is drawn ``(m,)``: within the data, beyond which nothing is known."""
-        return np.linspace(self.column.energy.min(), self.column.energy.max(), DRAWN)
 
 
 @dataclass(frozen=True)
