@@ -134,10 +134,12 @@ def width_doubt(unknown: Unknown, value: float, bounds: tuple[float, float]) -> 
     if unknown.logarithmic:
         factor = np.exp(DECADE)
         return (
-            "" if upper <= value * factor and lower >= value / factor else "no closer than a decade"
+            ""
+            if upper <= value * factor and lower >= value / factor
+            else "known no better than to a decade"
         )
     if max(upper - value, value - lower) > max(abs(value), unknown.size):
-        return f"95 % from {lower:.2g} to {upper:.2g}"
+        return "known no better than to its own size"
     return ""
 
 
@@ -162,8 +164,7 @@ def _doubt(
     unknown = problem.unknowns[place]
     if held[place]:
         lower = values[place] - unknown.lower <= unknown.upper - values[place]
-        side, at = ("lower", unknown.lower) if lower else ("upper", unknown.upper)
-        return f"at its {side} bound, {at:.6g}"
+        return f"at its {'lower' if lower else 'upper'} bound"
     if kernel[place] <= ALIKE:
         return ""
     lengths = np.linalg.norm(jacobian, axis=0)

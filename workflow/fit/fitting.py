@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+import re
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -125,8 +126,9 @@ def _solved(
     series: Sequence[FittedSeries],
     notes: Sequence[str],
 ) -> Fitted:
+    called = {one.name: path for one, (path, _) in zip(fitted.estimates, paths, strict=True)}
     parameters = tuple(
-        Parameter(path, unit, estimate)
+        Parameter(path, unit, replace(estimate, doubt=_in_paths(estimate.doubt, called)))
         for (path, unit), estimate in zip(paths, fitted.estimates, strict=True)
     )
     order = np.concatenate([one.column.energy for one in series])
@@ -149,6 +151,11 @@ def _solved(
             "there are others that look like a best one"
         )
     return Fitted(given, fitted, parameters, tuple(series), tuple(doubts))
+
+
+def _in_paths(text: str, called: Mapping[str, str]) -> str:
+    """A text with the paths of parameters in place of their names."""
+    return re.sub(r"[\w.]+", lambda word: called.get(word[0], word[0]), text)
 
 
 # --- joints -------------------------------------------------------------------------------------

@@ -76,7 +76,12 @@ def _scatter(fitted: Fitted, place: int) -> float:
 def _notes(fitted: Fitted) -> list[str]:
     found = fitted.fit
     how = "normal, of the given standard deviations" if found.known else "Student's"
-    lines = [f"+- is one standard deviation; bounds are {how}, to first order"]
+    lines = [f"+- is one standard deviation; bounds are {how}"]
+    lines += [
+        f"{parameter.path}: the model bends within its bounds, which are those of its profile"
+        for parameter in fitted.parameters
+        if parameter.estimate.determined and not parameter.estimate.straight
+    ]
     lines += [
         f"{first} and {second} are correlated by {value:.3f}: neither holds alone"
         for first, second, value in _close(fitted)
@@ -139,6 +144,7 @@ def _of_parameter(fitted: Fitted, parameter: Parameter) -> dict[str, Any]:
         "determined": known,
         "doubt": estimate.doubt,
         "fitted_as_logarithm": estimate.logarithmic,
+        "bounds_of_profile": known and not estimate.straight,
         "shares": {
             series.name: round(share, 4)
             for series, share in zip(fitted.series, estimate.shares.tolist(), strict=True)

@@ -38,8 +38,10 @@ def number_text(value: float, digits: int) -> str:
     """A number with so many digits, its power of ten as YAML has it."""
     if SMALL <= abs(value) < LARGE:
         return f"{float(f'{value:.{digits}g}'):.{MOST_DIGITS}g}"
-    mantissa, power, exponent = f"{value:.{digits}g}".partition("e")
-    return f"{mantissa}e{int(exponent)}" if power else mantissa
+    if value == 0.0:
+        return "0"
+    mantissa, _, exponent = f"{value:.{digits - 1}e}".partition("e")
+    return f"{float(mantissa):g}e{int(exponent)}"
 
 
 def quantity(text: str, unit: str) -> float | str:

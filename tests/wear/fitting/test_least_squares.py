@@ -110,7 +110,7 @@ def test_a_parameter_at_its_bound_is_told():
         [np.array([0.0, 1.0])],
     )
     start, slope = fit(held).estimates
-    assert slope.doubt == "at its lower bound, 0"
+    assert slope.doubt == "at its lower bound"
     # The other one is as if there were no slope: a mean.
     assert start.value == pytest.approx((y + NOISE).mean(), rel=1e-3)
     mean_error = np.std(y + NOISE, ddof=1) / np.sqrt(len(y))
