@@ -13,6 +13,8 @@ The arithmetic
 What is fitted
     - ``evolution_problem``: how joint parameters follow the dissipated energy.
     - ``EvolutionData``: what was measured of one of them.
+    - ``loop_problem``: a joint law from measured loops.
+    - ``mean_loop``, ``LoopData``: the mean of all loops of a record.
     - ``volume_problem``: wear coefficients from worn volumes.
     - ``VolumeData``, ``VolumeLaw``: the volumes, and what of the law is asked for.
 
@@ -38,6 +40,7 @@ if TYPE_CHECKING:
     from wear.fitting.estimates import Estimate
     from wear.fitting.evolutions import EvolutionData, evolution_problem
     from wear.fitting.least_squares import Fit, fit
+    from wear.fitting.loops import LoopData, loop_problem, mean_loop
     from wear.fitting.problem import FitError, FitProblem, Series, Unknown
     from wear.fitting.volumes import VolumeData, VolumeLaw, volume_problem
 
@@ -47,6 +50,7 @@ __all__ = [
     "Fit",
     "FitError",
     "FitProblem",
+    "LoopData",
     "Series",
     "Unknown",
     "VolumeData",
@@ -54,6 +58,8 @@ __all__ = [
     "diagnose",
     "evolution_problem",
     "fit",
+    "loop_problem",
+    "mean_loop",
     "volume_problem",
 ]
 
@@ -64,6 +70,7 @@ __getattr__, __dir__ = lazy_names(
         "estimates": ("Estimate",),
         "evolutions": ("EvolutionData", "evolution_problem"),
         "least_squares": ("Fit", "fit"),
+        "loops": ("LoopData", "loop_problem", "mean_loop"),
         "problem": ("FitError", "FitProblem", "Series", "Unknown"),
         "volumes": ("VolumeData", "VolumeLaw", "volume_problem"),
     },
