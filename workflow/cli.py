@@ -341,9 +341,10 @@ def loops(
 def fit(file: Path, out: Path | None, force: bool) -> None:
     """Find parameters of a case from measurements.
 
-    FIT is a YAML file that names tables of measurements and what is free (`fretscale new fit_joint`
-    and `fit_wear`). Tells values with their standard deviations and 95 % bounds, what the data do
-    not determine, and what speaks against the fit; with --out writes the section of a case.
+    FIT is a YAML file that names tables of measurements and what is free: `fretscale new` writes
+    fit_joint, fit_loops and fit_wear. Tells values with their standard deviations and 95 % bounds,
+    what the data do not determine, and what speaks against the fit; with --out writes the section
+    of a case.
     """
     from workflow.fit.fitting import run_fit
     from workflow.fit.report import report

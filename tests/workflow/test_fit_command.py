@@ -10,6 +10,7 @@ from ruamel.yaml import YAML
 from tests.conftest import CASES
 from tests.workflow.commands import invoke
 from tests.workflow.test_templates import ways
+from wear.joints import UniformIwan, march_joints
 from workflow.fit.schema import load_fit
 from workflow.fit.section import rounded
 from workflow.fit.template import FITS, fit_template
@@ -126,6 +127,33 @@ def test_what_is_not_determined_stands_without_a_number(folder):
     assert rate.value == pytest.approx(1.3e9, rel=1e-6)
 
 
+def test_a_law_comes_back_from_a_record_of_loops(folder):
+    law = UniformIwan(60e3, 0.9, 60.0, 1.4e3)
+    motion = 7e-3 * np.sin(2.0 * np.pi * np.arange(2401) / 600)
+    record = march_joints(law, law.rest(1), np.zeros((1, 1)), motion[:, None, None])
+    rows = [f"{1e3 * x:.9g}, {f:.9g}" for x, f in zip(motion, record.force.ravel(), strict=True)]
+    (folder / "loop.csv").write_text("\n".join(["displacement [um], force [N]", *rows]))
+    asked = {
+        "title": "As new",
+        "fit": "joint_law",
+        "measurements": [{"file": str(folder / "loop.csv")}],
+        "joint": {"law": "uniform_iwan", "normal_load": "60 N"},
+    }
+    found = fretscale.fit(asked, folder / "out")
+    assert found["joint.stiffness"].value == pytest.approx(60.0, rel=1e-3)
+    assert found["joint.friction"].value == pytest.approx(0.9, rel=1e-4)
+    section = YAML(typ="safe", pure=True).load(found.section)["joint"]
+    assert (section["law"], section["normal_load"]) == ("uniform_iwan", "60 N")
+    # Of load and friction only the product counts, and no number is given for either.
+    asked["joint"]["normal_load"] = "free"
+    found = fretscale.fit(asked)
+    assert found["joint.friction"].doubt == "only its product with joint.normal_load counts"
+    assert found["joint.stiffness"].value == pytest.approx(60.0, rel=1e-3)
+    del asked["joint"]["normal_load"]
+    with pytest.raises(fretscale.UserError, match="no normal load; allowed: that of the record"):
+        fretscale.fit(asked)
+
+
 def test_residual_stiffness_is_taken_off_for_laws_beside_a_spring(folder):
     text = JOINT.replace("law: bouc_wen", "law: jenkins")
     (folder / "joint.yaml").write_text(text, encoding="utf-8")
@@ -198,7 +226,7 @@ def test_every_comment_of_a_template_may_be_opened(folder, kind):
             text = text.replace("law: energy ", "law: energy_amplitude ")
         file.write_text(text, encoding="utf-8")
         load_fit(file)
-    assert len(seen) == {"fit_joint": 9, "fit_wear": 3}[kind]
+    assert len(seen) == {"fit_joint": 9, "fit_loops": 5, "fit_wear": 3}[kind]
 
 
 @pytest.mark.parametrize(

@@ -24,8 +24,9 @@ FEWEST = 6
 SAMPLES, SEED = 4000, 0
 """Normal samples that a split into two groups is held against, always the same."""
 
-SMALLEST_GROUP = 2
-"""Data in the smaller one of two groups: one alone is an outlier."""
+SMALLEST_GROUP = 0.1
+"""Share of the data in the smaller one of two groups, of which there are two at least: fewer are
+outliers."""
 
 MOST_NAMED = 5
 """Data of a list in a message."""
@@ -133,18 +134,19 @@ def _smallest_split(count: int) -> float:
 def _best_split(values: Array) -> tuple[Array, Array]:
     """Least sum of squares within two groups over that of all, and where they part, ``(m,)``.
 
-    Of samples ``(m, n)``; each group has :data:`SMALLEST_GROUP` or more.
+    Of samples ``(m, n)``; each group has a share of :data:`SMALLEST_GROUP` or more.
     """
     ordered = np.sort(values - values.mean(axis=1, keepdims=True), axis=1)
     count = ordered.shape[1]
-    below = np.cumsum(ordered, axis=1)[:, SMALLEST_GROUP - 1 : count - SMALLEST_GROUP]
-    sizes = np.arange(SMALLEST_GROUP, count - SMALLEST_GROUP + 1)
+    smallest = max(2, round(SMALLEST_GROUP * count))
+    below = np.cumsum(ordered, axis=1)[:, smallest - 1 : count - smallest]
+    sizes = np.arange(smallest, count - smallest + 1)
     # Two means m, -m n1/n2: what lies between the groups.
     between = below**2 * count / (sizes * (count - sizes))
     best = between.argmax(axis=1)
     rows = np.arange(len(ordered))
     total = np.sum(ordered**2, axis=1)
-    place = best + SMALLEST_GROUP - 1
+    place = best + smallest - 1
     limit = 0.5 * (ordered[rows, place] + ordered[rows, place + 1]) + values.mean(axis=1)
     return 1.0 - between[rows, best] / np.where(total > 0.0, total, 1.0), limit
 

@@ -12,9 +12,8 @@ from matplotlib.figure import Figure
 
 from sa_solver.types import Array
 from workflow.case.units import to_base
-from workflow.fit.fitting import Fitted, FittedSeries
+from workflow.fit.fitting import ENERGY, Fitted, FittedSeries
 from workflow.pictures.panels import legend_below, new_figure, volume_unit
-from workflow.pictures.scales import TO_JOULES
 from workflow.pictures.style import BLACK, BLUE, ORANGE, write_figures
 
 # Of a row of panels, and of title and legend [inches].
@@ -45,16 +44,16 @@ def figure(fitted: Fitted) -> Figure:
         _draw_data(left, fitted, series, here)
         _draw_residuals(right, series, fitted.fit.standardised[here])
         for axis in (left, right):
-            _label_energy(axis, series)
+            _label(axis, series)
     legend_below(drawn, axes[:, 0])
     return drawn
 
 
 def _draw_data(axis: Axes, fitted: Fitted, series: FittedSeries, here: Array) -> None:
     scale, unit = _scale(series)
-    energy = TO_JOULES * series.column.energy
+    places = series.along.factor * series.column.against
     axis.errorbar(
-        energy,
+        places,
         scale * series.column.values,
         yerr=scale * fitted.fit.deviations[here],
         fmt="o",
@@ -64,7 +63,7 @@ def _draw_data(axis: Axes, fitted: Fitted, series: FittedSeries, here: Array) ->
         label="measured, one standard deviation",
     )
     if series.curve is None:
-        axis.plot(energy, scale * fitted.fit.fitted[here], "x", color=BLUE, label="fit")
+        axis.plot(places, scale * fitted.fit.fitted[here], "x", color=BLUE, label="fit")
     else:
         _draw_curve(axis, fitted, series, series.curve, scale)
     called = series.name.replace("_", " ")
@@ -78,12 +77,12 @@ def _draw_curve(
     curve: Callable[[Array], Callable[[Array], Array]],
     scale: float,
 ) -> None:
-    energies = _spread(series)
-    predict = curve(energies)
+    places = _spread(series)
+    predict = curve(places)
     middle, half = scale * predict(fitted.fit.values), scale * fitted.fit.band(predict)
-    axis.plot(TO_JOULES * energies, middle, color=BLUE, label="fit")
+    axis.plot(series.along.factor * places, middle, color=BLUE, label="fit")
     axis.fill_between(
-        TO_JOULES * energies,
+        series.along.factor * places,
         middle - half,
         middle + half,
         color=BLUE,
@@ -94,7 +93,7 @@ def _draw_curve(
 
 
 def _draw_residuals(axis: Axes, series: FittedSeries, residuals: Array) -> None:
-    axis.plot(TO_JOULES * series.column.energy, residuals, "o", color=ORANGE, ms=4.0)
+    axis.plot(series.along.factor * series.column.against, residuals, "o", color=ORANGE, ms=4.0)
     for level in (-LINES, 0.0, LINES):
         axis.axhline(level, color=BLACK, lw=0.8, ls="-" if level == 0.0 else "--")
     most = max(LEAST, 1.1 * float(np.abs(residuals).max()))
@@ -102,9 +101,9 @@ def _draw_residuals(axis: Axes, series: FittedSeries, residuals: Array) -> None:
     axis.set_ylabel("residual [deviations]")
 
 
-def _label_energy(axis: Axes, series: FittedSeries) -> None:
-    axis.set_xlabel("dissipated energy [J]")
-    energy = TO_JOULES * series.column.energy
+def _label(axis: Axes, series: FittedSeries) -> None:
+    axis.set_xlabel(f"{series.along.name} [{series.along.unit}]")
+    energy = series.along.factor * series.column.against
     if _is_wide(series):
         smallest = energy[energy > 0.0].min()
         # Linear up to the first of them, so that no energy has its place too.
@@ -115,13 +114,15 @@ def _label_energy(axis: Axes, series: FittedSeries) -> None:
 
 
 def _is_wide(series: FittedSeries) -> bool:
-    energy = series.column.energy
-    return bool(energy.max() > DECADES * energy[energy > 0.0].min())
+    energy = series.column.against
+    return series.along == ENERGY and bool(energy.max() > DECADES * energy[energy > 0.0].min())
 
 
 def _spread(series: FittedSeries) -> Array:
-    """Energies of the curve ``(m,)``, as they are drawn: none beyond the data."""
-    energy = series.column.energy
+    """Places of the curve ``(m,)``, as they are drawn: none beyond the data."""
+    energy = series.column.against
+    if series.along != ENERGY:
+        return energy  # there and back: it is a loop
     if not _is_wide(series):
         return np.linspace(energy.min(), energy.max(), POINTS)
     smallest = energy[energy > 0.0].min()

@@ -5,6 +5,8 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -14,18 +16,25 @@ from wear.fitting import (
     EvolutionData,
     Fit,
     FitError,
+    LoopData,
     VolumeData,
     VolumeLaw,
     diagnose,
     evolution_problem,
     fit,
+    loop_problem,
+    mean_loop,
     volume_problem,
 )
+from wear.joints.loop_record import MeasuredLoopError
+from wear.joints.measured_loops import measure_loops
+from workflow.case.loop_file import read_loop_file
 from workflow.case.sections import Section
 from workflow.case.units import to_base
 from workflow.errors import CaseError, UserError
 from workflow.fit.measured import Column, read_columns
-from workflow.fit.schema import FREE, FitInput, JointFit, WearFit
+from workflow.fit.schema import FREE, FitInput, JointFit, LoopFit, WearFit
+from workflow.pictures.scales import TO_JOULES, TO_MICRONS
 
 # Columns of the parameters of a joint.
 MEASURED = {
@@ -73,18 +82,38 @@ class Parameter:
         return number / (1.0 if self.unit == "1" else to_base(f"1 {self.unit}", None))
 
 
+class Along(NamedTuple):
+    """What values were measured along: its name, base unit, and factor and unit it is shown in."""
+
+    name: str
+    base: str
+    factor: float
+    unit: str
+
+
+ENERGY = Along("dissipated energy", "N*mm", TO_JOULES, "J")
+DISPLACEMENT = Along("displacement", "mm", TO_MICRONS, "µm")
+
+
 @dataclass(frozen=True)
 class FittedSeries:
     """One kind of data: what it is called, what was measured, and where.
 
-    ``curve`` takes energies ``(m,)`` to what all values of the parameters make of them; None where
-    it depends on more.
+    ``curve`` takes places ``(m,)`` of what they were measured ``along`` to what all values of the
+    parameters make of them; None where it depends on more.
     """
 
     name: str
     unit: str
     column: Column
+    along: Along
     curve: Callable[[Array], Callable[[Array], Array]] | None
+
+    @property
+    def order(self) -> Array:
+        """What tells neighbours ``(n,)``: the energy, or the way along a loop."""
+        against = self.column.against
+        return against if self.along == ENERGY else np.arange(len(against), dtype=np.float64)
 
 
 @dataclass(frozen=True)
@@ -116,6 +145,8 @@ def run_fit(given: FitInput) -> Fitted:
     """
     if isinstance(given.file, JointFit):
         return _joint(given, given.file)
+    if isinstance(given.file, LoopFit):
+        return _loops(given, given.file)
     return _wear(given, given.file)
 
 
@@ -131,7 +162,7 @@ def _solved(
         Parameter(path, unit, replace(estimate, doubt=_in_paths(estimate.doubt, called)))
         for (path, unit), estimate in zip(paths, fitted.estimates, strict=True)
     )
-    order = np.concatenate([one.column.energy for one in series])
+    order = np.concatenate([one.order for one in series])
     files = np.concatenate([one.column.files for one in series])
     places = [place for one in series for place in one.column.places]
     doubts = list(notes)
@@ -186,6 +217,7 @@ def _joint(given: FitInput, file: JointFit) -> Fitted:
             one.name,
             JOINT_UNITS[one.name],
             columns[MEASURED[one.name]],
+            ENERGY,
             lambda energy, one=one: problem.curve(one, energy),  # type: ignore[misc]
         )
         for one in problem.data
@@ -200,7 +232,7 @@ def _evolution_data(file: JointFit, name: str, section: Section, column: Column)
     held = {key: float(value) for key, value in entries.items() if value != FREE}
     return EvolutionData(
         name,
-        column.energy,
+        column.against,
         column.values,
         str(section.kind),  # type: ignore[attr-defined]
         held,
@@ -231,8 +263,64 @@ def _without_residual(
             "as it is: right where nothing of it is left when all slides"
         )
         return columns, [note]
-    alone = Column(kt.energy, kt.values - residual, kt.deviations, kt.others, kt.places, kt.files)
+    alone = Column(kt.against, kt.values - residual, kt.deviations, kt.others, kt.places, kt.files)
     return {**columns, "kt": alone}, []
+
+
+# --- loops --------------------------------------------------------------------------------------
+
+
+def _loops(given: FitInput, file: LoopFit) -> Fitted:
+    entries = file.joint.model_dump(exclude={"law"})
+    # A normal load that is not given is that of each record.
+    entries["normal_load"] = np.nan if file.joint.normal_load is None else entries["normal_load"]
+    held = {key: float(value) for key, value in entries.items() if value != FREE}
+    loops = []
+    for number, one in enumerate(file.measurements, 1):
+        names = {k: v for k, v in one.columns.model_dump().items() if v is not None}
+        record = read_loop_file(Path(one.file), names)
+        columns = (record.get("normal_load"), record.get("time"))
+        try:
+            measured = measure_loops(record["displacement"], record["force"], *columns)
+        except MeasuredLoopError as error:
+            raise UserError(f"{one.file}: {error}") from error
+        loops.append(mean_loop(_loop_name(file, number), measured))
+    try:
+        problem = loop_problem(loops, file.joint.law, held)
+        fitted = fit(problem.problem)
+    except FitError as error:
+        raise UserError(f"{given.name}: {error}") from error
+    series = [
+        FittedSeries(
+            one.name,
+            "N",
+            _loop_column(one, measurement.file, number),
+            DISPLACEMENT,
+            lambda _, one=one: lambda values: problem.loop(one, values),  # type: ignore[misc]
+        )
+        for number, (one, measurement) in enumerate(zip(loops, file.measurements, strict=True))
+    ]
+    paths = [_loop_path(unknown.name) for unknown in problem.problem.unknowns]
+    return _solved(given, fitted, paths, series, [])
+
+
+def _loop_name(file: LoopFit, number: int) -> str:
+    return "force" if len(file.measurements) == 1 else f"force_{number}"
+
+
+def _loop_column(loop: LoopData, file: str, number: int) -> Column:
+    """The mean loop as a column; its places are named by their displacement."""
+    name = Path(file).name
+    places = tuple(f"{name} at {TO_MICRONS * x:.3g} um" for x in loop.displacement)
+    files = np.full(len(loop.force), number)
+    others = {"normal_load": np.full(len(loop.force), loop.normal_load)}
+    return Column(loop.displacement, loop.force, None, others, places, files)
+
+
+def _loop_path(name: str) -> tuple[str, str]:
+    """Path and unit of a parameter of :func:`loop_problem`."""
+    of, _, parameter = name.rpartition(".")
+    return (f"{of}.{parameter}", "N") if of else (f"joint.{name}", JOINT_UNITS.get(name, "1"))
 
 
 # --- wear ---------------------------------------------------------------------------------------
@@ -255,7 +343,9 @@ def _wear(given: FitInput, file: WearFit) -> Fitted:
                 f"{column.places[0].rpartition(':')[0]}: no column amplitude, which law: "
                 f"{file.wear.law} needs; allowed: half the stroke of every test"
             )
-        body = VolumeData(VOLUMES[name], column.energy, column.values, amplitude, column.deviations)
+        body = VolumeData(
+            VOLUMES[name], column.against, column.values, amplitude, column.deviations
+        )
         data.append(body)
     try:
         problem = volume_problem(data, law)
@@ -267,6 +357,7 @@ def _wear(given: FitInput, file: WearFit) -> Fitted:
             f"worn volume of {one.name.replace('_', ' ')}",
             "mm^3",
             column,
+            ENERGY,
             None
             if law.uses_amplitude
             else lambda energy, one=one: problem.curve(one, energy, None),  # type: ignore[misc]

@@ -42,11 +42,12 @@ QUANTITIES = {
 class Column:
     """Values of one kind from all files that have them, in base units.
 
-    ``energy``, ``values`` ``(n,)``, their ``deviations`` ``(n,)`` or None if they are not known,
-    ``others`` beside them by name, ``places`` as ``file:line`` and number of the file of each.
+    ``values`` ``(n,)``, ``against`` what they were measured ``(n,)``, and their ``deviations``
+    ``(n,)`` or None if they are not known. ``others`` are beside them by name, ``places`` are
+    ``file:line`` and ``files`` the number of the file of each.
     """
 
-    energy: Array
+    against: Array
     values: Array
     deviations: Array | None
     others: Mapping[str, Array]
@@ -171,7 +172,7 @@ def _joined(name: str, parts: Sequence[tuple[int, _Part]]) -> Column:
         )
     others = set.intersection(*(set(part.others) for _, part in parts))
     return Column(
-        energy=np.concatenate([part.energy for _, part in parts]),
+        against=np.concatenate([part.energy for _, part in parts]),
         values=np.concatenate([part.values for _, part in parts]),
         deviations=np.concatenate(known) if known else None,
         others={

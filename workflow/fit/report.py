@@ -178,11 +178,12 @@ def data_columns(fitted: Fitted) -> dict[str, Any]:
     """The table of all data, a row each, in the base units of their series."""
     found = fitted.fit
     series = [s.name for s in fitted.series for _ in s.column.places]
-    energy = np.concatenate([s.column.energy for s in fitted.series])
+    against = np.concatenate([s.column.against for s in fitted.series])
+    along = fitted.series[0].along
     return {
         "series": series,
         "place": fitted.places,
-        heading("energy", "N*mm"): energy,
+        heading(along.name.replace(" ", "_"), along.base): against,
         "measured": found.problem.data,
         "fitted": found.fitted,
         "deviation": found.deviations,

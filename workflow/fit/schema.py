@@ -210,7 +210,7 @@ class JointFit(Section):
 
     title: Title = entry("one line", "Joint of the friction rig, test 1")
     fit: Literal["joint_evolution"] = entry(
-        "joint_evolution or wear_coefficient", "joint_evolution"
+        "joint_evolution, joint_law or wear_coefficient", "joint_evolution"
     )
     measurements: tuple[JointMeasurement, ...] = entry("tables", min_length=1)
     law: Literal["bouc_wen", "jenkins", "uniform_iwan", "four_parameter_iwan"] = entry(
@@ -300,15 +300,108 @@ class WearFit(Section):
 
     title: Title = entry("one line", "Wear coefficient of the fretting tests")
     fit: Literal["wear_coefficient"] = entry(
-        "joint_evolution or wear_coefficient", "wear_coefficient"
+        "joint_evolution, joint_law or wear_coefficient", "wear_coefficient"
     )
     measurements: tuple[WearMeasurement, ...] = entry("tables: a row for each test", min_length=1)
     wear: FreeWear = entry("what the volumes follow")
 
 
-FitFile = JointFit | WearFit
-KINDS: Mapping[str, type[JointFit] | type[WearFit]] = {
+# --- loops --------------------------------------------------------------------------------------
+
+
+class LoopHeadings(Section):
+    """What the columns of a file are called, where not as `fretscale loops` takes them."""
+
+    displacement: Heading | None = entry("between the two sides", "LDV difference", default=None)
+    force: Heading | None = entry("that resists it", "load cell", default=None)
+    time: Heading | None = entry("where samples are not evenly spaced", "t", default=None)
+    normal_load: Heading | None = entry("that presses the joint", "preload", default=None)
+
+
+class LoopMeasurement(Measurement):
+    """A record of loops that are alike."""
+
+    columns: LoopHeadings = entry("other headings", default=LoopHeadings())
+
+
+FreeCoefficient = Annotated[float | Free, _or_free(Coefficient)]
+FreeStiffness = Annotated[float | Free, _or_free(JointStiffness)]
+FreeResidual = Annotated[float | Free, _or_free(ResidualStiffness)]
+
+
+class FreeJoint(Section):
+    """What all laws have."""
+
+    law: str  # named first; each law narrows it to its own name
+    normal_load: Annotated[float | Free, _or_free(Preload)] | None = entry(
+        "without it that of the files [N]", "60 N", default=None
+    )
+    friction: FreeCoefficient = entry(
+        "limit of the friction force over the normal load [1]", "free", default=FREE
+    )
+    stiffness: FreeStiffness = entry("of the stuck joint [N/mm]", "free", default=FREE)
+    residual_stiffness: FreeResidual = entry(f"{RESIDUAL} [N/mm]", "free", default=FREE)
+
+
+class FreeBoucWen(FreeJoint):
+    """Bouc and Wen's law, normalised."""
+
+    law: Literal["bouc_wen"] = entry(
+        "bouc_wen, jenkins, uniform_iwan or four_parameter_iwan", "bouc_wen"
+    )
+    sigma: Annotated[float | Free, FreeOr(Quantity("1", at_least=0.5, at_most=1.0))] = entry(
+        "shape of the unloading branch: straight at first with 0.5 [1]", 0.5, default=0.5
+    )
+    exponent: Annotated[float | Free, FreeOr(Quantity("1", at_least=1.0, at_most=100.0))] = entry(
+        "how sharply sticking turns into sliding [1]", "free", default=FREE
+    )
+
+
+class FreeJenkins(FreeJoint):
+    """A spring with a slider, and the residual slope beside it."""
+
+    law: Literal["jenkins"] = entry("a spring with a slider", "jenkins")
+
+
+class FreeUniformIwan(FreeJoint):
+    """Iwan's sliders, their limits spread evenly from nothing."""
+
+    law: Literal["uniform_iwan"] = entry("sliders with limits spread evenly", "uniform_iwan")
+
+
+class FreeFourParameterIwan(FreeJoint):
+    """Segalman's Iwan joint."""
+
+    law: Literal["four_parameter_iwan"] = entry("Segalman 2005", "four_parameter_iwan")
+    chi: Annotated[float | Free, FreeOr(Quantity("1", above=-1.0, at_most=10.0))] = entry(
+        "energy of a small cycle goes with the amplitude to the power of chi + 3 [1]",
+        "free",
+        default=FREE,
+    )
+    beta: Annotated[float | Free, FreeOr(Quantity("1", at_least=0.0, at_most=1e3))] = entry(
+        "stiffness lost at once in full slip over that of the spread sliders [1]",
+        "free",
+        default=FREE,
+    )
+
+
+class LoopFit(Section):
+    """A joint law from measured hysteresis loops."""
+
+    title: Title = entry("one line", "Joint of the friction rig, as new")
+    fit: Literal["joint_law"] = entry("joint_evolution, joint_law or wear_coefficient", "joint_law")
+    measurements: tuple[LoopMeasurement, ...] = entry(
+        "records: of several strokes all are fitted together", min_length=1
+    )
+    joint: Annotated[
+        FreeBoucWen | FreeJenkins | FreeUniformIwan | FreeFourParameterIwan,
+        Field(discriminator="law"),
+    ] = entry("the law")
+
+
+KINDS: Mapping[str, type[JointFit] | type[LoopFit] | type[WearFit]] = {
     "joint_evolution": JointFit,
+    "joint_law": LoopFit,
     "wear_coefficient": WearFit,
 }
 
@@ -318,7 +411,7 @@ class FitInput:
     """The file of a fit, read, and where its entries were written."""
 
     name: str
-    file: JointFit | WearFit
+    file: JointFit | LoopFit | WearFit
     source: Source
     text: str
 

@@ -12,7 +12,7 @@ import math
 from workflow.case.sections import Section
 from workflow.case.writing import Row, render
 from workflow.fit.fitting import JOINT_UNITS, UNITS, Fitted, Parameter
-from workflow.fit.schema import FREE, JointFit, WearFit
+from workflow.fit.schema import FREE, JointFit, LoopFit, WearFit
 
 # Of a deviation; the value ends with the same digit. Of numbers without one, or beyond it.
 DIGITS, MOST_DIGITS = 2, 9
@@ -66,7 +66,10 @@ def bounds_text(lower: float, upper: float, deviation: float) -> str:
 def section_of(fitted: Fitted) -> str:
     """The sections of a case, as YAML."""
     file = fitted.given.file
-    rows = _wear(fitted, file) if isinstance(file, WearFit) else _joint(fitted, file)
+    if isinstance(file, WearFit):
+        rows = _wear(fitted, file)
+    else:
+        rows = _joint(fitted, file) if isinstance(file, JointFit) else _law(fitted, file)
     return f"# {file.title}\n{render(rows).lstrip()}"
 
 
@@ -101,6 +104,21 @@ def _joint(fitted: Fitted, file: JointFit) -> list[Row]:
         for name, section in file.evolution.given.items()
     ]
     return [Row("joint", joint), Row("evolution", evolution)]
+
+
+def _law(fitted: Fitted, file: LoopFit) -> list[Row]:
+    rows = [Row("law", file.joint.law)]
+    for name, value in file.joint.model_dump(exclude={"law"}).items():
+        unit = JOINT_UNITS.get(name, "1")
+        if value == FREE:
+            rows.append(_row(fitted, f"joint.{name}", name))
+        elif value is not None:
+            rows.append(_held(value, unit, name))
+        else:
+            loads = [float(series.column.others[name].mean()) for series in fitted.series]
+            row = _held(sum(loads) / len(loads), unit, name)
+            rows.append(Row(name, row.value, "measured, the mean"))
+    return [Row("joint", rows)]
 
 
 def _function(fitted: Fitted, name: str, section: Section) -> list[Row]:

@@ -24,10 +24,10 @@ def fit(
 ) -> FitResult:
     """Find parameters of a case from measurements.
 
-    ``asked`` is what ``fretscale new fit_joint`` or ``fit_wear`` writes: the path of such a file,
-    or a dictionary of its entries, whose tables are looked for from the current folder. With
-    ``out`` the section of a case, tables, summary and figure are written there, over what an
-    earlier one has left if ``force``.
+    ``asked`` is what ``fretscale new fit_joint``, ``fit_loops`` or ``fit_wear`` writes: the path of
+    such a file, or a dictionary of its entries, whose tables are looked for from the current
+    folder. With ``out`` the section of a case, tables, summary and figure are written there, over
+    what an earlier one has left if ``force``.
 
     Returns the parameters with their bounds. Raises :class:`CaseError` and :class:`UserError` for a
     file, tables or data that allow no fit, in the words of the command; :class:`FretscaleError`
