@@ -1,5 +1,4 @@
-"""The result of a fit as a section of a case, ready to paste: numbers with no more digits than
-they are known to, and bounds beside them.
+"""The result of a fit as a section of a case, ready to paste, bounds beside its numbers.
 
 What the data do not determine stands there as a comment without a value, so that a case with it is
 refused until somebody decides it.
@@ -16,6 +15,9 @@ from workflow.fit.schema import FREE, JointFit, LoopFit, WearFit
 
 # Of a deviation; the value ends with the same digit. Of numbers without one, or beyond it.
 DIGITS, MOST_DIGITS = 2, 9
+# The same of what a case is to have: correlated parameters are known together far better than each
+# alone, and rounding one of them would move the curve.
+IN_SECTION = 4
 # Numbers between them are written without a power of ten.
 SMALL, LARGE = 1e-3, 1e6
 LEFT_OUT = "undetermined"
@@ -24,11 +26,11 @@ BOUNDS = "95 %: "
 SECOND = ("share", "second_rate")
 
 
-def rounded(value: float, deviation: float) -> str:
-    """A value to the last of :data:`DIGITS` digits of its deviation."""
+def rounded(value: float, deviation: float, of_deviation: int = DIGITS) -> str:
+    """A value to the last of so many digits of its deviation."""
     if value == 0.0 or deviation <= 10.0 ** (DIGITS - MOST_DIGITS) * abs(value):
         return number_text(value, MOST_DIGITS)
-    last = math.floor(math.log10(deviation)) - DIGITS + 1
+    last = math.floor(math.log10(deviation)) - of_deviation + 1
     if SMALL <= abs(value) < LARGE:
         return f"{round(value, -last):.{max(-last, 0)}f}"
     return number_text(value, max(math.floor(math.log10(abs(value))) - last + 1, 1))
@@ -78,7 +80,9 @@ def _row(fitted: Fitted, path: str, key: str) -> Row:
     parameter = fitted.by_path[path]
     if not parameter.estimate.determined:
         return Row(key, LEFT_OUT, parameter.estimate.doubt, off=True)
-    value, _, bounds = told(parameter)
+    _, _, bounds = told(parameter)
+    deviation = parameter.shown(parameter.estimate.deviation)
+    value = rounded(parameter.shown(parameter.estimate.value), deviation, IN_SECTION)
     return Row(key, quantity(value, parameter.unit), f"{BOUNDS}{bounds}")
 
 
