@@ -132,12 +132,8 @@ def width_doubt(unknown: Unknown, value: float, bounds: tuple[float, float]) -> 
     """Why bounds are too wide to tell anything, empty if they are not."""
     lower, upper = bounds
     if unknown.logarithmic:
-        factor = np.exp(DECADE)
-        return (
-            ""
-            if upper <= value * factor and lower >= value / factor
-            else "known no better than to a decade"
-        )
+        within = upper <= value * np.exp(DECADE) and lower >= value / np.exp(DECADE)
+        return "" if within else "known no better than to a decade"
     if max(upper - value, value - lower) > max(abs(value), unknown.size):
         return "known no better than to its own size"
     return ""

@@ -178,8 +178,8 @@ def _solved(
     ]
     if fitted.reached < fitted.tried:
         doubts.append(
-            f"{fitted.tried - fitted.reached} of {fitted.tried} starts ended at a worse fit: "
-            "there are others that look like a best one"
+            f"{fitted.tried - fitted.reached} of {fitted.tried} starts ended at a worse fit; the "
+            "best of all is told"
         )
     return Fitted(given, fitted, parameters, tuple(series), tuple(doubts))
 

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from tests.marks import slow
 from wear.fitting import fit, loop_problem, mean_loop
 from wear.fitting.loops import LAWS
 from wear.joints import march_joints, measure_loops
@@ -31,7 +32,9 @@ def record(law, stroke, rng=None):
     return mean_loop("force", measure_loops(motion, force, 60.0))
 
 
-@pytest.mark.parametrize("law", SHAPES)
+@pytest.mark.parametrize(
+    "law", ["jenkins", "uniform_iwan", slow("bouc_wen"), slow("four_parameter_iwan")]
+)
 def test_a_law_comes_back(law):
     # Of an exponent, too, that the reversal of a loop hardly shows: sigma is held.
     held = {"normal_load": np.nan} | ({"sigma": 0.5} if law == "bouc_wen" else {})
@@ -42,16 +45,20 @@ def test_a_law_comes_back(law):
     assert values == pytest.approx(truth, rel=DISCRETE)
 
 
-def test_noise_of_the_displacement_biases_the_stiffness_by_less_than_half_a_percent():
-    """It is the same for neighbours, so that bounds do not know of it: see the limits."""
-    stiffness, friction = [], []
-    for seed in range(4):
+@pytest.mark.slow
+def test_deviations_of_a_noisy_record_are_those_of_its_repetition():
+    """Neighbours err alike where the displacement is smoothed, which stated ones do not know of."""
+    trials, found = 10, []
+    for seed in range(trials):
         loop = record("jenkins", 14e-3, np.random.default_rng(seed))
-        found = fit(loop_problem([loop], "jenkins", {"normal_load": 60.0}).problem).estimates
-        stiffness.append(found[0].value)
-        friction.append(found[1].value)
-    assert stiffness == pytest.approx([60e3] * 4, rel=5e-3)
-    assert friction == pytest.approx([0.9] * 4, rel=2e-3)
+        found.append(fit(loop_problem([loop], "jenkins", {"normal_load": 60.0}).problem).estimates)
+    for place, truth in enumerate((60e3, 0.9, 1.4e3, OFFSET)):
+        values = np.array([estimates[place].value for estimates in found])
+        stated = np.mean([estimates[place].deviation for estimates in found])
+        scatter = values.std(ddof=1)
+        # The scatter of ten is known to a quarter.
+        assert 0.5 < scatter / stated < 1.75
+        assert abs(values.mean() - truth) < 3.5 * scatter / np.sqrt(trials)
 
 
 def test_several_strokes_are_fitted_together():
