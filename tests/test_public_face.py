@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parent.parent
-FACES = ["sa_solver", "wear", "wear.joints"]
+FACES = ["sa_solver", "wear", "wear.fitting", "wear.joints"]
 FACES += ["fe_models", "fe_models.dynamics", "fe_models.geometry", "fe_models.matrices"]
 FACES += ["fretscale"]
 LARGEST = 28

@@ -335,6 +335,31 @@ def loops(
 
 
 @cli.command()
+@click.argument("file", metavar="FIT", type=click.Path(path_type=Path))
+@click.option("--out", type=click.Path(path_type=Path), help="Folder for section and figure.")
+@click.option("--force", is_flag=True, help="Overwrite what is there.")
+def fit(file: Path, out: Path | None, force: bool) -> None:
+    """Find parameters of a case from measurements.
+
+    FIT is a YAML file that names tables of measurements and what is free: `fretscale new` writes
+    fit_joint, fit_loops and fit_wear. Tells values with their standard deviations and 95 % bounds,
+    what the data do not determine, and what speaks against the fit; with --out writes the section
+    of a case.
+    """
+    from workflow.fit.fitting import run_fit
+    from workflow.fit.report import report
+    from workflow.fit.running import write_fit
+    from workflow.fit.schema import load_fit
+
+    fitted = run_fit(load_fit(file))
+    for line in report(fitted):
+        click.echo(line)
+    if out is not None:
+        for path in write_fit(fitted, out, force):
+            click.echo(path)
+
+
+@cli.command()
 @click.argument("file", type=click.Path(path_type=Path))
 @click.option("--size", metavar="LENGTH", help="Of the elements, for a CAD file, such as '2 mm'.")
 @click.option("--out", type=click.Path(path_type=Path), help="Folder for a picture and a .vtu.")
@@ -366,11 +391,12 @@ def describe(
 
 
 def _kinds() -> dict[str, str]:
-    """What ``new`` writes: each kind of case, and the file of a sweep, in a line of plain words."""
+    """What ``new`` writes: each kind of case, and other files, in a line of plain words."""
+    from workflow.fit.template import FITS
     from workflow.kinds import about
     from workflow.sweep.template import ABOUT, SWEEP
 
-    return {**about(), SWEEP: ABOUT}
+    return {**about(), SWEEP: ABOUT, **{name: text for name, (_, text) in FITS.items()}}
 
 
 class _Kind(click.ParamType):
@@ -401,6 +427,7 @@ class _KindsInHelp(click.Command):
 @click.argument("file", required=False, type=click.Path(path_type=Path))
 def new(kind: str | None, file: Path | None) -> None:
     """Write a commented case to FILE; without KIND list the kinds."""
+    from workflow.fit.template import FITS, fit_template
     from workflow.kinds import template
     from workflow.sweep.template import SWEEP, sweep_template
 
@@ -410,7 +437,10 @@ def new(kind: str | None, file: Path | None) -> None:
         return
     if kind not in _kinds():
         raise errors.UserError(f"{kind}: no such kind of case; allowed: {', '.join(_kinds())}")
-    text = sweep_template() if kind == SWEEP else template(kind)
+    if kind in FITS:
+        text = fit_template(kind)
+    else:
+        text = sweep_template() if kind == SWEEP else template(kind)
     if file is None:
         click.echo(text, nl=False)
         return
@@ -432,14 +462,15 @@ def materials() -> None:
 
 @cli.command()
 def schema() -> None:
-    """Print the JSON schema of a case or a sweep, for editors."""
+    """Print the JSON schema of a case, a sweep or a fit, for editors."""
     import json
 
+    from workflow.fit.template import FITS
     from workflow.kinds import json_schema
     from workflow.sweep.schema import AnySweepFile
     from workflow.sweep.template import ABOUT, SWEEP
 
-    made = json_schema({SWEEP: (AnySweepFile, ABOUT)})
+    made = json_schema({SWEEP: (AnySweepFile, ABOUT), **FITS})
     click.echo(json.dumps(made, indent=1, allow_nan=False, ensure_ascii=False))
 
 

@@ -29,7 +29,11 @@ if TYPE_CHECKING:
 # The packages of each page, and what they are about.
 LIBRARIES = {
     "sa_solver": {"sa_solver": "contact mechanics"},
-    "wear": {"wear": "laws, contacts that wear, kinetics", "wear.joints": "joint laws"},
+    "wear": {
+        "wear": "laws, contacts that wear, kinetics",
+        "wear.fitting": "parameters from measurements",
+        "wear.joints": "joint laws",
+    },
     "fe_models": {
         "fe_models": "structures",
         "fe_models.dynamics": "structures that vibrate",

@@ -13,6 +13,7 @@ from fe_models.linear_solver import FactorMemoryError
 from sa_solver.errors import ConvergenceError, InputError
 from workflow import errors
 from workflow.cli import cli
+from workflow.fit.template import FITS
 from workflow.kinds import kinds, load_case
 from workflow.shell import system_check
 
@@ -115,7 +116,7 @@ def test_new_writes_a_case_that_checks(tmp_path, template_files, kind, words):
 
 def test_new_alone_lists_the_kinds_in_plain_words():
     lines = invoke("new").stdout.splitlines()
-    assert [line.split()[0] for line in lines] == [*kinds(), "sweep"]
+    assert [line.split()[0] for line in lines] == [*kinds(), "sweep", *FITS]
     assert all(len(line) < 100 for line in lines)
 
 

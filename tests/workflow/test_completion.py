@@ -8,6 +8,7 @@ import pytest
 from click.shell_completion import BashComplete
 
 from workflow.cli import cli
+from workflow.fit.template import FITS
 from workflow.kinds import kinds
 
 VARIABLE = "_FRETSCALE_COMPLETE"
@@ -25,7 +26,7 @@ def test_commands_are_completed():
 
 
 def test_kinds_are_completed():
-    assert [value for value, _ in completed("new", "")] == [*kinds(), "sweep"]
+    assert [value for value, _ in completed("new", "")] == [*kinds(), "sweep", *FITS]
     assert completed("new", "vibration_") == [("vibration_wear", "plain")]
 
 
@@ -33,7 +34,7 @@ def test_kinds_are_completed():
     "words",
     [
         *(("run",), ("check",), ("new", "dovetail"), ("verify",), ("verify", "a.yaml")),
-        *(("sweep",), ("chart",), ("resultants",), ("describe",), ("loops",)),
+        *(("sweep",), ("chart",), ("resultants",), ("describe",), ("loops",), ("fit",)),
     ],
 )
 def test_files_are_completed(words):

@@ -12,6 +12,7 @@ from tests.workflow.commands import invoke
 from tests.workflow.mutants import Mutants, sources
 from workflow.case.source import Source
 from workflow.errors import CaseError
+from workflow.fit.template import FITS, fit_template
 from workflow.kinds import about, kinds, parse_case, template
 from workflow.sweep.template import sweep_template
 
@@ -30,6 +31,12 @@ def validator(schema):
     return jsonschema.Draft202012Validator(schema)
 
 
+def text_of(kind):
+    if kind in FITS:
+        return fit_template(kind)
+    return sweep_template() if kind == "sweep" else template(kind)
+
+
 def plain(text):
     return YAML(typ="safe", pure=True).load(text)
 
@@ -39,7 +46,7 @@ def test_it_is_of_its_dialect(schema):
     assert schema["$schema"] == "https://json-schema.org/draft/2020-12/schema"
     assert "$id" not in schema
     titles = [schema["$defs"][one["$ref"].rpartition("/")[2]]["title"] for one in schema["oneOf"]]
-    assert titles == [*kinds(), "sweep"]
+    assert titles == [*kinds(), "sweep", *FITS]
 
 
 def test_every_entry_is_described(schema):
@@ -72,9 +79,9 @@ def test_shipped_files_are_valid(validator, path):
     assert validator.is_valid(plain(path.read_text("utf-8")))
 
 
-@pytest.mark.parametrize("kind", [*kinds(), "sweep"])
+@pytest.mark.parametrize("kind", [*kinds(), "sweep", *FITS])
 def test_templates_are_valid(validator, kind):
-    assert validator.is_valid(plain(sweep_template() if kind == "sweep" else template(kind)))
+    assert validator.is_valid(plain(text_of(kind)))
 
 
 @pytest.mark.parametrize(
@@ -103,10 +110,12 @@ def test_templates_are_valid(validator, kind):
         ("specimens", "  cycles: 300000.0", "  # cycles: 300000.0"),
         ("sweep", "design: grid", "design: all"),
         ("sweep", "values: [0.3, 0.4, 0.5]", "value: 0.3"),
+        ("fit_joint", "change: free", "change: fre"),
+        ("fit_wear", "law: energy ", "law: archard "),
     ],
 )
 def test_wrong_files_are_not(validator, kind, old, new):
-    text = sweep_template() if kind == "sweep" else template(kind)
+    text = text_of(kind)
     assert old in text
     assert not validator.is_valid(plain(text.replace(old, new, 1)))
 

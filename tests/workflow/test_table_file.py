@@ -7,8 +7,8 @@ from workflow.analyses.rig.excitation import RECORDED, Recorded
 from workflow.analyses.wear.loop_table import read_loop_table
 from workflow.case.fields import Quantity
 from workflow.case.input_files import InputFileError
+from workflow.case.loop_file import read_loop_file
 from workflow.case.table_file import read_table_file
-from workflow.commands.loop_file import read_loop_file
 
 # A byte-order mark, comments before and among the rows, empty lines, quotes, spaces and units.
 AWKWARD = '\ufeff# rig 1, run 7\r\n\r\n"{}" , {}{}\r\n 0.5 ,2{}\r\n  # paused, "here\r\n1,"3"{}\r\n'

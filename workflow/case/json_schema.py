@@ -28,7 +28,7 @@ def json_schema(models: Mapping[str, tuple[type[Section], str]]) -> dict[str, An
     return {
         "$schema": DIALECT,
         "title": "fretscale",
-        "description": "A case of fretscale, or a sweep: `fretscale new` lists the kinds.",
+        "description": "A case of fretscale, a sweep or a fit: `fretscale new` lists the kinds.",
         "type": "object",
         "oneOf": list(made.values()),
         "$defs": definitions,

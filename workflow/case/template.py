@@ -9,7 +9,6 @@ from pydantic.fields import FieldInfo
 
 from workflow.case.sections import (
     KINDS_ARE_NAMED_BY,
-    Case,
     Section,
     entries_of,
     sections_of,
@@ -35,9 +34,9 @@ FILLED_IN = (
 )
 
 
-def template(model: type[Case]) -> str:
-    """A commented case of a kind, ready to run, with every entry there is."""
-    return HEADER + render(_rows(model, set()))
+def template(model: type[Section], header: str = HEADER) -> str:
+    """A commented case of a kind, or another file, ready to run, with every entry there is."""
+    return header + render(_rows(model, set()))
 
 
 def _rows(model: type[Section], shown: set[tuple[type[Section], ...]]) -> list[Row]:

@@ -11,8 +11,8 @@ from sa_solver.types import Array
 from wear.joints.loop_record import MeasuredLoopError
 from wear.joints.measured_loops import MeanEstimate, MeasuredLoops, mean_estimate, measure_loops
 from workflow.analyses.wear.loop_table import write_loop_table
+from workflow.case.loop_file import BASE_UNITS, read_loop_file
 from workflow.case.units import UnitError, to_base
-from workflow.commands.loop_file import BASE_UNITS, read_loop_file
 from workflow.errors import UserError
 from workflow.shell.folder import OutputFolder
 from workflow.shell.lock import locked

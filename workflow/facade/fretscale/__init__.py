@@ -18,6 +18,11 @@ What several runs have in common
     - ``Comparison``: what differs in their cases and results, as text, table and page.
     - ``ComparedResult``: a main result in each of them, and how far they are apart.
 
+What was measured
+    - ``fit``: find parameters of a case from measurements.
+    - ``FitResult``: these with their bounds, and the section of a case.
+    - ``FittedParameter``: one of them.
+
 What is raised
     - ``FretscaleError``: the base of all; each says in a line what is wrong and what to do.
     - ``CaseError``: a case that cannot be run.
@@ -93,6 +98,7 @@ if TYPE_CHECKING:
     from workflow.interface.cases import Check, check, load_case
     from workflow.interface.comparing import ComparedResult, Comparison, compare
     from workflow.interface.datasets import Group, Values
+    from workflow.interface.fitting import FitResult, FittedParameter, fit
     from workflow.interface.results import MainResult, Results, open  # noqa: A004
     from workflow.interface.running import run
 
@@ -101,6 +107,8 @@ __all__ = [
     "Check",
     "ComparedResult",
     "Comparison",
+    "FitResult",
+    "FittedParameter",
     "FretscaleError",
     "Group",
     "MainResult",
@@ -112,6 +120,7 @@ __all__ = [
     "Values",
     "check",
     "compare",
+    "fit",
     "load_case",
     "open",
     "run",
@@ -136,6 +145,7 @@ __getattr__, __dir__ = lazy_names(
         "interface.cases": ("Check", "check", "load_case"),
         "interface.comparing": ("ComparedResult", "Comparison", "compare"),
         "interface.datasets": ("Group", "Values"),
+        "interface.fitting": ("FitResult", "FittedParameter", "fit"),
         "interface.results": ("MainResult", "Results", "open"),
         "interface.running": ("run",),
     },

@@ -1,0 +1,77 @@
+"""Parameters from measurements: least squares with bounds, and what the data say of each.
+
+The arithmetic
+    - ``fit``: the least squares of a problem.
+    - ``FitProblem``: what is free, what was measured, and the model between them.
+    - ``Unknown``: a free parameter and its bounds.
+    - ``Series``: data of one kind.
+    - ``Fit``: the best values, with residuals, correlation and bands.
+    - ``Estimate``: value, deviation and bounds of one parameter, or why it has none.
+    - ``diagnose``: what the residuals say against the fit: waves, outliers, groups.
+    - ``FitError``: data or parameters that no fit can be made of.
+
+What is fitted
+    - ``evolution_problem``: how joint parameters follow the dissipated energy.
+    - ``EvolutionData``: what was measured of one of them.
+    - ``loop_problem``: a joint law from measured loops.
+    - ``mean_loop``, ``LoopData``: the mean of all loops of a record.
+    - ``volume_problem``: wear coefficients from worn volumes.
+    - ``VolumeData``, ``VolumeLaw``: the volumes, and what of the law is asked for.
+
+A slope of measured points, with what it is known to:
+
+>>> import numpy as np
+>>> from wear.fitting import VolumeData, VolumeLaw, fit, volume_problem
+>>> energy, volume = 1e6 * np.array([1.0, 2.0, 4.0, 8.0]), np.array([1.1, 1.9, 4.1, 7.9]) * 1e-3
+>>> found = fit(volume_problem([VolumeData("both", energy, volume)], VolumeLaw()).problem)
+>>> alpha = found.estimates[0]
+>>> print(f"{1e9 * alpha.bounds[0]:.3f} to {1e9 * alpha.bounds[1]:.3f} 1e-9/MPa")
+0.956 to 1.032 1e-9/MPa
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from sa_solver.lazy import lazy_names
+
+if TYPE_CHECKING:
+    from wear.fitting.diagnosis import diagnose
+    from wear.fitting.estimates import Estimate
+    from wear.fitting.evolutions import EvolutionData, evolution_problem
+    from wear.fitting.least_squares import Fit, fit
+    from wear.fitting.loops import LoopData, loop_problem, mean_loop
+    from wear.fitting.problem import FitError, FitProblem, Series, Unknown
+    from wear.fitting.volumes import VolumeData, VolumeLaw, volume_problem
+
+__all__ = [
+    "Estimate",
+    "EvolutionData",
+    "Fit",
+    "FitError",
+    "FitProblem",
+    "LoopData",
+    "Series",
+    "Unknown",
+    "VolumeData",
+    "VolumeLaw",
+    "diagnose",
+    "evolution_problem",
+    "fit",
+    "loop_problem",
+    "mean_loop",
+    "volume_problem",
+]
+
+__getattr__, __dir__ = lazy_names(
+    __name__,
+    {
+        "diagnosis": ("diagnose",),
+        "estimates": ("Estimate",),
+        "evolutions": ("EvolutionData", "evolution_problem"),
+        "least_squares": ("Fit", "fit"),
+        "loops": ("LoopData", "loop_problem", "mean_loop"),
+        "problem": ("FitError", "FitProblem", "Series", "Unknown"),
+        "volumes": ("VolumeData", "VolumeLaw", "volume_problem"),
+    },
+)

@@ -1,0 +1,401 @@
+"""How joint parameters follow the dissipated energy: the functions of :mod:`wear.joints` fitted.
+
+Each quantity is an initial value times a function of the energy E. For given rates the product is
+linear in what is left, so that starts need no guess: rates are tried on a grid of powers of ten,
+the rest follows in closed form (the variable projection of Golub and Pereyra 1973, SIAM J. Numer.
+Anal. 10, 413, on a grid), and the best few are where the solver begins.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from itertools import product
+
+import numpy as np
+
+from sa_solver.types import Array
+from wear.fitting.problem import FitError, FitProblem, Series, Unknown
+from wear.joints.evolution import (
+    ArrheniusEvolution,
+    ExponentialEvolution,
+    LinearEvolution,
+    LogarithmicEvolution,
+    WearFunction,
+)
+
+STARTS = 4
+"""The solver begins at so many of the best rates."""
+
+PER_DECADE = 2
+"""Rates tried in each power of ten."""
+
+DECADES = {"scale": (-3.0, 2.0), "rate": (-2.0, 2.0), "second_rate": (-2.0, 2.0)}
+"""Powers of ten about the energies of the data between which rates are tried: from the inverse of
+the largest energy to that of the smallest, a scale over that of the energies themselves."""
+
+LATE = 13.0
+"""A logarithm goes on rising far beyond 1/rate: it is tried for so many powers of ten more."""
+
+REACH = 1e6
+"""Rates may lie so far beyond those that are tried."""
+
+HELD_WEIGHT = 1e3
+"""Of a held initial value beside the data, where starts are looked for."""
+
+INITIAL = "initial"
+"""The value at no energy, beside the parameters of a function."""
+
+
+@dataclass(frozen=True)
+class EvolutionForm:
+    """A function of the energy as it is fitted.
+
+    ``function`` makes it of its parameters by name; ``bounds`` are those of its linear parameters
+    and ``rates`` the names of the others. ``columns`` are the functions of E that it is a
+    combination of, given the rates, and ``parts`` its linear parameters from their coefficients.
+    """
+
+    function: Callable[[Mapping[str, float]], WearFunction]
+    bounds: Mapping[str, tuple[float, float]]
+    rates: tuple[str, ...]
+    columns: Callable[[Array, Mapping[str, float]], tuple[Array, ...]]
+    parts: Callable[[Array], dict[str, float]]
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Its parameters."""
+        return *self.bounds, *self.rates
+
+
+def _change(coefficients: Array) -> dict[str, float]:
+    first, second = coefficients
+    return {INITIAL: first, "change": second / first}
+
+
+def _slope(coefficients: Array) -> dict[str, float]:
+    first, second = coefficients
+    return {INITIAL: first, "slope": second / first}
+
+
+def _exponentials(coefficients: Array) -> dict[str, float]:
+    final, first, second = coefficients
+    initial, decays = coefficients.sum(), first + second
+    share = first / decays if decays else 0.5
+    return {INITIAL: initial, "final": final / initial, "share": share}
+
+
+def _single(coefficients: Array) -> dict[str, float]:
+    initial = coefficients.sum()
+    return {INITIAL: initial, "final": coefficients[0] / initial}
+
+
+def _arrhenius(energy: Array, rates: Mapping[str, float]) -> Array:
+    return ArrheniusEvolution(1.0, rates["scale"])(energy) - 1.0
+
+
+def _decay(energy: Array, rate: float) -> Array:
+    return np.asarray(np.exp(-rate * energy))
+
+
+ANY, NOT_NEGATIVE, SHARE = (-np.inf, np.inf), (0.0, np.inf), (0.0, 1.0)
+# No less than -1: the parameter would be below 0 in the end.
+CHANGE = (-1.0, np.inf)
+
+FORMS: Mapping[str, EvolutionForm] = {
+    "logarithmic": EvolutionForm(
+        lambda values: LogarithmicEvolution(values["change"], values["rate"]),
+        {"change": CHANGE},
+        ("rate",),
+        lambda energy, rates: (np.ones_like(energy), np.log1p(rates["rate"] * energy)),
+        _change,
+    ),
+    "arrhenius": EvolutionForm(
+        lambda values: ArrheniusEvolution(values["change"], values["scale"]),
+        {"change": CHANGE},
+        ("scale",),
+        lambda energy, rates: (np.ones_like(energy), _arrhenius(energy, rates)),
+        _change,
+    ),
+    "linear": EvolutionForm(
+        lambda values: LinearEvolution(values["slope"]),
+        {"slope": ANY},
+        (),
+        lambda energy, rates: (np.ones_like(energy), energy),
+        _slope,
+    ),
+    "exponential": EvolutionForm(
+        lambda values: ExponentialEvolution(
+            values["final"],
+            -values["rate"],
+            values.get("share", 1.0),
+            -values.get("second_rate", 0.0),
+        ),
+        {"final": NOT_NEGATIVE, "share": SHARE},
+        ("rate", "second_rate"),
+        lambda energy, rates: (
+            np.ones_like(energy),
+            _decay(energy, rates["rate"]),
+            _decay(energy, rates["second_rate"]),
+        ),
+        _exponentials,
+    ),
+}
+"""By the names that a case has for them; rates are 0 or above, as there."""
+
+SINGLE = EvolutionForm(
+    FORMS["exponential"].function,
+    {"final": NOT_NEGATIVE},
+    ("rate",),
+    lambda energy, rates: (np.ones_like(energy), _decay(energy, rates["rate"])),
+    _single,
+)
+"""An exponential whose second one is held at a share of nothing."""
+
+
+@dataclass(frozen=True)
+class EvolutionData:
+    """Values of one joint parameter, its ``name``, against energy.
+
+    ``energy`` ``(n,)`` [N mm], 0 or above, and ``values`` ``(n,)``, with their standard
+    ``deviations`` ``(n,)`` if they are known. ``form`` is a key of ``FORMS``, and ``held`` the
+    parameters that are not free, by name, ``initial`` among them.
+
+    Examples
+    --------
+    Friction whose initial value is known from elsewhere:
+
+    >>> import numpy as np
+    >>> from wear.fitting import EvolutionData
+    >>> energy, friction = np.array([1e3, 1e4, 1e5]), np.array([0.3, 0.5, 0.7])
+    >>> rising = EvolutionData("friction", energy, friction, "logarithmic", {"initial": 0.1})
+    >>> rising.free
+    ('change', 'rate')
+    """
+
+    name: str
+    energy: Array
+    values: Array
+    form: str
+    held: Mapping[str, float] = field(default_factory=dict)
+    deviations: Array | None = None
+
+    @property
+    def shape(self) -> EvolutionForm:
+        """The function, with as many terms as are free."""
+        if self.form == "exponential" and self.held.get("share") == 1.0:
+            return SINGLE
+        return FORMS[self.form]
+
+    @property
+    def free(self) -> tuple[str, ...]:
+        """Names of the parameters that are free."""
+        return tuple(name for name in (INITIAL, *self.shape.names) if name not in self.held)
+
+    def at(self, energy: Array, values: Mapping[str, float]) -> Array:
+        """The parameter at an ``energy`` with values of all that is free."""
+        all_values = {**self.held, **values}
+        return np.asarray(all_values[INITIAL] * self.shape.function(all_values)(energy))
+
+
+@dataclass(frozen=True)
+class EvolutionFit:
+    """The problem of some :class:`EvolutionData`, and where each finds its values.
+
+    ``names`` has the place among the unknowns by data and parameter: those ``shared`` have one.
+    """
+
+    problem: FitProblem
+    data: tuple[EvolutionData, ...]
+    names: Mapping[tuple[str, str], int]
+
+    def values_of(self, data: EvolutionData, values: Array) -> dict[str, float]:
+        """The free parameters of one of the data by name, of all values ``(p,)``."""
+        return _named(data, self.names, values)
+
+    def curve(self, data: EvolutionData, energy: Array) -> Callable[[Array], Array]:
+        """What all values ``(p,)`` make of one of the data at an ``energy`` ``(m,)`` [N mm]."""
+        return lambda values: data.at(energy, self.values_of(data, values))
+
+
+def evolution_problem(data: Sequence[EvolutionData], shared: Sequence[str] = ()) -> EvolutionFit:
+    """How joint parameters follow the energy, as a problem of :func:`fit`.
+
+    ``shared`` are names of parameters that have one value in all the data where they are free, as
+    the rates of Li et al. 2020, table A1. Raises FitError for energies below 0, values that are not
+    finite, data without energies above 0, and a shared parameter that none has free.
+
+    Examples
+    --------
+    Preload that a bolt loses, measured without error, comes back:
+
+    >>> import numpy as np
+    >>> from wear.fitting import EvolutionData, evolution_problem, fit
+    >>> energy = np.linspace(0.0, 8e6, 9)
+    >>> preload = 745.0 * (0.72 + 0.28 * np.exp(-0.3e-6 * energy))
+    >>> bolt = EvolutionData(
+    ...     "normal_load", energy, preload, "exponential", held={"share": 1.0, "second_rate": 0.0}
+    ... )
+    >>> for estimate in fit(evolution_problem([bolt]).problem).estimates:
+    ...     print(f"{estimate.name}: {estimate.value:.4g}")
+    normal_load.initial: 745
+    normal_load.final: 0.72
+    normal_load.rate: 3e-07
+    """
+    for one in data:
+        _check(one)
+    names, unknowns = _unknowns(data, shared)
+    series = tuple(Series(one.name, one.values, one.deviations) for one in data)
+
+    def predict(values: Array) -> Array:
+        return np.concatenate([one.at(one.energy, _named(one, names, values)) for one in data])
+
+    starts = _starts(data, shared, names)
+    return EvolutionFit(FitProblem(unknowns, series, predict, starts), tuple(data), names)
+
+
+def _check(data: EvolutionData) -> None:
+    if not (np.isfinite(data.energy).all() and np.isfinite(data.values).all()):
+        raise FitError(f"{data.name}: a number is not finite; allowed: finite numbers")
+    if not (data.energy >= 0.0).all():
+        raise FitError(f"{data.name}: an energy below 0; allowed: 0 or above")
+    if not (data.energy > 0.0).any():
+        raise FitError(f"{data.name}: no energy above 0; allowed: data of a joint that wears")
+
+
+def _named(
+    data: EvolutionData, names: Mapping[tuple[str, str], int], values: Array
+) -> dict[str, float]:
+    return {name: float(values[names[data.name, name]]) for name in data.free}
+
+
+def _unknowns(
+    data: Sequence[EvolutionData], shared: Sequence[str]
+) -> tuple[dict[tuple[str, str], int], tuple[Unknown, ...]]:
+    """Where each free parameter of the data is among the unknowns, and these."""
+    for name in shared:
+        if not any(name in one.free for one in data):
+            raise FitError(f"{name}: shared, but free nowhere; allowed: a free parameter")
+    largest = max(one.energy.max() for one in data)
+    smallest = min(one.energy[one.energy > 0.0].min() for one in data)
+    names: dict[tuple[str, str], int] = {}
+    unknowns: dict[str, Unknown] = {}
+    for one in data:
+        for name in one.free:
+            called = name if name in shared else f"{one.name}.{name}"
+            unknowns.setdefault(called, _unknown(one, name, called, (smallest, largest)))
+            names[one.name, name] = list(unknowns).index(called)
+    return names, tuple(unknowns.values())
+
+
+def _unknown(data: EvolutionData, name: str, called: str, energies: tuple[float, float]) -> Unknown:
+    if name == INITIAL:
+        return Unknown(called, lower=0.0)
+    if name in data.shape.rates:
+        lowest, highest = _tried(data, name, energies)
+        return Unknown(called, lowest / REACH, highest * REACH, logarithmic=True)
+    lower, upper = data.shape.bounds[name]
+    return Unknown(called, lower, upper, size=1.0 / energies[1] if name == "slope" else 1.0)
+
+
+def _tried(data: EvolutionData, name: str, energies: tuple[float, float]) -> tuple[float, float]:
+    """Lowest and highest rate that is tried; a scale is an energy."""
+    smallest, largest = energies
+    below, above = DECADES[name]
+    if name == "scale":
+        return smallest * 10.0**below, largest * 10.0**above
+    more = LATE if data.form == "logarithmic" else 0.0
+    return 10.0**below / largest, 10.0 ** (above + more) / smallest
+
+
+# --- starts -------------------------------------------------------------------------------------
+
+
+def _starts(
+    data: Sequence[EvolutionData],
+    shared: Sequence[str],
+    names: Mapping[tuple[str, str], int],
+) -> list[Array]:
+    """Values ``(p,)`` of the best rates of a grid, the best first."""
+    common = [name for name in shared if any(name in one.shape.rates for one in data)]
+    ranked: list[tuple[float, list[list[dict[str, float]]]]] = []
+    for rates in _grid(data, common):
+        choices = [_ranked(one, rates) for one in data]
+        cost = sum(choice[0][0] for choice in choices)
+        ranked.append((cost, [[values for _, values in choice] for choice in choices]))
+    ranked.sort(key=lambda one: one[0])
+    if common:
+        return [_start(data, names, [choice[0] for choice in one]) for _, one in ranked[:STARTS]]
+    (_, choices_of), *_ = ranked
+    return [
+        _start(data, names, [choice[min(k, len(choice) - 1)] for choice in choices_of])
+        for k in range(max(min(STARTS, len(choice)) for choice in choices_of))
+    ]
+
+
+def _start(
+    data: Sequence[EvolutionData],
+    names: Mapping[tuple[str, str], int],
+    values: Sequence[Mapping[str, float]],
+) -> Array:
+    start = np.zeros(max(names.values()) + 1)
+    for one, found in zip(data, values, strict=True):
+        for name in one.free:
+            start[names[one.name, name]] = found[name]
+    return start
+
+
+def _ranked(
+    data: EvolutionData, common: Mapping[str, float]
+) -> list[tuple[float, dict[str, float]]]:
+    """Cost and values of the data's own rates on their grid, the best first."""
+    known = {**data.held, **{k: v for k, v in common.items() if k in data.free}}
+    own = [name for name in data.shape.rates if name not in known]
+    found = [_linear(data, {**known, **rates}) for rates in _grid([data], own)]
+    return sorted(found, key=lambda one: one[0])
+
+
+def _grid(data: Sequence[EvolutionData], names: Sequence[str]) -> Iterator[dict[str, float]]:
+    """Rates that are tried together; of two exponentials the first is the slower one."""
+    if not names:
+        yield {}
+        return
+    largest = max(one.energy.max() for one in data)
+    smallest = min(one.energy[one.energy > 0.0].min() for one in data)
+    lines = []
+    for name in names:
+        one = next(one for one in data if name in one.shape.rates)
+        lowest, highest = _tried(one, name, (smallest, largest))
+        count = 1 + round(PER_DECADE * np.log10(highest / lowest))
+        lines.append(np.geomspace(lowest, highest, count).tolist())
+    for values in product(*lines):
+        rates = dict(zip(names, values, strict=True))
+        if rates.get("rate", 0.0) < rates.get("second_rate", np.inf):
+            yield rates
+
+
+def _linear(data: EvolutionData, known: Mapping[str, float]) -> tuple[float, dict[str, float]]:
+    """Cost and values where the rates are known; of what is held beside them only the initial."""
+    columns = np.stack(data.shape.columns(data.energy, known), axis=1)
+    weights = np.ones(len(data.values))
+    if data.deviations is not None:
+        weights /= data.deviations
+    left, right = columns * weights[:, None], data.values * weights
+    if INITIAL in known:
+        new = np.stack(data.shape.columns(np.zeros(1), known), axis=1)
+        left = np.vstack([left, HELD_WEIGHT * weights.max() * new])
+        right = np.append(right, HELD_WEIGHT * weights.max() * known[INITIAL])
+    coefficients = np.asarray(np.linalg.lstsq(left, right, rcond=None)[0], dtype=np.float64)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        parts = {**data.shape.parts(coefficients), **known}
+    values = {name: _allowed(data, name, parts[name]) for name in data.free}
+    residuals = data.at(data.energy, values) - data.values
+    size = float(np.abs(data.values).max()) or 1.0
+    cost = float(np.sum((residuals * weights) ** 2)) / float(size * weights.max()) ** 2
+    return cost, values
+
+
+def _allowed(data: EvolutionData, name: str, value: float) -> float:
+    """A value within its bounds, 1 for none."""
+    lower, upper = data.shape.bounds.get(name, NOT_NEGATIVE)
+    return float(np.clip(value, lower, upper)) if np.isfinite(value) else 1.0

@@ -1,0 +1,117 @@
+"""What a fit is asked: free parameters, series of data, and the model between them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from sa_solver.errors import InputError
+from sa_solver.types import Array, Indices, Mask
+
+
+class FitError(InputError):
+    """Data or parameters that no fit can be made of."""
+
+
+@dataclass(frozen=True)
+class Unknown:
+    """A free parameter, its ``name``, which lies from ``lower`` to ``upper``.
+
+    Known no better than to ``size`` or to its own value, whichever is larger, it is not determined.
+    A ``logarithmic`` one, above 0, is known by a factor instead.
+
+    Examples
+    --------
+    A rate, known within powers of ten:
+
+    >>> from wear.fitting import Unknown
+    >>> rate = Unknown("rate", lower=1e-9, upper=1e-3, logarithmic=True)
+    """
+
+    name: str
+    lower: float = -np.inf
+    upper: float = np.inf
+    size: float = 0.0
+    logarithmic: bool = False
+
+
+@dataclass(frozen=True)
+class Series:
+    """Data of one kind, its ``name``.
+
+    ``values`` ``(n,)``, and their standard ``deviations`` ``(n,)`` if they are known; without them
+    all have one, which the residuals tell.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from wear.fitting import Series
+    >>> friction = Series("friction", np.array([0.61, 0.64]), deviations=np.array([0.01, 0.01]))
+    """
+
+    name: str
+    values: Array
+    deviations: Array | None = None
+
+
+@dataclass(frozen=True)
+class FitProblem:
+    """What is free, what was measured, and the model between them.
+
+    ``predict`` takes the values ``(p,)`` of the ``unknowns`` to all data ``(n,)``, one of the
+    ``series`` after the other. ``starts`` are values ``(p,)`` to begin with, tried in their order.
+
+    Examples
+    --------
+    The mean of three values, as a problem:
+
+    >>> import numpy as np
+    >>> from wear.fitting import FitProblem, Series, Unknown, fit
+    >>> mean = FitProblem(
+    ...     unknowns=(Unknown("mean"),),
+    ...     series=(Series("y", np.array([1.0, 2.0, 3.0])),),
+    ...     predict=lambda values: np.full(3, values[0]),
+    ...     starts=[np.zeros(1)],
+    ... )
+    >>> print(f"{fit(mean).estimates[0].value:.6f}")
+    2.000000
+    """
+
+    unknowns: tuple[Unknown, ...]
+    series: tuple[Series, ...]
+    predict: Callable[[Array], Array]
+    starts: Sequence[Array]
+
+    @cached_property
+    def data(self) -> Array:
+        """All data ``(n,)``."""
+        return np.concatenate([series.values for series in self.series])
+
+    @cached_property
+    def places(self) -> Indices:
+        """Number of the series that each datum is of ``(n,)``."""
+        return np.repeat(np.arange(len(self.series)), [len(one.values) for one in self.series])
+
+    @cached_property
+    def logarithmic(self) -> Mask:
+        """Which unknowns are fitted as their logarithms ``(p,)``."""
+        return np.array([unknown.logarithmic for unknown in self.unknowns], dtype=np.bool_)
+
+    def inner(self, values: Array) -> Array:
+        """Values as they are fitted."""
+        return np.where(self.logarithmic, np.log(np.where(self.logarithmic, values, 1.0)), values)
+
+    def outer(self, inner: Array) -> Array:
+        """Fitted ones as values."""
+        return np.where(self.logarithmic, np.exp(np.where(self.logarithmic, inner, 0.0)), inner)
+
+    @cached_property
+    def bounds(self) -> tuple[Array, Array]:
+        """Lower and upper bounds as they are fitted, each ``(p,)``."""
+        with np.errstate(divide="ignore"):
+            lower = self.inner(np.array([unknown.lower for unknown in self.unknowns]))
+            upper = self.inner(np.array([unknown.upper for unknown in self.unknowns]))
+        return lower, upper

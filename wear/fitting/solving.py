@@ -1,0 +1,46 @@
+"""From a start to the nearest least squares: scipy's trust regions, with bounds."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.optimize import least_squares
+
+from sa_solver.types import Array
+from wear.fitting.problem import FitProblem
+
+TOLERANCE = 1e-12
+"""Of the solver, relative: the solution is then exact beside any bound of it."""
+
+ROUGH = 1e-10
+"""Tolerance from which on one-sided differences are good enough."""
+
+
+def solve(
+    problem: FitProblem, start: Array, deviations: Array, tolerance: float = TOLERANCE
+) -> tuple[Array, float, Array] | None:
+    """Where one start leads: fitted values ``(p,)``, cost, Jacobian ``(n, p)`` of the residuals."""
+    lower, upper = problem.bounds
+
+    def residuals(inner: Array) -> Array:
+        return np.asarray((problem.predict(problem.outer(inner)) - problem.data) / deviations)
+
+    inner = np.clip(start, lower, upper)
+    if not np.isfinite(residuals(inner)).all():
+        return None
+    solved = least_squares(
+        residuals,
+        inner,
+        jac="3-point" if tolerance < ROUGH else "2-point",
+        bounds=(lower, upper),
+        x_scale=_sizes(problem, inner),
+        ftol=tolerance,
+        xtol=tolerance,
+        gtol=tolerance,
+    )
+    return solved.x, float(solved.cost), solved.jac
+
+
+def _sizes(problem: FitProblem, inner: Array) -> Array:
+    """What a change of a parameter is measured by ``(p,)``."""
+    sizes = np.maximum(np.abs(inner), [unknown.size for unknown in problem.unknowns])
+    return np.where(problem.logarithmic | (sizes == 0.0), 1.0, sizes)

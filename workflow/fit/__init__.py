@@ -1,0 +1,1 @@
+"""``fretscale fit``: parameters of a case from measurements, with their bounds."""

@@ -1,0 +1,375 @@
+"""From the file of a fit to its result: data, problem, solution, and what speaks against it."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from sa_solver.types import Array
+from wear.fitting import (
+    Estimate,
+    EvolutionData,
+    Fit,
+    FitError,
+    LoopData,
+    VolumeData,
+    VolumeLaw,
+    diagnose,
+    evolution_problem,
+    fit,
+    loop_problem,
+    mean_loop,
+    volume_problem,
+)
+from wear.joints.loop_record import MeasuredLoopError
+from wear.joints.measured_loops import measure_loops
+from workflow.case.loop_file import read_loop_file
+from workflow.case.sections import Section
+from workflow.case.units import to_base
+from workflow.errors import CaseError, UserError
+from workflow.fit.measured import Column, read_columns
+from workflow.fit.schema import FREE, FitInput, JointFit, LoopFit, WearFit
+from workflow.pictures.scales import TO_JOULES, TO_MICRONS
+
+# Columns of the parameters of a joint.
+MEASURED = {
+    "friction": "mu",
+    "stiffness": "kt",
+    "residual_stiffness": "residual_stiffness",
+    "normal_load": "P",
+}
+INITIAL = "initial"
+# Units in which parameters are told: those of a joint at first, and all others.
+JOINT_UNITS = {
+    "friction": "1",
+    "stiffness": "N/um",
+    "residual_stiffness": "N/um",
+    "normal_load": "N",
+}
+UNITS = {
+    "rate": "1/J",
+    "second_rate": "1/J",
+    "scale": "J",
+    "slope": "1/J",
+    "coefficient": "um^3/J",
+    "threshold": "J",
+    "intercept": "um^3",
+}
+VOLUMES = {"volume": "both", "volume_1": "body_1", "volume_2": "body_2"}
+# From here on a single value decides a parameter, and its scatter is anybody's guess.
+ALONE = 0.9
+# Places in a message.
+MOST_NAMED = 5
+# Law of the worn volume: power of the amplitude.
+POWERS = {"energy": 0.0, "energy_amplitude": 1.0, "amplitude_power": None}
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A free parameter: its ``path`` in a case, the ``unit`` it is told in, and its estimate."""
+
+    path: str
+    unit: str
+    estimate: Estimate
+
+    def shown(self, number: float) -> float:
+        """A number of the base unit in the one that it is told in."""
+        return number / (1.0 if self.unit == "1" else to_base(f"1 {self.unit}", None))
+
+
+class Along(NamedTuple):
+    """What values were measured along: its name, base unit, and factor and unit it is shown in."""
+
+    name: str
+    base: str
+    factor: float
+    unit: str
+
+
+ENERGY = Along("dissipated energy", "N*mm", TO_JOULES, "J")
+DISPLACEMENT = Along("displacement", "mm", TO_MICRONS, "µm")
+
+
+@dataclass(frozen=True)
+class FittedSeries:
+    """One kind of data: what it is called, what was measured, and where.
+
+    ``curve`` takes places ``(m,)`` of what they were measured ``along`` to what all values of the
+    parameters make of them; None where it depends on more.
+    """
+
+    name: str
+    unit: str
+    column: Column
+    along: Along
+    curve: Callable[[Array], Callable[[Array], Array]] | None
+
+    @property
+    def order(self) -> Array:
+        """What tells neighbours ``(n,)``: the energy, or the way along a loop."""
+        against = self.column.against
+        return against if self.along == ENERGY else np.arange(len(against), dtype=np.float64)
+
+
+@dataclass(frozen=True)
+class Fitted:
+    """The result: the fit, its parameters by their paths in a case, data, and ``doubts``."""
+
+    given: FitInput
+    fit: Fit
+    parameters: tuple[Parameter, ...]
+    series: tuple[FittedSeries, ...]
+    doubts: tuple[str, ...]
+
+    @property
+    def places(self) -> tuple[str, ...]:
+        """``file:line`` of all data ``(n,)``."""
+        return tuple(place for series in self.series for place in series.column.places)
+
+    @property
+    def by_path(self) -> dict[str, Parameter]:
+        """The parameters by their paths."""
+        return {parameter.path: parameter for parameter in self.parameters}
+
+
+def run_fit(given: FitInput) -> Fitted:
+    """Fit what the file of a fit names.
+
+    Raises CaseError and InputFileError with file and line, UserError for data that allow no fit,
+    ConvergenceError where no start leads to a solution.
+    """
+    if isinstance(given.file, JointFit):
+        return _joint(given, given.file)
+    if isinstance(given.file, LoopFit):
+        return _loops(given, given.file)
+    return _wear(given, given.file)
+
+
+def _solved(
+    given: FitInput,
+    fitted: Fit,
+    paths: Sequence[tuple[str, str]],
+    series: Sequence[FittedSeries],
+    notes: Sequence[str],
+) -> Fitted:
+    called = {one.name: path for one, (path, _) in zip(fitted.estimates, paths, strict=True)}
+    parameters = tuple(
+        Parameter(path, unit, replace(estimate, doubt=_in_paths(estimate.doubt, called)))
+        for (path, unit), estimate in zip(paths, fitted.estimates, strict=True)
+    )
+    order = np.concatenate([one.order for one in series])
+    files = np.concatenate([one.column.files for one in series])
+    places = [place for one in series for place in one.column.places]
+    doubts = list(notes)
+    for doubt in diagnose(fitted, order, files):
+        named = ", ".join(places[k] for k in doubt.data[:MOST_NAMED])
+        more = " ..." if len(doubt.data) > MOST_NAMED else ""
+        where = f" ({named}{more})" if named else ""
+        doubts.append(": ".join(part for part in (doubt.series, doubt.text + where) if part))
+    doubts += [
+        f"{parameter.path}: rests on one value, {places[e.heaviest]}; more there would tell"
+        for parameter in parameters
+        if (e := parameter.estimate).determined and e.heaviest_share > ALONE
+    ]
+    if fitted.reached < fitted.tried:
+        doubts.append(
+            f"{fitted.tried - fitted.reached} of {fitted.tried} starts ended at a worse fit; the "
+            "best of all is told"
+        )
+    return Fitted(given, fitted, parameters, tuple(series), tuple(doubts))
+
+
+def _in_paths(text: str, called: Mapping[str, str]) -> str:
+    """A text with the paths of parameters in place of their names."""
+    return re.sub(r"[\w.]+", lambda word: called.get(word[0], word[0]), text)
+
+
+# --- joints -------------------------------------------------------------------------------------
+
+
+def _joint(given: FitInput, file: JointFit) -> Fitted:
+    names = [MEASURED[name] for name in file.evolution.given]
+    columns = read_columns(file.measurements, names, beside=("residual_stiffness",), ascending=True)
+    for name in file.evolution.given:
+        if MEASURED[name] not in columns:
+            place = given.source.where(("evolution", name))[1]
+            raise CaseError(
+                f"{place}: evolution.{name}: no file has its column {MEASURED[name]}; allowed: "
+                "one that has, or columns that names it"
+            )
+    columns, notes = _without_residual(file, columns)
+    data = [
+        _evolution_data(file, name, section, columns[MEASURED[name]])
+        for name, section in file.evolution.given.items()
+    ]
+    try:
+        problem = evolution_problem(data, file.shared)
+        fitted = fit(problem.problem)
+    except FitError as error:
+        raise UserError(f"{given.name}: {error}") from error
+    series = [
+        FittedSeries(
+            one.name,
+            JOINT_UNITS[one.name],
+            columns[MEASURED[one.name]],
+            ENERGY,
+            lambda energy, one=one: problem.curve(one, energy),  # type: ignore[misc]
+        )
+        for one in problem.data
+    ]
+    paths = [_joint_path(unknown.name) for unknown in problem.problem.unknowns]
+    return _solved(given, fitted, paths, series, notes)
+
+
+def _evolution_data(file: JointFit, name: str, section: Section, column: Column) -> EvolutionData:
+    """The data of a parameter of the joint, and what of its function is held."""
+    entries = {INITIAL: getattr(file.joint, name), **section.model_dump(exclude={"kind"})}
+    held = {key: float(value) for key, value in entries.items() if value != FREE}
+    return EvolutionData(
+        name,
+        column.against,
+        column.values,
+        str(section.kind),  # type: ignore[attr-defined]
+        held,
+        column.deviations,
+    )
+
+
+def _joint_path(name: str) -> tuple[str, str]:
+    """Path in a case and unit of a parameter of :func:`evolution_problem`."""
+    of, _, parameter = name.rpartition(".")
+    if parameter == INITIAL:
+        return f"joint.{of}", JOINT_UNITS[of]
+    where = f"evolution.{of}.{parameter}" if of else f"evolution.{parameter}"
+    return where, UNITS.get(parameter, "1")
+
+
+def _without_residual(
+    file: JointFit, columns: dict[str, Column]
+) -> tuple[dict[str, Column], list[str]]:
+    """The columns with a stiffness as the law has it, and what to say of that."""
+    if file.law == "bouc_wen" or "kt" not in columns:
+        return columns, []
+    kt = columns["kt"]
+    residual = kt.others.get("residual_stiffness")
+    if residual is None:
+        note = (
+            f"kt has no residual_stiffness beside it and is taken for the stiffness of {file.law} "
+            "as it is: right where nothing of it is left when all slides"
+        )
+        return columns, [note]
+    alone = Column(kt.against, kt.values - residual, kt.deviations, kt.others, kt.places, kt.files)
+    return {**columns, "kt": alone}, []
+
+
+# --- loops --------------------------------------------------------------------------------------
+
+
+def _loops(given: FitInput, file: LoopFit) -> Fitted:
+    entries = file.joint.model_dump(exclude={"law"})
+    # A normal load that is not given is that of each record.
+    entries["normal_load"] = np.nan if file.joint.normal_load is None else entries["normal_load"]
+    held = {key: float(value) for key, value in entries.items() if value != FREE}
+    loops = []
+    for number, one in enumerate(file.measurements, 1):
+        names = {k: v for k, v in one.columns.model_dump().items() if v is not None}
+        record = read_loop_file(Path(one.file), names)
+        columns = (record.get("normal_load"), record.get("time"))
+        try:
+            measured = measure_loops(record["displacement"], record["force"], *columns)
+        except MeasuredLoopError as error:
+            raise UserError(f"{one.file}: {error}") from error
+        loops.append(mean_loop(_loop_name(file, number), measured))
+    try:
+        problem = loop_problem(loops, file.joint.law, held)
+        fitted = fit(problem.problem)
+    except FitError as error:
+        raise UserError(f"{given.name}: {error}") from error
+    series = [
+        FittedSeries(
+            one.name,
+            "N",
+            _loop_column(one, measurement.file, number),
+            DISPLACEMENT,
+            lambda _, one=one: lambda values: problem.loop(one, values),  # type: ignore[misc]
+        )
+        for number, (one, measurement) in enumerate(zip(loops, file.measurements, strict=True))
+    ]
+    paths = [_loop_path(unknown.name) for unknown in problem.problem.unknowns]
+    return _solved(given, fitted, paths, series, [])
+
+
+def _loop_name(file: LoopFit, number: int) -> str:
+    return "force" if len(file.measurements) == 1 else f"force_{number}"
+
+
+def _loop_column(loop: LoopData, file: str, number: int) -> Column:
+    """The mean loop as a column; its places are named by their displacement."""
+    name = Path(file).name
+    places = tuple(f"{name} at {TO_MICRONS * x:.3g} um" for x in loop.displacement)
+    files = np.full(len(loop.force), number)
+    others = {"normal_load": np.full(len(loop.force), loop.normal_load)}
+    return Column(loop.displacement, loop.force, None, others, places, files)
+
+
+def _loop_path(name: str) -> tuple[str, str]:
+    """Path and unit of a parameter of :func:`loop_problem`."""
+    of, _, parameter = name.rpartition(".")
+    return (f"{of}.{parameter}", "N") if of else (f"joint.{name}", JOINT_UNITS.get(name, "1"))
+
+
+# --- wear ---------------------------------------------------------------------------------------
+
+
+def _wear(given: FitInput, file: WearFit) -> Fitted:
+    columns = read_columns(file.measurements, list(VOLUMES), beside=("amplitude",))
+    if "volume" in columns and len(columns) > 1:
+        raise UserError(
+            f"{given.name}: volume beside volume_1 or volume_2; allowed: that of both bodies, or "
+            "those of each"
+        )
+    reference = file.wear.reference_amplitude
+    law = VolumeLaw(file.wear.offset, POWERS[file.wear.law], reference or 1.0)
+    data = []
+    for name, column in columns.items():
+        amplitude = column.others.get("amplitude")
+        if law.uses_amplitude and amplitude is None:
+            raise UserError(
+                f"{column.places[0].rpartition(':')[0]}: no column amplitude, which law: "
+                f"{file.wear.law} needs; allowed: half the stroke of every test"
+            )
+        body = VolumeData(
+            VOLUMES[name], column.against, column.values, amplitude, column.deviations
+        )
+        data.append(body)
+    try:
+        problem = volume_problem(data, law)
+        fitted = fit(problem.problem)
+    except FitError as error:
+        raise UserError(f"{given.name}: {error}") from error
+    series = [
+        FittedSeries(
+            f"worn volume of {one.name.replace('_', ' ')}",
+            "mm^3",
+            column,
+            ENERGY,
+            None
+            if law.uses_amplitude
+            else lambda energy, one=one: problem.curve(one, energy, None),  # type: ignore[misc]
+        )
+        for one, column in zip(problem.data, columns.values(), strict=True)
+    ]
+    paths = [_wear_path(unknown.name) for unknown in problem.problem.unknowns]
+    return _solved(given, fitted, paths, series, [])
+
+
+def _wear_path(name: str) -> tuple[str, str]:
+    """Path and unit of a parameter of :func:`volume_problem`."""
+    of, _, parameter = name.rpartition(".")
+    where = ".".join(part for part in ("wear", of, parameter) if part)
+    return where, UNITS.get(parameter, "1")

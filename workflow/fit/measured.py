@@ -1,0 +1,183 @@
+"""Tables that were measured, as a fit takes them: columns with units, and where each value stands.
+
+A unit is asked for here, where other tables have the base unit without one: energies of tests are
+written in J, kJ or mJ, and one taken for another makes a rate that looks like any other.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from sa_solver.types import Array, Indices
+from workflow.case.fields import Quantity, shown
+from workflow.case.input_files import InputFileError
+from workflow.case.sections import Section
+from workflow.case.table_file import TableFile, read_table_file
+from workflow.fit.schema import Measurement
+
+ENERGY = "energy"
+OF_DEVIATIONS = "_deviation"
+# Base units and limits of what may be read.
+QUANTITIES = {
+    ENERGY: Quantity("N*mm", at_least=0.0, at_most=1e15, range_text="0 to 1e12 J"),
+    "mu": Quantity("1", at_least=0.0, at_most=10.0),
+    "kt": Quantity("N/mm", above=0.0, at_most=1e12, range_text="above 0 to 1e6 kN/um"),
+    "residual_stiffness": Quantity(
+        "N/mm", at_least=-1e12, at_most=1e12, range_text="-1e6 to 1e6 kN/um"
+    ),
+    "P": Quantity("N", at_least=0.0, at_most=1e9, range_text="0 to 1e6 kN"),
+    "volume": Quantity("mm^3", at_least=-1e9, at_most=1e9),
+    "volume_1": Quantity("mm^3", at_least=-1e9, at_most=1e9),
+    "volume_2": Quantity("mm^3", at_least=-1e9, at_most=1e9),
+    "amplitude": Quantity("mm", above=0.0, at_most=1e3),
+}
+
+
+@dataclass(frozen=True)
+class Column:
+    """Values of one kind from all files that have them, in base units.
+
+    ``values`` ``(n,)``, ``against`` what they were measured ``(n,)``, and their ``deviations``
+    ``(n,)`` or None if they are not known. ``others`` are beside them by name, ``places`` are
+    ``file:line`` and ``files`` the number of the file of each.
+    """
+
+    against: Array
+    values: Array
+    deviations: Array | None
+    others: Mapping[str, Array]
+    places: tuple[str, ...]
+    files: Indices
+
+
+@dataclass(frozen=True)
+class _Part:
+    """The same of one file."""
+
+    energy: Array
+    values: Array
+    deviations: Array | None
+    others: dict[str, Array]
+    places: list[str]
+
+
+def read_columns(
+    measurements: Sequence[Measurement],
+    names: Sequence[str],
+    beside: Sequence[str] = (),
+    ascending: bool = False,
+) -> dict[str, Column]:
+    """The columns of ``names`` that the files have, with those ``beside`` them where there are.
+
+    Rows of a file are in order of their energy where ``ascending``. Raises InputFileError, with
+    file and line.
+    """
+    parts: dict[str, list[tuple[int, _Part]]] = {}
+    for number, measurement in enumerate(measurements):
+        for name, part in _parts(measurement, names, beside, ascending).items():
+            parts.setdefault(name, []).append((number, part))
+    return {name: _joined(name, parts[name]) for name in names if name in parts}
+
+
+def _parts(
+    measurement: Measurement, names: Sequence[str], beside: Sequence[str], ascending: bool
+) -> dict[str, _Part]:
+    table = read_table_file(measurement.file)
+    headings, deviations = _section(measurement, "columns"), _section(measurement, "deviations")
+    called = {name: headings.get(name) or name for name in QUANTITIES}
+    table.require([called[ENERGY]], "a column of that name, or one that columns.energy names")
+    for name, heading in headings.items():
+        table.require([heading], f"the heading that columns.{name} names")
+    energy = _numbers(table, called, ENERGY)
+    if ascending:
+        _check_order(table, energy, called[ENERGY])
+    found = [name for name in names if called[name] in table.names]
+    if not found:
+        wanted = ", ".join(called[name] for name in names)
+        raise InputFileError(f"{table.place}: none of the columns {wanted}; allowed: at least one")
+    others = {name: _numbers(table, called, name) for name in beside if called[name] in table.names}
+    places = [f"{Path(table.file).name}:{line}" for line, _ in table.rows]
+    return {
+        name: _Part(
+            energy,
+            _numbers(table, called, name),
+            _deviations(table, called, name, deviations.get(name)),
+            others,
+            places,
+        )
+        for name in found
+    }
+
+
+def _section(measurement: Measurement, name: str) -> dict[str, Any]:
+    """What is given of a section, by key."""
+    section: Section = getattr(measurement, name)
+    return {key: value for key, value in section.model_dump().items() if value is not None}
+
+
+def _numbers(table: TableFile, called: Mapping[str, str], name: str) -> Array:
+    heading, quantity = called[name], QUANTITIES[name]
+    _check_unit(table, heading, quantity)
+    return table.column(heading, quantity)
+
+
+def _check_unit(table: TableFile, heading: str, quantity: Quantity) -> None:
+    """Ask for a unit of what has a dimension."""
+    if quantity.unit != "1" and not table.unit(heading):
+        example = {"N*mm": "J", "N/mm": "N/um"}.get(str(quantity.unit), quantity.unit)
+        raise InputFileError(
+            f"{table.place}: {shown(heading)}: no unit; allowed: one in brackets, such as "
+            f"{heading} [{example}]"
+        )
+
+
+def _check_order(table: TableFile, energy: Array, heading: str) -> None:
+    falls = np.flatnonzero(np.diff(energy) < 0.0)
+    if falls.size:
+        raise table.refusal(
+            int(falls[0]) + 1, heading, "the energy falls", "rows in order of their energy"
+        )
+
+
+def _deviations(
+    table: TableFile, called: Mapping[str, str], name: str, given: float | None
+) -> Array | None:
+    """Standard deviations of a column: a column of their own, one number for all, or unknown."""
+    heading = f"{called[name]}{OF_DEVIATIONS}"
+    if heading not in table.names:
+        return None if given is None else np.full(len(table), given)
+    if given is not None:
+        raise InputFileError(
+            f"{table.place}: {shown(heading)}: given beside deviations.{name}; allowed: one of them"
+        )
+    unit = QUANTITIES[name].unit
+    quantity = Quantity(unit, above=0.0)
+    _check_unit(table, heading, quantity)
+    return table.column(heading, quantity)
+
+
+def _joined(name: str, parts: Sequence[tuple[int, _Part]]) -> Column:
+    """One column of those of all files."""
+    known = [part.deviations for _, part in parts if part.deviations is not None]
+    if known and len(known) < len(parts):
+        unknown = next(part for _, part in parts if part.deviations is None)
+        raise InputFileError(
+            f"{unknown.places[0].rpartition(':')[0]}: {name}: no standard deviations, which other "
+            "files have; allowed: deviations of all, or of none"
+        )
+    others = set.intersection(*(set(part.others) for _, part in parts))
+    return Column(
+        against=np.concatenate([part.energy for _, part in parts]),
+        values=np.concatenate([part.values for _, part in parts]),
+        deviations=np.concatenate(known) if known else None,
+        others={
+            other: np.concatenate([part.others[other] for _, part in parts]) for other in others
+        },
+        places=tuple(place for _, part in parts for place in part.places),
+        files=np.repeat([number for number, _ in parts], [len(part.values) for _, part in parts]),
+    )

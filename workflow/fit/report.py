@@ -1,0 +1,192 @@
+"""What a fit says: on the terminal, in ``summary.json``, and in tables."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from workflow.case.plain import counted
+from workflow.fit.fitting import Fitted, Parameter
+from workflow.fit.section import told
+from workflow.shell.tables import heading
+from workflow.shell.versions import versions
+
+# Correlations are told on the terminal from here on.
+CLOSE = 0.9
+# Share of a series in a parameter that is not worth telling.
+LITTLE = 0.005
+GAP = "  "
+HEADINGS = ("parameter", "value", "+-", "95 % bounds", "decided by")
+
+
+def report(fitted: Fitted) -> list[str]:
+    """The table of parameters, and what to know of them."""
+    rows = [HEADINGS, *(_row(fitted, parameter) for parameter in fitted.parameters)]
+    told_rows = [row for row in rows if len(row) > 1]
+    widths = [max(len(row[k]) for row in told_rows) for k in range(len(HEADINGS))]
+    lines = [
+        GAP.join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip()
+        for row in rows
+    ]
+    return [fitted.given.file.title, *lines, *_series(fitted), *_notes(fitted)]
+
+
+def _row(fitted: Fitted, parameter: Parameter) -> tuple[str, ...]:
+    estimate = parameter.estimate
+    unit = "" if parameter.unit == "1" else f" {parameter.unit}"
+    if not estimate.determined:
+        return parameter.path, "not determined", "", estimate.doubt, _decided(fitted, parameter)
+    value, deviation, bounds = told(parameter)
+    return parameter.path, value + unit, deviation, bounds + unit, _decided(fitted, parameter)
+
+
+def _decided(fitted: Fitted, parameter: Parameter) -> str:
+    """Which series tell a parameter, the most important first."""
+    names = [series.name for series in fitted.series]
+    shares = parameter.estimate.shares.tolist()
+    order = sorted(range(len(names)), key=lambda k: -shares[k])
+    return ", ".join(f"{names[k]} {shares[k]:.0%}" for k in order if shares[k] > LITTLE)
+
+
+def _series(fitted: Fitted) -> list[str]:
+    lines = []
+    problem = fitted.fit.problem
+    for place, series in enumerate(fitted.series):
+        here = problem.places == place
+        unit = "" if series.unit == "1" else f" {series.unit}"
+        scatter = _scatter(fitted, place)
+        how = "given" if series.column.deviations is not None else "of the residuals"
+        count = counted(int(here.sum()), "value")
+        freedom = f"{fitted.fit.freedoms[place]:.3g} degrees of freedom"
+        text = f"standard deviation {scatter:.2g}{unit} ({how}), {freedom}"
+        lines.append(f"{series.name}: {count}, {text}")
+    return lines
+
+
+def _scatter(fitted: Fitted, place: int) -> float:
+    """Of a series, in the unit that it is told in: the root of the mean square."""
+    here = fitted.fit.problem.places == place
+    root = float(np.sqrt(np.mean(fitted.fit.deviations[here] ** 2)))
+    return Parameter("", fitted.series[place].unit, fitted.parameters[0].estimate).shown(root)
+
+
+def _notes(fitted: Fitted) -> list[str]:
+    found = fitted.fit
+    how = "normal, of the given standard deviations" if found.known else "Student's"
+    lines = [f"+- is one standard deviation; bounds are {how}"]
+    lines += [
+        f"{parameter.path}: the model bends within its bounds, which are those of its profile"
+        for parameter in fitted.parameters
+        if parameter.estimate.determined and not parameter.estimate.straight
+    ]
+    lines += [
+        f"{first} and {second} are correlated by {value:.3f}: neither holds alone"
+        for first, second, value in _close(fitted)
+    ]
+    return lines + [f"doubt: {doubt}" for doubt in fitted.doubts]
+
+
+def _close(fitted: Fitted) -> list[tuple[str, str, float]]:
+    """Pairs of parameters with a large correlation."""
+    correlation = fitted.fit.correlation
+    paths = [parameter.path for parameter in fitted.parameters]
+    return [
+        (paths[i], paths[k], float(correlation[i, k]))
+        for i in range(len(paths))
+        for k in range(i + 1, len(paths))
+        if abs(correlation[i, k]) > CLOSE
+    ]
+
+
+# --- files --------------------------------------------------------------------------------------
+
+
+def summary(fitted: Fitted, section: str) -> dict[str, Any]:
+    """What ``summary.json`` has, in the units told beside each number."""
+    found = fitted.fit
+    return {
+        "title": fitted.given.file.title,
+        "fit": fitted.given.file.fit,
+        "parameters": {p.path: _of_parameter(fitted, p) for p in fitted.parameters},
+        "correlation": {
+            "parameters": [parameter.path for parameter in fitted.parameters],
+            "matrix": [[_finite(value) for value in row] for row in found.correlation.tolist()],
+        },
+        "series": {
+            series.name: {
+                "values": len(series.column.values),
+                "scatter": _scatter(fitted, place),
+                "unit": series.unit,
+                "given": series.column.deviations is not None,
+                "freedom": float(fitted.fit.freedoms[place]),
+            }
+            for place, series in enumerate(fitted.series)
+        },
+        "excess": _finite(found.excess),
+        "starts": {"tried": found.tried, "reached": found.reached},
+        "doubts": list(fitted.doubts),
+        "section": section,
+        "versions": versions(),
+    }
+
+
+def _of_parameter(fitted: Fitted, parameter: Parameter) -> dict[str, Any]:
+    estimate = parameter.estimate
+    known = estimate.determined
+    return {
+        "value": parameter.shown(estimate.value) if known else None,
+        "unit": parameter.unit,
+        "deviation": parameter.shown(estimate.deviation) if known else None,
+        "bounds": [parameter.shown(bound) for bound in estimate.bounds] if known else None,
+        "determined": known,
+        "doubt": estimate.doubt,
+        "fitted_as_logarithm": estimate.logarithmic,
+        "bounds_of_profile": known and not estimate.straight,
+        "shares": {
+            series.name: round(share, 4)
+            for series, share in zip(fitted.series, estimate.shares.tolist(), strict=True)
+        },
+        "heaviest": {
+            "place": fitted.places[estimate.heaviest],
+            "share": round(estimate.heaviest_share, 4),
+        },
+    }
+
+
+def _finite(value: float) -> float | None:
+    return value if math.isfinite(value) else None
+
+
+def parameter_columns(fitted: Fitted) -> dict[str, Sequence[Any]]:
+    """The table of parameters, a row each."""
+    rows = [_of_parameter(fitted, parameter) for parameter in fitted.parameters]
+    return {
+        "parameter": [parameter.path for parameter in fitted.parameters],
+        "unit": [row["unit"] for row in rows],
+        "value": [row["value"] for row in rows],
+        "deviation": [row["deviation"] for row in rows],
+        "lower": [row["bounds"] and row["bounds"][0] for row in rows],
+        "upper": [row["bounds"] and row["bounds"][1] for row in rows],
+        "doubt": [row["doubt"] for row in rows],
+    }
+
+
+def data_columns(fitted: Fitted) -> dict[str, Any]:
+    """The table of all data, a row each, in the base units of their series."""
+    found = fitted.fit
+    series = [s.name for s in fitted.series for _ in s.column.places]
+    against = np.concatenate([s.column.against for s in fitted.series])
+    along = fitted.series[0].along
+    return {
+        "series": series,
+        "place": fitted.places,
+        heading(along.name.replace(" ", "_"), along.base): against,
+        "measured": found.problem.data,
+        "fitted": found.fitted,
+        "deviation": found.deviations,
+        "standardised_residual": found.standardised,
+        "leverage": found.leverages,
+    }

@@ -1,0 +1,433 @@
+"""The file of a fit: which measurements, what is free, and of which law."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any, ClassVar, Literal, get_args
+
+from pydantic import Field, model_validator
+
+from workflow.analyses.rig.joint_evolution import Change, Final, Part, PerEnergy, Slope
+from workflow.analyses.rig.joint_sections import (
+    Coefficient,
+    JointStiffness,
+    Preload,
+    ResidualStiffness,
+)
+from workflow.analyses.wear.case.evolution import PositiveEnergy
+from workflow.case.fields import Entry, File, Quantity, Word
+from workflow.case.loading import validated, word_at
+from workflow.case.sections import Length, Section, Title, disagreement, entry
+from workflow.case.source import Source, read_text
+
+FREE: Literal["free"] = "free"
+Free = Literal["free"]
+
+
+@dataclass(frozen=True)
+class FreeOr(Entry):
+    """The word free, or a quantity that is held."""
+
+    quantity: Quantity
+
+    @property
+    def allowed(self) -> str:
+        return f"free, or to hold it {self.quantity.allowed}"
+
+    def parse(self, value: object) -> Any:
+        if value == FREE:
+            return FREE
+        if isinstance(value, str) and value.isalpha():
+            raise self.refusal(value, "not known")
+        return self.quantity.parse(value)
+
+    def json_schema(self) -> dict[str, Any]:
+        return {"anyOf": [{"const": FREE}, *self.quantity.json_schema()["anyOf"]]}
+
+
+def _or_free(annotated: Any) -> FreeOr:
+    """The entry of a case, or free."""
+    return FreeOr(get_args(annotated)[1])
+
+
+FreeChange = Annotated[float | Free, _or_free(Change)]
+FreeRate = Annotated[float | Free, _or_free(PerEnergy)]
+FreeScale = Annotated[float | Free, _or_free(PositiveEnergy)]
+FreeSlope = Annotated[float | Free, _or_free(Slope)]
+FreeFinal = Annotated[float | Free, _or_free(Final)]
+FreeShare = Annotated[float | Free, _or_free(Part)]
+
+Heading = Annotated[str, Field(min_length=1)]
+Csv = Annotated[str, File((".csv",))]
+RESIDUAL = "slope when all slides"
+
+
+class Measurement(Section):
+    """A table that was measured."""
+
+    file: Csv = entry("CSV, headings with units, as seen from this folder", "measured.csv")
+
+
+# --- joints -------------------------------------------------------------------------------------
+
+
+class JointHeadings(Section):
+    """What the columns of a file are called, where not as `fretscale loops` calls them."""
+
+    filled_in: ClassVar[bool] = False
+
+    energy: Heading | None = entry("dissipated so far", "E", default=None)
+    mu: Heading | None = entry("friction coefficient", "friction coefficient", default=None)
+    kt: Heading | None = entry("stuck slope of the loop", "contact stiffness", default=None)
+    residual_stiffness: Heading | None = entry(RESIDUAL, "macroslip slope", default=None)
+    P: Heading | None = entry("normal load", "bolt preload", default=None)
+
+
+class JointDeviations(Section):
+    """Standard deviations of what was measured; without them the residuals tell the scatter."""
+
+    filled_in: ClassVar[bool] = False
+
+    mu: Annotated[float, Quantity("1", above=0.0)] | None = entry(
+        "of friction coefficients [1]", 0.01, default=None
+    )
+    kt: Annotated[float, Quantity("N/mm", above=0.0)] | None = entry(
+        "of stuck slopes [N/mm]", "1 N/um", default=None
+    )
+    residual_stiffness: Annotated[float, Quantity("N/mm", above=0.0)] | None = entry(
+        "of sliding slopes [N/mm]", "0.05 N/um", default=None
+    )
+    P: Annotated[float, Quantity("N", above=0.0)] | None = entry(
+        "of normal loads [N]", "5 N", default=None
+    )
+
+
+class JointMeasurement(Measurement):
+    """What loops said of a joint as it wore: energy, and mu, kt, residual_stiffness or P."""
+
+    columns: JointHeadings = entry("other headings", default=JointHeadings())
+    deviations: JointDeviations = entry(
+        "one standard deviation; or columns such as mu_deviation", default=JointDeviations()
+    )
+
+
+class NewJoint(Section):
+    """The joint before it has dissipated anything."""
+
+    normal_load: Annotated[float | Free, _or_free(Preload)] = entry(
+        "that presses the joint [N]", "free", default=FREE
+    )
+    friction: Annotated[float | Free, _or_free(Coefficient)] = entry(
+        "limit of the friction force over the normal load [1]", "free", default=FREE
+    )
+    stiffness: Annotated[float | Free, _or_free(JointStiffness)] = entry(
+        "of the stuck joint [N/mm]", "free", default=FREE
+    )
+    residual_stiffness: Annotated[float | Free, _or_free(ResidualStiffness)] = entry(
+        f"{RESIDUAL} [N/mm]", "free", default=FREE
+    )
+
+
+class FreeLogarithmic(Section):
+    """1 + change ln(1 + rate E)."""
+
+    kind: Literal["logarithmic"] = entry("1 + change ln(1 + rate E)", "logarithmic")
+    change: FreeChange = entry("of the factor with the logarithm [1]", "free", default=FREE)
+    rate: FreeRate = entry("beside the energy [1/(N*mm)]", "free", default=FREE)
+
+
+class FreeArrhenius(Section):
+    """1 + change exp(-scale / E)."""
+
+    kind: Literal["arrhenius"] = entry("1 + change exp(-scale / E)", "arrhenius")
+    change: FreeChange = entry("of the factor in the end [1]", "free", default=FREE)
+    scale: FreeScale = entry("energy that it takes [N*mm]", "free", default=FREE)
+
+
+class FreeLinear(Section):
+    """1 + slope E."""
+
+    kind: Literal["linear"] = entry("1 + slope E", "linear")
+    slope: FreeSlope = entry("against energy [1/(N*mm)]", "free", default=FREE)
+
+
+class FreeExponential(Section):
+    """final + (1 - final) (share exp(-rate E) + (1 - share) exp(-second_rate E))."""
+
+    kind: Literal["exponential"] = entry(
+        "final + (1 - final) (share exp(-rate E) + (1 - share) exp(-second_rate E))",
+        "exponential",
+    )
+    final: FreeFinal = entry("in the end [1]", "free", default=FREE)
+    rate: FreeRate = entry("of the first exponential [1/(N*mm)]", "free", default=FREE)
+    share: FreeShare = entry(
+        "of the first exponential: 1, or free with second_rate [1]", 1.0, default=1.0
+    )
+    second_rate: FreeRate = entry("of the second exponential [1/(N*mm)]", 0.0, default=0.0)
+
+    @model_validator(mode="after")
+    def _two_exponentials_or_one(self) -> FreeExponential:
+        if self.share == 1.0 and self.second_rate != 0.0:
+            raise disagreement(
+                "a second exponential with a share of nothing; allowed: share: free, or below 1",
+                *("share", "second_rate"),
+            )
+        return self
+
+
+FreeFactor = Annotated[
+    FreeLogarithmic | FreeArrhenius | FreeLinear | FreeExponential, Field(discriminator="kind")
+]
+
+
+class FreeEvolution(Section):
+    """Factors of the joint's parameters against the energy E that it has dissipated so far."""
+
+    friction: FreeFactor | None = entry("of mu", default=None)
+    stiffness: FreeFactor | None = entry("of kt", default=None)
+    residual_stiffness: FreeFactor | None = entry("of residual_stiffness", default=None)
+    normal_load: FreeFactor | None = entry("of P", default=None)
+
+    @model_validator(mode="after")
+    def _of_something(self) -> FreeEvolution:
+        if not self.given:
+            names = ", ".join(type(self).model_fields)
+            raise disagreement(f"nothing evolves; allowed: at least one of {names}")
+        return self
+
+    @property
+    def given(self) -> dict[str, Section]:
+        """The functions by the parameter that they are of."""
+        sections = {name: getattr(self, name) for name in type(self).model_fields}
+        return {name: section for name, section in sections.items() if section is not None}
+
+
+class JointFit(Section):
+    """How a joint's parameters follow the energy that it has dissipated."""
+
+    title: Title = entry("one line", "Joint of the friction rig, test 1")
+    fit: Literal["joint_evolution"] = entry(
+        "joint_evolution, joint_law or wear_coefficient", "joint_evolution"
+    )
+    measurements: tuple[JointMeasurement, ...] = entry("tables", min_length=1)
+    law: Literal["bouc_wen", "jenkins", "uniform_iwan", "four_parameter_iwan"] = entry(
+        "bouc_wen: its stiffness is all of kt; jenkins, uniform_iwan or four_parameter_iwan: kt "
+        "less residual_stiffness",
+        "bouc_wen",
+    )
+    joint: NewJoint = entry("initial values", default=NewJoint())
+    evolution: FreeEvolution = entry("functions of the energy E, each a factor of that value")
+    shared: tuple[Annotated[str, Word(("rate", "second_rate", "scale"))], ...] = entry(
+        "parameters with one value in all functions that have them free", ["rate"], default=()
+    )
+
+    @model_validator(mode="after")
+    def _shared_are_free(self) -> JointFit:
+        sections = self.evolution.given.values()
+        for name in self.shared:
+            if not any(getattr(section, name, None) == FREE for section in sections):
+                raise disagreement(f"{name}: free in no function; allowed: one that is", "shared")
+        return self
+
+
+# --- wear ---------------------------------------------------------------------------------------
+
+
+class WearHeadings(Section):
+    """What the columns of a file are called, where not as here."""
+
+    energy: Heading | None = entry("dissipated in the test", "E", default=None)
+    amplitude: Heading | None = entry("of the slip: half the stroke", "delta", default=None)
+    volume: Heading | None = entry("worn off both bodies", "wear", default=None)
+    volume_1: Heading | None = entry("worn off body 1", "wear flat", default=None)
+    volume_2: Heading | None = entry("worn off body 2", "wear ball", default=None)
+
+
+Deviation = Annotated[float, Quantity("mm^3", above=0.0, range_text="above 0 um^3")]
+
+
+class WearDeviations(Section):
+    """Standard deviations of volumes; without them the residuals tell the scatter."""
+
+    volume: Deviation | None = entry("of both bodies [mm^3]", "1e5 um^3", default=None)
+    volume_1: Deviation | None = entry("of body 1 [mm^3]", "1e5 um^3", default=None)
+    volume_2: Deviation | None = entry("of body 2 [mm^3]", "1e5 um^3", default=None)
+
+
+class WearMeasurement(Measurement):
+    """Volumes worn in tests: energy, and volume, or volume_1 and volume_2 of the bodies."""
+
+    columns: WearHeadings = entry("other headings", default=WearHeadings())
+    deviations: WearDeviations = entry(
+        "one standard deviation; or columns such as volume_deviation", default=WearDeviations()
+    )
+
+
+class FreeWear(Section):
+    """Law of the worn volume."""
+
+    law: Literal["energy", "energy_amplitude", "amplitude_power"] = entry(
+        "energy: V = α E; energy_amplitude: times amplitude over reference_amplitude; "
+        "amplitude_power: times a power of that, which is fitted",
+        "energy",
+    )
+    offset: Literal["none", "threshold", "intercept"] = entry(
+        "none; threshold: energy before anything wears; intercept: volume at no energy, as of "
+        "faster wear at first, which a case does not have",
+        "none",
+        default="none",
+    )
+    reference_amplitude: Length | None = entry(
+        "at which α holds, for the laws with an amplitude [mm]", "11 um", default=None
+    )
+
+    @model_validator(mode="after")
+    def _amplitude_has_a_reference(self) -> FreeWear:
+        if (self.law == "energy") != (self.reference_amplitude is None):
+            wrong = "not of law: energy" if self.law == "energy" else "missing, such as 11 um"
+            raise disagreement(
+                f"{wrong}; allowed: with energy_amplitude and amplitude_power",
+                "reference_amplitude",
+            )
+        return self
+
+
+class WearFit(Section):
+    """Wear coefficients from volumes against dissipated energy."""
+
+    title: Title = entry("one line", "Wear coefficient of the fretting tests")
+    fit: Literal["wear_coefficient"] = entry(
+        "joint_evolution, joint_law or wear_coefficient", "wear_coefficient"
+    )
+    measurements: tuple[WearMeasurement, ...] = entry("tables: a row for each test", min_length=1)
+    wear: FreeWear = entry("what the volumes follow")
+
+
+# --- loops --------------------------------------------------------------------------------------
+
+
+class LoopHeadings(Section):
+    """What the columns of a file are called, where not as `fretscale loops` takes them."""
+
+    displacement: Heading | None = entry("between the two sides", "LDV difference", default=None)
+    force: Heading | None = entry("that resists it", "load cell", default=None)
+    time: Heading | None = entry("where samples are not evenly spaced", "t", default=None)
+    normal_load: Heading | None = entry("that presses the joint", "preload", default=None)
+
+
+class LoopMeasurement(Measurement):
+    """A record of loops that are alike."""
+
+    columns: LoopHeadings = entry("other headings", default=LoopHeadings())
+
+
+FreeCoefficient = Annotated[float | Free, _or_free(Coefficient)]
+FreeStiffness = Annotated[float | Free, _or_free(JointStiffness)]
+FreeResidual = Annotated[float | Free, _or_free(ResidualStiffness)]
+
+
+class FreeJoint(Section):
+    """What all laws have."""
+
+    law: str  # named first; each law narrows it to its own name
+    normal_load: Annotated[float | Free, _or_free(Preload)] | None = entry(
+        "without it that of the files [N]", "60 N", default=None
+    )
+    friction: FreeCoefficient = entry(
+        "limit of the friction force over the normal load [1]", "free", default=FREE
+    )
+    stiffness: FreeStiffness = entry("of the stuck joint [N/mm]", "free", default=FREE)
+    residual_stiffness: FreeResidual = entry(f"{RESIDUAL} [N/mm]", "free", default=FREE)
+
+
+class FreeBoucWen(FreeJoint):
+    """Bouc and Wen's law, normalised."""
+
+    law: Literal["bouc_wen"] = entry(
+        "bouc_wen, jenkins, uniform_iwan or four_parameter_iwan", "bouc_wen"
+    )
+    sigma: Annotated[float | Free, FreeOr(Quantity("1", at_least=0.5, at_most=1.0))] = entry(
+        "shape of the unloading branch: straight at first with 0.5 [1]", 0.5, default=0.5
+    )
+    exponent: Annotated[float | Free, FreeOr(Quantity("1", at_least=1.0, at_most=100.0))] = entry(
+        "how sharply sticking turns into sliding [1]", "free", default=FREE
+    )
+
+
+class FreeJenkins(FreeJoint):
+    """A spring with a slider, and the residual slope beside it."""
+
+    law: Literal["jenkins"] = entry("a spring with a slider", "jenkins")
+
+
+class FreeUniformIwan(FreeJoint):
+    """Iwan's sliders, their limits spread evenly from nothing."""
+
+    law: Literal["uniform_iwan"] = entry("sliders with limits spread evenly", "uniform_iwan")
+
+
+class FreeFourParameterIwan(FreeJoint):
+    """Segalman's Iwan joint."""
+
+    law: Literal["four_parameter_iwan"] = entry("Segalman 2005", "four_parameter_iwan")
+    chi: Annotated[float | Free, FreeOr(Quantity("1", above=-1.0, at_most=10.0))] = entry(
+        "energy of a small cycle goes with the amplitude to the power of chi + 3 [1]",
+        "free",
+        default=FREE,
+    )
+    beta: Annotated[float | Free, FreeOr(Quantity("1", at_least=0.0, at_most=1e3))] = entry(
+        "stiffness lost at once in full slip over that of the spread sliders [1]",
+        "free",
+        default=FREE,
+    )
+
+
+class LoopFit(Section):
+    """A joint law from measured hysteresis loops."""
+
+    title: Title = entry("one line", "Joint of the friction rig, as new")
+    fit: Literal["joint_law"] = entry("joint_evolution, joint_law or wear_coefficient", "joint_law")
+    measurements: tuple[LoopMeasurement, ...] = entry(
+        "records: of several strokes all are fitted together", min_length=1
+    )
+    joint: Annotated[
+        FreeBoucWen | FreeJenkins | FreeUniformIwan | FreeFourParameterIwan,
+        Field(discriminator="law"),
+    ] = entry("the law")
+
+
+KINDS: Mapping[str, type[JointFit] | type[LoopFit] | type[WearFit]] = {
+    "joint_evolution": JointFit,
+    "joint_law": LoopFit,
+    "wear_coefficient": WearFit,
+}
+
+
+@dataclass(frozen=True)
+class FitInput:
+    """The file of a fit, read, and where its entries were written."""
+
+    name: str
+    file: JointFit | LoopFit | WearFit
+    source: Source
+    text: str
+
+
+def load_fit(path: Path) -> FitInput:
+    """Read the file of a fit. Raises CaseError, a line ``file:line: key: ...`` for each thing."""
+    return parse_fit(read_text(path), str(path))
+
+
+def parse_fit(text: str, name: str) -> FitInput:
+    """As :func:`load_fit`, of a text; ``name`` stands for the file in messages."""
+    source = Source(name, text)
+    kind = KINDS[word_at(source, ("fit",), tuple(KINDS))]
+    return FitInput(name, validated(source, kind), source, text)
+
+
+def text_of(entries: Mapping[str, Any]) -> str:
+    """Entries of a program as a text."""
+    return json.dumps(entries)

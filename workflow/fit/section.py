@@ -1,0 +1,174 @@
+"""The result of a fit as a section of a case, ready to paste, bounds beside its numbers.
+
+What the data do not determine stands there as a comment without a value, so that a case with it is
+refused until somebody decides it.
+"""
+
+from __future__ import annotations
+
+import math
+
+from workflow.case.sections import Section
+from workflow.case.writing import Row, render
+from workflow.fit.fitting import JOINT_UNITS, UNITS, Fitted, Parameter
+from workflow.fit.schema import FREE, JointFit, LoopFit, WearFit
+
+# Of a deviation; the value ends with the same digit. Of numbers without one, or beyond it.
+DIGITS, MOST_DIGITS = 2, 9
+# The same of what a case is to have: correlated parameters are known together far better than each
+# alone, and rounding one of them would move the curve.
+IN_SECTION = 4
+# Numbers between them are written without a power of ten.
+SMALL, LARGE = 1e-3, 1e6
+LEFT_OUT = "undetermined"
+BOUNDS = "95 %: "
+# Left out of a section where there is no second exponential.
+SECOND = ("share", "second_rate")
+
+
+def rounded(value: float, deviation: float, of_deviation: int = DIGITS) -> str:
+    """A value to the last of so many digits of its deviation."""
+    if value == 0.0 or deviation <= 10.0 ** (DIGITS - MOST_DIGITS) * abs(value):
+        return number_text(value, MOST_DIGITS)
+    last = math.floor(math.log10(deviation)) - of_deviation + 1
+    if SMALL <= abs(value) < LARGE:
+        return f"{round(value, -last):.{max(-last, 0)}f}"
+    return number_text(value, max(math.floor(math.log10(abs(value))) - last + 1, 1))
+
+
+def number_text(value: float, digits: int) -> str:
+    """A number with so many digits, its power of ten as YAML has it."""
+    if SMALL <= abs(value) < LARGE:
+        return f"{float(f'{value:.{digits}g}'):.{MOST_DIGITS}g}"
+    if value == 0.0:
+        return "0"
+    mantissa, _, exponent = f"{value:.{digits - 1}e}".partition("e")
+    return f"{float(mantissa):g}e{int(exponent)}"
+
+
+def quantity(text: str, unit: str) -> float | str:
+    """An entry of a case: a number, or one with its unit."""
+    return float(text) if unit == "1" else f"{text} {unit}"
+
+
+def told(parameter: Parameter) -> tuple[str, str, str]:
+    """Value, deviation and bounds of a parameter that is determined, without the unit."""
+    estimate = parameter.estimate
+    deviation = parameter.shown(estimate.deviation)
+    lower, upper = map(parameter.shown, estimate.bounds)
+    value = rounded(parameter.shown(estimate.value), deviation)
+    return value, number_text(deviation, DIGITS), bounds_text(lower, upper, deviation)
+
+
+def bounds_text(lower: float, upper: float, deviation: float) -> str:
+    """Bounds with the digits of the deviation."""
+    return f"{rounded(lower, deviation)} to {rounded(upper, deviation)}"
+
+
+def section_of(fitted: Fitted) -> str:
+    """The sections of a case, as YAML."""
+    file = fitted.given.file
+    if isinstance(file, WearFit):
+        rows = _wear(fitted, file)
+    else:
+        rows = _joint(fitted, file) if isinstance(file, JointFit) else _law(fitted, file)
+    return f"# {file.title}\n{render(rows).lstrip()}"
+
+
+def _row(fitted: Fitted, path: str, key: str) -> Row:
+    """The entry of a parameter that is free."""
+    parameter = fitted.by_path[path]
+    if not parameter.estimate.determined:
+        return Row(key, LEFT_OUT, parameter.estimate.doubt, off=True)
+    _, _, bounds = told(parameter)
+    deviation = parameter.shown(parameter.estimate.deviation)
+    value = rounded(parameter.shown(parameter.estimate.value), deviation, IN_SECTION)
+    return Row(key, quantity(value, parameter.unit), f"{BOUNDS}{bounds}")
+
+
+def _held(value: float | str, unit: str, key: str) -> Row:
+    """The entry of a parameter that was held at a ``value`` in base units."""
+    if isinstance(value, str):
+        return Row(key, value)
+    number = value if unit == "1" else Parameter("", unit, None).shown(value)  # type: ignore[arg-type]
+    return Row(key, quantity(number_text(number, MOST_DIGITS), unit), "held")
+
+
+def _joint(fitted: Fitted, file: JointFit) -> list[Row]:
+    joint = [Row("law", file.law)]
+    for name, unit in JOINT_UNITS.items():
+        if f"joint.{name}" in fitted.by_path:
+            joint.append(_row(fitted, f"joint.{name}", name))
+        elif (value := getattr(file.joint, name)) != FREE:
+            joint.append(_held(value, unit, name))
+        else:
+            joint.append(Row(name, LEFT_OUT, "not measured here", off=True))
+    evolution = [
+        Row(name, _function(fitted, name, section))
+        for name, section in file.evolution.given.items()
+    ]
+    return [Row("joint", joint), Row("evolution", evolution)]
+
+
+def _law(fitted: Fitted, file: LoopFit) -> list[Row]:
+    rows = [Row("law", file.joint.law)]
+    for name, value in file.joint.model_dump(exclude={"law"}).items():
+        unit = JOINT_UNITS.get(name, "1")
+        if value == FREE:
+            rows.append(_row(fitted, f"joint.{name}", name))
+        elif value is not None:
+            rows.append(_held(value, unit, name))
+        else:
+            loads = [float(series.column.others[name].mean()) for series in fitted.series]
+            row = _held(sum(loads) / len(loads), unit, name)
+            rows.append(Row(name, row.value, "measured, the mean"))
+    return [Row("joint", rows)]
+
+
+def _function(fitted: Fitted, name: str, section: Section) -> list[Row]:
+    """The entries of a function of the energy."""
+    rows = []
+    for key, value in section.model_dump().items():
+        if key in SECOND and getattr(section, "share", None) == 1.0:
+            continue
+        if value != FREE:
+            rows.append(_held(value, UNITS.get(key, "1"), key))
+            continue
+        own, common = f"evolution.{name}.{key}", f"evolution.{key}"
+        rows.append(_row(fitted, own if own in fitted.by_path else common, key))
+    return rows
+
+
+def _wear(fitted: Fitted, file: WearFit) -> list[Row]:
+    rows = [Row("law", "energy" if file.wear.law == "energy" else "energy_amplitude")]
+    if file.wear.reference_amplitude is not None:
+        rows.append(_held(file.wear.reference_amplitude, "um", "reference_amplitude"))
+    if "wear.exponent" in fitted.by_path:
+        found = _row(fitted, "wear.exponent", "exponent")
+        comment = f"{found.comment}; energy_amplitude has 1, energy 0"
+        rows.append(Row("exponent", found.value, comment, off=True))
+    bodies = [
+        name
+        for name in ("both", "body_1", "body_2")
+        if f"wear.{name}.coefficient" in fitted.by_path
+    ]
+    for body in bodies:
+        rows += _body(fitted, body)
+    return [Row("wear", rows)]
+
+
+def _body(fitted: Fitted, body: str) -> list[Row]:
+    """The entries of a body; of both together that of each is left to be decided."""
+    entries = [_row(fitted, f"wear.{body}.coefficient", "coefficient")]
+    if (path := f"wear.{body}.threshold") in fitted.by_path:
+        threshold = _row(fitted, path, "threshold")
+        scope = Row("scope", "global")
+        entries.append(Row("evolution", [scope, threshold], off=threshold.off))
+    if (path := f"wear.{body}.intercept") in fitted.by_path:
+        found = _row(fitted, path, "intercept")
+        comment = f"{found.comment}; a case has none: its volumes are less by so much"
+        entries.append(Row("intercept", found.value, comment, off=True))
+    if body != "both":
+        return [Row(body, entries)]
+    text = "of both together; which share each body has was not measured"
+    return [Row("body_1", entries, text, off=True), Row("body_2", entries, "", off=True)]

@@ -1,0 +1,24 @@
+"""The files of a fit that ``fretscale new`` writes."""
+
+from __future__ import annotations
+
+from workflow.case.sections import Section
+from workflow.case.template import EDITORS, template
+from workflow.fit.schema import JointFit, LoopFit, WearFit
+
+FITS: dict[str, tuple[type[Section], str]] = {
+    "fit_joint": (JointFit, "from measurements: how friction and stiffness of a joint follow wear"),
+    "fit_loops": (LoopFit, "from measurements: a joint law, of recorded hysteresis loops"),
+    "fit_wear": (WearFit, "from measurements: wear coefficients, of volumes against energy"),
+}
+HEADER = f"""\
+{EDITORS}\
+# `fretscale fit` finds what is `free` here; a value in place of that is held. A number without a
+# unit is in the base unit, given in brackets. Entries behind a # are optional: those said to be
+# `or` another kind take the place of the section above.
+"""
+
+
+def fit_template(kind: str) -> str:
+    """A commented file of a fit, one of ``FITS``."""
+    return template(FITS[kind][0], HEADER)

@@ -1,0 +1,151 @@
+"""Parameters from measurements, from a program."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from sa_solver.types import Array
+from workflow.case.source import IN_PYTHON
+from workflow.fit.fitting import Fitted, run_fit
+from workflow.fit.report import report, summary
+from workflow.fit.running import write_fit
+from workflow.fit.schema import load_fit, parse_fit, text_of
+from workflow.fit.section import section_of
+
+AnyFit = str | os.PathLike[str] | Mapping[str, Any]
+"""A fit: the path of its file, or its entries as nested dictionaries."""
+
+
+def fit(
+    asked: AnyFit, /, out: str | os.PathLike[str] | None = None, *, force: bool = False
+) -> FitResult:
+    """Find parameters of a case from measurements.
+
+    ``asked`` is what ``fretscale new fit_joint``, ``fit_loops`` or ``fit_wear`` writes: the path of
+    such a file, or a dictionary of its entries, whose tables are looked for from the current
+    folder. With ``out`` the section of a case, tables, summary and figure are written there, over
+    what an earlier one has left if ``force``.
+
+    Returns the parameters with their bounds. Raises :class:`CaseError` and :class:`UserError` for a
+    file, tables or data that allow no fit, in the words of the command; :class:`FretscaleError`
+    where no start leads to a solution.
+
+    Examples
+    --------
+    Volumes that four tests wore:
+
+    >>> import fretscale, pathlib, tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     table = pathlib.Path(folder, "volumes.csv")
+    ...     rows = ["energy [kJ], volume [mm^3]", "2, 3e-3", "4, 6.1e-3", "6, 9e-3", "8, 12e-3"]
+    ...     _ = table.write_text("\\n".join(rows))
+    ...     found = fretscale.fit(
+    ...         {
+    ...             "title": "Four tests",
+    ...             "fit": "wear_coefficient",
+    ...             "measurements": [{"file": str(table)}],
+    ...             "wear": {"law": "energy"},
+    ...         }
+    ...     )
+    >>> alpha = found["wear.both.coefficient"]
+    >>> print(f"{alpha.value:.0f} {alpha.unit}, {alpha.lower:.0f} to {alpha.upper:.0f}")
+    1503 um^3/J, 1488 to 1519
+    """
+    if isinstance(asked, Mapping):
+        fitted = run_fit(parse_fit(text_of(asked), IN_PYTHON))
+    else:
+        fitted = run_fit(load_fit(Path(asked)))
+    if out is not None:
+        write_fit(fitted, Path(out), force)
+    return FitResult(fitted)
+
+
+class FittedParameter(NamedTuple):
+    """A free parameter, in ``unit``: its ``value``, standard ``deviation`` and bounds of 95 %.
+
+    The bounds are ``lower`` and ``upper``. All are None where the data do not determine it, and
+    ``doubt`` says why. ``shares`` are those of each kind of data in its variance.
+
+    Examples
+    --------
+    >>> import fretscale
+    >>> rate = fretscale.FittedParameter("1/J", 3e-4, 1e-5, 2.8e-4, 3.2e-4, "", {"friction": 1.0})
+    >>> rate.value
+    0.0003
+    """
+
+    unit: str
+    value: float | None
+    deviation: float | None
+    lower: float | None
+    upper: float | None
+    doubt: str
+    shares: dict[str, float]
+
+
+class FitResult:
+    """What a fit has found; printed, it is what ``fretscale fit`` says.
+
+    ``parameters`` by their paths in a case, ``result["joint.friction"]`` the one of that path,
+    ``correlation`` of them ``(p, p)``, ``section`` the YAML of a case, ``doubts`` what speaks
+    against the fit, ``summary`` all of it as the command writes it.
+
+    Examples
+    --------
+    Stiffness that falls by a constant per joule, measured without error:
+
+    >>> import fretscale, pathlib, tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     table = pathlib.Path(folder, "loops.csv")
+    ...     rows = [f"{10 * k}, {20 - 0.1 * k}" for k in range(6)]
+    ...     _ = table.write_text("\\n".join(["energy [J], kt [N/um]", *rows]))
+    ...     found = fretscale.fit(
+    ...         {
+    ...             "title": "Six loops",
+    ...             "fit": "joint_evolution",
+    ...             "measurements": [{"file": str(table)}],
+    ...             "law": "bouc_wen",
+    ...             "evolution": {"stiffness": {"kind": "linear"}},
+    ...         }
+    ...     )
+    >>> {path: round(parameter.value, 9) for path, parameter in found.parameters.items()}
+    {'joint.stiffness': 20.0, 'evolution.stiffness.slope': -0.0005}
+    """
+
+    def __init__(self, fitted: Fitted) -> None:
+        self._fitted = fitted
+        self.section = section_of(fitted)
+        self.doubts = fitted.doubts
+        self.summary = summary(fitted, self.section)
+
+    def __getitem__(self, path: str) -> FittedParameter:
+        return self.parameters[path]
+
+    def __str__(self) -> str:
+        return "\n".join(report(self._fitted))
+
+    @property
+    def parameters(self) -> dict[str, FittedParameter]:
+        """All free parameters by their paths."""
+        return {path: _parameter(told) for path, told in self.summary["parameters"].items()}
+
+    @property
+    def correlation(self) -> Array:
+        """Of the parameters in their order ``(p, p)``; NaN where one is not determined."""
+        return self._fitted.fit.correlation
+
+
+def _parameter(told: Mapping[str, Any]) -> FittedParameter:
+    lower, upper = told["bounds"] or (None, None)
+    return FittedParameter(
+        told["unit"],
+        told["value"],
+        told["deviation"],
+        lower,
+        upper,
+        told["doubt"],
+        dict(told["shares"]),
+    )
