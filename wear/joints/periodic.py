@@ -182,7 +182,7 @@ class PeriodicMarch:
                 samples, joints, 1 + 2 * linearise_curves(len(lead), driven, nothing), 1
             )
             linearise_curves(len(lead), driven, maps)
-            return LinearisedMarch(*maps)
+            return LinearisedMarch.of(maps)
         remembered, linearise = MEMORY[directions]
         if isinstance(law, ElasticLaw):
             remembered, linearise = 0, linearise_elastic
@@ -190,7 +190,7 @@ class PeriodicMarch:
             self._kernels[0].settle(Period(basis, basis.T, lead), driven)
         maps = Maps.room(samples, joints, remembered, directions)
         linearise(driven, maps)
-        return LinearisedMarch(*maps)
+        return LinearisedMarch.of(maps)
 
     def _driven(
         self, coefficients: Array, basis: Array, lead: Array, functions: int
