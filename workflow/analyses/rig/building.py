@@ -12,44 +12,56 @@ from fe_models.dynamics.ground_motion import Translation
 from fe_models.dynamics.rig import Link, lumped_rig, unit_force
 from workflow.analyses.rig.damping import Damping
 from workflow.analyses.rig.friction_rig import friction_rig_model
-from workflow.analyses.rig.joint_sections import ElasticJoint, FrictionContactJoint, Joint
+from workflow.analyses.rig.joint_sections import ElasticJoint, Joint
+from workflow.analyses.rig.place_names import in_a_row
 from workflow.analyses.rig.reduced_rig import reduced_rig_model
-from workflow.analyses.rig.rig_model import RigModel
-from workflow.analyses.rig.structure import FrictionRig, JointedBody, Rig
+from workflow.analyses.rig.rig_model import JointEntry, RigModel
+from workflow.analyses.rig.structure import FrictionRig, JointedBody, Rig, own_laws
 from workflow.shell.reporter import Reporter
 
 
 def rig_model(
     structure: Rig | JointedBody | FrictionRig,
-    joint: Joint | ElasticJoint,
+    joint: Joint | ElasticJoint | None,
     mass: int | None,
     reporter: Reporter,
 ) -> RigModel:
     """The rig with its joints, of masses in a row driven at the ``mass`` of this number.
 
+    ``joint`` is that of the entries of joints that have no law of their own.
+
     Raises UserError where its bodies cannot be what the case says.
     """
     if isinstance(structure, JointedBody):
-        directions = 3 if isinstance(joint, FrictionContactJoint) else 1
-        return _damped(reduced_rig_model(structure, directions, reporter), structure.damping)
+        return _damped(reduced_rig_model(structure, joint, reporter), structure.damping)
     if isinstance(structure, FrictionRig):
         return _damped(friction_rig_model(structure, reporter), structure.damping)
     return row_of_masses(structure, mass or 1)
 
 
 def row_of_masses(rig: Rig, driven: int = 1) -> RigModel:
-    """Masses m1, m2, ... in a row from the ground on, the last held to the ground by the joint."""
+    """Masses m1, m2, ... in a row from the ground on, with joints; else one holds the last."""
     names = [f"m{number}" for number in range(1, len(rig.masses) + 1)]
     links = [Link(name, before) for name, before in zip(names, [None, *names], strict=False)]
+    places = in_a_row(names)
+    joints = [
+        [link]
+        for number, joint in enumerate(rig.joints)
+        for link in places.links(joint, f"structure.joints.{number}")
+    ] or [[Link(names[-1])]]
     model = lumped_rig(
         dict(zip(names, rig.masses, strict=True)),
         dict(zip(links, rig.springs, strict=True)),
-        [[Link(names[-1])]],
+        joints,
         np.array(rig.damping_ratio),
     )
     driving = unit_force(model, f"m{driven}")
     along = Translation(np.ones(len(names)), model.mass.sum(axis=1))
-    built = RigModel(model, driving, np.eye(len(names)), tuple(names), translations={"x": along})
+    built = RigModel(
+        *(model, driving, np.eye(len(names)), tuple(names)),
+        entries=tuple(JointEntry(1, own=law is not None) for law in own_laws(rig)),
+        translations={"x": along},
+    )
     return _damped(built, rig.damping)
 
 

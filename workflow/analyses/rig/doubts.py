@@ -20,7 +20,7 @@ RIGID = 1e12
 def about_modes(
     path: str, span: tuple[float, float], structure: Section, stiffness: float = RIGID
 ) -> Iterator[str]:
-    """About a ``span`` [Hz] in which a rig has no mode, be its joint of a stiffness open or stuck.
+    """About a ``span`` [Hz] in which a rig has no mode, be its joints of a stiffness open or stuck.
 
     Between both every mode moves as the joint slips. A reduced body is not looked at.
     """
@@ -46,11 +46,27 @@ def about_matrices(structure: Section, highest: float) -> Iterator[str]:
         yield from structure.doubts(highest)
 
 
+def _stretches(structure: Rig | FrictionRig) -> Array:
+    """What joints stretch by ``(j, n)``: of a rig that names none, one holds the last mass."""
+    unit = np.eye(len(structure.masses))
+    if isinstance(structure, FrictionRig) or not structure.joints:
+        return unit[-1:]
+    ends = [(joint.points, joint.against) for joint in structure.joints]
+    return np.array(
+        [
+            unit[int(second[1:]) - 1] - (0.0 if first is None else unit[int(first[1:]) - 1])
+            for second, first in ends
+        ]
+    )
+
+
 def modes(structure: Rig | FrictionRig, stiffness: float) -> Array:
-    """Natural frequencies [Hz] of the masses in a row, the last held by a stiffness [N/mm]."""
+    """Natural frequencies [Hz] of the masses in a row, whose joints have a stiffness [N/mm]."""
     masses, springs = np.array(structure.masses), np.array(structure.springs)
-    matrix = np.diag(springs + np.append(springs[1:], stiffness))
+    matrix = np.diag(springs + np.append(springs[1:], 0.0))
     matrix -= np.diag(springs[1:], 1) + np.diag(springs[1:], -1)
+    for stretch in _stretches(structure):
+        matrix += stiffness * np.outer(stretch, stretch)
     # Over the smallest mass, so that no slipped exponent overflows.
     least = masses.min()
     scale = np.sqrt(least / masses)

@@ -29,6 +29,11 @@ class Joint(Section):
     friction: Coefficient = entry("limit of the friction force over the normal load [1]", 0.11)
     stiffness: JointStiffness = entry("of the stuck joint [N/mm]", "27.3 N/um")
 
+    @property
+    def moves_mean(self) -> bool:
+        """Whether a vibration about 0 has a mean, and even harmonics."""
+        return False
+
 
 class RisingJoint(Joint):
     """A joint whose force goes on rising when all of it slides."""
@@ -110,6 +115,10 @@ class FrictionContactJoint(Joint):
     stiffness: JointStiffness = entry("along the surface, stuck [N/mm]", "100 N/um")
     normal_stiffness: JointStiffness = entry("in contact [N/mm]", "100 N/um")
     gap: Gap = entry("instead of a normal load: open by so much at rest [mm]", "0 um", default=0.0)
+
+    @property
+    def moves_mean(self) -> bool:
+        return True
 
     @model_validator(mode="after")
     def _pressed_or_open(self) -> FrictionContactJoint:

@@ -14,6 +14,7 @@ from workflow.analyses.rig.excitation import DrivingForce, Frequency, MassNumber
 from workflow.analyses.rig.joint_sections import (
     ElasticJoint,
     FrictionContactJoint,
+    Joint,
     VibrationLaw,
 )
 from workflow.analyses.rig.matrix_body import MatrixBody
@@ -22,7 +23,10 @@ from workflow.analyses.rig.structure import (
     ReducedBody,
     Rig,
     driven_place,
+    joint_rows,
+    own_laws,
     refuse_missing_mass,
+    refuse_own_joints,
     refuse_undriven,
     structure_outline,
 )
@@ -35,7 +39,7 @@ from workflow.analyses.vibration.sections import (
     NonlinearModes,
 )
 from workflow.case.fields import Quantity
-from workflow.case.plain import entries, shares
+from workflow.case.plain import shares
 from workflow.case.sections import Case, Title, disagreement, entry, one_of
 from workflow.case.source import Source
 
@@ -44,6 +48,8 @@ class VibrationCaseBase(Case):
     """A structure under forces a sin(2π frequency t), for all frequencies of a span."""
 
     also_filled_in: ClassVar[tuple[str, ...]] = ("forces",)
+    # Whether joints may have laws of their own, beside that of the case.
+    mixes_laws: ClassVar[bool] = False
     in_schema: ClassVar[Mapping[str, Any]] = one_of("forces", "excitation")
 
     title: Title = entry("one line", "Forced response of a friction rig")
@@ -75,6 +81,12 @@ class VibrationCaseBase(Case):
             raise disagreement("not ascending; allowed: each force above the last", "forces")
         if self.frequencies[0] >= self.frequencies[1]:
             raise disagreement("not ascending; allowed: lower, then upper end", "frequencies")
+        return self
+
+    @model_validator(mode="after")
+    def _wears_its_joint(self) -> VibrationCaseBase:
+        if not self.mixes_laws:
+            refuse_own_joints(self.structure, "the contact that wears alone")
         return self
 
     @model_validator(mode="after")
@@ -149,12 +161,13 @@ class VibrationCaseBase(Case):
         return tuple(sorted({*harmonics, *excited} | ({0} if mean else set())))
 
     def doubts(self) -> Iterator[str]:
-        joint = getattr(self, "joint", None)
-        # Nonlinear springs may take a mode anywhere above that without them.
-        free = joint is None or isinstance(joint, ElasticJoint)
-        stiffness = RIGID if free else getattr(joint, "stiffness", RIGID)
-        yield from about_modes("frequencies", self.frequencies, self.structure, stiffness)
+        yield from about_modes("frequencies", self.frequencies, self.structure, self._stuck)
         yield from about_matrices(self.structure, self.frequencies[1] * self.harmonics[-1])
+
+    @property
+    def _stuck(self) -> float:
+        """A stiffness [N/mm] that no joint has more of."""
+        return RIGID
 
     @property
     def driving(self) -> str:
@@ -224,6 +237,8 @@ class VibrationCase(DrivenMass):
     """Steady vibration of a structure on friction joints that stay as they are."""
 
     about: ClassVar[str] = "the steady vibration of a rig with friction joints, over frequency"
+    also_filled_in: ClassVar[tuple[str, ...]] = ("forces", "joint")
+    mixes_laws: ClassVar[bool] = True
 
     @classmethod
     def suits(cls, source: Source) -> bool:
@@ -232,7 +247,11 @@ class VibrationCase(DrivenMass):
     structure: Annotated[
         Rig | ReducedBody | MatrixBody | FrictionRig, Field(discriminator="kind")
     ] = entry("what holds the joints")
-    joint: VibrationLaw = entry("its law and its parameters; of all joints together")
+    joint: VibrationLaw | None = entry(
+        "its law and its parameters; of all joints together that have none of their own in "
+        "structure.joints",
+        default=None,
+    )
     loops: LoopsAt | None = entry("of all joints together, at one frequency", default=None)
     force_sweeps: Annotated[tuple[Frequency, ...], Field(max_length=100)] = entry(
         "frequencies at which motions are followed along the force, from the least to the largest "
@@ -272,22 +291,53 @@ class VibrationCase(DrivenMass):
         default="auto",
     )
 
+    @model_validator(mode="after")
+    def _has_laws(self) -> VibrationCase:
+        own = own_laws(self.structure)
+        if self.joint is None and None in own:
+            raise disagreement(
+                "missing; allowed: the law of all joints, or one for each entry of "
+                "structure.joints",
+                "joint",
+            )
+        if self.joint is not None and None not in own:
+            raise disagreement(
+                f"{self.joint.law}: given, but every entry of joints has a law of its own; "
+                "allowed: without it",
+                "joint",
+            )
+        return self
+
+    @property
+    def laws(self) -> tuple[Joint | ElasticJoint, ...]:
+        """That of every entry of joints, or of joints that need no entry."""
+        every = (own or self.joint for own in own_laws(self.structure))
+        return tuple(law for law in every if law is not None)
+
+    @property
+    def _stuck(self) -> float:
+        # Nonlinear springs may take a mode anywhere above that without them.
+        return max(law.stiffness if isinstance(law, Joint) else RIGID for law in self.laws)
+
+    @property
+    def law_names(self) -> str:
+        """What these are called."""
+        return ", ".join(dict.fromkeys(law.law for law in self.laws))
+
     @property
     def contacts(self) -> bool:
-        return isinstance(self.joint, FrictionContactJoint)
+        return any(isinstance(law, FrictionContactJoint) for law in self.laws)
 
     @property
     def moves_mean(self) -> bool:
-        elastic = isinstance(self.joint, ElasticJoint) and self.joint.moves_mean
-        return self.contacts or elastic
+        return any(law.moves_mean for law in self.laws)
 
     def doubts(self) -> Iterator[str]:
         yield from super().doubts()
-        elastic, harmonics = isinstance(self.joint, ElasticJoint), self.harmonics
-        one_sided = elastic and self.moves_mean
-        if one_sided and not any(number % 2 == 0 for number in harmonics if number > 0):
+        uneven = [law for law in self.laws if isinstance(law, ElasticJoint) and law.moves_mean]
+        if uneven and not any(number % 2 == 0 for number in self.harmonics if number > 0):
             yield (
-                f"resolution.harmonics: without even ones, which a joint of law {self.joint.law} "
+                f"resolution.harmonics: without even ones, which a joint of law {uneven[0].law} "
                 "that is not alike on both sides has; list them, such as [0, 1, 2, 3, 4, 5]"
             )
 
@@ -328,7 +378,7 @@ class VibrationCase(DrivenMass):
 
     @model_validator(mode="after")
     def _has_the_directions(self) -> VibrationCase:
-        if self.contacts and isinstance(self.structure, Rig):
+        if isinstance(self.joint, FrictionContactJoint) and isinstance(self.structure, Rig):
             raise disagreement(
                 "friction_contact: has three directions; allowed: in a reduced structure or a "
                 "friction_rig, or jenkins, which it is along one",
@@ -340,7 +390,7 @@ class VibrationCase(DrivenMass):
 
     def _require_pad_contacts(self) -> None:
         """Refuse joints that are not those of two pads."""
-        joint = self.joint
+        (joint,) = self.laws
         if not isinstance(joint, FrictionContactJoint):
             raise disagreement(
                 f"{joint.law}: between two pads; allowed: friction_contact", "joint.law"
@@ -359,6 +409,7 @@ class VibrationCase(DrivenMass):
 
     @model_validator(mode="after")
     def _looks_inside(self) -> VibrationCase:
+        self._require_joints_of_loops()
         low, high = self.frequencies
         looked_at = {f"at.{place}": frequency for place, frequency in enumerate(self.at)}
         if self.loops is not None:
@@ -374,11 +425,29 @@ class VibrationCase(DrivenMass):
             raise disagreement("not ascending; allowed: each frequency above the last", "at")
         return self
 
+    def _require_joints_of_loops(self) -> None:
+        """Refuse loops of an entry that there is not, and of several laws together."""
+        if self.loops is None:
+            return
+        number, own = self.loops.joints, own_laws(self.structure)
+        if number is None and any(own) and len(own) > 1:
+            raise disagreement(
+                "missing: joints of laws of their own have no loop together; allowed: the number "
+                f"of an entry of structure.joints, 1 to {len(own)}",
+                "loops.joints",
+                "loops",
+            )
+        count = 0 if isinstance(self.structure, FrictionRig) else len(self.structure.joints)
+        if number is not None and number > count:
+            allowed = f"1 to {count}" if count else "without it"
+            raise disagreement(
+                f"{number}: no such entry of structure.joints; allowed: {allowed}", "loops.joints"
+            )
+
     def outline(self) -> list[tuple[str, str]]:
-        structure, joint = self.structure, self.joint
         return [
-            *structure_outline(structure),
-            ("joint", f"{joint.law}, {entries(joint)}"),
+            *structure_outline(self.structure),
+            *joint_rows(self.joint, own_laws(self.structure)),
             ("forces", self.driving),
             ("method", self.resolved),
             *([("motions at", f"{', '.join(f'{at:g}' for at in self.at)} Hz")] if self.at else []),

@@ -55,7 +55,7 @@ def _write_results(outcome: VibrationOutcome, run: Run[VibrationCase]) -> None:
     case = outcome.case
     attributes = {
         "analysis": case.analysis,
-        "law": case.joint.law,
+        "law": case.law_names,
         "seen": list(outcome.labels),
         "engine_order": case.engine_order,
     }
@@ -184,7 +184,7 @@ def _every_bifurcation(outcome: VibrationOutcome) -> Iterator[tuple[str, Mapping
 
 def _summary(outcome: VibrationOutcome) -> dict[str, Any]:
     summary: dict[str, Any] = {
-        "law": outcome.case.joint.law,
+        "law": outcome.case.law_names,
         **outcome.numbers,
         "responses": [
             _response_summary(outcome.case.amount, response) for response in outcome.responses
