@@ -168,7 +168,7 @@ analysis: vibration
 structure:
   kind: reduced
   file: body.h5
-  further_masses: [{{name: damper, mass: 0.5 kg, directions: [x, y, z]}}]
+  further_masses: [{{name: damper, mass: 0.5 kg, directions: xyz}}]
   joints:
     - {{points: damper, against: holder, direction: -z, joint: {CONTACT}}}
     - {{points: block, direction: x, joint: {STOP}}}
@@ -218,7 +218,7 @@ def test_a_body_with_a_damper_is_a_row_of_three_masses(body):
     on_body = model_of(
         body,
         ON_BODY,
-        "structure.further_masses=[{name: damper, mass: 0.5 kg, directions: [x]}]",
+        "structure.further_masses=[{name: damper, mass: 0.5 kg, directions: x}]",
         "structure.springs=[{points: damper, direction: x, stiffness: 0.3 N/um}]",
         f"structure.joints=[{damper}, {{points: block, direction: x, joint: {STOP}}}]",
         "structure.damping_ratio=0",
@@ -262,12 +262,20 @@ def test_in_time_those_of_their_own_stay_as_they_are(tmp_path):
 # --- what cannot be -----------------------------------------------------------------------------
 
 
+def test_a_row_has_the_joint_of_the_case_behind_its_last_mass(tmp_path):
+    """Beside those that have a law of their own; none where no law is shared."""
+    beside = model_of(tmp_path, CASE, f"joint={HARDENS}")
+    np.testing.assert_array_equal(beside.rig.model.connection, [[-1, 1], [0, 1], [0, 1]])
+    assert [group.law.stiffness for group in beside.law.groups] == [KT, STIFF, 500.0]
+    alone = model_of(tmp_path, CASE)
+    np.testing.assert_array_equal(alone.rig.model.connection, [[-1, 1], [0, 1]])
+
+
 @pytest.mark.parametrize(
     ("overrides", "key", "said"),
     [
         (["structure.joints=[]"], "joint", "the law of all joints"),
         (["structure.joints.0.joint=null"], "joint", "or one for each entry"),
-        ([f"joint={SLIDER}"], "joint", "every entry of joints has a law of its own"),
         (["structure.joints.0.points=m3"], "structure.joints.0.points", "allowed: m1 to m2"),
         (["structure.joints.0.against=m2"], "structure.joints.0.against", "against itself"),
         (["structure.joints.1.direction=y"], "structure.joints.1.direction", "move along x"),
@@ -287,11 +295,12 @@ def test_nonsense_in_a_row_is_refused(tmp_path, overrides, key, said):
     ("overrides", "said"),
     [
         (["structure.further_masses.0.name=block"], "structure.further_masses.0.name: 'block'"),
-        (["structure.further_masses.0.directions=[x]"], "damper does not move along y; allowed: x"),
+        (["structure.further_masses.0.directions=x"], "damper does not move along y; allowed: x"),
         (
             ["structure.joints.0.against=damper"],
             "structure.joints.0.against: damper against itself",
         ),
+        ([f"joint={SLIDER}"], "jenkins: given, but every entry of joints has a law of its own"),
         (["structure.joints.0.points=dumper"], "structure.joints.0.points: 'dumper'"),
     ],
 )

@@ -16,7 +16,7 @@ from workflow.analyses.rig.joint_sections import ElasticJoint, Joint
 from workflow.analyses.rig.place_names import in_a_row
 from workflow.analyses.rig.reduced_rig import reduced_rig_model
 from workflow.analyses.rig.rig_model import JointEntry, RigModel
-from workflow.analyses.rig.structure import FrictionRig, JointedBody, Rig, own_laws
+from workflow.analyses.rig.structure import FrictionRig, JointedBody, Rig, joints_of
 from workflow.shell.reporter import Reporter
 
 
@@ -36,19 +36,23 @@ def rig_model(
         return _damped(reduced_rig_model(structure, joint, reporter), structure.damping)
     if isinstance(structure, FrictionRig):
         return _damped(friction_rig_model(structure, reporter), structure.damping)
-    return row_of_masses(structure, mass or 1)
+    return row_of_masses(structure, mass or 1, joint is not None)
 
 
-def row_of_masses(rig: Rig, driven: int = 1) -> RigModel:
-    """Masses m1, m2, ... in a row from the ground on, with joints; else one holds the last."""
+def row_of_masses(rig: Rig, driven: int = 1, shared: bool = True) -> RigModel:
+    """Masses m1, m2, ... in a row from the ground on, with joints.
+
+    Where there is a ``shared`` law that no entry has, one more is between the last and the ground.
+    """
+    joined = joints_of(rig, shared)
     names = [f"m{number}" for number in range(1, len(rig.masses) + 1)]
     links = [Link(name, before) for name, before in zip(names, [None, *names], strict=False)]
     places = in_a_row(names)
     joints = [
         [link]
-        for number, joint in enumerate(rig.joints)
+        for number, joint in enumerate(joined)
         for link in places.links(joint, f"structure.joints.{number}")
-    ] or [[Link(names[-1])]]
+    ]
     model = lumped_rig(
         dict(zip(names, rig.masses, strict=True)),
         dict(zip(links, rig.springs, strict=True)),
@@ -59,7 +63,7 @@ def row_of_masses(rig: Rig, driven: int = 1) -> RigModel:
     along = Translation(np.ones(len(names)), model.mass.sum(axis=1))
     built = RigModel(
         *(model, driving, np.eye(len(names)), tuple(names)),
-        entries=tuple(JointEntry(1, own=law is not None) for law in own_laws(rig)),
+        entries=tuple(JointEntry(1, own=joint.joint is not None) for joint in joined),
         translations={"x": along},
     )
     return _damped(built, rig.damping)

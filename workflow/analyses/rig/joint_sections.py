@@ -188,6 +188,10 @@ UniaxialJoint = BoucWenJoint | JenkinsJoint | UniformIwanJoint | FourParameterIw
 JointLaw = Annotated[UniaxialJoint, Field(discriminator="law")]
 # Those of a structure that moves in three directions too.
 ContactLaw = Annotated[UniaxialJoint | FrictionContactJoint, Field(discriminator="law")]
+# Those of masses in a row, which move along one direction.
+RowLaw = Annotated[
+    UniaxialJoint | PolynomialSpringJoint | ElasticStopJoint, Field(discriminator="law")
+]
 # Those of steady vibrations, in which joints need not wear.
 VibrationLaw = Annotated[
     UniaxialJoint | FrictionContactJoint | PolynomialSpringJoint | ElasticStopJoint,

@@ -96,7 +96,7 @@ class RigModel:
 
     def of_entry(self, number: int | None) -> tuple[slice, int]:
         """Joints of an entry of the case, or all, and their direction that is looked at."""
-        if number is None:
+        if number is None or not self.entries:
             return slice(0, self.joints), self.along
         first = sum(self.counts[:number])
         entry = self.entries[number]

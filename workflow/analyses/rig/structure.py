@@ -13,8 +13,8 @@ from pydantic import Field, model_validator
 from workflow.analyses.rig.damping import OF_MODES, Damping, DampingRatios, damping_text
 from workflow.analyses.rig.joint_sections import (
     ElasticJoint,
-    FrictionContactJoint,
     Joint,
+    RowLaw,
     VibrationLaw,
 )
 from workflow.analyses.rig.places import Against, Direction, Moved, Points
@@ -57,6 +57,10 @@ class RowJoint(JointPlaces):
     points: Title = entry("the mass: m1, m2, ... from the ground on", "m2")
     against: Title | None = entry("another mass; without it the ground", "m1", default=None)
     direction: Direction = entry("x, or -x: in which the mass stretches it", "x", default="x")
+    joint: RowLaw | None = entry(
+        "law and parameters of its own; without it the case's joint, which all without one share",
+        default=None,
+    )
 
 
 class Rig(Section):
@@ -71,7 +75,9 @@ class Rig(Section):
         ["1.4 N/um", "273 N/um"],
     )
     joints: tuple[RowJoint, ...] = entry(
-        "where they are; none: one between the last mass and the ground", default=()
+        "where they are; the case's joint is between the last mass and the ground where no entry "
+        "takes it",
+        default=(),
     )
     damping_ratio: DampingRatios = entry(f"without the joint, {OF_MODES}", 0.001)
     damping: Damping | None = entry("added to that of the modes", default=None)
@@ -95,12 +101,6 @@ class Rig(Section):
                 raise disagreement(
                     f"{joint.direction}: masses in a row move along x; allowed: x, -x",
                     f"{key}.direction",
-                )
-            if isinstance(joint.joint, FrictionContactJoint):
-                raise disagreement(
-                    "friction_contact: has three directions; allowed: in a reduced structure, or "
-                    "jenkins, which it is along one",
-                    f"{key}.joint.law",
                 )
         return self
 
@@ -147,14 +147,12 @@ class FurtherMass(Section):
 
     name: Title = entry("of the point, as joints, springs and forces name it", "damper")
     mass: Mass = entry("[t]", "50 g")
-    directions: Annotated[tuple[Literal["x", "y", "z"], ...], Field(min_length=1)] = entry(
-        "in which it moves; it is held in the others", ["x", "z"], default=("x", "y", "z")
+    directions: Literal["xyz", "xy", "xz", "yz", "x", "y", "z"] = entry(
+        "in which it moves; it is held in the others", "xz", default="xyz"
     )
 
     @model_validator(mode="after")
     def _is_a_point(self) -> FurtherMass:
-        if len(set(self.directions)) < len(self.directions):
-            raise disagreement("a direction twice; allowed: each once", "directions")
         if re.fullmatch(MODE, self.name) is not None:
             raise disagreement(f"{shown(self.name)}: the name of a mode; allowed: others", "name")
         return self
@@ -320,10 +318,24 @@ def _between(joint: JointPlaces) -> str:
     return f"between {joint.against} and {joint.points}"
 
 
-def own_laws(structure: Rig | JointedBody | FrictionRig) -> tuple[VibrationLaw | None, ...]:
-    """The law that each entry of joints has of its own; one None for joints that need no entry."""
-    joints = () if isinstance(structure, FrictionRig) else structure.joints
-    return tuple(places.joint for places in joints) or (None,)
+def joints_of(structure: Section, shared: bool = True) -> tuple[JointPlaces, ...]:
+    """The entries of joints of a structure, none of specimens that need none.
+
+    Where there is a ``shared`` law, of the case, and no entry has it, it is that of a joint between
+    the last mass of a row and the ground.
+    """
+    if isinstance(structure, Rig):
+        taken = any(joint.joint is None for joint in structure.joints)
+        last = () if taken or not shared else (RowJoint(points=f"m{len(structure.masses)}"),)
+        return (*structure.joints, *last)
+    return structure.joints if isinstance(structure, JointedBody) else ()
+
+
+def own_laws(structure: Section, shared: bool = True) -> tuple[VibrationLaw | None, ...]:
+    """The law that each of these has of its own; one None for joints that need no entry."""
+    if isinstance(structure, FrictionRig):
+        return (None,)
+    return tuple(places.joint for places in joints_of(structure, shared))
 
 
 def joint_rows(

@@ -161,13 +161,20 @@ class VibrationCaseBase(Case):
         return tuple(sorted({*harmonics, *excited} | ({0} if mean else set())))
 
     def doubts(self) -> Iterator[str]:
-        yield from about_modes("frequencies", self.frequencies, self.structure, self._stuck)
+        yield from about_modes(
+            "frequencies", self.frequencies, self.structure, self._stuck, self._shares
+        )
         yield from about_matrices(self.structure, self.frequencies[1] * self.harmonics[-1])
 
     @property
     def _stuck(self) -> float:
         """A stiffness [N/mm] that no joint has more of."""
         return RIGID
+
+    @property
+    def _shares(self) -> bool:
+        """Whether joints without a law of their own have one."""
+        return True
 
     @property
     def driving(self) -> str:
@@ -293,8 +300,8 @@ class VibrationCase(DrivenMass):
 
     @model_validator(mode="after")
     def _has_laws(self) -> VibrationCase:
-        own = own_laws(self.structure)
-        if self.joint is None and None in own:
+        own = self.own_laws
+        if self.joint is None and (None in own or not own):
             raise disagreement(
                 "missing; allowed: the law of all joints, or one for each entry of "
                 "structure.joints",
@@ -309,9 +316,18 @@ class VibrationCase(DrivenMass):
         return self
 
     @property
+    def _shares(self) -> bool:
+        return self.joint is not None
+
+    @property
+    def own_laws(self) -> tuple[Joint | ElasticJoint | None, ...]:
+        """Of every entry of joints, None for that of the case."""
+        return own_laws(self.structure, self._shares)
+
+    @property
     def laws(self) -> tuple[Joint | ElasticJoint, ...]:
         """That of every entry of joints, or of joints that need no entry."""
-        every = (own or self.joint for own in own_laws(self.structure))
+        every = (own or self.joint for own in self.own_laws)
         return tuple(law for law in every if law is not None)
 
     @property
@@ -429,7 +445,7 @@ class VibrationCase(DrivenMass):
         """Refuse loops of an entry that there is not, and of several laws together."""
         if self.loops is None:
             return
-        number, own = self.loops.joints, own_laws(self.structure)
+        number, own = self.loops.joints, self.own_laws
         if number is None and any(own) and len(own) > 1:
             raise disagreement(
                 "missing: joints of laws of their own have no loop together; allowed: the number "
@@ -437,17 +453,16 @@ class VibrationCase(DrivenMass):
                 "loops.joints",
                 "loops",
             )
-        count = 0 if isinstance(self.structure, FrictionRig) else len(self.structure.joints)
-        if number is not None and number > count:
-            allowed = f"1 to {count}" if count else "without it"
+        if number is not None and number > len(own):
             raise disagreement(
-                f"{number}: no such entry of structure.joints; allowed: {allowed}", "loops.joints"
+                f"{number}: no such entry of structure.joints; allowed: up to {len(own)}",
+                "loops.joints",
             )
 
     def outline(self) -> list[tuple[str, str]]:
         return [
             *structure_outline(self.structure),
-            *joint_rows(self.joint, own_laws(self.structure)),
+            *joint_rows(self.joint, self.own_laws),
             ("forces", self.driving),
             ("method", self.resolved),
             *([("motions at", f"{', '.join(f'{at:g}' for at in self.at)} Hz")] if self.at else []),

@@ -21,7 +21,7 @@ from wear.joints.periodic import PeriodicMarch
 from workflow.analyses.rig.building import rig_model
 from workflow.analyses.rig.laws import Laws, grouped, law_of, law_of_all, laws_of
 from workflow.analyses.rig.rig_model import RigModel
-from workflow.analyses.rig.structure import FrictionRig, own_laws
+from workflow.analyses.rig.structure import FrictionRig
 from workflow.analyses.vibration.case import VibrationCase
 from workflow.analyses.vibration.excitation import FORCE
 from workflow.analyses.vibration.load import Driving, driving_of
@@ -208,7 +208,7 @@ def _law(case: VibrationCase, rig: RigModel) -> Laws:
     of their own, and may share stiffness by their areas.
     """
     if not isinstance(case.structure, FrictionRig):
-        shared, *own = laws_of([case.joint, *own_laws(case.structure)])
+        shared, *own = laws_of([case.joint, *case.own_laws])
         return law_of_all(shared, own, rig.counts)
     whole = law_of(case.laws[0])
     assert isinstance(whole, FrictionContact)
