@@ -3,20 +3,27 @@
 from math import copysign
 from pathlib import Path
 
+import h5py
 import numpy as np
 import pytest
 import scipy.linalg as sl
+from matplotlib import rc_context
 
 from fe_models.dynamics.excitation import CombinedForces, HarmonicForce
 from fe_models.dynamics.forced_response import along_force
 from fe_models.dynamics.newmark import TimeStepControl, integrate
 from fe_models.reduction import ReducedModel, save_reduced
+from tests.workflow.conftest import invoke
+from tests.workflow.figure_checks import problems
 from workflow.analyses.rig.building import rig_model
 from workflow.analyses.rig.structure import own_laws
 from workflow.analyses.time.joint_model import JointModel
+from workflow.analyses.vibration.figures.shares import joint_states
 from workflow.analyses.vibration.model import VibrationModel
+from workflow.analyses.vibration.outcome import Contents
 from workflow.errors import UserError
 from workflow.kinds import load_case, parse_case
+from workflow.pictures.style import STYLE
 from workflow.shell.reporter import Reporter
 
 SLIDER = "{law: jenkins, normal_load: 20 N, friction: 0.5, stiffness: 3 N/um}"
@@ -144,6 +151,44 @@ def test_masses_that_do_not_meet_move_as_each_alone(tmp_path):
     np.testing.assert_allclose(
         motion.cycle.dissipated, [slides.cycle.dissipated[0], 0.0], rtol=1e-8
     )
+
+
+def test_a_run_tells_what_each_joint_does(tmp_path):
+    """Table, results and figure; the loop is that of the entry that is asked for."""
+    settings = [
+        *("frequencies=[100 Hz, 130 Hz]", "resolution={harmonics: [0, 1, 2, 3], samples: 64}"),
+        *("loops={frequency: 110 Hz, joints: 1}", "stability=none", "forces=[40 N]"),
+    ]
+    (tmp_path / "case.yaml").write_text(CASE, encoding="utf-8")
+    chosen = [part for setting in settings for part in ("--set", setting)]
+    ended = invoke("run", tmp_path / "case.yaml", "--out", tmp_path / "out", *chosen)
+    assert ended.exit_code == 0, ended.output
+    with h5py.File(tmp_path / "out" / "results.h5") as file:
+        assert file.attrs["law"] == "jenkins, elastic_stop"
+        response = file["responses/00000"]
+        slip, apart = response["nodes/slip"][()], response["nodes/separated"][()]
+        np.testing.assert_allclose(slip.mean(axis=1), response["slip"], atol=1e-12)
+        assert slip[:, 0].max() > 0.2
+        assert not slip[:, 1].any()
+        assert not apart[:, 0].any()
+        lost = response["nodes/energy"][()]
+        np.testing.assert_allclose(lost.sum(axis=1), response["energy_per_cycle"], rtol=1e-12)
+        loop = response["loops/00000"]
+        assert np.ptp(loop["force"]) == pytest.approx(2.0 * LIMIT)
+        assert loop.attrs["stiffness"] == pytest.approx(KT)
+        table = np.loadtxt(tmp_path / "out" / "joints_00000.csv", delimiter=",", skiprows=1)
+        columns = np.column_stack([response["frequency"], slip, apart, lost])
+        np.testing.assert_allclose(table, columns, rtol=1e-8)
+        with rc_context(STYLE):
+            figure = joint_states(file, Contents(("00000",), (), False, False, joints=2))
+            figure.canvas.draw()
+        assert not problems(figure)
+        _, slider, stop = figure.axes
+        assert slider.get_ylabel().startswith("m2 - m1")
+        # From the bottom up: it sticks, slips, is apart.
+        tops = [part.get_paths()[0].vertices[:, 1].max() for part in stop.collections]
+        sticks = 100.0 * (1.0 - slip - apart)
+        np.testing.assert_allclose(tops, [sticks[:, 1].max(), sticks[:, 1].max(), 100.0], atol=1.0)
 
 
 # --- a body and a mass beside it ----------------------------------------------------------------

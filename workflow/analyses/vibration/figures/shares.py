@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import Any
 
 import h5py
@@ -101,11 +102,12 @@ def _shown(file: h5py.File, contents: Contents) -> list[h5py.Group]:
 
 
 def _names(file: h5py.File) -> list[str]:
-    """What each joint stretches by, in its first direction that moves."""
-    return [
-        next((name for name in map(bytes.decode, row) if name != "ground"), "joint")
-        for row in file["names/joints"][()]
-    ]
+    """What each joint stretches by; of those of several directions without these."""
+    names = []
+    for row in file["names/joints"][()]:
+        first, *more = (name for name in map(bytes.decode, row) if name != "ground")
+        names.append(re.sub(r" [xyz]\b", "", first) if more else first)
+    return names
 
 
 # --- along the curve ----------------------------------------------------------------------------
