@@ -59,10 +59,13 @@ class DeviatingJoints(Protocol):
     """:class:`PeriodicJoints` that also know what becomes of small deviations from their period.
 
     Without them nothing can be said of the stability of a motion. The times of ``basis`` ascend
-    from the beginning of the period; the last increment leads back to it.
+    from the beginning of the period; the last increment leads back to it. Joints that remember more
+    in some motions than in others have room for at least ``memory`` numbers.
     """
 
-    def linearise(self, coefficients: Array, basis: Array, lead: Array) -> Deviations: ...
+    def linearise(
+        self, coefficients: Array, basis: Array, lead: Array, memory: int = 0
+    ) -> Deviations: ...
 
 
 class PeriodicJoints(Protocol):

@@ -54,7 +54,7 @@ def model_of(folder: Path, text: str, *overrides: str) -> VibrationModel:
     return VibrationModel.of(case, Reporter(folder / "run.log"))
 
 
-def central_differences(damping, force, frequency, steps=2000, periods=40, stop=STIFF):
+def central_differences(damping, force, frequency, steps=1000, periods=30):
     """Both masses in the last of many periods, by an explicit method and the laws written out."""
     step = 1.0 / (steps * frequency)
     inverse = np.linalg.inv(MASSES / step**2 + damping / (2.0 * step)).tolist()
@@ -66,7 +66,7 @@ def central_differences(damping, force, frequency, steps=2000, periods=40, stop=
         stretch += (b - a) - (b0 - a0)
         if abs(stretch) > LIMIT / KT:
             stretch = copysign(LIMIT / KT, stretch)
-        slides, pushed = KT * stretch, stop * max(b - GAP, 0.0)
+        slides, pushed = KT * stretch, STIFF * max(b - GAP, 0.0)
         loads = drive[number % steps] + slides, -slides - pushed
         right = [
             loads[i] + inner[i][0] * a + inner[i][1] * b - back[i][0] * a0 - back[i][1] * b0
@@ -87,16 +87,16 @@ def test_two_laws_are_the_motion_of_an_explicit_method(tmp_path):
     slips, apart = (motion.cycle.states == 1).mean(axis=0)[0], (motion.cycle.states == 2).mean(0)[1]
     assert slips > 0.2
     assert 0.5 < apart < 0.95
-    steps = 2000
+    steps = 1000
     expected = central_differences(model.rig.model.damping, 40.0, 110.0, steps)
     size = np.abs(expected).max()
-    np.testing.assert_allclose(motion.displacement(steps), expected, atol=4e-3 * size)
+    np.testing.assert_allclose(motion.displacement(steps), expected, atol=3e-4 * size)
     force = HarmonicForce(model.rig.driven, 40.0, 110.0)
-    control = TimeStepControl(1.0 / (400 * 110.0))
+    control = TimeStepControl(1.0 / (250 * 110.0))
     marched = integrate(
-        model.rig.model, model.law, CombinedForces((force,)), 30 / 110.0, control
-    ).displacement[-401:-1]
-    np.testing.assert_allclose(marched, motion.displacement(400), atol=4e-3 * size)
+        model.rig.model, model.law, CombinedForces((force,)), 25 / 110.0, control
+    ).displacement[-251:-1]
+    np.testing.assert_allclose(marched, motion.displacement(250), atol=4e-3 * size)
 
 
 def test_a_stop_is_grazed_beside_a_slider(tmp_path):
@@ -121,7 +121,7 @@ def test_a_stop_is_grazed_beside_a_slider(tmp_path):
     last = above[-1]
     expected = central_differences(model.rig.model.damping, last.force, 60.0)
     np.testing.assert_allclose(
-        last.displacement(2000), expected, atol=5e-3 * np.abs(expected).max()
+        last.displacement(1000), expected, atol=5e-4 * np.abs(expected).max()
     )
 
 

@@ -156,12 +156,18 @@ class MixedMarch:
             lambda: np.concatenate([cycle.dissipated for cycle in cycles]),
         )
 
-    def linearise(self, coefficients: Array, basis: Array, lead: Array) -> LinearisedMarch:
+    def linearise(
+        self, coefficients: Array, basis: Array, lead: Array, memory: int = 0
+    ) -> LinearisedMarch:
         """What small deviations do, as :meth:`PeriodicMarch.linearise`."""
         joints, _, directions = coefficients.shape
         parts = list(self._parts(coefficients))
-        marches = [march.linearise(own, basis, lead) for march, _, _, own in parts]
+        marches = [march.linearise(own, basis, lead, memory) for march, _, _, own in parts]
         memory = max(march.kept.shape[2] for march in marches)
+        for place, (march, _, _, own) in enumerate(parts):
+            # Those whose memory depends on the motion have room for as much in all motions.
+            if isinstance(march.law, MasingLaw) and marches[place].kept.shape[2] < memory:
+                marches[place] = march.linearise(own, basis, lead, memory)
         maps = Maps.room(len(basis), joints, memory, directions)
         maps.kept[:] = np.eye(memory)
         for march, (_, at, along, _) in zip(marches, parts, strict=True):

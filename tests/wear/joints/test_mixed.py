@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -141,6 +143,28 @@ def test_stability_of_what_does_not_meet_is_that_of_each_alone():
     assert [of.neutral for of in each] == [0, 1, 0, 0]
     assert together.neutral == 1
     assert together.verdict == "stable"
+
+
+def test_stability_of_spread_sliders_is_that_of_many():
+    """Iwan's joint beside a spring, against sixty sliders; turning points come and go."""
+    count = 60
+    limits = 8.0 * (np.arange(count) + 0.5) / count**2 * 2.0
+    many = Jenkins(2e3 / count, 1.0, limits)
+    model, load = masses(("slips", "hardens"))
+    rows = model.connection
+    together = replace(model, connection=np.vstack([np.repeat(rows[:1], count, axis=0), rows[1:]]))
+    spring = JointGroup(HARDENS, 1)
+    resolution, told = Resolution((0, 1, 2, 3, 5), 256), []
+    for structure, joints in ((model, JointGroup(IWAN, 1)), (together, JointGroup(many, count))):
+        march = MixedLaw((joints, spring)).march()
+        problem = HarmonicBalance(structure, march, load, resolution)
+        floquet = Floquet(problem)
+        told.append([])
+        for frequency in (30.0, 60.0, 165.0):
+            motion = problem.solve(frequency, 1.0)
+            assert motion.converged
+            told[-1].append(np.abs(floquet.stability(motion).multipliers[:2]))
+    np.testing.assert_allclose(told[0], told[1], atol=5e-3)
 
 
 def test_a_line_of_sliders_stays_one():
