@@ -164,10 +164,10 @@ class MixedMarch:
         parts = list(self._parts(coefficients))
         marches = [march.linearise(own, basis, lead, memory) for march, _, _, own in parts]
         memory = max(march.kept.shape[2] for march in marches)
-        for place, (march, _, _, own) in enumerate(parts):
+        for place, (of_group, _, _, own) in enumerate(parts):
             # Those whose memory depends on the motion have room for as much in all motions.
-            if isinstance(march.law, MasingLaw) and marches[place].kept.shape[2] < memory:
-                marches[place] = march.linearise(own, basis, lead, memory)
+            if isinstance(of_group.law, MasingLaw) and marches[place].kept.shape[2] < memory:
+                marches[place] = of_group.linearise(own, basis, lead, memory)
         maps = Maps.room(len(basis), joints, memory, directions)
         maps.kept[:] = np.eye(memory)
         for march, (_, at, along, _) in zip(marches, parts, strict=True):
