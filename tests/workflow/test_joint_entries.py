@@ -285,6 +285,44 @@ def test_a_body_with_a_damper_is_a_row_of_three_masses(body):
     np.testing.assert_allclose(on_body.motion[:, along], row.motion, atol=1e-11)
 
 
+def test_a_damper_on_own_matrices_under_a_load(tmp_path):
+    """The same row of three masses; the load of the matrices does not act on the third."""
+    load = np.array([[1.0], [0.0]])
+    np.savez(tmp_path / "two.npz", K=SPRINGS, M=MASSES, F=load)
+    (tmp_path / "unknowns.csv").write_text("point,direction\nblock,x\nholder,x\n", "utf-8")
+    own = f"""\
+title: A damper on matrices
+analysis: vibration
+structure:
+  kind: matrices
+  matrices: {{file: two.npz, unknowns: unknowns.csv, units: {{length: mm, force: N}}}}
+  further_masses: [{{name: damper, mass: 0.5 kg, directions: x}}]
+  joints:
+    - {{points: damper, against: holder, direction: x, joint: {SLIDER}}}
+    - {{points: damper, direction: x, joint: {HARDENS}}}
+  damping_ratio: 0.03
+  driven: {{load: 1}}
+  seen: {{points: damper, direction: x}}
+forces: [10 N]
+frequencies: [50 Hz, 400 Hz]
+resolution: {{harmonics: 3, samples: 64}}
+"""
+    row = (
+        "structure.masses=[2 kg, 1 kg, 0.5 kg]",
+        "structure.springs=[1 N/um, 2 N/um, 0 N/um]",
+        f"structure.joints=[{{points: m3, against: m2, joint: {SLIDER}}}, "
+        f"{{points: m3, joint: {HARDENS}}}]",
+        "structure.damping_ratio=0.03",
+        "resolution={harmonics: 3, samples: 64}",
+    )
+    found, expected = (
+        model_of(tmp_path, text, *overrides).problem.solve(90.0, 10.0)
+        for text, overrides in ((own, ()), (CASE, row))
+    )
+    assert found.converged
+    np.testing.assert_allclose(found.motion, expected.motion, atol=1e-11)
+
+
 # --- in time ------------------------------------------------------------------------------------
 
 

@@ -280,7 +280,7 @@ class MatrixBody(JointedBody, Matrices):
                 if getattr(part, end, None) is not None:
                     wanted[f"{key}.{end}"] = getattr(part, end)
         for key, point in wanted.items():
-            there = self.points if key.startswith("retained.") else self.kept
+            there = self.points if key.startswith("retained.") else self.places
             if not matching(there, point):
                 held = ", but not retained" if matching(self.points, point) else ""
                 raise disagreement(
@@ -301,9 +301,14 @@ class MatrixBody(JointedBody, Matrices):
         return [p for wanted in self.retained for p in matching(self.points, wanted)]
 
     @property
+    def places(self) -> list[str]:
+        """These, and masses beside the body."""
+        return [*self.kept, *(mass.name for mass in self.further_masses)]
+
+    @property
     def joint_count(self) -> int:
         """How many joints there are."""
-        return sum(len(matching(self.kept, joint.points)) for joint in self.joints)
+        return sum(len(matching(self.places, joint.points)) for joint in self.joints)
 
     @property
     def laden(self) -> dict[str, float]:

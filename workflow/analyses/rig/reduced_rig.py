@@ -126,7 +126,9 @@ def _driven(
         return np.zeros(len(model.mass))
     if isinstance(driven, Moved):
         return _shape(model, points, driven, "structure.driven")
-    return reduced.loads[:, driven.load - 1]
+    load = reduced.loads[:, driven.load - 1]
+    # Masses beside the body are none of its matrices.
+    return np.pad(load, (0, len(model.mass) - len(load)))
 
 
 def _along(contact: bool, places: JointPlaces, seen: Moved) -> int:
