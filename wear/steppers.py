@@ -32,8 +32,8 @@ from sa_solver.types import Array
 from wear.worn import Spent, State, WearStep, WornState
 
 LAST = 0.5
-"""Length of the last pair of steps over that of the pairs before it. What those miss is pressed away
-by what follows; the pressure at the end shows what the last ones miss."""
+"""Length of the last pair of steps over that of the pairs before it. What those miss is pressed
+away by what follows; the pressure at the end shows what the last ones miss."""
 
 FIRST_STEP, FIRST_SHARE = 24.0, 0.5 / (1.0 + LAST)
 """First automatic step over the explicit limit, and its largest share of the run: short enough to
@@ -495,7 +495,7 @@ def first_cycles(contact: ComparedContact[Worn], state: Worn, total: float) -> f
 
 
 def in_pairs(longest: float, total: float) -> float:
-    """Cycles of the next of the fewest pairs of steps, ``longest`` at most, that make the ``total``.
+    """Cycles of the next of the fewest pairs of steps that make the ``total``, ``longest`` at most.
 
     All are alike but the last pair, which is shorter where that takes no more of them: its steps
     are :data:`LAST` times as long then, or what is left.

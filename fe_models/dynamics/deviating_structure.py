@@ -123,7 +123,9 @@ class ActiveJoints:
         for maps in (starts, ends):
             never &= (maps[:, active] == 0.0).all(axis=(0, 3))
         never[constant[active]] = False
-        neutral = int((holds & ~nothing).sum()) * kept.shape[2] + int(never.sum())
+        remembered = deviations.remembered
+        numbered = np.arange(kept.shape[2]) < remembered[active, None]
+        neutral = int(remembered[holds & ~nothing].sum()) + int((never & numbered).sum())
         return cls(active, constant, springs, ~never.ravel(), neutral)
 
     def steps(self, deviations: Deviations, structure: ModalStructure) -> JointSteps:

@@ -167,43 +167,57 @@ class Floquet:
             samples *= 2
         at = structure, motion.frequency
         for finer in range(finest + 1):
-            times, deviations = self._marched(motion, SPLIT**finer * samples, deepest + finer)
-            joints = ActiveJoints.of(deviations, structure)
-            fine, shifts = multipliers_of(*at, times, deviations, joints)
+            times = self._times(motion, SPLIT**finer * samples, deepest + finer)
             half = times.halved()
             # Half as many times, and the same of a motion as far off as this one may be.
-            coarse, _ = multipliers_of(*at, half, self._deviations(motion, half), joints)
-            other = _displaced(motion)
-            moved, _ = multipliers_of(*at, half, self._deviations(other, half), joints)
+            first, *others = self._alike(
+                (motion, times), (motion, half), (_displaced(motion), half)
+            )
+            joints = ActiveJoints.of(first, structure)
+            fine, shifts = multipliers_of(*at, times, first, joints)
+            coarse, moved = (multipliers_of(*at, half, of, joints)[0] for of in others)
             told = _judged(fine, coarse, moved, joints.neutral + shifts)
             if told.verdict != "unknown":
                 break
         return told
 
-    def _marched(
-        self, motion: HarmonicSolution, samples: int, deepest: int
-    ) -> tuple[PeriodTimes, Deviations]:
-        """What joints make of deviations, in short steps where they change what they do."""
+    def _times(self, motion: HarmonicSolution, samples: int, deepest: int) -> PeriodTimes:
+        """Those of a period, in short steps where joints change what they do."""
         times = PeriodTimes.even(samples, deepest)
         while True:
-            deviations = self._deviations(motion, times)
-            regimes = deviations.regimes
+            regimes = self._deviations(motion, times).regimes
             changes = (regimes != np.roll(regimes, -1, axis=0)).any(axis=1)
             # It changes in this step or, where the motion turns, in the next.
             marked = changes | np.roll(changes, 1)
             if not (marked & (times.levels < deepest)).any():
-                return times, deviations
+                return times
             times = times.divided(marked)
 
-    def _deviations(self, motion: HarmonicSolution, times: PeriodTimes) -> Deviations:
+    def _alike(self, *of: tuple[HarmonicSolution, PeriodTimes]) -> list[Deviations]:
+        """What joints make of deviations from motions, as many numbers of memory in each."""
+        every = [self._deviations(*motion) for motion in of]
+        memory = max(each.kept.shape[2] for each in every)
+        return [
+            each if each.kept.shape[2] == memory else self._deviations(*motion, memory)
+            for each, motion in zip(every, of, strict=True)
+        ]
+
+    def _deviations(
+        self, motion: HarmonicSolution, times: PeriodTimes, memory: int = 0
+    ) -> Deviations:
         assert isinstance(self._joints, DeviatingJoints)
         basis = motion.resolution.functions_at(times.starts, times.parts)
         lead, linearise = motion.resolution.lead, self._joints.linearise
         if self._sector is None:
-            return linearise(motion.coefficients, basis, lead)
+            return linearise(motion.coefficients, basis, lead, memory)
         ring, sectors = self._sector.ring, range(self._sectors)
-        every = (motion_of(ring, motion, sector).coefficients for sector in sectors)
-        return JoinedDeviations.of([linearise(each, basis, lead) for each in every])
+        every = [motion_of(ring, motion, sector).coefficients for sector in sectors]
+        parts = [linearise(each, basis, lead, memory) for each in every]
+        most = max(part.kept.shape[2] for part in parts)
+        return JoinedDeviations.of(
+            part if part.kept.shape[2] == most else linearise(each, basis, lead, most)
+            for part, each in zip(parts, every, strict=True)
+        )
 
 
 def _unknown(message: str) -> Stability:

@@ -7,7 +7,7 @@ from typing import Protocol, runtime_checkable
 
 import numpy as np
 
-from sa_solver.types import Array
+from sa_solver.types import Array, Indices
 
 
 class Cycle(Protocol):
@@ -33,7 +33,9 @@ class Deviations(Protocol):
     From each of ``t`` times of a period to the next, deviations of what ``j`` joints remember
     ``(p,)`` and of their displacements ``(d,)`` go on as δs_end = A δs + E δu + D δu_end, and their
     forces are S δs_end + T δu_end: ``kept`` A, ``by_start`` E, ``by_end`` D ``(t, j, ...)``,
-    ``pull`` S ``(j, d, p)`` and ``tangent`` T. ``regimes`` ``(t, j)`` tell what joints do.
+    ``pull`` S ``(j, d, p)`` and ``tangent`` T. ``regimes`` ``(t, j)`` tell what joints do. Of the
+    numbers each joint has ``remembered`` ``(j,)``: further ones, of which others have more, stay as
+    they are.
     """
 
     @property
@@ -48,6 +50,8 @@ class Deviations(Protocol):
     def tangent(self) -> Array: ...
     @property
     def regimes(self) -> np.ndarray: ...
+    @property
+    def remembered(self) -> Indices: ...
 
 
 @runtime_checkable
@@ -55,10 +59,13 @@ class DeviatingJoints(Protocol):
     """:class:`PeriodicJoints` that also know what becomes of small deviations from their period.
 
     Without them nothing can be said of the stability of a motion. The times of ``basis`` ascend
-    from the beginning of the period; the last increment leads back to it.
+    from the beginning of the period; the last increment leads back to it. Joints that remember more
+    in some motions than in others have room for at least ``memory`` numbers.
     """
 
-    def linearise(self, coefficients: Array, basis: Array, lead: Array) -> Deviations: ...
+    def linearise(
+        self, coefficients: Array, basis: Array, lead: Array, memory: int = 0
+    ) -> Deviations: ...
 
 
 class PeriodicJoints(Protocol):

@@ -5,7 +5,7 @@ Deviations need not travel as the wave does: whether it holds is a matter of all
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,7 +15,7 @@ from fe_models.dynamics.harmonic_solution import HarmonicSolution
 from fe_models.dynamics.periodic_joints import Deviations
 from fe_models.dynamics.receptance import Receptance
 from fe_models.dynamics.sector import CyclicSector, Ring
-from sa_solver.types import Array
+from sa_solver.types import Array, Indices
 
 
 @dataclass(frozen=True)
@@ -28,31 +28,25 @@ class JoinedDeviations:
     pull: Array
     tangent: Array
     regimes: np.ndarray
+    remembered: Indices
 
     @classmethod
-    def of(cls, parts: Sequence[Deviations]) -> JoinedDeviations:
-        """Joined; a joint that remembers less than others has further numbers that stay 0."""
-        most = max(part.kept.shape[2] for part in parts)
+    def of(cls, parts: Iterable[Deviations]) -> JoinedDeviations:
+        """Joined; all have room for as much memory."""
+        every = tuple(parts)
 
-        def joined(name: str, axis: int, remembered: tuple[int, ...] = ()) -> Array:
-            return np.concatenate(
-                [_widened(getattr(part, name), most, remembered) for part in parts], axis=axis
-            )
+        def joined(name: str, axis: int) -> Array:
+            return np.concatenate([getattr(part, name) for part in every], axis=axis)
 
         return cls(
-            joined("kept", 1, (2, 3)),
-            joined("by_start", 1, (2,)),
-            joined("by_end", 1, (2,)),
-            joined("pull", 0, (2,)),
+            joined("kept", 1),
+            joined("by_start", 1),
+            joined("by_end", 1),
+            joined("pull", 0),
             joined("tangent", 1),
             joined("regimes", 1),
+            np.concatenate([part.remembered for part in every]),
         )
-
-
-def _widened(maps: Array, size: int, axes: tuple[int, ...]) -> Array:
-    """With zeros up to a ``size`` along these axes."""
-    missing = [size - maps.shape[axis] if axis in axes else 0 for axis in range(maps.ndim)]
-    return np.pad(maps, [(0, more) for more in missing])
 
 
 def ring_structure(sector: CyclicSector, directions: int) -> ModalStructure:

@@ -233,6 +233,18 @@ ELASTIC = {
     "polynomial_spring": {"law": "polynomial_spring", "stiffness": "1 N/um"},
     "elastic_stop": {"law": "elastic_stop", "stiffness": "10 N/um"},
 }
+# Joints in a row of masses, of laws of their own too.
+LAWS = {"bouc_wen": {"law": "bouc_wen", **JOINT}} | JOINTS | ELASTIC
+IN_A_ROW = {law: [{"points": "m2", "joint": joint}] for law, joint in LAWS.items()}
+IN_A_ROW[ALWAYS] = [{"points": "m2", "against": "m1"}]
+# A body with a mass beside it, and two entries of joints.
+OWN_ON_BODY = REDUCED | {
+    "further_masses": [{"name": "damper", "mass": 1}],
+    "joints": [
+        {"points": "pad", "direction": "-z", "joint": CONTACT},
+        {"points": "ring", "direction": "x"},
+    ],
+}
 GIVEN["vibration"] = {
     "structure": {
         "reduced": REDUCED,
@@ -252,7 +264,7 @@ GIVEN["vibration"] = {
     },
 }
 GIVEN["rig"] = GIVEN["joint"] | {
-    "structure": {"reduced": REDUCED, "matrices": MATRICES},
+    "structure": {"reduced": OWN_ON_BODY, "matrices": MATRICES},
     "structure.driven": {"load": {"load": 1}},
     **DAMPING,
     "joint": JOINTS | {"friction_contact": CONTACT},
@@ -291,6 +303,12 @@ APART_MATRICES = {
 APART = f"structure.matrices={APART_MATRICES | {'units': {'length': 'mm', 'force': 'N'}}}"
 # A sector of a wheel in the place of the template's mesh, with the same names.
 SECTOR = "structure.file=sector.msh"
+# What the entries of a section need beside it.
+WITH_SECTION = {
+    "structure.other_bodies.": [f"structure.contacts={BOLTED}"],
+    "ring.": RING,
+    "structure.cyclic.": [SECTOR],
+}
 # Cells of the templates that may take heights.
 CELLS = {"mesh": (128, 256), "resultants": (128, 256)}
 CELLS |= dict.fromkeys(("bodies", "bodies_wear"), (128, 128))
@@ -326,18 +344,19 @@ class Leaf:
                 chosen = [given[tag] for tag in (*self.tags, ALWAYS) if tag in given]
                 overrides += [f"{section}={value}" for value in chosen[:1]]
         overrides += self._shaken
-        if self.key.startswith("structure.other_bodies."):
-            overrides.append(f"structure.contacts={BOLTED}")
-        if self.key.startswith("ring."):
-            overrides += RING
-        if self.key.startswith("structure.cyclic."):
-            overrides.append(SECTOR)
+        for section, further in WITH_SECTION.items():
+            if self.key.startswith(section):
+                overrides += further
         if "legs" in self.tags:
             overrides.append("contact.method=full")
         if "pretension" in self.tags:
             overrides += ["load_path.cycle_from=2", "load_path.peak_leg=2"]
+        if self.key.startswith("structure.joints.") and "rig" in self.tags:
+            joints = [IN_A_ROW[tag] for tag in (*self.tags, ALWAYS) if tag in IN_A_ROW]
+            overrides.append(f"structure.joints={joints[0]}")
         if "friction_contact" in self.tags:
-            overrides.append(f"structure={REDUCED}")
+            own = self.key.startswith("structure.")
+            overrides.append(f"structure={OWN_ON_BODY if own else REDUCED}")
         if "friction_rig" in self.tags:
             overrides.append(f"joint={CONTACT | {'normal_load': 60}}")
         return overrides

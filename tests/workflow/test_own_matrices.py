@@ -348,4 +348,4 @@ def test_a_file_that_changes_is_read_again(two):
 def test_a_run_refuses_it_too(two):
     code, message = refused(two, OWN, "structure.joints=[{points: holder, direction: z}]")
     assert code == 2
-    assert "there is no point 'holder z'" in message
+    assert "holder does not move along z; allowed: x" in message

@@ -117,7 +117,7 @@ def rig_of(folder: Path, *overrides: str, text: str = SPECIMEN):
     case = parse_case(text, str(folder / "case.yaml"), overrides)
     mass = getattr(case, "mass", None)
     rig = rig_model(case.structure, case.joint, mass, Reporter(folder / "run.log"))
-    return rig, JointModel.of(case, rig.joints)
+    return rig, JointModel.of(case, rig.counts)
 
 
 def row(rig: RigModel, kind: str, axis: str) -> np.ndarray:
@@ -192,7 +192,7 @@ def test_joints_that_move_alike_are_together_the_one_they_share(specimen, law):
     case = parse_case(SPECIMEN, str(specimen / "case.yaml"), [joint])
     forces = []
     for count in (1, 4):
-        each = JointModel.of(case, count).at(0.0)
+        each = JointModel.of(case, (count,)).at(0.0)
         path = 0.01 * np.array([1.0, -1.0, 0.5])[:, None, None] * np.ones(each.directions)
         alike = np.repeat(path, count, axis=1)
         followed = march_joints(each, each.rest(count), np.zeros(alike.shape[1:]), alike)

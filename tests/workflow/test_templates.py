@@ -14,6 +14,7 @@ from tests.workflow.case_leaves import (
     CONTACT,
     EXCITED,
     INTERFACE,
+    OWN_ON_BODY,
     REDUCED,
     RING,
     SECTOR,
@@ -37,7 +38,10 @@ NEEDS = {
     "load_path": ["contact.method=full"],
     "structure.body": ["structure.file=specimens.yaml"],
     "structure.interfaces.nodes": [f"structure.interfaces.0.frame={INTERFACE['frame']}"],
-    "  law: friction_contact": [f"structure={REDUCED}"],
+    "\n#   law: friction_contact": [f"structure={REDUCED}"],
+    # Of a body another entry takes the case's joint.
+    "\n      # joint:  # law and parameters of these": [f"structure={OWN_ON_BODY}"],
+    "\n      # joint:  # or: Contact at points": [f"structure={OWN_ON_BODY}"],
     "  kind: friction_rig": [f"joint={CONTACT | {'normal_load': 60}}"],
     "  # size: 2 mm  # for CAD files only": CAD,
     "structure.cyclic": [SECTOR],
@@ -111,6 +115,11 @@ def without(lines, start, indent, name):
     return lines
 
 
+def _brings(block, words):
+    """Whether a block has these words in it; behind a line's end, at the beginning of a line."""
+    return words.startswith((" ", "\n")) and words in f"\n{block}"
+
+
 def ways(text, tried, overrides=(), within=""):
     """Whatever may be opened in turn, and then what is within that: key, text and overrides."""
     here = Template(text)
@@ -120,7 +129,7 @@ def ways(text, tried, overrides=(), within=""):
         if not key.startswith(within) or (key, block) in tried:
             continue
         tried.add((key, block))
-        asked = [NEEDS[w] for w in NEEDS if w == key or (w.startswith(" ") and w in block)]
+        asked = [NEEDS[w] for w in NEEDS if w == key or _brings(block, w)]
         needed = [override for overrides_of_it in asked for override in overrides_of_it]
         opened = here.opened(start)
         yield key, opened, [*overrides, *needed]

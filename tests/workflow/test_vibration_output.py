@@ -41,8 +41,10 @@ BACKBONE = {
     "energy_per_cycle": "N mm",
     "slip": "1",
 }
-CONTENTS = Contents(("00000", "00001"), ("00000", "00001"), places=True, backbone=True)
-NAMES = {"frequency_response", "resonance", "loops", "node_states", "pad_states"}
+CONTENTS = Contents(
+    ("00000", "00001"), ("00000", "00001"), places=True, backbone=True, joints=ROWS**2
+)
+NAMES = {"frequency_response", "resonance", "loops", "node_shares", "node_states", "pad_states"}
 
 
 @pytest.fixture(scope="module")
@@ -201,12 +203,16 @@ def test_titles_fit_the_width(results: h5py.File) -> None:
 def test_responses_are_named_after_what_is_seen(
     results: h5py.File, summary: dict[str, Any]
 ) -> None:
-    (axis,) = vibration.frequency_response(results, CONTENTS).axes
+    axis, phase = vibration.frequency_response(results, CONTENTS).axes
     assert axis.get_ylabel() == "amplitude of block x / force [µm/N]"
     lines = {str(line.get_label()): line for line in axis.lines}
     response = results["responses/00001"]
     label = f"25 N: {summary['responses'][1]['resonance']:.4g} Hz"
     np.testing.assert_allclose(lines[label].get_ydata(), 1e3 * response["amplitude"][:, 1] / 25.0)
+    drawn = np.asarray(phase.lines[-1].get_ydata())
+    turns = (drawn - np.degrees(response["phase"])) / 360.0
+    np.testing.assert_allclose(turns, np.round(turns), atol=1e-9)
+    assert np.abs(np.diff(drawn)).max() < 180.0
 
 
 def test_backbone_and_peaks_against_force(results: h5py.File, summary: dict[str, Any]) -> None:
@@ -246,7 +252,7 @@ def test_states_have_the_symmetry_of_the_block(results: h5py.File) -> None:
     numbers = rows_and_columns(*places().T)
     assert numbers is not None
     for response in results["responses"].values():
-        kinds = vibration_states._kinds(response)[:, numbers]
+        kinds = vibration_states.kinds_of(response)[:, numbers]
         np.testing.assert_array_equal(kinds, kinds[:, :, ::-1])
     # Without harmonics of even order nothing tells x from -x; one sample in two cycles may.
     assert (kinds != kinds[:, ::-1]).mean() < 0.02
@@ -264,7 +270,7 @@ def test_states_are_those_of_the_forces(results: h5py.File) -> None:
 
 
 def test_low_forces_stick_and_high_ones_slip(results: h5py.File) -> None:
-    low, high = (vibration_states._kinds(response) for response in results["responses"].values())
+    low, high = (vibration_states.kinds_of(response) for response in results["responses"].values())
     open_kind, sticks = vibration_states.OPEN, vibration_states.STICKS
     # Far below resonance all that touches sticks under the small force.
     assert set(low[0].tolist()) == {open_kind, sticks}
@@ -401,7 +407,10 @@ def test_case_without_figures_and_paraview_has_none(tmp_path: Path) -> None:
     assert (out / "frf_00000.csv").exists()
     for name in ("figures", "paraview", "loop_00000.csv", "backbone.csv"):
         assert not (out / name).exists()
-    one = Contents(("00000",), (), places=True, backbone=False)
+    with h5py.File(out / "results.h5") as file:
+        joints = file["responses/00000/nodes/slip"].shape[1]
+    one = Contents(("00000",), (), places=True, backbone=False, joints=joints)
     assert ANALYSIS.pictures is not None
     later = write_figures(ANALYSIS.pictures, one, out / "results.h5", tmp_path / "later")
-    assert {path.stem for path in later} == {"frequency_response", "node_states", "pad_states"}
+    states = {"node_shares", "node_states", "pad_states"}
+    assert {path.stem for path in later} == {"frequency_response", *states}

@@ -62,7 +62,7 @@ def test_a_further_branch_is_found_with_its_fold_and_drawn_dashed(tmp_path: Any)
         assert ((group["multiplier"][()] > 1.0) == (codes == -1)).all()
         assert list(group["bifurcations"].attrs["kind"]) == ["fold"]
         contents = Contents(("00000", "00001"), (), places=False, backbone=False)
-        (axis,) = frequency_response(file, contents).axes
+        axis, _ = frequency_response(file, contents).axes
         dashed = [line for line in axis.lines if line.get_linestyle() == "--"]
         drawn = np.concatenate([line.get_xdata() for line in dashed])
         unstable = group["frequency"][()][codes == -1]

@@ -22,7 +22,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sa_solver.types import Array
+from sa_solver.types import Array, Indices
 from wear.joints.compiled import compiled
 from wear.joints.elastic import STOP, elastic_force
 from wear.joints.friction_path import advance_slopes, contact_of, pressing
@@ -54,6 +54,8 @@ class LinearisedMarch:
     ``kept`` A ``(t, j, p, p)``, ``by_start`` E and ``by_end`` D ``(t, j, p, d)``, ``pull`` S
     ``(j, d, p)`` and ``tangent`` T ``(t, j, d, d)`` as in the module; ``regimes`` ``(t, j)`` are
     whole numbers that change from an increment to the next where the joint does something else.
+    A joint that remembers less than others has ``remembered`` ``(j,)`` numbers: the further ones
+    have no part in it, and stay as they are.
     """
 
     kept: Array
@@ -62,6 +64,13 @@ class LinearisedMarch:
     pull: Array
     tangent: Array
     regimes: np.ndarray
+    remembered: Indices
+
+    @classmethod
+    def of(cls, maps: Maps) -> LinearisedMarch:
+        """Of joints that remember equally many numbers."""
+        joints, _, memory = maps.pull.shape
+        return cls(*maps, np.full(joints, memory))
 
 
 class Maps(NamedTuple):

@@ -14,9 +14,11 @@ import numpy as np
 
 from sa_solver.types import Array
 from wear.joints.bouc_wen import BoucWen
+from wear.joints.elastic import ElasticLaw
 from wear.joints.friction_contact import FrictionContact
 from wear.joints.jenkins import Jenkins
 from wear.joints.law import JointResponse, JointState
+from wear.joints.linearised import LinearisedMarch, Maps
 from wear.joints.masing import MasingLaw
 from wear.joints.parameters import JointError
 from wear.joints.periodic import PeriodicMarch, SettledCycle
@@ -33,7 +35,7 @@ class JointGroup:
     4
     """
 
-    law: Jenkins | BoucWen | MasingLaw | FrictionContact
+    law: Jenkins | BoucWen | MasingLaw | FrictionContact | ElasticLaw
     joints: int
 
 
@@ -133,19 +135,15 @@ class MixedMarch:
     ) -> SettledCycle:
         """The settled period, as :meth:`PeriodicMarch.settle`."""
         joints, size, d = coefficients.shape
-        rows = [rows for _, rows in self.law.rows()]
-        own = [slice(march.directions) for march in self.marches]
-        cycles = [
-            march.settle(np.ascontiguousarray(coefficients[at, :, along]), basis, weights, lead)
-            for march, at, along in zip(self.marches, rows, own, strict=True)
-        ]
+        parts = list(self._parts(coefficients))
+        cycles = [march.settle(own, basis, weights, lead) for march, _, _, own in parts]
         force, samples = np.zeros((joints, size, d)), np.zeros((len(basis), joints, d))
-        for cycle, at, along in zip(cycles, rows, own, strict=True):
+        for cycle, (_, at, along, _) in zip(cycles, parts, strict=True):
             force[at, :, along], samples[:, at, along] = cycle.force, cycle.samples
 
         def jacobian() -> Array:
             whole = np.zeros((joints, size, d, size, d))
-            for cycle, at, along in zip(cycles, rows, own, strict=True):
+            for cycle, (_, at, along, _) in zip(cycles, parts, strict=True):
                 whole[at, :, along, :, along] = cycle.jacobian
             return whole
 
@@ -157,6 +155,37 @@ class MixedMarch:
             jacobian,
             lambda: np.concatenate([cycle.dissipated for cycle in cycles]),
         )
+
+    def linearise(
+        self, coefficients: Array, basis: Array, lead: Array, memory: int = 0
+    ) -> LinearisedMarch:
+        """What small deviations do, as :meth:`PeriodicMarch.linearise`."""
+        joints, _, directions = coefficients.shape
+        parts = list(self._parts(coefficients))
+        marches = [march.linearise(own, basis, lead, memory) for march, _, _, own in parts]
+        memory = max(march.kept.shape[2] for march in marches)
+        for place, (of_group, _, _, own) in enumerate(parts):
+            # Those whose memory depends on the motion have room for as much in all motions.
+            if isinstance(of_group.law, MasingLaw) and marches[place].kept.shape[2] < memory:
+                marches[place] = of_group.linearise(own, basis, lead, memory)
+        maps = Maps.room(len(basis), joints, memory, directions)
+        maps.kept[:] = np.eye(memory)
+        for march, (_, at, along, _) in zip(marches, parts, strict=True):
+            known = slice(march.kept.shape[2])
+            maps.kept[:, at, known, known] = march.kept
+            maps.by_start[:, at, known, along] = march.by_start
+            maps.by_end[:, at, known, along] = march.by_end
+            maps.pull[at, along, known] = march.pull
+            maps.tangent[:, at, along, along] = march.tangent
+            maps.regimes[:, at] = march.regimes
+        remembered = np.concatenate([march.remembered for march in marches])
+        return LinearisedMarch(*maps, remembered)
+
+    def _parts(self, coefficients: Array) -> Iterator[tuple[PeriodicMarch, slice, slice, Array]]:
+        """Each group's march, where its joints and directions are, and its own coefficients."""
+        for march, (_, rows) in zip(self.marches, self.law.rows(), strict=True):
+            own = slice(march.directions)
+            yield march, rows, own, np.ascontiguousarray(coefficients[rows, :, own])
 
 
 def _stacked(states: Sequence[JointState]) -> JointState:

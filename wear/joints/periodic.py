@@ -166,11 +166,14 @@ class PeriodicMarch:
             partial(written, kernels.dissipate, driven.dissipated),
         )
 
-    def linearise(self, coefficients: Array, basis: Array, lead: Array) -> LinearisedMarch:
+    def linearise(
+        self, coefficients: Array, basis: Array, lead: Array, memory: int = 0
+    ) -> LinearisedMarch:
         """What small deviations from the settled period do, increment by increment.
 
         Arguments as those of :meth:`settle`; the times of ``basis``, which ascend from the
-        beginning of the period, need not be equally far apart.
+        beginning of the period, need not be equally far apart. Joints of spread sliders have room
+        for at least ``memory`` numbers, so that motions with fewer turning points are like others.
         """
         joints, _, directions = coefficients.shape
         self._require(coefficients, basis, basis.T, lead)
@@ -178,11 +181,10 @@ class PeriodicMarch:
         law, samples = self.law, len(basis)
         if isinstance(law, MasingLaw):
             nothing = Maps.room(samples, joints, 1, 1)
-            maps = Maps.room(
-                samples, joints, 1 + 2 * linearise_curves(len(lead), driven, nothing), 1
-            )
+            needed = 1 + 2 * linearise_curves(len(lead), driven, nothing)
+            maps = Maps.room(samples, joints, max(needed, memory), 1)
             linearise_curves(len(lead), driven, maps)
-            return LinearisedMarch(*maps)
+            return LinearisedMarch.of(maps)
         remembered, linearise = MEMORY[directions]
         if isinstance(law, ElasticLaw):
             remembered, linearise = 0, linearise_elastic
@@ -190,7 +192,7 @@ class PeriodicMarch:
             self._kernels[0].settle(Period(basis, basis.T, lead), driven)
         maps = Maps.room(samples, joints, remembered, directions)
         linearise(driven, maps)
-        return LinearisedMarch(*maps)
+        return LinearisedMarch.of(maps)
 
     def _driven(
         self, coefficients: Array, basis: Array, lead: Array, functions: int

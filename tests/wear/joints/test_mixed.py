@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from fe_models.dynamics.excitation import CombinedForces, ConstantForce, HarmonicForce
+from fe_models.dynamics.floquet import Floquet
 from fe_models.dynamics.harmonic_balance import HarmonicBalance, PeriodicLoad
 from fe_models.dynamics.harmonics import Resolution
 from fe_models.dynamics.newmark import TimeStepControl, integrate
 from fe_models.dynamics.rig import Link, lumped_rig, unit_force
 from wear.joints.bouc_wen import BoucWen
+from wear.joints.elastic import ElasticStop, PolynomialSpring
 from wear.joints.friction_contact import FrictionContact
 from wear.joints.iwan import UniformIwan
 from wear.joints.jenkins import Jenkins
@@ -65,6 +69,102 @@ def test_periods_of_groups_and_their_derivatives():
         np.testing.assert_array_equal(cycle.dissipated[rows], alone.dissipated)
         np.testing.assert_array_equal(cycle.states[:, rows], alone.states)
         assert not cycle.jacobian[rows, :, group.law.directions :].any()
+
+
+def test_deviations_of_groups_are_those_of_each_alone():
+    """What a group does not remember stays as it is, and moves nothing."""
+    law = MixedLaw((*ALL.groups, JointGroup(ElasticStop(1e3, 0.005), 1)))
+    resolution = Resolution((0, 1, 3), 128)
+    coefficients = 0.02 * np.random.default_rng(2).standard_normal((5, resolution.size, 3))
+    given = resolution.basis, resolution.lead
+    march = law.march().linearise(coefficients, *given)
+    for group, rows in law.rows():
+        own = slice(group.law.directions)
+        part = np.ascontiguousarray(coefficients[rows, :, own])
+        alone = PeriodicMarch(group.law).linearise(part, *given)
+        known = slice(alone.kept.shape[2])
+        np.testing.assert_array_equal(march.kept[:, rows, known, known], alone.kept)
+        np.testing.assert_array_equal(march.by_start[:, rows, known, own], alone.by_start)
+        np.testing.assert_array_equal(march.by_end[:, rows, known, own], alone.by_end)
+        np.testing.assert_array_equal(march.pull[rows, own, known], alone.pull)
+        np.testing.assert_array_equal(march.tangent[:, rows, own, own], alone.tangent)
+        np.testing.assert_array_equal(march.regimes[:, rows], alone.regimes)
+        beyond = slice(alone.kept.shape[2], None)
+        assert not march.pull[rows, :, beyond].any()
+        assert not march.by_end[:, rows, beyond].any()
+        rest = march.kept[:, rows, beyond, beyond]
+        np.testing.assert_array_equal(rest, np.broadcast_to(np.eye(rest.shape[2]), rest.shape))
+
+
+# One by one on masses that know nothing of each other; two axes of a contact's mass are its own.
+HARDENS = PolynomialSpring(0.0, cubic=4e5)
+ALONE = {"slips": SLIDER, "sticks": SLIDER, "hardens": HARDENS, "contact": CONTACT}
+PULLS = {"slips": 9.0, "sticks": 0.4, "hardens": 3.0, "contact": 9.0}
+
+
+def masses(names):
+    """Each on its springs and its joint, with the force that shakes it."""
+    moving = [f"{name} {axis}" for name in names for axis in axes(name)]
+    stiff = {"x": 500.0, "y": 700.0, "z": 300.0}
+    nowhere = Link(None)
+    directions = 3 if "contact" in names else 1
+    joints = [
+        [*(Link(f"{name} {axis}") for axis in axes(name)), *[nowhere] * 2][:directions]
+        for name in names
+    ]
+    springs = {Link(name): stiff[name[-1]] for name in moving}
+    model = lumped_rig(dict.fromkeys(moving, 2e-3), springs, joints, 0.05)
+    push = sum(PULLS[name] * unit_force(model, f"{name} x") for name in names)
+    pressed = [name for name in names if name == "contact"]
+    press = sum((15.0 * unit_force(model, f"{name} z") for name in pressed), 0.0 * push)
+    return model, PeriodicLoad({1: -1j * push}, press)
+
+
+def axes(name):
+    return "xyz" if name == "contact" else "x"
+
+
+def stability(names, march):
+    model, load = masses(names)
+    problem = HarmonicBalance(model, march, load, Resolution((0, 1, 2, 3, 5), 256))
+    motion = problem.solve(95.0, 1.0)
+    assert motion.converged
+    return Floquet(problem).stability(motion)
+
+
+def test_stability_of_what_does_not_meet_is_that_of_each_alone():
+    """Multipliers of all are those of each; a slider that sticks is neutral, and counted once."""
+    each = [stability((name,), PeriodicMarch(law)) for name, law in ALONE.items()]
+    groups = tuple(JointGroup(law, 1) for law in ALONE.values())
+    together = stability(tuple(ALONE), MixedLaw(groups).march())
+    alone = np.sort(np.concatenate([np.abs(of.multipliers) for of in each]))[::-1]
+    told = np.abs(together.multipliers)
+    np.testing.assert_allclose(told, alone[: len(told)], atol=2e-4)
+    assert [of.neutral for of in each] == [0, 1, 0, 0]
+    assert together.neutral == 1
+    assert together.verdict == "stable"
+
+
+def test_stability_of_spread_sliders_is_that_of_many():
+    """Iwan's joint beside a spring, against sixty sliders; turning points come and go."""
+    count = 60
+    limits = 8.0 * (np.arange(count) + 0.5) / count**2 * 2.0
+    many = Jenkins(2e3 / count, 1.0, limits)
+    model, load = masses(("slips", "hardens"))
+    rows = model.connection
+    together = replace(model, connection=np.vstack([np.repeat(rows[:1], count, axis=0), rows[1:]]))
+    spring = JointGroup(HARDENS, 1)
+    resolution, told = Resolution((0, 1, 2, 3, 5), 256), []
+    for structure, joints in ((model, JointGroup(IWAN, 1)), (together, JointGroup(many, count))):
+        march = MixedLaw((joints, spring)).march()
+        problem = HarmonicBalance(structure, march, load, resolution)
+        floquet = Floquet(problem)
+        told.append([])
+        for frequency in (30.0, 60.0, 165.0):
+            motion = problem.solve(frequency, 1.0)
+            assert motion.converged
+            told[-1].append(np.abs(floquet.stability(motion).multipliers[:2]))
+    np.testing.assert_allclose(told[0], told[1], atol=5e-3)
 
 
 def test_a_line_of_sliders_stays_one():

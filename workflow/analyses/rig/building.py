@@ -12,18 +12,18 @@ from fe_models.dynamics.ground_motion import Translation
 from fe_models.dynamics.rig import Link, lumped_rig, unit_force
 from workflow.analyses.rig.damping import Damping
 from workflow.analyses.rig.friction_rig import friction_rig_model
-from workflow.analyses.rig.joint_sections import ElasticJoint, FrictionContactJoint, Joint
-from workflow.analyses.rig.place_names import PlaceNames
+from workflow.analyses.rig.joint_sections import ElasticJoint, Joint
+from workflow.analyses.rig.place_names import PlaceNames, in_a_row
 from workflow.analyses.rig.reduced_rig import reduced_rig_model
-from workflow.analyses.rig.rig_model import RigModel
+from workflow.analyses.rig.rig_model import JointEntry, RigModel
 from workflow.analyses.rig.ring import RingOfSectors
-from workflow.analyses.rig.structure import FrictionRig, JointedBody, Rig
+from workflow.analyses.rig.structure import FrictionRig, JointedBody, Rig, joints_of
 from workflow.shell.reporter import Reporter
 
 
 def rig_model(
     structure: Rig | JointedBody | FrictionRig,
-    joint: Joint | ElasticJoint,
+    joint: Joint | ElasticJoint | None,
     mass: int | None,
     reporter: Reporter,
     ring: RingOfSectors | None = None,
@@ -31,32 +31,46 @@ def rig_model(
 ) -> RigModel:
     """The rig with its joints, of masses in a row driven at the ``mass`` of this number.
 
-    A sector of a ``ring`` is driven by an ``engine_order``.
+    ``joint`` is that of the entries of joints that have no law of their own. A sector of a ``ring``
+    is driven by an ``engine_order``.
 
     Raises UserError where its bodies cannot be what the case says.
     """
     if isinstance(structure, JointedBody):
-        directions = 3 if isinstance(joint, FrictionContactJoint) else 1
-        built = reduced_rig_model(structure, directions, reporter, ring, engine_order)
+        built = reduced_rig_model(structure, joint, reporter, ring, engine_order)
         return _damped(built, structure.damping)
     if isinstance(structure, FrictionRig):
         return _damped(friction_rig_model(structure, reporter), structure.damping)
-    return row_of_masses(structure, mass or 1)
+    return row_of_masses(structure, mass or 1, joint is not None)
 
 
-def row_of_masses(rig: Rig, driven: int = 1) -> RigModel:
-    """Masses m1, m2, ... in a row from the ground on, the last held to the ground by the joint."""
+def row_of_masses(rig: Rig, driven: int = 1, shared: bool = True) -> RigModel:
+    """Masses m1, m2, ... in a row from the ground on, with joints.
+
+    Where there is a ``shared`` law that no entry has, one more is between the last and the ground.
+    """
+    joined = joints_of(rig, shared)
     names = [f"m{number}" for number in range(1, len(rig.masses) + 1)]
     links = [Link(name, before) for name, before in zip(names, [None, *names], strict=False)]
+    places = in_a_row(names)
+    joints = [
+        [link]
+        for number, joint in enumerate(joined)
+        for link in places.links(joint, f"structure.joints.{number}")
+    ]
     model = lumped_rig(
         dict(zip(names, rig.masses, strict=True)),
         dict(zip(links, rig.springs, strict=True)),
-        [[Link(names[-1])]],
+        joints,
         np.array(rig.damping_ratio),
     )
     driving = unit_force(model, f"m{driven}")
     along = Translation(np.ones(len(names)), model.mass.sum(axis=1))
-    built = RigModel(model, driving, np.eye(len(names)), tuple(names), translations={"x": along})
+    built = RigModel(
+        *(model, driving, np.eye(len(names)), tuple(names)),
+        entries=tuple(JointEntry(1, own=joint.joint is not None) for joint in joined),
+        translations={"x": along},
+    )
     return _damped(built, rig.damping)
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from sa_solver.types import Array
 from workflow.analyses.rig.matrix_body import MatrixBody
-from workflow.analyses.rig.structure import FrictionRig, Rig
+from workflow.analyses.rig.structure import FrictionRig, Rig, joints_of
 from workflow.case.sections import Section
 
 # Of a force at one frequency: so many times away from every mode it hardly is meant to be.
@@ -18,15 +18,20 @@ RIGID = 1e12
 
 
 def about_modes(
-    path: str, span: tuple[float, float], structure: Section, stiffness: float = RIGID
+    path: str,
+    span: tuple[float, float],
+    structure: Section,
+    stiffness: float = RIGID,
+    shared: bool = True,
 ) -> Iterator[str]:
-    """About a ``span`` [Hz] in which a rig has no mode, be its joint of a stiffness open or stuck.
+    """About a ``span`` [Hz] in which a rig has no mode, be its joints of a stiffness open or stuck.
 
-    Between both every mode moves as the joint slips. A reduced body is not looked at.
+    Some may have a ``shared`` law. Between both every mode moves as the joint slips. A reduced body
+    is not looked at.
     """
     if not isinstance(structure, Rig | FrictionRig):
         return
-    opened, stuck = (modes(structure, held) for held in (0.0, stiffness))
+    opened, stuck = (modes(structure, held, shared) for held in (0.0, stiffness))
     low, high = span
     if not ((opened <= high) & (stuck >= low)).any():
         shown = (", ".join(f"{f:.3g}" for f in frequencies) for frequencies in (opened, stuck))
@@ -46,11 +51,27 @@ def about_matrices(structure: Section, highest: float) -> Iterator[str]:
         yield from structure.doubts(highest)
 
 
-def modes(structure: Rig | FrictionRig, stiffness: float) -> Array:
-    """Natural frequencies [Hz] of the masses in a row, the last held by a stiffness [N/mm]."""
+def _stretches(structure: Rig | FrictionRig, shared: bool) -> Array:
+    """What joints stretch by ``(j, n)``."""
+    unit = np.eye(len(structure.masses))
+    if isinstance(structure, FrictionRig):
+        return unit[-1:]
+    ends = [(joint.points, joint.against) for joint in joints_of(structure, shared)]
+    return np.array(
+        [
+            unit[int(second[1:]) - 1] - (0.0 if first is None else unit[int(first[1:]) - 1])
+            for second, first in ends
+        ]
+    )
+
+
+def modes(structure: Rig | FrictionRig, stiffness: float, shared: bool = True) -> Array:
+    """Natural frequencies [Hz] of the masses in a row, whose joints have a stiffness [N/mm]."""
     masses, springs = np.array(structure.masses), np.array(structure.springs)
-    matrix = np.diag(springs + np.append(springs[1:], stiffness))
+    matrix = np.diag(springs + np.append(springs[1:], 0.0))
     matrix -= np.diag(springs[1:], 1) + np.diag(springs[1:], -1)
+    for stretch in _stretches(structure, shared):
+        matrix += stiffness * np.outer(stretch, stretch)
     # Over the smallest mass, so that no slipped exponent overflows.
     least = masses.min()
     scale = np.sqrt(least / masses)

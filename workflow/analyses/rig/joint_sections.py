@@ -29,6 +29,11 @@ class Joint(Section):
     friction: Coefficient = entry("limit of the friction force over the normal load [1]", 0.11)
     stiffness: JointStiffness = entry("of the stuck joint [N/mm]", "27.3 N/um")
 
+    @property
+    def moves_mean(self) -> bool:
+        """Whether a vibration about 0 has a mean, and even harmonics."""
+        return False
+
 
 class RisingJoint(Joint):
     """A joint whose force goes on rising when all of it slides."""
@@ -111,6 +116,10 @@ class FrictionContactJoint(Joint):
     normal_stiffness: JointStiffness = entry("in contact [N/mm]", "100 N/um")
     gap: Gap = entry("instead of a normal load: open by so much at rest [mm]", "0 um", default=0.0)
 
+    @property
+    def moves_mean(self) -> bool:
+        return True
+
     @model_validator(mode="after")
     def _pressed_or_open(self) -> FrictionContactJoint:
         if self.gap > 0.0 and self.normal_load > 0.0:
@@ -179,6 +188,10 @@ UniaxialJoint = BoucWenJoint | JenkinsJoint | UniformIwanJoint | FourParameterIw
 JointLaw = Annotated[UniaxialJoint, Field(discriminator="law")]
 # Those of a structure that moves in three directions too.
 ContactLaw = Annotated[UniaxialJoint | FrictionContactJoint, Field(discriminator="law")]
+# Those of masses in a row, which move along one direction.
+RowLaw = Annotated[
+    UniaxialJoint | PolynomialSpringJoint | ElasticStopJoint, Field(discriminator="law")
+]
 # Those of steady vibrations, in which joints need not wear.
 VibrationLaw = Annotated[
     UniaxialJoint | FrictionContactJoint | PolynomialSpringJoint | ElasticStopJoint,

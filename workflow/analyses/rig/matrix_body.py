@@ -282,7 +282,7 @@ class MatrixBody(JointedBody, Matrices):
                     # That there is a next sector is known where joints are made.
                     wanted[f"{key}.{end}"] = point.removeprefix(NEXT)
         for key, point in wanted.items():
-            there = self.points if key.startswith("retained.") else self.kept
+            there = self.points if key.startswith("retained.") else self.places
             if not matching(there, point):
                 held = ", but not retained" if matching(self.points, point) else ""
                 raise disagreement(
@@ -303,10 +303,15 @@ class MatrixBody(JointedBody, Matrices):
         return [p for wanted in self.retained for p in matching(self.points, wanted)]
 
     @property
+    def places(self) -> list[str]:
+        """These, and masses beside the body."""
+        return [*self.kept, *(mass.name for mass in self.further_masses)]
+
+    @property
     def joint_count(self) -> int:
         """How many joints there are."""
         return sum(
-            len(matching(self.kept, joint.points.removeprefix(NEXT))) for joint in self.joints
+            len(matching(self.places, joint.points.removeprefix(NEXT))) for joint in self.joints
         )
 
     @property

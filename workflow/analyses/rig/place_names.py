@@ -81,6 +81,12 @@ class PlaceNames:
         return None if name is None else self._known_as.get(name, name)
 
 
+def in_a_row(masses: Sequence[str]) -> PlaceNames:
+    """Masses in a row, which move along x and whose displacements have the masses' names."""
+    along = {f"{name} x": name for name in masses}
+    return PlaceNames(list(along), along)
+
+
 def link_along(point: str, opposite: str | None, direction: str) -> Link:
     """What stretches when a point moves in a direction, from another or the ground."""
     axis = direction[-1]

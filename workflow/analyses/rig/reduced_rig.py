@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterator
+from collections.abc import Sequence
 from contextlib import suppress
 
 import numpy as np
 import scipy.linalg as sl
 
-from fe_models.dynamics.ground_motion import Translation, translation_of
+from fe_models.dynamics.ground_motion import Translation, along, translation_of
 from fe_models.dynamics.model import DynamicModel
 from fe_models.dynamics.receptance import RIGID
 from fe_models.dynamics.rig import Link, RigError, reduced_rig, unit_force
@@ -19,13 +19,14 @@ from fe_models.matrices.reduction import listed_names
 from fe_models.mesh import MeshError
 from fe_models.reduction import STEPS, ReducedModel
 from sa_solver.types import Array, Progress, Tally
+from workflow.analyses.rig.joint_sections import ElasticJoint, FrictionContactJoint, Joint
 from workflow.analyses.rig.matrix_body import LoadCase, MatrixBody
 from workflow.analyses.rig.place_names import PlaceNames, link_along
 from workflow.analyses.rig.places import Moved
 from workflow.analyses.rig.point_body import PointBody
-from workflow.analyses.rig.rig_model import RigModel
+from workflow.analyses.rig.rig_model import JointEntry, RigModel
 from workflow.analyses.rig.ring import RingOfSectors, with_next
-from workflow.analyses.rig.structure import JointedBody, JointPlaces, ReducedBody
+from workflow.analyses.rig.structure import JointedBody, JointPlaces, ReducedBody, own_laws
 from workflow.analyses.specimens.case import SpecimensCase
 from workflow.analyses.specimens.memory import memory
 from workflow.analyses.specimens.model import SpecimensModel
@@ -38,20 +39,21 @@ AXES = "xyz"
 
 def reduced_rig_model(
     body: JointedBody,
-    directions: int,
+    joint: Joint | ElasticJoint | None,
     reporter: Reporter,
     ring: RingOfSectors | None = None,
     engine_order: int = 1,
 ) -> RigModel:
-    """The rig that a reduced body makes, with joints of so many ``directions``, 1 or 3.
+    """The rig that a reduced body makes; ``joint`` is that of entries without a law of their own.
 
-    It may be a sector of a ``ring`` that is driven by an ``engine_order``.
-    Raises UserError for a file without such a body, and for points that it does not have.
+    Joints have three directions if any of them is a contact. The body may be a sector of a ``ring``
+    that is driven by an ``engine_order``. Raises UserError for a file without such a body, and for
+    points that it does not have.
     """
     with reporter.stage("reduction", "steps") as told:
         reduced, massless = _reduced_body(body, reporter, told)
     try:
-        return _rig_on(reduced, body, directions, ring, engine_order)
+        return _rig_on(reduced, body, [own or joint for own in own_laws(body)], ring, engine_order)
     except UserError as error:
         if not massless:
             raise
@@ -61,41 +63,52 @@ def reduced_rig_model(
 def _rig_on(
     reduced: ReducedModel,
     body: JointedBody,
-    directions: int,
+    laws: Sequence[Joint | ElasticJoint | None],
     of_ring: RingOfSectors | None,
     engine_order: int,
 ) -> RigModel:
-    """The rig on a reduced model."""
+    """The rig on a reduced model, whose entries of joints have these laws."""
     if reduced.names is None:
         raise UserError(
             "structure.file: a model whose kept displacements have no names; allowed: one of a "
             "specimens run, or written with names"
         )
-    points, ring, sector = _Points(reduced.names), None, None
+    further = _further_masses(body, reduced.names)
+    points, ring, sector = _Points([*reduced.names, *further]), None, None
     linked = points
     if of_ring is not None:
         ring = of_ring.of_order(engine_order, points)
-        linked = _Points(with_next(reduced.names, ring))
+        linked = _Points(with_next(points.names, ring))
+    contacts = [isinstance(law, FrictionContactJoint) for law in laws]
+    directions = 3 if any(contacts) else 1
     joints = [
-        joint
-        for number, places in enumerate(body.joints)
-        for joint in linked.joints(places, directions, f"structure.joints.{number}")
+        linked.joints(places, contact, directions, f"structure.joints.{number}")
+        for number, (places, contact) in enumerate(zip(body.joints, contacts, strict=True))
     ]
-    added = points.masses(body), linked.springs(body), np.array(body.damping_ratio)
+    every = [joint for entry in joints for joint in entry]
+    masses = {**points.masses(body), **further}
+    added = masses, linked.springs(body), np.array(body.damping_ratio)
     try:
         if ring is None:
-            model = reduced_rig(reduced, reduced.names, joints, *added)
+            model = reduced_rig(reduced, reduced.names, every, *added)
         else:
-            sector = reduced_sector(reduced, reduced.names, joints, ring, *added)
+            sector = reduced_sector(reduced, reduced.names, every, ring, *added)
             model, points = sector.at(0), _Points([n for n in points.names if n not in ring.ties])
         driven = _driven(body, reduced, model, points, sector)
         seen = _shape(model, points, body.seen, "structure.seen")
     except RigError as error:
         raise UserError(f"structure: {error}") from error
     label = f"{body.seen.points} {body.seen.direction}"
-    along = _along(directions, body)
+    entries = tuple(
+        JointEntry(
+            len(entry), _along(contact, places, body.seen), contact, places.joint is not None
+        )
+        for entry, contact, places in zip(joints, contacts, body.joints, strict=True)
+    )
+    # That of joints which have the case's law, if there are any.
+    looked_at = min(entries, key=lambda entry: entry.own).along
     return RigModel(
-        *(model, driven, seen[None], (label,), directions, along),
+        *(model, driven, seen[None], (label,), directions, looked_at, entries),
         in_a_row=False,
         translations={} if sector is not None else _translations(reduced, model),
         sector=sector,
@@ -115,6 +128,8 @@ def _translations(body: ReducedModel, model: DynamicModel) -> dict[str, Translat
         with suppress(RigError):
             rigid = np.zeros(len(model.mass))
             rigid[: len(body.stiffness)] = translation_of(body, axis)
+            # Of masses beside the body those that move along the axis.
+            rigid[len(body.stiffness) :] = along(model.names[len(body.stiffness) :], axis)
             found[axis] = Translation(rigid, model.mass @ rigid)
     return found
 
@@ -133,19 +148,19 @@ def _driven(
     if isinstance(driven, Moved):
         return _shape(model, points, driven, "structure.driven")
     load = reduced.loads[:, driven.load - 1]
+    # Masses beside the body are none of its matrices.
     if sector is None:
-        return load
+        return np.pad(load, (0, len(model.mass) - len(load)))
     # What is on a face on which the next sector begins acts there.
     shared = np.pad(load, (0, len(sector.model.mass) - len(load)))
     return sector.force(shared, sector.ring.shift(1))
 
 
-def _along(directions: int, body: JointedBody) -> int:
+def _along(contact: bool, places: JointPlaces, seen: Moved) -> int:
     """The joints' direction that is looked at: their only one, or of two across the one seen."""
-    if directions == 1:
+    if not contact:
         return 0
-    across = _across(body.joints[0].direction)
-    axis = body.seen.direction[-1]
+    across, axis = _across(places.direction), seen.direction[-1]
     return across.index(axis) if axis in across else 0
 
 
@@ -246,14 +261,38 @@ def reduced_specimens(
 # --- its points ---------------------------------------------------------------------------------
 
 
+def _further_masses(body: JointedBody, names: Sequence[str]) -> dict[str, float]:
+    """Masses beside a body of these ``names``, by their displacements [t]."""
+    points = {name.rpartition(" ")[0] for name in names}
+    for number, mass in enumerate(body.further_masses):
+        if mass.name in points:
+            raise UserError(
+                f"structure.further_masses.{number}.name: '{mass.name}': a point of the body; "
+                "allowed: others, or structure.masses, which adds to points"
+            )
+    return {
+        f"{mass.name} {axis}": mass.mass for mass in body.further_masses for axis in mass.directions
+    }
+
+
 class _Points(PlaceNames):
     """The kept points of a body by name, and what is put there."""
 
-    def joints(self, places: JointPlaces, directions: int, key: str) -> Iterator[list[Link]]:
-        """The links of every joint: that along its direction; three with it as the last."""
-        across = _across(places.direction) if directions > 1 else []
-        for point, opposite in self.pairs(places, key):
-            yield [link_along(point, opposite, axis) for axis in (*across, places.direction)]
+    def joints(
+        self, places: JointPlaces, contact: bool, directions: int, key: str
+    ) -> list[list[Link]]:
+        """The links of every joint of an entry, as many as ``directions``.
+
+        Of a contact that along its direction is the last of three; of others it is the first, and
+        nothing moves them in further ones.
+        """
+        across = _across(places.direction) if contact else []
+        axes, pairs = [*across, places.direction], self.pairs(places, key)
+        for point in (end for pair in pairs for end in pair if end is not None):
+            for axis in axes:
+                self.moving(point, axis[-1], f"{key}.direction")
+        nowhere = [Link(None)] * (directions - len(axes))
+        return [[*(link_along(*pair, axis) for axis in axes), *nowhere] for pair in pairs]
 
     def masses(self, body: JointedBody) -> dict[str, float]:
         """Masses added to displacements [t]."""

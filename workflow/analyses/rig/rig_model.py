@@ -20,13 +20,25 @@ from fe_models.dynamics.sector import CyclicSector
 from sa_solver.types import Array, Indices
 from wear.joints.elastic import ElasticLaw
 from wear.joints.friction_contact import FrictionContact
-from workflow.analyses.rig.laws import Law
-from workflow.analyses.rig.place_names import PlaceNames
+from workflow.analyses.rig.laws import Laws, grouped
+from workflow.analyses.rig.place_names import PlaceNames, in_a_row
+from workflow.analyses.rig.structure import MODE
 
 # Natural frequencies that are reported, from the lowest on: those of a row of masses, all.
 MOST_FREQUENCIES = 20
-# Names of displacements that are those of modes, whichever body has them.
-MODE = r"(.* )?mode \d+"
+
+
+@dataclass(frozen=True)
+class JointEntry:
+    """So many ``joints`` of one entry of a case; loops are along their direction ``along``.
+
+    They may be ``contacts``, and have a law that is their ``own``.
+    """
+
+    joints: int
+    along: int = 0
+    contacts: bool = False
+    own: bool = False
 
 
 @dataclass(frozen=True)
@@ -35,8 +47,8 @@ class RigModel:
 
     ``driven`` ``(n,)`` are the forces of an excitation of 1 N; ``seen`` ``(k, n)`` takes
     displacements to those that are kept, with ``labels`` ``(k,)``, the last of which is looked at.
-    Loops are those along the joints' direction number ``along``. Of masses ``in_a_row`` the second
-    mode is looked for too.
+    Loops are those along the joints' direction number ``along``; ``entries`` are the joints of a
+    case, one entry after the other, none where they need none. Masses ``in_a_row`` move along x.
 
     Two bodies that touch have ``pressing`` ``(n,)``, the forces of a normal load of 1 N (elsewhere
     the load is the joints' own preload); ``stretch`` ``(n,)``, which takes displacements to the one
@@ -53,6 +65,7 @@ class RigModel:
     labels: tuple[str, ...]
     directions: int = 1
     along: int = 0
+    entries: tuple[JointEntry, ...] = ()
     in_a_row: bool = True
     pressing: Array | None = None
     stretch: Array | None = None
@@ -80,6 +93,32 @@ class RigModel:
         return len(self.model.connection) // self.directions
 
     @property
+    def shared(self) -> np.ndarray:
+        """Which joints ``(j,)`` have no law of their own, but that of the case."""
+        own = np.repeat([entry.own for entry in self.entries], self.counts)
+        return np.logical_not(own) if self.entries else np.ones(self.joints, bool)
+
+    @property
+    def contacts(self) -> np.ndarray:
+        """Which joints ``(j,)`` are friction contacts."""
+        if not self.entries:
+            return np.full(self.joints, self.directions > 1)
+        return np.repeat([entry.contacts for entry in self.entries], self.counts)
+
+    @property
+    def counts(self) -> list[int]:
+        """Joints of every entry of the case."""
+        return [entry.joints for entry in self.entries]
+
+    def of_entry(self, number: int | None) -> tuple[slice, int]:
+        """Joints of an entry of the case, or all, and their direction that is looked at."""
+        if number is None or not self.entries:
+            return slice(0, self.joints), self.along
+        first = sum(self.counts[:number])
+        entry = self.entries[number]
+        return slice(first, first + entry.joints), entry.along
+
+    @property
     def retained(self) -> Indices:
         """The displacements of places ``(p,)``: all but the modes of reduced bodies."""
         modal = [re.fullmatch(MODE, name) is not None for name in self.model.names]
@@ -89,10 +128,7 @@ class RigModel:
     def place_names(self) -> PlaceNames:
         """Its places as a case names them: masses in a row move along x."""
         names = [self.model.names[place] for place in self.retained]
-        if not self.in_a_row:
-            return PlaceNames(names)
-        along = {f"{name} x": name for name in names}
-        return PlaceNames(list(along), along)
+        return in_a_row(names) if self.in_a_row else PlaceNames(names)
 
     @property
     def stretched(self) -> list[str]:
@@ -110,7 +146,7 @@ class RigModel:
         """Joints ``(j, d)`` that have not moved [mm]."""
         return np.zeros((self.joints, self.directions))
 
-    def preload(self, law: Law) -> Array:
+    def preload(self, law: Laws) -> Array:
         """The static load ``(n,)`` that balances joints that have not moved [N].
 
         Displacements count from there: what the load has done to the structure before does not
@@ -119,7 +155,7 @@ class RigModel:
         force = law.respond(law.rest(self.joints), self.still).force
         return np.asarray(force.ravel() @ self.model.connection)
 
-    def with_preload(self, law: Law, force: ExcitationForce) -> CombinedForces:
+    def with_preload(self, law: Laws, force: ExcitationForce) -> CombinedForces:
         """An excitation, with the static load that balances the joints at rest."""
         preload = self.preload(law)
         if not preload.any():
@@ -127,9 +163,20 @@ class RigModel:
         return CombinedForces((force, ConstantForce(preload)))
 
     def loop(self, motion: Motion) -> tuple[Array, Array]:
-        """Mean displacement [mm] and force [N] of all joints ``(t,)``, along one direction."""
+        """Mean displacement [mm] and force [N] ``(t,)`` of all joints that have the case's law,
+        along one direction."""
+        stretch, force, shared = motion.joint_displacement, motion.joint_force, self.shared
+        pulled = force[:, shared, self.along].sum(axis=1)
+        return stretch[:, shared, self.along].mean(axis=1), pulled
+
+    def by_entry(self, motion: Motion) -> tuple[Array, Array]:
+        """Mean displacements [mm] and forces [N] ``(t, e)`` of every entry of joints."""
+        entries = [self.of_entry(number) for number in range(len(self.entries))]
         stretch, force = motion.joint_displacement, motion.joint_force
-        return stretch[:, :, self.along].mean(axis=1), force[:, :, self.along].sum(axis=1)
+        return (
+            np.stack([stretch[:, rows, along].mean(axis=1) for rows, along in entries], axis=1),
+            np.stack([force[:, rows, along].sum(axis=1) for rows, along in entries], axis=1),
+        )
 
     def looked_at(self, values: Array) -> Array:
         """Displacement or acceleration ``(t,)`` that is looked at, of all of them ``(t, n)``."""
@@ -137,9 +184,9 @@ class RigModel:
 
     def contact(self, motion: Motion) -> dict[str, Any]:
         """How friction contacts press in a motion; nothing of joints along one direction."""
-        if self.directions == 1:
+        if not self.contacts.any():
             return {}
-        normal = motion.joint_force[:, :, 2]
+        normal = motion.joint_force[:, self.contacts, 2]
         total = normal.sum(axis=1)
         return {
             "smallest_normal_force": float(total.min()),
@@ -151,7 +198,7 @@ class RigModel:
         """The lowest natural frequencies without the joints [Hz]."""
         return _lowest(natural_frequencies(self.driven_so))
 
-    def stuck(self, law: Law, rest: Array | None = None) -> Array:
+    def stuck(self, law: Laws, rest: Array | None = None) -> Array:
         """Tangents ``(j, d, d)`` [N/mm] of joints that stick.
 
         Where the load presses them, they are displaced by ``rest`` ``(j, d)`` [mm].
@@ -161,7 +208,7 @@ class RigModel:
             state = law.respond(state, rest).state
         return law.respond(state, still).tangent
 
-    def stuck_damping(self, law: Law, rest: Array | None = None) -> list[float]:
+    def stuck_damping(self, law: Laws, rest: Array | None = None) -> list[float]:
         """Damping ratios of the lowest modes with all joints stuck: C is that of the open ones."""
         held, model = sl.block_diag(*self.stuck(law, rest)), self.driven_so
         stiffness = model.stiffness + model.connection.conj().T @ held @ model.connection
@@ -175,19 +222,20 @@ class RigModel:
         ratios: list[float] = (0.5 * lost / angular).tolist()
         return ratios
 
-    def modes(self, law: Law, rest: Array | None = None) -> dict[str, list[float]]:
+    def modes(self, law: Laws, rest: Array | None = None) -> dict[str, list[float]]:
         """The lowest natural frequencies with all joints stuck, and with all sliding [Hz].
 
         Those that are open at rest stay open; see :meth:`stuck`.
         """
         stuck = self.stuck(law, rest)
         sliding = np.zeros_like(stuck)
-        if isinstance(law, FrictionContact):
-            sliding[:, 2, 2] = stuck[:, 2, 2]
-        elif isinstance(law, ElasticLaw):
-            sliding = stuck
-        else:
-            sliding[:, 0, 0] = law.residual_stiffness
+        for group, rows in grouped(law, self.joints).rows():
+            if isinstance(group.law, FrictionContact):
+                sliding[rows, 2, 2] = stuck[rows, 2, 2]
+            elif isinstance(group.law, ElasticLaw):
+                sliding[rows] = stuck[rows]
+            else:
+                sliding[rows, 0, 0] = group.law.residual_stiffness
         return {
             "stuck": _lowest(natural_frequencies(self.driven_so, stuck)),
             "sliding": _lowest(natural_frequencies(self.driven_so, sliding)),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from pathlib import Path
@@ -10,24 +11,60 @@ from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 from pydantic import Field, model_validator
 
 from workflow.analyses.rig.damping import OF_MODES, Damping, DampingRatios, damping_text
+from workflow.analyses.rig.joint_sections import (
+    ElasticJoint,
+    Joint,
+    RowLaw,
+    VibrationLaw,
+)
 from workflow.analyses.rig.places import Against, Direction, Moved, Points
 from workflow.analyses.specimens.case import SpecimensCase
-from workflow.case.fields import Quantity, Whole
+from workflow.case.fields import Quantity, Whole, shown
 from workflow.case.input_files import InputFileError, open_hdf5
 from workflow.case.loading import YAML, CaseFile, outline_of
-from workflow.case.sections import Length, Section, disagreement, entry
+from workflow.case.plain import entries
+from workflow.case.sections import Length, Section, Title, disagreement, entry
 
 if TYPE_CHECKING:
     from fe_models.reduction import ReducedModel
 
+# Names of displacements that are those of modes, whichever body has them.
+MODE = r"(.* )?mode \d+"
 # Rows of specimens that a rig tells, and what it calls them.
 OF_SPECIMENS = {"structure": "specimens", "material": "material", "wear law": "wear law"}
 Mass = Annotated[float, Quantity("t", above=0.0, at_most=1e3, range_text="above 0 to 1e6 kg")]
 Spring = Annotated[float, Quantity("N/mm", at_least=0.0, at_most=1e12, range_text="0 to 1e6 kN/um")]
 
 
+class JointPlaces(Against):
+    """A joint at each of some points."""
+
+    direction: Direction = entry(
+        "in which the points move when the joint stretches; those of a friction contact move so to "
+        "close it, and slide across",
+        "-z",
+    )
+    joint: VibrationLaw | None = entry(
+        "law and parameters of these joints together; without it those of the case's joint, which "
+        "all entries without one share",
+        default=None,
+    )
+
+
+class RowJoint(JointPlaces):
+    """A joint of a mass in a row."""
+
+    points: Title = entry("the mass: m1, m2, ... from the ground on", "m2")
+    against: Title | None = entry("another mass; without it the ground", "m1", default=None)
+    direction: Direction = entry("x, or -x: in which the mass stretches it", "x", default="x")
+    joint: RowLaw | None = entry(
+        "law and parameters of its own; without it the case's joint, which all without one share",
+        default=None,
+    )
+
+
 class Rig(Section):
-    """Masses in a row on springs from the ground on; the joint holds the last to the ground."""
+    """Masses in a row on springs from the ground on."""
 
     kind: Literal["rig"] = entry("masses in a row", "rig")
     masses: Annotated[tuple[Mass, ...], Field(min_length=1, max_length=20)] = entry(
@@ -37,8 +74,35 @@ class Rig(Section):
         "each between its mass and the one before, or the ground [N/mm]",
         ["1.4 N/um", "273 N/um"],
     )
+    joints: tuple[RowJoint, ...] = entry(
+        "where they are; the case's joint is between the last mass and the ground where no entry "
+        "takes it",
+        default=(),
+    )
     damping_ratio: DampingRatios = entry(f"without the joint, {OF_MODES}", 0.001)
     damping: Damping | None = entry("added to that of the modes", default=None)
+
+    @model_validator(mode="after")
+    def _joins_its_own(self) -> Rig:
+        names = [f"m{number}" for number in range(1, len(self.masses) + 1)]
+        for number, joint in enumerate(self.joints):
+            key = f"joints.{number}"
+            for end in ("points", "against"):
+                name = getattr(joint, end)
+                if name is not None and name not in names:
+                    raise disagreement(
+                        f"{shown(name)}: no such mass; allowed: m1 to {names[-1]}", f"{key}.{end}"
+                    )
+            if joint.points == joint.against:
+                raise disagreement(
+                    f"{joint.points} against itself; allowed: others", f"{key}.against"
+                )
+            if joint.direction[-1] != "x":
+                raise disagreement(
+                    f"{joint.direction}: masses in a row move along x; allowed: x, -x",
+                    f"{key}.direction",
+                )
+        return self
 
     @model_validator(mode="after")
     def _damps_its_own(self) -> Rig:
@@ -62,17 +126,8 @@ class Rig(Section):
     @property
     def text(self) -> str:
         """The rig in a few words."""
-        return f"rig of {_on_springs(self.masses, self.springs)}"
-
-
-class JointPlaces(Against):
-    """A joint at each of some points."""
-
-    direction: Direction = entry(
-        "in which the points move when the joint stretches; those of a friction contact move so to "
-        "close it, and slide across",
-        "-z",
-    )
+        joints = f", joints {joined(self.joints)}" if self.joints else ""
+        return f"rig of {_on_springs(self.masses, self.springs)}{joints}"
 
 
 class AddedMass(Points):
@@ -85,6 +140,22 @@ class AddedSpring(Against):
     """A spring that points share evenly."""
 
     stiffness: Spring = entry("of all of them together [N/mm]", "273 N/um")
+
+
+class FurtherMass(Section):
+    """A mass that is no part of the body: a point of its own."""
+
+    name: Title = entry("of the point, as joints, springs and forces name it", "damper")
+    mass: Mass = entry("[t]", "50 g")
+    directions: Literal["xyz", "xy", "xz", "yz", "x", "y", "z"] = entry(
+        "in which it moves; it is held in the others", "xz", default="xyz"
+    )
+
+    @model_validator(mode="after")
+    def _is_a_point(self) -> FurtherMass:
+        if re.fullmatch(MODE, self.name) is not None:
+            raise disagreement(f"{shown(self.name)}: the name of a mode; allowed: others", "name")
+        return self
 
 
 class StoredBody(Section):
@@ -108,6 +179,9 @@ class JointedBody(Section, ABC):
 
     joints: tuple[JointPlaces, ...] = entry("where they are", min_length=1)
     masses: tuple[AddedMass, ...] = entry("added, moving in x, y and z", default=())
+    further_masses: tuple[FurtherMass, ...] = entry(
+        "beside the body, such as a damper: joints and springs hold them", default=()
+    )
     springs: tuple[AddedSpring, ...] = entry("added", default=())
     damping_ratio: DampingRatios = entry(f"without the joints, {OF_MODES}", 0.001)
     damping: Damping | None = entry("added to that of the modes", default=None)
@@ -117,6 +191,16 @@ class JointedBody(Section, ABC):
         default=None,
     )
     seen: Moved = entry("points whose mean displacement is looked at")
+
+    @model_validator(mode="after")
+    def _names_masses_once(self) -> JointedBody:
+        names = [mass.name for mass in self.further_masses]
+        for number, name in enumerate(names):
+            if name in names[:number]:
+                raise disagreement(
+                    f"{shown(name)}: twice; allowed: each its own", f"further_masses.{number}.name"
+                )
+        return self
 
     @property
     @abstractmethod
@@ -132,12 +216,13 @@ class JointedBody(Section, ABC):
     @property
     def added(self) -> str:
         """Where joints are, and what is added, in a few words."""
-        places = ", ".join(joint.points for joint in self.joints)
-        added = [f"{1e3 * added.mass:g} kg at {added.points}" for added in self.masses] + [
+        added = [f"{1e3 * added.mass:g} kg at {added.points}" for added in self.masses]
+        added += [f"{1e3 * added.mass:g} kg as {added.name}" for added in self.further_masses]
+        added += [
             f"{1e-3 * spring.stiffness:g} N/um at {spring.points} along {spring.direction}"
             for spring in self.springs
         ]
-        return f"joints at {places}" + (f"; added: {', '.join(added)}" if added else "")
+        return f"joints {joined(self.joints)}" + (f"; added: {', '.join(added)}" if added else "")
 
     def outline(self) -> list[tuple[str, str]]:
         """Rows about the body itself."""
@@ -218,6 +303,64 @@ def _on_springs(masses: Sequence[float], springs: Sequence[float]) -> str:
     """Masses in a row, and the springs that hold them."""
     stiff = ", ".join(f"{1e-3 * spring:.6g}" for spring in springs)
     return f"{', '.join(f'{1e3 * mass:g}' for mass in masses)} kg on springs of {stiff} N/µm"
+
+
+def joined(joints: Sequence[JointPlaces]) -> str:
+    """Where joints are, and the laws of those that have their own."""
+    parts = []
+    for joint in joints:
+        between = "at " + joint.points if joint.against is None else _between(joint)
+        parts.append(between if joint.joint is None else f"{between} ({joint.joint.law})")
+    return ", ".join(parts)
+
+
+def _between(joint: JointPlaces) -> str:
+    return f"between {joint.against} and {joint.points}"
+
+
+def joints_of(structure: Section, shared: bool = True) -> tuple[JointPlaces, ...]:
+    """The entries of joints of a structure, none of specimens that need none.
+
+    Where there is a ``shared`` law, of the case, and no entry has it, it is that of a joint between
+    the last mass of a row and the ground.
+    """
+    if isinstance(structure, Rig):
+        taken = any(joint.joint is None for joint in structure.joints)
+        last = () if taken or not shared else (RowJoint(points=f"m{len(structure.masses)}"),)
+        return (*structure.joints, *last)
+    return structure.joints if isinstance(structure, JointedBody) else ()
+
+
+def own_laws(structure: Section, shared: bool = True) -> tuple[VibrationLaw | None, ...]:
+    """The law that each of these has of its own; one None for joints that need no entry."""
+    if isinstance(structure, FrictionRig):
+        return (None,)
+    return tuple(places.joint for places in joints_of(structure, shared))
+
+
+def joint_rows(
+    shared: Joint | ElasticJoint | None, own: Sequence[Joint | ElasticJoint | None]
+) -> list[tuple[str, str]]:
+    """The laws of joints with their parameters, for an outline."""
+    numbered = [(f"joint {number}", law) for number, law in enumerate(own, start=1)]
+    every = [("joint", shared), *numbered]
+    return [(name, f"{law.law}, {entries(law)}") for name, law in every if law is not None]
+
+
+def refuse_own_joints(structure: Section, otherwise: str) -> None:
+    """Refuse joints in a row of masses, and laws of their own; ``otherwise`` is what may be."""
+    if isinstance(structure, Rig) and structure.joints:
+        raise disagreement(
+            f"{len(structure.joints)}: given; allowed: {otherwise}", "structure.joints"
+        )
+    if not isinstance(structure, JointedBody):
+        return
+    for number, law in enumerate(own_laws(structure)):
+        if law is not None:
+            raise disagreement(
+                f"{law.law}: a law of its own; allowed: {otherwise}",
+                f"structure.joints.{number}.joint",
+            )
 
 
 def structure_outline(structure: Rig | JointedBody | FrictionRig) -> list[tuple[str, str]]:

@@ -2,22 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import pairwise
 from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 from pydantic import Field, model_validator
 
-from workflow.analyses.rig.doubts import AWAY, about_matrices, about_modes
+from workflow.analyses.rig.doubts import AWAY, RIGID, about_matrices, about_modes
 from workflow.analyses.rig.excitation import Drive, Excitation, Hammer, Harmonic, Recorded, Time
 from workflow.analyses.rig.joint_evolution import JointEvolution
-from workflow.analyses.rig.joint_sections import ContactLaw, FrictionContactJoint, Joint, JointLaw
+from workflow.analyses.rig.joint_sections import (
+    ContactLaw,
+    ElasticJoint,
+    FrictionContactJoint,
+    Joint,
+    JointLaw,
+)
 from workflow.analyses.rig.matrix_body import MatrixBody
 from workflow.analyses.rig.structure import (
     ReducedBody,
     Rig,
     driven_place,
+    joint_rows,
+    own_laws,
     refuse_missing_mass,
     refuse_undriven,
     structure_outline,
@@ -25,7 +33,7 @@ from workflow.analyses.rig.structure import (
 from workflow.analyses.wear.case.evolution import PositiveEnergy, TotalEnergy
 from workflow.analyses.wear.case.sections import Cycles
 from workflow.case.fields import Quantity
-from workflow.case.plain import entries, plain, times
+from workflow.case.plain import plain, times
 from workflow.case.sections import (
     Case,
     DottedPath,
@@ -174,7 +182,8 @@ class RigCase(TimeCase):
         "what holds the joint"
     )
     joint: ContactLaw = entry(
-        "its law, and the parameters that it begins with; several joints share them evenly"
+        "its law, and the parameters that it begins with; several joints share them evenly, but "
+        "those with a law of their own in structure.joints, which stays as it is"
     )
     excitation: Excitation = entry("what drives the rig")
     ageing: SteadyAgeing = entry(
@@ -189,6 +198,16 @@ class RigCase(TimeCase):
         otherwise = "a reduced body; allowed: structure.driven"
         refuse_undriven(self.structure)
         refuse_missing_mass(self.structure, self.excitation.mass, "excitation.mass", otherwise)
+        return self
+
+    @model_validator(mode="after")
+    def _leaves_a_joint(self) -> RigCase:
+        if None not in own_laws(self.structure):
+            raise disagreement(
+                f"{self.joint.law}: given, but every entry of joints has a law of its own; "
+                "allowed: an entry without one, whose joint this is",
+                *("joint", "structure.joints"),
+            )
         return self
 
     @model_validator(mode="after")
@@ -244,7 +263,7 @@ class RigCase(TimeCase):
         structure = self.structure
         rows = [
             *structure_outline(structure),
-            *joint_outline(self),
+            *joint_outline(self, own_laws(structure)),
             ("excitation", excitation_outline(self)),
             ("time steps", f"of {plain(self.integration.step, 's')}"),
         ]
@@ -253,7 +272,8 @@ class RigCase(TimeCase):
         return rows
 
     def doubts(self) -> Iterator[str]:
-        excitation, stiffness = self.excitation, self.joint.stiffness
+        excitation, own = self.excitation, own_laws(self.structure)
+        stiffness = RIGID if any(own) else self.joint.stiffness
         if isinstance(excitation, Harmonic):
             span = excitation.frequency / AWAY, excitation.frequency * AWAY
             yield from about_modes("excitation.frequency", span, self.structure, stiffness)
@@ -301,9 +321,11 @@ def check_within(energies: tuple[float, ...], ageing: Ageing) -> None:
         )
 
 
-def joint_outline(case: TimeCase) -> list[tuple[str, str]]:
-    """The joint, whether it evolves, and where it is looked at."""
-    rows = [("joint", f"{case.joint.law}, {entries(case.joint)}")]
+def joint_outline(
+    case: TimeCase, own: Sequence[Joint | ElasticJoint | None] = ()
+) -> list[tuple[str, str]]:
+    """The joint, those with laws of their own, whether it evolves, and where it is looked at."""
+    rows = joint_rows(case.joint, own)
     if not case.evolution.is_empty:
         rows.append(("evolution", case.evolution.text))
     if any(case.energies):

@@ -22,7 +22,7 @@ from wear.joints.ageing import (
 from wear.joints.law import march_joints
 from wear.joints.loop_record import MeasuredLoopError
 from wear.joints.measured_loops import measure_loops
-from workflow.analyses.rig.laws import Law
+from workflow.analyses.rig.laws import Laws
 from workflow.analyses.time.case import Ageing, JointCase, joules
 from workflow.analyses.time.joint_model import JointModel
 from workflow.analyses.time.outcome import LOOP, PARAMETERS, State, TimeOutcome, loop_curves
@@ -78,7 +78,7 @@ def _state(model: JointModel, energy: float, cycles: float, amplitude: float) ->
     return State(energy, cycles, parameters, numbers, curves)
 
 
-def steady_loop(law: Law, amplitude: float) -> tuple[Array, Array, float]:
+def steady_loop(law: Laws, amplitude: float) -> tuple[Array, Array, float]:
     """A settled cycle between ± ``amplitude`` [mm]: displacement, force, and energy dissipated.
 
     From a reversal on, its end included.

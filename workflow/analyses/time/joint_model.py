@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from wear.joints import evolution as forms
 from wear.joints.elastic import ElasticLaw
 from wear.joints.evolution import JointEvolution, WearFunction
 from wear.joints.friction_contact import FrictionContact
 from workflow.analyses.rig import joint_evolution as given
-from workflow.analyses.rig.joint_sections import BoucWenJoint
-from workflow.analyses.rig.laws import LAWS, Law, LineLaw, shared_out
+from workflow.analyses.rig.joint_sections import BoucWenJoint, ElasticJoint, Joint
+from workflow.analyses.rig.laws import Law, Laws, LineLaw, law_of, law_of_all, laws_of
 from workflow.analyses.time.case import TimeCase
 from workflow.analyses.time.outcome import PARAMETERS
 from workflow.analyses.wear.loop_table import read_loop_table
@@ -23,18 +23,24 @@ from workflow.errors import UserError
 class JointModel:
     """A joint that wears: its ``law`` with the parameters that ``evolution`` begins with.
 
-    They are those of all ``joints`` together, which share stiffness and load evenly.
+    There are entries of so many joints, ``counts``: those without a law that is their ``own``, and
+    stays as it is, share stiffness and load of the joint evenly.
     """
 
     law: Law
     evolution: JointEvolution
-    joints: int = 1
+    counts: Sequence[int] = (1,)
+    own: Sequence[Law | None] = (None,)
 
     @classmethod
-    def of(cls, case: TimeCase, joints: int = 1) -> JointModel:
+    def of(
+        cls,
+        case: TimeCase,
+        counts: Sequence[int] = (1,),
+        own: Sequence[Joint | ElasticJoint | None] = (None,),
+    ) -> JointModel:
         """The joint of a case. Raises UserError where its table of loops cannot be taken."""
-        parameters: dict[str, Any] = case.joint.model_dump(exclude={"law"})
-        return cls(LAWS[case.joint.law](**parameters), _evolution(case), joints)
+        return cls(law_of(case.joint), _evolution(case), counts, laws_of(own))
 
     @property
     def line_law(self) -> LineLaw:
@@ -42,9 +48,9 @@ class JointModel:
         assert not isinstance(self.law, FrictionContact | ElasticLaw)
         return self.law
 
-    def at(self, energy: float) -> Law:
-        """The law of each joint after so much ``energy`` dissipated in all of them [N mm]."""
-        return shared_out(self._whole(energy), self.joints)
+    def at(self, energy: float) -> Laws:
+        """The law of each joint after so much ``energy`` dissipated in those that wear [N mm]."""
+        return law_of_all(self._whole(energy), self.own, self.counts)
 
     def parameters(self, energy: float) -> dict[str, float]:
         """Parameters after so much dissipated ``energy`` [N mm], by name."""

@@ -77,6 +77,14 @@ def motion_curves(rig: RigModel, motion: Motion, force: ExcitationForce) -> dict
     seen, pull = rig.seen.T, "force of the joint, or the sum of several, resisting"
     dissipated = motion.energies.joints.sum(axis=1)
     lost = "energy that the joint has dissipated since the beginning"
+    of_entries = {}
+    if len(rig.entries) > 1:
+        moved, pulled = rig.by_entry(motion)
+        of_each = "of the joints of each entry of structure.joints"
+        of_entries = {
+            "joints_displacement": Dataset(moved, "mm", f"mean displacement {of_each}"),
+            "joints_force": Dataset(pulled, "N", f"sum of the forces {of_each}, resisting"),
+        }
     return {
         "time": Dataset(motion.times, "s", "time"),
         "excitation": Dataset(force.value(motion.times), "N", "force of the excitation"),
@@ -85,5 +93,6 @@ def motion_curves(rig: RigModel, motion: Motion, force: ExcitationForce) -> dict
             motion.acceleration @ seen, "mm/s^2", "accelerations of what is seen"
         ),
         "joint_force": Dataset(rig.loop(motion)[1], "N", pull),
+        **of_entries,
         "dissipated": Dataset(dissipated, "N mm", lost),
     }

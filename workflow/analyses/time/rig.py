@@ -18,6 +18,7 @@ from wear.joints.ageing import LongTest
 from workflow.analyses.rig import excitation as given
 from workflow.analyses.rig.building import rig_model
 from workflow.analyses.rig.rig_model import RigModel
+from workflow.analyses.rig.structure import own_laws
 from workflow.analyses.time.case import Ageing, Integration, RigCase, joules
 from workflow.analyses.time.hammer import run_hammer
 from workflow.analyses.time.joint import aged, energies_within, evolution_curve, extracted, test_end
@@ -76,7 +77,7 @@ def run_rig(case: RigCase, reporter: Reporter, steps: Steps) -> TimeOutcome:
     """
     rig = rig_model(case.structure, case.joint, case.excitation.mass, reporter)
     memory(case, len(rig.model.mass)).check()
-    joint = JointModel.of(case, rig.joints)
+    joint = JointModel.of(case, rig.counts, own_laws(case.structure))
     runs = {"hammer": run_hammer, "recorded": _run_recorded, "harmonic": _run_harmonic}
     outcome = runs[case.excitation.kind](case, rig, joint, reporter, steps)
     numbers = {"free": rig.free(), **outcome.numbers}
@@ -224,7 +225,7 @@ class _SteadyStates:
             if last.steady is not None or last.periods == excitation.periods:
                 return None
             motion = motion_of(rig, self.joint, energy, force, period, control, last.start)
-            dissipated = float(motion.energies.joints[-1].sum())
+            dissipated = float(motion.energies.joints[-1, rig.shared].sum())
             stretch, joint_force = rig.loop(motion)
             now = np.array([dissipated, np.ptp(stretch)])
             change, periods = _change(now, last.now), last.periods + 1

@@ -14,6 +14,7 @@ from workflow.analyses.rig.excitation import DrivingForce, Frequency, MassNumber
 from workflow.analyses.rig.joint_sections import (
     ElasticJoint,
     FrictionContactJoint,
+    Joint,
     VibrationLaw,
 )
 from workflow.analyses.rig.matrix_body import MatrixBody
@@ -24,7 +25,10 @@ from workflow.analyses.rig.structure import (
     ReducedBody,
     Rig,
     driven_place,
+    joint_rows,
+    own_laws,
     refuse_missing_mass,
+    refuse_own_joints,
     refuse_undriven,
     structure_outline,
 )
@@ -37,7 +41,7 @@ from workflow.analyses.vibration.sections import (
     NonlinearModes,
 )
 from workflow.case.fields import Quantity
-from workflow.case.plain import entries, shares
+from workflow.case.plain import shares
 from workflow.case.sections import Case, Title, disagreement, entry, one_of
 from workflow.case.source import Source
 
@@ -46,6 +50,8 @@ class VibrationCaseBase(Case):
     """A structure under forces a sin(2π frequency t), for all frequencies of a span."""
 
     also_filled_in: ClassVar[tuple[str, ...]] = ("forces",)
+    # Whether joints may have laws of their own, beside that of the case.
+    mixes_laws: ClassVar[bool] = False
     in_schema: ClassVar[Mapping[str, Any]] = one_of("forces", "excitation")
 
     title: Title = entry("one line", "Forced response of a friction rig")
@@ -79,6 +85,12 @@ class VibrationCaseBase(Case):
             raise disagreement("not ascending; allowed: each force above the last", "forces")
         if self.frequencies[0] >= self.frequencies[1]:
             raise disagreement("not ascending; allowed: lower, then upper end", "frequencies")
+        return self
+
+    @model_validator(mode="after")
+    def _wears_its_joint(self) -> VibrationCaseBase:
+        if not self.mixes_laws:
+            refuse_own_joints(self.structure, "the contact that wears alone")
         return self
 
     @model_validator(mode="after")
@@ -153,12 +165,20 @@ class VibrationCaseBase(Case):
         return tuple(sorted({*harmonics, *excited} | ({0} if mean else set())))
 
     def doubts(self) -> Iterator[str]:
-        joint = getattr(self, "joint", None)
-        # Nonlinear springs may take a mode anywhere above that without them.
-        free = joint is None or isinstance(joint, ElasticJoint)
-        stiffness = RIGID if free else getattr(joint, "stiffness", RIGID)
-        yield from about_modes("frequencies", self.frequencies, self.structure, stiffness)
+        yield from about_modes(
+            "frequencies", self.frequencies, self.structure, self._stuck, self._shares
+        )
         yield from about_matrices(self.structure, self.frequencies[1] * self.harmonics[-1])
+
+    @property
+    def _stuck(self) -> float:
+        """A stiffness [N/mm] that no joint has more of."""
+        return RIGID
+
+    @property
+    def _shares(self) -> bool:
+        """Whether joints without a law of their own have one."""
+        return True
 
     @property
     def driving(self) -> str:
@@ -228,6 +248,8 @@ class VibrationCase(DrivenMass):
     """Steady vibration of a structure on friction joints that stay as they are."""
 
     about: ClassVar[str] = "the steady vibration of a rig with friction joints, over frequency"
+    also_filled_in: ClassVar[tuple[str, ...]] = ("forces", "joint")
+    mixes_laws: ClassVar[bool] = True
 
     @classmethod
     def suits(cls, source: Source) -> bool:
@@ -236,8 +258,10 @@ class VibrationCase(DrivenMass):
     structure: Annotated[
         Rig | ReducedBody | MatrixBody | PointBody | FrictionRig, Field(discriminator="kind")
     ] = entry("what holds the joints")
-    joint: VibrationLaw = entry(
-        "its law and its parameters; of all joints together, of those of one sector of a ring"
+    joint: VibrationLaw | None = entry(
+        "its law and its parameters; of all joints together that have none of their own in "
+        "structure.joints, of those of one sector of a ring",
+        default=None,
     )
     ring: RingOfSectors | None = entry(
         "of like sectors, of which the structure is one: a wave of the engine order travels round",
@@ -282,22 +306,62 @@ class VibrationCase(DrivenMass):
         default="auto",
     )
 
+    @model_validator(mode="after")
+    def _has_laws(self) -> VibrationCase:
+        own = self.own_laws
+        if self.joint is None and (None in own or not own):
+            raise disagreement(
+                "missing; allowed: the law of all joints, or one for each entry of "
+                "structure.joints",
+                "joint",
+            )
+        if self.joint is not None and None not in own:
+            raise disagreement(
+                f"{self.joint.law}: given, but every entry of joints has a law of its own; "
+                "allowed: without it",
+                "joint",
+            )
+        return self
+
+    @property
+    def _shares(self) -> bool:
+        return self.joint is not None
+
+    @property
+    def own_laws(self) -> tuple[Joint | ElasticJoint | None, ...]:
+        """Of every entry of joints, None for that of the case."""
+        return own_laws(self.structure, self._shares)
+
+    @property
+    def laws(self) -> tuple[Joint | ElasticJoint, ...]:
+        """That of every entry of joints, or of joints that need no entry."""
+        every = (own or self.joint for own in self.own_laws)
+        return tuple(law for law in every if law is not None)
+
+    @property
+    def _stuck(self) -> float:
+        # Nonlinear springs may take a mode anywhere above that without them.
+        return max(law.stiffness if isinstance(law, Joint) else RIGID for law in self.laws)
+
+    @property
+    def law_names(self) -> str:
+        """What these are called."""
+        return ", ".join(dict.fromkeys(law.law for law in self.laws))
+
     @property
     def contacts(self) -> bool:
-        return isinstance(self.joint, FrictionContactJoint)
+        return any(isinstance(law, FrictionContactJoint) for law in self.laws)
 
     @property
     def moves_mean(self) -> bool:
-        elastic = isinstance(self.joint, ElasticJoint) and self.joint.moves_mean
-        return self.contacts or elastic
+        return any(law.moves_mean for law in self.laws)
 
     def doubts(self) -> Iterator[str]:
         yield from super().doubts()
-        elastic, harmonics = isinstance(self.joint, ElasticJoint), self.harmonics
-        one_sided = elastic and self.moves_mean
-        if one_sided and not any(number % 2 == 0 for number in harmonics if number > 0):
+        uneven = [law for law in self.laws if isinstance(law, ElasticJoint) and law.moves_mean]
+        if uneven and not any(number % 2 == 0 for number in self.harmonics if number > 0):
             yield (
-                f"resolution.harmonics: without even ones, which a joint of law {self.joint.law} "
+                f"resolution.harmonics: without even ones, which a joint of law {uneven[0].law} "
                 "that is not alike on both sides has; list them, such as [0, 1, 2, 3, 4, 5]"
             )
 
@@ -373,7 +437,7 @@ class VibrationCase(DrivenMass):
 
     @model_validator(mode="after")
     def _has_the_directions(self) -> VibrationCase:
-        if self.contacts and isinstance(self.structure, Rig):
+        if isinstance(self.joint, FrictionContactJoint) and isinstance(self.structure, Rig):
             raise disagreement(
                 "friction_contact: has three directions; allowed: in a reduced structure or a "
                 "friction_rig, or jenkins, which it is along one",
@@ -385,7 +449,7 @@ class VibrationCase(DrivenMass):
 
     def _require_pad_contacts(self) -> None:
         """Refuse joints that are not those of two pads."""
-        joint = self.joint
+        (joint,) = self.laws
         if not isinstance(joint, FrictionContactJoint):
             raise disagreement(
                 f"{joint.law}: between two pads; allowed: friction_contact", "joint.law"
@@ -404,6 +468,7 @@ class VibrationCase(DrivenMass):
 
     @model_validator(mode="after")
     def _looks_inside(self) -> VibrationCase:
+        self._require_joints_of_loops()
         low, high = self.frequencies
         looked_at = {f"at.{place}": frequency for place, frequency in enumerate(self.at)}
         if self.loops is not None:
@@ -432,12 +497,29 @@ class VibrationCase(DrivenMass):
         )
         return f"{ring.text}; nodal diameters: harmonic {', '.join(each)}"
 
+    def _require_joints_of_loops(self) -> None:
+        """Refuse loops of an entry that there is not, and of several laws together."""
+        if self.loops is None:
+            return
+        number, own = self.loops.joints, self.own_laws
+        if number is None and any(own) and len(own) > 1:
+            raise disagreement(
+                "missing: joints of laws of their own have no loop together; allowed: the number "
+                f"of an entry of structure.joints, 1 to {len(own)}",
+                "loops.joints",
+                "loops",
+            )
+        if number is not None and number > len(own):
+            raise disagreement(
+                f"{number}: no such entry of structure.joints; allowed: up to {len(own)}",
+                "loops.joints",
+            )
+
     def outline(self) -> list[tuple[str, str]]:
-        structure, joint = self.structure, self.joint
         return [
-            *structure_outline(structure),
+            *structure_outline(self.structure),
             *([] if self.ring is None else [("ring", self.waves)]),
-            ("joint", f"{joint.law}, {entries(joint)}"),
+            *joint_rows(self.joint, self.own_laws),
             ("forces", self.driving),
             ("method", self.resolved),
             *([("motions at", f"{', '.join(f'{at:g}' for at in self.at)} Hz")] if self.at else []),

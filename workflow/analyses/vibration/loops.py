@@ -20,6 +20,7 @@ from wear.joints.jenkins import Jenkins
 from wear.joints.loop_record import MeasuredLoopError
 from wear.joints.measured_loops import measure_loops
 from wear.joints.periodic import SLIP, STICK
+from workflow.analyses.rig.laws import grouped
 from workflow.analyses.vibration.case import VibrationCase
 from workflow.analyses.vibration.model import VibrationModel
 from workflow.analyses.vibration.outcome import Curves
@@ -55,7 +56,9 @@ def loops_of(
         if not motion.converged:
             reporter.warn(f"{told}: no loop at {frequency:g} Hz: {motion.message}")
             continue
-        loops.append(loop_of(model, motion, case.joint.normal_load))
+        number = None if case.loops.joints is None else case.loops.joints - 1
+        load = case.laws[number or 0].normal_load
+        loops.append(loop_of(model, motion, load, number))
         start = motion
     return tuple(loops)
 
@@ -68,17 +71,23 @@ def _known(problem: HarmonicBalance, frequency: float, near: HarmonicSolution) -
     return replace(motion, error=resolution_error(problem, motion))
 
 
-def loop_of(model: VibrationModel, motion: HarmonicSolution, load: float) -> Curves:
-    """The loop of all joints together in a motion, under a normal ``load`` [N]."""
+def loop_of(
+    model: VibrationModel, motion: HarmonicSolution, load: float, entry: int | None = None
+) -> Curves:
+    """The loop of joints together in a motion, under a normal ``load`` [N].
+
+    They are those of an ``entry`` of the case, or all.
+    """
     rig = model.rig
+    rows, along = rig.of_entry(entry)
     if rig.stretch is None:
-        mean = motion.coefficients[:, :, rig.along].mean(axis=0)
+        mean = motion.coefficients[rows, :, along].mean(axis=0)
         displacement = motion.resolution.basis @ mean
     else:
         between = replace(motion, motion=(motion.motion @ rig.stretch)[:, None])
         displacement = between.displacement(motion.resolution.samples)[:, 0]
-    force = motion.cycle.samples[:, :, rig.along].sum(axis=1)
-    total = motion.cycle.force[:, :, rig.along].sum(axis=0)
+    force = motion.cycle.samples[:, rows, along].sum(axis=1)
+    total = motion.cycle.force[rows, :, along].sum(axis=0)
     expansion = motion.resolution.basis @ total
     moved = "between the targets, or the mean of the joints, in a cycle"
     datasets = {
@@ -94,12 +103,12 @@ def loop_of(model: VibrationModel, motion: HarmonicSolution, load: float) -> Cur
         "harmonics": list(motion.resolution.harmonics),
         "stroke": float(np.ptp(displacement)),
         "force_range": float(np.ptp(force)),
-        "energy": float(motion.cycle.dissipated.sum()),
-        "slip": model.time_share(motion, SLIP),
+        "energy": float(motion.cycle.dissipated[rows].sum()),
+        "slip": model.time_share(motion, SLIP, rows),
         "error": None if motion.error is None else motion.error.largest,
         # Largest force that the harmonics leave out, over half of the range of the force.
         "deformation": float(np.abs(force - expansion).max()) / half if half > 0.0 else 0.0,
-        **_slopes(model, motion, displacement, force, load),
+        **_slopes(model, motion, displacement, force, load, rows),
     }
     return Curves(datasets, numbers)
 
@@ -110,10 +119,15 @@ def closed(values: Array) -> Array:
 
 
 def _slopes(
-    model: VibrationModel, motion: HarmonicSolution, displacement: Array, force: Array, load: float
+    model: VibrationModel,
+    motion: HarmonicSolution,
+    displacement: Array,
+    force: Array,
+    load: float,
+    rows: slice,
 ) -> dict[str, float | None]:
     """Stick slope and friction of a loop; no friction where it does not slide."""
-    slope, friction = _stick_slope(model, motion, displacement, force), None
+    slope, friction = _stick_slope(model, motion, displacement, force, rows), None
     with suppress(MeasuredLoopError):
         loop = measure_loops(np.tile(displacement, REPEATED), np.tile(force, REPEATED))
         if loop.energy.mean() > STUCK_LOOP * np.ptp(displacement) * np.ptp(force):
@@ -124,15 +138,22 @@ def _slopes(
 
 
 def _stick_slope(
-    model: VibrationModel, motion: HarmonicSolution, displacement: Array, force: Array
+    model: VibrationModel,
+    motion: HarmonicSolution,
+    displacement: Array,
+    force: Array,
+    rows: slice,
 ) -> float | None:
     """Slope over the increments in which all joints that touch at rest stick; None without any.
 
     A state is that at the end of an increment: a joint with one slider that sticks then has stuck
     throughout. Joints of many sliders have no such increments but in a loop without slip.
     """
-    sticks = (motion.cycle.states[:, model.touching] == STICK).all(axis=1)
-    if not isinstance(model.law, FrictionContact | Jenkins) and not sticks.all():
+    sticks = (motion.cycle.states[:, rows][:, model.touching[rows]] == STICK).all(axis=1)
+    groups = grouped(model.law, model.rig.joints).rows()
+    laws = [of.law for of, at in groups if at.start < rows.stop and rows.start < at.stop]
+    at_once = all(isinstance(law, FrictionContact | Jenkins) for law in laws)
+    if not at_once and not sticks.all():
         return None
     moved, pulled = ((curve - np.roll(curve, 1))[sticks] for curve in (displacement, force))
     square = float(moved @ moved)

@@ -16,9 +16,10 @@ from fe_models.dynamics.harmonics import Resolution
 from fe_models.dynamics.receptance import Receptance
 from sa_solver.types import Array
 from wear.joints.friction_contact import FrictionContact
+from wear.joints.mixed import MixedLaw
 from wear.joints.periodic import PeriodicMarch
 from workflow.analyses.rig.building import rig_model
-from workflow.analyses.rig.laws import LAWS, Law, shared_out
+from workflow.analyses.rig.laws import Laws, grouped, law_of, law_of_all, laws_of
 from workflow.analyses.rig.rig_model import RigModel
 from workflow.analyses.rig.structure import FrictionRig
 from workflow.analyses.vibration.case import VibrationCase
@@ -47,7 +48,7 @@ class VibrationModel:
     """A structure, the ``law`` of each of its joints, and what drives it."""
 
     rig: RigModel
-    law: Law
+    law: Laws
     problem: HarmonicBalance
     driving: Driving
 
@@ -61,10 +62,10 @@ class VibrationModel:
         threads = max(1, min(rig.joints // JOINTS_PER_THREAD, os.cpu_count() or 1, MOST_THREADS))
         static = rig.preload(law)
         if rig.pressing is not None:
-            static = case.joint.normal_load * rig.pressing
+            static = case.laws[0].normal_load * rig.pressing
         driving = driving_of(case, rig)
         of_joints = (
-            PeriodicMarch(law, threads),
+            law.march(threads) if isinstance(law, MixedLaw) else PeriodicMarch(law, threads),
             replace(driving.load, static=static if static.any() else None),
             Resolution(case.harmonics, case.resolution.samples),
         )
@@ -80,14 +81,15 @@ class VibrationModel:
         rest = self.problem.solve(1.0, 0.0)
         if not rest.converged:
             raise MethodFailed(
-                "the joints do not balance the static load; change joint.normal_load or "
-                f"joint.normal_stiffness ({rest.message})"
+                "the joints do not balance the static load; change normal_load or "
+                f"normal_stiffness of the joint ({rest.message})"
             )
         return rest
 
-    def time_share(self, motion: HarmonicSolution, state: int) -> float:
-        """Share of the cycle in which joints that touch at rest have a state."""
-        return float((motion.cycle.states[:, self.touching] == state).mean())
+    def time_share(self, motion: HarmonicSolution, state: int, rows: slice = slice(None)) -> float:
+        """Share of the cycle in which joints that touch at rest, of these, have a state."""
+        states = motion.cycle.states[:, rows][:, self.touching[rows]]
+        return float((states == state).mean()) if states.size else 0.0
 
     @property
     def resting(self) -> Array | None:
@@ -97,9 +99,11 @@ class VibrationModel:
     @cached_property
     def touching(self) -> np.ndarray:
         """Which joints ``(j,)`` touch at rest."""
-        if not isinstance(self.law, FrictionContact):
-            return np.ones(self.rig.joints, dtype=bool)
-        return np.asarray(self.rest.cycle.samples[0, :, 2] > 0.0)
+        touching = np.ones(self.rig.joints, dtype=bool)
+        for group, rows in grouped(self.law, self.rig.joints).rows():
+            if isinstance(group.law, FrictionContact):
+                touching[rows] = self.rest.cycle.samples[0, rows, 2] > 0.0
+        return touching
 
     @property
     def undamped(self) -> bool:
@@ -218,16 +222,17 @@ class VibrationModel:
         return moved, moved - steady.respond(pulled @ receptance.at_joints.conj()), pulled
 
 
-def _law(case: VibrationCase, rig: RigModel) -> Law:
-    """The law of each joint: all of them share stiffness and load evenly.
+def _law(case: VibrationCase, rig: RigModel) -> Laws:
+    """The law of each joint: those of an entry, or of all, share stiffness and load evenly.
 
     Between two bodies that a load presses together, joints have the gap of the bodies and no load
     of their own, and may share stiffness by their areas.
     """
-    whole: Law = LAWS[case.joint.law](**case.joint.model_dump(exclude={"law"}))
-    if rig.pressing is None or not isinstance(whole, FrictionContact):
-        return shared_out(whole, rig.joints)
-    assert isinstance(case.structure, FrictionRig)
+    if not isinstance(case.structure, FrictionRig):
+        shared, *own = laws_of([case.joint, *case.own_laws])
+        return law_of_all(shared, own, rig.counts)
+    whole = law_of(case.laws[0])
+    assert isinstance(whole, FrictionContact)
     even = case.structure.sharing == "even"
     share = 1.0 / rig.joints if even else rig.area / rig.area.sum()
     return replace(

@@ -59,8 +59,9 @@ class Answers:
 class Response:
     """The motions under one ``force`` [N].
 
-    ``curves`` along the frequency, ``numbers`` for the summary; of joints with places ``nodes``,
-    along the frequency too, and ``resonance``, along the cycle there; ``loops``, along a cycle, by
+    ``curves`` along the frequency, ``numbers`` for the summary; ``nodes``, what each joint does
+    along the frequency too, and of joints with places ``resonance``, along the cycle there;
+    ``loops``, along a cycle, by
     the resolutions in which they were found, the finest last; ``answers`` at the frequencies
     asked for; ``harmonics`` of motions, by what they are of; ``bifurcations`` along the curve.
     """
@@ -68,7 +69,7 @@ class Response:
     force: float
     curves: Datasets
     numbers: Mapping[str, Any]
-    nodes: Datasets | None = None
+    nodes: Datasets
     resonance: Datasets | None = None
     loops: tuple[Curves, ...] = ()
     answers: Answers | None = None
@@ -103,6 +104,12 @@ class VibrationOutcome:
     diameters: Datasets | None = None
 
     @property
+    def _joints(self) -> int:
+        """How many there are, 0 where none of them ever slips or is apart."""
+        shares = [r.nodes[name].values for r in self.responses for name in ("slip", "separated")]
+        return shares[0].shape[1] if any(share.any() for share in shares) else 0
+
+    @property
     def contents(self) -> Contents:
         """What ``results.h5`` holds of it."""
         names = [f"{number:05d}" for number in range(len(self.responses))]
@@ -111,6 +118,7 @@ class VibrationOutcome:
             responses=tuple(names),
             loops=tuple(loops),
             places=self.contact is not None,
+            joints=self._joints,
             backbone=self.backbone is not None,
             at=bool(self.case.at),
             modes=tuple(f"{number:05d}" for number in range(len(self.modes))),
@@ -123,16 +131,17 @@ class VibrationOutcome:
 class Contents:
     """What ``results.h5`` of a vibration case holds.
 
-    ``responses`` by force, and those of them with ``loops``. Joints with ``places`` have states
-    along every response, and the cycle at resonance. There may be a ``backbone``, motions ``at``
-    chosen frequencies, and ``modes`` over their amplitude; frequencies may be those of an
-    ``engine``. A ring has natural frequencies by nodal ``diameters``.
+    ``responses`` by force, and those of them with ``loops``. Of joints with ``places`` there is the
+    cycle at resonance; so many ``joints`` slip or are apart at times. There may be a ``backbone``,
+    motions ``at`` chosen frequencies, and ``modes`` over their amplitude; frequencies may be those
+    of an ``engine``. A ring has natural frequencies by nodal ``diameters``.
     """
 
     responses: tuple[str, ...]
     loops: tuple[str, ...]
     places: bool
     backbone: bool
+    joints: int = 0
     at: bool = False
     modes: tuple[str, ...] = ()
     engine: bool = False

@@ -151,7 +151,7 @@ def response_under(
         force,
         curves,
         _numbers(case, model, branch, curves, found, resonance) | stability.numbers,
-        nodes=_nodes(branch) if model.rig.pressing is not None else None,
+        nodes=_nodes(branch),
         resonance=_cycle(resonance) if model.rig.pressing is not None else None,
         loops=loops_of(case, model, branch, reporter, steps),
         harmonics={RESONANCE: harmonics_of(model.rig, resonance)},

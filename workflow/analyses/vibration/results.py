@@ -57,7 +57,7 @@ def _write_results(outcome: VibrationOutcome, run: Run[VibrationCase]) -> None:
     case = outcome.case
     attributes = {
         "analysis": case.analysis,
-        "law": case.joint.law,
+        "law": case.law_names,
         "seen": list(outcome.labels),
         "engine_order": case.engine_order,
     }
@@ -92,9 +92,9 @@ def _write_results(outcome: VibrationOutcome, run: Run[VibrationCase]) -> None:
 
 def _put_response(writer: ResultsWriter, place: str, amount: Amount, response: Response) -> None:
     put_response_curves(writer, place, amount, response)
-    for kind, datasets in ((NODES, response.nodes), (RESONANCE, response.resonance)):
-        if datasets is not None:
-            writer.put(f"{place}/{kind}", datasets)
+    writer.put(f"{place}/{NODES}", response.nodes)
+    if response.resonance is not None:
+        writer.put(f"{place}/{RESONANCE}", response.resonance)
     for number, loop in enumerate(response.loops):
         writer.put(f"{place}/{LOOPS}/{number:05d}", loop.datasets, **loop.numbers)
     if response.answers is not None:
@@ -166,6 +166,8 @@ def _write_responses(outcome: VibrationOutcome, folder: OutputFolder) -> None:
         under = f"{outcome.case.amount.under(response.force)}"
         path = folder.reserve(f"frf_{number:05d}.csv", f"response {under}, over frequency")
         write_curves(path, response.curves)
+        path = folder.reserve(f"joints_{number:05d}.csv", f"what each joint does {under}")
+        write_curves(path, {"frequency": response.curves["frequency"], **response.nodes})
         if response.loops:
             path = folder.reserve(f"loop_{number:05d}.csv", f"loop of the joints {under}")
             write_curves(path, response.loops[-1].datasets)
@@ -197,7 +199,7 @@ def _every_bifurcation(outcome: VibrationOutcome) -> Iterator[tuple[str, Mapping
 
 def _summary(outcome: VibrationOutcome) -> dict[str, Any]:
     summary: dict[str, Any] = {
-        "law": outcome.case.joint.law,
+        "law": outcome.case.law_names,
         **outcome.numbers,
         "responses": [
             _response_summary(outcome.case.amount, response) for response in outcome.responses

@@ -67,7 +67,7 @@ def point_time(case: VibrationCaseBase) -> float:
 def _directions(case: VibrationCaseBase) -> int:
     """Of all joints."""
     if isinstance(case.structure, Rig):
-        return 1
+        return len(case.structure.joints) or 1
     joints = JOINTS
     if isinstance(case.structure, MatrixBody | PointBody):
         joints = case.structure.joint_count

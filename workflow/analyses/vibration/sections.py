@@ -130,12 +130,19 @@ class LoopsAt(Section):
         [5, 15],
         default=(),
     )
+    joints: Annotated[int, Whole(1, 1000)] | None = entry(
+        "of which entry of structure.joints, counted from 1; without it of all together, if they "
+        "have one law",
+        1,
+        default=None,
+    )
 
     @property
     def text(self) -> str:
         """Where they are found, and how finely."""
         highest = " and to ".join(str(harmonics[-1]) for harmonics in self.harmonics)
-        return f"at {self.frequency:g} Hz" + (f", harmonics to {highest}" if highest else "")
+        of = "" if self.joints is None else f", of joint {self.joints}"
+        return f"at {self.frequency:g} Hz{of}" + (f", harmonics to {highest}" if highest else "")
 
     @model_validator(mode="after")
     def _finer_and_finer(self) -> LoopsAt:

@@ -13,6 +13,7 @@ from matplotlib.figure import Figure
 
 from sa_solver.types import Array, Indices
 from workflow.analyses.vibration.excitation import FORCE, LEVEL, Amount
+from workflow.analyses.vibration.figures.stability import draw_motions, explain_stability
 from workflow.analyses.vibration.pad_nodes import rows_and_columns
 from workflow.analyses.vibration_wear.outcome import (
     CONTACT,
@@ -35,7 +36,7 @@ from workflow.pictures.panels import (
     spread,
 )
 from workflow.pictures.scales import PER_MICRON, TO_JOULES, TO_MICRONS
-from workflow.pictures.style import BLUE, GREEN, ORANGE, PURPLE
+from workflow.pictures.style import BLACK, BLUE, GREEN, ORANGE, PURPLE
 from workflow.shell.results import grid_of
 
 # More curves, or panels, than this overlap.
@@ -47,6 +48,15 @@ PROFILE = {
     "gap": "gap without load [µm]",
     "normal_force": "pressure at rest [MPa]",
     "energy": "energy per cycle\nand area [mJ/mm²]",
+}
+# What leads from peak to peak.
+PEAKS: dict[str, Any] = {
+    "color": BLACK,
+    "marker": "o",
+    "markersize": 3.5,
+    "linewidth": 0.9,
+    "zorder": 4,
+    "label": "all peaks, in turn",
 }
 FORCE_COLOURS = (BLUE, ORANGE, GREEN, PURPLE)
 # What is shown over the cycles, two on a panel: dataset, scale and label.
@@ -76,17 +86,29 @@ def figures_of(contents: Contents) -> Figures:
 
 
 def frequency_response(file: h5py.File) -> Figure:
-    """Amplitude of the last mass over the force, a panel per force, a curve per state."""
+    """Amplitude of the last mass over the force, a panel per force, a curve for every state.
+
+    A line leads from peak to peak; where motions are unstable curves are dashed.
+    """
     forces, amount = list(file.attrs["forces"]), _amount(file)
     shown = spread(range(len(forces)), MOST_FORCES)
     figure = new_figure(_change(file, *STUCK), 4.0 * len(shown) + 0.5)
     panels = figure.subplots(len(shown), 1, sharex=True, squeeze=False)[:, 0]
+    states = shaded(sorted(file[WORN]), len(file[WORN]))
+    named = set(spread([name for name, _ in states], MOST_STATES))
     for axis, place in zip(panels, shown, strict=True):
-        for state, colour in _states(file):
-            response = state[f"{RESPONSES}/{place:05d}"]
-            receptance = TO_MICRONS * response["amplitude"][:, -1] / forces[place]
-            label = f"{_cycles(state)}: {response.attrs['resonance']:.4g} Hz"
-            axis.plot(response["frequency"][()], receptance, color=colour, label=label)
+        responses = [file[f"{WORN}/{name}/{RESPONSES}/{place:05d}"] for name, _ in states]
+        for response, (name, colour) in zip(responses, states, strict=True):
+            frequency, amplitude = response["frequency"][()], response["amplitude"][:, -1]
+            look = {"color": colour}
+            if name in named:
+                cycles = _cycles(file[WORN][name])
+                look["label"] = f"{cycles}: {response.attrs['resonance']:.4g} Hz"
+            receptance = TO_MICRONS * amplitude / forces[place]
+            draw_motions(axis, response, frequency, receptance, **look)
+        peaks = np.array(list(map(_peak, responses)))
+        axis.plot(peaks[:, 0], TO_MICRONS * peaks[:, 1] / forces[place], **PEAKS)
+        explain_stability(axis, responses)
         over = f"amplitude / {amount.name} [{amount.receptance[1]}]"
         axis.set(title=amount.told(forces[place]), ylabel=over, yscale="log")
         legend_beside(axis, "cycles: resonance")
@@ -94,6 +116,13 @@ def frequency_response(file: h5py.File) -> Figure:
     for side in (panels[-1].xaxis, *(axis.yaxis for axis in panels)):
         plain_ticks(side)
     return figure
+
+
+def _peak(response: h5py.Group) -> tuple[float, float]:
+    """Frequency [Hz] and amplitude [mm] at resonance; none at an end of the curve."""
+    frequency, at = response["frequency"][()], float(response.attrs["resonance"])
+    inside = frequency.min() < at < frequency.max()
+    return (at, float(response.attrs["amplitude"])) if inside else (np.nan, np.nan)
 
 
 def _amount(file: h5py.File) -> Amount:

@@ -77,7 +77,7 @@ def _worn_state(
 ) -> WornState:
     """The pads in a state, ``reached`` by so many cycles in all and steps since the last."""
     cycles, taken = reached
-    loop = loop_of(cycle.model, cycle.motion, case.joint.normal_load)
+    loop = loop_of(cycle.model, cycle.motion, case.laws[0].normal_load)
     error, responses = responses_to_all(case, cycle.model, cycle.motion, reporter, steps)
     depth = state.surfaces.depth
     numbers: dict[str, Any] = {

@@ -9,12 +9,14 @@ import h5py
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import MultipleLocator
 
 from workflow.analyses.vibration.excitation import Amount, amount_in, told_in, under_in
 from workflow.analyses.vibration.figures.engine import engine_orders
 from workflow.analyses.vibration.figures.loops import loops
 from workflow.analyses.vibration.figures.modes import modes
 from workflow.analyses.vibration.figures.ring import nodal_diameters
+from workflow.analyses.vibration.figures.shares import MOST_JOINTS, joint_states, node_shares
 from workflow.analyses.vibration.figures.stability import (
     draw_motions,
     explain_stability,
@@ -38,12 +40,15 @@ TO_PERCENT = 1e2
 LIMIT: dict[str, Any] = {"color": BLACK, "linewidth": 0.8}
 STYLES = {"free": ":", "stuck": "--"}
 ASKED: dict[str, Any] = {"markersize": 4.5, "markerfacecolor": "white"}
+# Phases begin within half a turn of the lag at resonance, a quarter of one [°].
+TURN, QUARTER = 360.0, 90.0
 # Room above the highest peak and below the lowest response, as factors.
 ABOVE, BELOW = 3.0, 0.5
 
 
 def figures_of(contents: Contents) -> Figures:
     """The figures of a run, by name."""
+    many = contents.joints > MOST_JOINTS
     drawn = {
         "frequency_response": (frequency_response, True),
         "resonance": (resonance, len(contents.responses) > 1 or contents.backbone),
@@ -51,6 +56,8 @@ def figures_of(contents: Contents) -> Figures:
         "engine_orders": (engine_orders, contents.engine),
         "nodal_diameters": (nodal_diameters, contents.diameters),
         "loops": (loops, bool(contents.loops)),
+        "joint_states": (joint_states, contents.joints and not many),
+        "node_shares": (node_shares, many),
         "node_states": (node_states, contents.places),
         "pad_states": (pad_states, contents.places),
     }
@@ -82,9 +89,11 @@ def _amount_of(file: h5py.File) -> Amount:
 
 
 def frequency_response(file: h5py.File, contents: Contents) -> Figure:
-    """Amplitude of what is looked at over the force, a curve per force, with linear limits."""
-    figure = new_figure(_title(file), 7.0)
-    axis, peaks, lows = figure.subplots(), [], []
+    """Amplitude of what is looked at over the force, a curve per force, with linear limits; and
+    its phase."""
+    figure = new_figure(_title(file), 9.0)
+    axis, phase = figure.subplots(2, 1, sharex=True, height_ratios=(2.4, 1.0))
+    peaks, lows = [], []
     linear = file["linear"]
     for name, style in STYLES.items():
         frequency, receptance = linear["frequency"][()], TO_MICRONS * linear[name][()]
@@ -98,6 +107,7 @@ def frequency_response(file: h5py.File, contents: Contents) -> Figure:
             axis, response, response["frequency"][()], size / force, color=colour, label=label
         )
         mark_bifurcations(axis, response, "frequency", TO_MICRONS / force, colour)
+        _draw_phase(phase, response, color=colour)
         peaks.append(TO_MICRONS * float(response.attrs["amplitude"]) / force)
         lows.append(size.min() / force)
         axis.plot(response.attrs["resonance"], peaks[-1], "o", color=colour, markersize=5)
@@ -106,9 +116,12 @@ def frequency_response(file: h5py.File, contents: Contents) -> Figure:
             sizes = TO_MICRONS * asked["amplitude"][:, -1] / force
             axis.plot(asked["frequency"][()], sizes, "D", color=colour, **ASKED)
     drawn = [response for response, _ in _shown(file, contents)]
-    drawn += _draw_further(axis, file, contents, over_force=True)
+    drawn += _draw_further(axis, file, contents, phase)
     explain_stability(axis, drawn)
     _over_frequency(axis, file)
+    axis.set_xlabel("")
+    phase.set(xlabel="frequency [Hz]", ylabel="phase [°]")
+    phase.yaxis.set_major_locator(MultipleLocator(QUARTER))
     amount = _amount_of(file)
     axis.set_ylabel(f"amplitude of {_seen(file)} / {amount.name} [{amount.receptance[1]}]")
     axis.set_ylim(BELOW * min(lows), ABOVE * max(peaks))
@@ -117,10 +130,20 @@ def frequency_response(file: h5py.File, contents: Contents) -> Figure:
     return figure
 
 
+def _draw_phase(axis: Axes, motions: h5py.Group, **look: Any) -> None:
+    """The phase of harmonic 1 along a curve, without jumps by a turn."""
+    phases = np.degrees(np.unwrap(motions["phase"][()]))
+    phases -= TURN * np.round((phases[0] + QUARTER) / TURN)
+    draw_motions(axis, motions, motions["frequency"][()], phases, **look)
+
+
 def _draw_further(
-    axis: Axes, file: h5py.File, contents: Contents, *, over_force: bool
+    axis: Axes, file: h5py.File, contents: Contents, phase: Axes | None = None
 ) -> list[h5py.Group]:
-    """Branches beside the shown responses, in the colours of their forces; these branches."""
+    """Branches beside the shown responses, in the colours of their forces; these branches.
+
+    Beside a panel of the ``phase`` amplitudes are over the force.
+    """
     amount = _amount_of(file).name
     colours = {response.attrs[amount]: colour for response, colour in _shown(file, contents)}
     branches = [
@@ -128,10 +151,12 @@ def _draw_further(
     ]
     for branch in branches:
         force = float(branch.attrs[amount])
-        factor, colour = TO_MICRONS / (force if over_force else 1.0), colours[force]
+        factor, colour = TO_MICRONS / (1.0 if phase is None else force), colours[force]
         size = factor * branch["amplitude"][:, -1]
         draw_motions(axis, branch, branch["frequency"][()], size, color=colour, linewidth=1.4)
         mark_bifurcations(axis, branch, "frequency", factor, colour)
+        if phase is not None:
+            _draw_phase(phase, branch, color=colour, linewidth=1.4)
     return branches
 
 
@@ -188,7 +213,7 @@ def _draw_amplitudes(axis: Axes, file: h5py.File, contents: Contents) -> None:
         draw_motions(axis, response, response["frequency"][()], size, **look)
         mark_bifurcations(axis, response, "frequency", TO_MICRONS, colour)
     drawn = [response for response, _ in _shown(file, contents)]
-    drawn += _draw_further(axis, file, contents, over_force=False)
+    drawn += _draw_further(axis, file, contents)
     _over_frequency(axis, file)
     if contents.backbone:
         backbone = file["backbone"]

@@ -29,16 +29,21 @@ MARK: dict[str, Any] = {"markersize": 6, "linestyle": "none", "zorder": 5}
 
 def draw_motions(axis: Axes, group: h5py.Group, x: Array, y: Array, **look: Any) -> None:
     """A curve of motions ``(n,)``, solid as far as nothing is said of their stability."""
-    if "stability" not in group:
+    codes = _codes(group)
+    if not codes.any():
         axis.plot(x, y, "-", **look)
         return
-    codes = group["stability"][()]
     parts = np.minimum(codes[:-1], codes[1:]) if len(codes) > 1 else codes
     label = look.pop("label", None)
     for code, line in LINES.items():
         for first, last in _runs(parts == code):
             axis.plot(x[first : last + 1], y[first : last + 1], line, label=label, **look)
             label = None
+
+
+def _codes(group: h5py.Group) -> np.ndarray:
+    """What the column says of each motion; nothing where it is not there."""
+    return np.asarray(group["stability"][()]) if "stability" in group else np.zeros(0, int)
 
 
 def _runs(flags: np.ndarray) -> list[tuple[int, int]]:
@@ -60,7 +65,8 @@ def mark_bifurcations(axis: Axes, group: h5py.Group, x: str, factor: float, colo
 
 def explain_stability(axis: Axes, groups: list[h5py.Group]) -> None:
     """Entries of the legend for what is drawn of the stability of these curves."""
-    codes = {int(code) for group in groups if "stability" in group for code in group["stability"]}
+    known = [codes for codes in map(_codes, groups) if codes.any()]
+    codes = {int(code) for of_curve in known for code in of_curve}
     for code, word in WORDS.items():
         if code in codes:
             axis.add_line(Line2D([], [], color=BLACK, linestyle=LINES[code], label=word))

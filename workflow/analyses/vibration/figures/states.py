@@ -88,7 +88,7 @@ def pad_states(file: h5py.File, contents: Contents) -> Figure:
         for axis, response in zip(row, shown, strict=True):
             place = _point_near(response, factor * float(response.attrs["resonance"]))
             frequency = response["frequency"][place]
-            _draw_pad(axis, file["contact"], _kinds(response)[place])
+            _draw_pad(axis, file["contact"], kinds_of(response)[place])
             axis.set_title(f"{told_in(response.attrs)}, {frequency:.4g} Hz", fontsize="small")
         row[0].set_ylabel(f"{name}\ny [mm]")
     for axis in panels[-1]:
@@ -97,7 +97,7 @@ def pad_states(file: h5py.File, contents: Contents) -> Figure:
     return figure
 
 
-def _kinds(response: h5py.Group) -> Indices:
+def kinds_of(response: h5py.Group) -> Indices:
     """What every node does at every point of a curve ``(p, j)``, as places in ``KINDS``."""
     slip, apart = response["nodes/slip"][()], response["nodes/separated"][()]
     kinds = np.where(slip <= ROUNDING, STICKS, SLIPS_LONG)
@@ -110,7 +110,7 @@ def _kinds(response: h5py.Group) -> Indices:
 def _title(shown: list[h5py.Group]) -> str:
     texts = []
     for response in (shown[0], shown[-1])[: len(shown)]:
-        kinds = _kinds(response)[_point_near(response, float(response.attrs["resonance"]))]
+        kinds = kinds_of(response)[_point_near(response, float(response.attrs["resonance"]))]
         touching = int((kinds != OPEN).sum())
         sticking = int((kinds == STICKS).sum())
         texts.append(f"{sticking} of {touching} {under_in(response.attrs)}")
@@ -126,7 +126,7 @@ def _draw_over_frequency(axis: Axes, response: h5py.Group, order: Indices) -> No
     points = largest_at(frequency, response["amplitude"][:, -1], np.sqrt(edges[1:] * edges[:-1]))
     nodes = np.arange(len(order) + 1)
     axis.grid(visible=False)
-    axis.pcolormesh(edges, nodes, _kinds(response)[points][:, order].T, **CELLS)
+    axis.pcolormesh(edges, nodes, kinds_of(response)[points][:, order].T, **CELLS)
 
 
 def largest_at(frequency: Array, amplitude: Array, wanted: Array) -> Indices:

@@ -1,0 +1,223 @@
+"""Figures of a vibration case: for how much of the period joints slip and are apart."""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+
+import h5py
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import Patch
+
+from sa_solver.types import Array, Indices
+from workflow.analyses.vibration.excitation import amount_in, told_in, under_in
+from workflow.analyses.vibration.figures.stability import draw_motions
+from workflow.analyses.vibration.figures.states import (
+    COLUMNS,
+    KINDS,
+    MOST_TICKS,
+    kinds_of,
+    largest_at,
+)
+from workflow.analyses.vibration.outcome import Contents
+from workflow.pictures.panels import new_figure, plain_ticks, spread, whole_ticks
+from workflow.pictures.scales import TO_MICRONS
+from workflow.pictures.style import BLACK, BLUE, COLOUR_MAP, ORANGE
+
+# Forces beside each other, and joints below each other, that are still readable.
+MOST_FORCES, MOST_JOINTS = 3, 6
+TO_PERCENT = 1e2
+# What a joint does for a share of the period, from the bottom of its panel.
+DOES = {"sticks, or is pressed": BLUE, "slips": ORANGE, "is apart": "#B8B8B8"}
+# Heights of the response and of what is below it [inch].
+RESPONSE, STRIP, MAP, AROUND = 2.2, 1.5, 2.6, 1.6
+
+
+def joint_states(file: h5py.File, contents: Contents) -> Figure:
+    """For how much of the period each of a few joints sticks, slips and is apart."""
+    names = _names(file)
+    shown = _shown(file, contents)
+    height = AROUND + RESPONSE + STRIP * len(names)
+    figure = new_figure(_most_slipping(shown, names), height)
+    panels = figure.subplots(
+        *(1 + len(names), len(shown)),
+        sharex=True,
+        sharey="row",
+        squeeze=False,
+        height_ratios=(RESPONSE, *(STRIP,) * len(names)),
+    )
+    for column, response in zip(panels.T, shown, strict=True):
+        _draw_response(column[0], response)
+        frequency, points = _along(response)
+        slip, apart = _shares(response, points)
+        for joint, axis in enumerate(column[1:]):
+            _draw_stack(axis, frequency, [1.0 - slip - apart, slip, apart], joint)
+            _mark_resonance(axis, response)
+    _label(panels, shown[0])
+    for axis, name in zip(panels[1:, 0], names, strict=True):
+        axis.set_ylabel(f"{name}\n[% of period]")
+    _legend(figure, DOES)
+    return figure
+
+
+def node_shares(file: h5py.File, contents: Contents) -> Figure:
+    """For how much of the period each of many joints slips and is apart; and how many do what."""
+    shown = _shown(file, contents)
+    figure = new_figure(_most_at_once(shown), AROUND + RESPONSE + 2.0 * MAP + STRIP)
+    panels = figure.subplots(
+        *(4, len(shown)),
+        sharex=True,
+        sharey="row",
+        squeeze=False,
+        height_ratios=(RESPONSE, MAP, MAP, STRIP),
+    )
+    order, ticks, label = _order(file, contents)
+    for column, response in zip(panels.T, shown, strict=True):
+        _draw_response(column[0], response)
+        frequency, points = _along(response)
+        for axis, shares in zip(column[1:3], _shares(response, points), strict=True):
+            mesh = _draw_map(axis, frequency, shares[:, order])
+        kinds = kinds_of(response)[points]
+        counts = [(kinds == kind).mean(axis=1, keepdims=True) for kind in range(len(KINDS))]
+        _draw_stack(column[3], frequency, counts, 0, tuple(KINDS.values()))
+        for axis in column[1:]:
+            _mark_resonance(axis, response)
+    _label(panels, shown[0])
+    for axis, what in zip(panels[1:3, 0], ("slips", "apart"), strict=True):
+        axis.set_ylabel(f"{what}\n{label}")
+        if ticks:
+            axis.set_yticks(*ticks)
+        else:
+            whole_ticks(axis.yaxis)
+    panels[3, 0].set_ylabel("[% of nodes]" if contents.places else "[% of joints]")
+    figure.colorbar(mesh, ax=panels[1:3], label="share of the period [%]", aspect=40)
+    _legend(figure, KINDS)
+    return figure
+
+
+def _shown(file: h5py.File, contents: Contents) -> list[h5py.Group]:
+    return [file["responses"][name] for name in spread(contents.responses, MOST_FORCES)]
+
+
+def _names(file: h5py.File) -> list[str]:
+    """What each joint stretches by; of those of several directions without these."""
+    names = []
+    for row in file["names/joints"][()]:
+        first, *more = (name for name in map(bytes.decode, row) if name != "ground")
+        names.append(re.sub(r" [xyz]\b", "", first) if more else first)
+    return names
+
+
+# --- along the curve ----------------------------------------------------------------------------
+
+
+def _along(response: h5py.Group) -> tuple[Array, Indices]:
+    """Edges of columns ``(c + 1,)`` over the frequency, and the motion in each: the largest."""
+    frequency = response["frequency"][()]
+    edges = np.geomspace(frequency.min(), frequency.max(), COLUMNS + 1)
+    middle = np.sqrt(edges[1:] * edges[:-1])
+    return edges, largest_at(frequency, response["amplitude"][:, -1], middle)
+
+
+def _shares(response: h5py.Group, points: Indices) -> tuple[Array, Array]:
+    """Shares of the period ``(c, j)`` in which joints slip, and are apart."""
+    return response["nodes/slip"][()][points], response["nodes/separated"][()][points]
+
+
+def _draw_response(axis: Axes, response: h5py.Group) -> None:
+    _, force = amount_in(response.attrs)
+    size = TO_MICRONS * response["amplitude"][:, -1] / force
+    draw_motions(axis, response, response["frequency"][()], size, color=BLACK)
+    _mark_resonance(axis, response)
+    axis.set_title(f"{told_in(response.attrs)}: {response.attrs['resonance']:.4g} Hz")
+
+
+def _mark_resonance(axis: Axes, response: h5py.Group) -> None:
+    axis.axvline(response.attrs["resonance"], color=BLACK, linestyle=":", linewidth=1.2)
+
+
+def _draw_stack(
+    axis: Axes,
+    edges: Array,
+    shares: list[Array],
+    joint: int,
+    colours: tuple[str, ...] = tuple(DOES.values()),
+) -> None:
+    """Shares ``(c, j)`` of one joint on each other [%]."""
+    below = np.zeros(len(edges))
+    axis.grid(visible=False)
+    for share, colour in zip(shares, colours, strict=True):
+        # Each column is as wide as it is.
+        above = below + TO_PERCENT * np.append(share[:, joint], share[-1, joint])
+        axis.fill_between(edges, below, above, step="post", color=colour, linewidth=0.0)
+        below = above
+    axis.set_ylim(0.0, TO_PERCENT)
+
+
+def _draw_map(axis: Axes, edges: Array, shares: Array) -> Any:
+    axis.grid(visible=False)
+    rows = np.arange(shares.shape[1] + 1)
+    return axis.pcolormesh(
+        *(edges, rows, TO_PERCENT * shares.T), cmap=COLOUR_MAP, vmin=0.0, vmax=TO_PERCENT
+    )
+
+
+# --- words --------------------------------------------------------------------------------------
+
+
+def _order(file: h5py.File, contents: Contents) -> tuple[Indices, Any, str]:
+    """The joints from the bottom up, ticks for them, and what they are ordered by."""
+    if not contents.places:
+        return np.arange(contents.joints), None, "joints by number"
+    distance = np.hypot(file["contact/x"][()], file["contact/y"][()])
+    order = np.argsort(distance, kind="stable")
+    places = np.unique(np.linspace(0, len(order) - 1, MOST_TICKS).round().astype(int))
+    names = [f"{distance[order[place]]:.2g}" for place in places]
+    return order, (places + 0.5, names), "distance from the middle [mm]"
+
+
+def _label(panels: Any, response: h5py.Group) -> None:
+    """Scales and labels that the panels of all forces share."""
+    amount, _ = amount_in(response.attrs)
+    top = panels[0, 0]
+    top.set(xscale="log", yscale="log")
+    top.set_ylabel(f"amplitude / {amount.name}\n[{amount.receptance[1]}]")
+    for axis in panels[-1]:
+        axis.set_xlabel("frequency [Hz]")
+    frequencies = response["frequency"][()]
+    top.set_xlim(frequencies.min(), frequencies.max())
+    for side in (panels[-1, 0].xaxis, top.yaxis):
+        plain_ticks(side)
+
+
+def _most_slipping(shown: list[h5py.Group], names: list[str]) -> str:
+    """Which joint slips longest, or is apart longest where none slips."""
+    response = shown[-1]
+    for word, name in (("slips", "slip"), ("is apart", "separated")):
+        shares = response[f"nodes/{name}"][()]
+        if shares.any():
+            _, joint = np.unravel_index(shares.argmax(), shares.shape)
+            most = TO_PERCENT * shares.max()
+            return (
+                f"{names[joint]} {word} up to {most:.0f} % of the period {under_in(response.attrs)}"
+            )
+    return f"Nothing slips or parts {under_in(response.attrs)}"
+
+
+def _most_at_once(shown: list[h5py.Group]) -> str:
+    """How many slip and are apart at some time of a cycle, at most."""
+    texts = []
+    for name, word in (("slip", "slip"), ("separated", "are apart")):
+        shares = shown[-1][f"nodes/{name}"][()]
+        texts.append(f"{(shares > 0.0).sum(axis=1).max()} {word}")
+    count = shares.shape[1]
+    return f"Of {count} joints at most {' and '.join(texts)} at times {under_in(shown[-1].attrs)}"
+
+
+def _legend(figure: Figure, colours: dict[str, str]) -> None:
+    patches = [Patch(facecolor=colour, label=name) for name, colour in colours.items()]
+    figure.legend(
+        handles=patches, loc="outside lower center", ncols=len(colours), columnspacing=1.2
+    )
