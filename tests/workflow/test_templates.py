@@ -44,6 +44,7 @@ NEEDS = {
     "structure.retained": ["structure.modes=20"],
     "structure.modes": ["structure.retained=[pad, ring, tip]"],
     "  # instead of forces and mass, with wear.level": ["wear.force=", "wear.level=1"],
+    "  # instead of forces, with wear.level": ["structure.driven=", "wear.force=", "wear.level=1"],
     "wear.level": ["forces=", f"excitation={EXCITED['excitation'][ALWAYS]}"],
 }
 

@@ -21,7 +21,7 @@ from sa_solver.types import Array, Progress, Tally
 from workflow.analyses.rig.matrix_body import LoadCase, MatrixBody
 from workflow.analyses.rig.place_names import PlaceNames, link_along
 from workflow.analyses.rig.places import Moved
-from workflow.analyses.rig.rig_model import RigModel
+from workflow.analyses.rig.rig_model import JointNodes, RigModel
 from workflow.analyses.rig.structure import JointedBody, JointPlaces, ReducedBody
 from workflow.analyses.specimens.case import SpecimensCase
 from workflow.analyses.specimens.memory import memory
@@ -80,7 +80,27 @@ def _rig_on(reduced: ReducedModel, body: JointedBody, directions: int) -> RigMod
         *(model, driven, seen[None], (label,), directions, along),
         in_a_row=False,
         translations=_translations(reduced, model),
+        nodes=_nodes(reduced, body, points),
     )
+
+
+def _nodes(reduced: ReducedModel, body: JointedBody, points: PlaceNames) -> JointNodes:
+    """Where the joints are."""
+    assert reduced.names is not None
+    names, normals = [], []
+    for number, joint in enumerate(body.joints):
+        found = points.of(joint.points, f"structure.joints.{number}.points")
+        # They close along their direction.
+        normal = np.eye(3)[AXES.index(joint.direction[-1])]
+        names += found
+        normals += [normal if joint.direction.startswith("-") else 0.0 - normal] * len(found)
+    places = None
+    if reduced.places is not None:
+        of = {name.rpartition(" ")[0]: k for k, name in enumerate(reduced.names)}
+        places = reduced.places[[of[name] for name in names]]
+    if places is not None and not np.isfinite(places).all():
+        places = None
+    return JointNodes(tuple(names), np.array(normals), places)
 
 
 def _shape(model: DynamicModel, points: PlaceNames, moved: Moved, key: str) -> Array:

@@ -53,8 +53,12 @@ class VibrationModel:
     def of(cls, case: VibrationCase, reporter: Reporter) -> VibrationModel:
         """The model of a case. Raises UserError for a structure or joints that cannot be."""
         rig = rig_model(case.structure, case.joint, case.mass, reporter)
+        return cls.on(case, rig, _law(case, rig))
+
+    @classmethod
+    def on(cls, case: VibrationCase, rig: RigModel, law: Law) -> VibrationModel:
+        """The model of a case on a rig whose joints have this law."""
         memory(case, len(rig.model.mass), rig.joints).check()
-        law = _law(case, rig)
         threads = max(1, min(rig.joints // JOINTS_PER_THREAD, os.cpu_count() or 1, MOST_THREADS))
         static = rig.preload(law)
         if rig.pressing is not None:

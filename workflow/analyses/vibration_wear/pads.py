@@ -1,8 +1,9 @@
-"""Two specimens in a vibrating rig: how their contacts move, and what that takes off every node.
+"""Contacts at the nodes of a vibrating structure: how they move, and what that takes off each.
 
-In a cycle of the rig's steady motion by harmonic balance the contact of a node slides along a path
-and dissipates an energy; what both bodies lose by it is up to their laws. The gap grows by the
-depth, and rest and motion are found anew.
+They are those of two specimens in a rig, or at the joints of any reduced body. In a cycle of the
+steady motion by harmonic balance the contact of a node slides along a path and dissipates an
+energy; what both bodies lose by it is up to their laws. The gap grows by the depth, and rest and
+motion are found anew.
 """
 
 from __future__ import annotations
@@ -13,8 +14,10 @@ from functools import cached_property
 
 import numpy as np
 
+from fe_models.dynamics.forced_response import ResponseBranch
 from fe_models.dynamics.harmonic_balance import HarmonicBalance
 from fe_models.dynamics.harmonic_solution import HarmonicSolution
+from fe_models.dynamics.phase_resonance import along_phase_resonance
 from sa_solver.types import Array
 from wear.joints.friction_contact import FrictionContact
 from wear.joints.periodic import PeriodicMarch
@@ -110,14 +113,16 @@ class WearingPads:
     """Pads that wear under a ``force`` [N], or level, at a ``frequency`` [Hz].
 
     ``amount`` says which it is. ``unworn`` is the rig before, ``laws`` are those of body 1 and
-    body 2.
+    body 2. Without a frequency it is that of phase resonance, in every state anew, which for the
+    unworn pads is looked for ``near`` a motion.
     """
 
     unworn: VibrationModel
     laws: tuple[WearLaw, WearLaw]
     force: float
-    frequency: float
+    frequency: float | None
     amount: Amount = FORCE
+    near: HarmonicSolution | None = None
     _solved: deque[tuple[Surfaces, PadCycle]] = field(
         init=False, default_factory=lambda: deque(maxlen=KEPT)
     )
@@ -135,14 +140,9 @@ class WearingPads:
             if surfaces is state.surfaces:
                 return cycle
         model = worn_model(self.unworn, state.surfaces.depth)
-        start = state.start
+        start = self.near if state.start is None else state.start
         assert start is None or isinstance(start, HarmonicSolution)
-        motion = model.problem.solve(self.frequency, self.force, start)
-        if not motion.converged:
-            raise ContactFailure(
-                f"no motion {self.amount.under(self.force)} at {self.frequency:g} Hz: "
-                f"{motion.message}"
-            )
+        motion = self._motion(model.problem, start)
         cycle = PadCycle(model, motion)
         self._solved.append((state.surfaces, cycle))
         return cycle
@@ -151,14 +151,41 @@ class WearingPads:
         """The same as wear steps take it."""
         return NodalContact(self.laws, (self.at(state),))
 
+    def _motion(self, problem: HarmonicBalance, start: HarmonicSolution | None) -> HarmonicSolution:
+        if self.frequency is None:
+            assert start is not None
+            return resonance_near(problem, start, self.force, self.amount)
+        motion = problem.solve(self.frequency, self.force, start)
+        if not motion.converged:
+            raise ContactFailure(
+                f"no motion {self.amount.under(self.force)} at {self.frequency:g} Hz: "
+                f"{motion.message}"
+            )
+        return motion
+
+
+def resonance_near(
+    problem: HarmonicBalance,
+    start: HarmonicSolution | ResponseBranch,
+    force: float,
+    amount: Amount = FORCE,
+) -> HarmonicSolution:
+    """The motion at phase resonance under a force, near a motion or the largest of a response.
+
+    Raises :class:`wear.stepping.ContactFailure` where there is none.
+    """
+    found = along_phase_resonance(problem, start, (force, force))
+    if not found.solutions:
+        raise ContactFailure(f"no resonance {amount.under(force)}: {found.message}")
+    return found.solutions[0]
+
 
 def worn_model(unworn: VibrationModel, depth: Array) -> VibrationModel:
     """The rig whose contacts have lost a ``depth`` ``(j,)`` [mm]: only their law is new."""
     rig, problem = unworn.rig, unworn.problem
     assert isinstance(unworn.law, FrictionContact)
     assert isinstance(problem.joints, PeriodicMarch)
-    gap = rig.gap + depth
-    law = replace(unworn.law, gap=gap)
+    law = unworn.law.worn(depth)
     worn = HarmonicBalance(
         problem.model,
         replace(problem.joints, law=law),
@@ -166,4 +193,4 @@ def worn_model(unworn: VibrationModel, depth: Array) -> VibrationModel:
         problem.resolution,
         problem.receptance,
     )
-    return VibrationModel(replace(rig, gap=gap), law, worn, unworn.driving)
+    return VibrationModel(replace(rig, gap=rig.gap + depth), law, worn, unworn.driving)

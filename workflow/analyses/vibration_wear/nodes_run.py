@@ -1,4 +1,4 @@
-"""A friction rig whose specimens wear each other: motion, wear, motion, responses on the way."""
+"""A structure that wears its contacts at nodes: motion, wear, motion, responses on the way."""
 
 from __future__ import annotations
 
@@ -6,26 +6,35 @@ from typing import Any
 
 import numpy as np
 
+from fe_models.dynamics.cycle_energy import energy_lost, work_done
+from fe_models.dynamics.forced_response import along_frequency
+from fe_models.dynamics.harmonic_solution import HarmonicSolution
 from sa_solver.steps import Steps
+from wear.laws import WearLaw
 from wear.nodes import NodalState
 from wear.steppers import HeunStepper
+from workflow.analyses.rig.rig_model import RigModel
 from workflow.analyses.specimens.case import SpecimensCase
 from workflow.analyses.vibration.case import VibrationCase
 from workflow.analyses.vibration.loops import loop_of
 from workflow.analyses.vibration.model import VibrationModel
 from workflow.analyses.vibration.outcome import Curves
-from workflow.analyses.vibration_wear.case import FrictionRigWearCase
+from workflow.analyses.vibration.response import step_control
+from workflow.analyses.vibration_wear.body import body_model
+from workflow.analyses.vibration_wear.case import FrictionRigWearCase, ReducedWearCase
 from workflow.analyses.vibration_wear.outcome import (
     LOOP,
     NODES,
+    POSITION,
     VibrationWearOutcome,
+    WornNodes,
     WornState,
     depth_fields,
     path_field,
     step_error,
     wearing_loop,
 )
-from workflow.analyses.vibration_wear.pads import PadCycle, WearingPads
+from workflow.analyses.vibration_wear.pads import PadCycle, WearingPads, resonance_near
 from workflow.analyses.vibration_wear.states import responses_to_all, worn_states
 from workflow.case.loading import load_case
 from workflow.case.plain import counted
@@ -33,14 +42,14 @@ from workflow.shell.dataset import Dataset
 from workflow.shell.reporter import Reporter
 
 
-def wear_specimens(
-    case: FrictionRigWearCase, reporter: Reporter, steps: Steps
+def wear_nodes(
+    case: FrictionRigWearCase | ReducedWearCase, reporter: Reporter, steps: Steps
 ) -> VibrationWearOutcome:
     """All that is kept of a run."""
     wear = case.wear
-    unworn = VibrationModel.of(case.unworn, reporter)
-    specimens = load_case(case.structure.specimens, [SpecimensCase])
-    pads = WearingPads(unworn, specimens.laws, case.wearing, wear.frequency, case.amount)
+    unworn, laws = _unworn(case, reporter)
+    near = None if wear.frequency is not None else _resonance(case, unworn, reporter, steps)
+    pads = WearingPads(unworn, laws, case.wearing, wear.frequency, case.amount, near)
     state = pads.begin()
     with reporter.stage("wear"):
         pads.at(state)
@@ -58,13 +67,58 @@ def wear_specimens(
 
     stepper = HeunStepper(wear.tolerance)
     states = worn_states(wear.cycles, stepper, state, pads.contact_at, describe, reporter, steps)
-    rig = unworn.rig
-    places = {
-        "x": Dataset(rig.places[:, 0], "mm", "of each node on the contact plane"),
-        "y": Dataset(rig.places[:, 1], "mm", "of each node on the contact plane"),
-        "area": Dataset(rig.area, "mm^2", "that belongs to each node"),
-    }
-    return VibrationWearOutcome(case, states, places=places)
+    return VibrationWearOutcome(case, states, nodes=_nodes(unworn.rig))
+
+
+def _unworn(
+    case: FrictionRigWearCase | ReducedWearCase, reporter: Reporter
+) -> tuple[VibrationModel, tuple[WearLaw, WearLaw]]:
+    """The structure before the first cycle, and the laws of body 1 and body 2."""
+    if isinstance(case, ReducedWearCase):
+        return body_model(case, reporter), case.laws
+    specimens = load_case(case.structure.specimens, [SpecimensCase])
+    return VibrationModel.of(case.unworn, reporter), specimens.laws
+
+
+def _resonance(
+    case: FrictionRigWearCase | ReducedWearCase,
+    unworn: VibrationModel,
+    reporter: Reporter,
+    steps: Steps,
+) -> HarmonicSolution:
+    """The phase resonance of the unworn structure under what wears it: the largest in the span."""
+    problem, state = unworn.problem, case.unworn
+
+    def found() -> HarmonicSolution:
+        branch = along_frequency(
+            problem,
+            case.wearing,
+            case.frequencies,
+            upward=case.continuation.start == "lower",
+            control=step_control(state),
+        )
+        return resonance_near(problem, branch, case.wearing, case.amount)
+
+    with reporter.stage("resonance"):
+        return steps("resonance that wears", found)
+
+
+def _nodes(rig: RigModel) -> WornNodes:
+    """Where the contacts are, as far as it is known."""
+    area = {"area": Dataset(rig.area, "mm^2", "that belongs to each node")}
+    nodes = rig.nodes
+    if nodes is None:
+        return WornNodes(_on_plane(rig, "of each node on the contact plane") | area)
+    bodies = {"normal": Dataset(nodes.normals, "1", "out of body 1, what the joints' points meet")}
+    if nodes.places is not None:
+        bodies[POSITION] = Dataset(nodes.places, "mm", "of each node, x, y, z")
+        if nodes.alike:
+            bodies |= _on_plane(rig, "of each node across the normal, from the middle of all")
+    return WornNodes(bodies | area, nodes.names)
+
+
+def _on_plane(rig: RigModel, what: str) -> dict[str, Dataset]:
+    return {axis: Dataset(rig.places[:, k], "mm", what) for k, axis in enumerate("xy")}
 
 
 def _worn_state(
@@ -79,6 +133,7 @@ def _worn_state(
     cycles, taken = reached
     loop = loop_of(cycle.model, cycle.motion, case.joint.normal_load)
     error, responses = responses_to_all(case, cycle.model, cycle.motion, reporter, steps)
+    problem, motion = cycle.model.problem, cycle.motion
     depth = state.surfaces.depth
     numbers: dict[str, Any] = {
         "cycles": cycles,
@@ -91,7 +146,10 @@ def _worn_state(
         # Not of the loop: nodes that hardly touch slip at once, and it may never stick as a whole.
         "stiffness": cycle.model.stuck_slope(cycle.motion.frequency),
         "stroke": loop.numbers["stroke"],
+        "frequency": motion.frequency,
         "energy_per_cycle": float(cycle.energy.sum()),
+        "work_per_cycle": work_done(problem, motion),
+        "damped_per_cycle": energy_lost(problem, motion) - float(cycle.energy.sum()),
         "error": error,
         **cycle.model.numbers(),
     }
@@ -103,11 +161,11 @@ def _worn_state(
 
 
 def _fields(cycle: PadCycle, state: NodalState, loop: Curves) -> dict[str, dict[str, Dataset]]:
-    gap, pressed = np.asarray(cycle.law.gap), cycle.model.rest.cycle.samples[0, :, 2]
+    gap, pressed = cycle.model.rig.gap, cycle.model.rest.cycle.samples[0, :, 2]
     moved, pulled = (loop.datasets[name].values for name in ("displacement", "force"))
     return {
         NODES: {
-            "gap": Dataset(gap, "mm", "of the worn bodies without load"),
+            "gap": Dataset(gap, "mm", "of the worn bodies without load; below 0 what it closes"),
             **depth_fields(*state.surfaces.depths),
             "normal_force": Dataset(pressed, "N", "of each node at rest"),
             "path": path_field(cycle.path),
