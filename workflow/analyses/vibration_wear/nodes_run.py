@@ -48,7 +48,9 @@ def wear_nodes(
     """All that is kept of a run."""
     wear = case.wear
     unworn, laws = _unworn(case, reporter)
-    near = None if wear.frequency is not None else _resonance(case, unworn, reporter, steps)
+    near = (
+        None if wear.frequency is not None else resonance_that_wears(case, unworn, reporter, steps)
+    )
     pads = WearingPads(unworn, laws, case.wearing, wear.frequency, case.amount, near)
     state = pads.begin()
     with reporter.stage("wear"):
@@ -80,13 +82,16 @@ def _unworn(
     return VibrationModel.of(case.unworn, reporter), specimens.laws
 
 
-def _resonance(
+def resonance_that_wears(
     case: FrictionRigWearCase | ReducedWearCase,
     unworn: VibrationModel,
     reporter: Reporter,
     steps: Steps,
 ) -> HarmonicSolution:
-    """The phase resonance of the unworn structure under what wears it: the largest in the span."""
+    """The phase resonance of the unworn structure under what wears it: the largest in the span.
+
+    Raises :class:`wear.stepping.ContactFailure` where there is none.
+    """
     problem, state = unworn.problem, case.unworn
 
     def found() -> HarmonicSolution:
