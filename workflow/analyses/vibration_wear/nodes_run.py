@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from fe_models.dynamics.cycle_energy import energy_lost, work_done
 from fe_models.dynamics.forced_response import along_frequency
+from fe_models.dynamics.harmonic_balance import HarmonicBalance
 from fe_models.dynamics.harmonic_solution import HarmonicSolution
+from fe_models.dynamics.phase_resonance import along_phase_resonance
 from sa_solver.steps import Steps
 from wear.laws import WearLaw
 from wear.nodes import NodalState
 from wear.steppers import HeunStepper
+from wear.stepping import ContactFailure
 from workflow.analyses.rig.rig_model import RigModel
 from workflow.analyses.specimens.case import SpecimensCase
 from workflow.analyses.vibration.case import VibrationCase
@@ -21,7 +25,11 @@ from workflow.analyses.vibration.model import VibrationModel
 from workflow.analyses.vibration.outcome import Curves
 from workflow.analyses.vibration.response import step_control
 from workflow.analyses.vibration_wear.body import body_model
-from workflow.analyses.vibration_wear.case import FrictionRigWearCase, ReducedWearCase
+from workflow.analyses.vibration_wear.case import (
+    FrictionRigWearCase,
+    NodesWearCase,
+    ReducedWearCase,
+)
 from workflow.analyses.vibration_wear.outcome import (
     LOOP,
     NODES,
@@ -34,7 +42,7 @@ from workflow.analyses.vibration_wear.outcome import (
     step_error,
     wearing_loop,
 )
-from workflow.analyses.vibration_wear.pads import PadCycle, WearingPads, resonance_near
+from workflow.analyses.vibration_wear.pads import PadCycle, WearingPads
 from workflow.analyses.vibration_wear.states import responses_to_all, worn_states
 from workflow.case.loading import load_case
 from workflow.case.plain import counted
@@ -48,10 +56,8 @@ def wear_nodes(
     """All that is kept of a run."""
     wear = case.wear
     unworn, laws = _unworn(case, reporter)
-    near = (
-        None if wear.frequency is not None else resonance_that_wears(case, unworn, reporter, steps)
-    )
-    pads = WearingPads(unworn, laws, case.wearing, wear.frequency, case.amount, near)
+    search = None if wear.at is None else partial(resonance_that_wears, case)
+    pads = WearingPads(unworn, laws, case.wearing, wear.frequency, case.amount, search)
     state = pads.begin()
     with reporter.stage("wear"):
         pads.at(state)
@@ -82,30 +88,22 @@ def _unworn(
     return VibrationModel.of(case.unworn, reporter), specimens.laws
 
 
-def resonance_that_wears(
-    case: FrictionRigWearCase | ReducedWearCase,
-    unworn: VibrationModel,
-    reporter: Reporter,
-    steps: Steps,
-) -> HarmonicSolution:
-    """The phase resonance of the unworn structure under what wears it: the largest in the span.
+def resonance_that_wears(case: NodesWearCase, problem: HarmonicBalance) -> HarmonicSolution:
+    """The phase resonance under what wears: the largest of the response within the frequencies.
 
     Raises :class:`wear.stepping.ContactFailure` where there is none.
     """
-    problem, state = unworn.problem, case.unworn
-
-    def found() -> HarmonicSolution:
-        branch = along_frequency(
-            problem,
-            case.wearing,
-            case.frequencies,
-            upward=case.continuation.start == "lower",
-            control=step_control(state),
+    force, upward = case.wearing, case.continuation.start == "lower"
+    branch = along_frequency(
+        problem, force, case.frequencies, upward=upward, control=step_control(case.unworn)
+    )
+    found = along_phase_resonance(problem, branch, (force, force))
+    if not found.solutions:
+        raise ContactFailure(
+            f"no resonance {case.amount.under(force)}: {branch.message or found.message}; change "
+            "frequencies, or give wear.frequency"
         )
-        return resonance_near(problem, branch, case.wearing, case.amount)
-
-    with reporter.stage("resonance"):
-        return steps("resonance that wears", found)
+    return found.solutions[0]
 
 
 def _nodes(rig: RigModel) -> WornNodes:

@@ -9,12 +9,12 @@ motion are found anew.
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
 
-from fe_models.dynamics.forced_response import ResponseBranch
 from fe_models.dynamics.harmonic_balance import HarmonicBalance
 from fe_models.dynamics.harmonic_solution import HarmonicSolution
 from fe_models.dynamics.phase_resonance import along_phase_resonance
@@ -28,6 +28,9 @@ from wear.surfaces import Surfaces
 from workflow.analyses.vibration.excitation import FORCE, Amount
 from workflow.analyses.vibration.model import VibrationModel
 
+# Of the frequency of a resonance: by so much it moves from one state to the next. What Newton's
+# method finds farther away may be of another mode, or of contacts that it has left wide open.
+CLOSE = 0.05
 # Pads of the last states: those before and after a step.
 KEPT = 2
 
@@ -113,8 +116,8 @@ class WearingPads:
     """Pads that wear under a ``force`` [N], or level, at a ``frequency`` [Hz].
 
     ``amount`` says which it is. ``unworn`` is the rig before, ``laws`` are those of body 1 and
-    body 2. Without a frequency it is that of phase resonance, in every state anew, which for the
-    unworn pads is looked for ``near`` a motion.
+    body 2. Without a frequency it is that of phase resonance in every state, near that of the state
+    before, or where there is none close by found by ``search`` on the equations of the motion.
     """
 
     unworn: VibrationModel
@@ -122,7 +125,7 @@ class WearingPads:
     force: float
     frequency: float | None
     amount: Amount = FORCE
-    near: HarmonicSolution | None = None
+    search: Callable[[HarmonicBalance], HarmonicSolution] | None = None
     _solved: deque[tuple[Surfaces, PadCycle]] = field(
         init=False, default_factory=lambda: deque(maxlen=KEPT)
     )
@@ -140,7 +143,7 @@ class WearingPads:
             if surfaces is state.surfaces:
                 return cycle
         model = worn_model(self.unworn, state.surfaces.depth)
-        start = self.near if state.start is None else state.start
+        start = state.start
         assert start is None or isinstance(start, HarmonicSolution)
         motion = self._motion(model.problem, start)
         cycle = PadCycle(model, motion)
@@ -153,8 +156,9 @@ class WearingPads:
 
     def _motion(self, problem: HarmonicBalance, start: HarmonicSolution | None) -> HarmonicSolution:
         if self.frequency is None:
-            assert start is not None
-            return resonance_near(problem, start, self.force, self.amount)
+            assert self.search is not None
+            followed = None if start is None else self._followed(problem, start)
+            return followed or self.search(problem)
         motion = problem.solve(self.frequency, self.force, start)
         if not motion.converged:
             raise ContactFailure(
@@ -163,21 +167,17 @@ class WearingPads:
             )
         return motion
 
-
-def resonance_near(
-    problem: HarmonicBalance,
-    start: HarmonicSolution | ResponseBranch,
-    force: float,
-    amount: Amount = FORCE,
-) -> HarmonicSolution:
-    """The motion at phase resonance under a force, near a motion or the largest of a response.
-
-    Raises :class:`wear.stepping.ContactFailure` where there is none.
-    """
-    found = along_phase_resonance(problem, start, (force, force))
-    if not found.solutions:
-        raise ContactFailure(f"no resonance {amount.under(force)}: {found.message}")
-    return found.solutions[0]
+    def _followed(
+        self, problem: HarmonicBalance, start: HarmonicSolution
+    ) -> HarmonicSolution | None:
+        """The phase resonance close to that of another state, None if there is none."""
+        settled = problem.solve(start.frequency, self.force, start)
+        if not settled.converged:
+            return None
+        found = along_phase_resonance(problem, settled, (self.force, self.force)).solutions
+        if not found or abs(np.log(found[0].frequency / start.frequency)) > CLOSE:
+            return None
+        return found[0]
 
 
 def worn_model(unworn: VibrationModel, depth: Array) -> VibrationModel:
