@@ -249,7 +249,7 @@ GIVEN["reduced_wear"] = {
     "joint.pressed": {ALWAYS: {"points": "ring", "direction": "-z"}},
     **DAMPING,
     **EXCITED,
-    **laws({}, "body_1", "body_2"),
+    **laws({"force": 1, "frequency": 1, "cycles": [10]}, "body_1", "body_2"),
 }
 GIVEN["rig"] = GIVEN["joint"] | {
     "structure": {"reduced": REDUCED, "matrices": MATRICES},

@@ -106,7 +106,7 @@ RUNS = {
     ),
     "body wear": LongRun(
         BODY,
-        (IN_TEXT, "wear.frequency=", "wear.at=resonance", "wear.force=20 N", "wear.tolerance=1 %"),
+        (IN_TEXT, "wear.frequency=", "wear.at_resonance=true", "wear.force=20 N"),
         as_texts(),
     ),
     "pad wear": LongRun(PADS_THAT_WEAR, ("forces=[20 N]",), (("specimens.yaml", SPECIMENS),)),

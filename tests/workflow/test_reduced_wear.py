@@ -298,7 +298,7 @@ def test_nothing_wears_where_one_body_is_given_none(pads):
 
 def test_wear_follows_the_resonance(folder):
     """The holder lags its force by a quarter of a period, in every state."""
-    case = case_of(folder, "wear.frequency=", "wear.at=resonance", "wear.force=20 N")
+    case = case_of(folder, "wear.frequency=", "wear.at_resonance=true", "wear.force=20 N")
     assert dict(case.outline())["worn by"] == "20 N at resonance"
     reporter = Reporter(folder / "log")
     unworn = body_model(case, reporter)
@@ -387,8 +387,8 @@ def test_a_case_is_written_as_it_was_read(folder):
         (["joint.nodes="], "joint.area: missing; allowed: area of all contacts together"),
         (["joint.area=1 mm^2"], "given beside areas in"),
         (["joint.pressed="], "without pressed, so that each contact carries a load"),
-        (["wear.frequency="], "neither given; allowed: frequency, or at: resonance"),
-        (["wear.at=resonance"], "both given; allowed: frequency, or at: resonance"),
+        (["wear.frequency="], "wear.frequency=: missing; allowed: frequency, or at_resonance: true"),
+        (["wear.at_resonance=true"], "given beside at_resonance"),
         (["wear.body_1.coefficient=0", "wear.body_2.coefficient=0"], "0 for both bodies"),
         (["joint.friction=0"], "joint.friction"),
         (["wear.cycles=[10, 5]"], "wear.cycles=[10, 5]: not ascending"),

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from itertools import pairwise
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, Any, ClassVar
 
-from pydantic import Field, model_validator
+from pydantic import Field, StrictBool, model_validator
 
 from wear.laws import WearLaw
 from workflow.analyses.rig.doubts import AWAY, about_modes
@@ -100,16 +100,16 @@ class WearOfNodes(WearByVibration):
     """The same of contacts at nodes, at resonance too; with the error of steps between them."""
 
     also_filled_in: ClassVar[tuple[str, ...]] = ("force", "frequency")
-    in_schema: ClassVar[Mapping[str, Any]] = one_of("frequency", "at")
+    in_schema: ClassVar[Mapping[str, Any]] = one_of("frequency", "at_resonance")
 
     frequency: Frequency | None = entry(  # type: ignore[assignment]
         "of the force [Hz]", "100 Hz", default=None
     )
-    at: Literal["resonance"] | None = entry(
-        "instead of frequency: resonance, where what is driven lags the force by a quarter of a "
-        "period, found anew as wear moves it; the largest within frequencies",
-        "resonance",
-        default=None,
+    at_resonance: StrictBool = entry(
+        "without frequency: whether it is that at which what is driven lags the force by a quarter "
+        "of a period, found anew as wear moves it; at first the largest within frequencies",
+        False,
+        default=False,
     )
     tolerance: Annotated[
         float, Quantity("1", at_least=1e-4, at_most=0.5, range_text="0.01 % to 50 %")
@@ -122,9 +122,11 @@ class WearOfNodes(WearByVibration):
 
     @model_validator(mode="after")
     def _at_one_frequency(self) -> WearOfNodes:
-        if (self.frequency is None) == (self.at is None):
-            given = "neither" if self.at is None else "both"
-            raise disagreement(f"{given} given; allowed: frequency, or at: resonance", "frequency")
+        if (self.frequency is None) != self.at_resonance:
+            wrong = "given beside at_resonance" if self.at_resonance else "missing"
+            raise disagreement(
+                f"{wrong}; allowed: frequency, or at_resonance: true", "frequency", "at_resonance"
+            )
         return self
 
     @property
@@ -241,11 +243,11 @@ class NodesWearCase(VibrationWearCaseBase):
     @model_validator(mode="after")
     def _has_a_resonance(self) -> NodesWearCase:
         excitation = self.excitation
-        if self.wear.at is not None and excitation is not None and excitation.moves_by_a_way:
+        if self.wear.at_resonance and excitation is not None and excitation.moves_by_a_way:
             raise disagreement(
-                "resonance: with a displacement of the ground, whose forces change with the "
+                "true: with a displacement of the ground, whose forces change with the "
                 "frequency; allowed: a kind of base that is acceleration, or wear.frequency",
-                *("wear.at", "excitation"),
+                *("wear.at_resonance", "excitation"),
             )
         return self
 

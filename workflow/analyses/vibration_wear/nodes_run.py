@@ -56,7 +56,7 @@ def wear_nodes(
     """All that is kept of a run."""
     wear = case.wear
     unworn, laws = _unworn(case, reporter)
-    search = None if wear.at is None else partial(resonance_that_wears, case)
+    search = partial(resonance_that_wears, case) if wear.at_resonance else None
     pads = WearingPads(unworn, laws, case.wearing, wear.frequency, case.amount, search)
     state = pads.begin()
     with reporter.stage("wear"):
