@@ -28,7 +28,7 @@ from workflow.analyses.vibration.model import VibrationModel
 from workflow.analyses.vibration_wear.body import body_model
 from workflow.analyses.vibration_wear.case import ReducedWearCase
 from workflow.analyses.vibration_wear.nodes_run import resonance_that_wears
-from workflow.analyses.vibration_wear.pads import WearingPads
+from workflow.analyses.vibration_wear.pads import WearingPads, worn_model
 from workflow.case.writing import dump_case
 from workflow.kinds import parse_case
 from workflow.shell.reporter import Reporter
@@ -293,6 +293,21 @@ def test_nothing_wears_where_one_body_is_given_none(pads):
     assert after.surfaces.depth_2.any()
 
 
+def test_wear_alike_everywhere_lowers_the_body_and_nothing_else(pads):
+    """Also where all contacts of the motion that one begins with are open on the worn body.
+
+    Newton's method then leads bodies apart so far that rounding hid that nothing balances the load.
+    """
+    begun = pads.at(pads.begin())
+    deep = 1.1 * float(begun.motion.coefficients[:, 0, 2].max())
+    problem = worn_model(pads.unworn, np.full(NODES, deep)).problem
+    motion = problem.solve(300.0, 60.0, begun.motion)
+    assert motion.converged
+    np.testing.assert_allclose(motion.cycle.dissipated, begun.energy, atol=1e-8)
+    lowered = motion.coefficients[:, 0, 2] - begun.motion.coefficients[:, 0, 2]
+    np.testing.assert_allclose(lowered, deep, rtol=1e-8)
+
+
 # --- at resonance --------------------------------------------------------------------------------
 
 
@@ -387,7 +402,10 @@ def test_a_case_is_written_as_it_was_read(folder):
         (["joint.nodes="], "joint.area: missing; allowed: area of all contacts together"),
         (["joint.area=1 mm^2"], "given beside areas in"),
         (["joint.pressed="], "without pressed, so that each contact carries a load"),
-        (["wear.frequency="], "wear.frequency=: missing; allowed: frequency, or at_resonance: true"),
+        (
+            ["wear.frequency="],
+            "wear.frequency=: missing; allowed: frequency, or at_resonance: true",
+        ),
         (["wear.at_resonance=true"], "given beside at_resonance"),
         (["wear.body_1.coefficient=0", "wear.body_2.coefficient=0"], "0 for both bodies"),
         (["joint.friction=0"], "joint.friction"),
