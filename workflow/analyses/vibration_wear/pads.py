@@ -29,7 +29,7 @@ from workflow.analyses.vibration.excitation import FORCE, Amount
 from workflow.analyses.vibration.model import VibrationModel
 
 # Of the frequency of a resonance: by so much it moves from one state to the next. What Newton's
-# method finds farther away may be of another mode, or of contacts that it has left wide open.
+# method finds farther away may be of another mode.
 CLOSE = 0.05
 # Pads of the last states: those before and after a step.
 KEPT = 2
@@ -82,7 +82,8 @@ class PadCycle:
 
     @property
     def start(self) -> HarmonicSolution:
-        return self.motion
+        """The motion about rest, from which that of pads that rest elsewhere may begin."""
+        return _moved_by(self.motion, -self.model.problem.rest.displacement)
 
     @cached_property
     def path(self) -> Array:
@@ -145,6 +146,8 @@ class WearingPads:
         model = worn_model(self.unworn, state.surfaces.depth)
         start = state.start
         assert start is None or isinstance(start, HarmonicSolution)
+        if start is not None:
+            start = _moved_by(start, model.problem.rest.displacement)
         motion = self._motion(model.problem, start)
         cycle = PadCycle(model, motion)
         self._solved.append((state.surfaces, cycle))
@@ -178,6 +181,13 @@ class WearingPads:
         if not found or abs(np.log(found[0].frequency / start.frequency)) > CLOSE:
             return None
         return found[0]
+
+
+def _moved_by(motion: HarmonicSolution, mean: Array) -> HarmonicSolution:
+    """A motion whose joints' mean displacement is another by so much ``(j, d)`` [mm]."""
+    coefficients = motion.coefficients.copy()
+    coefficients[:, motion.resolution.harmonics.index(0)] += mean
+    return replace(motion, coefficients=coefficients)
 
 
 def worn_model(unworn: VibrationModel, depth: Array) -> VibrationModel:
