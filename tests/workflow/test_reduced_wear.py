@@ -16,6 +16,8 @@ from fe_models.dynamics.cycle_energy import energy_lost, work_done
 from fe_models.dynamics.harmonic_balance import HarmonicBalance, PeriodicLoad
 from fe_models.dynamics.harmonics import Resolution
 from fe_models.dynamics.rig import Link, lumped_rig, unit_force
+from fe_models.matrices import on_all, own_matrices
+from fe_models.reduction import save_reduced
 from tests.workflow.conftest import invoke
 from tests.workflow.shown_files import check_arrays, check_scene, total
 from tests.workflow.time_scenes import refused
@@ -283,6 +285,24 @@ def test_a_load_on_the_contacts_is_that_on_what_presses_them(folder, tmp_path):
         cycle = pads.at(state)
         depths.append(np.append(state.surfaces.depth, cycle.energy))
     np.testing.assert_allclose(depths[0], depths[1], rtol=1e-7)
+
+
+def test_a_stored_reduced_body_wears_as_its_matrices(pads, folder):
+    """The other kind of structure, with places that its file has."""
+    save_reduced(folder / "body.h5", on_all(own_matrices({}, folder / "body.npz")))
+    own = case_of(folder)
+    kept = ("joints", "damping_ratio", "driven", "seen")
+    entries = own.structure.model_dump(include=set(kept), exclude_none=True)
+    stored = {"kind": "reduced", "file": "body.h5", **entries}
+    case = case_of(folder, "structure=" + json.dumps(stored))
+    assert case.structure.kind == "reduced"
+    other = pads_of(case, folder)
+    np.testing.assert_array_equal(other.unworn.rig.places, pads.unworn.rig.places)
+    expected, depths = (
+        each.contact_at(each.begin()).explicit_step(each.begin(), 1e5).state.surfaces.depths
+        for each in (pads, other)
+    )
+    np.testing.assert_allclose(depths, expected, rtol=1e-9)
 
 
 def test_nothing_wears_where_one_body_is_given_none(pads):
