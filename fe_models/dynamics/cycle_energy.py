@@ -42,6 +42,23 @@ def energy_lost(problem: HarmonicBalance, solution: HarmonicSolution) -> float:
     return joints + energy_damped(problem, solution.motion, harmonics, solution.frequency)
 
 
+def work_done(problem: HarmonicBalance, solution: HarmonicSolution) -> float:
+    """Work of the forces in a period [N mm], π Σ k Im(f_kᴴ x_k) but for its sign.
+
+    That of a ground that moves by a given way is the work of what it does to the masses, on
+    displacements relative to it. In balance it is the :func:`energy_lost`.
+    """
+    harmonics, angular = solution.resolution.harmonics, 2.0 * np.pi * solution.frequency
+    load = problem.load
+    forces = [(order, wave) for order, wave in load.waves.items()]
+    forces += [(order, (angular * order) ** 2 * wave) for order, wave in load.inertial.items()]
+    moved = (
+        order * float(np.vdot(solution.motion[harmonics.index(order)], wave).imag)
+        for order, wave in forces
+    )
+    return np.pi * solution.force * sum(moved)
+
+
 def energy_damped(
     problem: HarmonicBalance, motion: ComplexArray, harmonics: Sequence[int], frequency: float
 ) -> float:

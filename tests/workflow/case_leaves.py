@@ -194,7 +194,12 @@ EXCITED = {
     },
 }
 WORN_SO = ["forces=", "wear.force=", "wear.level=1"]
-SHAKEN = {"vibration": ["forces="], "vibration_wear": WORN_SO, "friction_rig_wear": WORN_SO}
+SHAKEN = {
+    "vibration": ["forces="],
+    "vibration_wear": WORN_SO,
+    "friction_rig_wear": WORN_SO,
+    "reduced_wear": ["structure.driven=", *WORN_SO],
+}
 GIVEN["vibration_wear"] = GIVEN["friction_rig_wear"] = DAMPING | EXCITED
 CONTACT = {"law": "friction_contact", **JOINT, "normal_load": 0, "normal_stiffness": 1e4}
 REDUCED = {
@@ -262,6 +267,14 @@ GIVEN["vibration"] = {
     "further_branches": {
         ALWAYS: [{"force": "40 N", "frequency": "200 Hz", "amplitude": "50 um"}],
     },
+}
+GIVEN["reduced_wear"] = {
+    "structure": {"matrices": MATRICES},
+    "structure.driven": {"load": {"load": 1}},
+    "joint.pressed": {ALWAYS: {"points": "ring", "direction": "-z"}},
+    **DAMPING,
+    **EXCITED,
+    **laws({"force": 1, "frequency": 1, "cycles": [10]}, "body_1", "body_2"),
 }
 GIVEN["rig"] = GIVEN["joint"] | {
     "structure": {"reduced": OWN_ON_BODY, "matrices": MATRICES},

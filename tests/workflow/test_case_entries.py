@@ -136,6 +136,7 @@ def test_entries_are_described():
 BESIDE = {f"structure.matrices.{part}": [APART] for part in APART_MATRICES} | {
     "structure.retained": ["structure.modes=20"],
     "structure.modes": ["structure.retained=[pad, tip]"],
+    "joint.nodes": ["joint.area="],
 }
 
 

@@ -20,6 +20,7 @@ from tests.workflow.scenes import RIG_OF_THESIS
 from tests.workflow.test_friction_rig import RIG as PADS
 from tests.workflow.test_friction_rig import SPECIMENS
 from tests.workflow.test_friction_rig_wear import WORN
+from tests.workflow.test_reduced_wear import BODY, IN_TEXT, as_texts
 from tests.workflow.test_specimens_case import SMALL
 from tests.workflow.test_vibration_wear import RIG as WEARING_RIG
 from tests.workflow.test_vibration_wear import WEAR as BALL
@@ -102,6 +103,11 @@ RUNS = {
             "contact.grid=[48, 48]",
             "error_budget=known",
         ),
+    ),
+    "body wear": LongRun(
+        BODY,
+        (IN_TEXT, "wear.frequency=", "wear.at_resonance=true", "wear.force=20 N"),
+        as_texts(),
     ),
     "pad wear": LongRun(PADS_THAT_WEAR, ("forces=[20 N]",), (("specimens.yaml", SPECIMENS),)),
 }

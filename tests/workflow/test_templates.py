@@ -50,6 +50,7 @@ NEEDS = {
     "structure.modes": ["structure.retained=[pad, ring, tip]"],
     "  # instead of forces and mass, with wear.level": ["wear.force=", "wear.level=1"],
     "ring": RING,
+    "  # instead of forces, with wear.level": ["structure.driven=", "wear.force=", "wear.level=1"],
     "wear.level": ["forces=", f"excitation={EXCITED['excitation'][ALWAYS]}"],
 }
 

@@ -34,7 +34,7 @@ leaves while the force turns is integrated by Gauss's rule to 1e-13.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -126,3 +126,32 @@ class FrictionContact(CompiledLaw):
         return parameter_columns(
             self.stiffness, self.normal_stiffness, self.friction, self.normal_load, self.gap
         )
+
+    @property
+    def clearance(self) -> Parameter:
+        """How far points are apart at zero displacement [mm]; below 0 what a load has closed."""
+        return self.gap - self.normal_load / self.normal_stiffness
+
+    def worn(self, depth: Parameter) -> FrictionContact:
+        """The law of surfaces that have lost a ``depth`` between them, a number or ``(n,)`` [mm].
+
+        They lose kn of load per depth, and are apart by what goes beyond it. Raises
+        :class:`wear.joints.parameters.JointError` without normal stiffness: such a load stays
+        whatever is worn.
+
+        Examples
+        --------
+        100 N on 20 kN/mm are gone after 5 µm:
+
+        >>> import numpy as np
+        >>> from wear.joints import FrictionContact
+        >>> law = FrictionContact(1e4, normal_stiffness=2e4, friction=0.5, normal_load=100.0)
+        >>> worn = law.worn(np.array([0.002, 0.006]))
+        >>> print(worn.normal_load.round(9), worn.gap.round(9))
+        [60.  0.] [0.    0.001]
+        """
+        if np.any(np.asarray(self.normal_stiffness) == 0.0):
+            raise JointError("a normal stiffness of 0 keeps its load whatever is worn: give more")
+        apart = self.clearance + depth
+        load = self.normal_stiffness * np.maximum(-apart, 0.0)
+        return replace(self, normal_load=load, gap=np.maximum(apart, 0.0))

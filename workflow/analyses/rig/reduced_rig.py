@@ -24,7 +24,7 @@ from workflow.analyses.rig.matrix_body import LoadCase, MatrixBody
 from workflow.analyses.rig.place_names import PlaceNames, link_along
 from workflow.analyses.rig.places import Moved
 from workflow.analyses.rig.point_body import PointBody
-from workflow.analyses.rig.rig_model import JointEntry, RigModel
+from workflow.analyses.rig.rig_model import JointEntry, JointNodes, RigModel
 from workflow.analyses.rig.ring import RingOfSectors, with_next
 from workflow.analyses.rig.structure import JointedBody, JointPlaces, ReducedBody, own_laws
 from workflow.analyses.specimens.case import SpecimensCase
@@ -111,8 +111,29 @@ def _rig_on(
         *(model, driven, seen[None], (label,), directions, looked_at, entries),
         in_a_row=False,
         translations={} if sector is not None else _translations(reduced, model),
+        nodes=_nodes(reduced, body, linked),
         sector=sector,
     )
+
+
+def _nodes(reduced: ReducedModel, body: JointedBody, points: PlaceNames) -> JointNodes:
+    """Where the joints are."""
+    assert reduced.names is not None
+    names, normals = [], []
+    for number, joint in enumerate(body.joints):
+        found = points.of(joint.points, f"structure.joints.{number}.points")
+        # They close along their direction.
+        normal = np.eye(3)[AXES.index(joint.direction[-1])]
+        names += found
+        normals += [normal if joint.direction.startswith("-") else 0.0 - normal] * len(found)
+    places = None
+    of = {name.rpartition(" ")[0]: k for k, name in enumerate(reduced.names)}
+    # Points of a next sector and masses beside the body have none.
+    if reduced.places is not None and all(name in of for name in names):
+        places = reduced.places[[of[name] for name in names]]
+    if places is not None and not np.isfinite(places).all():
+        places = None
+    return JointNodes(tuple(names), np.array(normals), places)
 
 
 def _shape(model: DynamicModel, points: PlaceNames, moved: Moved, key: str) -> Array:

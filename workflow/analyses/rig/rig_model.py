@@ -42,6 +42,24 @@ class JointEntry:
 
 
 @dataclass(frozen=True)
+class JointNodes:
+    """Where the joints of a reduced body are.
+
+    ``names`` ``(j,)`` are those of their points, ``normals`` ``(j, 3)`` lead from what they meet
+    into the body, ``places`` ``(j, 3)`` are theirs [mm], None unless all are known.
+    """
+
+    names: tuple[str, ...]
+    normals: Array
+    places: Array | None
+
+    @property
+    def alike(self) -> bool:
+        """Whether all have one normal."""
+        return bool((self.normals == self.normals[0]).all())
+
+
+@dataclass(frozen=True)
 class RigModel:
     """A vibrating structure with joints of ``directions`` directions.
 
@@ -54,7 +72,8 @@ class RigModel:
     the load is the joints' own preload); ``stretch`` ``(n,)``, which takes displacements to the one
     that loops are drawn over, not the joints' mean; and of each joint its place ``places``
     ``(j, 2)`` on the contact plane [mm], the initial ``gap`` ``(j,)`` [mm] and ``area`` ``(j,)``
-    [mm²], empty elsewhere. ``translations`` are those with the ground, by direction.
+    [mm²], empty elsewhere. ``translations`` are those with the ground, by direction; ``nodes`` the
+    joints of a reduced body.
 
     Of a ring ``sector`` is one, and ``model`` that of no nodal diameter.
     """
@@ -73,6 +92,7 @@ class RigModel:
     gap: Array = field(default_factory=lambda: np.empty(0))
     area: Array = field(default_factory=lambda: np.empty(0))
     translations: Mapping[str, Translation] = field(default_factory=dict)
+    nodes: JointNodes | None = None
     sector: CyclicSector | None = None
 
     @property

@@ -57,8 +57,12 @@ class VibrationModel:
         """The model of a case. Raises UserError for a structure or joints that cannot be."""
         order = round(case.engine_order or 1)
         rig = rig_model(case.structure, case.joint, case.mass, reporter, case.ring, order)
+        return cls.on(case, rig, _law(case, rig))
+
+    @classmethod
+    def on(cls, case: VibrationCase, rig: RigModel, law: Laws) -> VibrationModel:
+        """The model of a case on a rig whose joints have this law."""
         memory(case, len(rig.model.mass), rig.joints).check()
-        law = _law(case, rig)
         threads = max(1, min(rig.joints // JOINTS_PER_THREAD, os.cpu_count() or 1, MOST_THREADS))
         static = rig.preload(law)
         if rig.pressing is not None:

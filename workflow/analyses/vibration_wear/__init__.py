@@ -1,7 +1,11 @@
-"""Vibration of a rig on a contact that it wears: motion, wear, motion."""
+"""Vibration of a structure that wears the contacts it moves on: motion, wear, motion."""
 
 from workflow.analyses.vibration.memory import memory
-from workflow.analyses.vibration_wear.case import FrictionRigWearCase, VibrationWearCase
+from workflow.analyses.vibration_wear.case import (
+    FrictionRigWearCase,
+    ReducedWearCase,
+    VibrationWearCase,
+)
 from workflow.analyses.vibration_wear.quantities import CURVES, main_results
 from workflow.analyses.vibration_wear.run_time import run_time
 from workflow.shell.analysis import Analysis, Pictures, Run
@@ -9,7 +13,7 @@ from workflow.shell.analysis import Analysis, Pictures, Run
 __all__ = ["ANALYSIS"]
 
 
-def _run(run: Run[VibrationWearCase | FrictionRigWearCase]) -> None:
+def _run(run: Run[VibrationWearCase | FrictionRigWearCase | ReducedWearCase]) -> None:
     # Joint laws are compiled when they are first needed.
     from workflow.analyses.vibration_wear.run import run_vibration_wear
 
@@ -27,7 +31,11 @@ def _pictures() -> Pictures:
 
 ANALYSIS = Analysis(
     name="vibration_wear",
-    cases={"vibration_wear": VibrationWearCase, "friction_rig_wear": FrictionRigWearCase},
+    cases={
+        "vibration_wear": VibrationWearCase,
+        "friction_rig_wear": FrictionRigWearCase,
+        "reduced_wear": ReducedWearCase,
+    },
     run=_run,
     pictures=_pictures,
     memory=memory,

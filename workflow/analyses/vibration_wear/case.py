@@ -2,30 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from itertools import pairwise
 from pathlib import Path
-from typing import Annotated, ClassVar, Literal
+from typing import Annotated, Any, ClassVar
 
-from pydantic import Field, model_validator
+from pydantic import Field, StrictBool, model_validator
 
+from wear.laws import WearLaw
 from workflow.analyses.rig.doubts import AWAY, about_modes
 from workflow.analyses.rig.excitation import DrivingForce, Frequency
-from workflow.analyses.rig.joint_sections import (
-    FrictionContactJoint,
-    JenkinsJoint,
-    Joint,
-    JointStiffness,
-)
-from workflow.analyses.rig.structure import FrictionRig, Rig, structure_outline
+from workflow.analyses.rig.joint_sections import FrictionContactJoint, JenkinsJoint, Joint
+from workflow.analyses.rig.matrix_body import MatrixBody
+from workflow.analyses.rig.structure import FrictionRig, ReducedBody, Rig, structure_outline
 from workflow.analyses.vibration.case import DrivenMass, VibrationCase, VibrationCaseBase, wears
 from workflow.analyses.vibration.excitation import Level, VibrationExcitation
-from workflow.analyses.wear.case.sections import Cycles, PressingForce
+from workflow.analyses.vibration_wear.node_contacts import NodeContacts, PadContacts
+from workflow.analyses.wear.case.sections import Cycles, Laws, TwoBodies
+from workflow.analyses.wear.case.worn_bodies import BodyWear, wearing
 from workflow.analyses.wear.structures.bodies.case import BodiesWearCase, Reciprocation
 from workflow.case.fields import Quantity
 from workflow.case.loading import YAML, CaseFile, load_case, outline_of
 from workflow.case.plain import entries, plain, times
-from workflow.case.sections import Section, Title, disagreement, entry
+from workflow.case.sections import Section, Title, disagreement, entry, one_of
 from workflow.case.source import Source
 
 # Rows of the contact's own case that are told, and what they are called.
@@ -35,7 +34,6 @@ OF_CONTACT = {
     "friction": "friction",
     "wear law": "wear law",
 }
-WearingFriction = Annotated[float, Quantity("1", above=0.0, at_most=10.0)]
 # Of the cases with wear, what a vibration case of one state has no use for.
 NOT_OF_A_STATE = ("assumed", "expect")
 
@@ -92,10 +90,27 @@ class WearByVibration(Section):
             raise disagreement("not ascending; allowed: each number above the last", "cycles")
         return self
 
+    @property
+    def where(self) -> str:
+        """The frequency of the motion that wears, in words."""
+        return f"at {self.frequency:g} Hz"
+
 
 class WearOfNodes(WearByVibration):
-    """The same, with the error of steps between specimens."""
+    """The same of contacts at nodes, at resonance too; with the error of steps between them."""
 
+    also_filled_in: ClassVar[tuple[str, ...]] = ("force", "frequency")
+    in_schema: ClassVar[Mapping[str, Any]] = one_of("frequency", "at_resonance")
+
+    frequency: Frequency | None = entry(  # type: ignore[assignment]
+        "of the force [Hz]", "100 Hz", default=None
+    )
+    at_resonance: StrictBool = entry(
+        "without frequency: whether it is that at which what is driven lags the force by a quarter "
+        "of a period, found anew as wear moves it; at first the largest within frequencies",
+        False,
+        default=False,
+    )
     tolerance: Annotated[
         float, Quantity("1", at_least=1e-4, at_most=0.5, range_text="0.01 % to 50 %")
     ] = entry(
@@ -105,22 +120,38 @@ class WearOfNodes(WearByVibration):
         default=0.1,
     )
 
+    @model_validator(mode="after")
+    def _at_one_frequency(self) -> WearOfNodes:
+        if (self.frequency is None) != self.at_resonance:
+            wrong = "given beside at_resonance" if self.at_resonance else "missing"
+            raise disagreement(
+                f"{wrong}; allowed: frequency, or at_resonance: true", "frequency", "at_resonance"
+            )
+        return self
 
-class PadContacts(Joint):
-    """A friction contact at every node of two pads that a load presses together."""
+    @property
+    def where(self) -> str:
+        return "at resonance" if self.frequency is None else super().where
 
-    law: Literal["friction_contact"] = entry("at every node of the pads", "friction_contact")
-    friction: WearingFriction = entry("limit of the friction force over the normal load [1]", 0.88)
-    normal_load: PressingForce = entry("that presses the pads together [N]", "60 N")
-    stiffness: JointStiffness = entry("along the pads, stuck [N/mm]", "45 N/um")
-    normal_stiffness: JointStiffness = entry("in contact [N/mm]", "58.5 N/um")
+
+class WearOfBody(TwoBodies[BodyWear], Laws, WearOfNodes):
+    """The same with the laws of both bodies."""
+
+    body_1: BodyWear = entry("what the points of the joints meet: others, or the ground")
+    body_2: BodyWear = entry("the body at the points of the joints")
+
+    @model_validator(mode="after")
+    def _something_wears(self) -> WearOfBody:
+        if self.body_1.rate(1.0) == self.body_2.rate(1.0) == 0.0:
+            raise disagreement("0 for both bodies; allowed: one of them at most", "body_1")
+        return self
 
 
 class VibrationWearCaseBase(VibrationCaseBase):
     """A rig on a contact that it wears, and its response to forces a sin(2π frequency t)."""
 
     title: Title = entry("one line", "Forced response of a friction rig as it wears")
-    structure: Rig | FrictionRig = entry("what holds the contact")
+    structure: Rig | FrictionRig | ReducedBody | MatrixBody = entry("what holds the contact")
     excitation: VibrationExcitation | None = entry(
         "instead of forces and mass, with wear.level: forces at any places, records, motion of the "
         "ground",
@@ -156,7 +187,7 @@ class VibrationWearCaseBase(VibrationCaseBase):
         structure, wear = self.structure, self.wear
         return [
             *structure_outline(structure),
-            ("worn by", f"{self.amount.told(self.wearing)} at {wear.frequency:g} Hz"),
+            ("worn by", f"{self.amount.told(self.wearing)} {wear.where}"),
             ("states", f"unworn and after {'; '.join(map(times, wear.cycles))} cycles"),
             ("forces", self.driving),
             ("method", self.resolved),
@@ -164,8 +195,10 @@ class VibrationWearCaseBase(VibrationCaseBase):
 
     def doubts(self) -> Iterator[str]:
         yield from super().doubts()
-        span = self.wear.frequency / AWAY, self.wear.frequency * AWAY
-        yield from about_modes("wear.frequency", span, self.structure)
+        frequency: float | None = self.wear.frequency
+        if frequency is not None:
+            span = frequency / AWAY, frequency * AWAY
+            yield from about_modes("wear.frequency", span, self.structure)
 
     def _of_a_state(self, joint: Joint, mass: int | None = None) -> VibrationCase:
         """The vibration case with this joint, driven at the mass of this number."""
@@ -201,14 +234,22 @@ class VibrationWearCase(VibrationWearCaseBase, DrivenMass):
         ]
 
 
-class FrictionRigWearCase(VibrationWearCaseBase):
-    """Steady vibration of two specimens in a rig, which wear each other node by node."""
+class NodesWearCase(VibrationWearCaseBase):
+    """Steady vibration of a structure that wears its contacts node by node."""
 
-    about: ClassVar[str] = "the steady vibration of a rig with two specimens that it wears"
+    joint: PadContacts = entry("all contacts together")
+    wear: WearOfNodes = entry("how the contacts wear")
 
-    structure: FrictionRig = entry("two specimens in a rig; their case says how they wear")
-    joint: PadContacts = entry("all contacts of the pads together; gaps are those of their form")
-    wear: WearOfNodes = entry("how the pads wear")
+    @model_validator(mode="after")
+    def _has_a_resonance(self) -> NodesWearCase:
+        excitation = self.excitation
+        if self.wear.at_resonance and excitation is not None and excitation.moves_by_a_way:
+            raise disagreement(
+                "true: with a displacement of the ground, whose forces change with the "
+                "frequency; allowed: a kind of base that is acceleration, or wear.frequency",
+                *("wear.at_resonance", "excitation"),
+            )
+        return self
 
     @property
     def contacts(self) -> bool:
@@ -217,8 +258,55 @@ class FrictionRigWearCase(VibrationWearCaseBase):
     @property
     def unworn(self) -> VibrationCase:
         """The vibration case before the first cycle."""
-        return self._of_a_state(FrictionContactJoint(**self.joint.model_dump()))
+        shared = FrictionContactJoint.model_fields.keys() & PadContacts.model_fields.keys()
+        return self._of_a_state(FrictionContactJoint(**self.joint.model_dump(include=shared)))
 
     def outline(self) -> list[tuple[str, str]]:
         joint = self.joint
         return [*super().outline(), ("joint", f"{joint.law}, {entries(joint)}")]
+
+
+class FrictionRigWearCase(NodesWearCase):
+    """Steady vibration of two specimens in a rig, which wear each other node by node."""
+
+    about: ClassVar[str] = "the steady vibration of a rig with two specimens that it wears"
+
+    structure: FrictionRig = entry("two specimens in a rig; their case says how they wear")
+    joint: PadContacts = entry("all contacts of the pads together; gaps are those of their form")
+    wear: WearOfNodes = entry("how the pads wear")
+
+
+class ReducedWearCase(NodesWearCase):
+    """Steady vibration of a reduced body that wears the friction contacts at its nodes."""
+
+    about: ClassVar[str] = "the steady vibration of a reduced body that wears its contacts"
+
+    title: Title = entry("one line", "Forced response of a body as its contacts wear")
+    structure: Annotated[ReducedBody | MatrixBody, Field(discriminator="kind")] = entry(
+        "a body with friction contacts at its nodes"
+    )
+    excitation: VibrationExcitation | None = entry(
+        "instead of forces, with wear.level and without structure.driven: forces at any places, "
+        "records, motion of the ground",
+        default=None,
+    )
+    joint: NodeContacts = entry("all contacts together")
+    wear: WearOfBody = entry("how the contacts wear")
+
+    @property
+    def laws(self) -> tuple[WearLaw, WearLaw]:
+        """Those of body 1 and body 2."""
+        return self.wear.body_1.described(), self.wear.body_2.described()
+
+    def outline(self) -> list[tuple[str, str]]:
+        joint, wear = self.joint, self.wear
+        pressed = "each contact by its share"
+        if joint.pressed is not None:
+            pressed = f"{joint.pressed.points} along {joint.pressed.direction}"
+        nodes = [] if joint.nodes is None else [("nodes", Path(joint.nodes).name)]
+        return [
+            *super().outline(),
+            ("pressed", pressed),
+            *nodes,
+            *wearing({"body_1": wear.body_1, "body_2": wear.body_2}),
+        ]

@@ -80,7 +80,8 @@ def figures_of(contents: Contents) -> Figures:
     return {
         "frequency_response": frequency_response,
         "evolution": partial(evolution, contents=contents),
-        **({"profile": profile} if contents.at_nodes else {"scar": scar}),
+        **({} if contents.at_nodes else {"scar": scar}),
+        **({"profile": profile} if contents.at_nodes and contents.on_plane else {}),
         "loops": partial(loops, contents=contents),
     }
 
@@ -218,7 +219,10 @@ def loops(file: h5py.File, contents: Contents) -> Figure:
         if not contents.at_nodes:
             axis.plot(*_loop(state[HALF_SPACE]), "o", color=colour, markersize=3)
     if contents.at_nodes:
-        axis.set(xlabel="displacement between the targets [µm]", ylabel="force [N]")
+        axis.set(
+            xlabel="displacement between the targets, or mean of the contacts [µm]",
+            ylabel="force [N]",
+        )
     else:
         label = "force [N]; points: whole tangential problem"
         axis.set(xlabel="displacement of the joint [µm]", ylabel=label)

@@ -21,6 +21,8 @@ LOOP, HALF_SPACE = "loop", "half_space_loop"
 # The same of specimens, whose contact is at nodes, and the group of what does not wear.
 NODES, PLACES = "nodes", "places"
 WORN, EVOLUTION = "worn", "evolution"
+# Coordinates of nodes in space, where they are known.
+POSITION = "position"
 # What wear steps have left before the first.
 NOTHING_WORN = {"depth": 0.0}
 
@@ -29,10 +31,13 @@ NOTHING_WORN = {"depth": 0.0}
 class Contents:
     """What ``results.h5`` of such a case holds.
 
-    The contact is ``at_nodes``, or on a grid with loops of its tangential problem.
+    The contact is ``at_nodes``, or on a grid with loops of its tangential problem. Nodes are
+    ``placed`` where their coordinates are known, and ``on_plane`` where they have one normal.
     """
 
     at_nodes: bool
+    placed: bool = True
+    on_plane: bool = True
 
 
 @dataclass(frozen=True)
@@ -49,16 +54,27 @@ class WornState:
 
 
 @dataclass(frozen=True)
+class WornNodes:
+    """Nodes of a contact: what of them does not wear, and ``names`` ``(j,)`` where they have any.
+
+    ``datasets`` are area, and as far as they are known position, normal, and x and y on the plane.
+    """
+
+    datasets: Datasets
+    names: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
 class VibrationWearOutcome:
     """All states of a run, the unworn one first.
 
-    The contact is on a ``grid``, or at nodes with ``places``.
+    The contact is on a ``grid``, or at ``nodes``.
     """
 
     case: VibrationWearCaseBase
     states: tuple[WornState, ...]
     grid: Grid | None = None
-    places: Datasets | None = None
+    nodes: WornNodes | None = None
 
     @property
     def evolution(self) -> dict[str, Dataset]:
@@ -86,11 +102,14 @@ class VibrationWearOutcome:
             "friction": ("1", "coefficient"),
             "stiffness": (
                 "N/mm",
-                "of all that touches, stuck; of pads between the targets",
+                "of all that touches, stuck; over what opens between the targets, or their mean",
             ),
             "full_slip": ("mm", "motion of the joint from rest at which all of it slides"),
             "stroke": ("mm", "of the joint from end to end, under the force that wears"),
-            "energy_per_cycle": ("N mm", "under the force that wears"),
+            "frequency": ("Hz", "of the motion that wears"),
+            "energy_per_cycle": ("N mm", "that joints dissipate under the force that wears"),
+            "work_per_cycle": ("N mm", "of the force that wears"),
+            "damped_per_cycle": ("N mm", "by the damping of the structure, in the same motion"),
             "stuck": ("Hz", "natural frequencies with the contact stuck"),
             "resonance": ("Hz", "under each force"),
             "receptance": ("mm/N", "largest amplitude of the last mass over the force, under each"),
@@ -122,7 +141,7 @@ def path_field(path: Array) -> Dataset:
 
 def wearing_loop(displacement: Array, force: Array) -> dict[str, Dataset]:
     """The loop of the joint in the motion that wears it."""
-    moved = "of the joint, or between the targets, under the force that wears"
+    moved = "of the joint or the mean of all, or between the targets, under the force that wears"
     return {
         "displacement": Dataset(displacement, "mm", moved),
         "force": Dataset(force, "N", "of the joint along it"),

@@ -1,13 +1,15 @@
-"""Two specimens in a vibrating rig: how their contacts move, and what that takes off every node.
+"""Contacts at the nodes of a vibrating structure: how they move, and what that takes off each.
 
-In a cycle of the rig's steady motion by harmonic balance the contact of a node slides along a path
-and dissipates an energy; what both bodies lose by it is up to their laws. The gap grows by the
-depth, and rest and motion are found anew.
+They are those of two specimens in a rig, or at the joints of any reduced body. In a cycle of the
+steady motion by harmonic balance the contact of a node slides along a path and dissipates an
+energy; what both bodies lose by it is up to their laws. The gap grows by the depth, and rest and
+motion are found anew.
 """
 
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -15,6 +17,7 @@ import numpy as np
 
 from fe_models.dynamics.harmonic_balance import HarmonicBalance
 from fe_models.dynamics.harmonic_solution import HarmonicSolution
+from fe_models.dynamics.phase_resonance import along_phase_resonance
 from sa_solver.types import Array
 from wear.joints.friction_contact import FrictionContact
 from wear.joints.periodic import PeriodicMarch
@@ -25,6 +28,9 @@ from wear.surfaces import Surfaces
 from workflow.analyses.vibration.excitation import FORCE, Amount
 from workflow.analyses.vibration.model import VibrationModel
 
+# Of the frequency of a resonance: by so much it moves from one state to the next. What Newton's
+# method finds farther away may be of another mode.
+CLOSE = 0.05
 # Pads of the last states: those before and after a step.
 KEPT = 2
 
@@ -76,7 +82,8 @@ class PadCycle:
 
     @property
     def start(self) -> HarmonicSolution:
-        return self.motion
+        """The motion about rest, from which that of pads that rest elsewhere may begin."""
+        return _moved_by(self.motion, -self.model.problem.rest.displacement)
 
     @cached_property
     def path(self) -> Array:
@@ -110,14 +117,16 @@ class WearingPads:
     """Pads that wear under a ``force`` [N], or level, at a ``frequency`` [Hz].
 
     ``amount`` says which it is. ``unworn`` is the rig before, ``laws`` are those of body 1 and
-    body 2.
+    body 2. Without a frequency it is that of phase resonance in every state, near that of the state
+    before, or where there is none close by found by ``search`` on the equations of the motion.
     """
 
     unworn: VibrationModel
     laws: tuple[WearLaw, WearLaw]
     force: float
-    frequency: float
+    frequency: float | None
     amount: Amount = FORCE
+    search: Callable[[HarmonicBalance], HarmonicSolution] | None = None
     _solved: deque[tuple[Surfaces, PadCycle]] = field(
         init=False, default_factory=lambda: deque(maxlen=KEPT)
     )
@@ -137,12 +146,9 @@ class WearingPads:
         model = worn_model(self.unworn, state.surfaces.depth)
         start = state.start
         assert start is None or isinstance(start, HarmonicSolution)
-        motion = model.problem.solve(self.frequency, self.force, start)
-        if not motion.converged:
-            raise ContactFailure(
-                f"no motion {self.amount.under(self.force)} at {self.frequency:g} Hz: "
-                f"{motion.message}"
-            )
+        if start is not None:
+            start = _moved_by(start, model.problem.rest.displacement)
+        motion = self._motion(model.problem, start)
         cycle = PadCycle(model, motion)
         self._solved.append((state.surfaces, cycle))
         return cycle
@@ -151,14 +157,45 @@ class WearingPads:
         """The same as wear steps take it."""
         return NodalContact(self.laws, (self.at(state),))
 
+    def _motion(self, problem: HarmonicBalance, start: HarmonicSolution | None) -> HarmonicSolution:
+        if self.frequency is None:
+            assert self.search is not None
+            followed = None if start is None else self._followed(problem, start)
+            return followed or self.search(problem)
+        motion = problem.solve(self.frequency, self.force, start)
+        if not motion.converged:
+            raise ContactFailure(
+                f"no motion {self.amount.under(self.force)} at {self.frequency:g} Hz: "
+                f"{motion.message}"
+            )
+        return motion
+
+    def _followed(
+        self, problem: HarmonicBalance, start: HarmonicSolution
+    ) -> HarmonicSolution | None:
+        """The phase resonance close to that of another state, None if there is none."""
+        settled = problem.solve(start.frequency, self.force, start)
+        if not settled.converged:
+            return None
+        found = along_phase_resonance(problem, settled, (self.force, self.force)).solutions
+        if not found or abs(np.log(found[0].frequency / start.frequency)) > CLOSE:
+            return None
+        return found[0]
+
+
+def _moved_by(motion: HarmonicSolution, mean: Array) -> HarmonicSolution:
+    """A motion whose joints' mean displacement is another by so much ``(j, d)`` [mm]."""
+    coefficients = motion.coefficients.copy()
+    coefficients[:, motion.resolution.harmonics.index(0)] += mean
+    return replace(motion, coefficients=coefficients)
+
 
 def worn_model(unworn: VibrationModel, depth: Array) -> VibrationModel:
     """The rig whose contacts have lost a ``depth`` ``(j,)`` [mm]: only their law is new."""
     rig, problem = unworn.rig, unworn.problem
     assert isinstance(unworn.law, FrictionContact)
     assert isinstance(problem.joints, PeriodicMarch)
-    gap = rig.gap + depth
-    law = replace(unworn.law, gap=gap)
+    law = unworn.law.worn(depth)
     worn = HarmonicBalance(
         problem.model,
         replace(problem.joints, law=law),
@@ -166,4 +203,4 @@ def worn_model(unworn: VibrationModel, depth: Array) -> VibrationModel:
         problem.resolution,
         problem.receptance,
     )
-    return VibrationModel(replace(rig, gap=gap), law, worn, unworn.driving)
+    return VibrationModel(replace(rig, gap=rig.gap + depth), law, worn, unworn.driving)

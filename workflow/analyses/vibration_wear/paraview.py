@@ -1,25 +1,44 @@
 """A contact that a rig wears for ParaView: ``contact.pvd``, its faces over the cycles.
 
 Every step is the contact as it wears (``contact/<state>``): the cells of the grid as points of a
-surface, or the nodes of the pads. Warp By Vector on ``worn_1`` or ``worn_2`` shows a body's worn
-shape; the axes are those of the face. ``view.py`` shows them.
+surface, or the nodes of the contacts. Warp By Vector on ``worn_1`` or ``worn_2`` shows a body's
+worn shape; the axes are those of the face, of a reduced body its own. ``view.py`` shows them.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import h5py
 import numpy as np
 
 from sa_solver.types import Array, Frame
+from workflow.analyses.vibration.pad_nodes import rows_and_columns
 from workflow.analyses.vibration.paraview import pad_mesh
-from workflow.analyses.vibration_wear.outcome import CONTACT, NODES, PLACES, WORN, Contents
+from workflow.analyses.vibration_wear.outcome import (
+    CONTACT,
+    NODES,
+    PLACES,
+    POSITION,
+    WORN,
+    Contents,
+)
 from workflow.pictures.view import FIRST, Scene, Shown, View, write_view
-from workflow.pictures.vtk import CYCLES, FacePoints, Fields, Step, attach, write_series
+from workflow.pictures.vtk import (
+    CYCLES,
+    FacePoints,
+    Fields,
+    Step,
+    attach,
+    quadrilaterals,
+    write_series,
+)
 from workflow.shell.results import grid_of
+
+if TYPE_CHECKING:
+    import pyvista
 
 SERIES = "contact.pvd"
 FACE = Frame(np.zeros(3), np.eye(3))
@@ -30,7 +49,12 @@ PER_AREA = "N/mm"
 
 
 def write_vibration_wear(contents: Contents, file: h5py.File, folder: Path) -> list[Path]:
-    """Write the states, their series over the cycles, and the script; returns their paths."""
+    """Write the states, their series over the cycles, and the script; returns their paths.
+
+    Nothing where nobody knows where the nodes are.
+    """
+    if not contents.placed:
+        return []
     steps = _nodes(file, folder) if contents.at_nodes else _cells(file, folder)
     written = write_series(folder / SERIES, CYCLES, steps)
     return [*written, _write_view(file, folder)]
@@ -42,26 +66,48 @@ def _cells(file: h5py.File, folder: Path) -> Iterator[Step]:
         contact = state[CONTACT]
         shown = {key: points.of(contact[key]) for key in ("pressure", "energy")}
         path = folder / "contact" / f"{name}.vtp"
-        mesh = points.mesh(_fields(contact, shown, points.of, "gap"))
+        mesh = points.mesh(_fields(contact, shown, points.of, "gap", FACE.axes[2]))
         yield float(state.attrs["cycles"]), CONTACT, path, mesh
 
 
 def _nodes(file: h5py.File, folder: Path) -> Iterator[Step]:
     places = file[PLACES]
-    area = places["area"][()]
+    area, placed = places["area"][()], POSITION in places
+    normal = places["normal"][()] if placed else FACE.axes[2]
     for name, state in file[WORN].items():
         nodes = state[NODES]
         shown = {"pressure": nodes["normal_force"][()] / area, "energy": nodes["energy"][()] / area}
-        mesh = pad_mesh(places)
-        fields = _fields(nodes, shown, lambda dataset: np.asarray(dataset[()]), "unloaded_gap")
+        mesh = _body_mesh(places) if placed else pad_mesh(places)
+        fields = _fields(nodes, shown, lambda dataset: dataset[()], "unloaded_gap", normal)
         attach(mesh.point_data, fields | {"area": (area, "mm^2")})
         yield float(state.attrs["cycles"]), CONTACT, folder / "contact" / f"{name}.vtu", mesh
 
 
-def _fields(contact: h5py.Group, shown: dict[str, Array], of: Any, gap: str) -> Fields:
+def _body_mesh(places: h5py.Group) -> pyvista.UnstructuredGrid:
+    """Quadrilaterals between nodes in rows and columns, each normal's apart; or nodes alone."""
+    import pyvista
+
+    position, normals = places[POSITION][()], places["normal"][()]
+    faces, alone = [], []
+    for normal in np.unique(normals, axis=0):
+        nodes = np.flatnonzero((normals == normal).all(axis=1))
+        numbers = rows_and_columns(*position[nodes][:, normal == 0.0].T)
+        if numbers is None:
+            alone.append(nodes[:, None])
+        else:
+            faces.append(quadrilaterals(nodes[numbers]))
+    kinds = {pyvista.CellType.QUAD: faces, pyvista.CellType.VERTEX: alone}
+    cells = {kind: np.concatenate(parts) for kind, parts in kinds.items() if parts}
+    return pyvista.UnstructuredGrid(cells, position)
+
+
+def _fields(
+    contact: h5py.Group, shown: dict[str, Array], of: Any, gap: str, normal: Array
+) -> Fields:
     """Of a state: at rest pressure and gap, of a cycle path and energy, and what is worn.
 
     ``gap`` is what the one in the results is called: at rest, or that of bodies without load.
+    ``normal`` ``(3,)``, or that of each point, leads out of body 1.
     """
     depths = {body: of(contact[f"depth_{body}"]) for body in INTO_BODY}
     fields: Fields = {
@@ -73,7 +119,7 @@ def _fields(contact: h5py.Group, shown: dict[str, Array], of: Any, gap: str) -> 
     }
     for body, depth in depths.items():
         fields[f"depth_{body}"] = depth, "mm"
-        fields[f"worn_{body}"] = np.outer(INTO_BODY[body] * depth, FACE.axes[2]), "mm"
+        fields[f"worn_{body}"] = INTO_BODY[body] * depth[:, None] * normal, "mm"
     return fields
 
 

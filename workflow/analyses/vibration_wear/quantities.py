@@ -9,7 +9,7 @@ from typing import Any
 
 from workflow.analyses.vibration.excitation import under_in
 from workflow.analyses.vibration.quantities import of_response
-from workflow.analyses.vibration_wear.case import FrictionRigWearCase, VibrationWearCase
+from workflow.analyses.vibration_wear.case import VibrationWearCaseBase
 from workflow.case.plain import times
 from workflow.shell.analysis import Summary
 from workflow.shell.quantities import CurvesOf, Quantity
@@ -28,6 +28,7 @@ NUMBERS = {
     "peak_pressure": ("MPa", "largest pressure at rest", ""),
     "stiffness": ("N/mm", "tangential stiffness", "N/um"),
     "stroke": ("mm", "stroke under the force that wears", ""),
+    "frequency": ("Hz", "frequency of the motion that wears", ""),
     "energy_per_cycle": ("N mm", "energy dissipated in a cycle", ""),
 }
 # Parts of the error of each, which add up, and what that is of.
@@ -52,7 +53,7 @@ CURVES = (
 )
 
 
-def main_results(case: VibrationWearCase | FrictionRigWearCase, summary: Summary) -> list[Quantity]:
+def main_results(case: VibrationWearCaseBase, summary: Summary) -> list[Quantity]:
     """Of every state, the unworn one first."""
     states = enumerate(summary["states"])
     return told(summary, chain.from_iterable(_of_state(n, state, summary) for n, state in states))

@@ -9,23 +9,31 @@ import numpy as np
 from workflow.analyses.vibration.excitation import Amount
 from workflow.analyses.vibration.outcome import trend
 from workflow.analyses.vibration.results import put_response_curves
-from workflow.analyses.vibration_wear.case import FrictionRigWearCase, VibrationWearCase
+from workflow.analyses.vibration_wear.case import (
+    FrictionRigWearCase,
+    ReducedWearCase,
+    VibrationWearCase,
+)
 from workflow.analyses.vibration_wear.outcome import (
     EVOLUTION,
+    NODES,
     PLACES,
+    POSITION,
     RESPONSES,
     WORN,
     Contents,
     VibrationWearOutcome,
+    WornNodes,
     WornState,
 )
 from workflow.shell.analysis import Run
+from workflow.shell.dataset import Dataset
 from workflow.shell.folder import OutputFolder
 from workflow.shell.results import Along, On, run_results
 from workflow.shell.summary import finish
-from workflow.shell.tables import write_curves
+from workflow.shell.tables import DIGITS, heading, write_curves, write_table
 
-VibrationWearRun = Run[VibrationWearCase | FrictionRigWearCase]
+VibrationWearRun = Run[VibrationWearCase | FrictionRigWearCase | ReducedWearCase]
 
 # What rises, falls, or neither, beside the resonance under the least force.
 TRENDS = ("stiffness", "peak_pressure", "touching")
@@ -51,7 +59,11 @@ def write_vibration_wear_output(outcome: VibrationWearOutcome, run: VibrationWea
 
 
 def _contents(outcome: VibrationWearOutcome) -> Contents:
-    return Contents(outcome.places is not None)
+    if outcome.nodes is None:
+        return Contents(at_nodes=False)
+    known = outcome.nodes.datasets
+    on_plane = "x" in known
+    return Contents(at_nodes=True, placed=on_plane or POSITION in known, on_plane=on_plane)
 
 
 def _write_results(outcome: VibrationWearOutcome, run: VibrationWearRun) -> None:
@@ -65,8 +77,8 @@ def _write_results(outcome: VibrationWearOutcome, run: VibrationWearRun) -> None
         writer.put_contents(_contents(outcome))
         if outcome.grid is not None:
             writer.put_grid("grid", outcome.grid)
-        if outcome.places is not None:
-            writer.put(PLACES, outcome.places)
+        if outcome.nodes is not None:
+            writer.put(PLACES, {**outcome.nodes.datasets, **_named(outcome.nodes)})
         writer.put(EVOLUTION, outcome.evolution, Along("cycles"))
         for number, state in enumerate(outcome.states):
             place = f"{WORN}/{number:05d}"
@@ -77,6 +89,12 @@ def _write_results(outcome: VibrationWearOutcome, run: VibrationWearRun) -> None
             for force, response in enumerate(state.responses):
                 where = f"{place}/{RESPONSES}/{force:05d}"
                 put_response_curves(writer, where, case.amount, response)
+
+
+def _named(nodes: WornNodes) -> dict[str, Dataset]:
+    """The names of nodes that have any."""
+    names = np.array(nodes.names, dtype=np.bytes_)
+    return {"name": Dataset(names, "1", "of the point of each contact")} if nodes.names else {}
 
 
 # --- tables -------------------------------------------------------------------------------------
@@ -91,6 +109,22 @@ def _write_tables(outcome: VibrationWearOutcome, folder: OutputFolder) -> None:
             what = f"response {under(response.force)} after {state.cycles:g} cycles"
             path = folder.reserve(f"frf_{number:05d}_{force:05d}.csv", f"{what}, over frequency")
             write_curves(path, response.curves)
+    if outcome.nodes is not None:
+        for number, state in enumerate(outcome.states):
+            _write_nodes(outcome.nodes, number, state, folder)
+
+
+def _write_nodes(nodes: WornNodes, number: int, state: WornState, folder: OutputFolder) -> None:
+    """What each node has lost and dissipates in a state, a row for each."""
+    what = f"nodes after {state.cycles:g} cycles: gaps, depths, energies of a cycle"
+    path = folder.reserve(f"{NODES}_{number:05d}.csv", what)
+    columns: dict[str, Any] = {heading("point", ""): nodes.names} if nodes.names else {}
+    for name, dataset in {**nodes.datasets, **state.fields[NODES]}.items():
+        by_axis = dataset.values.reshape(len(dataset.values), -1).T
+        axes = "xyz" if len(by_axis) > 1 else ("",)
+        for axis, values in zip(axes, by_axis, strict=True):
+            columns[heading(f"{name}_{axis}".strip("_"), dataset.unit)] = values
+    write_table(path, columns, DIGITS)
 
 
 # --- summary ------------------------------------------------------------------------------------

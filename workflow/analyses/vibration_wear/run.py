@@ -8,8 +8,8 @@ from sa_solver.normal import NormalContactError
 from wear.joints.parameters import JointError
 from wear.stepping import ContactFailure
 from workflow.analyses.vibration_wear.case import VibrationWearCase
-from workflow.analyses.vibration_wear.friction_rig_run import wear_specimens
 from workflow.analyses.vibration_wear.half_space_run import wear_half_space
+from workflow.analyses.vibration_wear.nodes_run import wear_nodes
 from workflow.analyses.vibration_wear.results import (
     VibrationWearRun,
     write_vibration_wear_output,
@@ -30,7 +30,7 @@ def run_vibration_wear(run: VibrationWearRun) -> None:
             if isinstance(case, VibrationWearCase):
                 outcome = wear_half_space(case, reporter, steps)
             else:
-                outcome = wear_specimens(case, reporter, steps)
+                outcome = wear_nodes(case, reporter, steps)
     except (ContactFailure, NormalContactError) as error:
         raise MethodFailed(str(error)) from error
     except JointError as error:

@@ -1,24 +1,41 @@
-"""A friction rig whose specimens wear each other: motion, wear, motion, responses on the way."""
+"""A structure that wears its contacts at nodes: motion, wear, motion, responses on the way."""
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
 import numpy as np
 
+from fe_models.dynamics.cycle_energy import energy_lost, work_done
+from fe_models.dynamics.forced_response import along_frequency
+from fe_models.dynamics.harmonic_balance import HarmonicBalance
+from fe_models.dynamics.harmonic_solution import HarmonicSolution
+from fe_models.dynamics.phase_resonance import along_phase_resonance
 from sa_solver.steps import Steps
+from wear.laws import WearLaw
 from wear.nodes import NodalState
 from wear.steppers import HeunStepper
+from wear.stepping import ContactFailure
+from workflow.analyses.rig.rig_model import RigModel
 from workflow.analyses.specimens.case import SpecimensCase
 from workflow.analyses.vibration.case import VibrationCase
 from workflow.analyses.vibration.loops import loop_of
 from workflow.analyses.vibration.model import VibrationModel
 from workflow.analyses.vibration.outcome import Curves
-from workflow.analyses.vibration_wear.case import FrictionRigWearCase
+from workflow.analyses.vibration.response import step_control
+from workflow.analyses.vibration_wear.body import body_model
+from workflow.analyses.vibration_wear.case import (
+    FrictionRigWearCase,
+    NodesWearCase,
+    ReducedWearCase,
+)
 from workflow.analyses.vibration_wear.outcome import (
     LOOP,
     NODES,
+    POSITION,
     VibrationWearOutcome,
+    WornNodes,
     WornState,
     depth_fields,
     path_field,
@@ -33,14 +50,14 @@ from workflow.shell.dataset import Dataset
 from workflow.shell.reporter import Reporter
 
 
-def wear_specimens(
-    case: FrictionRigWearCase, reporter: Reporter, steps: Steps
+def wear_nodes(
+    case: FrictionRigWearCase | ReducedWearCase, reporter: Reporter, steps: Steps
 ) -> VibrationWearOutcome:
     """All that is kept of a run."""
     wear = case.wear
-    unworn = VibrationModel.of(case.unworn, reporter)
-    specimens = load_case(case.structure.specimens, [SpecimensCase])
-    pads = WearingPads(unworn, specimens.laws, case.wearing, wear.frequency, case.amount)
+    unworn, laws = _unworn(case, reporter)
+    search = partial(resonance_that_wears, case) if wear.at_resonance else None
+    pads = WearingPads(unworn, laws, case.wearing, wear.frequency, case.amount, search)
     state = pads.begin()
     with reporter.stage("wear"):
         pads.at(state)
@@ -58,13 +75,53 @@ def wear_specimens(
 
     stepper = HeunStepper(wear.tolerance)
     states = worn_states(wear.cycles, stepper, state, pads.contact_at, describe, reporter, steps)
-    rig = unworn.rig
-    places = {
-        "x": Dataset(rig.places[:, 0], "mm", "of each node on the contact plane"),
-        "y": Dataset(rig.places[:, 1], "mm", "of each node on the contact plane"),
-        "area": Dataset(rig.area, "mm^2", "that belongs to each node"),
-    }
-    return VibrationWearOutcome(case, states, places=places)
+    return VibrationWearOutcome(case, states, nodes=_nodes(unworn.rig))
+
+
+def _unworn(
+    case: FrictionRigWearCase | ReducedWearCase, reporter: Reporter
+) -> tuple[VibrationModel, tuple[WearLaw, WearLaw]]:
+    """The structure before the first cycle, and the laws of body 1 and body 2."""
+    if isinstance(case, ReducedWearCase):
+        return body_model(case, reporter), case.laws
+    specimens = load_case(case.structure.specimens, [SpecimensCase])
+    return VibrationModel.of(case.unworn, reporter), specimens.laws
+
+
+def resonance_that_wears(case: NodesWearCase, problem: HarmonicBalance) -> HarmonicSolution:
+    """The phase resonance under what wears: the largest of the response within the frequencies.
+
+    Raises :class:`wear.stepping.ContactFailure` where there is none.
+    """
+    force, upward = case.wearing, case.continuation.start == "lower"
+    branch = along_frequency(
+        problem, force, case.frequencies, upward=upward, control=step_control(case.unworn)
+    )
+    found = along_phase_resonance(problem, branch, (force, force))
+    if not found.solutions:
+        raise ContactFailure(
+            f"no resonance {case.amount.under(force)}: {branch.message or found.message}; change "
+            "frequencies, or give wear.frequency"
+        )
+    return found.solutions[0]
+
+
+def _nodes(rig: RigModel) -> WornNodes:
+    """Where the contacts are, as far as it is known."""
+    area = {"area": Dataset(rig.area, "mm^2", "that belongs to each node")}
+    nodes = rig.nodes
+    if nodes is None:
+        return WornNodes(_on_plane(rig, "of each node on the contact plane") | area)
+    bodies = {"normal": Dataset(nodes.normals, "1", "out of body 1, what the joints' points meet")}
+    if nodes.places is not None:
+        bodies[POSITION] = Dataset(nodes.places, "mm", "of each node, x, y, z")
+        if nodes.alike:
+            bodies |= _on_plane(rig, "of each node across the normal, from the middle of all")
+    return WornNodes(bodies | area, nodes.names)
+
+
+def _on_plane(rig: RigModel, what: str) -> dict[str, Dataset]:
+    return {axis: Dataset(rig.places[:, k], "mm", what) for k, axis in enumerate("xy")}
 
 
 def _worn_state(
@@ -79,6 +136,7 @@ def _worn_state(
     cycles, taken = reached
     loop = loop_of(cycle.model, cycle.motion, case.laws[0].normal_load)
     error, responses = responses_to_all(case, cycle.model, cycle.motion, reporter, steps)
+    problem, motion = cycle.model.problem, cycle.motion
     depth = state.surfaces.depth
     numbers: dict[str, Any] = {
         "cycles": cycles,
@@ -91,7 +149,10 @@ def _worn_state(
         # Not of the loop: nodes that hardly touch slip at once, and it may never stick as a whole.
         "stiffness": cycle.model.stuck_slope(cycle.motion.frequency),
         "stroke": loop.numbers["stroke"],
+        "frequency": motion.frequency,
         "energy_per_cycle": float(cycle.energy.sum()),
+        "work_per_cycle": work_done(problem, motion),
+        "damped_per_cycle": energy_lost(problem, motion) - float(cycle.energy.sum()),
         "error": error,
         **cycle.model.numbers(),
     }
@@ -103,11 +164,11 @@ def _worn_state(
 
 
 def _fields(cycle: PadCycle, state: NodalState, loop: Curves) -> dict[str, dict[str, Dataset]]:
-    gap, pressed = np.asarray(cycle.law.gap), cycle.model.rest.cycle.samples[0, :, 2]
+    gap, pressed = cycle.model.rig.gap, cycle.model.rest.cycle.samples[0, :, 2]
     moved, pulled = (loop.datasets[name].values for name in ("displacement", "force"))
     return {
         NODES: {
-            "gap": Dataset(gap, "mm", "of the worn bodies without load"),
+            "gap": Dataset(gap, "mm", "of the worn bodies without load; below 0 what it closes"),
             **depth_fields(*state.surfaces.depths),
             "normal_force": Dataset(pressed, "N", "of each node at rest"),
             "path": path_field(cycle.path),

@@ -1,0 +1,70 @@
+"""A reduced body as a vibrating structure whose joints are contacts that wear."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from fe_models.dynamics.rig import unit_force
+from sa_solver.types import Array
+from wear.joints.friction_contact import FrictionContact
+from workflow.analyses.rig.building import rig_model
+from workflow.analyses.rig.rig_model import JointNodes, RigModel
+from workflow.analyses.vibration.model import VibrationModel
+from workflow.analyses.vibration_wear.case import ReducedWearCase
+from workflow.shell.reporter import Reporter
+
+
+def body_model(case: ReducedWearCase, reporter: Reporter) -> VibrationModel:
+    """The body before the first cycle.
+
+    Raises UserError for a structure, points or areas that cannot be.
+    """
+    unworn, joint = case.unworn, case.joint
+    rig = rig_model(case.structure, unworn.joint, None, reporter)
+    assert rig.nodes is not None
+    area, gap = joint.of_points(rig.nodes.names)
+    share = np.full(rig.joints, 1.0 / rig.joints)
+    if joint.sharing == "area":
+        share = area / area.sum()
+    carried = share * joint.normal_load if joint.pressed is None else np.zeros(rig.joints)
+    law = FrictionContact(
+        stiffness=share * joint.stiffness,
+        normal_stiffness=share * joint.normal_stiffness,
+        friction=joint.friction,
+        normal_load=carried,
+        gap=gap,
+    )
+    along = rig.model.connection[rig.along :: rig.directions]
+    rig = replace(
+        rig,
+        pressing=_pressing(case, rig, law),
+        stretch=along.mean(axis=0),
+        places=on_plane(rig.nodes),
+        # Below 0 where a load has closed it.
+        gap=np.broadcast_to(law.clearance, area.shape),
+        area=area,
+    )
+    return VibrationModel.on(unworn, rig, law)
+
+
+def _pressing(case: ReducedWearCase, rig: RigModel, law: FrictionContact) -> Array:
+    """Forces ``(n,)`` of a normal load of 1 N: on the points that it presses, or on the contacts.
+
+    The latter balance what each contact carries before it wears, at no displacement.
+    """
+    pressed = case.joint.pressed
+    if pressed is None:
+        return rig.preload(law) / case.joint.normal_load
+    shares = rig.place_names.shared(pressed, "joint.pressed")
+    return np.sum([share * unit_force(rig.model, name) for name, share in shares], axis=0)
+
+
+def on_plane(nodes: JointNodes) -> Array:
+    """Places ``(j, 2)`` along the axes across the normal, from their middle; 0 if not known."""
+    if nodes.places is None:
+        return np.zeros((len(nodes.names), 2))
+    across = np.flatnonzero(nodes.normals[0] == 0.0)
+    places = nodes.places[:, across]
+    return np.asarray(places - places.mean(axis=0))
