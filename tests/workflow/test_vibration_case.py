@@ -176,7 +176,7 @@ def test_files_of_a_run(tmp_path):
         ("forces=[]", "forces"),
         ("frequencies=[400 Hz, 20 Hz]", "not ascending"),
         ("mass=3", "no such mass; allowed: 1 to 2"),
-        ("structure.kind=joint", "not known; allowed: rig, reduced, matrices, friction_rig"),
+        ("structure.kind=joint", "allowed: rig, reduced, matrices, points, friction_rig"),
         (
             "joint={law: friction_contact, normal_load: 1, friction: 0.5, stiffness: 1, "
             "normal_stiffness: 1}",

@@ -301,7 +301,8 @@ class VibrationCase(DrivenMass):
     )
     stability: Literal["auto", "every", "none"] = entry(
         "of which motions it is found, and where it changes; auto: of every one in structures of "
-        "up to 64 modes and 12 directions of joints, as with more one may take a second",
+        "up to 64 modes and 12 directions of joints, in all sectors of a ring together, as with "
+        "more one may take a second",
         "every",
         default="auto",
     )
