@@ -36,28 +36,31 @@ RESPONSE, STRIP, MAP, AROUND = 2.2, 1.5, 2.6, 1.6
 
 
 def joint_states(file: h5py.File, contents: Contents) -> Figure:
-    """For how much of the period each of a few joints sticks, slips and is apart."""
-    names = _names(file)
-    shown = _shown(file, contents)
-    height = AROUND + RESPONSE + STRIP * len(names)
+    """For how much of the period each of a few joints sticks, slips and is apart.
+
+    Those that do nothing but stick, as springs, are left out.
+    """
+    names, shown = _names(file), _shown(file, contents)
+    joints = _changing(shown)
+    height = AROUND + RESPONSE + STRIP * len(joints)
     figure = new_figure(_most_slipping(shown, names), height)
     panels = figure.subplots(
-        *(1 + len(names), len(shown)),
+        *(1 + len(joints), len(shown)),
         sharex=True,
         sharey="row",
         squeeze=False,
-        height_ratios=(RESPONSE, *(STRIP,) * len(names)),
+        height_ratios=(RESPONSE, *(STRIP,) * len(joints)),
     )
     for column, response in zip(panels.T, shown, strict=True):
         _draw_response(column[0], response)
         frequency, points = _along(response)
         slip, apart = _shares(response, points)
-        for joint, axis in enumerate(column[1:]):
+        for joint, axis in zip(joints, column[1:], strict=True):
             _draw_stack(axis, frequency, [1.0 - slip - apart, slip, apart], joint)
             _mark_resonance(axis, response)
     _label(panels, shown[0])
-    for axis, name in zip(panels[1:, 0], names, strict=True):
-        axis.set_ylabel(f"{name}\n[% of period]")
+    for axis, joint in zip(panels[1:, 0], joints, strict=True):
+        axis.set_ylabel(f"{names[joint]}\n[% of period]")
     _legend(figure, DOES)
     return figure
 
@@ -108,6 +111,12 @@ def _names(file: h5py.File) -> list[str]:
         first, *more = (name for name in map(bytes.decode, row) if name != "ground")
         names.append(re.sub(r" [xyz]\b", "", first) if more else first)
     return names
+
+
+def _changing(shown: list[h5py.Group]) -> list[int]:
+    """Joints that slip or are apart at times; the first where none does under these forces."""
+    shares = [response[f"nodes/{name}"][()] for response in shown for name in ("slip", "separated")]
+    return [int(j) for j in np.flatnonzero(np.any([s.any(axis=0) for s in shares], axis=0))] or [0]
 
 
 # --- along the curve ----------------------------------------------------------------------------
