@@ -27,8 +27,8 @@ from sa_solver.types import Array, Mask
 SETTLED = 0.3
 STEADY = 0.01
 """A phase ends once its preconditioned residual has fallen by this factor, by the second where the
-sets are nearly those of the last. From 0.2 to 0.5 and 0.01 to 0.2 the counts differ by 10 %: shorter
-phases project more often, longer ones solve for wrong sets."""
+sets are nearly those of the last. From 0.2 to 0.5 and 0.01 to 0.2 the counts differ by 10 %:
+shorter phases project more often, longer ones solve for wrong sets."""
 
 NEARLY = 3e-4
 """Share of the pressed cells that may change between nearly the same sets. Up to 1e-4 or 1e-3 take
