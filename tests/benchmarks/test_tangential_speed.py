@@ -50,11 +50,11 @@ def test_convolutions_by_share_of_sliding(share: float, record: dict[str, float]
     record[f"shear, 128², Q/µP {share}: convolutions"] = state.convolutions
     record[f"shear, 128², Q/µP {share}: time in convolutions"] = spent
     assert state.converged
-    assert state.convolutions <= 60
+    assert state.convolutions <= 40
 
 
 def test_convolutions_by_grid(record: dict[str, float]) -> None:
-    """At Q/µP 0.75: at most half as many again from 64 x 64 to 256 x 256, 40 at 512 x 512."""
+    """At Q/µP 0.75: at most half as many again from 64 x 64 to 256 x 256, 30 at 512 x 512."""
     counts = {}
     for cells in (64, 128, 256, 512, 1024):
         contact, limit = sphere(cells)
@@ -64,8 +64,8 @@ def test_convolutions_by_grid(record: dict[str, float]) -> None:
         record[f"shear, {cells}², Q/µP 0.75: convolutions"] = state.convolutions
     assert counts[128] <= 120
     assert counts[256] <= 1.5 * counts[64]
-    assert counts[512] <= 40
-    assert counts[1024] <= 60
+    assert counts[512] <= 30
+    assert counts[1024] <= 50
 
 
 def flank() -> tuple[FrictionalContact, Array, Array]:
@@ -121,7 +121,7 @@ def test_a_cycle_of_22_increments(
     record["cycle of 22 increments: transform pairs"] = transforms
     record["cycle of 22 increments: processor seconds"] = spent
     record["cycle of 22 increments: time in convolutions"] = spent / convolution
-    assert count <= 1150
+    assert count <= 1020
     assert spent < 3600.0 * convolution
 
 

@@ -96,6 +96,24 @@ def test_projected_gradients_reach_the_same(share):
     assert slow.rigid[1] == pytest.approx(fast.shift_y, rel=1e-6)
 
 
+@pytest.mark.parametrize("cells", [0, 3, 32])
+def test_the_approximate_inverse_of_shear(cells):
+    """Symmetric, positive, and of a condition of a few whether none, few or many cells yield."""
+    operator, compliance = BoxOperator(HalfSpace(GRID, PAIR)), np.zeros(GRID.shape)
+    compliance.ravel()[20 : 20 + cells] = np.geomspace(0.3, 3e3, cells) * operator.self_compliance
+    windows, rest = operator.windows(compliance)
+    inverse = np.diag(np.tile(rest.ravel(), 2))
+    for level, window in windows:
+        units = window * np.eye(128).reshape(128, 2, 8, 8)
+        columns = [window * operator.precondition(unit, level) for unit in units]
+        inverse += np.reshape(columns, (128, 128)).T
+    np.testing.assert_allclose(inverse, inverse.T, atol=1e-12 * inverse.max())
+    assert np.linalg.eigvalsh(inverse).min() > 0.0
+    whole = matrix() + np.diag(np.tile(compliance.ravel(), 2))
+    values = np.sort(np.linalg.eigvals(inverse @ whole).real)
+    assert values[-1] < 6.0 * values[0]
+
+
 def test_modes_and_their_sums():
     """Sums, motions and products against the fields themselves."""
     rng = np.random.default_rng(0)
