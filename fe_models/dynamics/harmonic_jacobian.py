@@ -217,7 +217,7 @@ def _excess(slopes: Array, tangents: Array, held: float) -> tuple[np.ndarray, Ar
     # Derivatives of many harmonics are gigabytes: no copies but of what differs.
     each = np.empty((joints, 2))
     for joint in range(joints):
-        each[joint] = _largest(slopes[joint], tangents[joint], held)
+        each[joint, 0], each[joint, 1] = _largest(slopes[joint], tangents[joint], held)
     differing = np.flatnonzero(each[:, 1] > SAME * each[:, 0].max())
     excess = slopes[differing]
     for place in range(len(differing)):

@@ -69,7 +69,7 @@ def monodromy(structure: StructureSteps, joints: JointSteps) -> Array:
         memory[number, own + number] = 1.0
     compliance = np.empty((len(structure.forward), forces, forces))
     for kind in range(len(compliance)):
-        compliance[kind] = structure.residual
+        _copy(structure.residual, compliance[kind])
         _add_product(-1.0, structure.at_joints, structure.by_end[kind], compliance[kind])
     new_state, new_memory = np.empty_like(state), np.empty_like(memory)
     force, moved = np.empty((forces, size)), np.zeros((forces, size))
@@ -78,7 +78,8 @@ def monodromy(structure: StructureSteps, joints: JointSteps) -> Array:
     _memory_forces(joints, memory, force)
     _add_product(1.0, structure.at_joints, state, moved)
     _add_product(-1.0, structure.residual, force, moved)
-    slopes[:] = joints.tangent[-1]
+    for joint in range(count):
+        _copy(joints.tangent[-1, joint], slopes[joint])
     _solve(_coupled(structure.residual, slopes, matrix), moved)
     _add_springs(1.0, joints.tangent[-1], moved, force)
     for step in range(len(joints.kinds)):
@@ -105,14 +106,28 @@ def monodromy(structure: StructureSteps, joints: JointSteps) -> Array:
         _forget(new_memory)
         state, new_state = new_state, state
         memory, new_memory = new_memory, memory
-    return np.concatenate((state, memory))
+    whole = np.empty((size, size))
+    _copy(state, whole)
+    _copy(memory, whole[own:])
+    return whole
+
+
+@njit(cache=True, nogil=True)
+def _copy(rows: Array, to: Array) -> None:
+    """Write rows as others: by numbers, which takes far less time to compile than as a whole."""
+    for row in range(rows.shape[0]):
+        for c in range(rows.shape[1]):
+            to[row, c] = rows[row, c]
 
 
 @njit(cache=True, nogil=True)
 def _add_product(factor: float, matrix: Array, rows: Array, to: Array) -> None:
     """factor matrix @ rows, added."""
     if len(matrix) > FEW:
-        to += factor * np.dot(matrix, rows)
+        product = np.dot(matrix, rows)
+        for i in range(matrix.shape[0]):
+            for c in range(rows.shape[1]):
+                to[i, c] += factor * product[i, c]
         return
     for i in range(matrix.shape[0]):
         for k in range(matrix.shape[1]):
@@ -217,10 +232,13 @@ def _solve(matrix: Array, rhs: Array) -> None:
     """Make of ``rhs`` matrix⁻¹ rhs; the matrix may be overwritten."""
     size = len(matrix)
     if size > FEW:
-        rhs[:] = np.linalg.solve(matrix, rhs)
+        _copy(np.linalg.solve(matrix, rhs), rhs)
         return
     for column in range(size):
-        pivot = column + np.argmax(np.abs(matrix[column:, column]))
+        pivot = column
+        for row in range(column + 1, size):
+            if abs(matrix[row, column]) > abs(matrix[pivot, column]):
+                pivot = row
         for c in range(size):
             matrix[column, c], matrix[pivot, c] = matrix[pivot, c], matrix[column, c]
         for c in range(rhs.shape[1]):

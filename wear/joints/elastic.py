@@ -60,7 +60,11 @@ def settle_elastic(period: Period, joints: DrivenJoints) -> None:
             joints.force[j, t], joints.states[j, t] = force, state
             for c in range(basis.shape[1]):
                 slopes[t, c] = slope * basis[t, c]
-        joints.jacobian[j] = np.dot(weights, slopes)
+        # As a whole it would take far longer to compile.
+        jacobian = np.dot(weights, slopes)
+        for row in range(len(jacobian)):
+            for c in range(len(jacobian)):
+                joints.jacobian[j, row, c] = jacobian[row, c]
         joints.dissipated[j], joints.change[j] = 0.0, 0.0
 
 
