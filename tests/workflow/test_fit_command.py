@@ -170,6 +170,7 @@ def test_residual_stiffness_is_taken_off_for_laws_beside_a_spring(folder):
         ("loops.csv", "\n0.1,", "\nnan,", "loops.csv:3: energy: nan: not a finite number"),
         ("loops.csv", "\n0.1,", "\n0.9,", "loops.csv:4: energy: 0.15"),
         ("loops.csv", " mu,", " friction,", "evolution.friction: no file has its column mu"),
+        ("loops.csv", "residual_stiffness [N/um]", "mu_deviations", "did you mean 'mu_deviation'?"),
         ("joint.yaml", "bouc_wen", "iwan", "law: 'iwan': not known"),
         ("joint.yaml", "logarithmic}", "logarithmic, rate: fre}", "'fre': not known"),
         ("joint.yaml", "loops.csv}", "loops.csv, columns: {mu: f}}", "no column f; this file has"),
