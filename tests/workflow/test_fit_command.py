@@ -148,6 +148,8 @@ def test_a_law_comes_back_from_a_record_of_loops(folder):
     asked["joint"]["normal_load"] = "free"
     found = fretscale.fit(asked)
     assert found["joint.friction"].doubt == "only its product with joint.normal_load counts"
+    (product,) = [doubt for doubt in found.doubts if " times joint.normal_load is " in doubt]
+    assert float(product.partition(" is ")[2].split()[0]) == pytest.approx(54.0, rel=1e-4)
     assert found["joint.stiffness"].value == pytest.approx(60.0, rel=1e-3)
     del asked["joint"]["normal_load"]
     with pytest.raises(fretscale.UserError, match="no normal load; allowed: that of the record"):

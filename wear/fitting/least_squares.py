@@ -124,6 +124,13 @@ class Fit:
         squares = np.sum((self.residuals / self.deviations) ** 2)
         return float(np.sqrt(squares / self.freedoms.sum()))
 
+    def product(self, first: int, second: int) -> tuple[float, float]:
+        """Product of two parameters that are fitted as they are, and its standard deviation."""
+        slopes = np.zeros(len(self.values))
+        slopes[first], slopes[second] = self.values[second], self.values[first]
+        variance = float(slopes @ self.covariance @ slopes)
+        return float(self.values[first] * self.values[second]), float(np.sqrt(max(variance, 0.0)))
+
     def band(self, predict: Callable[[Array], Array]) -> Array:
         """Half the width ``(m,)`` of the 95 % band of what ``predict`` says of the parameters.
 
