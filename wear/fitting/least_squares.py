@@ -258,6 +258,8 @@ def _check(problem: FitProblem) -> None:
         given = series.deviations
         if not np.isfinite(series.values).all():
             raise FitError(f"{series.name}: a value is not finite; allowed: finite numbers")
+        if not series.values.any():
+            raise FitError(f"{series.name}: all values are 0; allowed: data that say something")
         if given is not None and not ((given > 0.0) & np.isfinite(given)).all():
             raise FitError(f"{series.name}: a standard deviation is not above 0; allowed: above 0")
     if len(data) <= free:
