@@ -148,6 +148,8 @@ def test_a_law_comes_back_from_a_record_of_loops(folder):
     asked["joint"]["normal_load"] = "free"
     found = fretscale.fit(asked)
     assert found["joint.friction"].doubt == "only its product with joint.normal_load counts"
+    (product,) = [doubt for doubt in found.doubts if " times joint.normal_load is " in doubt]
+    assert float(product.partition(" is ")[2].split()[0]) == pytest.approx(54.0, rel=1e-4)
     assert found["joint.stiffness"].value == pytest.approx(60.0, rel=1e-3)
     del asked["joint"]["normal_load"]
     with pytest.raises(fretscale.UserError, match="no normal load; allowed: that of the record"):
@@ -170,6 +172,7 @@ def test_residual_stiffness_is_taken_off_for_laws_beside_a_spring(folder):
         ("loops.csv", "\n0.1,", "\nnan,", "loops.csv:3: energy: nan: not a finite number"),
         ("loops.csv", "\n0.1,", "\n0.9,", "loops.csv:4: energy: 0.15"),
         ("loops.csv", " mu,", " friction,", "evolution.friction: no file has its column mu"),
+        ("loops.csv", "residual_stiffness [N/um]", "mu_deviations", "did you mean 'mu_deviation'?"),
         ("joint.yaml", "bouc_wen", "iwan", "law: 'iwan': not known"),
         ("joint.yaml", "logarithmic}", "logarithmic, rate: fre}", "'fre': not known"),
         ("joint.yaml", "loops.csv}", "loops.csv, columns: {mu: f}}", "no column f; this file has"),

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import combinations
 
 import numpy as np
 
@@ -23,6 +22,8 @@ leave 1e-9 of noise in it."""
 
 ALIKE = 1e-5
 """Columns of the Jacobian, in relative changes, that differ by no more are one: a product."""
+
+PRODUCT, QUOTIENT = "product with", "quotient by"
 
 DECADE = float(np.log(10.0))
 """A logarithm that is known no better than to a decade is not determined."""
@@ -42,6 +43,7 @@ class Estimate:
     the datum with the largest share of its own, ``heaviest_share``. ``quantile`` is what the
     deviation is multiplied with for linear bounds; where the model bends within these, which
     ``straight`` then denies, bounds are those of the profile (:mod:`wear.fitting.profiles`).
+    ``partner`` is the name of another of which only the product with this one counts, if any.
 
     Examples
     --------
@@ -71,6 +73,7 @@ class Estimate:
     logarithmic: bool
     quantile: float
     straight: bool = True
+    partner: str = ""
 
     @property
     def determined(self) -> bool:
@@ -114,6 +117,7 @@ def estimate_at(
     if doubt:
         deviation, bounds = np.nan, (np.nan, np.nan)
     heaviest = int(np.argmax(terms))
+    products = [name for name, how in _together(problem, place, values, jacobian) if how == PRODUCT]
     return Estimate(
         name=unknown.name,
         value=value,
@@ -125,6 +129,7 @@ def estimate_at(
         heaviest_share=float(terms[heaviest]) / total if total > 0.0 else 0.0,
         logarithmic=unknown.logarithmic,
         quantile=quantile,
+        partner=products[0] if products and kernel[place] > ALIKE and not held[place] else "",
     )
 
 
@@ -168,23 +173,21 @@ def _doubt(
         return "the data do not depend on it"
     tied = (kernel > ALIKE) & (lengths > 0.0)
     others = [problem.unknowns[k].name for k in np.flatnonzero(tied) if k != place]
-    for name, how in _only_together(problem, values, jacobian).get(unknown.name, ()):
+    for name, how in _together(problem, place, values, jacobian):
         return f"only its {how} {name} counts"
     return f"only together with {', '.join(others)}"
 
 
-def _only_together(
-    problem: FitProblem, values: Array, jacobian: Array
-) -> dict[str, list[tuple[str, str]]]:
-    """Pairs of which only product or quotient counts: each with the others it goes with."""
+def _together(
+    problem: FitProblem, place: int, values: Array, jacobian: Array
+) -> list[tuple[str, str]]:
+    """Others of which only product or quotient with the one at a ``place`` counts, and which."""
     relative = jacobian * np.where(problem.logarithmic, 1.0, values)
-    pairs: dict[str, list[tuple[str, str]]] = {}
-    for i, k in combinations(range(len(values)), 2):
-        length = np.linalg.norm(relative[:, i])
-        for sign, how in ((1.0, "product with"), (-1.0, "quotient by")):
-            apart = np.linalg.norm(relative[:, i] - sign * relative[:, k])
-            if length > 0.0 and apart <= ALIKE * length:
-                names = problem.unknowns[i].name, problem.unknowns[k].name
-                pairs.setdefault(names[0], []).append((names[1], how))
-                pairs.setdefault(names[1], []).append((names[0], how))
+    length = float(np.linalg.norm(relative[:, place]))
+    pairs = []
+    for k, other in enumerate(problem.unknowns):
+        for sign, how in ((1.0, PRODUCT), (-1.0, QUOTIENT)):
+            apart = np.linalg.norm(relative[:, place] - sign * relative[:, k])
+            if k != place and length > 0.0 and apart <= ALIKE * length:
+                pairs.append((other.name, how))
     return pairs

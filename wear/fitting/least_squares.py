@@ -124,6 +124,13 @@ class Fit:
         squares = np.sum((self.residuals / self.deviations) ** 2)
         return float(np.sqrt(squares / self.freedoms.sum()))
 
+    def product(self, first: int, second: int) -> tuple[float, float]:
+        """Product of two parameters that are fitted as they are, and its standard deviation."""
+        slopes = np.zeros(len(self.values))
+        slopes[first], slopes[second] = self.values[second], self.values[first]
+        variance = float(slopes @ self.covariance @ slopes)
+        return float(self.values[first] * self.values[second]), float(np.sqrt(max(variance, 0.0)))
+
     def band(self, predict: Callable[[Array], Array]) -> Array:
         """Half the width ``(m,)`` of the 95 % band of what ``predict`` says of the parameters.
 
@@ -251,6 +258,8 @@ def _check(problem: FitProblem) -> None:
         given = series.deviations
         if not np.isfinite(series.values).all():
             raise FitError(f"{series.name}: a value is not finite; allowed: finite numbers")
+        if not series.values.any():
+            raise FitError(f"{series.name}: all values are 0; allowed: data that say something")
         if given is not None and not ((given > 0.0) & np.isfinite(given)).all():
             raise FitError(f"{series.name}: a standard deviation is not above 0; allowed: above 0")
     if len(data) <= free:

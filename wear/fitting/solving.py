@@ -18,7 +18,10 @@ ROUGH = 1e-10
 def solve(
     problem: FitProblem, start: Array, deviations: Array, tolerance: float = TOLERANCE
 ) -> tuple[Array, float, Array] | None:
-    """Where one start leads: fitted values ``(p,)``, cost, Jacobian ``(n, p)`` of the residuals."""
+    """Where one start leads: fitted values ``(p,)``, cost, Jacobian ``(n, p)`` of the residuals.
+
+    None where it leads to what is not finite.
+    """
     lower, upper = problem.bounds
 
     def residuals(inner: Array) -> Array:
@@ -27,16 +30,21 @@ def solve(
     inner = np.clip(start, lower, upper)
     if not np.isfinite(residuals(inner)).all():
         return None
-    solved = least_squares(
-        residuals,
-        inner,
-        jac="3-point" if tolerance < ROUGH else "2-point",
-        bounds=(lower, upper),
-        x_scale=_sizes(problem, inner),
-        ftol=tolerance,
-        xtol=tolerance,
-        gtol=tolerance,
-    )
+    try:
+        # Steps too far, which the solver takes back.
+        with np.errstate(over="ignore", under="ignore", invalid="ignore", divide="ignore"):
+            solved = least_squares(
+                residuals,
+                inner,
+                jac="3-point" if tolerance < ROUGH else "2-point",
+                bounds=(lower, upper),
+                x_scale=_sizes(problem, inner),
+                ftol=tolerance,
+                xtol=tolerance,
+                gtol=tolerance,
+            )
+    except (ValueError, np.linalg.LinAlgError):  # a Jacobian that is not finite
+        return None
     return solved.x, float(solved.cost), solved.jac
 
 

@@ -176,12 +176,28 @@ def _solved(
         for parameter in parameters
         if (e := parameter.estimate).determined and e.heaviest_share > ALONE
     ]
+    doubts += _products(fitted, parameters)
     if fitted.reached < fitted.tried:
         doubts.append(
             f"{fitted.tried - fitted.reached} of {fitted.tried} starts ended at a worse fit; the "
             "best of all is told"
         )
     return Fitted(given, fitted, parameters, tuple(series), tuple(doubts))
+
+
+def _products(fitted: Fit, parameters: Sequence[Parameter]) -> list[str]:
+    """What is known of pairs of parameters of which only the product counts."""
+    names = [parameter.estimate.name for parameter in parameters]
+    told = []
+    for place, parameter in enumerate(parameters):
+        partner = parameter.estimate.partner
+        if partner and names.index(partner) > place and not parameter.estimate.logarithmic:
+            other = parameters[names.index(partner)]
+            value, deviation = map(other.shown, fitted.product(place, names.index(partner)))
+            unit = "" if other.unit == "1" else f" {other.unit}"
+            number = f"{parameter.shown(value):.5g}{unit} +- {parameter.shown(deviation):.2g}"
+            told.append(f"{parameter.path} times {other.path} is {number}; hold one of them")
+    return told
 
 
 def _in_paths(text: str, called: Mapping[str, str]) -> str:

@@ -6,6 +6,7 @@ written in J, kJ or mJ, and one taken for another makes a rate that looks like a
 
 from __future__ import annotations
 
+import difflib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -22,6 +23,8 @@ from workflow.fit.schema import Measurement
 
 ENERGY = "energy"
 OF_DEVIATIONS = "_deviation"
+# Likeness from which on a heading is a slip of the pen for that of deviations.
+NEARLY = 0.85
 # Base units and limits of what may be read.
 QUANTITIES = {
     ENERGY: Quantity("N*mm", at_least=0.0, at_most=1e15, range_text="0 to 1e12 J"),
@@ -93,6 +96,7 @@ def _parts(
     table.require([called[ENERGY]], "a column of that name, or one that columns.energy names")
     for name, heading in headings.items():
         table.require([heading], f"the heading that columns.{name} names")
+    _check_slips(table, [called[name] for name in names])
     energy = _numbers(table, called, ENERGY)
     if ascending:
         _check_order(table, energy, called[ENERGY])
@@ -134,6 +138,17 @@ def _check_unit(table: TableFile, heading: str, quantity: Quantity) -> None:
             f"{table.place}: {shown(heading)}: no unit; allowed: one in brackets, such as "
             f"{heading} [{example}]"
         )
+
+
+def _check_slips(table: TableFile, headings: Sequence[str]) -> None:
+    """Refuse what is nearly a column of deviations: it would be passed over without a word."""
+    known = [f"{heading}{OF_DEVIATIONS}" for heading in headings]
+    for name in table.names:
+        near = difflib.get_close_matches(name, known, n=1, cutoff=NEARLY)
+        if near and name not in (*known, *headings):
+            raise InputFileError(
+                f"{table.place}: {shown(name)}: unknown column; did you mean '{near[0]}'?"
+            )
 
 
 def _check_order(table: TableFile, energy: Array, heading: str) -> None:

@@ -170,5 +170,12 @@ def _body(fitted: Fitted, body: str) -> list[Row]:
         entries.append(Row("intercept", found.value, comment, off=True))
     if body != "both":
         return [Row(body, entries)]
-    text = "of both together; which share each body has was not measured"
-    return [Row("body_1", entries, text, off=True), Row("body_2", entries, "", off=True)]
+    total = entries[0]
+    known = f"{total.value}, {total.comment}" if not total.off else total.comment
+    share = Row("coefficient", LEFT_OUT, f"its share of what both have: {known}")
+    evolution = [entry for entry in entries if entry.key == "evolution"]
+    others = [Row("coefficient", LEFT_OUT, "the rest"), *evolution]
+    return [
+        Row("body_1", [share, *entries[1:]], "not measured each by itself", off=True),
+        Row("body_2", others, "", off=True),
+    ]
