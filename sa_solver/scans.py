@@ -40,7 +40,7 @@ QUARTER = 1e-9
 """Angle [rad] from a multiple of 90° up to which points are turned without interpolation."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Scan:
     """Heights as measured: ``heights`` ``(nx, ny)`` and ``pitch`` ``(dx, dy)``, all in mm.
 
