@@ -344,7 +344,7 @@ def _measured(overlay: _Overlay, worn: Mask) -> Scar:
         worn=worn,
         pitch=overlay.pitch,
         volume=float(depth[worn].sum()) * dx * dy,
-        volume_error=bound * dx * dy,
+        volume_error=float(bound * dx * dy),
         deepest=float(means[worn].max()),
         depth_error=_t95(noise.patches) * rms(means[whole]),
         noise=rms(overlay.depth[rim]),
@@ -410,7 +410,7 @@ class _Noise:
         covariance = found + fitted * mean / points
         # White noise has no less than its own variance, whatever chance makes of its neighbours.
         length = float(np.sqrt(max(mean / covariance[0], 1.0)))
-        return cls(covariance, length, points / patch)
+        return cls(covariance, length, float(points / patch))
 
     def variance_of(self, weights: Array) -> float:
         """Variance of the sum with such ``weights`` ``(nx, ny)``."""

@@ -25,7 +25,8 @@ LISTED = {
     "A case": ("new", "check", "run", "resume"),
     "What came out": ("report", "compare"),
     "Many runs": ("sweep", "chart", "verify"),
-    "Input and output": ("materials", "describe", "resultants", "loops", "schema"),
+    "Input and output": ("materials", "describe", "resultants", "surface", "schema"),
+    "Measurements": ("loops", "scar"),
 }
 
 
