@@ -109,22 +109,23 @@ def fit(scan: Scan, level: Level, where: Mask | None = None) -> Array:
     ``where`` narrows the points that count. Raises InputError for fewer than twice the terms.
     """
     (nx, ny), points = scan.heights.shape, scan.measured if where is None else where & scan.measured
-    x, y = np.linspace(-1.0, 1.0, nx)[:, None], np.linspace(-1.0, 1.0, ny)[None, :]
     terms = [(i, j) for i, j in TERMS[level] if (nx > 1 or i == 0) and (ny > 1 or j == 0)]
-    surface = np.zeros((nx, ny))
     if not terms:
-        return surface
+        return np.zeros((nx, ny))
     if np.count_nonzero(points) < 2 * len(terms):
         raise InputError(
             f"{np.count_nonzero(points)} points to fit a {level} to: give at least {2 * len(terms)}"
         )
-    shapes = [np.broadcast_to(x**i * y**j, (nx, ny)) for i, j in terms]
-    columns = [shape[points] for shape in shapes]
-    # Coordinates reach from -1 to 1: the products are well conditioned.
-    products = np.array([[one @ other for other in columns] for one in columns])
-    factors = np.linalg.lstsq(products, [one @ scan.heights[points] for one in columns])[0]
-    for factor, shape in zip(factors, shapes, strict=True):
-        surface += factor * shape
+    # Coordinates reach from -1 to 1, so that the normal equations are well conditioned; powers up
+    # to those of two terms together.
+    x, y = (np.vander(np.linspace(-1.0, 1.0, n), 5, increasing=True) for n in (nx, ny))
+    moments = x.T @ points @ y
+    products = np.array([[moments[i + k, j + m] for k, m in terms] for i, j in terms])
+    sums = x.T @ np.where(points, scan.heights, 0.0) @ y
+    factors = np.zeros((5, 5))
+    at = tuple(np.transpose(terms))
+    factors[at] = np.linalg.lstsq(products, sums[at])[0]
+    surface: Array = x @ factors @ y.T
     return surface
 
 
@@ -181,7 +182,7 @@ def _membrane(heights: Array, measured: Mask) -> Array:
         shape=(count, count),
     )
     whole = heights.copy()
-    whole[~measured] = spsolve(matrix.tocsc(), known)
+    whole[~measured] = spsolve(matrix.tocsc(), known, permc_spec="MMD_AT_PLUS_A")
     return whole
 
 
