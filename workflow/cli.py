@@ -360,6 +360,44 @@ def fit(file: Path, out: Path | None, force: bool) -> None:
 
 
 @cli.command()
+@click.argument("before", type=click.Path(path_type=Path))
+@click.argument("after", type=click.Path(path_type=Path))
+@click.option("--worn", metavar="RECTANGLE", help="Where, from the middle: XMIN,XMAX,YMIN,YMAX.")
+@click.option("--bare", nargs=3, metavar="UNIT DX DY", help="Of scans that do not say theirs.")
+@click.option("--out", type=click.Path(path_type=Path), help="Folder for table, map and figure.")
+@click.option("--force", is_flag=True, help="Overwrite what is there.")
+def scar(before: Path, after: Path, out: Path | None, force: bool, **given: Any) -> None:
+    """Measure the wear between the scans BEFORE and AFTER.
+
+    Tells depth and volume with 95 % bounds; the scans are laid over each other by what is not worn.
+    """
+    from workflow.commands.scar import report, scar_of_files, write_scar
+
+    measured = scar_of_files(before, after, **given)
+    for line in report(measured):
+        click.echo(line)
+    for path in [] if out is None else write_scar(measured, out, after.name, force):
+        click.echo(path)
+
+
+@cli.command()
+@click.argument("folder", type=click.Path(exists=True, file_okay=False, path_type=Path))
+@click.argument("file", type=click.Path(path_type=Path))
+@click.option("--body", type=click.Choice(["1", "2"]), required=True, help="The lower is 1.")
+@click.option("--unworn", is_flag=True, help="As it was before the first cycle.")
+@click.option("--interface", help="Of several.")
+@click.option("--force", is_flag=True, help="Overwrite the file.")
+def surface(folder: Path, file: Path, **given: Any) -> None:
+    """Write a surface of the run in FOLDER to a profilometer's FILE.
+
+    By its ending: .x3p, .sur, .al3d or .sdf; .npz without further libraries.
+    """
+    from workflow.commands.surface import write_surface
+
+    click.echo(write_surface(folder, file, **given))
+
+
+@cli.command()
 @click.argument("file", type=click.Path(path_type=Path))
 @click.option("--size", metavar="LENGTH", help="Of the elements, for a CAD file, such as '2 mm'.")
 @click.option("--out", type=click.Path(path_type=Path), help="Folder for a picture and a .vtu.")

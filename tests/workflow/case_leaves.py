@@ -30,6 +30,8 @@ GAPS = {
     "paraboloid": {"shape": "paraboloid", "radius_x": "1 m", "radius_y": "1 m"},
     "heights": {"shape": "heights", "file": "gap.npy"},
 }
+SURFACE = {"file": "disk.npy", "unit": "um", "pitch": ["4 um", "4 um"]}
+SURFACES = {"body_1": SURFACE, "body_2": SURFACE}
 INTERFACE = {
     "name": "interface",
     "size": [11, 60],
@@ -136,7 +138,9 @@ GIVEN = {
         "structure": {
             "ellipsoid": {"kind": "bodies", "shape": "ellipsoid", "radius_x": 1, "radius_y": 2},
             "heights": {"kind": "bodies", "shape": "heights", "file": "gap.npy"},
-        }
+            "plane": {"kind": "bodies", "shape": "plane", "surfaces": SURFACES},
+        },
+        "structure.surfaces": {ALWAYS: SURFACES},
     },
     "line": {
         "structure": {
@@ -147,7 +151,9 @@ GIVEN = {
                 "edge_radius": 2,
             },
             "heights": {"kind": "bodies", "shape": "heights", "file": "gap.npy"},
-        }
+            "plane": {"kind": "bodies", "shape": "plane", "surfaces": SURFACES},
+        },
+        "structure.surfaces": {ALWAYS: SURFACES},
     },
 }
 FLAT = {"kind": "bodies", "shape": "flat", "half_width": 0.1, "step": 0.1}
@@ -156,6 +162,7 @@ LEGS = {"legs": {"legs": [{"P": 5}, {"P": 6}]}}
 # Two bodies that wear may have the shapes of those that do not, or be flat; legs or a stroke.
 GIVEN |= {
     f"{kind}_wear": wear("body_1", "body_2")
+    | GIVEN[kind]
     | {"structure": GIVEN[kind]["structure"] | {"flat": flat}, "load_path": LEGS}
     for kind, flat in FLATS.items()
 }

@@ -32,7 +32,7 @@ WRONG = [
     ("no structure", BALL, "structure: {kind: bodies, shape: sphere, radius: 10 mm}\n", "",
      "structure.kind", "missing; allowed: bodies"),
     ("no shape", BALL, "shape: sphere, ", "", "structure.shape", "missing; allowed: sphere, "),
-    ("unknown shape", BALL, "sphere", "torus", "structure.shape", "flat_rounded, heights"),
+    ("unknown shape", BALL, "sphere", "torus", "structure.shape", "flat_rounded, plane, heights"),
     ("entry of another shape", BALL, "sphere", "ellipsoid", "structure.radius",
      "did you mean 'radius_"),
     ("unknown key", BALL, "radius:", "radios:", "structure.radios", "'radius'"),

@@ -74,14 +74,7 @@ def read_heights(file: str) -> Array:
 
     Raises InputFileError.
     """
-    name, dataset = split_dataset(file)
-    ending = Path(name).suffix
-    if ending == ".npy":
-        heights = _read_npy(name)
-    elif ending == ".h5":
-        heights = _read_dataset(name, dataset)
-    else:
-        heights = _read_csv(name)
+    heights = _read_csv(file) if file.endswith(".csv") else read_array(file)
     if heights.dtype.kind not in "iuf" or heights.ndim not in (1, 2) or heights.size == 0:
         raise InputFileError(
             f"{file}: {heights.ndim} dimensions of type {heights.dtype}; "
@@ -96,11 +89,22 @@ def read_heights(file: str) -> Array:
     return heights
 
 
-def _read_npy(file: str) -> np.ndarray:
+def read_array(file: str) -> np.ndarray:
+    """The array in ``.npy``, ``.npz:array`` or ``.h5:dataset``. Raises InputFileError."""
+    name, array = split_dataset(file)
+    if name.endswith(".h5"):
+        return _read_dataset(name, array)
     try:
-        return np.asarray(np.load(file, allow_pickle=False))
+        found = np.load(name, allow_pickle=False)
+        if isinstance(found, np.ndarray):
+            return found
+        with found:
+            if array in found:
+                return np.asarray(found[array])
+            there = ", ".join(found)
     except Exception as error:  # what is no such file, or a damaged one, ends in a dozen ways
-        raise _unreadable(file, error) from error
+        raise _unreadable(name, error) from error
+    raise InputFileError(f"{name}: {array or 'which array?'}: allowed with a colon: {there}")
 
 
 def _read_dataset(file: str, dataset: str) -> np.ndarray:

@@ -25,8 +25,8 @@ LISTED = {
     "A case": ("new", "check", "run", "resume"),
     "What came out": ("report", "compare"),
     "Many runs": ("sweep", "chart", "verify"),
-    "Input and output": ("materials", "describe", "resultants", "schema"),
-    "What was measured": ("loops", "fit"),
+    "Input and output": ("materials", "describe", "resultants", "surface", "schema"),
+    "What was measured": ("loops", "scar", "fit"),
 }
 
 

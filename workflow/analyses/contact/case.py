@@ -18,6 +18,7 @@ from sa_solver.types import Material as ElasticMaterial
 from workflow.analyses.contact.doubts import about_grid, about_pressure, about_shear
 from workflow.analyses.contact.load_path import ContactPath, LegsOrFile, LineContactPath
 from workflow.analyses.contact.load_table import PRESSING, LoadTable
+from workflow.analyses.contact.surfaces import MeasuredSurfaces
 from workflow.case.doubts import heights, hertz, uneven_cells
 from workflow.case.fields import File, Quantity
 from workflow.case.input_files import InputFileError, read_heights
@@ -46,7 +47,8 @@ Poisson = Annotated[float, Quantity("1", at_least=0.0, at_most=0.5)]
 RIGID = ElasticMaterial(young=np.inf, poisson=0.0)
 AREA_SHAPES = ("sphere", "ellipsoid")
 LINE_SHAPES = ("cylinder", "flat_rounded")
-HEIGHTS = "heights"
+# Of either dimension.
+PLANE, HEIGHTS = "plane", "heights"
 
 # --- bodies -------------------------------------------------------------------------------------
 
@@ -56,6 +58,7 @@ class Bodies(Section):
 
     kind: Literal["bodies"] = entry("what the structure is", "bodies")
     shape: str  # each narrows it to its name
+    surfaces: MeasuredSurfaces | None = entry("as measured, on top of the shape", default=None)
 
     @property
     def text(self) -> str:
@@ -63,8 +66,13 @@ class Bodies(Section):
         return shape_in_words(self)
 
     @abstractmethod
+    def form_on(self, grid: Grid) -> Array:
+        """What the shape leaves of the gap before loading on ``grid``, ``(nx, ny)`` [mm]."""
+
     def gap_on(self, grid: Grid) -> Array:
         """Gap before loading on ``grid``, ``(nx, ny)`` [mm]."""
+        form = self.form_on(grid)
+        return form if self.surfaces is None else form + self.surfaces.gap(grid)
 
 
 class Shape(Bodies):
@@ -74,14 +82,24 @@ class Shape(Bodies):
     def height(self, x: Array, y: Array) -> Array:
         """Gap before loading [mm] at ``x`` and ``y``, which broadcast against each other."""
 
-    def gap_on(self, grid: Grid) -> Array:
+    def form_on(self, grid: Grid) -> Array:
         return self.height(grid.x, grid.y)
+
+
+class Plane(Shape):
+    """No form of its own: all of it is in the measured surfaces."""
+
+    shape: Literal["plane"] = entry("a plane all over the grid", "plane")
+    surfaces: MeasuredSurfaces = entry("as measured, with all of their form")
+
+    def height(self, x: Array, y: Array) -> Array:
+        return np.zeros_like(x + y)
 
 
 class Sphere(Shape):
     """Hertz's paraboloid (x² + y²) / 2 R."""
 
-    shape: Literal["sphere"] = entry("sphere, ellipsoid or heights", "sphere")
+    shape: Literal["sphere"] = entry("sphere, ellipsoid, plane or heights", "sphere")
     radius: RoundingRadius = entry("relative, 1/R = 1/R1 + 1/R2 [mm]", "10 mm")
 
     def height(self, x: Array, y: Array) -> Array:
@@ -91,7 +109,7 @@ class Sphere(Shape):
 class Ellipsoid(Shape):
     """Paraboloid x² / 2 Rx + y² / 2 Ry."""
 
-    shape: Literal["ellipsoid"] = entry("sphere, ellipsoid or heights", "ellipsoid")
+    shape: Literal["ellipsoid"] = entry("sphere, ellipsoid, plane or heights", "ellipsoid")
     radius_x: RoundingRadius = entry("relative, of the section along x [mm]", "10 mm")
     radius_y: RoundingRadius = entry("relative, of the section along y [mm]", "20 mm")
 
@@ -102,7 +120,7 @@ class Ellipsoid(Shape):
 class Cylinder(Shape):
     """Parabola x² / 2 R, the same all along y: a line contact."""
 
-    shape: Literal["cylinder"] = entry("cylinder, flat_rounded or heights", "cylinder")
+    shape: Literal["cylinder"] = entry("cylinder, flat_rounded, plane or heights", "cylinder")
     radius: RoundingRadius = entry("relative, 1/R = 1/R1 + 1/R2 [mm]", "10 mm")
 
     def height(self, x: Array, y: Array) -> Array:
@@ -112,7 +130,9 @@ class Cylinder(Shape):
 class FlatRounded(Shape):
     """Flat, and a parabola beyond either end of it: a line contact."""
 
-    shape: Literal["flat_rounded"] = entry("cylinder, flat_rounded or heights", "flat_rounded")
+    shape: Literal["flat_rounded"] = entry(
+        "cylinder, flat_rounded, plane or heights", "flat_rounded"
+    )
     half_width: Length = entry("of the flat [mm]", "4 mm")
     edge_radius: RoundingRadius = entry("of the parabola beyond it [mm]", "10 mm")
 
@@ -129,7 +149,7 @@ class Heights(Bodies):
         "gap in mm, a value per cell; for .h5 with :dataset at the end", "gap.npy"
     )
 
-    def gap_on(self, grid: Grid) -> Array:
+    def form_on(self, grid: Grid) -> Array:
         return read_heights(self.file)
 
 
@@ -298,6 +318,7 @@ class BodiesCase(Case):
         check_bulk_stress(self.load_path.table(), self.materials)
         if isinstance(self.structure, Heights):
             require_shape(self.structure.file, self.contact.centred().shape)
+        check_surfaces(self.structure, self.contact.centred())
         return self
 
     def outline(self) -> list[tuple[str, str]]:
@@ -312,6 +333,7 @@ class BodiesCase(Case):
             ("structure", f"{self.structure.text}, {kind}"),
             ("load path", f"{count} of {', '.join(table.columns)}"),
             ("loads", ", ".join(self.load_path.ranges())),
+            *surfaces_in_words(self.structure, grid),
             *of_bodies("material", self.materials),
             ("friction", f"{self.friction.coefficient:g}" if self.friction.coefficient else "none"),
             ("contact", f"{cells}, history {self.contact.history}"),
@@ -326,12 +348,13 @@ class BodiesCase(Case):
         else:
             yield from uneven_cells(sides, grid.shape)
         if isinstance(self.structure, Heights):
-            yield from heights("structure.file", self.structure.gap_on(grid), sides)
+            yield from heights("structure.file", self.structure.form_on(grid), sides)
         elif "P" in loads and (load := float(loads["P"].max())) > 0.0:
             bodies = self.materials.body_1, self.materials.body_2
             if found := unworn_contact(self.structure, bodies, load, grid.line):
                 yield from about_pressure("load_path", found[1], bodies)
                 yield from about_grid(found[0], sides, grid.shape)
+        yield from surface_doubts(self.structure, grid)
         unit = "N/mm" if grid.line else "N"
         yield from about_shear("load_path", table, self.friction.coefficient, unit)
 
@@ -342,15 +365,15 @@ class ContactCase(BodiesCase):
     about: ClassVar[str] = "a ball, ellipsoid or measured heights under any history of loads"
 
     title: Title = entry("one line", "Ball on a flat, pressed and sheared")
-    structure: Annotated[Sphere | Ellipsoid | Heights, Field(discriminator="shape")] = entry(
-        "the bodies: no finite elements"
+    structure: Annotated[Sphere | Ellipsoid | Plane | Heights, Field(discriminator="shape")] = (
+        entry("the bodies: no finite elements")
     )
     load_path: ContactPath = entry("forces or motions, in turn")
     contact: ContactGrid = entry("half-space grid")
 
     @classmethod
     def suits(cls, source: Source) -> bool:
-        return not touches_along_a_line(source, (HEIGHTS,))
+        return not touches_along_a_line(source, (PLANE, HEIGHTS))
 
 
 class LineContactCase(BodiesCase):
@@ -359,28 +382,46 @@ class LineContactCase(BodiesCase):
     about: ClassVar[str] = "a cylinder, flat or heights along a line under any history of loads"
 
     title: Title = entry("one line", "Cylinder on a flat, pressed and sheared")
-    structure: Annotated[Cylinder | FlatRounded | Heights, Field(discriminator="shape")] = entry(
-        "the bodies: no finite elements"
+    structure: Annotated[Cylinder | FlatRounded | Plane | Heights, Field(discriminator="shape")] = (
+        entry("the bodies: no finite elements")
     )
     load_path: LineContactPath = entry("forces or motions per length, in turn")
     contact: LineContactGrid = entry("half-plane grid")
 
     @classmethod
     def suits(cls, source: Source) -> bool:
-        return touches_along_a_line(source, (HEIGHTS,))
+        return touches_along_a_line(source, (PLANE, HEIGHTS))
 
 
 def touches_along_a_line(source: Source, ambiguous: tuple[str, ...]) -> bool:
     """Whether two bodies touch along a line: by shape; ``ambiguous`` shapes may be both.
 
-    Heights and flats know no dimension: a grid of one size is that of a line contact. Raises
-    CaseError where the shape is none of them.
+    Heights, planes and flats know no dimension: a grid of one size is that of a line contact.
+    Raises CaseError where the shape is none of them.
     """
     if source.at(("structure", "kind")) != "bodies":
         return False
     shape = word_at(source, ("structure", "shape"), (*AREA_SHAPES, *LINE_SHAPES, *ambiguous))
     one_size = isinstance(source.at(("contact", "size")), str | int | float)
     return one_size if shape in ambiguous else shape in LINE_SHAPES
+
+
+def check_surfaces(bodies: Bodies, grid: Grid) -> None:
+    """Raise unless measured surfaces fit the grid."""
+    if bodies.surfaces is not None:
+        bodies.surfaces.check(grid)
+
+
+def surface_doubts(bodies: Bodies, grid: Grid) -> Iterator[str]:
+    """About measured surfaces: their units, and roughness that the grid does not carry."""
+    if bodies.surfaces is not None:
+        yield from bodies.surfaces.doubts(grid)
+
+
+def surfaces_in_words(bodies: Bodies, grid: Grid) -> list[tuple[str, str]]:
+    """A row for each measured surface."""
+    told = {} if bodies.surfaces is None else bodies.surfaces.told(grid)
+    return [(f"surface {name[-1]}", text) for name, text in told.items()]
 
 
 def require_shape(file: str, grid: tuple[int, int]) -> None:

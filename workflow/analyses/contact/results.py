@@ -116,8 +116,9 @@ def _fields(state: ContactState, friction: float) -> dict[str, Dataset]:
 
 def _summary(outcome: ContactOutcome) -> dict[str, Any]:
     case, grid, history = outcome.case, outcome.grid, outcome.history
-    friction = case.friction.coefficient
+    friction, surfaces = case.friction.coefficient, case.structure.surfaces
     return {
+        **({} if surfaces is None else {"surfaces": surfaces.summary(grid)}),
         "increments": len(outcome.table),
         "history": {
             key: getattr(history, key) for key in ("method", "reason", "parts", "error", "error_of")

@@ -8,7 +8,7 @@ from sa_solver.contact_state import ContactState
 from sa_solver.errors import ContactProblemError
 from sa_solver.history import ContactLoadPath, History, HistoryError, march_history
 from workflow.analyses.contact.bodies import bodies_of, bulk_strain, half_space_of
-from workflow.analyses.contact.case import BodiesCase
+from workflow.analyses.contact.case import BodiesCase, surface_doubts
 from workflow.analyses.contact.results import (
     ContactOutcome,
     ContactRun,
@@ -46,6 +46,8 @@ def _march(
 ) -> tuple[ContactOutcome, str]:
     """What the path has led to, and why it ended early if it did."""
     grid, table = case.contact.centred(), case.load_path.table()
+    for doubt in surface_doubts(case.structure, grid):
+        reporter.warn(doubt)
     height, half_space = case.structure.gap_on(grid), half_space_of(case, grid)
     strain = bulk_strain(table, bodies_of(case))
     passed: dict[int, ContactState] = {}

@@ -72,6 +72,8 @@ def _compute(run: Run[WearCase]) -> Outcome:
     case, reporter = run.case, run.reporter
     # First, so that a state that cannot be gone on from is told before anything is computed.
     kept = checkpoint.restored(run, run.kept) if run.kept else None
+    for doubt in case.surface_doubts():
+        reporter.warn(doubt)
     source = structure_of(case).source(case)
     faces = meshed_faces(case, source, reporter)
     with contact_workers(case, faces if _worn_apart(case, source) else ()) as workers:

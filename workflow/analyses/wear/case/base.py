@@ -207,6 +207,14 @@ class WearCase(Case):
         if (sides := self.face_sides()) is not None:
             yield from uneven_cells(sides, self.contact.grid)
 
+    def measured(self) -> dict[str, Any]:
+        """What the summary has of surfaces as measured; nothing where there are none."""
+        return {}
+
+    def surface_doubts(self) -> Iterator[str]:
+        """About surfaces as measured, for a run to warn of."""
+        yield from ()
+
     @property
     def yields(self) -> list[float | None]:
         """Yield stresses of the bodies that have one [MPa]."""

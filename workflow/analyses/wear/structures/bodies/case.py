@@ -8,25 +8,30 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from math import inf
-from typing import Annotated, ClassVar, Generic, Literal, Self
+from typing import Annotated, Any, ClassVar, Generic, Literal, Self
 
 import numpy as np
 from pydantic import Discriminator, Field, Tag, model_validator
 
-from sa_solver.types import Array, Tilt
+from sa_solver.types import Array, Grid, Tilt
 from sa_solver.types import Material as ElasticMaterial
 from workflow.analyses.contact.case import (
     HEIGHTS,
+    PLANE,
     BodyMaterials,
     Cylinder,
     Ellipsoid,
     FlatRounded,
     Heights,
+    Plane,
     Shape,
     Sphere,
     check_bulk_stress,
+    check_surfaces,
     elastic,
     require_shape,
+    surface_doubts,
+    surfaces_in_words,
     touches_along_a_line,
     unworn_contact,
 )
@@ -83,8 +88,10 @@ class FlatStrip(Shape):
         return np.where(np.abs(x) < self.half_width, 0.0, self.step)
 
 
-BodiesOfArea = Annotated[Sphere | Ellipsoid | Flat | Heights, Field(discriminator="shape")]
-BodiesOfLine = Annotated[Cylinder | FlatRounded | FlatStrip | Heights, Field(discriminator="shape")]
+BodiesOfArea = Annotated[Sphere | Ellipsoid | Flat | Plane | Heights, Field(discriminator="shape")]
+BodiesOfLine = Annotated[
+    Cylinder | FlatRounded | FlatStrip | Plane | Heights, Field(discriminator="shape")
+]
 
 # --- loads --------------------------------------------------------------------------------------
 
@@ -250,7 +257,7 @@ class TwoBodiesWearCase(WearCase):
 
     @classmethod
     def suits(cls, source: Source) -> bool:
-        return touches_along_a_line(source, (HEIGHTS, FLAT)) == cls.line
+        return touches_along_a_line(source, (PLANE, HEIGHTS, FLAT)) == cls.line
 
     @property
     def size(self) -> tuple[float, float]:
@@ -258,10 +265,22 @@ class TwoBodiesWearCase(WearCase):
         size = self.contact.size
         return size if isinstance(size, tuple) else (size, inf)
 
+    @property
+    def grid(self) -> Grid:
+        """That of the contact."""
+        return Grid.over(self.size, self.contact.grid, self.line)
+
     @model_validator(mode="after")
     def _can_run(self) -> Self:
         _check(self)
         return self
+
+    def measured(self) -> dict[str, Any]:
+        surfaces = self.structure.surfaces
+        return {} if surfaces is None else {"surfaces": surfaces.summary(self.grid)}
+
+    def surface_doubts(self) -> Iterator[str]:
+        yield from surface_doubts(self.structure, self.grid)
 
     def material(self, number: int) -> ElasticMaterial:
         return elastic(getattr(self.materials, self.bodies[number - 1]))
@@ -270,6 +289,7 @@ class TwoBodiesWearCase(WearCase):
         kind, force = ("line contact", "N/mm") if self.line else ("no finite elements", "N")
         return [
             ("structure", f"{self.structure.text}, {kind}"),
+            *surfaces_in_words(self.structure, self.grid),
             ("load path", _in_words(self.load_path, force)),
         ]
 
@@ -312,6 +332,7 @@ def _check(case: TwoBodiesWearCase) -> None:
     """Refuse what does not fit together: grid, heights, motions, materials and loops."""
     if isinstance(case.structure, Heights):
         require_shape(case.structure.file, case.contact.grid)
+    check_surfaces(case.structure, case.grid)
     table, path = case.load_path.table(), case.load_path
     check_bulk_stress(table, case.materials)
     _check_room(case, table)
@@ -378,5 +399,6 @@ def _doubts(case: TwoBodiesWearCase) -> Iterator[str]:
         yield from long_stroke(f"load_path{'.stroke' if simple else ''}", stroke, width)
     unit = "N/mm" if case.line else "N"
     yield from about_shear("load_path", table, case.friction.coefficient, unit)
+    yield from case.surface_doubts()
     if isinstance(case.structure, Heights):
         yield from heights("structure.file", read_heights(case.structure.file), sides)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -15,6 +16,7 @@ from wear.drive import Drive
 from wear.face_loads import CycleLoads
 from workflow.analyses.contact.bodies import bulk_strain
 from workflow.analyses.contact.case import Heights, Shape
+from workflow.analyses.contact.surfaces import MeasuredSurfaces
 from workflow.analyses.wear.gaps import GapFunction, GridHeights
 from workflow.analyses.wear.load_source import (
     COARSER,
@@ -140,13 +142,33 @@ class BodiesSource(UncoupledSource):
 
     @property
     def _grid(self) -> Grid:
-        contact = self._case.contact
-        size = contact.size if isinstance(contact.size, tuple) else (contact.size, 1.0)
-        return Grid.over(size, contact.grid, self.line)
+        return self._case.grid
 
 
-def gap_of(shape: Shape | Heights, grid: Grid) -> GapFunction:
+@dataclass(frozen=True)
+class MeasuredGap:
+    """Gap of a ``form`` [mm] and of measured ``surfaces``, of the cells of any grid over a face.
+
+    ``face`` is the grid that tells its size.
+    """
+
+    form: GapFunction
+    surfaces: MeasuredSurfaces
+    face: Grid
+
+    def __call__(self, x: Array, y: Array) -> Array:
+        """Means over cells at ``x`` ``(n, 1)`` and ``y`` ``(1, m)``, which cover the face."""
+        grid = Grid.over(self.face.size, (x.size, y.size), self.face.line)
+        # No other places are asked for.
+        assert np.allclose(grid.x, x)
+        assert np.allclose(grid.y, y)
+        return self.form(x, y) + self.surfaces.gap(grid)
+
+
+def gap_of(bodies: Shape | Heights, grid: Grid) -> GapFunction:
     """Gap [mm] of the unloaded bodies at x and y of the face that ``grid`` covers."""
-    if isinstance(shape, Heights):
-        return GridHeights(grid, read_heights(shape.file))
-    return shape.height
+    if isinstance(bodies, Heights):
+        form: GapFunction = GridHeights(grid, read_heights(bodies.file))
+    else:
+        form = bodies.height
+    return form if bodies.surfaces is None else MeasuredGap(form, bodies.surfaces, grid)

@@ -1,0 +1,195 @@
+"""Surfaces as they were measured, on top of the form of two bodies: case entries and heights."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from functools import lru_cache
+from pathlib import Path
+from typing import Annotated, Any, ClassVar
+
+from pydantic import model_validator
+
+from sa_solver.errors import InputError
+from sa_solver.scans import Beyond, Level, Resampled, Scan, filled, levelled, resampled, rms
+from sa_solver.types import Array, Grid
+from workflow.case.fields import File, Quantity, Word, split_dataset
+from workflow.case.input_files import InputFileError
+from workflow.case.plain import plain
+from workflow.case.scan_files import ENDINGS, UNITS, read_scan
+from workflow.case.sections import Length, Section, disagreement, entry, one_of
+
+Shift = Annotated[float, Quantity("mm", at_least=-1e4, at_most=1e4, range_text="-10 to 10 m")]
+Angle = Annotated[float, Quantity("rad", at_least=-6.4, at_most=6.4, range_text="-360 to 360 deg")]
+Share = Annotated[float, Quantity("1", at_least=0.0, at_most=0.5)]
+# What a grid may lose of the roughness before that is doubted.
+LOST = 0.3
+# A height [mm] below which there is no roughness to lose.
+SMOOTH = 1e-9
+# Over the shorter side, heights of more are no roughness, nor are those of less [mm].
+STEEP, FINE = 0.1, 1e-7
+
+
+class MeasuredSurface(Section):
+    """Heights as they were measured, out of the body, of any number of points and pitch."""
+
+    also_filled_in: ClassVar[tuple[str, ...]] = ("unit", "pitch")
+
+    file: Annotated[str, File(ENDINGS)] = entry(
+        "of a profilometer (.sur, .x3p, .al3d, .plu, ...), x, y, z (.csv), or bare heights "
+        "(.npy, .csv; with a colon .npz:array, .h5:dataset)",
+        "disk.npy",
+    )
+    unit: Annotated[str, Word(UNITS)] | None = entry(
+        "of bare heights: m, mm, um or nm; other files say it", "um", default=None
+    )
+    pitch: tuple[Length, Length] | None = entry(
+        "of bare heights along x, along y; other files say it [mm]", ["4 um", "4 um"], default=None
+    )
+    level: Level = entry(
+        "what is taken off: none, mean, plane, or form (second order)", "plane", default="plane"
+    )
+    missing: Share = entry(
+        "share of points that may be: they are laid over those around by a membrane [1]",
+        "5 %",
+        default=0.05,
+    )
+    shift: tuple[Shift, Shift] = entry(
+        "where its middle lies on the grid, along x, along y [mm]", [0, 0], default=(0.0, 0.0)
+    )
+    angle: Angle = entry(
+        "how far it is turned on the face, from x to y [rad]", "0 deg", default=0.0
+    )
+    beyond: Beyond = entry(
+        "its border the grid finds nothing (refused), or the scan mirrored",
+        "refused",
+        default="refused",
+    )
+
+    @model_validator(mode="after")
+    def _can_be_read(self) -> MeasuredSurface:
+        try:
+            self.scan()
+        except InputFileError as error:
+            raise disagreement(str(error), "file") from error
+        except InputError as error:
+            raise disagreement(f"{self.file}: {error}", "missing", "file") from error
+        return self
+
+    def read(self) -> Scan:
+        """As it is in the file. Raises InputFileError."""
+        return _read(self.file, _stamp(self.file), self.unit, self.pitch)
+
+    def scan(self) -> Scan:
+        """Levelled, and filled where points are missing. Raises InputFileError, InputError."""
+        return _prepared(self.read(), self.level, self.missing)
+
+    def on(self, grid: Grid, number: int) -> Resampled:
+        """On the grid of the contact, as body 1 or 2. Raises InputError."""
+        scan = self.scan() if number == 1 else self.scan().turned_over
+        return resampled(scan, grid, self.shift, self.angle, self.beyond)
+
+
+def _stamp(file: str) -> tuple[int, int] | None:
+    """What a file that has changed has another of; None where there is none."""
+    try:
+        found = Path(split_dataset(file)[0]).stat()
+    except OSError:
+        return None
+    return found.st_mtime_ns, found.st_size
+
+
+# Scans of millions of points take seconds, and are asked for wherever a case is looked at.
+@lru_cache(maxsize=2)
+def _read(file: str, stamp: object, unit: str | None, pitch: tuple[float, float] | None) -> Scan:
+    return read_scan(file, unit, pitch)
+
+
+@lru_cache(maxsize=2)
+def _prepared(scan: Scan, level: Level, missing: float) -> Scan:
+    return filled(levelled(scan, level), missing)
+
+
+class MeasuredSurfaces(Section):
+    """Those of either body or both: heights out of it, which come on top of the form."""
+
+    also_filled_in: ClassVar[tuple[str, ...]] = ("body_1",)
+    in_schema: ClassVar[Mapping[str, Any]] = one_of("body_1", "body_2")
+
+    body_1: MeasuredSurface | None = entry("of the lower body, seen from above", default=None)
+    body_2: MeasuredSurface | None = entry(
+        "of the upper body, seen from below: turned over about x", default=None
+    )
+
+    @model_validator(mode="after")
+    def _is_one(self) -> MeasuredSurfaces:
+        if not self.bodies:
+            raise disagreement("no surface; allowed: body_1, body_2 or both", "body_1")
+        return self
+
+    @property
+    def bodies(self) -> dict[str, MeasuredSurface]:
+        """Those that there are."""
+        both = {"body_1": self.body_1, "body_2": self.body_2}
+        return {name: surface for name, surface in both.items() if surface is not None}
+
+    def on(self, grid: Grid) -> dict[str, Resampled]:
+        """Each on a grid, by body. Raises InputError."""
+        return {name: surface.on(grid, int(name[-1])) for name, surface in self.bodies.items()}
+
+    def gap(self, grid: Grid) -> Array:
+        """What they add to the gap of the unloaded bodies ``(nx, ny)`` [mm]."""
+        return -sum((on.heights for on in self.on(grid).values()), start=0.0 * (grid.x + grid.y))
+
+    def check(self, grid: Grid) -> None:
+        """Refuse those that the grid does not fit."""
+        for name, surface in self.bodies.items():
+            try:
+                surface.on(grid, int(name[-1]))
+            except InputError as error:
+                key = f"structure.surfaces.{name}"
+                raise disagreement(
+                    f"{surface.file}: {error}", f"{key}.file", "contact.size"
+                ) from error
+
+    def summary(self, grid: Grid) -> dict[str, Any]:
+        """Numbers of each, in base units: points, pitch, share missing, and what the grid lost."""
+        numbers = {}
+        for name, on in self.on(grid).items():
+            scan = self.bodies[name].read()
+            numbers[name] = {
+                "points": list(scan.heights.shape),
+                "pitch": list(scan.pitch),
+                "missing": scan.missing,
+                "rms": rms(self.bodies[name].scan().heights),
+                "rms_on_grid": rms(on.heights),
+                "lost": on.lost,
+            }
+        return numbers
+
+    def told(self, grid: Grid) -> dict[str, str]:
+        """The same in a line each, by body."""
+        return {name: _in_words(numbers) for name, numbers in self.summary(grid).items()}
+
+    def doubts(self, grid: Grid) -> Iterator[str]:
+        """About units, and grids that do not carry the roughness."""
+        for name, numbers in self.summary(grid).items():
+            key = f"structure.surfaces.{name}"
+            height = numbers["rms"]
+            if height > STEEP * min(grid.size[: 1 if grid.line else 2]) or SMOOTH < height < FINE:
+                yield f"{key}: heights of {plain(height, 'mm', 3)} rms: is their unit right?"
+            if height > SMOOTH and numbers["lost"] > LOST * height:
+                yield (
+                    f"{key}: {plain(numbers['lost'], 'mm', 3)} of {plain(height, 'mm', 3)} rms is "
+                    "finer than the cells, which do not carry it: take more of them"
+                )
+
+
+def _in_words(numbers: Mapping[str, Any]) -> str:
+    (nx, ny), pitch = numbers["points"], numbers["pitch"]
+    steps = [plain(step, "mm", 4) for step in pitch]
+    apart = steps[0] if ny == 1 or steps[0] == steps[1] else " x ".join(steps)
+    missing = f", {numbers['missing']:.2g} of them filled in" if numbers["missing"] else ""
+    return (
+        f"{nx} x {ny} points {apart} apart{missing}, {plain(numbers['rms'], 'mm', 3)} rms, "
+        f"{plain(numbers['lost'], 'mm', 3)} of it finer than the grid"
+    )

@@ -1,0 +1,151 @@
+"""``fretscale scar``: depth and volume of the wear between two scans of a body."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from sa_solver.errors import InputError
+from sa_solver.scans import Scan
+from sa_solver.types import Mask
+from wear.scar import Scar, measure_scar
+from workflow.case.input_files import InputFileError
+from workflow.case.plain import plain
+from workflow.case.scan_files import UNITS, read_scan
+from workflow.case.units import UnitError, to_base
+from workflow.errors import UserError
+from workflow.shell.folder import OutputFolder
+from workflow.shell.lock import locked
+from workflow.shell.store import replacing, write_text
+
+TABLE, FIELDS, FIGURE = "scar.csv", "scar.npz", "scar.png"
+TO_MICRONS, PER_MICRON = 1e3, 1e9
+LENGTHS = "lengths from the middle, XMIN,XMAX,YMIN,YMAX such as '-0.3 mm,0.3 mm,-0.2 mm,0.2 mm'"
+
+
+def scar_of_files(
+    before: Path, after: Path, worn: str | None, bare: tuple[str, str, str] | None
+) -> Scar:
+    """Measure what was lost between two files of scans.
+
+    ``worn`` is the text of a rectangle on the second; ``bare`` unit and pitch along x and y of
+    files that do not say theirs. Raises UserError.
+    """
+    first, second = (_read(path, bare) for path in (before, after))
+    where = None if worn is None else _rectangle(worn, second)
+    try:
+        return measure_scar(first, second, where)
+    except InputError as error:
+        raise UserError(f"{after}: {error}") from error
+
+
+def _read(path: Path, bare: tuple[str, str, str] | None) -> Scan:
+    unit, *steps = bare or (None,)
+    if unit is not None and unit not in UNITS:
+        raise UserError(f"--bare {unit}: no such unit; allowed: {', '.join(UNITS)}")
+    pitch = [_length(f"--bare {step}", step) for step in steps if step is not None]
+    if any(step <= 0.0 for step in pitch):
+        raise UserError("--bare: a pitch that is not above 0; allowed: lengths such as '4 um'")
+    try:
+        return read_scan(str(path), unit, (pitch[0], pitch[1]) if pitch else None)
+    except InputFileError as error:
+        raise UserError(f"{error} (--bare UNIT DX DY)" if bare is None else str(error)) from error
+
+
+def _length(place: str, text: str) -> float:
+    """A length [mm], a bare number is in mm."""
+    try:
+        return to_base(text if any(c.isalpha() for c in text) else f"{text} mm", "mm")
+    except UnitError as error:
+        raise UserError(f"{place}: {error}; allowed: a length such as '4 um'") from error
+
+
+def _rectangle(text: str, scan: Scan) -> Mask:
+    """The points of a scan within a rectangle. Raises UserError."""
+    parts = [part.strip() for part in text.split(",")]
+    if len(parts) != 4:
+        raise UserError(f"--worn {text}: not four; allowed: {LENGTHS}")
+    x_min, x_max, y_min, y_max = (_length(f"--worn {part}", part) for part in parts)
+    x, y = (
+        (np.arange(count) - 0.5 * (count - 1)) * pitch
+        for count, pitch in zip(scan.heights.shape, scan.pitch, strict=True)
+    )
+    inside: Mask = ((x >= x_min) & (x <= x_max))[:, None] & ((y >= y_min) & (y <= y_max))[None, :]
+    if not inside.any():
+        raise UserError(f"--worn {text}: no point of the scan is in it; allowed: {LENGTHS}")
+    return inside
+
+
+# --- what is printed ----------------------------------------------------------------------------
+
+
+def report(scar: Scar) -> list[str]:
+    """What was lost, with 95 % bounds, how the scans were laid over each other, and doubts."""
+    volume, error = PER_MICRON * scar.volume, PER_MICRON * scar.volume_error
+    lines = [
+        f"volume   {volume:.4g} +- {error:.2g} um^3 ({scar.volume:.4g} mm^3), 95 %",
+        f"deepest  {TO_MICRONS * scar.deepest:.4g} +- {TO_MICRONS * scar.depth_error:.2g} um "
+        "(the largest mean of 3 x 3 points)",
+        f"area     {scar.area:.4g} mm^2",
+        f"rim      {plain(scar.noise, 'mm', 3)} rms, correlated over "
+        f"{plain(scar.length, 'mm', 3)}: {scar.patches:.0f} independent patches",
+    ]
+    if scar.shift is None:
+        lines.append(
+            "the rims have no roughness in common: laid over each other by their plane alone"
+        )
+    else:
+        shift = [plain(by, "mm", 4) for by in scar.shift]
+        lines.append(f"laid over each other: the second lies {shift[0]}, {shift[1]} off the first")
+    if scar.missing:
+        lines.append(f"{scar.missing:.1%} of the worn area are missing points, laid in between")
+    return [*lines, *_doubts(scar)]
+
+
+def _doubts(scar: Scar) -> list[str]:
+    doubts = []
+    if not scar.sure:
+        doubts.append(
+            "doubt: the noise is correlated over so much of the rim that it is hardly known: "
+            "the errors are about right at best; scans that reach farther tell more"
+        )
+    if scar.volume < scar.volume_error:
+        doubts.append("doubt: no volume that differs from none; are the files in order?")
+    return doubts
+
+
+# --- what is written ----------------------------------------------------------------------------
+
+
+def write_scar(scar: Scar, out: Path, title: str, force: bool) -> list[Path]:
+    """Write the numbers, the depths on the points of the second scan, and the figure.
+
+    Raises UserError for a folder that has them already, unless ``force``.
+    """
+    from workflow.commands.scar_figure import write_figure
+
+    with locked(out):
+        folder = OutputFolder(out, "scar")
+        paths = folder.replace(dict.fromkeys((TABLE, FIELDS, FIGURE), "measured scar"), force)
+        write_text(paths[0], "\n".join(_table(scar)) + "\n")
+        with replacing(paths[1]) as place, place.open("wb") as stream:
+            np.savez_compressed(
+                stream, depth=scar.depth, worn=scar.worn, pitch=np.array(scar.pitch)
+            )
+        write_figure(scar, title, paths[2])
+    return paths
+
+
+def _table(scar: Scar) -> list[str]:
+    rows = {
+        "volume [mm^3]": (scar.volume, f"{scar.volume_error:.6g}"),
+        "deepest [mm]": (scar.deepest, f"{scar.depth_error:.6g}"),
+        "area [mm^2]": (scar.area, ""),
+        "noise [mm]": (scar.noise, ""),
+        "correlated [mm]": (scar.length, ""),
+        "patches [1]": (scar.patches, ""),
+        "missing [1]": (scar.missing, ""),
+    }
+    told = [f"{name},{value:.10g},{bound}" for name, (value, bound) in rows.items()]
+    return ["quantity,value,bound 95 %", *told]
