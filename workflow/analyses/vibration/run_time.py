@@ -21,7 +21,7 @@ POINT, GROWING_POINT = 5e-3, 3e-2
 # A point of so many unknowns, and the linear limits of so many directions, of joints [s].
 MANY, MANY_UNKNOWNS, MANY_POWER = 0.37, 4000.0, 1.5
 LIMITS, DIRECTIONS, CUBE = 25.0, 363.0, 3
-# Times that of modes that dashpots mix: each harmonic is a solution of all of them.
+# Times that of modes that a damping matrix mixes: each harmonic is a solution of all of them.
 MIXED = 40.0
 # Joints of a reduced body whose points are not counted.
 JOINTS = 100
@@ -56,8 +56,8 @@ def structure_time(case: VibrationCaseBase) -> float:
 def point_time(case: VibrationCaseBase) -> float:
     """Of a point of a curve [s]."""
     unknowns = _directions(case) * 2 * len(case.harmonics)
-    damping, mixed = case.structure.damping, 1.0
-    if damping is not None and damping.dashpots and not isinstance(case.structure, Rig):
+    structure, mixed = case.structure, 1.0
+    if isinstance(structure, MatrixBody) and structure.matrices.damping is not None:
         mixed = MIXED
     one = POINT if case.resolution.tolerance is None else GROWING_POINT
     return one + mixed * float(MANY * (unknowns / MANY_UNKNOWNS) ** MANY_POWER)
