@@ -51,14 +51,16 @@ def damped(
     if min(mass_factor, stiffness_factor, loss_factor, *dashpots.values(), 0.0) < 0.0:
         raise RigError("damping below zero, which feeds vibrations: give 0 or more")
     damping = model.damping + mass_factor * model.mass + stiffness_factor * model.stiffness
+    rows = [] if model.dashpots is None else [*model.dashpots]
     for link, coefficient in dashpots.items():
-        stretch = stretch_of(model.names, link)
-        damping = damping + coefficient * np.outer(stretch, stretch)
+        rows.append(np.sqrt(coefficient) * stretch_of(model.names, link))
+        damping = damping + np.outer(rows[-1], rows[-1])
     structural = model.structural
     if loss_factor > 0.0:
         of_stiffness = loss_factor * model.stiffness
         structural = of_stiffness if structural is None else structural + of_stiffness
-    return replace(model, damping=damping, structural=structural)
+    together = np.array(rows) if rows else None
+    return replace(model, damping=damping, structural=structural, dashpots=together)
 
 
 def rayleigh_factors(frequencies: Array, ratios: Array) -> tuple[float, float]:

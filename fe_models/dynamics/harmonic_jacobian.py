@@ -16,7 +16,8 @@ from numba import njit
 
 from fe_models.dynamics.harmonics import ComplexArray, Resolution, by_function, by_joint
 from fe_models.dynamics.joint_rest import Rest, SpringJoints
-from fe_models.dynamics.receptance import FEW, Receptance, SteadyMotion
+from fe_models.dynamics.modal_inverse import FEW
+from fe_models.dynamics.receptance import Receptance, SteadyMotion
 from fe_models.dynamics.static_residual import ResidualReceptance
 from sa_solver.types import Array
 

@@ -232,25 +232,27 @@ def _solve(matrix: Array, rhs: Array) -> None:
     """Make of ``rhs`` matrix⁻¹ rhs; the matrix may be overwritten."""
     size = len(matrix)
     if size > FEW:
-        _copy(np.linalg.solve(matrix, rhs), rhs)
+        rhs[:] = np.linalg.solve(matrix, rhs)
         return
     for column in range(size):
         pivot = column
         for row in range(column + 1, size):
             if abs(matrix[row, column]) > abs(matrix[pivot, column]):
                 pivot = row
-        for c in range(size):
-            matrix[column, c], matrix[pivot, c] = matrix[pivot, c], matrix[column, c]
-        for c in range(rhs.shape[1]):
-            rhs[column, c], rhs[pivot, c] = rhs[pivot, c], rhs[column, c]
-        inverse = 1.0 / matrix[column, column]
-        for c in range(size):
-            matrix[column, c] *= inverse
-        for c in range(rhs.shape[1]):
-            rhs[column, c] *= inverse
+        inverse = 1.0 / matrix[pivot, column]
+        _lift(matrix, pivot, column, inverse)
+        _lift(rhs, pivot, column, inverse)
         for row in range(size):
-            share = matrix[row, column]
-            if row != column and share != 0.0:
-                for c in range(size):
-                    matrix[row, c] -= share * matrix[column, c]
-                _add_row(-share, rhs[column], rhs[row])
+            if row != column:
+                share = -matrix[row, column]
+                _add_row(share, matrix[column], matrix[row])
+                _add_row(share, rhs[column], rhs[row])
+
+
+@njit(cache=True, nogil=True)
+def _lift(rows: Array, pivot: int, to: int, factor: float) -> None:
+    """Exchange two rows, and multiply the one that has come up."""
+    for c in range(rows.shape[1]):
+        lifted = factor * rows[pivot, c]
+        rows[pivot, c] = rows[to, c]
+        rows[to, c] = lifted

@@ -18,6 +18,13 @@ import scipy.linalg as sl
 from numba import njit
 
 from fe_models.dynamics.harmonics import ComplexArray
+from fe_models.dynamics.modal_inverse import (
+    MixedModes,
+    ModalInverse,
+    ModesWithDashpots,
+    UnmixedModes,
+    flexibilities,
+)
 from fe_models.dynamics.model import DynamicModel
 from sa_solver.errors import InputError
 from sa_solver.types import Array
@@ -31,8 +38,9 @@ RIGID = 1e-13
 HELD = 1e-2
 # Damping between different modes, over the largest, below which there is none: rounding.
 DIAGONAL = 1e-10
-# Products of frequencies, directions of joints and modes up to which calls cost more than loops.
-FEW = 4000
+# Inertia and stiffness of a mode over what is left of them without dashpots, at most, for these to
+# be taken apart: nearer to a natural frequency without other damping too many digits are lost.
+MOST_RESONANT = 1e5
 
 
 class ReceptanceError(InputError):
@@ -49,17 +57,7 @@ class SteadyMotion:
         self.structure, self.angular = structure, angular
         # The first frequency that is not 0.
         self._moving = int(angular[0] == 0.0)
-        moving, damping, squares = angular[self._moving :], structure.damping, structure.squares
-        loss = structure.loss
-        # Whether damping mixes the modes: then their stiffnesses are matrices (k, n, n), and
-        # otherwise their flexibilities are numbers (k, n).
-        self._mixed = damping.ndim == 2
-        if not self._mixed:
-            self._flexibility = _flexibilities(moving, squares, damping, loss)
-        else:
-            turning = moving[:, None, None]
-            inertia = np.diag(squares) - turning * turning * np.eye(len(squares))
-            self._stiffness = inertia + 1j * (turning * damping + loss)
+        self._inverse = structure.inverse_at(angular[self._moving :])
 
     def respond(self, force: ComplexArray) -> ComplexArray:
         """Displacements under forces; held at ω = 0."""
@@ -71,64 +69,33 @@ class SteadyMotion:
     def vibrate(self, force: ComplexArray) -> ComplexArray:
         """:meth:`respond` without what constant forces do: 0 at ω = 0."""
         moving = self._moving
-        if not self._mixed and not moving:
-            return np.asarray(force * self._flexibility)
+        if not moving:
+            return self._inverse.times(force)
         response = np.empty(force.shape, dtype=complex)
-        response[:moving] = 0.0
-        if not self._mixed:
-            np.multiply(force[moving:], self._flexibility, out=response[moving:])
-        else:
-            response[moving:] = np.linalg.solve(self._stiffness, force[moving:, :, None])[..., 0]
+        response[:moving], response[moving:] = 0.0, self._inverse.times(force[moving:])
         return response
 
     def per_force(self, weights: ComplexArray) -> ComplexArray:
         """wᵀ x per force on the modes ``(k, n)``, of ``weights`` w ``(k, n)`` at ω > 0."""
-        if not self._mixed:
-            return np.asarray(weights * self._flexibility)
-        turned = self._stiffness.transpose(0, 2, 1)
-        return np.asarray(np.linalg.solve(turned, weights[..., None])[..., 0])
+        return self._inverse.turned(weights)
 
     def stiffness_slope(self, motion: ComplexArray) -> ComplexArray:
         """∂(K + iD + iωC - ω²M)/∂ω x: forces that a motion needs more per rad/s."""
-        damping = self.structure.damping
-        if not self._mixed:
-            return _stiffness_slopes(motion, self.angular, damping)
-        return np.asarray(1j * (motion @ damping.T) - (2.0 * self.angular)[:, None] * motion)
+        structure = self.structure
+        if structure.damping.ndim == 1:
+            return _stiffness_slopes(motion, self.angular, structure.damping)
+        lagging = 1j * structure.damp(motion)
+        return np.asarray(lagging - (2.0 * self.angular)[:, None] * motion)
 
     def between_joints(self) -> ComplexArray:
         """Displacements of joints by forces on joints ``(k, j d, j d)`` [mm/N]; held at ω = 0."""
         at_joints, moving = self.structure.at_joints, self._moving
-        on_modes = at_joints.conj().T
         size = len(at_joints)
         between = np.empty((len(self.angular), size, size), dtype=complex)
         if moving:
             between[0] = self.structure.static_flexibility
-        if not self._mixed:
-            if len(self._flexibility) * at_joints.size <= FEW:
-                _few_between_joints(self._flexibility, at_joints, between[moving:])
-                return between
-            inverse = self._flexibility[:, None, :]
-            if np.iscomplexobj(at_joints):
-                between[moving:] = (at_joints * inverse) @ on_modes
-                return between
-            # Two real products cost half of a complex one.
-            between.real[moving:] = (at_joints * inverse.real) @ on_modes
-            between.imag[moving:] = (at_joints * inverse.imag) @ on_modes
-        else:
-            between[moving:] = at_joints @ np.linalg.solve(self._stiffness, on_modes)
+        self._inverse.between(at_joints, between[moving:])
         return between
-
-
-@njit(cache=True)
-def _few_between_joints(flexibility: ComplexArray, at_joints: Array, between: ComplexArray) -> None:
-    """Write what so many frequencies ``(k, n)`` make between joints ``(k, j d, j d)``."""
-    for k in range(len(flexibility)):
-        for to in range(len(at_joints)):
-            for by in range(len(at_joints)):
-                response = 0.0j
-                for n in range(at_joints.shape[1]):
-                    response += flexibility[k, n] * (at_joints[to, n] * np.conj(at_joints[by, n]))
-                between[k, to, by] = response
 
 
 @njit(cache=True)
@@ -141,22 +108,10 @@ def _stiffness_slopes(motion: ComplexArray, angular: Array, damping: Array) -> C
     return slopes
 
 
-@njit(cache=True)
-def _flexibilities(angular: Array, squares: Array, damping: Array, loss: Array) -> ComplexArray:
-    """1 / (ω_n² - ω² + i (ω c_n + d_n)) ``(k, n)``."""
-    flexibilities = np.empty((len(angular), len(squares)), np.complex128)
-    for k in range(len(angular)):
-        for n in range(len(squares)):
-            lagging = angular[k] * damping[n] + loss[n]
-            stiffness = complex(squares[n] - angular[k] * angular[k], lagging)
-            flexibilities[k, n] = 1.0 / stiffness
-    return flexibilities
-
-
-def _is_diagonal(damping: Array) -> bool:
-    """Whether damping ``(n, n)`` does not mix the modes."""
+def _is_diagonal(damping: Array, largest: float) -> bool:
+    """Whether damping ``(n, n)``, of matrices of so large values, does not mix the modes."""
     between_modes = np.abs(damping - np.diag(np.diag(damping))).max()
-    return bool(between_modes <= DIAGONAL * np.abs(damping).max())
+    return bool(between_modes <= DIAGONAL * largest)
 
 
 class Receptance:
@@ -182,11 +137,19 @@ class Receptance:
         loss = np.zeros_like(damping)
         if model.structural is not None:
             loss = shapes.conj().T @ model.structural @ shapes
-        diagonal = not mixed or (_is_diagonal(damping) and _is_diagonal(loss))
+        largest, unmixed = np.abs(damping).max(), _is_diagonal(loss, np.abs(loss).max())
+        diagonal = not mixed or (unmixed and _is_diagonal(damping, largest))
         # Viscous and structural (n,), or (n, n) where one of them mixes the modes.
         self.damping, self.loss = (
             np.diag(part).real.copy() if diagonal else part for part in (damping, loss)
         )
+        # Rows of dashpots (r, n), where nothing else mixes the modes.
+        self._dashpots: Array | None = None
+        if not diagonal and unmixed and model.dashpots is not None:
+            rows = model.dashpots @ shapes
+            few = len(rows) <= len(squares)
+            if few and _is_diagonal(damping - rows.T @ rows, largest):
+                self._dashpots = rows
         self.held = self._holding_stiffness() if rigid.any() else 0.0
         try:
             self.static_factors = sl.cho_factor(
@@ -210,6 +173,31 @@ class Receptance:
     def at(self, angular: Array) -> SteadyMotion:
         """The structure at ``k`` frequencies [rad/s]."""
         return SteadyMotion(self, angular)
+
+    def inverse_at(self, angular: Array) -> ModalInverse:
+        """Displacements of modes by forces on them, at ``k`` frequencies above 0 [rad/s]."""
+        if self.damping.ndim == 1:
+            return UnmixedModes(flexibilities(angular, self.squares, self.damping, self.loss))
+        if self._dashpots is not None:
+            alone, loss = self._without_dashpots, np.diag(self.loss)
+            flexibility = flexibilities(angular, self.squares, alone, loss)
+            terms = self.squares + np.square(angular)[:, None]
+            if (np.abs(flexibility) * terms).max(initial=0.0) < MOST_RESONANT:
+                return ModesWithDashpots(flexibility, angular, self._dashpots)
+        return MixedModes(self.squares, self.damping, self.loss, angular)
+
+    def damp(self, motion: ComplexArray) -> ComplexArray:
+        """C x ``(k, n)``, where damping mixes the modes."""
+        if self._dashpots is None:
+            return np.asarray(motion @ self.damping.T)
+        by_dashpots = (motion @ self._dashpots.T) @ self._dashpots
+        return np.asarray(self._without_dashpots * motion + by_dashpots)
+
+    @property
+    def _without_dashpots(self) -> Array:
+        """Damping of each mode ``(n,)`` by all else."""
+        assert self._dashpots is not None
+        return np.asarray(np.diag(self.damping) - np.square(self._dashpots).sum(axis=0))
 
     def less_damped(self, rate: float) -> Receptance:
         """The structure with C - ``rate`` M [1/s] in the place of its damping."""

@@ -61,22 +61,21 @@ class WaveMotion(SteadyMotion):
     def __init__(self, rest: Receptance, structures: Sequence[Receptance], angular: Array) -> None:
         self.structure, self.angular, self._structures = rest, angular, structures
         self._moving = int(angular[0] == 0.0)
-        moving, turning = structures[self._moving :], angular[self._moving :, None]
-        self._mixed = any(each.damping.ndim == 2 for each in structures)
-        squares = np.array([each.squares for each in moving])
-        stiffness = squares - turning * turning
-        if not self._mixed:
-            damping, loss = (
-                np.array([getattr(each, part) for each in moving]) for part in ("damping", "loss")
-            )
-            self._flexibility = 1.0 / (stiffness + 1j * (turning * damping + loss))
-            return
-        damping, loss = (
-            np.array([_matrix(getattr(each, part)) for each in moving])
-            for part in ("damping", "loss")
-        )
-        inertia = stiffness[:, :, None] * np.eye(squares.shape[1])
-        self._stiffness = inertia + 1j * (turning[:, :, None] * damping + loss)
+        # One at a time: every harmonic has a structure of its own.
+        self._inverses = [
+            structures[row].inverse_at(angular[row : row + 1])
+            for row in range(self._moving, len(structures))
+        ]
+
+    def vibrate(self, force: ComplexArray) -> ComplexArray:
+        response = np.zeros(force.shape, dtype=complex)
+        for row, inverse in enumerate(self._inverses, start=self._moving):
+            response[row] = inverse.times(force[row : row + 1])[0]
+        return response
+
+    def per_force(self, weights: ComplexArray) -> ComplexArray:
+        rows = zip(self._inverses, weights, strict=True)
+        return np.array([inverse.turned(row[None])[0] for inverse, row in rows])
 
     def stiffness_slope(self, motion: ComplexArray) -> ComplexArray:
         slopes = -2.0 * self.angular[:, None] * motion
@@ -91,13 +90,8 @@ class WaveMotion(SteadyMotion):
         between = np.empty((len(self.angular), size, size), dtype=complex)
         if moving:
             between[0] = self.structure.static_flexibility
-        for row, each in enumerate(self._structures[moving:]):
-            on_modes = each.at_joints.conj().T
-            if self._mixed:
-                answered = np.linalg.solve(self._stiffness[row], on_modes)
-            else:
-                answered = self._flexibility[row][:, None] * on_modes
-            between[moving + row] = each.at_joints @ answered
+        for row, inverse in enumerate(self._inverses, start=moving):
+            inverse.between(self._structures[row].at_joints, between[row : row + 1])
         return between
 
 
@@ -134,8 +128,3 @@ class WaveTransfer(HarmonicTransfer):
     def _each(self, amplitudes: ComplexArray, maps: Sequence[ComplexArray]) -> ComplexArray:
         """Amplitudes ``(k, ...)`` of harmonics, each by its own map."""
         return np.array([row @ by for row, by in zip(amplitudes, maps, strict=True)])
-
-
-def _matrix(damping: Array) -> Array:
-    """Damping of modes ``(n, n)``, given so or as its diagonal."""
-    return damping if damping.ndim == 2 else np.diag(damping)

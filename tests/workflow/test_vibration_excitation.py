@@ -116,6 +116,12 @@ def test_engine_orders_tell_speeds(tmp_path):
 ONE = "forces: [{points: m1, amplitude: 1 N}]"
 
 
+OPPOSED = (
+    "{levels: [1], forces: [{points: m1, amplitude: 1 N}, "
+    "{points: m1, amplitude: 1 N, phase: 180 deg}]}"
+)
+
+
 @pytest.mark.parametrize(
     ("settings", "message"),
     [
@@ -161,6 +167,7 @@ ONE = "forces: [{points: m1, amplitude: 1 N}]"
             ],
             "with a displacement of the ground, whose forces change with the frequency; allowed",
         ),
+        (["forces=", f"excitation={OPPOSED}"], "the parts of harmonic 1 cancel each other"),
     ],
 )
 def test_nonsense_is_refused_with_its_place(tmp_path, settings, message):

@@ -75,6 +75,7 @@ def test_figure_has_a_row_for_each_mode(sliding):
         ("modes={numbers: [], amplitudes: [1 um, 5 um]}", "modes.numbers"),
         ("modes={numbers: [0], amplitudes: [1 um, 5 um]}", "modes.numbers"),
         ("modes={amplitudes: [0 um, 5 um]}", "modes.amplitudes"),
+        ("modes={numbers: [9], amplitudes: [1 um, 5 um]}", "modes.numbers: mode 9: the structure"),
     ],
 )
 def test_what_modes_cannot_be(tmp_path, asked, why):

@@ -1,5 +1,7 @@
 """Damping beside that of the modes, against linear algebra and balances of energy."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import scipy.linalg as sl
@@ -8,8 +10,10 @@ from fe_models.dynamics.cycle_energy import damping_ratio, energy_lost
 from fe_models.dynamics.damping import damped, rayleigh_factors
 from fe_models.dynamics.harmonic_balance import HarmonicBalance, PeriodicLoad
 from fe_models.dynamics.harmonics import Resolution
+from fe_models.dynamics.modal_inverse import MixedModes, ModesWithDashpots
 from fe_models.dynamics.newmark import TimeStepControl, integrate
 from fe_models.dynamics.phase_resonance import along_phase_resonance
+from fe_models.dynamics.receptance import Receptance
 from fe_models.dynamics.rig import Link, RigError, lumped_rig, natural_frequencies, unit_force
 from wear.joints.jenkins import Jenkins
 from wear.joints.periodic import PeriodicMarch
@@ -120,3 +124,41 @@ def test_what_cannot_be_is_refused():
         lumped_rig(MASSES, SPRINGS, [[Link("b")]], np.array([0.1, 0.1, 0.1]))
     with pytest.raises(ValueError, match="structural damping is not known in time"):
         integrate(two_masses(loss_factor=0.1), None, None, 0.1, TimeStepControl(1e-3))
+
+
+def test_dashpots_are_taken_apart_from_the_damping_of_modes():
+    """A row of 20 masses with three dashpots: as with the whole matrix, at resonance too."""
+    names = [f"m{number}" for number in range(20)]
+    springs = {Link(name, before): 1e3 for name, before in zip(names, [None, *names], strict=False)}
+    dashpots = {Link("m3"): 0.5, Link("m9", "m4"): 2.0, Link("m19"): 1e3}
+    for ratio in (0.002, 0.0):
+        row = lumped_rig(dict.fromkeys(names, 1e-3), springs, [[Link("m19")]], ratio)
+        natural = natural_frequencies(row)
+        model = damped(row, loss_factor=0.01 * (ratio > 0.0), dashpots=dashpots)
+        apart, whole = Receptance(model), Receptance(replace(model, dashpots=None))
+        force = np.arange(60.0).reshape(3, 20) + 1j
+        # On a natural frequency a mode that nothing else damps cannot be divided by what is left.
+        at_resonance = MixedModes if ratio == 0.0 else ModesWithDashpots
+        for frequency, way in ((17.0, ModesWithDashpots), (natural[2], at_resonance)):
+            angular = 2.0 * np.pi * frequency * np.array([1.0, 3.0, 5.0])
+            assert isinstance(apart.inverse_at(angular), way)
+            assert isinstance(whole.inverse_at(angular), MixedModes)
+            steady, wanted = apart.at(angular), whole.at(angular)
+            response = wanted.vibrate(force)
+            stiffness = np.diag(whole.squares - angular[0] ** 2) + 1j * (
+                angular[0] * whole.damping + whole.loss
+            )
+            np.testing.assert_allclose(stiffness @ response[0], force[0], rtol=1e-9)
+            scale = np.abs(response).max()
+            np.testing.assert_allclose(steady.vibrate(force), response, atol=1e-10 * scale)
+            # Constant forces know no damping: the mean has its own inverse.
+            still, with_mean = np.insert(force, 0, 1.0, axis=0), np.insert(angular, 0, 0.0)
+            np.testing.assert_allclose(whole.at(with_mean).respond(still)[1:], response)
+            alone = whole.at(np.zeros(1)).respond(still[:1])
+            np.testing.assert_allclose(alone[0], 1.0 / whole.squares, rtol=1e-9)
+            between = wanted.between_joints()
+            np.testing.assert_allclose(steady.between_joints(), between, rtol=1e-8)
+            slope = wanted.stiffness_slope(response)
+            np.testing.assert_allclose(
+                steady.stiffness_slope(response), slope, atol=1e-10 * np.abs(slope).max()
+            )

@@ -25,6 +25,9 @@ from workflow.analyses.vibration.excitation import (
 )
 from workflow.errors import UserError
 
+# What forces leave of each other, over all of them, where they cancel: rounding.
+CANCELLED = 1e-12
+
 
 @dataclass(frozen=True)
 class MovingGround:
@@ -78,14 +81,18 @@ def driving_of(case: VibrationCaseBase, rig: RigModel) -> Driving:
 def _driven_by(excitation: VibrationExcitation, rig: RigModel, highest: int) -> Driving:
     size = len(rig.model.mass)
     waves: defaultdict[int, ComplexArray] = defaultdict(lambda: np.zeros(size, dtype=complex))
+    # Of harmonic 1, the parts together, whatever they leave of each other.
+    parts = 0.0
     inertial: defaultdict[int, ComplexArray] = defaultdict(lambda: np.zeros(size, dtype=complex))
     for number, force in enumerate(excitation.forces):
         shape = _shape(rig, force, f"excitation.forces.{number}")
         waves[force.harmonic] += force.wave * shape
+        parts += abs(force.wave) * float(np.linalg.norm(shape)) * (force.harmonic == 1)
     for number, record in enumerate(excitation.records):
         shape = _shape(rig, record, f"excitation.records.{number}")
         for order, wave in waves_of(record, highest):
             waves[order] += wave * shape
+            parts += abs(wave) * float(np.linalg.norm(shape)) * (order == 1)
     ground = []
     for number, motion in enumerate(excitation.base):
         if not rig.translations:
@@ -107,6 +114,11 @@ def _driven_by(excitation: VibrationExcitation, rig: RigModel, highest: int) -> 
         else:
             inertial[motion.harmonic] += wave * along.inertia
         ground.append(MovingGround(motion.harmonic, wave, accelerated, along.rigid))
+    if not excitation.base and float(np.linalg.norm(waves[1])) <= CANCELLED * parts:
+        raise UserError(
+            "excitation: the parts of harmonic 1 cancel each other, and nothing drives at the "
+            "frequency; allowed: parts that leave something of each other"
+        )
     load = PeriodicLoad(dict(waves), inertial=dict(inertial))
     return Driving(load, tuple(ground), LEVEL, tuple(excitation.left_out(highest)))
 

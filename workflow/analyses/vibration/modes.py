@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from fe_models.dynamics.harmonic_balance import HarmonicBalance
+from fe_models.dynamics.harmonics import HarmonicBalanceError
 from fe_models.dynamics.nonlinear_mode import LinearMode, ModeMotion, along_nonlinear_mode
 from sa_solver.steps import Steps
 from wear.joints.periodic import SLIP
@@ -19,7 +20,7 @@ from workflow.analyses.vibration.response import (
     progress_along,
     step_control,
 )
-from workflow.errors import MethodFailed
+from workflow.errors import MethodFailed, UserError
 from workflow.shell.dataset import Dataset
 from workflow.shell.reporter import Reporter
 
@@ -28,6 +29,15 @@ STILL = 1e-6
 # Share of the damping of a mode from which on its error counts: that of a mode with almost none is
 # of no use to anybody.
 LEAST_DAMPING = 1e-4
+
+
+def refuse_missing_modes(case: VibrationCase, model: VibrationModel) -> None:
+    """Refuse the number of a mode that the structure has not, before any curve is followed."""
+    for number in () if case.modes is None else case.modes.numbers:
+        try:
+            LinearMode.of(model.problem, number)
+        except HarmonicBalanceError as error:
+            raise UserError(f"modes.numbers: {error}; allowed: one of these") from error
 
 
 def mode_of(

@@ -17,7 +17,7 @@ from workflow.analyses.vibration.case import VibrationCase
 from workflow.analyses.vibration.further import further_from
 from workflow.analyses.vibration.harmonics import CURVE, harmonics_along, names_of
 from workflow.analyses.vibration.model import VibrationModel
-from workflow.analyses.vibration.modes import mode_of
+from workflow.analyses.vibration.modes import mode_of, refuse_missing_modes
 from workflow.analyses.vibration.outcome import Curves, Response, VibrationOutcome, trend
 from workflow.analyses.vibration.response import backbone_of, force_sweep, response_under
 from workflow.analyses.vibration.results import write_vibration_output
@@ -59,6 +59,7 @@ def _outcome(case: VibrationCase, reporter: Reporter, steps: Steps) -> Vibration
                     "harmonic taken and left out: raise highest, or resolution.harmonics"
                 )
         diameters = model.diameters()
+        refuse_missing_modes(case, model)
         linear = steps("linear limits", lambda: model.linear(case.frequencies))
     responses: list[Response] = []
     backbone = None

@@ -22,8 +22,11 @@ POINT, GROWING_POINT = 5e-3, 3e-2
 # A point of so many unknowns, and the linear limits of so many directions, of joints [s].
 MANY, MANY_UNKNOWNS, MANY_POWER = 0.37, 4000.0, 1.5
 LIMITS, DIRECTIONS, CUBE = 25.0, 363.0, 3
-# Times that of modes that dashpots mix: each harmonic is a solution of all of them.
+# Times that of modes that a damping matrix mixes: each harmonic is a solution of all of them.
 MIXED = 40.0
+# Stability of a point with one joint, and of so many directions of joints of which most slip [s];
+# directions up to which it is found unless the case says otherwise.
+STABILITY, MANY_STABILITY, FEW_DIRECTIONS = 3e-3, 1.2, 12
 # Joints of a reduced body whose points are not counted.
 JOINTS = 100
 
@@ -39,7 +42,7 @@ def run_time(case: VibrationCase) -> RunTime:
         least, largest = case.modes.amplitudes
         curves += len(case.modes.numbers) * log(largest / least)
     points = POINTS * curves + ANSWER * len(case.at) * len(case.amounts)
-    return RunTime(structure_time(case), points * point_time(case))
+    return RunTime(structure_time(case), points * (point_time(case) + stability_time(case)))
 
 
 def structure_time(case: VibrationCaseBase) -> float:
@@ -57,11 +60,20 @@ def structure_time(case: VibrationCaseBase) -> float:
 def point_time(case: VibrationCaseBase) -> float:
     """Of a point of a curve [s]."""
     unknowns = _directions(case) * 2 * len(case.harmonics)
-    damping, mixed = case.structure.damping, 1.0
-    if damping is not None and damping.dashpots and not isinstance(case.structure, Rig):
+    structure, mixed = case.structure, 1.0
+    if isinstance(structure, MatrixBody) and structure.matrices.damping is not None:
         mixed = MIXED
     one = POINT if case.resolution.tolerance is None else GROWING_POINT
     return one + mixed * float(MANY * (unknowns / MANY_UNKNOWNS) ** MANY_POWER)
+
+
+def stability_time(case: VibrationCase) -> float:
+    """Of the stability of a point of a curve [s]."""
+    directions = _directions(case)
+    many = case.stability == "auto" and directions > FEW_DIRECTIONS
+    if case.stability == "none" or many:
+        return 0.0
+    return STABILITY + MANY_STABILITY * (directions - 1) / DIRECTIONS
 
 
 def _directions(case: VibrationCaseBase) -> int:

@@ -24,6 +24,9 @@ from workflow.shell.reporter import Reporter
 CODES = {"stable": 1, "unknown": 0, "unstable": -1}
 # Motions whose stability is found in one step of a run.
 TOGETHER = 20
+# At a fold of the motion itself a multiplier is 1, and passes it: a fold of which neither is true,
+# this far from 1, is of the harmonics that are taken.
+AWAY = 0.1
 
 
 @dataclass(frozen=True)
@@ -76,6 +79,7 @@ def stability_along(
         return tuple(_described(each, amplitude(each.motion), case.amount) for each in found)
 
     bifurcations = steps("bifurcations", find)
+    _warn_of_folds(name, bifurcations, reporter)
     unknown = [at for at in known if at.verdict == "unknown"]
     if len(unknown) == len(known) and known:
         reporter.warn(f"{name}: nothing is said of stability: {unknown[0].message}")
@@ -85,6 +89,22 @@ def stability_along(
         "largest_multiplier": max((at.largest for at in known), default=0.0),
     }
     return CurveStability(_columns(known), numbers, bifurcations)
+
+
+def _warn_of_folds(
+    name: str, bifurcations: Sequence[Mapping[str, Any]], reporter: Reporter
+) -> None:
+    """Warn of folds that more harmonics would not have."""
+    for each in bifurcations:
+        if each["kind"] != "fold" or each["unstable_before"] != each["unstable_after"]:
+            continue
+        multiplier = each["multiplier"] * np.exp(1j * each["multiplier_angle"])
+        if abs(multiplier - 1.0) > AWAY:
+            reporter.warn(
+                f"{name}: the fold at {each['frequency']:.4g} Hz is none of the motion itself, of "
+                f"which no multiplier is near 1 there ({multiplier:.2g}): give more "
+                "resolution.harmonics and resolution.samples"
+            )
 
 
 def _stability_of(floquet: Floquet, motions: tuple[HarmonicSolution, ...]) -> tuple[Stability, ...]:
