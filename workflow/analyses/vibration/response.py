@@ -145,7 +145,7 @@ def response_under(
     # The peak may have been found before the resolution grew.
     problem = branch.problem.refined(peak.resolution)
     resonance = steps("accurate resonance", lambda: accurate(problem, peak, accuracy))
-    _warn_of_stroke(model, told, resonance, reporter)
+    warn_of_stroke(model, f"{told}: at resonance", resonance, reporter)
     found = problem.refined(resonance.resolution)
     response = Response(
         force,
@@ -401,11 +401,11 @@ def _cycle(solution: HarmonicSolution) -> dict[str, Dataset]:
     }
 
 
-def _warn_of_stroke(
+def warn_of_stroke(
     model: VibrationModel, told: str, motion: HarmonicSolution, reporter: Reporter
 ) -> None:
-    """Warn where contacts move further than contacts of fixed pairs of nodes may."""
-    if model.rig.pressing is None:
+    """Warn where contacts move further than contacts of fixed pairs of nodes may, if placed."""
+    if not len(model.rig.places):
         return
     moved = motion.resolution.basis @ motion.coefficients
     stroke, width = (
@@ -414,7 +414,7 @@ def _warn_of_stroke(
     )
     if stroke > LARGE_STROKE * width:
         reporter.warn(
-            f"{told}: at resonance the pads slide over each other by {stroke:.3g} mm, "
+            f"{told} the pads slide over each other by {stroke:.3g} mm, "
             f"more than {LARGE_STROKE:.0%} of their width: that other nodes meet is neglected"
         )
 

@@ -62,9 +62,12 @@ def _pressing(case: ReducedWearCase, rig: RigModel, law: FrictionContact) -> Arr
 
 
 def on_plane(nodes: JointNodes) -> Array:
-    """Places ``(j, 2)`` along the axes across the normal, from their middle; 0 if not known."""
-    if nodes.places is None:
-        return np.zeros((len(nodes.names), 2))
+    """Places ``(j, 2)`` along the axes across the normal, from their middle.
+
+    None ``(0, 2)`` where they are not known, or have several normals.
+    """
+    if nodes.places is None or not nodes.alike:
+        return np.empty((0, 2))
     across = np.flatnonzero(nodes.normals[0] == 0.0)
     places = nodes.places[:, across]
     return np.asarray(places - places.mean(axis=0))

@@ -23,7 +23,7 @@ from workflow.analyses.vibration.case import VibrationCase
 from workflow.analyses.vibration.loops import loop_of
 from workflow.analyses.vibration.model import VibrationModel
 from workflow.analyses.vibration.outcome import Curves
-from workflow.analyses.vibration.response import step_control
+from workflow.analyses.vibration.response import step_control, warn_of_stroke
 from workflow.analyses.vibration_wear.body import body_model
 from workflow.analyses.vibration_wear.case import (
     FrictionRigWearCase,
@@ -115,7 +115,7 @@ def _nodes(rig: RigModel) -> WornNodes:
     bodies = {"normal": Dataset(nodes.normals, "1", "out of body 1, what the joints' points meet")}
     if nodes.places is not None:
         bodies[POSITION] = Dataset(nodes.places, "mm", "of each node, x, y, z")
-        if nodes.alike:
+        if len(rig.places):
             bodies |= _on_plane(rig, "of each node across the normal, from the middle of all")
     return WornNodes(bodies | area, nodes.names)
 
@@ -137,6 +137,7 @@ def _worn_state(
     loop = loop_of(cycle.model, cycle.motion, case.laws[0].normal_load)
     error, responses = responses_to_all(case, cycle.model, cycle.motion, reporter, steps)
     problem, motion = cycle.model.problem, cycle.motion
+    warn_of_stroke(cycle.model, f"{cycles:g} cycles: in the motion that wears", motion, reporter)
     depth = state.surfaces.depth
     numbers: dict[str, Any] = {
         "cycles": cycles,
