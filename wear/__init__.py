@@ -32,8 +32,8 @@ What follows
     - ``ruiz``, ``findley``, ``smith_watson_topper``: where cracks start.
 
 Contacts at nodes are in :mod:`wear.nodes`, joints of vibrating structures in :mod:`wear.joints`,
-wear between two scans in :mod:`wear.scar`. A cylinder of 10 mm that is pressed by 50 N/mm and slides
-40 µm a cycle:
+wear between two scans in :mod:`wear.scar`. A cylinder of 10 mm that is pressed by 50 N/mm and
+slides 40 µm a cycle:
 
 >>> import numpy as np
 >>> from sa_solver import ElasticPair, Grid, LoadHistory, Material
