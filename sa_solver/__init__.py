@@ -26,7 +26,8 @@ What is raised
     - ``InputError``: data without a meaning or a solution.
     - ``ConvergenceError``: a method that did not come to its end.
 
-Closed forms to compare with are in :mod:`sa_solver.reference`. Units are N, mm and MPa; signs are
+Closed forms to compare with are in :mod:`sa_solver.reference`, measured surfaces in
+:mod:`sa_solver.scans`. Units are N, mm and MPa; signs are
 those of :mod:`sa_solver.types`. A sphere on a flat, against Hertz:
 
 >>> from sa_solver import ElasticPair, Grid, HalfSpace, Material, NormalContact

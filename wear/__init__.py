@@ -31,8 +31,9 @@ What follows
     - ``linear_regime``: the rate after running-in, and how far it can be extrapolated.
     - ``ruiz``, ``findley``, ``smith_watson_topper``: where cracks start.
 
-Contacts at nodes are in :mod:`wear.nodes`, joints of vibrating structures in :mod:`wear.joints`. A
-cylinder of 10 mm that is pressed by 50 N/mm and slides 40 µm a cycle:
+Contacts at nodes are in :mod:`wear.nodes`, joints of vibrating structures in :mod:`wear.joints`,
+wear between two scans in :mod:`wear.scar`. A cylinder of 10 mm that is pressed by 50 N/mm and
+slides 40 µm a cycle:
 
 >>> import numpy as np
 >>> from sa_solver import ElasticPair, Grid, LoadHistory, Material

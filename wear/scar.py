@@ -264,7 +264,8 @@ class _Overlay:
                     "more than two thirds look worn, so that no rim tells where the surface was: "
                     "give the worn area, or scans that reach farther"
                 )
-            self.lay(~worn)
+            # The scar hides the roughness that both have in common, until it is left out.
+            (self.align if share or not self.recognised else self.lay)(~worn)
         return worn
 
 

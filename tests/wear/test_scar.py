@@ -28,9 +28,11 @@ def shifted(heights, shift):
     return np.fft.ifft2(np.fft.fft2(heights) * turned).real
 
 
-def scans(seed, cells=80, noise=2e-4, waves=0.0, missing=0.0, roughness=4e-4, most_shift=3.0):
+def scans(
+    seed, cells=80, noise=2e-4, waves=0.0, missing=0.0, roughness=4e-4, most_shift=3.0, size=1.0
+):
     """Before and after a spherical cap of 4 µm; volume of the cap, its disk, and the shift."""
-    rng, grid = np.random.default_rng(seed), Grid.covering((1.0, 1.0), (cells, cells))
+    rng, grid = np.random.default_rng(seed), Grid.covering((size, size), (cells, cells))
     cap = np.maximum(DEEPEST - (grid.x**2 + grid.y**2) / (2.0 * RADIUS), 0.0)
     surface = roughness * rough(rng, cells, 18.0)
     shift = rng.uniform(-most_shift, most_shift, 2)
@@ -61,6 +63,14 @@ def test_a_tilted_scan_with_missing_points_gives_its_volume(given):
     assert got.sure
     # Two scans of such noise, the first smoothed a little where it was moved.
     assert 0.9 < got.noise / (np.sqrt(2.0) * 5e-5) < 1.6
+
+
+def test_a_scar_over_much_of_the_scan_is_found_where_it_hides_the_shift():
+    """Moved by 20 points, which are seen in the rim alone: as with the worn area given."""
+    before, after, volume, _, shift = scans(2, 320, 1e-4, size=0.8, most_shift=20.0)
+    got = measure_scar(before, after)
+    assert abs(got.volume - volume) < got.volume_error < 0.01 * volume
+    np.testing.assert_allclose(got.shift, shift, atol=0.1 * before.pitch[0])
 
 
 def test_no_noise_no_error():
