@@ -31,7 +31,11 @@ from sa_solver.errors import InputError
 from sa_solver.types import Array
 from wear.worn import Spent, State, WearStep, WornState
 
-FIRST_STEP, FIRST_SHARE = 16.0, 0.25
+LAST = 0.5
+"""Length of the last pair of steps over that of the pairs before it. What those miss is pressed away
+by what follows; the pressure at the end shows what the last ones miss."""
+
+FIRST_STEP, FIRST_SHARE = 24.0, 0.5 / (1.0 + LAST)
 """First automatic step over the explicit limit, and its largest share of the run: short enough to
 be accepted at 1 %, if not always, and steps may grow eightfold from one to the next."""
 
@@ -491,5 +495,10 @@ def first_cycles(contact: ComparedContact[Worn], state: Worn, total: float) -> f
 
 
 def in_pairs(longest: float, total: float) -> float:
-    """Cycles of steps, ``longest`` at most, of which an even number makes the ``total``."""
-    return total / (2.0 * float(np.ceil(0.5 * total / longest * (1.0 - ROUNDING))))
+    """Cycles of the next of the fewest pairs of steps, ``longest`` at most, that make the ``total``.
+
+    All are alike but the last pair, which is shorter where that takes no more of them: its steps
+    are :data:`LAST` times as long then, or what is left.
+    """
+    before = float(np.ceil(0.5 * total / longest * (1.0 - ROUNDING))) - 1.0
+    return min(longest, 0.5 * total / (before + LAST)) if before else 0.5 * total

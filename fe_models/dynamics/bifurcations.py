@@ -20,14 +20,12 @@ from typing import Generic, Literal
 import numpy as np
 from scipy.optimize import brentq
 
-from fe_models.dynamics.continuation import ContinuationControl, CurvePoint, Scaling, correct
+from fe_models.dynamics.continuation import ContinuationControl
 from fe_models.dynamics.floquet import Floquet, Stability
-from fe_models.dynamics.harmonic_balance import Balance, HarmonicBalance
+from fe_models.dynamics.followed_curve import Chord, FollowedCurve, Place
 from fe_models.dynamics.harmonic_solution import HarmonicSolution
-from fe_models.dynamics.newton import Equations, L
-from fe_models.dynamics.phase_resonance import PhaseBalance, PhaseResonance
+from fe_models.dynamics.newton import L
 from sa_solver.errors import ConvergenceError
-from sa_solver.types import Array
 
 Kind = Literal["fold", "branching", "period_doubling", "neimark_sacker", "jump"]
 # Share of the way between two points to which a bifurcation is located.
@@ -55,62 +53,6 @@ class Bifurcation:
     unstable: tuple[int, int]
 
 
-@dataclass(frozen=True)
-class FollowedCurve(Generic[L]):
-    """The ``equations`` of a curve of motions of a ``problem``, and how motions are points of it.
-
-    ``unknowns_of`` and ``parameter_of`` a motion; ``motion_of`` unknowns, a parameter and the
-    equations there; steps are shares of what unknowns differ from the ``origin`` ``(n,)``.
-    """
-
-    problem: HarmonicBalance
-    equations: Equations[L]
-    origin: Array
-    unknowns_of: Callable[[HarmonicSolution], Array]
-    parameter_of: Callable[[HarmonicSolution], float]
-    motion_of: Callable[[Array, float, L], HarmonicSolution]
-
-
-def curve_by_frequency(problem: HarmonicBalance, force: float) -> FollowedCurve[Balance]:
-    """Motions under a force, along the frequency."""
-    return FollowedCurve(
-        problem,
-        problem.by_frequency(force),
-        problem.guess(None),
-        problem.guess,
-        lambda motion: motion.frequency,
-        lambda unknowns, frequency, at: problem.describe(unknowns, at, frequency, force),
-    )
-
-
-def curve_by_force(problem: HarmonicBalance, frequency: float) -> FollowedCurve[Balance]:
-    """Motions at a frequency [Hz], along the force."""
-    return FollowedCurve(
-        problem,
-        problem.by_force(frequency),
-        problem.guess(None),
-        problem.guess,
-        lambda motion: motion.force,
-        lambda unknowns, force, at: problem.describe(unknowns, at, frequency, force),
-    )
-
-
-def curve_by_phase(problem: HarmonicBalance, near: HarmonicSolution) -> FollowedCurve[PhaseBalance]:
-    """Phase resonances, along the force; frequencies are counted from that of one of them."""
-    equations = PhaseResonance.near(problem, near)
-
-    def unknowns_of(motion: HarmonicSolution) -> Array:
-        return np.append(problem.guess(motion), equations.place_of(motion.frequency))
-
-    def motion_of(unknowns: Array, force: float, at: PhaseBalance) -> HarmonicSolution:
-        return problem.describe(unknowns[:-1], at.balance, at.frequency, force)
-
-    origin = np.append(problem.guess(None), 0.0)
-    return FollowedCurve(
-        problem, equations, origin, unknowns_of, lambda motion: motion.force, motion_of
-    )
-
-
 def find_bifurcations(
     curve: FollowedCurve[L], motions: Sequence[HarmonicSolution], stability: Sequence[Stability]
 ) -> tuple[Bifurcation, ...]:
@@ -119,7 +61,9 @@ def find_bifurcations(
     Where Newton's method does not find the curve between two points none is told there.
     """
     floquet = Floquet(curve.problem)
-    ways = [Way(curve, *ends, floquet) for ends in pairwise(motions)]
+    places = [curve.coordinates_of(motion) for motion in motions]
+    control = ContinuationControl()
+    ways = [_Way(Chord(curve, *ends, control), floquet) for ends in pairwise(places)]
     folds = {place: fold for place in _turns(curve, motions, ways) if (fold := ways[place].fold())}
     counts: dict[int, tuple[int, int]] = {}
     found = []
@@ -152,7 +96,7 @@ def _changes(stability: Sequence[Stability]) -> Iterator[int]:
 
 
 def _turns(
-    curve: FollowedCurve[L], motions: Sequence[HarmonicSolution], ways: Sequence[Way[L]]
+    curve: FollowedCurve[L], motions: Sequence[HarmonicSolution], ways: Sequence[_Way[L]]
 ) -> Iterator[int]:
     """Points between which and the next the curve turns back in its parameter."""
     steps = np.diff([curve.parameter_of(motion) for motion in motions])
@@ -174,37 +118,22 @@ def _kind_of(multiplier: complex) -> Kind:
     return "period_doubling" if np.pi - angle <= REAL else "neimark_sacker"
 
 
-@dataclass(frozen=True)
-class _Place(Generic[L]):
-    """A point of the curve, the equations there, and its direction along the parameter."""
-
-    point: CurvePoint
-    equations: L
-    turning: float
-
-
 class _Lost(ConvergenceError):
     """Newton's method does not find the curve."""
 
 
-class Way(Generic[L]):
+class _Way(Generic[L]):
     """The way from one motion of a curve to another, by shares of the chord between them."""
 
-    def __init__(
-        self,
-        curve: FollowedCurve[L],
-        start: HarmonicSolution,
-        end: HarmonicSolution,
-        floquet: Floquet,
-    ) -> None:
-        self._curve, self._ends, self._floquet = curve, (start, end), floquet
-        self._places: dict[float, _Place[L] | None] = {}
+    def __init__(self, chord: Chord[L], floquet: Floquet) -> None:
+        self._chord, self._floquet = chord, floquet
+        self._places: dict[float, Place[L] | None] = {}
         self._known: dict[float, Stability] = {}
 
-    def at(self, share: float) -> _Place[L] | None:
-        """The point across the chord at a share of it; None where there is none."""
+    def at(self, share: float) -> Place[L] | None:
+        """The point of the curve across the chord at a share of it; None where there is none."""
         if share not in self._places:
-            self._places[share] = self._found(share)
+            self._places[share] = self._chord.at(share)
         return self._places[share]
 
     def fold(self) -> tuple[HarmonicSolution, complex] | None:
@@ -244,34 +173,15 @@ class Way(Generic[L]):
     def _motion(self, share: float) -> HarmonicSolution:
         place = self._require(share)
         unknowns, parameter = place.point.unknowns, place.point.parameter
-        return self._curve.motion_of(unknowns, parameter, place.equations)
+        return self._chord.curve.motion_of(unknowns, parameter, place.equations)
 
     def _stability(self, share: float) -> Stability:
         if share not in self._known:
             self._known[share] = self._floquet.stability(self._motion(share))
         return self._known[share]
 
-    def _require(self, share: float) -> _Place[L]:
+    def _require(self, share: float) -> Place[L]:
         place = self.at(share)
         if place is None:
             raise _Lost
         return place
-
-    def _found(self, share: float) -> _Place[L] | None:
-        curve = self._curve
-        start, end = (
-            np.append(curve.unknowns_of(motion), curve.parameter_of(motion))
-            for motion in self._ends
-        )
-        chord = end - start
-        # A step as long as the chord, from where it leads to this share of it.
-        begin = start + (share - 1.0) * chord
-        point = CurvePoint(begin[:-1], float(begin[-1]), chord, 1.0, 0, 0, 0.0)
-        scaling = Scaling(abs(float(end[-1])), curve.origin, curve.problem.rounding)
-        scaling.adapt(CurvePoint(start[:-1], float(start[-1]), chord, 1.0, 0, 0, 0.0))
-        step = scaling.scaled(chord)
-        corrected = correct(curve.equations, point, step, scaling, ContinuationControl())
-        if corrected is None:
-            return None
-        new, at, tangent = corrected
-        return _Place(new, at, float(tangent[-1]))

@@ -10,26 +10,23 @@ beyond it, between two points: its farthest point is looked for, on either side 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from dataclasses import replace
+from functools import partial
 from itertools import pairwise
 
 import numpy as np
 from scipy.optimize import brentq, minimize_scalar
 
-from fe_models.dynamics.bordered import Bordered, LinearMap
-from fe_models.dynamics.continuation import ContinuationControl, Scaling
+from fe_models.dynamics.continuation import ContinuationControl
+from fe_models.dynamics.followed_curve import Chord, curve_by_frequency
 from fe_models.dynamics.forced_response import ResponseBranch
-from fe_models.dynamics.harmonic_balance import Balance, HarmonicBalance
+from fe_models.dynamics.harmonic_balance import Balance
 from fe_models.dynamics.harmonic_solution import HarmonicSolution
 from fe_models.dynamics.newton import NewtonControl, NewtonSolution, solve
 from fe_models.dynamics.sizes import norm
 from sa_solver.steps import COMPUTED, Steps
 from sa_solver.types import Array
 
-# Of a chord's length: how far from it a motion between its ends may be. A curve whose tangent turns
-# by 30 degrees in a step is off by a tenth.
-BESIDE = 0.5
 # Of a chord: where a curve crosses a frequency, and where it is farthest.
 SHARE_TOLERANCE, FARTHEST_TOLERANCE = 1e-9, 1e-6
 # Motions that differ by less, as a share of the vibration, are one.
@@ -79,11 +76,10 @@ class _Curve:
     """The points ``(n + 1,)`` of a branch, unknowns and frequency, at its last resolution."""
 
     def __init__(self, branch: ResponseBranch, control: ContinuationControl) -> None:
-        self._problem, self._control = branch.problem, control
-        self._points = [
-            np.append(self._problem.guess(motion), motion.frequency) for motion in branch.solutions
-        ]
-        self._force = branch.solutions[0].force if branch.solutions else 0.0
+        force = branch.solutions[0].force if branch.solutions else 0.0
+        self._problem, self._control, self._force = branch.problem, control, force
+        self._curve = curve_by_frequency(self._problem, force)
+        self._points = [self._curve.coordinates_of(motion) for motion in branch.solutions]
 
     def crossed(self, frequency: float) -> Iterator[tuple[Array, Array]]:
         """Points between which the curve crosses a frequency, in its order."""
@@ -93,7 +89,7 @@ class _Curve:
             if (begin[-1] - frequency) * (end[-1] - frequency) < 0.0:
                 yield begin, end
             elif self._may_turn_beyond(place, frequency):
-                farthest = self._chord(begin, end).farthest(frequency)
+                farthest = _farthest(self._chord(begin, end), frequency)
                 if farthest is not None:
                     yield begin, farthest
                     yield farthest, end
@@ -123,13 +119,12 @@ class _Curve:
         chord = self._chord(begin, end)
         if direct.converged and chord.along(np.append(direct.unknowns, frequency)):
             return direct
-        across = chord.crossing(frequency)
+        across = _crossing(chord, frequency)
         return direct if across is None else self._solve(across, frequency)
 
     def _solve(self, coordinates: Array, frequency: float) -> NewtonSolution[Balance]:
-        equations = self._problem.by_frequency(self._force)
         newton = NewtonControl(self._control.tolerance)
-        return solve(equations, coordinates[:-1], frequency, newton)
+        return solve(self._curve.equations, coordinates[:-1], frequency, newton)
 
     def _may_turn_beyond(self, place: int, frequency: float) -> bool:
         """Whether the curve turns back at an end of a chord, and may have got to a frequency.
@@ -146,109 +141,40 @@ class _Curve:
                 return True
         return False
 
-    def _chord(self, begin: Array, end: Array) -> _Chord:
-        problem = self._problem
-        scaling = Scaling(float(end[-1]), problem.guess(None), problem.rounding)
-        scaling.unknowns = norm(begin[:-1] - problem.guess(None)) or 1.0
-        scaling.parameter = float(begin[-1])
-        return _Chord(problem, self._force, begin, end, scaling, self._control.tolerance)
+    def _chord(self, begin: Array, end: Array) -> Chord[Balance]:
+        return Chord(self._curve, begin, end, self._control)
 
 
-@dataclass(frozen=True)
-class _Across:
-    """A balance and how far it is from a plane: equations for unknowns and frequency.
+def _crossing(chord: Chord[Balance], frequency: float) -> Array | None:
+    """Where a curve crosses a frequency that lies between those of a chord's ends, if found."""
 
-    ``left`` [mm] is the distance, ``row`` ``(n + 1,)`` its derivative, ``unit`` the size by which
-    it counts.
-    """
+    def beyond(share: float) -> float:
+        return _frequency(chord, share) - frequency
 
-    balance: Balance
-    left: float
-    row: Array
-    unit: float
-
-    @cached_property
-    def residual(self) -> Array:
-        return np.append(self.balance.residual, self.left)
-
-    @cached_property
-    def jacobian(self) -> Array | LinearMap:
-        bordered = Bordered(self.balance.jacobian, self.balance.slope, self.row)
-        return bordered.assembled() if isinstance(bordered.inner, np.ndarray) else bordered
-
-    @property
-    def slope(self) -> Array:
-        """By the share of the chord: not asked for."""
-        raise NotImplementedError
-
-    @property
-    def size(self) -> float:
-        return self.balance.size
-
-    @property
-    def relative(self) -> float:
-        return float(np.hypot(self.balance.relative, self.left / self.unit))
+    ends = beyond(0.0), beyond(1.0)
+    if not ends[0] * ends[1] < 0.0:
+        return None
+    share = brentq(beyond, 0.0, 1.0, xtol=SHARE_TOLERANCE, disp=False)
+    found = chord.at(float(share))
+    return None if found is None else found.point.coordinates
 
 
-@dataclass(frozen=True)
-class _Chord:
-    """Two points of a curve, measured by a ``scaling``, and what of the curve is between them."""
+def _farthest(chord: Chord[Balance], frequency: float) -> Array | None:
+    """The point in which a curve turns back beyond a frequency, if it gets there."""
+    sense = float(np.sign(frequency - chord.begin[-1]))
 
-    problem: HarmonicBalance
-    force: float
-    begin: Array
-    end: Array
-    scaling: Scaling
-    tolerance: float
+    def nearness(share: float) -> float:
+        far = sense * _frequency(chord, share)
+        return -far if np.isfinite(far) else np.inf
 
-    @cached_property
-    def _way(self) -> Array:
-        return self.scaling.scaled(self.end - self.begin)
+    search = minimize_scalar(
+        nearness, bounds=(0.0, 1.0), method="bounded", options={"xatol": FARTHEST_TOLERANCE}
+    )
+    found = chord.at(float(search.x)) if -search.fun > sense * frequency else None
+    return None if found is None else found.point.coordinates
 
-    def along(self, coordinates: Array) -> bool:
-        """Whether a point lies beside the chord, between its ends."""
-        way, length = self.scaling.scaled(coordinates - self.begin), norm(self._way)
-        share = float(way @ self._way) / length**2
-        return 0.0 <= share <= 1.0 and norm(way - share * self._way) <= BESIDE * length
 
-    def __call__(self, unknowns: Array, parameter: float) -> _Across:
-        """The equations at a point, for the plane at a share of the chord."""
-        unit, direction = self.scaling.unknowns, self._way / norm(self._way)
-        frequency = float(unknowns[-1])
-        balance = self.problem.evaluate(unknowns[:-1], frequency, self.force, "frequency")
-        on_the_way = self.scaling.scaled(unknowns - self.begin) - parameter * self._way
-        row = direction.copy()
-        row[-1] *= unit / self.scaling.parameter
-        return _Across(balance, unit * float(direction @ on_the_way), row, unit)
-
-    def at(self, share: float) -> Array:
-        """The point ``(n + 1,)`` of the curve at a share of the chord; NaN if it is not found."""
-        guess = self.begin + share * (self.end - self.begin)
-        solution = solve(self, guess, share, NewtonControl(self.tolerance))
-        return solution.unknowns if solution.converged else np.full_like(guess, np.nan)
-
-    def crossing(self, frequency: float) -> Array | None:
-        """Where the curve crosses a frequency that lies between those of the ends, if found."""
-
-        def beyond(share: float) -> float:
-            return float(self.at(share)[-1]) - frequency
-
-        ends = beyond(0.0), beyond(1.0)
-        if not ends[0] * ends[1] < 0.0:
-            return None
-        share = brentq(beyond, 0.0, 1.0, xtol=SHARE_TOLERANCE, disp=False)
-        found = self.at(float(share))
-        return found if np.isfinite(found).all() else None
-
-    def farthest(self, frequency: float) -> Array | None:
-        """The point in which the curve turns back beyond a frequency, if it gets there."""
-        sense = float(np.sign(frequency - self.begin[-1]))
-
-        def nearness(share: float) -> float:
-            far = sense * float(self.at(share)[-1])
-            return -far if np.isfinite(far) else np.inf
-
-        search = minimize_scalar(
-            nearness, bounds=(0.0, 1.0), method="bounded", options={"xatol": FARTHEST_TOLERANCE}
-        )
-        return self.at(float(search.x)) if -search.fun > sense * frequency else None
+def _frequency(chord: Chord[Balance], share: float) -> float:
+    """That of the curve across a chord; NaN where it is not found."""
+    found = chord.at(share)
+    return np.nan if found is None else found.point.parameter

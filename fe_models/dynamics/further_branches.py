@@ -15,7 +15,6 @@ from itertools import pairwise
 
 import numpy as np
 
-from fe_models.dynamics.bifurcations import Way, curve_by_frequency
 from fe_models.dynamics.continuation import (
     ContinuationControl,
     CurvePoint,
@@ -23,7 +22,7 @@ from fe_models.dynamics.continuation import (
     first_point,
     follow,
 )
-from fe_models.dynamics.floquet import Floquet
+from fe_models.dynamics.followed_curve import Chord, curve_by_frequency
 from fe_models.dynamics.forced_response import Accuracy, Along, BranchRecorder, Motions
 from fe_models.dynamics.harmonic_balance import Balance, HarmonicBalance
 from fe_models.dynamics.harmonic_solution import HarmonicSolution
@@ -205,30 +204,21 @@ def _passes(
     problem: HarmonicBalance, motions: Sequence[HarmonicSolution], motion: HarmonicSolution
 ) -> bool:
     """Whether a curve of motions passes a motion: the point of it that is nearest is the motion."""
-    curve, floquet = curve_by_frequency(problem, motion.force), Floquet(problem)
-    at = _coordinates(problem, motion)
-    places = [_coordinates(problem, each) for each in motions]
+    curve, control = curve_by_frequency(problem, motion.force), ContinuationControl()
+    at = curve.coordinates_of(motion)
+    places = [curve.coordinates_of(each) for each in motions]
     # Shares of the motion's unknowns and of its frequency count alike.
     scale = np.full(len(at), 1.0 / (problem.vibration(motion.coefficients) or 1.0))
     scale[-1] = 1.0 / motion.frequency
-    for number, (start, end) in enumerate(pairwise(places)):
+    for start, end in pairwise(places):
         chord, beyond = scale * (end - start), scale * (at - start)
         share = float(beyond @ chord) / (float(chord @ chord) or 1.0)
         away = np.linalg.norm(beyond - share * chord)
         if 0.0 <= share <= 1.0 and away <= NEARBY * np.linalg.norm(chord):
-            way = Way(curve, motions[number], motions[number + 1], floquet)
-            place = way.at(share)
-            if place is None:
-                return True
-            point = np.append(place.point.unknowns, place.point.parameter)
-            if _apart(problem, point, at, motion) <= SAME:
+            place = Chord(curve, start, end, control).at(share)
+            if place is None or _apart(problem, place.point.coordinates, at, motion) <= SAME:
                 return True
     return any(_apart(problem, end, at, motion) <= SAME for end in (places[0], places[-1]))
-
-
-def _coordinates(problem: HarmonicBalance, motion: HarmonicSolution) -> Array:
-    """Unknowns and frequency ``(n + 1,)``."""
-    return np.append(problem.guess(motion), motion.frequency)
 
 
 def _apart(problem: HarmonicBalance, one: Array, other: Array, motion: HarmonicSolution) -> float:

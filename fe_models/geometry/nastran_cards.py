@@ -20,6 +20,12 @@ INCLUDE, END = "INCLUDE", "ENDDATA"
 BARE_EXPONENT = re.compile(r"(?<=[\d.])([+-]\d+)$")
 
 
+def fortran_real(text: str) -> float:
+    """A number as Fortran writes it: 1.5D-3, 1.5-3, 0.5-101. Raises ``ValueError``."""
+    plain = text.strip().upper().replace("D", "E")
+    return float(plain if "E" in plain else BARE_EXPONENT.sub(r"E\1", plain))
+
+
 @dataclass
 class Entry:
     """A bulk data entry: its name, its fields without the continuation marks, and its line."""
@@ -41,12 +47,10 @@ class Entry:
 
     def real(self, index: int) -> float:
         """A field that is a number; an empty one is 0. Raises :class:`MeshError`."""
-        text = self.text(index).upper().replace("D", "E")
+        text = self.text(index)
         try:
-            return float(BARE_EXPONENT.sub(r"E\1", text) if "E" not in text else text or 0.0)
+            return fortran_real(text) if text else 0.0
         except ValueError:
-            if not text:
-                return 0.0
             raise self.wrong(f"{self.text(index)!r} is no number") from None
 
     def wrong(self, what: str) -> MeshError:

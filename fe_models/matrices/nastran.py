@@ -16,7 +16,14 @@ import numpy as np
 import scipy.sparse as sp
 
 from fe_models.geometry.nastran_cards import Entry, bulk_data
-from fe_models.matrices.unknowns import MatrixError, MatrixFile, Unknown, Values, by_number
+from fe_models.matrices.unknowns import (
+    MatrixError,
+    MatrixFile,
+    Unknown,
+    Values,
+    by_number,
+    mirrored,
+)
 from fe_models.mesh import MeshError
 
 DMIG = "DMIG"
@@ -113,8 +120,7 @@ class _Dmig:
         matrix = sp.coo_matrix((given, (rows, columns)), shape=(size, width))
         if self.form != SYMMETRIC:
             return matrix.toarray() if self.form in RECTANGULAR else matrix.tocsr()
-        # Either triangle may have an entry.
-        return (matrix + matrix.T - sp.diags(matrix.diagonal())).tocsr()
+        return mirrored(matrix)
 
 
 def _label(entry: Entry, first: int) -> Label:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -11,6 +10,7 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 import scipy.sparse as sp
 
+from fe_models.geometry.nastran_cards import fortran_real
 from sa_solver.errors import InputError
 from sa_solver.types import Array
 
@@ -18,8 +18,6 @@ TRANSLATIONS, ROTATIONS, MODAL = ("x", "y", "z"), ("rx", "ry", "rz"), "modal"
 # Those that nodes have by their numbers 1 to 6, in Abaqus and in Nastran.
 BY_NUMBER = (*TRANSLATIONS, *ROTATIONS)
 DIRECTIONS = (*BY_NUMBER, MODAL)
-# Fortran leaves the letter out where an exponent has three digits: 0.5-101.
-BARE_EXPONENT = re.compile(r"(?<=[\d.])([+-]\d+)$")
 
 Values: TypeAlias = Array | sp.csr_matrix
 
@@ -114,9 +112,8 @@ def once(place: object, unknowns: Sequence[Unknown]) -> tuple[Unknown, ...]:
 
 def number(place: object, text: str) -> float:
     """A number as Fortran writes it. Raises :class:`MatrixError`."""
-    plain = text.strip().upper().replace("D", "E")
     try:
-        value = float(plain if "E" in plain else BARE_EXPONENT.sub(r"E\1", plain))
+        value = fortran_real(text)
     except ValueError:
         raise MatrixError(f"{place}: {text.strip()!r} is no number; allowed: numbers") from None
     if not np.isfinite(value):
@@ -134,7 +131,7 @@ def whole(place: object, text: str) -> int:
         ) from None
 
 
-def mirrored(lower: sp.coo_matrix) -> sp.csr_matrix:
-    """A symmetric matrix of one of its triangles."""
-    whole_matrix = lower + lower.T
-    return (whole_matrix - sp.diags(lower.diagonal())).tocsr()
+def mirrored(given: sp.coo_matrix) -> sp.csr_matrix:
+    """A symmetric matrix of entries in either triangle, of each pair one."""
+    both = given + given.T
+    return (both - sp.diags(given.diagonal())).tocsr()

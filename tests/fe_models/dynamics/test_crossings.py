@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from fe_models.dynamics import crossings
 from fe_models.dynamics.crossings import motions_at
+from fe_models.dynamics.followed_curve import Chord
 from fe_models.dynamics.forced_response import along_frequency
 from fe_models.dynamics.harmonic_balance import HarmonicBalance, PeriodicLoad
 from fe_models.dynamics.harmonics import Resolution
@@ -80,7 +80,7 @@ def test_folds_between_points_are_not_missed(branch):
 
 def test_where_newton_alone_goes_astray_the_chord_leads(branch, monkeypatch):
     """Nothing that Newton's method finds at once is believed: planes across the chord cut it."""
-    monkeypatch.setattr(crossings._Chord, "along", lambda self, coordinates: False)
+    monkeypatch.setattr(Chord, "along", lambda self, coordinates: False)
     np.testing.assert_allclose(np.sort(sizes(branch, 190.0)), amplitudes(190.0), rtol=1e-9)
 
 

@@ -7,10 +7,11 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from fe_models.dynamics import floquet
-from fe_models.dynamics.bifurcations import curve_by_force, curve_by_frequency, find_bifurcations
+from fe_models.dynamics.bifurcations import find_bifurcations
 from fe_models.dynamics.continuation import ContinuationControl
 from fe_models.dynamics.excitation import CombinedForces, ConstantForce, HarmonicForce
 from fe_models.dynamics.floquet import Floquet
+from fe_models.dynamics.followed_curve import curve_by_force, curve_by_frequency
 from fe_models.dynamics.forced_response import along_force, along_frequency
 from fe_models.dynamics.further_branches import further_branches, vibrating_starts
 from fe_models.dynamics.harmonic_balance import HarmonicBalance, PeriodicLoad

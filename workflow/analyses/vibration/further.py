@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from fe_models.dynamics.bifurcations import curve_by_frequency
+from fe_models.dynamics.followed_curve import curve_by_frequency
 from fe_models.dynamics.forced_response import ResponseBranch
 from fe_models.dynamics.further_branches import (
     FurtherBranch,

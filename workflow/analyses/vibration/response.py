@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 from scipy.optimize import minimize_scalar
 
-from fe_models.dynamics.bifurcations import curve_by_force, curve_by_frequency, curve_by_phase
 from fe_models.dynamics.continuation import ContinuationControl
 from fe_models.dynamics.cycle_energy import damping_ratio
+from fe_models.dynamics.followed_curve import curve_by_force, curve_by_frequency, curve_by_phase
 from fe_models.dynamics.forced_response import (
     Accuracy,
     ResponseBranch,

@@ -9,8 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from fe_models.dynamics.bifurcations import Bifurcation, FollowedCurve, find_bifurcations
+from fe_models.dynamics.bifurcations import Bifurcation, find_bifurcations
 from fe_models.dynamics.floquet import Floquet, Stability
+from fe_models.dynamics.followed_curve import FollowedCurve
 from fe_models.dynamics.harmonic_solution import HarmonicSolution
 from sa_solver.steps import Steps
 from workflow.analyses.vibration.case import VibrationCase
