@@ -8,7 +8,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from fe_models.dynamics import harmonic_balance, harmonic_jacobian, receptance
+from fe_models.dynamics import harmonic_balance, harmonic_jacobian, modal_inverse
 from fe_models.dynamics.cycle_energy import energy_lost
 from fe_models.dynamics.excitation import HarmonicForce
 from fe_models.dynamics.forced_response import Accuracy, along_force, along_frequency
@@ -218,7 +218,7 @@ def test_loops_over_few_modes_and_joints_are_the_products_of_many(monkeypatch, h
     found = []
     for few in (harmonic_jacobian.FEW, -1):
         monkeypatch.setattr(harmonic_jacobian, "FEW", few)
-        monkeypatch.setattr(receptance, "FEW", few)
+        monkeypatch.setattr(modal_inverse, "FEW", few)
         problem = balance(model, PeriodicMarch(law), harmonics, 64, load)
         unknowns = np.random.default_rng(5).standard_normal(problem.size) * 0.02
         at = problem.evaluate(unknowns, 30.0, 2.0, "frequency")
