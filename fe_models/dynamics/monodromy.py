@@ -228,17 +228,25 @@ def _coupled(compliance: Array, slopes: Array, matrix: Array) -> Array:
 
 
 @njit(cache=True, nogil=True)
+def _pivot(matrix: Array, column: int) -> int:
+    """Row of the largest entry of a column, from the diagonal down."""
+    largest = column
+    for row in range(column + 1, len(matrix)):
+        if abs(matrix[row, column]) > abs(matrix[largest, column]):
+            largest = row
+    return largest
+
+
+@njit(cache=True, nogil=True)
 def _solve(matrix: Array, rhs: Array) -> None:
     """Make of ``rhs`` matrix⁻¹ rhs; the matrix may be overwritten."""
     size = len(matrix)
     if size > FEW:
-        _copy(np.linalg.solve(matrix, rhs), rhs)
+        solution: Array = np.linalg.solve(matrix, rhs)
+        _copy(solution, rhs)
         return
     for column in range(size):
-        pivot = column
-        for row in range(column + 1, size):
-            if abs(matrix[row, column]) > abs(matrix[pivot, column]):
-                pivot = row
+        pivot = _pivot(matrix, column)
         for c in range(size):
             matrix[column, c], matrix[pivot, c] = matrix[pivot, c], matrix[column, c]
         for c in range(rhs.shape[1]):
