@@ -113,7 +113,7 @@ def monodromy(structure: StructureSteps, joints: JointSteps) -> Array:
 
 
 @njit(cache=True, nogil=True)
-def _copy(rows: Array, to: Array) -> None:
+def _copy(rows: np.ndarray, to: Array) -> None:
     """Write rows as others: by numbers, which takes far less time to compile than as a whole."""
     for row in range(rows.shape[0]):
         for c in range(rows.shape[1]):
@@ -242,8 +242,7 @@ def _solve(matrix: Array, rhs: Array) -> None:
     """Make of ``rhs`` matrix⁻¹ rhs; the matrix may be overwritten."""
     size = len(matrix)
     if size > FEW:
-        solution: Array = np.linalg.solve(matrix, rhs)
-        _copy(solution, rhs)
+        _copy(np.linalg.solve(matrix, rhs), rhs)
         return
     for column in range(size):
         pivot = _pivot(matrix, column)
