@@ -100,8 +100,10 @@ class MixedModes:
         ]
 
     def times(self, force: ComplexArray) -> ComplexArray:
-        sides = zip(self._factors, force, strict=True)
-        return np.array([_solved(factors, side) for factors, side in sides])
+        response = np.empty(force.shape, dtype=complex)
+        for factors, side, at in zip(self._factors, force, response, strict=True):
+            at[:] = _solved(factors, side)
+        return response
 
     def turned(self, weights: ComplexArray) -> ComplexArray:
         sides = zip(self._factors, weights, strict=True)

@@ -113,7 +113,7 @@ def monodromy(structure: StructureSteps, joints: JointSteps) -> Array:
 
 
 @njit(cache=True, nogil=True)
-def _copy(rows: Array, to: Array) -> None:
+def _copy(rows: np.ndarray, to: Array) -> None:
     """Write rows as others: by numbers, which takes far less time to compile than as a whole."""
     for row in range(rows.shape[0]):
         for c in range(rows.shape[1]):
@@ -228,17 +228,24 @@ def _coupled(compliance: Array, slopes: Array, matrix: Array) -> Array:
 
 
 @njit(cache=True, nogil=True)
+def _pivot(matrix: Array, column: int) -> int:
+    """Row of the largest entry of a column, from the diagonal down."""
+    largest = column
+    for row in range(column + 1, len(matrix)):
+        if abs(matrix[row, column]) > abs(matrix[largest, column]):
+            largest = row
+    return largest
+
+
+@njit(cache=True, nogil=True)
 def _solve(matrix: Array, rhs: Array) -> None:
     """Make of ``rhs`` matrix⁻¹ rhs; the matrix may be overwritten."""
     size = len(matrix)
     if size > FEW:
-        rhs[:] = np.linalg.solve(matrix, rhs)
+        _copy(np.linalg.solve(matrix, rhs), rhs)
         return
     for column in range(size):
-        pivot = column
-        for row in range(column + 1, size):
-            if abs(matrix[row, column]) > abs(matrix[pivot, column]):
-                pivot = row
+        pivot = _pivot(matrix, column)
         inverse = 1.0 / matrix[pivot, column]
         _lift(matrix, pivot, column, inverse)
         _lift(rhs, pivot, column, inverse)
