@@ -138,7 +138,8 @@ def flexibilities(angular: Array, squares: Array, damping: Array, loss: Array) -
         for n in range(len(squares)):
             lagging = angular[k] * damping[n] + loss[n]
             stiffness = complex(squares[n] - angular[k] * angular[k], lagging)
-            flexibilities[k, n] = 1.0 / stiffness
+            # None without damping at a natural frequency: whoever solves with it sees that.
+            flexibilities[k, n] = 1.0 / stiffness if stiffness != 0.0 else complex(np.inf, 0.0)
     return flexibilities
 
 

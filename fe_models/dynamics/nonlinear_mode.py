@@ -34,6 +34,9 @@ from fe_models.dynamics.resolution_error import richer_problem
 from sa_solver.steps import COMPUTED, Steps
 from sa_solver.types import Array
 
+# Share of its frequency by which a linear mode is left to begin with: with joints of no stiffness
+# it is that of the structure alone, whose flexibility is not finite there.
+BESIDE = 1e-4
 # Frequencies are looked for up to this factor from the linear mode's, and damping ratios up to it.
 FARTHEST, MOST_DAMPED = 1e3, 10.0
 
@@ -345,7 +348,7 @@ def _beginning(
     reference = problem.alone.at_points.T @ problem.model.mass @ linear.shape
     scale = float(np.linalg.norm(moved)) or 1.0
     equations = NonlinearMode(problem, reference + 0j, linear.frequency, scale)
-    return np.append(unknowns, [0.0, scale * linear.damping_ratio]), equations
+    return np.append(unknowns, [scale * BESIDE, scale * linear.damping_ratio]), equations
 
 
 def _first(

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.special import ellipk
 
 from fe_models.dynamics.continuation import ContinuationControl
 from fe_models.dynamics.cycle_energy import energy_lost
@@ -19,6 +20,7 @@ from fe_models.dynamics.rig import Link, lumped_rig, unit_force
 from tests.fe_models.dynamics.harmonic_rigs import KT, LOAD, MU, REACH, balance, rig
 from tests.fe_models.dynamics.test_phase_resonance import block_problem
 from tests.oracles.event_driven import SliderJoints, integrate_exactly
+from wear.joints.elastic import PolynomialSpring
 from wear.joints.jenkins import Jenkins
 from wear.joints.periodic import PeriodicMarch
 
@@ -176,3 +178,18 @@ def test_amplitudes_must_ascend(ends):
 def test_modes_that_are_not_there():
     with pytest.raises(HarmonicBalanceError, match="has 1 to 1"):
         LinearMode.of(oscillator(), 2)
+
+
+def test_mode_of_duffing_is_the_free_vibration_of_elliptic_functions():
+    """x'' + x + x³ = 0 has the period 4 K(m) / √(1 + A²), m = A² / (2 + 2 A²), at amplitude A; the
+    joint has no stiffness at rest, and the mode begins where the structure alone has none."""
+    model = lumped_rig({"m": 1.0}, {Link("m"): 1.0}, [[Link("m")]], 0.01)
+    load = PeriodicLoad({1: unit_force(model, "m")})
+    spring = PeriodicMarch(PolynomialSpring(0.0, cubic=1.0))
+    problem = HarmonicBalance(model, spring, load, Resolution(tuple(range(1, 22, 2)), 256))
+    branch = along_nonlinear_mode(problem, LinearMode.of(problem, 1), (0.05, 4.0))
+    assert branch.message == ""
+    for mode in branch.motions:
+        squared = np.abs(mode.solution.displacement(1024)).max() ** 2
+        period = 4.0 * ellipk(squared / (2.0 + 2.0 * squared)) / np.sqrt(1.0 + squared)
+        assert mode.solution.frequency * period == pytest.approx(1.0, abs=1e-9)
