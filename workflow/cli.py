@@ -18,6 +18,7 @@ from click.shell_completion import CompletionItem
 
 from workflow import errors
 from workflow.commands.group import OneLineGroup
+from workflow.measurements import fit, loops, scar
 
 if TYPE_CHECKING:
     from workflow.shell.screen import Loudness
@@ -309,78 +310,6 @@ def resultants(case: str, out: Path, overrides: tuple[str, ...], force: bool) ->
 
 
 @cli.command()
-@click.argument("file", type=click.Path(path_type=Path))
-@click.option("--out", type=click.Path(path_type=Path), help="Folder for a table and a figure.")
-@click.option("--normal-load", metavar="FORCE", help="Such as '60 N', if FILE has no column of it.")
-@click.option("--column", "columns", multiple=True, metavar="KEY=NAME", help="Another heading.")
-@click.option("--force", is_flag=True, help="Overwrite what is there.")
-def loops(
-    file: Path, out: Path | None, normal_load: str | None, columns: tuple[str, ...], force: bool
-) -> None:
-    """Measure hysteresis loops in FILE.
-
-    Tells friction, stiffness and energy of each of them.
-
-    FILE is CSV with headings such as `displacement [um], force [N]`, and `time [s]` where samples
-    are not evenly spaced, and `normal_load [N]` where it is known.
-    """
-    from workflow.commands.loops import loops_of_file, report, write_loops
-
-    measured = loops_of_file(file, columns, normal_load)
-    for line in report(measured):
-        click.echo(line)
-    if out is not None:
-        for path in write_loops(measured, out, file.name, force):
-            click.echo(path)
-
-
-@cli.command()
-@click.argument("file", metavar="FIT", type=click.Path(path_type=Path))
-@click.option("--out", type=click.Path(path_type=Path), help="Folder for section and figure.")
-@click.option("--force", is_flag=True, help="Overwrite what is there.")
-def fit(file: Path, out: Path | None, force: bool) -> None:
-    """Find parameters of a case from measurements.
-
-    FIT is a YAML file that names tables of measurements and what is free: `fretscale new` writes
-    fit_joint, fit_loops and fit_wear. Tells values with their standard deviations and 95 % bounds,
-    what the data do not determine, and what speaks against the fit; with --out writes the section
-    of a case.
-    """
-    from workflow.fit.fitting import run_fit
-    from workflow.fit.report import report
-    from workflow.fit.running import write_fit
-    from workflow.fit.schema import load_fit
-
-    fitted = run_fit(load_fit(file))
-    for line in report(fitted):
-        click.echo(line)
-    if out is not None:
-        for path in write_fit(fitted, out, force):
-            click.echo(path)
-
-
-@cli.command()
-@click.argument("before", type=click.Path(path_type=Path))
-@click.argument("after", type=click.Path(path_type=Path))
-@click.option("--worn", metavar="RECTANGLE", help="Where, from the middle: XMIN,XMAX,YMIN,YMAX.")
-@click.option("--bare", nargs=3, metavar="UNIT DX DY", help="Of scans that do not say theirs.")
-@click.option("--out", type=click.Path(path_type=Path), help="Folder for table, map and figure.")
-@click.option("--force", is_flag=True, help="Overwrite what is there.")
-def scar(before: Path, after: Path, out: Path | None, force: bool, **given: Any) -> None:
-    """Measure the wear between the scans BEFORE and AFTER.
-
-    Tells depth and volume with 95 % bounds; the scans are laid over each other by what is not worn.
-    """
-    from workflow.commands.scar import report, scar_of_files, write_scar
-
-    measured = scar_of_files(before, after, **given)
-    for line in report(measured):
-        click.echo(line)
-    for path in [] if out is None else write_scar(measured, out, after.name, force):
-        click.echo(path)
-
-
-@cli.command()
 @click.argument("folder", type=click.Path(exists=True, file_okay=False, path_type=Path))
 @click.argument("file", type=click.Path(path_type=Path))
 @click.option("--body", type=click.Choice(["1", "2"]), required=True, help="The lower is 1.")
@@ -510,6 +439,10 @@ def schema() -> None:
 
     made = json_schema({SWEEP: (AnySweepFile, ABOUT), **FITS})
     click.echo(json.dumps(made, indent=1, allow_nan=False, ensure_ascii=False))
+
+
+for _command in (loops, scar, fit):
+    cli.add_command(_command)
 
 
 def main() -> None:

@@ -49,7 +49,8 @@ def frictional_error(contact, before, height, state, load):
     limit = contact.friction * pressure
     size, amount = np.hypot(*shear), np.hypot(*slip)
     depth = moved[2].max()
-    reach = max(np.hypot(*moved[:2]).max(), SMALLEST * depth)
+    # That of the increment, which tolerances are shares of.
+    reach = max(np.hypot(*(moved - before.displacement)[:2]).max(), SMALLEST * depth)
     slipping = size >= limit * (1.0 - 1e-6)
     stuck = (pressure > 0.0) & ~slipping
     opposed = (np.sum(shear * slip, axis=0) + size * amount)[slipping]

@@ -374,7 +374,8 @@ class Leaf:
         if self.key.startswith("structure.joints.") and "rig" in self.tags:
             joints = [IN_A_ROW[tag] for tag in (*self.tags, ALWAYS) if tag in IN_A_ROW]
             overrides.append(f"structure.joints={joints[0]}")
-        if "friction_contact" in self.tags:
+        # What wears stands alone: laws of its own are refused.
+        if "friction_contact" in self.tags and self.kind != "reduced_wear":
             own = self.key.startswith("structure.")
             overrides.append(f"structure={OWN_ON_BODY if own else REDUCED}")
         if "friction_rig" in self.tags:

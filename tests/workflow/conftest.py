@@ -305,6 +305,7 @@ def template_files(tmp_path_factory: pytest.TempPathFactory) -> Path:
         (folder / f"nodes_{body}.csv").write_text(NODES, encoding="utf-8")
     for name in ("specimens_wear.yaml", "specimens_rig.yaml"):
         shutil.copy(CASES / name, folder)
+    save_reduced(folder / "body_2.h5", BODY)
     return folder
 
 
@@ -323,7 +324,6 @@ def folders(tmp_path_factory: pytest.TempPathFactory, template_files: Path) -> d
         period = "phase [deg],force\n0,0\n90,5\n270,-5\n360,0\n"
         (made[kind] / "period.csv").write_text(period, encoding="utf-8")
         shutil.copy(CASES / "specimens_coarse.yaml", made[kind] / "specimens.yaml")
-        save_reduced(made[kind] / "body_2.h5", BODY)
         write_matrices_of_templates(made[kind])
         (made[kind] / "nodes.csv").write_text("point,area\npad 1,1\npad 2,1\n", encoding="utf-8")
         (made[kind] / "loops.csv").write_text("energy,P,kt,mu\n0,1,1,1\n", encoding="utf-8")
