@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from scipy.special import mathieu_a, mathieu_b
 
 from fe_models.dynamics import floquet
 from fe_models.dynamics.bifurcations import find_bifurcations
@@ -103,6 +104,29 @@ def test_duffing_against_shooting_and_liouville(folded):
         lost = np.exp(-DAMPING / motion.frequency)
         assert abs(np.prod(told.multipliers)) == pytest.approx(lost, rel=1e-4)
         assert (told.verdict == "stable") == (abs(wanted[0]) < 1.0)
+
+
+@pytest.mark.parametrize(
+    ("value", "share"), [(mathieu_b, 0.2), (mathieu_a, 0.2), (mathieu_b, 1.0), (mathieu_a, 1.0)]
+)
+def test_duffing_in_one_harmonic_against_mathieu(value, share):
+    """Deviations from A cos ωt obey Mathieu's equation, whose characteristic values are known.
+
+    With τ = ωt and damping taken off, δ'' + (v + 2p cos 2τ) δ = 0, p = 3 A² / (4 ω²): on the border
+    v of stability both multipliers of a period are 1, and one is beyond 1 on one side of it.
+    """
+    border = value(1 if share < 1.0 else 2, share)
+    omega = np.sqrt((1.0 - 0.25 * DAMPING**2) / (border - 2.0 * share))
+    problem, traces = oscillator(PolynomialSpring(0.0, cubic=1.0), (1,), samples=512), []
+    for further in (0.99, 1.0, 1.01):
+        size = np.array([omega * further * np.sqrt(share / 0.75), 0.0])
+        frequency = omega * further / TURN
+        at = problem.evaluate(size, frequency, 0.3, "frequency")
+        motion = problem.describe(size, at, frequency, 0.3)
+        multipliers = Floquet(problem).stability(motion).multipliers
+        traces.append(np.sum(multipliers).real * np.exp(0.5 * DAMPING / frequency))
+    assert traces[1] == pytest.approx(2.0, abs=2e-4)
+    assert (traces[0] - 2.0) * (traces[2] - 2.0) < 0.0
 
 
 def test_folds_of_duffing_are_where_the_curve_turns_and_a_multiplier_is_1(folded):
