@@ -21,6 +21,7 @@ from workflow.analyses.vibration.modes import mode_of, refuse_missing_modes
 from workflow.analyses.vibration.outcome import Curves, Response, VibrationOutcome, trend
 from workflow.analyses.vibration.response import backbone_of, force_sweep, response_under
 from workflow.analyses.vibration.results import write_vibration_output
+from workflow.analyses.vibration.stability import looked_for
 from workflow.errors import UserError
 from workflow.shell.analysis import Run
 from workflow.shell.reporter import Reporter
@@ -51,13 +52,7 @@ def _outcome(case: VibrationCase, reporter: Reporter, steps: Steps) -> Vibration
     model = VibrationModel.of(case, reporter)
     with reporter.stage("rest and linear limits"):
         numbers, contact = model.numbers(), model.contact()
-        for number, share in enumerate(model.driving.left_out):
-            reporter.log(f"record {number + 1}: {share:.2%} above its highest harmonic left out")
-            if share > LEFT_OUT:
-                reporter.warn(
-                    f"excitation.records.{number}: {share:.1%} of its force is above the highest "
-                    "harmonic taken and left out: raise highest, or resolution.harmonics"
-                )
+        _tell_what_is_left_out(case, model, reporter)
         diameters = model.diameters()
         refuse_missing_modes(case, model)
         linear = steps("linear limits", lambda: model.linear(case.frequencies))
@@ -110,6 +105,19 @@ def _outcome(case: VibrationCase, reporter: Reporter, steps: Steps) -> Vibration
         tuple(further),
         diameters,
     )
+
+
+def _tell_what_is_left_out(case: VibrationCase, model: VibrationModel, reporter: Reporter) -> None:
+    """Of records, and the stability of a large structure that nobody has asked for."""
+    for number, share in enumerate(model.driving.left_out):
+        reporter.log(f"record {number + 1}: {share:.2%} above its highest harmonic left out")
+        if share > LEFT_OUT:
+            reporter.warn(
+                f"excitation.records.{number}: {share:.1%} of its force is above the highest "
+                "harmonic taken and left out: raise highest, or resolution.harmonics"
+            )
+    if case.stability == "auto" and not looked_for(case, model):
+        reporter.say("stability: not looked for in so large a structure; `stability: every` does")
 
 
 @dataclass
