@@ -59,6 +59,19 @@ def changed(tmp_path):
     return apply
 
 
+@pytest.mark.skipif(shutil.which("git") is None, reason="git applies the patches")
+@pytest.mark.parametrize("patch", sorted((ROOT / "docs" / "extend").glob("*.patch")))
+def test_patches_apply(patch, tmp_path):
+    """To files as they are: lines beside the change are those that the patch knows."""
+    for line in patch.read_text("utf-8").splitlines():
+        if line.startswith("+++ b/"):
+            name = line.removeprefix("+++ b/")
+            (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+            if (ROOT / name).exists():
+                shutil.copy(ROOT / name, tmp_path / name)
+    subprocess.run(["git", "apply", "--check", str(patch)], cwd=tmp_path, check=True)
+
+
 def settings(overrides):
     return [part for override in overrides for part in ("--set", override)]
 
