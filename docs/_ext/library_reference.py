@@ -78,15 +78,16 @@ def write_pages(folder: Path) -> None:
 
 
 def _blocks(packages: dict[str, str]) -> Iterator[str]:
-    """A page, the first of its packages being what it is about."""
-    lines = "=-~"
+    """A page, the first of its packages being what it is about; every class has one place."""
+    lines, placed = "=-~", set[type]()
     for number, (name, about) in enumerate(packages.items()):
         package, below = import_module(name), lines[min(number, 1) :]
         yield _heading(f"{name}: {about}", below[0])
         yield f".. automodule:: {name}\n   :no-members:"
         for title, names in groups(package):
             yield from _section(title, below[1], [f"{name}.{public}" for public in names])
-        back = sorted(others(package), key=lambda cls: (cls.__module__, cls.__name__))
+        back = sorted(others(package) - placed, key=lambda cls: (cls.__module__, cls.__name__))
+        placed.update(back)
         paths = [f"{cls.__module__}.{cls.__name__}" for cls in back]
         yield from _section(f"What else {name} takes and gives back", below[1], paths)
 
