@@ -4,8 +4,6 @@ import json
 import os
 import random
 import re
-import subprocess
-import sys
 import time
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,6 +13,7 @@ import pytest
 import yaml
 
 from tests.marks import slow
+from tests.workflow import forked
 from tests.workflow.conftest import invoke
 from tests.workflow.scenes import RIG_OF_THESIS
 from tests.workflow.test_friction_rig import RIG as PADS
@@ -201,10 +200,9 @@ def test_every_step_can_be_the_last(kind, tmp_path):
 # --- killed --------------------------------------------------------------------------------------
 
 posix_only = pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
-# With how often steps are brought to the disk: as shipped, or each of them.
-START = "from workflow.shell import steps; steps.SHARE, steps.FIRST_SAVE = {share}, {first}; "
-AS_SHIPPED = START.format(share=steps.SHARE, first=steps.FIRST_SAVE)
-EVERY_STEP = START.format(share="float('inf')", first=0.0)
+# How often steps are brought to the disk, by what that may take: as shipped, or each of them.
+AS_SHIPPED = (steps.SHARE, steps.FIRST_SAVE)
+EVERY_STEP = (float("inf"), 0.0)
 
 
 @dataclass(frozen=True)
@@ -219,38 +217,40 @@ class Kill:
     lost: float
 
 
-def killed(command: list[object], out: Path, seconds: float, code: str) -> Kill | float:
+def killed(
+    command: list[object], out: Path, seconds: float, saves: tuple[float, float]
+) -> Kill | float:
     """Run as a process, and kill it so long after it has begun; if it ends before, in how long.
 
     It has begun with the first step that it keeps, or if few are kept once its log says so.
     """
     log, path, before = out / "run.log", out / "checkpoint.h5", kept_in(out)
-    mark = path if code == EVERY_STEP else log
+    mark = path if saves == EVERY_STEP else log
     written = mark.stat().st_mtime_ns if mark.exists() else 0
-    arguments = [sys.executable, "-c", f"{code}from workflow.cli import main; main()"]
-    process = subprocess.Popen(
-        [*arguments, *map(str, command)], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
-    )
+    process = forked.start([str(word) for word in command], *saves)
     end = time.monotonic() + PATIENCE
-    while process.poll() is None and not (mark.exists() and mark.stat().st_mtime_ns > written):
+    while process.exitcode is None and not (mark.exists() and mark.stat().st_mtime_ns > written):
         assert time.monotonic() < end
         time.sleep(0.01)
     begun = time.time()
-    try:
-        process.wait(seconds)
-    except subprocess.TimeoutExpired:
-        process.kill()
-        process.wait()
-    else:
-        assert process.returncode == 0
+    process.join(seconds)
+    if process.exitcode is not None:
+        assert process.exitcode == 0
         return time.time() - begun
+    process.kill()
+    process.join()
     moment, kept = time.time(), kept_in(out)
     last = max(begun, path.stat().st_mtime) if path.exists() else begun
     return Kill(before, kept, moment - last)
 
 
 def kill_at_random(
-    command: list[object], out: Path, dice: random.Random, whole: float, code: str, most: int
+    command: list[object],
+    out: Path,
+    dice: random.Random,
+    whole: float,
+    saves: tuple[float, float],
+    most: int,
 ) -> tuple[list[Kill], float]:
     """Kill a run and its resumptions at random moments of the ``whole`` seconds; it then ends.
 
@@ -258,7 +258,7 @@ def kill_at_random(
     """
     kills: list[Kill] = []
     for _ in range(most):
-        kill = killed(command, out, dice.uniform(0.0, whole), code)
+        kill = killed(command, out, dice.uniform(0.0, whole), saves)
         if isinstance(kill, float):
             whole = whole if kills else kill
             break
@@ -288,12 +288,12 @@ def kills_of(kind: str, folder: Path, most: int) -> list[Kill]:
         if len(kills) >= most and 2 * sum(kill.kept > kill.before for kill in kills) > most:
             break
         # The first step that is kept has the start behind it.
-        code, share = (AS_SHIPPED, 1.0) if number % 3 == 2 else (EVERY_STEP, 0.5)
+        saves, share = (AS_SHIPPED, 1.0) if number % 3 == 2 else (EVERY_STEP, 0.5)
         out = folder / str(number)
         most_now = min(IN_ONE_RUN, max(most - len(kills), 1))
         command = RUNS[kind].command(folder, out)
         # The first run of all may have been long, with functions to compile.
-        new, within = kill_at_random(command, out, dice, share * seconds, code, most_now)
+        new, within = kill_at_random(command, out, dice, share * seconds, saves, most_now)
         seconds = within / share
         assert results_of(out) == reference
         computed, kept = counted(out)
