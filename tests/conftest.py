@@ -13,6 +13,11 @@ for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
 CASES = Path(__file__).parent.parent / "cases"
 
 
+def pytest_collection() -> None:
+    """What is collected stays: there is nothing to search for garbage before its end."""
+    gc.disable()
+
+
 @pytest.hookimpl(trylast=True)  # of the tests that are selected
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Bring long tests to the front of both halves, with which two workers begin.
@@ -31,6 +36,7 @@ def pytest_collection_finish() -> None:
     """Keep the libraries and thousands of tests out of what is searched for garbage again."""
     gc.collect()
     gc.freeze()
+    gc.enable()
 
 
 @pytest.fixture(scope="session")

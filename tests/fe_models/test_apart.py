@@ -15,7 +15,7 @@ from fe_models.gmsh_session import gmsh_model
 from fe_models.mesh import MeshError
 
 posix_only = pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
-PATIENCE = 60.0
+PATIENCE = 120.0
 
 
 @pytest.fixture(scope="module")

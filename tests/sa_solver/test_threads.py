@@ -28,7 +28,7 @@ def test_jobs_work_side_by_side_only_where_threads_may(monkeypatch: pytest.Monke
     monkeypatch.setenv(THREADS, "2")
     assert threads() == 2
     # Each waits for the other.
-    barrier = threading.Barrier(2, timeout=10.0)
+    barrier = threading.Barrier(2, timeout=120.0)
     assert sorted(at_once([barrier.wait, barrier.wait])) == [0, 1]
     monkeypatch.setenv(THREADS, "1")
     here = threading.get_ident()

@@ -12,7 +12,7 @@ from workflow.analyses.wear.recording import Recorder
 from workflow.shell.store import read_arrays
 
 # Seconds within which everything must have ended.
-PATIENCE = 60.0
+PATIENCE = 120.0
 
 posix_only = pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
 

@@ -10,6 +10,7 @@ import h5py
 import numpy as np
 import pytest
 
+from tests.marks import slow
 from tests.workflow.commands import runs_here
 from tests.workflow.scenes import BALL, ROLLER_LOADS, ROLLER_WEAR
 from workflow.errors import MethodFailed, NotWritten
@@ -149,7 +150,9 @@ def same(folder, other):
     return names(folder) == names(other)
 
 
-@pytest.mark.parametrize("share", np.linspace(0.0, 1.0, 8, endpoint=False))
+@pytest.mark.parametrize(
+    "share", [*np.linspace(0.0, 0.75, 4), *map(slow, np.linspace(0.125, 0.875, 4))]
+)
 def test_a_run_goes_on_from_any_file_that_was_not_written(share, whole, monkeypatch, tmp_path):
     """From some file on nothing can be written any more; what was whole before stays so."""
     (folder, count), out, fsync = whole, tmp_path / "out", os.fsync
@@ -175,7 +178,7 @@ def test_a_run_goes_on_from_any_file_that_was_not_written(share, whole, monkeypa
 
 
 @posix_only
-@pytest.mark.parametrize("size", [0, 4_000])
+@pytest.mark.parametrize("size", [slow(0), 4_000])
 def test_a_limit_of_the_system_ends_a_run_in_one_line(size, ball, tmp_path):
     """Neither the lock, at first, nor then the results may grow beyond it."""
     out = tmp_path / "out"
@@ -193,7 +196,7 @@ def test_a_limit_of_the_system_ends_a_run_in_one_line(size, ball, tmp_path):
 
 
 @linux_only
-@pytest.mark.parametrize("arguments", [["schema"], ["--help"], ["new", "bodies"]])
+@pytest.mark.parametrize("arguments", [["schema"], ["--help"], slow(["new", "bodies"])])
 def test_output_that_cannot_be_written_is_one_line(arguments):
     with FULL.open("w") as full:
         ending = command(*arguments, stdout=full)
@@ -212,7 +215,7 @@ def test_nothing_is_said_where_nothing_can_be(ball, tmp_path):
 
 
 @posix_only
-@pytest.mark.parametrize("arguments", [["schema"], ["--help"]])
+@pytest.mark.parametrize("arguments", [["schema"], slow(["--help"])])
 def test_who_stops_reading_has_had_enough(arguments):
     """As `head` does: nothing is wrong that anybody has to be told."""
     read, write = os.pipe()
@@ -224,7 +227,9 @@ def test_who_stops_reading_has_had_enough(arguments):
 
 
 @posix_only
-@pytest.mark.parametrize("arguments", [["check"], ["new"], ["materials"], ["schema"], ["--help"]])
+@pytest.mark.parametrize(
+    "arguments", [["check"], slow(["new"]), slow(["materials"]), slow(["schema"]), ["--help"]]
+)
 def test_output_that_nobody_wants_is_left_out(arguments, ball):
     """With >&- there is no stdout at all."""
     closed = f"import os; os.close(1); {COMMAND}"

@@ -22,7 +22,7 @@ from workflow.shell import lock
 from workflow.shell.lock import LOCK, locked
 
 # Seconds within which another process has begun or ended.
-PATIENCE = 60.0
+PATIENCE = 120.0
 HOLD = """
 import sys, time
 from pathlib import Path

@@ -17,7 +17,7 @@ from workflow.shell.lock import LOCK, locked
 
 pytestmark = pytest.mark.skipif(not hasattr(signal, "SIGALRM"), reason="pipes of POSIX")
 # Seconds after which whoever waits for a pipe is woken.
-PATIENCE = 20
+PATIENCE = 120
 SHORT = ("wear.cycles=1e4", "wear.step.cycles=5e3", "contact.grid=[24, 8]")
 
 

@@ -90,7 +90,7 @@ def test_tangent_after_a_step_too_small_to_see(law):
 
 
 @EVERY
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150, deadline=None, derandomize=True)
 @given(path=PATHS)
 def test_energy_is_never_gained(law, path):
     history = lead(law, np.array(path) * REACH)
@@ -100,7 +100,7 @@ def test_energy_is_never_gained(law, path):
 
 
 @EVERY
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100, deadline=None, derandomize=True)
 @given(path=PATHS, shares=st.lists(st.floats(0.01, 0.99), min_size=1, max_size=4))
 def test_a_straight_path_may_be_divided(law, path, shares):
     whole = lead(law, np.array(path) * REACH)
