@@ -131,10 +131,17 @@ class ActiveJoints:
     def steps(self, deviations: Deviations, structure: ModalStructure) -> JointSteps:
         """Their maps, with forces less those of springs that the structure has."""
         active = self.active
-        kept, starts, ends = (
-            maps[:, active] for maps in (deviations.kept, deviations.by_start, deviations.by_end)
+        # Taken, they are in rows whatever they come from: for others all is compiled again.
+        kept, starts, ends, tangent = (
+            np.take(maps, active, axis=1)
+            for maps in (
+                deviations.kept,
+                deviations.by_start,
+                deviations.by_end,
+                deviations.tangent,
+            )
         )
-        tangent = deviations.tangent[:, active] - structure.reference[active]
+        tangent -= structure.reference[active]
         springs = self.constant[active]
         for maps in (kept, starts, ends):
             maps[:, springs] = 0.0

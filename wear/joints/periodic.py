@@ -147,7 +147,7 @@ class PeriodicMarch:
         joints, size, directions = coefficients.shape
         kernels = self._kernels[0]
         driven = self._driven(coefficients, basis, lead, size)
-        period = Period(basis, weights, lead)
+        period = Period.of(basis, weights, lead)
 
         def written(by: SettlingKernel | None, result: Array) -> Array:
             if by is not None:
@@ -189,7 +189,7 @@ class PeriodicMarch:
         if isinstance(law, ElasticLaw):
             remembered, linearise = 0, linearise_elastic
         else:
-            self._kernels[0].settle(Period(basis, basis.T, lead), driven)
+            self._kernels[0].settle(Period.of(basis, basis.T, lead), driven)
         maps = Maps.room(samples, joints, remembered, directions)
         linearise(driven, maps)
         return LinearisedMarch.of(maps)

@@ -53,6 +53,11 @@ class Period(NamedTuple):
     weights: Array
     lead: Array
 
+    @classmethod
+    def of(cls, basis: Array, weights: Array, lead: Array) -> Period:
+        """In rows, for which all is compiled."""
+        return cls(*map(np.ascontiguousarray, (basis, weights, lead)))
+
 
 class DrivenJoints(NamedTuple):
     """Joints driven through a period; the last two axes only where they have three directions.
