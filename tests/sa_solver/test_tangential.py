@@ -266,12 +266,17 @@ def test_similar_bodies_may_change_places():
 
 
 # -- controls --
-@pytest.mark.parametrize("imposed", ["x", "y", "t", "xy", "xt", "yt", "xyt"])
-def test_motions_instead_of_forces(imposed):
+@pytest.fixture(scope="module")
+def forced():
+    """Under forces, after others; with the offset that these leave."""
     solver, limit, _ = sphere(32)
-    start = solver.solve(limit, Qx=-0.5 * SLIDING, Mz=-20.0, tolerance=1e-11)
-    offset = -start.displacement
-    forced = solver.solve(limit, offset, **COMBINED, tolerance=1e-11)
+    offset = -solver.solve(limit, Qx=-0.5 * SLIDING, Mz=-20.0, tolerance=1e-11).displacement
+    return solver.solve(limit, offset, **COMBINED, tolerance=1e-11), offset
+
+
+@pytest.mark.parametrize("imposed", ["x", "y", "t", "xy", "xt", "yt", "xyt"])
+def test_motions_instead_of_forces(imposed, forced):
+    (forced, offset), (solver, limit, _) = forced, sphere(32)
     names = {"x": ("Qx", "shift_x"), "y": ("Qy", "shift_y"), "t": ("Mz", "twist")}
     loads = dict(COMBINED)
     for key in imposed:
