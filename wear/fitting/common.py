@@ -28,6 +28,18 @@ class Common:
     ``deviations`` ``(m,)``; NaN where a test does not tell. ``chance`` is that of tests that agree
     to lie so far apart; NaN where nothing tells their scatter, where the
     model meets the data but for rounding, or where fewer than two have a value.
+
+    Examples
+    --------
+    The second of two tests alone tells the coefficient, since the first has no energy:
+
+    >>> import numpy as np
+    >>> from wear.fitting import VolumeData, VolumeLaw, common_over, fit, volume_problem
+    >>> tests = VolumeData("both", 1e6 * np.array([0.0, 1.0, 2.0]), 1e-3 * np.array([0.0, 1.1, 2]))
+    >>> found = fit(volume_problem([tests], VolumeLaw()).problem)
+    >>> (coefficient,) = common_over(found, np.array([0, 1, 1]))
+    >>> print(coefficient.name, coefficient.shares, np.isnan(coefficient.own))
+    both.coefficient [0. 1.] [ True False]
     """
 
     name: str
