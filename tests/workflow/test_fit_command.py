@@ -216,6 +216,13 @@ def test_files_of_two_materials_are_told(folder):
     )
     assert any("two groups" in doubt and "b.csv:2" in doubt for doubt in found.doubts)
     assert any("files lie apart" in doubt for doubt in found.doubts)
+    (apart,) = [doubt for doubt in found.doubts if "contradict each other" in doubt]
+    assert apart.startswith("wear.both.coefficient: ")
+    tests = found.summary["tests"]["wear.both.coefficient"]
+    assert [one["file"] for one in tests["files"]] == ["a.csv", "b.csv"]
+    assert [one["own"] for one in tests["files"]] == pytest.approx([1000.0, 1800.0], rel=0.01)
+    assert [one["share"] for one in tests["files"]] == [0.5, 0.5]
+    assert "wear.both.coefficient by file: a.csv 50% (alone " in str(found)
 
 
 @pytest.mark.parametrize("kind", FITS)

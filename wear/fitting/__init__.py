@@ -8,6 +8,8 @@ The arithmetic
     - ``Fit``: the best values, with residuals, correlation and bands.
     - ``Estimate``: value, deviation and bounds of one parameter, or why it has none.
     - ``diagnose``: what the residuals say against the fit: waves, outliers, groups.
+    - ``common_over``: which test decides a common parameter, and whether they agree on it.
+    - ``Common``: what tests say of one parameter.
     - ``FitError``: data or parameters that no fit can be made of.
 
 What is fitted
@@ -36,6 +38,7 @@ from typing import TYPE_CHECKING
 from sa_solver.lazy import lazy_names
 
 if TYPE_CHECKING:
+    from wear.fitting.common import Common, common_over
     from wear.fitting.diagnosis import diagnose
     from wear.fitting.estimates import Estimate
     from wear.fitting.evolutions import EvolutionData, evolution_problem
@@ -45,6 +48,7 @@ if TYPE_CHECKING:
     from wear.fitting.volumes import VolumeData, VolumeLaw, volume_problem
 
 __all__ = [
+    "Common",
     "Estimate",
     "EvolutionData",
     "Fit",
@@ -55,6 +59,7 @@ __all__ = [
     "Unknown",
     "VolumeData",
     "VolumeLaw",
+    "common_over",
     "diagnose",
     "evolution_problem",
     "fit",
@@ -66,6 +71,7 @@ __all__ = [
 __getattr__, __dir__ = lazy_names(
     __name__,
     {
+        "common": ("Common", "common_over"),
         "diagnosis": ("diagnose",),
         "estimates": ("Estimate",),
         "evolutions": ("EvolutionData", "evolution_problem"),

@@ -131,10 +131,10 @@ class Fit:
         variance = float(slopes @ self.covariance @ slopes)
         return float(self.values[first] * self.values[second]), float(np.sqrt(max(variance, 0.0)))
 
-    def band(self, predict: Callable[[Array], Array]) -> Array:
-        """Half the width ``(m,)`` of the 95 % band of what ``predict`` says of the parameters.
+    def slopes(self, predict: Callable[[Array], Array]) -> Array:
+        """Change ``(m, p)`` of what ``predict`` says, by the fitted parameters.
 
-        To first order, of the curve itself: data scatter about it.
+        Of logarithms where these are fitted; by central differences, within the bounds.
         """
         inner = self.problem.inner(self.values)
         steps = _steps(inner)
@@ -147,7 +147,14 @@ class Fit:
             ]
             lengths = [_within(self.problem, inner + way * moved)[place] for way in (1.0, -1.0)]
             columns.append((ends[0] - ends[1]) / (lengths[0] - lengths[1]))
-        slopes = np.stack(columns, axis=-1)
+        return np.stack(columns, axis=-1)
+
+    def band(self, predict: Callable[[Array], Array]) -> Array:
+        """Half the width ``(m,)`` of the 95 % band of what ``predict`` says of the parameters.
+
+        To first order, of the curve itself: data scatter about it.
+        """
+        slopes = self.slopes(predict)
         terms = np.maximum(np.einsum("mi,kij,mj->mk", slopes, self.parts, slopes), 0.0)
         widths = [
             np.sqrt(one.sum()) * quantile_of(one, self.problem, self.freedoms) for one in terms
@@ -221,7 +228,7 @@ def fit(problem: FitProblem) -> Fit:
         )
         for place in range(len(values))
     ]
-    if not _is_exact(problem, residuals):
+    if not is_exact(problem, residuals):
         alone = profiled(problem, inner, deviations, alone)
     estimates = tuple(led_astray(alone, place, parts.sum(axis=0)) for place in range(len(values)))
     return Fit(
@@ -240,7 +247,7 @@ def fit(problem: FitProblem) -> Fit:
     )
 
 
-def _is_exact(problem: FitProblem, residuals: Array) -> bool:
+def is_exact(problem: FitProblem, residuals: Array) -> bool:
     """Whether a series is met but for rounding: its scatter then is anything."""
     sizes = [np.abs(series.values).max() for series in problem.series]
     left = [np.abs(residuals[problem.places == k]).max() for k in range(len(sizes))]

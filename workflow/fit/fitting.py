@@ -10,8 +10,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sa_solver.types import Array
+from sa_solver.types import Array, Indices
 from wear.fitting import (
+    Common,
     Estimate,
     EvolutionData,
     Fit,
@@ -19,6 +20,7 @@ from wear.fitting import (
     LoopData,
     VolumeData,
     VolumeLaw,
+    common_over,
     diagnose,
     evolution_problem,
     fit,
@@ -26,6 +28,7 @@ from wear.fitting import (
     mean_loop,
     volume_problem,
 )
+from wear.fitting.diagnosis import ALARM
 from wear.joints.loop_record import MeasuredLoopError
 from wear.joints.measured_loops import measure_loops
 from workflow.case.loop_file import read_loop_file
@@ -118,13 +121,34 @@ class FittedSeries:
 
 @dataclass(frozen=True)
 class Fitted:
-    """The result: the fit, its parameters by their paths in a case, data, and ``doubts``."""
+    """The result: the fit, its parameters by their paths in a case, data, and ``doubts``.
+
+    ``tests`` has what each file says of a parameter, by path, where there are several tables.
+    """
 
     given: FitInput
     fit: Fit
     parameters: tuple[Parameter, ...]
     series: tuple[FittedSeries, ...]
     doubts: tuple[str, ...]
+    tests: Mapping[str, Common]
+
+    def shown_tests(self, path: str) -> list[tuple[str, float, float, float]]:
+        """Files of a parameter's :class:`Common`: name, share, own value and its deviation."""
+        common, shown = self.tests[path], self.by_path[path].shown
+        return [
+            (
+                Path(self.given.file.measurements[test].file).name,
+                share,
+                shown(own),
+                shown(deviation),
+            )
+            for test, share, own, deviation in zip(
+                *(common.tests.tolist(), common.shares.tolist()),
+                *(common.own.tolist(), common.deviations.tolist()),
+                strict=True,
+            )
+        ]
 
     @property
     def places(self) -> tuple[str, ...]:
@@ -182,7 +206,39 @@ def _solved(
             f"{fitted.tried - fitted.reached} of {fitted.tried} starts ended at a worse fit; the "
             "best of all is told"
         )
-    return Fitted(given, fitted, parameters, tuple(series), tuple(doubts))
+    tests = _tests(fitted, parameters, series, files)
+    found = Fitted(given, fitted, parameters, tuple(series), tuple(doubts), tests)
+    return replace(found, doubts=(*doubts, *_contradictions(found)))
+
+
+def _tests(
+    fitted: Fit, parameters: Sequence[Parameter], series: Sequence[FittedSeries], files: Indices
+) -> dict[str, Common]:
+    """What each table says of the parameters; loops are records that differ as strokes do."""
+    if series[0].along != ENERGY or len(np.unique(files)) < 2:
+        return {}
+    paths = {parameter.estimate.name: parameter.path for parameter in parameters}
+    return {paths[one.name]: one for one in common_over(fitted, files)}
+
+
+def _contradictions(fitted: Fitted) -> list[str]:
+    """Parameters on which the files do not agree."""
+    told = []
+    for path, common in fitted.tests.items():
+        # One false alarm in a thousand fits, whatever the number of parameters.
+        if common.chance < ALARM / len(fitted.tests):
+            unit = fitted.by_path[path].unit
+            values = ", ".join(
+                f"{name} {own:.4g} +- {deviation:.2g}"
+                for name, _, own, deviation in fitted.shown_tests(path)
+                if np.isfinite(own)
+            )
+            told.append(
+                f"{path}: the files contradict each other beyond their scatter ({values}"
+                f"{'' if unit == '1' else f' {unit}'}): bounds of a common value are too small; "
+                "fit them apart, or ask what the tests differ in"
+            )
+    return told
 
 
 def _products(fitted: Fit, parameters: Sequence[Parameter]) -> list[str]:

@@ -31,7 +31,7 @@ def report(fitted: Fitted) -> list[str]:
         GAP.join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip()
         for row in rows
     ]
-    return [fitted.given.file.title, *lines, *_series(fitted), *_notes(fitted)]
+    return [fitted.given.file.title, *lines, *_series(fitted), *_tests(fitted), *_notes(fitted)]
 
 
 def _row(fitted: Fitted, parameter: Parameter) -> tuple[str, ...]:
@@ -63,6 +63,19 @@ def _series(fitted: Fitted) -> list[str]:
         freedom = f"{fitted.fit.freedoms[place]:.3g} degrees of freedom"
         text = f"standard deviation {scatter:.2g}{unit} ({how}), {freedom}"
         lines.append(f"{series.name}: {count}, {text}")
+    return lines
+
+
+def _tests(fitted: Fitted) -> list[str]:
+    """What each file says of the parameters."""
+    lines = []
+    for path in fitted.tests:
+        files = ", ".join(
+            f"{name} {share:.0%}"
+            + (f" (alone {own:.4g} +- {dev:.2g})" if math.isfinite(own) else "")
+            for name, share, own, dev in fitted.shown_tests(path)
+        )
+        lines.append(f"{path} by file: {files}")
     return lines
 
 
@@ -125,6 +138,7 @@ def summary(fitted: Fitted, section: str) -> dict[str, Any]:
             }
             for place, series in enumerate(fitted.series)
         },
+        "tests": {path: _of_tests(fitted, path) for path in fitted.tests},
         "excess": _finite(found.excess),
         "starts": {"tried": found.tried, "reached": found.reached},
         "doubts": list(fitted.doubts),
@@ -153,6 +167,17 @@ def _of_parameter(fitted: Fitted, parameter: Parameter) -> dict[str, Any]:
             "place": fitted.places[estimate.heaviest],
             "share": round(estimate.heaviest_share, 4),
         },
+    }
+
+
+def _of_tests(fitted: Fitted, path: str) -> dict[str, Any]:
+    return {
+        "unit": fitted.by_path[path].unit,
+        "chance_to_agree": _finite(fitted.tests[path].chance),
+        "files": [
+            {"file": name, "share": round(share, 4), "own": _finite(own), "deviation": _finite(dev)}
+            for name, share, own, dev in fitted.shown_tests(path)
+        ],
     }
 
 
