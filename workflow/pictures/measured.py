@@ -18,7 +18,7 @@ from workflow.case.readable import everyday_unit, suited
 from workflow.case.sections import Measured
 from workflow.case.units import UnitError, to_base
 from workflow.errors import UserError
-from workflow.pictures.style import BLACK, BLUE, ORANGE
+from workflow.pictures.style import AMBER, BLACK, BLUE, ORANGE
 from workflow.shell.analysis import Pictures
 from workflow.shell.measured import Beside, beside
 from workflow.shell.quantities import CurvesOf
@@ -72,10 +72,17 @@ def _pointed(
                 _unit(axis.get_ylabel(), found.curve.y_unit),
             )
             if any(_is_of(line, found, *units) for line in list(axis.lines)):
-                _draw_points(axis, found, *units, colour=BLACK)
-                if axis.get_legend() is not None:
-                    axis.legend()
+                _draw_points(axis, found, *units, "D", BLACK)
+                _name_points(axis)
     return figure
+
+
+def _name_points(axis: Axes) -> None:
+    """Name the points, the last that were drawn, beside what the legend has already."""
+    legend, points = axis.get_legend(), axis.containers[-1]
+    handles, texts = ([], []) if legend is None else (legend.legend_handles, legend.get_texts())
+    names = [text.get_text() for text in texts]
+    axis.legend([*handles, points], [*names, points.get_label()])
 
 
 def _unit(label: str, base: str) -> float:
@@ -100,7 +107,9 @@ def _same(drawn: Array, curve: Array) -> bool:
     return bool(np.allclose(drawn, curve, rtol=0.0, atol=size, equal_nan=True))
 
 
-def _draw_points(axis: Axes, found: Beside, x_unit: float, y_unit: float, colour: str) -> None:
+def _draw_points(
+    axis: Axes, found: Beside, x_unit: float, y_unit: float, marker: str, colour: str
+) -> None:
     points = found.points
     bars = None if points.deviations is None else points.deviations / y_unit
     told = "measured" if bars is None else "measured, one standard deviation"
@@ -108,9 +117,9 @@ def _draw_points(axis: Axes, found: Beside, x_unit: float, y_unit: float, colour
         points.x / x_unit,
         points.y / y_unit,
         bars,
-        fmt="o",
+        fmt=marker,
         color=colour,
-        mfc="white",
+        mfc="white" if marker == "o" else AMBER,
         ms=6.0,
         lw=1.2,
         capsize=3.0,
@@ -140,7 +149,7 @@ def _draw_beside(left: Axes, right: Axes, found: Beside) -> None:
         _most(curve.y, points.y), curve.y_unit, everyday_unit(curve.y_unit, curve.title)
     )
     left.plot(curve.x / x_unit, curve.y / y_unit, color=BLUE, label="computed")
-    _draw_points(left, found, x_unit, y_unit, ORANGE)
+    _draw_points(left, found, x_unit, y_unit, "o", ORANGE)
     left.set_title(f"{curve.title[:1].upper()}{curve.title[1:]}")
     left.set_ylabel(_label(curve.y_name, y_name))
     left.legend()

@@ -1,9 +1,11 @@
 """Points that were measured beside the curves of a run.
 
-Between two points of a computed curve a straight line is taken. What that leaves is estimated by
-the same with every second point: a third of the difference, as the error falls with the square of
-the distance. Where a curve comes to a place several times, as a loop does, the branch that is
-nearest to the point is meant, which flatters the computation; it is told. Nothing is extrapolated.
+Between two points of a computed curve a straight line is taken. Its error is estimated by lines
+through every second point, first those of even and then those of odd number: with differences a and
+b to the line through all, it is a b / (a + b), which is exact for even distances and curvature. At
+the ends, where only one of the two is another line, it is at most that difference. Where a curve
+comes to a place several times, as a loop does, the branch that is nearest to the point is meant,
+which flatters the computation; it is told. Nothing is extrapolated.
 """
 
 from __future__ import annotations
@@ -30,8 +32,6 @@ from workflow.shell.quantities import CurvesOf
 OF_DEVIATIONS = "_deviation"
 # Beyond an end of a curve by so much of its length, a point is at the end: conversion rounds.
 AT_END = 1e-9
-# The error of straight lines with every second point is four times that with all.
-OF_DIFFERENCE = 3.0
 
 
 @dataclass(frozen=True)
@@ -48,7 +48,8 @@ class Beside:
     """Points beside the curve that they are of.
 
     ``computed`` ``(n,)`` is NaN outside the curve, ``several`` whether it comes to one of them more
-    than once. ``error`` is the largest estimate of what interpolation leaves.
+    than once. ``error`` is the largest estimate of what interpolation leaves, None of a curve
+    of two points, where nothing tells it.
     """
 
     entry: Measured
@@ -56,7 +57,7 @@ class Beside:
     points: Points
     computed: Array
     several: bool
-    error: float
+    error: float | None
 
     @property
     def inside(self) -> Mask:
@@ -101,15 +102,32 @@ def compared(entry: Measured, curve: Curve, points: Points) -> Beside:
     """Points beside a curve, each with what is computed there."""
     crossings = [_crossings(curve.x, curve.y, x) for x in points.x]
     computed = np.array([_nearest(c, y) for c, y in zip(crossings, points.y, strict=True)])
-    coarse = np.unique(np.append(np.arange(0, curve.x.size, 2), curve.x.size - 1))
-    thinned = (
-        _nearest(_crossings(curve.x[coarse], curve.y[coarse], x), y)
-        for x, y in zip(points.x, computed, strict=True)
-    )
-    differences = np.abs(np.fromiter(thinned, dtype=np.float64) - computed)
-    error = float(np.nanmax(differences, initial=0.0)) / OF_DIFFERENCE
+    error = _interpolation_error(curve, points.x, computed)
     several = any(np.ptp(c) > 0.0 for c in crossings if c.size > 1)
     return Beside(entry, curve, points, computed, several, error)
+
+
+def _interpolation_error(curve: Curve, x: Array, computed: Array) -> float | None:
+    last = curve.x.size - 1
+    if last < 2:
+        return None
+    differences = []
+    for first in (0, 1):
+        kept = np.unique([0, *range(first, last, 2), last])
+        found = [
+            _nearest(_crossings(curve.x[kept], curve.y[kept], place), value)
+            for place, value in zip(x, computed, strict=True)
+        ]
+        differences.append(np.abs(np.array(found) - computed))
+    even, odd = differences
+    whole = np.where(even + odd > 0.0, even + odd, 1.0)
+    at_end = _between(x, curve.x[:2]) | _between(x, curve.x[-2:])
+    errors = np.where(at_end, np.maximum(even, odd), even * odd / whole)
+    return float(np.max(errors[np.isfinite(errors)], initial=0.0))
+
+
+def _between(x: Array, ends: Array) -> Mask:
+    return (ends.min() <= x) & (x <= ends.max())
 
 
 def read_points(entry: Measured, x_unit: str, y_unit: str) -> Points:
