@@ -221,11 +221,11 @@ class Expectation(Section):
 class MeasuredHeadings(Section):
     """Headings of a table that was measured, without their units."""
 
-    at: Title = entry("of what the curve goes along", "energy", default="at")
-    values: Title = entry(
-        "of what was measured; with _deviation at its end, of its standard deviations",
+    at: Title | None = entry("of what the curve goes along, if not at", "energy", default=None)
+    values: Title | None = entry(
+        "of what was measured, if not values; with _deviation at its end, of its deviations",
         "mu",
-        default="values",
+        default=None,
     )
 
 
@@ -235,12 +235,16 @@ MeasuredNumbers = tuple[Annotated[float, Quantity(None)], ...]
 class Measured(Section):
     """Points that were measured, to be shown beside a curve of the results."""
 
+    also_filled_in: ClassVar[tuple[str, ...]] = "at", "values"
+
     curve: Title = entry(
         "its title, as `fretscale compare` draws it; its beginning where there is one such curve",
         "friction of the joint",
     )
     file: Annotated[str, File((".csv",))] | None = entry(
-        "CSV, headings with units, as seen from the folder of the case", default=None
+        "instead of at and values: CSV, headings with units, as seen from the folder of the case",
+        "measured.csv",
+        default=None,
     )
     columns: MeasuredHeadings = entry("headings of the file", default=MeasuredHeadings())
     at: MeasuredNumbers = entry(
@@ -249,10 +253,11 @@ class Measured(Section):
     values: MeasuredNumbers = entry("what was measured there", [0.34, 0.37], default=())
     deviation: Annotated[float, Quantity(None, above=0.0)] | None = entry(
         "standard deviation of every value, with its unit; without one there is no chi²",
+        0.02,
         default=None,
     )
     relative_deviation: Annotated[float, Quantity("1", above=0.0, at_most=10.0)] | None = entry(
-        "the same as a share of each value [1]", "5 %", default=None
+        "instead of deviation: as a share of each value [1]", "5 %", default=None
     )
     source: Title = entry("who measured it, and where it is printed", "Li 2020, fig. 15")
 

@@ -80,9 +80,9 @@ def _pointed(
 def _name_points(axis: Axes) -> None:
     """Name the points, the last that were drawn, beside what the legend has already."""
     legend, points = axis.get_legend(), axis.containers[-1]
-    handles, texts = ([], []) if legend is None else (legend.legend_handles, legend.get_texts())
-    names = [text.get_text() for text in texts]
-    axis.legend([*handles, points], [*names, points.get_label()])
+    handles: list[Any] = [] if legend is None else [*legend.legend_handles]
+    names = [] if legend is None else [text.get_text() for text in legend.get_texts()]
+    axis.legend([*handles, points], [*names, str(points.get_label())])
 
 
 def _unit(label: str, base: str) -> float:

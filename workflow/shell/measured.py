@@ -272,20 +272,25 @@ def _nearest(candidates: Array, value: float) -> float:
 
 def _table(entry: Measured, file: str) -> TableFile:
     table = read_table_file(file)
-    names = [entry.columns.at, entry.columns.values]
-    table.require(names, "the headings that columns names")
-    heading = f"{entry.columns.values}{OF_DEVIATIONS}"
-    if heading in table.names and not (entry.deviation is entry.relative_deviation is None):
+    at, values, deviations = _called(entry)
+    table.require([at, values], "the headings that columns names, or at and values")
+    if deviations in table.names and not (entry.deviation is entry.relative_deviation is None):
         raise InputFileError(
-            f"{table.place}: {heading}: given beside a deviation in the case; allowed: one of them"
+            f"{table.place}: {deviations}: given beside a deviation in the case; "
+            "allowed: one of them"
         )
     return table
 
 
+def _called(entry: Measured) -> tuple[str, str, str]:
+    """Headings of places, values and standard deviations."""
+    values = entry.columns.values or "values"
+    return entry.columns.at or "at", values, f"{values}{OF_DEVIATIONS}"
+
+
 def _headings(entry: Measured, table: TableFile) -> list[str]:
-    """Of places, values and, if they are there, standard deviations."""
-    names = [entry.columns.at, entry.columns.values, f"{entry.columns.values}{OF_DEVIATIONS}"]
-    return [name for name in names if name in table.names]
+    """Those of them that a table has."""
+    return [name for name in _called(entry) if name in table.names]
 
 
 def _numbers(table: TableFile, name: str, base: str) -> Array:
