@@ -42,7 +42,7 @@ INTERFACE = {
 EXPECT = [
     {"quantity": "a.b", "value": "3 um", "tolerance": "1 %", "kind": "earlier", "source": "a test"}
 ]
-MEASURED = [{"curve": "depth", "at": [1], "values": [1], "source": "a test"}]
+MEASURED = [{"curve": "depth", "at": [1, 2], "values": [1, 2], "source": "a test"}]
 REPORTED = [{"normal_force": "17 N", "steady": "stiffness", "cycles": 1e6}]
 ALWAYS = ""  # in place of a kind: for sections of one kind alone
 PLAIN = {"measured": {ALWAYS: MEASURED}, "expect": {ALWAYS: EXPECT}}  # of all kinds

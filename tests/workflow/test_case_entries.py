@@ -156,6 +156,8 @@ def stated(leaf):
             return ["wear.law=energy_amplitude", plain]
         case "wear.energy" | "ageing.energy":
             return [leaf.key.replace("energy", "cycles="), plain]
+        case "measured.0.file":
+            return ["measured.0.at=[]", "measured.0.values=[]", plain]
         case "evolution.file":
             return [f"evolution={{file: {example}}}"]
         case "structure.body":
