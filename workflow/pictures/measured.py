@@ -63,7 +63,10 @@ def _pointed(
     curves: Sequence[CurvesOf],
     file: h5py.File,
 ) -> Figure:
-    """A figure with points in each panel that has the line of a curve."""
+    """A figure with points in each panel that has the line of a curve.
+
+    Those outside the computed range would press the rest together: they are in the figure of all.
+    """
     figure = draw(file)
     for found in _found(measured, curves, file):
         for axis in figure.axes:
@@ -72,7 +75,7 @@ def _pointed(
                 _unit(axis.get_ylabel(), found.curve.y_unit),
             )
             if any(_is_of(line, found, *units) for line in list(axis.lines)):
-                _draw_points(axis, found, *units, "D", BLACK)
+                _draw_points(axis, found, *units, "D", BLACK, whole=False)
                 _name_points(axis)
     return figure
 
@@ -108,9 +111,15 @@ def _same(drawn: Array, curve: Array) -> bool:
 
 
 def _draw_points(
-    axis: Axes, found: Beside, x_unit: float, y_unit: float, marker: str, colour: str
+    axis: Axes,
+    found: Beside,
+    x_unit: float,
+    y_unit: float,
+    marker: str,
+    colour: str,
+    whole: bool = True,
 ) -> None:
-    points = found.points
+    points = found.points if whole else found.points.only(found.inside)
     bars = None if points.deviations is None else points.deviations / y_unit
     told = "measured" if bars is None else "measured, one standard deviation"
     axis.errorbar(

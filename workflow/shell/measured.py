@@ -42,6 +42,11 @@ class Points:
     y: Array
     deviations: Array | None
 
+    def only(self, chosen: Mask) -> Points:
+        """Those of a mask ``(n,)``."""
+        deviations = None if self.deviations is None else self.deviations[chosen]
+        return Points(self.x[chosen], self.y[chosen], deviations)
+
 
 @dataclass(frozen=True)
 class Beside:
