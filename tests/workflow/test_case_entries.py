@@ -137,6 +137,7 @@ BESIDE = {f"structure.matrices.{part}": [APART] for part in APART_MATRICES} | {
     "structure.retained": ["structure.modes=20"],
     "structure.modes": ["structure.retained=[pad, tip]"],
     "joint.nodes": ["joint.area="],
+    "measured.0.file": ["measured.0.at=[]", "measured.0.values=[]"],
 }
 
 
@@ -156,8 +157,6 @@ def stated(leaf):
             return ["wear.law=energy_amplitude", plain]
         case "wear.energy" | "ageing.energy":
             return [leaf.key.replace("energy", "cycles="), plain]
-        case "measured.0.file":
-            return ["measured.0.at=[]", "measured.0.values=[]", plain]
         case "evolution.file":
             return [f"evolution={{file: {example}}}"]
         case "structure.body":
