@@ -265,9 +265,11 @@ def check(case: str, overrides: tuple[str, ...], out: Path | None, force: bool) 
     from workflow.case.doubts import doubts_of
     from workflow.case.leaves import taken
     from workflow.kinds import analysis_of, load_case
+    from workflow.shell.measured import check_measured
 
     loaded = load_case(case, overrides)
     analysis = analysis_of(loaded)
+    check_measured(loaded, analysis.curves)
     memory, run_time = analysis.memory(loaded), analysis.run_time(loaded)
     memory.check()
     click.echo(f"OK {case}: {loaded.title}")

@@ -42,8 +42,10 @@ INTERFACE = {
 EXPECT = [
     {"quantity": "a.b", "value": "3 um", "tolerance": "1 %", "kind": "earlier", "source": "a test"}
 ]
+MEASURED = [{"curve": "depth", "at": [1, 2], "values": [1, 2], "source": "a test"}]
 REPORTED = [{"normal_force": "17 N", "steady": "stiffness", "cycles": 1e6}]
 ALWAYS = ""  # in place of a kind: for sections of one kind alone
+PLAIN = {"measured": {ALWAYS: MEASURED}, "expect": {ALWAYS: EXPECT}}  # of all kinds
 FRICTION = {"friction.evolution": {ALWAYS: {"energy": [0, 1e6], "factor": [1, 2]}}}
 EVOLUTIONS = {
     "local": {"scope": "local", "energy": [0, 1000], "factor": [1, 2], "threshold": 10},
@@ -359,7 +361,7 @@ class Leaf:
     def needed(self) -> list[str]:
         """Overrides that make the template have it."""
         overrides = []
-        for section, given in ({"expect": {ALWAYS: EXPECT}} | GIVEN.get(self.kind, {})).items():
+        for section, given in (PLAIN | GIVEN.get(self.kind, {})).items():
             if self.key.startswith(f"{section}."):
                 chosen = [given[tag] for tag in (*self.tags, ALWAYS) if tag in given]
                 overrides += [f"{section}={value}" for value in chosen[:1]]

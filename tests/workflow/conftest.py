@@ -327,6 +327,7 @@ def folders(tmp_path_factory: pytest.TempPathFactory, template_files: Path) -> d
         write_matrices_of_templates(made[kind])
         (made[kind] / "nodes.csv").write_text("point,area\npad 1,1\npad 2,1\n", encoding="utf-8")
         (made[kind] / "loops.csv").write_text("energy,P,kt,mu\n0,1,1,1\n", encoding="utf-8")
+        (made[kind] / "measured.csv").write_text("at,values\n0,1\n", encoding="utf-8")
     return made
 
 

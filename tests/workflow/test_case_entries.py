@@ -137,6 +137,7 @@ BESIDE = {f"structure.matrices.{part}": [APART] for part in APART_MATRICES} | {
     "structure.retained": ["structure.modes=20"],
     "structure.modes": ["structure.retained=[pad, tip]"],
     "joint.nodes": ["joint.area="],
+    "measured.0.file": ["measured.0.at=[]", "measured.0.values=[]"],
 }
 
 

@@ -218,6 +218,64 @@ class Expectation(Section):
     )
 
 
+class MeasuredHeadings(Section):
+    """Headings of a table that was measured, without their units."""
+
+    at: Title | None = entry("of what the curve goes along, if not at", "energy", default=None)
+    values: Title | None = entry(
+        "of what was measured, if not values; with _deviation at its end, of its deviations",
+        "mu",
+        default=None,
+    )
+
+
+MeasuredNumbers = tuple[Annotated[float, Quantity(None)], ...]
+
+
+class Measured(Section):
+    """Points that were measured, to be shown beside a curve of the results."""
+
+    also_filled_in: ClassVar[tuple[str, ...]] = "at", "values"
+
+    curve: Title = entry(
+        "its title, as `fretscale compare` draws it; its beginning where there is one such curve",
+        "friction of the joint",
+    )
+    file: Annotated[str, File((".csv",))] | None = entry(
+        "instead of at and values: CSV, headings with units, as seen from the folder of the case",
+        "measured.csv",
+        default=None,
+    )
+    columns: MeasuredHeadings = entry("headings of the file", default=MeasuredHeadings())
+    at: MeasuredNumbers = entry(
+        "where, with units, in place of a file", ["0 J", "2 kJ"], default=()
+    )
+    values: MeasuredNumbers = entry("what was measured there", [0.34, 0.37], default=())
+    deviation: Annotated[float, Quantity(None, above=0.0)] | None = entry(
+        "standard deviation of every value, with its unit; without one there is no chi²",
+        0.02,
+        default=None,
+    )
+    relative_deviation: Annotated[float, Quantity("1", above=0.0, at_most=10.0)] | None = entry(
+        "instead of deviation: as a share of each value [1]", "5 %", default=None
+    )
+    source: Title = entry("who measured it, and where it is printed", "Li 2020, fig. 15")
+
+    @model_validator(mode="after")
+    def _agrees(self) -> Self:
+        if (self.file is None) == (not self.at and not self.values):
+            raise disagreement("allowed: a file, or at and values", "file", "at")
+        if len(self.at) != len(self.values):
+            raise disagreement(
+                f"{len(self.values)} for {len(self.at)} places; allowed: as many as in at", "values"
+            )
+        if self.deviation is not None and self.relative_deviation is not None:
+            raise disagreement("given beside deviation; allowed: one of them", "relative_deviation")
+        if self.relative_deviation is not None and 0.0 in self.values:
+            raise disagreement("a share of 0 is none; allowed: deviation", "relative_deviation")
+        return self
+
+
 class OutputWithoutFields(Output):
     """What is written beside summary and results, of a case that has no fields."""
 
@@ -242,7 +300,7 @@ FIRST = (
     *("nonlinearity", "reduction", "contact", "wear", "coupling"),
     *("accuracy", "error_budget", "fidelity", "loops", "stress"),
 )
-LAST = ("output", "assumed", "reported", "expect")
+LAST = ("output", "assumed", "reported", "measured", "expect")
 
 
 class Case(Section, ABC):
@@ -259,6 +317,9 @@ class Case(Section, ABC):
         "inputs that are ours because the source does not print them",
         ["structure"],
         default=(),
+    )
+    measured: tuple[Measured, ...] = entry(
+        "points to be shown beside curves of the results", default=()
     )
     expect: tuple[Expectation, ...] = entry("values the run must reproduce", default=())
 

@@ -13,7 +13,17 @@ from workflow.shell.folder import OutputFolder
 from workflow.shell.store import read_bytes
 
 # Sections of a case that the structural stages do not look at.
-NOT_STRUCTURAL = {"title", "contact", "wear", "coupling", "stress", "output", "assumed", "expect"}
+NOT_STRUCTURAL = {
+    "title",
+    "contact",
+    "wear",
+    "coupling",
+    "stress",
+    "output",
+    "assumed",
+    "measured",
+    "expect",
+}
 # Stages whose results runs of the same structure find in the cache, whatever its friction and how
 # its load path is divided; and the one whose first result they find where these are the same too.
 CONDENSED = ("mesh", "condensation", "reduction")

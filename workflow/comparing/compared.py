@@ -20,7 +20,7 @@ from workflow.shell.quantities import Quantity
 from workflow.shell.summary import required_number
 
 # Entries of a case that no result depends on.
-NO_MATTER = "title", "output", "assumed", "expect", "reported"
+NO_MATTER = "title", "output", "assumed", "measured", "expect", "reported"
 NOTHING = "–"
 
 

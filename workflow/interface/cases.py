@@ -15,6 +15,7 @@ from workflow.case.sections import Case
 from workflow.case.source import IN_PYTHON, dotted
 from workflow.case.writing import dump_case
 from workflow.errors import CaseError
+from workflow.shell.measured import check_measured
 
 AnyCase = str | os.PathLike[str] | Mapping[str, Any] | Case
 """A case: the path of its file, its entries as nested dictionaries, or one that was loaded."""
@@ -106,6 +107,7 @@ def check(case: AnyCase, /, **overrides: Any) -> Check:
     """
     loaded = load_case(case, **overrides)
     analysis = kinds.analysis_of(loaded)
+    check_measured(loaded, analysis.curves)
     memory, time = analysis.memory(loaded), analysis.run_time(loaded)
     memory.check()
     outline, doubts = (*loaded.outline(), *taken(loaded)), tuple(doubts_of(loaded))

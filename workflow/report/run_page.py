@@ -9,7 +9,7 @@ from pathlib import PurePath
 from typing import Any
 
 from workflow.case.leaves import GIVEN, Leaf, in_words, leaves_of
-from workflow.case.readable import percent, pretty, readable
+from workflow.case.readable import everyday_unit, percent, pretty, readable
 from workflow.case.typeset import exact_percent, given, number, typeset
 from workflow.kinds import analysis_of
 from workflow.report.numbers import error_budget, results
@@ -35,7 +35,7 @@ from workflow.shell.quantities import Quantity
 from workflow.shell.summary import QuantityError, counted_from_first
 
 # Sections of a case that are no part of what is computed, and those that most readers look for.
-APART = "title", "analysis", "output", "assumed", "expect", "reported"
+APART = "title", "analysis", "output", "assumed", "measured", "expect", "reported"
 LOOKED_FOR = (
     *("materials", "friction", "load_path", "wear", "joint", "evolution", "drive", "excitation"),
     *("energies", "ageing", "forces", "frequencies"),
@@ -59,6 +59,7 @@ def run_page(run: ToldRun) -> str:
         section("Results", results(quantities, run.summary) if quantities else ""),
         section("Warnings", _warnings(run.summary["warnings"])),
         section("Expectations", _expectations(run)),
+        section("Measured", _measured(run.summary)),
         section("Figures", *_figures(run)),
         section("Error budget", budget),
         section("Remarks", _remarks(run.summary)),
@@ -171,6 +172,37 @@ def _as_expected(value: float, unit: str, quantity: Quantity | None) -> str:
     if unit or quantity is None:
         return f"{readable(value, '1', GIVEN).number} {pretty(unit)}".strip()
     return str(readable(value, quantity.unit, GIVEN, quantity.everyday))
+
+
+def _measured(summary: Mapping[str, Any]) -> Html:
+    found = summary.get("measured", ())
+    rows = [_measured_cells(one) for one in found if "rms_deviation" in one]
+    if not rows:
+        return Html("")
+    head = ["", "points", "mean", "rms", "rms, relative", "chi² per point", "most at", "from"]
+    told = (
+        "Computed minus measured, between two computed points by a straight line. Relative is over "
+        "the rms of what was measured. Of chi², 1 is the scatter that the deviations say."
+    )
+    if any(one["nearest_of_several_branches"] for one in found if "refused" not in one):
+        told += " Of several branches of a curve the nearest one is meant, which flatters."
+    return lines([table(head, rows, numbers=(1, 2, 3, 4, 5, 6), stacks=True), html(note(told))])
+
+
+def _measured_cells(one: Mapping[str, Any]) -> list[object]:
+    share, chi = one["relative_rms_deviation"], one.get("reduced_chi_square")
+    outside, everyday = len(one["outside"]), everyday_unit(one["unit"], one["curve"])
+    count = f"{one['points']}" + (f" (and {outside} outside)" if outside else "")
+    return [
+        number(one["curve"]),
+        count,
+        unbroken(number(str(readable(one["mean_deviation"], one["unit"], None, everyday)))),
+        unbroken(number(str(readable(one["rms_deviation"], one["unit"], None, everyday)))),
+        "–" if share is None else percent(share),
+        "–" if chi is None else f"{chi:.3g}",
+        unbroken(number(str(readable(one["largest"]["at"], one["at_unit"])))),
+        one["source"],
+    ]
 
 
 def _figures(run: ToldRun) -> Iterator[Html]:

@@ -2,17 +2,38 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path, PurePath
+from typing import Any
 
+from workflow.case.sections import Case, Measured
 from workflow.errors import UserError
 from workflow.kinds import analysis_of, kind_of, load_case
 from workflow.pictures.drawing import vector_figures
 from workflow.report.run_page import run_page
 from workflow.report.told import ToldRun
+from workflow.shell.analysis import Analysis, Pictures
 from workflow.shell.folder import DIGESTS, OutputFolder
 from workflow.shell.lock import locked
+from workflow.shell.quantities import CurvesOf
 from workflow.shell.results import read_contents
 from workflow.shell.store import file_digest, read_bytes, write_text
+
+
+def pictures_of(analysis: Analysis[Any], case: Case) -> Callable[[], Pictures] | None:
+    """What draws the results of a case, with what was measured in it; None for nothing."""
+    if analysis.pictures is None or not case.measured:
+        return analysis.pictures
+    return partial(_with_measured, analysis.pictures, case.measured, analysis.curves)
+
+
+def _with_measured(
+    pictures: Callable[[], Pictures], measured: Sequence[Measured], curves: Sequence[CurvesOf]
+) -> Pictures:
+    from workflow.pictures.measured import with_measured  # plots take a second to load
+
+    return with_measured(pictures(), measured, curves)
 
 
 def write_page(run: ToldRun, path: Path) -> None:
@@ -70,7 +91,8 @@ def told_run(root: Path, figures: bool = True) -> ToldRun:
 
 def _figures(root: Path) -> dict[str, str]:
     folder = OutputFolder(root)
-    pictures = analysis_of(load_case(folder.case)).pictures
+    case = load_case(folder.case)
+    pictures = pictures_of(analysis_of(case), case)
     if pictures is None:
         return {}
     contents = read_contents(folder.results, pictures().contents)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager
+from functools import partial
 from pathlib import Path
 from typing import Any, Literal
 
@@ -15,7 +16,7 @@ from workflow.errors import UNWRITTEN, CaseError, NotWritten, UserError
 from workflow.kinds import analysis_of, kind_of, load_case
 from workflow.pictures.drawing import load_what_draws, write_pictures
 from workflow.report.told import ToldRun
-from workflow.report.writing import write_page
+from workflow.report.writing import pictures_of, write_page
 from workflow.runs.first_look import first_look
 from workflow.runs.provenance import case_values, provenance_of
 from workflow.shell import checkpoint
@@ -24,6 +25,7 @@ from workflow.shell.checkpoint import Checkpoint
 from workflow.shell.folder import ASIDE, MANIFEST, OutputFolder
 from workflow.shell.forecast import in_words
 from workflow.shell.lock import locked
+from workflow.shell.measured import check_measured, tell_measured
 from workflow.shell.processes import Beside
 from workflow.shell.reporter import SHORT_RUN, Reporter, telling
 from workflow.shell.run_time import RunTime
@@ -166,6 +168,7 @@ def _start(
     believed.
     """
     analysis = analysis_of(case)
+    check_measured(case, analysis.curves)
     with closing(Screen(loudness > Loudness.QUIET)) as screen, screen.row("choice of settings"):
         case, choice = analysis.choose(case)
     analysis.memory(case).check()
@@ -215,17 +218,18 @@ def _run(
 
     def draw(contents: Any) -> None:
         with reporter.stage("paraview and figures", "pictures") as told:
-            if analysis.pictures is not None:
-                drawn.extend(analysis.pictures().figures_of(contents))
+            if pictures is not None:
+                drawn.extend(pictures().figures_of(contents))
                 sharing = beside if analysis.draws_beside else None
                 figures.update(
-                    write_pictures(case.output, folder, analysis.pictures, contents, sharing, told)
+                    write_pictures(case.output, folder, pictures, contents, sharing, told)
                 )
 
     def report(summary: Summary) -> None:
         if case.output.report:
             _report(run, summary, figures)
 
+    pictures = pictures_of(analysis, case)
     figures: dict[str, str] = {}
     drawn: list[str] = []
     expected = analysis.run_time(case)
@@ -252,11 +256,12 @@ def _run(
             choice=folder.choice,
             compute=compute,
             draw=draw,
+            measured=partial(tell_measured, case, analysis.curves, folder.results),
             report=report,
             beside=beside,
         )
         if analysis.draws_beside and case.output.figure_formats:
-            beside.begin(load_what_draws, analysis.pictures, case.output)
+            beside.begin(load_what_draws, pictures, case.output)
         with telling(reporter):
             analysis.run(run)
         for line in first_look(folder.root, drawn):

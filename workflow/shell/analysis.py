@@ -35,7 +35,8 @@ class Run(Generic[AnyCase]):
     ``choice`` is the record of the settings that were chosen for the case, None
     where they stand as written. ``compute`` runs another case file into a folder, from where an
     earlier run there has got to; False if that was finished already. ``draw`` writes the pictures
-    of the results that the case asks for, told what these hold. ``report`` puts the summary that
+    of the results that the case asks for, told what these hold. ``measured`` tells how far these
+    are from what was measured, as the summary has it. ``report`` puts the summary that
     the run is to end with, and what was drawn, on a page for people. ``beside`` is a process for
     what need not wait, which draws at the end.
     """
@@ -50,6 +51,7 @@ class Run(Generic[AnyCase]):
     choice: dict[str, Any] | None
     compute: Callable[[Path, Path], bool]
     draw: Callable[[Any], None]
+    measured: Callable[[], list[dict[str, Any]]]
     report: Callable[[Summary], None]
     beside: Beside
 

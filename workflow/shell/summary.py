@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from itertools import chain
 from typing import Any
 
 from workflow.shell.analysis import Run
+from workflow.shell.measured import doubts_of_measured, lines_of_measured
 from workflow.shell.quantities import Quantity
 from workflow.shell.versions import versions
 
@@ -20,12 +22,15 @@ def finish(run: Run[Any], numbers: Mapping[str, Any], lines: Iterable[str]) -> N
 
     ``numbers`` are what the analysis tells, ``lines`` the same in short.
     """
-    reporter = run.reporter
+    reporter, measured = run.reporter, run.measured()
+    for doubt in doubts_of_measured(measured):
+        reporter.warn(doubt)
     seconds = {name: round(value, 2) for name, value in reporter.seconds.items()}
     summary = {
         "title": run.case.title,
         "assumed": list(run.case.assumed),
         **numbers,
+        **({"measured": measured} if measured else {}),
         **({"choice": run.choice} if run.choice else {}),
         "warnings": reporter.warnings,
         "seconds": seconds,
@@ -34,7 +39,7 @@ def finish(run: Run[Any], numbers: Mapping[str, Any], lines: Iterable[str]) -> N
     run.report(summary)
     run.folder.finish(summary, run.provenance)
     run.folder.discard_state()
-    for line in lines:
+    for line in chain(lines, lines_of_measured(measured)):
         reporter.say(line)
     reporter.log(
         f"  seconds: {', '.join(f'{name} {value:.1f}' for name, value in seconds.items())}"

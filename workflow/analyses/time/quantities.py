@@ -34,6 +34,7 @@ NUMBERS = {
 MOVED = "stroke", "largest_displacement"
 # What runs are compared by, beside the numbers.
 CURVES = (
+    CurvesOf("cycles", "evolution/energy", "evolution/cycles"),
     CurvesOf("stiffness of the joint", "evolution/energy", "evolution/stiffness"),
     CurvesOf("friction of the joint", "evolution/energy", "evolution/friction"),
     CurvesOf("normal load of the joint", "evolution/energy", "evolution/normal_load"),

@@ -35,7 +35,7 @@ OF_CONTACT = {
     "wear law": "wear law",
 }
 # Of the cases with wear, what a vibration case of one state has no use for.
-NOT_OF_A_STATE = ("assumed", "expect")
+NOT_OF_A_STATE = ("assumed", "measured", "expect")
 
 
 def _unfit(bodies: BodiesWearCase) -> str:

@@ -113,7 +113,9 @@ def _numbered(source: StructureStage, history: InterfaceHistory) -> InterfaceHis
 def _imported(case: WearCase, faces: tuple[ContactFace, ...], out: Path) -> ResultantsCase:
     """The case with the loads of the files in the place of its structure."""
     shared = ResultantsCase.model_fields.keys() & type(case).model_fields.keys()
-    data = case.model_dump(include=shared - {"structure", "assumed", "expect"}, exclude_none=True)
+    data = case.model_dump(
+        include=shared - {"structure", "assumed", "measured", "expect"}, exclude_none=True
+    )
     for section in ("materials", "wear"):
         for number, body in enumerate(case.bodies, start=1):
             data[section][f"body_{number}"] = data[section].pop(body)

@@ -298,7 +298,7 @@ def _summary(
         "cycles": float(state.cycles[-1]),
         "jumps": state.jump,
         "work": vars(state.spent),
-        **outcome.case.measured(),
+        **outcome.case.told_surfaces(),
         **({"structure": structure.summary(state)} if structure else {}),
         **{
             name: _interface_summary(outcome, contact)

@@ -207,7 +207,7 @@ class WearCase(Case):
         if (sides := self.face_sides()) is not None:
             yield from uneven_cells(sides, self.contact.grid)
 
-    def measured(self) -> dict[str, Any]:
+    def told_surfaces(self) -> dict[str, Any]:
         """What the summary has of surfaces as measured; nothing where there are none."""
         return {}
 

@@ -275,7 +275,7 @@ class TwoBodiesWearCase(WearCase):
         _check(self)
         return self
 
-    def measured(self) -> dict[str, Any]:
+    def told_surfaces(self) -> dict[str, Any]:
         surfaces = self.structure.surfaces
         return {} if surfaces is None else {"surfaces": surfaces.summary(self.grid)}
 

@@ -1,0 +1,182 @@
+"""What was measured in the figures of a run: points with one standard deviation."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import partial
+from typing import Any
+
+import h5py
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from sa_solver.types import Array
+from workflow.case.readable import everyday_unit, suited
+from workflow.case.sections import Measured
+from workflow.case.units import UnitError, to_base
+from workflow.errors import UserError
+from workflow.pictures.style import AMBER, BLACK, BLUE, ORANGE
+from workflow.shell.analysis import Pictures
+from workflow.shell.measured import Beside, beside
+from workflow.shell.quantities import CurvesOf
+
+# Name of the figure of all that was measured.
+MEASURED = "measured"
+WIDE, HIGH = 12.0, 4.2  # inches, of a row
+# The unit in the label of an axis.
+IN_BRACKETS = re.compile(r".*\[(.*?)\]", re.DOTALL)
+# Lines of a figure are those of a curve when they agree to so much of what these reach: drawn
+# numbers have been divided by a unit and are otherwise the same.
+SAME = 1e-9
+
+
+def with_measured(
+    plain: Pictures, measured: Sequence[Measured], curves: Sequence[CurvesOf]
+) -> Pictures:
+    """The pictures of a run with points in all that show the curve they are of, and one of all."""
+
+    def figures_of(contents: Any) -> Mapping[str, Callable[[h5py.File], Figure]]:
+        drawn = plain.figures_of(contents)
+        pointed = {n: partial(_pointed, draw, measured, curves) for n, draw in drawn.items()}
+        return pointed | {MEASURED: partial(_draw_all, measured, curves)}
+
+    return Pictures(figures_of, plain.write_paraview, plain.contents)
+
+
+def _found(
+    measured: Sequence[Measured], curves: Sequence[CurvesOf], file: h5py.File
+) -> Iterator[Beside]:
+    """Those that can be compared; why others cannot is a warning of the run."""
+    for entry in measured:
+        try:
+            yield beside(entry, file, curves)
+        except UserError:
+            continue
+
+
+def _pointed(
+    draw: Callable[[h5py.File], Figure],
+    measured: Sequence[Measured],
+    curves: Sequence[CurvesOf],
+    file: h5py.File,
+) -> Figure:
+    """A figure with points in each panel that has the line of a curve.
+
+    Those outside the computed range would press the rest together: they are in the figure of all.
+    """
+    figure = draw(file)
+    for found in _found(measured, curves, file):
+        for axis in figure.axes:
+            units = (
+                _unit(axis.get_xlabel(), found.curve.x_unit),
+                _unit(axis.get_ylabel(), found.curve.y_unit),
+            )
+            if any(_is_of(line, found, *units) for line in list(axis.lines)):
+                _draw_points(axis, found, *units, "D", BLACK, whole=False)
+                _name_points(axis)
+    return figure
+
+
+def _name_points(axis: Axes) -> None:
+    """Name the points, the last that were drawn, beside what the legend has already."""
+    legend, points = axis.get_legend(), axis.containers[-1]
+    handles: list[Any] = [] if legend is None else [*legend.legend_handles]
+    names = [] if legend is None else [text.get_text() for text in legend.get_texts()]
+    axis.legend([*handles, points], [*names, str(points.get_label())])
+
+
+def _unit(label: str, base: str) -> float:
+    """How large the unit of an axis is; NaN where it is of another kind."""
+    match = IN_BRACKETS.match(label)
+    try:
+        return to_base(f"1 {match[1]}", base) if match else 1.0 if base == "1" else np.nan
+    except UnitError:
+        return float("nan")
+
+
+def _is_of(line: Line2D, found: Beside, x_unit: float, y_unit: float) -> bool:
+    """Whether a line is the curve, in these units."""
+    drawn = (np.asarray(line.get_xdata(), float), np.asarray(line.get_ydata(), float))
+    return _same(drawn[0] * x_unit, found.curve.x) and _same(drawn[1] * y_unit, found.curve.y)
+
+
+def _same(drawn: Array, curve: Array) -> bool:
+    if drawn.shape != curve.shape or not np.any(np.isfinite(curve)):
+        return False
+    size = SAME * float(np.nanmax(np.abs(curve)))
+    return bool(np.allclose(drawn, curve, rtol=0.0, atol=size, equal_nan=True))
+
+
+def _draw_points(
+    axis: Axes,
+    found: Beside,
+    x_unit: float,
+    y_unit: float,
+    marker: str,
+    colour: str,
+    whole: bool = True,
+) -> None:
+    points = found.points if whole else found.points.only(found.inside)
+    bars = None if points.deviations is None else points.deviations / y_unit
+    told = "measured" if bars is None else "measured, one standard deviation"
+    axis.errorbar(
+        points.x / x_unit,
+        points.y / y_unit,
+        bars,
+        fmt=marker,
+        color=colour,
+        mfc="white" if marker == "o" else AMBER,
+        ms=6.0,
+        lw=1.2,
+        capsize=3.0,
+        zorder=5,
+        label=told,
+    )
+
+
+def _draw_all(measured: Sequence[Measured], curves: Sequence[CurvesOf], file: h5py.File) -> Figure:
+    """Each curve with its points, and beside it how far they are off."""
+    rows = list(_found(measured, curves, file))
+    figure = Figure(figsize=(WIDE, HIGH * max(len(rows), 1)), layout="constrained")
+    panels = figure.subplots(max(len(rows), 1), 2, squeeze=False)
+    for (left, right), found in zip(panels, rows, strict=False):
+        _draw_beside(left, right, found)
+    if not rows:
+        for axis in panels[0]:
+            axis.set_axis_off()
+        panels[0, 0].set_title("Nothing that was measured can be compared: see the warnings")
+    return figure
+
+
+def _draw_beside(left: Axes, right: Axes, found: Beside) -> None:
+    curve, points = found.curve, found.points
+    x_name, x_unit = suited(_most(curve.x, points.x), curve.x_unit)
+    y_name, y_unit = suited(
+        _most(curve.y, points.y), curve.y_unit, everyday_unit(curve.y_unit, curve.title)
+    )
+    left.plot(curve.x / x_unit, curve.y / y_unit, color=BLUE, label="computed")
+    _draw_points(left, found, x_unit, y_unit, "o", ORANGE)
+    left.set_title(f"{curve.title[:1].upper()}{curve.title[1:]}")
+    left.set_ylabel(_label(curve.y_name, y_name))
+    left.legend()
+    off = (found.computed - points.y) / y_unit
+    bars = None if points.deviations is None else points.deviations / y_unit
+    right.errorbar(points.x / x_unit, off, bars, fmt="o", color=ORANGE, ms=6.0, capsize=3.0)
+    right.axhline(0.0, color=BLACK, lw=0.8)
+    right.set_title("Computed minus measured")
+    right.set_ylabel(_label("deviation", y_name))
+    for axis in left, right:
+        axis.set_xlabel(_label(curve.x_name, x_name))
+    right.set_xlim(left.get_xlim())
+
+
+def _most(*values: Array) -> float:
+    finite = np.abs(np.concatenate([v[np.isfinite(v)] for v in values]))
+    return float(finite.max(initial=0.0))
+
+
+def _label(name: str, unit: str) -> str:
+    return f"{name} [{unit}]" if unit else name
