@@ -10,7 +10,7 @@ import numpy as np
 
 from workflow.case.plain import counted
 from workflow.fit.fitting import Fitted, Parameter
-from workflow.fit.section import told
+from workflow.fit.section import entries_of, told
 from workflow.shell.tables import heading
 from workflow.shell.versions import versions
 
@@ -110,7 +110,9 @@ def summary(fitted: Fitted, section: str) -> dict[str, Any]:
     return {
         "title": fitted.given.file.title,
         "fit": fitted.given.file.fit,
-        "parameters": {p.path: _of_parameter(fitted, p) for p in fitted.parameters},
+        "parameters": {
+            p.path: _of_parameter(fitted, p) | _in_a_case(fitted, p) for p in fitted.parameters
+        },
         "correlation": {
             "parameters": [parameter.path for parameter in fitted.parameters],
             "matrix": [[_finite(value) for value in row] for row in found.correlation.tolist()],
@@ -153,6 +155,16 @@ def _of_parameter(fitted: Fitted, parameter: Parameter) -> dict[str, Any]:
             "place": fitted.places[estimate.heaviest],
             "share": round(estimate.heaviest_share, 4),
         },
+    }
+
+
+def _in_a_case(fitted: Fitted, parameter: Parameter) -> dict[str, Any]:
+    """What a sweep needs of a parameter: its entries, and between which values it may be."""
+    unknown = fitted.fit.problem.unknowns[fitted.parameters.index(parameter)]
+    limits = unknown.lower, unknown.upper
+    return {
+        "entries": entries_of(fitted, parameter.path),
+        "allowed": [_finite(parameter.shown(limit)) for limit in limits],
     }
 
 
