@@ -3,7 +3,7 @@
 Each is normal, with halves of their own width: its best value is the median, and its 95 % bounds,
 Student's or of the profile, are the 2.5 and 97.5 % quantiles. One that was fitted as its logarithm
 is drawn as that. Their normal numbers have the correlation of the fit (Nelsen 2006, *An
-Introduction to Copulas*, section 2.3). What lies beyond where a parameter may be is put at the limit.
+Introduction to Copulas*, section 2.3). What lies beyond its limits is put at them.
 """
 
 from __future__ import annotations

@@ -317,18 +317,8 @@ def _disagreements(sweep: Sweep) -> Iterator[str]:
     """What does not go together."""
     file, varied = sweep.file, sweep.file.variations()
     place = sweep.source.where
-    for name in sweep.fitted.entries if sweep.fitted else ():
-        if name in varied or name in file.set:
-            where = place(("vary" if name in varied else "set", name))[1]
-            yield f"{where}: {name}: the fit gives it too; allowed: one of them"
-    if file.fit is not None and file.design != "sample":
-        yield f"{place(('fit',))[1]}: fit: in design: {file.design}; allowed: design: sample"
-    if not varied and file.fit is None:
-        where = f"{place(('vary',))[1]}: vary"
-        if "vary" in file.model_fields_set:
-            yield f"{where}: nothing; allowed: such as friction.coefficient"
-        else:
-            yield f"{where}: missing; allowed: what each entry is given, or fit"
+    yield from _without_variation(sweep)
+    yield from _beside_a_fit(sweep)
     for name in varied.keys() & file.set.keys():
         yield f"{place(('set', name))[1]}: set.{name}: varies as well; allowed: one of them"
     if (file.design == "sample") != (file.samples is not None):
@@ -340,6 +330,29 @@ def _disagreements(sweep: Sweep) -> Iterator[str]:
     if file.design != "sample":
         for name, variation in varied.items():
             yield from _without_sample(sweep, name, variation)
+
+
+def _without_variation(sweep: Sweep) -> Iterator[str]:
+    file, where = sweep.file, f"{sweep.source.where(('vary',))[1]}: vary"
+    if file.variations() or file.fit is not None:
+        return
+    if "vary" in file.model_fields_set:
+        yield f"{where}: nothing; allowed: such as friction.coefficient"
+    else:
+        yield f"{where}: missing; allowed: what each entry is given, or fit"
+
+
+def _beside_a_fit(sweep: Sweep) -> Iterator[str]:
+    """What does not go with the fit that is named."""
+    if sweep.fitted is None:
+        return
+    file, varied, place = sweep.file, sweep.file.variations(), sweep.source.where
+    for name in sweep.fitted.entries:
+        if name in varied or name in file.set:
+            where = place(("vary" if name in varied else "set", name))[1]
+            yield f"{where}: {name}: the fit gives it too; allowed: one of them"
+    if file.design != "sample":
+        yield f"{place(('fit',))[1]}: fit: in design: {file.design}; allowed: design: sample"
 
 
 def _without_sample(sweep: Sweep, name: str, variation: Variation) -> Iterator[str]:
