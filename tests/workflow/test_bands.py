@@ -24,7 +24,7 @@ def parameter(name, value, bounds, *, allowed=FREE, logarithmic=False, entries=N
 
 
 def even(power, columns):
-    """Normal numbers ``(2**power, columns)``, spread evenly and without correlation of their own."""
+    """Normal numbers ``(2**power, columns)``, spread evenly, without correlation."""
     return ndtri(Sobol(columns, rng=0).random_base2(power))
 
 
