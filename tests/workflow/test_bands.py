@@ -2,6 +2,7 @@
 
 import json
 
+import h5py
 import numpy as np
 import pytest
 from scipy.special import ndtri
@@ -9,11 +10,16 @@ from scipy.stats.qmc import Sobol
 
 from tests.workflow.scenes import BALL
 from wear.fitting import VolumeData, VolumeLaw, fit, volume_problem
+from workflow.analyses import time
 from workflow.errors import CaseError
+from workflow.runs.job import Finished
+from workflow.shell.folder import OutputFolder
+from workflow.sweep.band_figures import write_band_figures
 from workflow.sweep.bands import FEWEST, band_of, curve_band
-from workflow.sweep.design import runs_of
+from workflow.sweep.design import Run, runs_of
 from workflow.sweep.fitted import FittedParameter, FittedSample, read_fit
 from workflow.sweep.schema import load_sweep
+from workflow.sweep.table import Row
 
 FREE = (-np.inf, np.inf)
 
@@ -105,6 +111,29 @@ def test_a_loop_has_a_band_on_each_of_its_ways():
         assert piece.median[at] == pytest.approx(sign * 0.5)
     folded = [loops[0], *[(x[:40], y[:40]) for x, y in loops[1:]]]
     assert curve_band(folded) == []
+
+
+def test_curves_of_the_runs_are_drawn_with_bands(tmp_path):
+    """Panels of one axis share a figure; what no run changes has none, and a failure no curve."""
+    rows = []
+    for number in range(FEWEST):
+        root = tmp_path / f"{number}"
+        root.mkdir()
+        with h5py.File(OutputFolder(root).results, "w") as file:
+            energy = np.linspace(0.0, 6e6, 20)
+            wear = {
+                "friction": 0.3 + 1e-3 * number + 1e-8 * energy,
+                "stiffness": 1e5 + 0.0 * energy,
+            }
+            for name, values in {"energy": energy, **wear}.items():
+                file[f"evolution/{name}"] = values
+                file[f"evolution/{name}"].attrs["unit"] = "N mm" if name == "energy" else "1"
+        rows.append(Row(Run(f"{number}", {}), Finished(None, root, {})))
+    rows.append(Row(Run("broken", {}), Finished(None, tmp_path / "broken", None, "it broke")))
+    (path,) = write_band_figures("Joint", time.ANALYSIS, rows, tmp_path)
+    assert path.name == "bands_over_energy.png"
+    assert path.stat().st_size > 10_000
+    assert write_band_figures("Joint", time.ANALYSIS, rows[1:], tmp_path / "few") == []
 
 
 # --- from the file of a fit -----------------------------------------------------------------------
