@@ -109,6 +109,8 @@ def test_a_loop_has_a_band_on_each_of_its_ways():
         sides = sorted((sign * 0.405, sign * 0.595))
         assert (piece.lower[at], piece.upper[at]) == pytest.approx(sides, abs=1e-12)
         assert piece.median[at] == pytest.approx(sign * 0.5)
+    short = [(x[:41], y[:41]) for x, y in loops[:-1]] + [(there[:11], 2.0 + 0.0 * there[:11])]
+    assert curve_band(short)[0].places[[0, -1]].tolist() == [there[10], 1.0]
     folded = [loops[0], *[(x[:40], y[:40]) for x, y in loops[1:]]]
     assert curve_band(folded) == []
 

@@ -65,8 +65,8 @@ def _known_within(ordered: Array, quantile: float) -> list[float | None]:
 def curve_band(curves: Sequence[tuple[Array, Array]]) -> list[Piece]:
     """The band of curves, each x and y ``(n,)``, piece by piece between their turns in x.
 
-    Empty where they do not turn alike, or are too few: there is no place to compare them at. Where
-    fewer than it takes have a value the band is NaN: beyond its end a curve says nothing.
+    Empty where they do not turn alike, or are too few: there is no place to compare them at. It ends
+    where the first of them does: those that go on are others than all, as runs that dissipate more.
     """
     cut = [_pieces(x, y) for x, y in curves if len(x) > 1]
     if len(cut) < FEWEST or len({len(pieces) for pieces in cut}) > 1:
@@ -90,13 +90,11 @@ def _ascending(x: Array, y: Array) -> tuple[Array, Array]:
 
 
 def _band(pieces: Sequence[tuple[Array, Array]]) -> Piece:
+    first, last = max(x[0] for x, _ in pieces), min(x[-1] for x, _ in pieces)
     places = np.unique(np.concatenate([x for x, _ in pieces]))
+    places = places[(places >= first) & (places <= last)]
     if len(places) > MOST_PLACES:
         places = places[np.linspace(0, len(places) - 1, MOST_PLACES).round().astype(int)]
-    values = np.array([np.interp(places, x, y, left=np.nan, right=np.nan) for x, y in pieces])
-    there = np.isfinite(values).sum(axis=0) >= FEWEST
-    sides = np.full((3, len(places)), np.nan)
-    for at in np.flatnonzero(there):
-        known = values[np.isfinite(values[:, at]), at]
-        sides[:, at] = np.quantile(known, [LOWER, 0.5, UPPER], method="weibull")
+    values = np.array([np.interp(places, x, y) for x, y in pieces])
+    sides = np.quantile(values, [LOWER, 0.5, UPPER], axis=0, method="weibull")
     return Piece(places, *sides)
