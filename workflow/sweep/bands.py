@@ -65,8 +65,8 @@ def _known_within(ordered: Array, quantile: float) -> list[float | None]:
 def curve_band(curves: Sequence[tuple[Array, Array]]) -> list[Piece]:
     """The band of curves, each x and y ``(n,)``, piece by piece between their turns in x.
 
-    Empty where they do not turn alike, or are too few: there is no place to compare them at. It ends
-    where the first of them does: those that go on are others than all, as runs that dissipate more.
+    Empty where they do not turn alike, or are too few: there is no place to compare them at. It
+    ends where the first of them does: those that go on, as runs that dissipate more, are not all.
     """
     cut = [_pieces(x, y) for x, y in curves if len(x) > 1]
     if len(cut) < FEWEST or len({len(pieces) for pieces in cut}) > 1:
