@@ -11,8 +11,8 @@ from tests.workflow.conftest import invoke
 from tests.workflow.scenes import BALL
 from tests.workflow.test_report import QUIET, Page
 from workflow.comparing import compare
-from workflow.comparing.curves import curves_in
 from workflow.errors import UserError
+from workflow.shell.curves import curves_in
 from workflow.shell.folder import OutputFolder
 from workflow.shell.quantities import CurvesOf
 

@@ -13,8 +13,8 @@ from sa_solver.types import Array
 from workflow.case.readable import suited
 from workflow.case.typeset import minus
 from workflow.comparing.compared import Comparison
-from workflow.comparing.curves import Curve, curves_in
 from workflow.pictures.style import AMBER, BLACK, BLUE, GREEN, ORANGE, PURPLE, SKY
+from workflow.shell.curves import Curve, curves_in
 from workflow.shell.folder import OutputFolder
 
 INCHES = 7.0, 4.6

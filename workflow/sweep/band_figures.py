@@ -15,10 +15,10 @@ from matplotlib.figure import Figure
 
 from sa_solver.types import Array
 from workflow.case.readable import suited
-from workflow.comparing.curves import Curve, curves_in
 from workflow.pictures.panels import legend_below, new_figure, panel_grid
 from workflow.pictures.style import BLACK, BLUE, ORANGE, write_figures
 from workflow.shell.analysis import Analysis
+from workflow.shell.curves import Curve, curves_in
 from workflow.shell.folder import OutputFolder
 from workflow.sweep.bands import FEWEST, Piece, curve_band
 from workflow.sweep.table import Row
