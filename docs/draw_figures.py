@@ -28,6 +28,7 @@ FIGURES = {
         "chart cases/rig_two_dof.yaml --axis harmonics --set 'forces=[10 N, 50 N]' "
         "--set 'loops={frequency: 100 Hz}'",
     ),
+    "li_figure_13": ("bands_over_energy", "sweep cases/sweeps/bolted_joint_test4.yaml"),
 }
 
 

@@ -1,5 +1,6 @@
 """Templates of cases and sweeps: all that stands there as a comment is right without its sign."""
 
+import json
 import re
 from typing import get_args
 
@@ -19,6 +20,7 @@ from tests.workflow.case_leaves import (
     RING,
     SECTOR,
 )
+from tests.workflow.test_bands import told_by_fit
 from workflow.case.sections import KINDS_ARE_NAMED_BY, sections_of
 from workflow.errors import CaseError
 from workflow.kinds import about, kinds, parse_case, template
@@ -185,6 +187,9 @@ def test_templates_tell_editors_of_the_schema():
 
 def test_every_comment_of_a_sweep_may_be_opened(tmp_path, dovetail_text):
     (tmp_path / "my.yaml").write_text(dovetail_text, encoding="utf-8")
+    (tmp_path / "wear").mkdir()
+    told = told_by_fit(entries=["wear.disk.coefficient"])
+    (tmp_path / "wear" / "summary.json").write_text(json.dumps(told), encoding="utf-8")
     sweep = tmp_path / "sweep.yaml"
     grid, sample = sweep_template(), sweep_template().replace("design: grid", "design: sample")
     sample = sample.replace("# samples: 50", "samples: 50")
@@ -194,4 +199,4 @@ def test_every_comment_of_a_sweep_may_be_opened(tmp_path, dovetail_text):
     for _, text, _ in ways(sample, seen):
         sweep.write_text(text, encoding="utf-8")
         load_sweep(sweep)
-    assert len(seen) == 6
+    assert len(seen) == 7

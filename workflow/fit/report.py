@@ -10,7 +10,7 @@ import numpy as np
 
 from workflow.case.plain import counted
 from workflow.fit.fitting import Fitted, Parameter
-from workflow.fit.section import told
+from workflow.fit.section import entries_of, told
 from workflow.shell.tables import heading
 from workflow.shell.versions import versions
 
@@ -123,7 +123,9 @@ def summary(fitted: Fitted, section: str) -> dict[str, Any]:
     return {
         "title": fitted.given.file.title,
         "fit": fitted.given.file.fit,
-        "parameters": {p.path: _of_parameter(fitted, p) for p in fitted.parameters},
+        "parameters": {
+            p.path: _of_parameter(fitted, p) | _in_a_case(fitted, p) for p in fitted.parameters
+        },
         "correlation": {
             "parameters": [parameter.path for parameter in fitted.parameters],
             "matrix": [[_finite(value) for value in row] for row in found.correlation.tolist()],
@@ -178,6 +180,16 @@ def _of_tests(fitted: Fitted, path: str) -> dict[str, Any]:
             {"file": name, "share": round(share, 4), "own": _finite(own), "deviation": _finite(dev)}
             for name, share, own, dev in fitted.shown_tests(path)
         ],
+    }
+
+
+def _in_a_case(fitted: Fitted, parameter: Parameter) -> dict[str, Any]:
+    """What a sweep needs of a parameter: its entries, and between which values it may be."""
+    unknown = fitted.fit.problem.unknowns[fitted.parameters.index(parameter)]
+    limits = unknown.lower, unknown.upper
+    return {
+        "entries": entries_of(fitted, parameter.path),
+        "allowed": [_finite(parameter.shown(limit)) for limit in limits],
     }
 
 

@@ -139,6 +139,23 @@ def _function(fitted: Fitted, name: str, section: Section) -> list[Row]:
     return rows
 
 
+def entries_of(fitted: Fitted, path: str) -> list[str]:
+    """The entries of a case that have the parameter: none of what no case has."""
+    file, name = fitted.given.file, path.rpartition(".")[2]
+    if isinstance(file, WearFit):
+        if path.startswith("wear.both.") or name not in ("coefficient", "threshold"):
+            return []
+        return [path.replace(".threshold", ".evolution.threshold")]
+    if isinstance(file, LoopFit) or path != f"evolution.{name}":
+        return [path]
+    return [
+        f"evolution.{of}.{name}"
+        for of, section in file.evolution.given.items()
+        if getattr(section, name, None) == FREE
+        and not (name in SECOND and getattr(section, "share", None) == 1.0)
+    ]
+
+
 def _wear(fitted: Fitted, file: WearFit) -> list[Row]:
     rows = [Row("law", "energy" if file.wear.law == "energy" else "energy_amplitude")]
     if file.wear.reference_amplitude is not None:

@@ -41,12 +41,14 @@ class Run:
 def runs_of(sweep: Sweep) -> list[Run]:
     """The runs of a sweep; a sample may draw the same one twice. Raises CaseError."""
     varied = sweep.file.variations()
+    paths = list(varied)
     if sweep.file.design == "sample":
-        rows = _sampled(list(varied.values()), sweep.file.samples or 0, sweep.file.seed)
+        columns = _sampled(sweep)
+        paths, rows = list(columns), list(zip(*columns.values(), strict=True))
     else:
         rows = _combined(sweep, [_listed(variation) for variation in varied.values()])
-    named = zip(_names(_short_names(list(varied)), rows), rows, strict=True)
-    return [Run(name, dict(zip(varied, row, strict=True))) for name, row in named]
+    named = zip(_names(_short_names(paths), rows), rows, strict=True)
+    return [Run(name, dict(zip(paths, row, strict=True))) for name, row in named]
 
 
 def _combined(sweep: Sweep, columns: list[list[Any]]) -> list[tuple[Any, ...]]:
@@ -89,13 +91,22 @@ def _written(like: Amount, number: float) -> int | float | str:
 # --- samples ------------------------------------------------------------------------------------
 
 
-def _sampled(varied: list[Variation], samples: int, seed: int) -> list[tuple[Any, ...]]:
-    """A Latin hypercube: in every column each of ``samples`` equal shares is hit once."""
+def _sampled(sweep: Sweep) -> dict[str, list[Any]]:
+    """A Latin hypercube: in every column each of ``samples`` equal shares is hit once.
+
+    Of what a fit gives this holds before its correlation ties the columns together.
+    """
     from scipy.stats import qmc  # half a second
 
-    points = qmc.LatinHypercube(d=len(varied), seed=np.random.default_rng(seed)).random(samples)
-    columns = [_drawn(variation, share) for variation, share in zip(varied, points.T, strict=True)]
-    return list(zip(*columns, strict=True))
+    varied, fitted = sweep.file.variations(), sweep.fitted
+    count = len(varied) + (len(fitted.parameters) if fitted else 0)
+    draws = qmc.LatinHypercube(d=count, seed=np.random.default_rng(sweep.file.seed))
+    points = draws.random(sweep.file.samples or 0)
+    columns = {
+        name: _drawn(variation, share)
+        for (name, variation), share in zip(varied.items(), points.T, strict=False)
+    }
+    return columns | (fitted.columns(points[:, len(varied) :]) if fitted else {})
 
 
 def _drawn(variation: Variation, share: Array) -> list[Any]:

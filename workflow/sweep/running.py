@@ -11,9 +11,12 @@ import time
 from collections.abc import Iterator, Sequence
 from contextlib import closing
 from pathlib import Path
+from typing import Any
 
+from sa_solver.types import Array
 from workflow.case.plain import counted
 from workflow.errors import CaseError, UserError
+from workflow.kinds import analysis_of
 from workflow.runs.job import Finished, Job
 from workflow.runs.jobs import run_jobs
 from workflow.runs.run import kept_in
@@ -23,6 +26,7 @@ from workflow.shell.reporter import Reporter, telling
 from workflow.shell.screen import Loudness
 from workflow.shell.store import write_text
 from workflow.shell.versions import versions
+from workflow.sweep.bands import FEWEST, band_of
 from workflow.sweep.design import Run, runs_of
 from workflow.sweep.schema import Sweep, load_sweep
 from workflow.sweep.table import Row, columns_of, spread, unit_of, varied_in, write_sweep_table
@@ -69,6 +73,8 @@ def run_sweep(
             _write_summary(sweep, rows, folder)
             failed = sum(not row.done for row in rows)
             reporter.say(f"{len(rows) - failed} runs done, {failed} failed: {out / TABLE}")
+            if few := _few(sweep, len(rows) - failed):
+                reporter.say(f"  {few}")
             # Of what neither wears nor is a contact there are none, and no folder.
             if figures := sorted((out / FIGURES).glob("*")) if failed < len(rows) else []:
                 reporter.say(f"  figure    {figures[0]}")
@@ -170,7 +176,7 @@ def _write_summary(sweep: Sweep, rows: list[Row], folder: OutputFolder) -> None:
         "runs": len(rows),
         "failed": {row.run.name: row.finished.error for row in rows if not row.done},
         "found": {
-            name: {"unit": unit_of(name, rows), **statistics}
+            name: {"unit": unit_of(name, rows), **statistics} | _band(sweep, values)
             for name, values in columns.items()
             if (statistics := spread(values)) is not None
         },
@@ -178,6 +184,20 @@ def _write_summary(sweep: Sweep, rows: list[Row], folder: OutputFolder) -> None:
         "versions": versions(),
     }
     folder.write_summary(summary)
+
+
+def _band(sweep: Sweep, values: Array) -> dict[str, Any]:
+    """The 95 % band of numbers, of a sample."""
+    if sweep.file.design != "sample":
+        return {}
+    return {"band": band_of(values)}
+
+
+def _few(sweep: Sweep, done: int) -> str:
+    """What so few runs of a sample cannot tell, empty if they can."""
+    if sweep.file.design != "sample" or done >= FEWEST:
+        return ""
+    return f"no 95 % bands: {counted(done, 'run')} done; they take {FEWEST}"
 
 
 def _title(sweep: Sweep, rows: Sequence[Row]) -> str:
@@ -195,3 +215,8 @@ def _write_figures(sweep: Sweep, rows: list[Row], folder: OutputFolder) -> None:
 
     with folder.filling(FIGURES, "figures of the results") as figures:
         write_sweep_figures(_title(sweep, rows), rows, figures)
+        if sweep.file.design == "sample":
+            from workflow.sweep.band_figures import write_band_figures
+
+            analysis = analysis_of(rows[0].run.job(sweep).load())
+            write_band_figures(_title(sweep, rows), analysis, rows, figures)

@@ -16,7 +16,8 @@ from workflow.case.loading import validated
 from workflow.case.sections import Section, Title, disagreement, entry, one_of
 from workflow.case.source import Source, read_text
 from workflow.case.writing import scalar
-from workflow.errors import CaseError
+from workflow.errors import CaseError, UserError
+from workflow.sweep.fitted import FittedSample, read_fit
 
 # Beyond it a sweep is a slip of the pen: a run takes seconds at least.
 MOST_RUNS = 10_000
@@ -234,7 +235,14 @@ class SweepFile(Section):
         "file, as seen from the folder of this one", "dovetail_2d.yaml"
     )
     set: dict[str, AnyValue] = entry("entries changed in every run", default={})
-    vary: Section = entry("what each entry is given, by its dotted path in the case")
+    vary: Section = entry(
+        "what each entry is given, by its dotted path in the case", default=Section()
+    )
+    fit: Annotated[str, File((".json",))] | None = entry(
+        "summary.json of a fit: its parameters vary too, as it knows them; for design: sample",
+        "wear/summary.json",
+        default=None,
+    )
     design: Literal["grid", "zip", "sample"] = entry(
         "grid: every value with every other; zip: first with first, second with second; sample: "
         "a Latin hypercube",
@@ -255,20 +263,23 @@ class AnySweepFile(SweepFile):
     """The same, whatever varies: as editors take it."""
 
     vary: dict[str, Variation] = entry(  # type: ignore[assignment]
-        "what each entry is given, by its dotted path in the case"
+        "what each entry is given, by its dotted path in the case", default={}
     )
 
 
 @dataclass(frozen=True)
 class Sweep:
-    """The file of a sweep, read, and where its entries were written."""
+    """The file of a sweep, read, where its entries were written, and the fit that it names."""
 
     name: str
     file: SweepFile
     source: Source
+    fitted: FittedSample | None = None
 
     def place(self, path: str) -> str:
         """File and line, and the entry that varies or is set."""
+        if self.fitted is not None and path in self.fitted.entries:
+            return f"{self.source.where(('fit',))[1]}: fit: {path}"
         section = "set" if path in self.file.set else "vary"
         return f"{self.source.where((section, path))[1]}: {section}.{path}"
 
@@ -276,10 +287,20 @@ class Sweep:
 def load_sweep(path: Path) -> Sweep:
     """Read the file of a sweep. Raises CaseError, a line ``file:line: key: ...`` for each thing."""
     source = Source(str(path), read_text(path))
-    sweep = Sweep(str(path), validated(source, _kind_of(source)), source)
+    file = validated(source, _kind_of(source))
+    sweep = Sweep(str(path), file, source, _fitted(source, file))
     if wrong := list(_disagreements(sweep)):
         raise CaseError("\n".join(wrong))
     return sweep
+
+
+def _fitted(source: Source, file: SweepFile) -> FittedSample | None:
+    if file.fit is None:
+        return None
+    try:
+        return read_fit(Path(file.fit))
+    except UserError as error:
+        raise CaseError(f"{source.where(('fit',))[1]}: fit: {error}") from None
 
 
 def _kind_of(source: Source) -> type[SweepFile]:
@@ -296,8 +317,8 @@ def _disagreements(sweep: Sweep) -> Iterator[str]:
     """What does not go together."""
     file, varied = sweep.file, sweep.file.variations()
     place = sweep.source.where
-    if not varied:
-        yield f"{place(('vary',))[1]}: vary: nothing; allowed: such as friction.coefficient"
+    yield from _without_variation(sweep)
+    yield from _beside_a_fit(sweep)
     for name in varied.keys() & file.set.keys():
         yield f"{place(('set', name))[1]}: set.{name}: varies as well; allowed: one of them"
     if (file.design == "sample") != (file.samples is not None):
@@ -309,6 +330,29 @@ def _disagreements(sweep: Sweep) -> Iterator[str]:
     if file.design != "sample":
         for name, variation in varied.items():
             yield from _without_sample(sweep, name, variation)
+
+
+def _without_variation(sweep: Sweep) -> Iterator[str]:
+    file, where = sweep.file, f"{sweep.source.where(('vary',))[1]}: vary"
+    if file.variations() or file.fit is not None:
+        return
+    if "vary" in file.model_fields_set:
+        yield f"{where}: nothing; allowed: such as friction.coefficient"
+    else:
+        yield f"{where}: missing; allowed: what each entry is given, or fit"
+
+
+def _beside_a_fit(sweep: Sweep) -> Iterator[str]:
+    """What does not go with the fit that is named."""
+    if sweep.fitted is None:
+        return
+    file, varied, place = sweep.file, sweep.file.variations(), sweep.source.where
+    for name in sweep.fitted.entries:
+        if name in varied or name in file.set:
+            where = place(("vary" if name in varied else "set", name))[1]
+            yield f"{where}: {name}: the fit gives it too; allowed: one of them"
+    if file.design != "sample":
+        yield f"{place(('fit',))[1]}: fit: in design: {file.design}; allowed: design: sample"
 
 
 def _without_sample(sweep: Sweep, name: str, variation: Variation) -> Iterator[str]:

@@ -1,0 +1,116 @@
+"""Figures of a sample: 95 % bands of the curves that its kind of run is compared by."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from sa_solver.types import Array
+from workflow.case.readable import suited
+from workflow.pictures.panels import legend_below, new_figure, panel_grid
+from workflow.pictures.style import BLACK, BLUE, ORANGE, write_figures
+from workflow.shell.analysis import Analysis
+from workflow.shell.curves import Curve, curves_in
+from workflow.shell.folder import OutputFolder
+from workflow.sweep.bands import FEWEST, Piece, curve_band
+from workflow.sweep.table import Row
+
+# Of a row of panels, and of title and legend [inches].
+ROW, REST = 4.0, 1.3
+# Runs shown where there is no band.
+MOST_RUNS = 100
+
+Curves = dict[str, list[Curve]]
+"""Curves of the runs by title."""
+
+
+def write_band_figures(
+    title: str, analysis: Analysis[Any], rows: Sequence[Row], folder: Path
+) -> list[Path]:
+    """Draw the bands of all curves that enough runs have, a figure for each horizontal axis.
+
+    Returns their paths.
+    """
+    figures: dict[str, Curves] = {}
+    for name, curves in _curves(analysis, rows).items():
+        if len(curves) >= FEWEST and _changes(curves):
+            along = re.sub(r"[^\w-]+", "_", curves[0].x_name)
+            figures.setdefault(f"bands_over_{along}", {})[name] = curves
+    drawn = {name: partial(_draw, title, curves) for name, curves in figures.items()}
+    return write_figures(drawn.items(), folder)
+
+
+def _curves(analysis: Analysis[Any], rows: Sequence[Row]) -> Curves:
+    """Curves of the runs that have ended, by title."""
+    curves: Curves = {}
+    for row in rows:
+        if not row.done:
+            continue
+        with h5py.File(OutputFolder(row.finished.folder).results) as file:
+            for wanted in analysis.curves:
+                for curve in curves_in(file, wanted):
+                    curves.setdefault(curve.title, []).append(curve)
+    return curves
+
+
+def _changes(curves: Sequence[Curve]) -> bool:
+    """Whether any run has another curve than the first."""
+    first = curves[0]
+    return any(
+        len(c.x) != len(first.x) or not np.array_equal(c.y, first.y) or np.any(c.x != first.x)
+        for c in curves
+    )
+
+
+def _draw(title: str, panels: Curves) -> Figure:
+    columns = min(len(panels), 2)
+    most = max(map(len, panels.values()))
+    figure = new_figure(f"{title}: {most} runs", REST + ROW * -(-len(panels) // columns))
+    axes = panel_grid(figure, len(panels), columns)
+    for axis, (name, curves) in zip(axes, panels.items(), strict=True):
+        _draw_panel(axis, name, curves)
+    legend_below(figure, axes)
+    return figure
+
+
+def _draw_panel(axis: Axes, name: str, curves: Sequence[Curve]) -> None:
+    first = curves[0]
+    x_unit, x_size = suited(max(_largest(curve.x) for curve in curves), first.x_unit)
+    y_unit, y_size = suited(max(_largest(curve.y) for curve in curves), first.y_unit)
+    shown = [(curve.x / x_size, curve.y / y_size) for curve in curves]
+    if pieces := curve_band(shown):
+        _draw_band(axis, pieces)
+        axis.set_title(name)
+    else:
+        for number, (x, y) in enumerate(shown[:MOST_RUNS]):
+            axis.plot(x, y, color=BLACK, lw=0.5, alpha=0.4, label=None if number else "each run")
+        axis.set_title(f"{name}: no band, runs do not turn back alike")
+    if first.logarithmic:
+        axis.set_yscale("log", nonpositive="mask")
+    axis.set_xlabel(_label(first.x_name, x_unit))
+    axis.set_ylabel(_label(first.y_name, y_unit))
+
+
+def _draw_band(axis: Axes, pieces: Sequence[Piece]) -> None:
+    look: dict[str, Any] = {"color": BLUE, "alpha": 0.3, "lw": 0}
+    for number, piece in enumerate(pieces):
+        labels = (None, None) if number else ("95 % of the runs at each place", "median")
+        axis.fill_between(piece.places, piece.lower, piece.upper, label=labels[0], **look)
+        axis.plot(piece.places, piece.median, color=ORANGE, label=labels[1])
+
+
+def _largest(values: Array) -> float:
+    finite = np.abs(values[np.isfinite(values)])
+    return float(finite.max()) if finite.size else 0.0
+
+
+def _label(name: str, unit: str) -> str:
+    return f"{name} [{unit}]" if unit else name

@@ -1,0 +1,134 @@
+"""Parameters of a fit as a sample: values as the fit knows them, together as it knows them.
+
+Each is normal, with halves of their own width: its best value is the median, and its 95 % bounds,
+Student's or of the profile, are the 2.5 and 97.5 % quantiles. One that was fitted as its logarithm
+is drawn as that. Their normal numbers have the correlation of the fit (Nelsen 2006, *An
+Introduction to Copulas*, section 2.3). What lies beyond its limits is put at them.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from sa_solver.types import Array
+from workflow.case.source import read_text
+from workflow.errors import UserError
+
+# Of a normal quantity, in deviations: its 97.5 % quantile.
+REACH = 1.959963984540054
+# Of values: correlated ones are known together far better than each alone.
+SIGNIFICANT = 10
+
+
+@dataclass(frozen=True)
+class FittedParameter:
+    """A parameter in its ``unit`` ("1" for none): ``value``, 95 % ``bounds``, what is ``allowed``.
+
+    ``entries`` are those of a case that have it: several, where functions share it.
+    """
+
+    name: str
+    value: float
+    unit: str
+    bounds: tuple[float, float]
+    allowed: tuple[float, float]
+    logarithmic: bool
+    entries: tuple[str, ...]
+
+    def at(self, normal: Array) -> Array:
+        """Values ``(n,)`` of standard normal numbers ``(n,)``."""
+        ends = np.array([self.bounds[0], self.value, self.bounds[1]])
+        lower, best, upper = np.log(ends) if self.logarithmic else ends
+        width = np.where(normal < 0.0, best - lower, upper - best) / REACH
+        drawn = best + width * normal
+        return np.clip(np.exp(drawn) if self.logarithmic else drawn, *self.allowed)
+
+    def written(self, value: float) -> float | str:
+        """A value as a case has it."""
+        number = f"{value:.{SIGNIFICANT}g}"
+        return float(number) if self.unit == "1" else f"{number} {self.unit}"
+
+
+@dataclass(frozen=True)
+class FittedSample:
+    """Parameters that entries of a case have, and their ``correlation`` ``(p, p)``."""
+
+    parameters: tuple[FittedParameter, ...]
+    correlation: Array
+
+    @property
+    def entries(self) -> list[str]:
+        """Paths of all entries that vary."""
+        return [entry for parameter in self.parameters for entry in parameter.entries]
+
+    def draw(self, normal: Array) -> Array:
+        """Values ``(n, p)`` of independent standard normal numbers ``(n, p)``."""
+        sizes, directions = np.linalg.eigh(self.correlation)
+        # Symmetric, so that each keeps as much of its own even spread as it can.
+        root = (directions * np.sqrt(np.maximum(sizes, 0.0))) @ directions.T
+        tied = normal @ root
+        columns = [parameter.at(z) for parameter, z in zip(self.parameters, tied.T, strict=True)]
+        return np.stack(columns, axis=1)
+
+    def columns(self, shares: Array) -> dict[str, list[float | str]]:
+        """What each entry is given, of independent shares ``(n, p)`` from 0 to 1."""
+        from scipy.special import ndtri
+
+        values = self.draw(ndtri(shares))
+        return {
+            entry: [parameter.written(float(value)) for value in column]
+            for parameter, column in zip(self.parameters, values.T, strict=True)
+            for entry in parameter.entries
+        }
+
+
+def read_fit(path: Path) -> FittedSample:
+    """The parameters that the ``summary.json`` of a fit tells.
+
+    Raises UserError for another file, a fit without a parameter that a case has, and one of them
+    that the data do not determine.
+    """
+    try:
+        summary = json.loads(read_text(path))
+        told = summary["parameters"]
+        parameters = [_parameter(name, told[name]) for name in told if told[name]["entries"]]
+        names, matrix = summary["correlation"]["parameters"], summary["correlation"]["matrix"]
+    except (ValueError, KeyError, TypeError, AttributeError) as error:
+        if isinstance(error, UserError):
+            raise
+        raise UserError(
+            f"{path}: not what a fit tells; allowed: summary.json of `fretscale fit`"
+        ) from None
+    if not parameters:
+        raise UserError(f"{path}: no parameter that a case has; allowed: a fit with one")
+    here = [names.index(parameter.name) for parameter in parameters]
+    return FittedSample(tuple(parameters), _correlation(matrix, here))
+
+
+def _parameter(name: str, told: Mapping[str, Any]) -> FittedParameter:
+    if not told["determined"]:
+        raise UserError(
+            f"{name}: not determined by the fit ({told['doubt']}); allowed: a fit that holds it"
+        )
+    lower, upper = told["allowed"]
+    return FittedParameter(
+        name,
+        float(told["value"]),
+        str(told["unit"]),
+        (float(told["bounds"][0]), float(told["bounds"][1])),
+        (-math.inf if lower is None else lower, math.inf if upper is None else upper),
+        bool(told["fitted_as_logarithm"]),
+        tuple(told["entries"]),
+    )
+
+
+def _correlation(matrix: Sequence[Sequence[float]], here: Sequence[int]) -> Array:
+    """Of some of the parameters."""
+    return np.array([[matrix[i][k] for k in here] for i in here], dtype=np.float64)
