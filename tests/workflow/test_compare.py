@@ -170,11 +170,14 @@ def test_curves_are_found_by_patterns(tmp_path):
         grid.attrs["shape"], grid.attrs["pitch"] = (4, 3), (1.0, 2.0)
         field = file.create_dataset("contact/face/00007/pressure", data=np.arange(12).reshape(4, 3))
         field.attrs["unit"] = "MPa"
-        loops = CurvesOf("loop", "responses/*/loops/-1/force", "responses/*/loops/-1/displacement")
+        at = "responses/*/loops/-1"
+        loops = CurvesOf("loop", f"{at}/force", f"{at}/displacement", ("N", "mm"))
         found = list(curves_in(file, loops))
         assert [curve.title for curve in found] == ["loop, under 10 N", "loop, under 30 N"]
         assert found[0].y.tolist() == [10.0, 10.0, 10.0]
-        (profile,) = curves_in(file, CurvesOf("p", "grid/*", "contact/*/-1/pressure"))
+        (profile,) = curves_in(
+            file, CurvesOf("p", "grid/*", "contact/*/-1/pressure", ("mm", "MPa"))
+        )
         assert (profile.title, profile.y.tolist()) == ("p, face", [1, 4, 7, 10])
         assert profile.x.tolist() == [-1.5, -0.5, 0.5, 1.5]
-        assert list(curves_in(file, CurvesOf("none", "grid/*", "loops/*/-1/force"))) == []
+        assert list(curves_in(file, CurvesOf("none", "grid/*", "loops/*/-1/force", ("", "")))) == []

@@ -7,16 +7,19 @@ import socket
 from dataclasses import dataclass
 from pathlib import Path
 
+import h5py
 import pytest
 
 from tests.marks import slow
 from tests.workflow.commands import invoke, jobs_here
 from tests.workflow.test_kills import RUNS, run_here
-from workflow.kinds import load_case
+from workflow.kinds import analysis_of, load_case
 from workflow.runs.job import Job
 from workflow.runs.jobs import run_jobs
 from workflow.runs.run import bring_to_end
 from workflow.shell import steps
+from workflow.shell.curves import curves_in
+from workflow.shell.dataset import unit_in
 from workflow.shell.folder import OutputFolder
 from workflow.shell.lock import LOCK
 
@@ -99,14 +102,26 @@ def test_whoever_takes_up_a_finished_run_clears_it(joint, take_up, tmp_path):
     assert (cut / "summary.json").read_bytes() == written
 
 
+def check_units_of_curves(run):
+    """What is measured is held against them before a run: they are those of its results."""
+    folder = OutputFolder(run)
+    with h5py.File(folder.results) as file:
+        for wanted in analysis_of(load_case(folder.case)).curves:
+            for curve in curves_in(file, wanted):
+                for unit, declared in zip((curve.x_unit, curve.y_unit), wanted.units, strict=True):
+                    assert not declared or unit in (declared, unit_in(True, declared)), curve.title
+
+
 EVERY_KIND = [slow(kind) for kind in RUNS if kind != "joint"]
 
 
 @pytest.mark.parametrize("kind", EVERY_KIND)
 def test_runs_of_every_kind_are_cleared(kind, tmp_path):
-    for runs in cut_off(kind, tmp_path):
-        resumed(runs.cut)
-        check_clean(runs, runs.cut)
+    runs = cut_off(kind, tmp_path)
+    for run in runs:
+        resumed(run.cut)
+        check_clean(run, run.cut)
+    check_units_of_curves(runs[0].whole)
 
 
 def test_what_somebody_put_there_stays(joint, tmp_path):

@@ -29,8 +29,8 @@ from workflow.shell.measured import (
 )
 from workflow.shell.quantities import CurvesOf
 
-DEPTH = CurvesOf("depth", "kinetics/cycles", "kinetics/*/depth")
-VOLUME = CurvesOf("volume", "kinetics/cycles", "kinetics/*/volume")
+DEPTH = CurvesOf("depth", "kinetics/cycles", "kinetics/*/depth", ("1", "mm"))
+VOLUME = CurvesOf("volume", "kinetics/cycles", "kinetics/*/volume", ("1", "mm^3"))
 INLINE = {"curve": "depth", "at": [100.0], "values": ["3 um"], "source": "made up"}
 
 
@@ -158,16 +158,28 @@ def case_of(*measured: Measured) -> Case:
 
 
 def test_what_cannot_be_compared_is_a_warning_not_the_end_of_a_run(results: Path) -> None:
-    case = case_of(entry(), entry(values=["3 N"]), entry(curve="depth, flank"))
+    case = case_of(entry(), entry(curve="depth, flank"))
     check_measured(case, [DEPTH])
-    good, force, nowhere = tell_measured(case, [DEPTH, VOLUME], results)
+    good, nowhere = tell_measured(case, [DEPTH, VOLUME], results)
     assert good["curve"] == "depth, pad"
     assert good["mean_deviation"] == pytest.approx(-3e-3 + 3e-5)
-    assert "cannot be converted to mm" in force["refused"]
     assert "allowed: depth, pad; volume, pad" in nowhere["refused"]
-    assert len(list(doubts_of_measured([good, force, nowhere]))) == 2
-    with pytest.raises(UserError, match=r"measured\.0\.curve: 'colour': no such curve"):
-        check_measured(case_of(entry(curve="colour")), [DEPTH])
+    assert len(list(doubts_of_measured([good, nowhere]))) == 1
+
+
+@pytest.mark.parametrize(
+    ("given", "wrong"),
+    [
+        ({"curve": "colour"}, r"measured\.0\.curve: 'colour': no such curve; allowed: depth"),
+        ({"values": ["3 N"]}, r"measured\.0: values: .*'N' cannot be converted to mm"),
+        ({"values": [3.0]}, r"measured\.0: values: 3: no unit; allowed: such as 1 mm"),
+        ({"deviation": "1 N"}, r"measured\.0: deviation: .*'N' cannot be converted to mm"),
+        ({"at": ["3 J"]}, r"measured\.0: at: "),
+    ],
+)
+def test_what_is_of_no_curve_is_refused_before_a_run(given: dict[str, Any], wrong: str) -> None:
+    with pytest.raises(UserError, match=wrong):
+        check_measured(case_of(entry(**given)), [DEPTH])
 
 
 def test_points_are_drawn_where_the_curve_is_and_nowhere_else(results: Path) -> None:

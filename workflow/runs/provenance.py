@@ -13,7 +13,7 @@ from workflow.shell.folder import OutputFolder
 from workflow.shell.store import file_digest
 
 # Entries that no number depends on: pictures may be switched off before a run goes on.
-FREE = {"title", "output", "assumed", "expect"}
+FREE = {"title", "output", "assumed", "measured", "expect"}
 
 
 def provenance_of(folder: OutputFolder, case: Case) -> dict[str, Any]:

@@ -26,6 +26,7 @@ from workflow.case.sections import Case, Measured
 from workflow.case.table_file import TableFile, check_unit, read_table_file
 from workflow.errors import UserError
 from workflow.shell.curves import Curve, curves_in
+from workflow.shell.dataset import unit_in
 from workflow.shell.quantities import CurvesOf
 
 # Ending of the heading of standard deviations, as in `fretscale fit`.
@@ -73,18 +74,34 @@ class Beside:
 def check_measured(case: Case, curves: Sequence[CurvesOf]) -> None:
     """Raise UserError for what no run could be compared with, before it is begun.
 
-    What needs the results to be known, as the unit of a curve, is left to :func:`beside`.
+    What needs the results to be known, as which of its curves are there, is left to :func:`beside`.
     """
     for number, entry in enumerate(case.measured):
-        if not any(_begins(entry.curve, wanted.title) for wanted in curves):
+        meant = [wanted for wanted in curves if _begins(entry.curve, wanted.title)]
+        if not meant:
             known = "; ".join(wanted.title for wanted in curves) or "none"
             raise UserError(
                 f"measured.{number}.curve: {shown(entry.curve)}: no such curve; allowed: {known}"
             )
-        if entry.file is not None:
-            table = _table(entry, entry.file)
-            for name in _headings(entry, table):
-                _numbers(table, name, table.unit(name) or "1")
+        refusals = [_refusal(entry, *units) for wanted in meant for units in _units_of(wanted)]
+        if all(refusals):
+            raise UserError(f"measured.{number}: {refusals[0]}")
+
+
+def _units_of(curves: CurvesOf) -> Iterator[tuple[str, str]]:
+    """Those that curves may have: in contacts over an area, and in line contacts."""
+    for line in (False, True):
+        x, y = (unit_in(line, unit) for unit in curves.units)
+        yield x, y
+
+
+def _refusal(entry: Measured, x_unit: str, y_unit: str) -> str:
+    """Why its points are none in these units, of which "" is any; empty if they are."""
+    try:
+        read_points(entry, x_unit, y_unit)
+    except UserError as error:
+        return str(error)
+    return ""
 
 
 def beside(entry: Measured, file: h5py.File, curves: Sequence[CurvesOf]) -> Beside:
@@ -136,7 +153,10 @@ def _between(x: Array, ends: Array) -> Mask:
 
 
 def read_points(entry: Measured, x_unit: str, y_unit: str) -> Points:
-    """The points of an entry in base units. Raises InputFileError, with file and line or key."""
+    """The points of an entry in base units. Raises InputFileError, with file and line or key.
+
+    Where a base unit is "", numbers are only read, in the unit that they have.
+    """
     if entry.file is None:
         x = _listed("at", entry.at, x_unit)
         y = _listed("values", entry.values, y_unit)
@@ -236,6 +256,7 @@ def lines_of_measured(content: Sequence[dict[str, Any]]) -> Iterator[str]:
             + (f" ({percent(share)})" if share is not None else "")
             + (f", chi² {chi:.3g} per point" if chi is not None else "")
             + f", most at {readable(worst['at'], one['at_unit'])}"
+            + ("; nearest of several branches" if one["nearest_of_several_branches"] else "")
         )
 
 
@@ -300,11 +321,11 @@ def _headings(entry: Measured, table: TableFile) -> list[str]:
 
 def _numbers(table: TableFile, name: str, base: str) -> Array:
     above = 0.0 if name.endswith(OF_DEVIATIONS) else -np.inf
-    return table.column(name, Quantity(base, above=above))
+    return table.column(name, Quantity(base or table.unit(name) or "1", above=above))
 
 
 def _with_unit(table: TableFile, name: str, base: str) -> Array:
-    if base != "1" and not table.unit(name):
+    if base not in ("", "1") and not table.unit(name):
         raise InputFileError(
             f"{table.place}: {shown(name)}: no unit; allowed: one in brackets, such as "
             f"{name} [{base}]"
@@ -314,7 +335,7 @@ def _with_unit(table: TableFile, name: str, base: str) -> Array:
 
 def _listed(key: str, numbers: Sequence[float], base: str) -> Array:
     """Numbers of the case, which must have been written in units of this dimension."""
-    for number in numbers:
+    for number in numbers if base else ():
         _, unit = in_unit_of(number, number)
         if unit or base != "1":
             if not unit and number != 0.0:

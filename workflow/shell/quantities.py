@@ -39,10 +39,12 @@ class CurvesOf:
 
     What stands for them in ``y`` does in ``x`` too. Of a dataset of several columns the last is
     meant. Where ``x`` is a grid, ``y`` is a field over it, of a vector its first component, and the
-    curve goes along x through its middle. ``logarithmic`` is the axis of y.
+    curve goes along x through its middle. ``units`` are the base units of x and y ("1" for none, ""
+    where the case decides), of a contact over an area. ``logarithmic`` is the axis of y.
     """
 
     title: str
     x: str
     y: str
+    units: tuple[str, str]
     logarithmic: bool = False

@@ -41,12 +41,16 @@ CURVES = (
         "pressure along x in the middle, last increment",
         "grid/bodies",
         "contact/bodies/-1/pressure",
+        ("mm", "MPa"),
     ),
     CurvesOf(
-        "shear along x in the middle, last increment", "grid/bodies", "contact/bodies/-1/shear"
+        "shear along x in the middle, last increment",
+        "grid/bodies",
+        "contact/bodies/-1/shear",
+        ("mm", "MPa"),
     ),
-    CurvesOf("tangential force over motion", "history/shift_x", "history/Qx"),
-    CurvesOf("normal force over approach", "history/approach", "history/P"),
+    CurvesOf("tangential force over motion", "history/shift_x", "history/Qx", ("mm", "N")),
+    CurvesOf("normal force over approach", "history/approach", "history/P", ("mm", "N")),
 )
 
 

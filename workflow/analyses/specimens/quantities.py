@@ -25,14 +25,24 @@ STATE = {
 COUPLED = {"secant_stiffness": "secant_stiffness", "energy_per_cycle": "energy"}
 # What runs are compared by, beside the numbers.
 CURVES = (
-    CurvesOf("tangential stiffness", "loads/*/kinetics/cycles", "loads/*/kinetics/stick_stiffness"),
-    CurvesOf("contact area", "loads/*/kinetics/cycles", "loads/*/kinetics/area"),
-    CurvesOf("depth worn from body 1", "loads/*/kinetics/cycles", "loads/*/kinetics/depth_1"),
-    CurvesOf("depth worn from body 2", "loads/*/kinetics/cycles", "loads/*/kinetics/depth_2"),
+    CurvesOf(
+        "tangential stiffness",
+        "loads/*/kinetics/cycles",
+        "loads/*/kinetics/stick_stiffness",
+        ("1", "N/mm"),
+    ),
+    CurvesOf("contact area", "loads/*/kinetics/cycles", "loads/*/kinetics/area", ("1", "mm^2")),
+    CurvesOf(
+        "depth worn from body 1", "loads/*/kinetics/cycles", "loads/*/kinetics/depth_1", ("1", "mm")
+    ),
+    CurvesOf(
+        "depth worn from body 2", "loads/*/kinetics/cycles", "loads/*/kinetics/depth_2", ("1", "mm")
+    ),
     CurvesOf(
         "loop, worn",
         "loads/*/states/-1/loop/ring_displacement",
         "loads/*/states/-1/loop/ring_force",
+        ("mm", "N"),
     ),
 )
 

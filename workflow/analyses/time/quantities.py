@@ -34,21 +34,27 @@ NUMBERS = {
 MOVED = "stroke", "largest_displacement"
 # What runs are compared by, beside the numbers.
 CURVES = (
-    CurvesOf("cycles", "evolution/energy", "evolution/cycles"),
-    CurvesOf("stiffness of the joint", "evolution/energy", "evolution/stiffness"),
-    CurvesOf("friction of the joint", "evolution/energy", "evolution/friction"),
-    CurvesOf("normal load of the joint", "evolution/energy", "evolution/normal_load"),
-    CurvesOf("loop in the last state", "states/-1/loop/displacement", "states/-1/loop/force"),
+    CurvesOf("cycles", "evolution/energy", "evolution/cycles", ("N mm", "1")),
+    CurvesOf("stiffness of the joint", "evolution/energy", "evolution/stiffness", ("N mm", "N/mm")),
+    CurvesOf("friction of the joint", "evolution/energy", "evolution/friction", ("N mm", "1")),
+    CurvesOf(
+        "normal load of the joint", "evolution/energy", "evolution/normal_load", ("N mm", "N")
+    ),
+    CurvesOf(
+        "loop in the last state", "states/-1/loop/displacement", "states/-1/loop/force", ("mm", "N")
+    ),
     CurvesOf(
         "frequency response in the last state",
         "states/-1/frequency_response/frequency",
         "states/-1/frequency_response/magnitude",
+        ("Hz", "mm/(s^2 N)"),
         logarithmic=True,
     ),
     CurvesOf(
         "damping in the ring-down, last state",
         "states/-1/ring_down/amplitude",
         "states/-1/ring_down/damping_ratio",
+        ("mm", "1"),
     ),
 )
 

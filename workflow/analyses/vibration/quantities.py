@@ -52,10 +52,18 @@ MODE = {
 }
 # What runs are compared by, beside the numbers.
 CURVES = (
-    CurvesOf("amplitude", "responses/*/frequency", "responses/*/amplitude", logarithmic=True),
-    CurvesOf("loop", "responses/*/loops/-1/displacement", "responses/*/loops/-1/force"),
-    CurvesOf("phase resonance", "backbone/force", "backbone/frequency"),
-    CurvesOf("mode", "modes/*/amplitude", "modes/*/frequency"),
+    CurvesOf(
+        "amplitude",
+        "responses/*/frequency",
+        "responses/*/amplitude",
+        ("Hz", "mm"),
+        logarithmic=True,
+    ),
+    CurvesOf(
+        "loop", "responses/*/loops/-1/displacement", "responses/*/loops/-1/force", ("mm", "N")
+    ),
+    CurvesOf("phase resonance", "backbone/force", "backbone/frequency", ("", "Hz")),
+    CurvesOf("mode", "modes/*/amplitude", "modes/*/frequency", ("mm", "Hz")),
 )
 
 

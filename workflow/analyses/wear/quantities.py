@@ -31,13 +31,15 @@ PARAMETERS = {
 }
 # What runs are compared by, beside the numbers.
 CURVES = (
-    CurvesOf("depth worn from body 1", "kinetics/cycles", "kinetics/*/depth_1"),
-    CurvesOf("depth worn from body 2", "kinetics/cycles", "kinetics/*/depth_2"),
-    CurvesOf("volume worn from body 1", "kinetics/cycles", "kinetics/*/volume_1"),
-    CurvesOf("volume worn from body 2", "kinetics/cycles", "kinetics/*/volume_2"),
-    CurvesOf("pressure across the middle, unworn", "grid/*", "contact/*/00000/pressure"),
-    CurvesOf("pressure across the middle, worn", "grid/*", "contact/*/-1/pressure"),
-    CurvesOf("tangential loop, worn", "loops/*/-1/displacement", "loops/*/-1/force"),
+    CurvesOf("depth worn from body 1", "kinetics/cycles", "kinetics/*/depth_1", ("1", "mm")),
+    CurvesOf("depth worn from body 2", "kinetics/cycles", "kinetics/*/depth_2", ("1", "mm")),
+    CurvesOf("volume worn from body 1", "kinetics/cycles", "kinetics/*/volume_1", ("1", "mm^3")),
+    CurvesOf("volume worn from body 2", "kinetics/cycles", "kinetics/*/volume_2", ("1", "mm^3")),
+    CurvesOf(
+        "pressure across the middle, unworn", "grid/*", "contact/*/00000/pressure", ("mm", "MPa")
+    ),
+    CurvesOf("pressure across the middle, worn", "grid/*", "contact/*/-1/pressure", ("mm", "MPa")),
+    CurvesOf("tangential loop, worn", "loops/*/-1/displacement", "loops/*/-1/force", ("mm", "N")),
 )
 
 
