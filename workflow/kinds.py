@@ -1,33 +1,43 @@
-"""The analyses there are. A new one is a folder in ``workflow/analyses`` and a name here."""
+"""The analyses there are. A new one is a folder in ``workflow/analyses`` and a name here.
+
+Each is loaded when it is asked for: to run a contact nobody waits for the entries of vibrations.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from workflow.analyses import contact, specimens, time, vibration, vibration_wear, wear
 from workflow.case import loading
 from workflow.case.json_schema import json_schema as write_schema
 from workflow.case.sections import Case, Section
 from workflow.case.template import template as write_template
 from workflow.shell.analysis import Analysis
 
-ANALYSES: tuple[Analysis[Any], ...] = (
-    wear.ANALYSIS,
-    specimens.ANALYSIS,
-    contact.ANALYSIS,
-    time.ANALYSIS,
-    vibration.ANALYSIS,
-    vibration_wear.ANALYSIS,
-)
+ANALYSES: Mapping[str, str] = {
+    "wear": "wear",
+    "specimens": "wear",
+    "contact": "contact",
+    "time": "time",
+    "vibration": "vibration",
+    "vibration_wear": "vibration",
+}
+"""The folder of each analysis, and how its cases call it in ``analysis``."""
 
 NOTHING: Mapping[str, tuple[type[Section], str]] = {}
 
 
-def kinds() -> dict[str, type[Case]]:
-    """Every kind of case, by the name that ``fretscale new`` has for it."""
-    return {name: case for analysis in ANALYSES for name, case in analysis.cases.items()}
+def analyses(called: str | None = None) -> list[Analysis[Any]]:
+    """Those whose cases call them so; all of them if none does."""
+    names = [name for name, word in ANALYSES.items() if word == called] or list(ANALYSES)
+    return [import_module(f"workflow.analyses.{name}").ANALYSIS for name in names]
+
+
+def kinds(called: str | None = None) -> dict[str, type[Case]]:
+    """Every kind of case, by the name that ``fretscale new`` has for it, or those so called."""
+    return {name: case for analysis in analyses(called) for name, case in analysis.cases.items()}
 
 
 def about() -> dict[str, str]:
@@ -37,22 +47,27 @@ def about() -> dict[str, str]:
 
 def analysis_of(case: Case) -> Analysis[Any]:
     """The analysis of a case."""
-    return next(analysis for analysis in ANALYSES if type(case) in analysis.cases.values())
+    own = analyses(case.analysis)
+    return next(analysis for analysis in own if type(case) in analysis.cases.values())
 
 
 def kind_of(case: Case) -> str:
     """The name of a case's kind."""
-    return next(name for name, model in kinds().items() if type(case) is model)
+    return next(name for name, model in kinds(case.analysis).items() if type(case) is model)
 
 
 def load_case(path: str | Path, overrides: Sequence[str] = ()) -> Case:
     """The case of whatever kind in a file: see :func:`workflow.case.loading.load_case`."""
-    return loading.load_case(path, list(kinds().values()), overrides)
+    return loading.load_case(path, _those_called, overrides)
 
 
 def parse_case(text: str, name: str, overrides: Sequence[str] = ()) -> Case:
     """The same, from text."""
-    return loading.parse_case(text, name, list(kinds().values()), overrides)
+    return loading.parse_case(text, name, _those_called, overrides)
+
+
+def _those_called(called: object) -> list[type[Case]]:
+    return list(kinds(called if isinstance(called, str) else None).values())
 
 
 def template(kind: str) -> str:

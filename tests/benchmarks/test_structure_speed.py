@@ -48,7 +48,8 @@ def cube() -> Body:
 
 
 def blade() -> Body:
-    return CASE.structure.geometry().mesh(FINE_FLANK, FINE_SIZE).body_2
+    bodies = CASE.structure.geometry().mesh(FINE_FLANK, FINE_SIZE).bodies
+    return next(body for body in bodies if body.name == "blade")
 
 
 def held_below(elastic: ElasticBody) -> tuple[Array, Array]:

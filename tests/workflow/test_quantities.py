@@ -16,8 +16,9 @@ from tests.workflow.test_kills import PADS_THAT_WEAR
 from tests.workflow.time_scenes import JOINT
 from workflow.analyses.wear.quantities import _left_by_mesh, _load_ranges
 from workflow.analyses.wear.worn_structure import load_ranges
+from workflow.case.sections import words_of
 from workflow.case.units import to_base
-from workflow.kinds import ANALYSES, analysis_of, load_case
+from workflow.kinds import ANALYSES, analyses, analysis_of, kinds, load_case
 from workflow.report.page import html
 from workflow.report.writing import write_report
 from workflow.shell.summary import required_number
@@ -96,7 +97,14 @@ def test_main_results_are_numbers_in_the_units_of_the_results(tmp_path, name):
 
 
 def test_every_analysis_has_its_case_here():
-    assert {analysis.name for analysis in ANALYSES} == set(CASES_OF)
+    assert {analysis.name for analysis in analyses()} == set(CASES_OF) == set(ANALYSES)
+
+
+def test_analyses_are_called_as_their_cases_do():
+    for name, analysis in zip(ANALYSES, analyses(), strict=True):
+        for case in analysis.cases.values():
+            assert words_of(case, "analysis") == (ANALYSES[name],)
+    assert kinds("fretting") == kinds()
 
 
 def test_loads_tell_their_ends_and_increments():

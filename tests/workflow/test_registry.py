@@ -6,9 +6,11 @@ Both are made here and registered by one line each; the command line then knows 
 import json
 import math
 import re
+import sys
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Annotated, ClassVar, Literal
 
 import h5py
@@ -94,7 +96,8 @@ RADIUS = 0.0075 ** (1.0 / 3.0)
 @pytest.fixture
 def ball(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
     """The analysis registered, and a new case of it."""
-    monkeypatch.setattr(kinds, "ANALYSES", (*kinds.ANALYSES, HERTZ))
+    monkeypatch.setattr(kinds, "ANALYSES", {**kinds.ANALYSES, "hertz": "hertz"})
+    monkeypatch.setitem(sys.modules, "workflow.analyses.hertz", SimpleNamespace(ANALYSIS=HERTZ))
     path = tmp_path / "ball.yaml"
     done("new", "ball", path)
     return path

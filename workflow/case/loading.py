@@ -20,10 +20,13 @@ AnyCase = TypeVar("AnyCase", bound=Case)
 AnySection = TypeVar("AnySection", bound=Section)
 YAML = ".yaml"
 
+Kinds = Sequence[type[AnyCase]] | Callable[[object], Sequence[type[AnyCase]]]
+"""Kinds of cases, or what gives those of the analysis that a case calls by a word."""
+
 
 def load_case(
     path: str | Path,
-    kinds: Sequence[type[AnyCase]],
+    kinds: Kinds[AnyCase],
     overrides: Sequence[str] = (),
     within: Sequence[str] = (),
 ) -> AnyCase:
@@ -39,7 +42,7 @@ def load_case(
 def parse_case(
     text: str,
     name: str,
-    kinds: Sequence[type[AnyCase]],
+    kinds: Kinds[AnyCase],
     overrides: Sequence[str] = (),
     within: Sequence[str] = (),
 ) -> AnyCase:
@@ -48,7 +51,8 @@ def parse_case(
     Files that the case names are looked for from the folder of ``name``.
     """
     source = Source(name, text, overrides)
-    return validated(source, _kind_of_case(source, kinds), within)
+    known = kinds(source.at(("analysis",))) if callable(kinds) else kinds
+    return validated(source, _kind_of_case(source, known), within)
 
 
 def validated(source: Source, model: type[AnySection], within: Sequence[str] = ()) -> AnySection:

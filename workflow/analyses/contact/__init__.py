@@ -46,4 +46,5 @@ ANALYSIS: Analysis[BodiesCase] = Analysis(
     quantities=main_results,
     curves=CURVES,
     comparison=Comparison(quantities=_quantities, at_the_end=AT_THE_END),
+    draws_beside=True,
 )
