@@ -53,7 +53,7 @@ def load_case(case: AnyCase, /, **overrides: Any) -> Case:
         return kinds.load_case(os.fspath(case), changes)
     if isinstance(case, Mapping):
         return kinds.parse_case(json.dumps(_plain(case)), IN_PYTHON, changes)
-    if isinstance(case, Case):
+    if type(case) in kinds.kinds(getattr(case, "analysis", None)).values():
         return kinds.parse_case(dump_case(case), IN_PYTHON, changes) if changes else case
     raise CaseError(
         f"{IN_PYTHON}: of type {type(case).__name__}; allowed: the path of a file, a dictionary, "
