@@ -35,7 +35,7 @@ LONGEST = 0.25  # wave, over the width of the grid
 WORN = 0.02
 # Allowed: convolutions cold and warm; iterations, and time over that of alike bodies.
 # Of the 22 warm ones of the harsh surface 12 find the set (a tenth of its cells change), 10 take
-# the residual from 1e-2 to 1e-8; with 5 cells of 4082 changed it takes 12. Unlike bodies on the box
+# the residual from 1e-4 to 1e-8; with 5 cells of 4082 changed it takes 12. Unlike bodies on the box
 # of 96 x 96 cells around the contact take 52 and 46 convolutions, in 5.5 times the time in place of
 # 12.6.
 ROUGH, UNLIKE, RATIO = (60, 25), 110, 25.0
