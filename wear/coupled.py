@@ -336,7 +336,7 @@ class CoupledWear:
         left = max(cycles, min(self._left(state), self._to_stop(state)))
         while True:
             with self._stage("wear"):
-                jumped = self.contacts.jump(state.interfaces, cycles, left)
+                jumped = self.contacts.jump(self._begun(state, cycles), cycles, left)
             spent = sum((further for _, further in jumped), spent)
             interfaces = tuple(worn for worn, _ in jumped)
             shorter = cycles * self._share_to_stop(state, interfaces)
@@ -355,11 +355,14 @@ class CoupledWear:
         elif size.depth is not None or size.volume is not None:
             cycles = _cycles_to(size.depth, size.volume, state)
         else:
-            # The steps that are left, all of one length: none of them is a mere remainder.
-            proposed = min(interface.next_cycles for interface in state.interfaces)
-            cycles = left / max(1.0, np.ceil(left / proposed * (1.0 - ROUNDING)))
+            cycles = _cycles_of_steps(state.interfaces, left)
         cycles = min(cycles, self._to_stop(state))
         return left if cycles > left * (1.0 - ROUNDING) else float(cycles)
+
+    def _begun(self, state: CoupledState, cycles: float) -> Sequence[InterfaceState]:
+        """The contacts as they begin a jump of so many ``cycles``."""
+        automatic = self.settings.jump == JumpSize()
+        return _in_phase(state.interfaces, cycles) if automatic else state.interfaces
 
     def _left(self, state: CoupledState) -> float:
         """Cycles to the end of the run."""
@@ -426,6 +429,35 @@ def _depth(kinetics: Array) -> float:
 def _volume(kinetics: Array) -> float:
     """Volume of all bodies [mm³] in a row of kinetics ``(interfaces, 5)``."""
     return float(kinetics[:, 2:4].sum(axis=1).sum())
+
+
+def _cycles_of_steps(interfaces: Sequence[InterfaceState], left: float) -> float:
+    """Cycles of a jump as long as the contacts' own steps, of the ``left`` ones.
+
+    Where a contact is half-way through two steps that are judged together, to where it ends them.
+    """
+    half_way = [interface.next_cycles for interface in interfaces if interface.half_way]
+    if half_way:
+        return min(max(half_way), left)
+    # The steps that are left, all of one length: none of them is a mere remainder.
+    proposed = min(interface.next_cycles for interface in interfaces)
+    return left / float(max(1.0, np.ceil(left / proposed * (1.0 - ROUNDING))))
+
+
+def _in_phase(interfaces: Sequence[InterfaceState], cycles: float) -> Sequence[InterfaceState]:
+    """The contacts before a jump of so many ``cycles``, all of which end two steps with it.
+
+    Where some are half-way, the others take two steps. Out of phase some would always begin the two
+    that make up what is left: jumps would halve for ever, and the run never end.
+    """
+    if not any(interface.half_way for interface in interfaces):
+        return interfaces
+    return [
+        interface
+        if interface.half_way
+        else replace(interface, next_cycles=min(interface.next_cycles, 0.5 * cycles))
+        for interface in interfaces
+    ]
 
 
 def _cycles_to(depth: float | None, volume: float | None, state: CoupledState) -> float:

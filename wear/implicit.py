@@ -81,8 +81,7 @@ class ImplicitStepper(ComparingStepper[WearState, WearingContact]):
         self, contact: WearingContact, after: WearState, proposed: float, left: float
     ) -> float:
         """An even number of them: the last of an odd one costs as much as two."""
-        half_way = after.companion.coarse is not None
-        if half_way or not left > 0.0 or _in_turn(contact, after):
+        if after.half_way or not left > 0.0 or _in_turn(contact, after):
             return proposed
         return in_pairs(proposed, left)
 
@@ -97,7 +96,7 @@ class ImplicitStepper(ComparingStepper[WearState, WearingContact]):
         contact, with_companion = contacts
         companion = state.companion
         if _in_turn(contact, state):
-            if companion.coarse is not None:
+            if state.half_way:
                 # It has worn as long as the others, and goes on from where it is.
                 state = replace(state, coarse=replace(companion, coarse=None))
             return super()._compared(state, cycles, contacts, at, last)
@@ -137,7 +136,7 @@ class ImplicitStepper(ComparingStepper[WearState, WearingContact]):
         if _in_turn(contact, before):
             return super()._judged(contact, control, ends, cycles, left)
         to_go, begun = max(left / cycles, 1.0), before.companion.coarse
-        if after.companion.coarse is not None:
+        if after.half_way:
             room = _room_half_way(control, before, after, to_go)
             if room < 1.0:
                 return False, SAFETY * room

@@ -61,6 +61,11 @@ class WornState:
         return self if self.coarse is None else self.coarse
 
     @property
+    def half_way(self) -> bool:
+        """Whether steps of twice the length are half-way through one: the next step ends it."""
+        return self.companion.coarse is not None
+
+    @property
     def errors(self) -> tuple[Array, Array]:
         """Estimated errors of the depth of body 1 and body 2 [mm], by cell or node: 0 if unknown.
 

@@ -12,6 +12,8 @@ that stay the same during a jump are Euler's method on that.
 import subprocess
 import sys
 from contextlib import contextmanager
+from dataclasses import replace
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
@@ -117,6 +119,12 @@ def cycle(load: float, grid: Grid) -> CycleLoads:
     loads = LoadHistory(zero + load, *(zero,) * 7, sliding=np.ones(2, dtype=bool))
     cells = grid.shape[0] * grid.shape[1]
     return CycleLoads(loads, np.broadcast_to(slip, (2, 2, cells)).copy())
+
+
+def to_and_fro(load: float, grid: Grid) -> CycleLoads:
+    """There under a load, and back under less."""
+    there = cycle(load, grid)
+    return replace(there, loads=replace(there.loads, P=load * np.array([1.0, 0.4])))
 
 
 def run(settings: CoupledSettings, source: Falling, contacts, *observers) -> list[CoupledState]:
@@ -316,6 +324,25 @@ def test_jumps_that_are_left_are_foreseen(
     assert foreseen[-1] == 0
     assert np.all(foreseen[2:] <= 2 * true[2:])
     assert np.all(true[2:] <= 2 * np.array(foreseen[2:]))
+
+
+def test_contacts_of_unlike_steps_end_together() -> None:
+    """In no more jumps than they take by themselves, one after the other.
+
+    Each takes its steps two by two, and not as many of them as the other.
+    """
+    contacts = [cylinder(stepper=ImplicitStepper(ErrorControl(share))) for share in (0.02, 0.01)]
+    histories = [to_and_fro(load, contacts[0].grid) for load in (50.0, 20.0)]
+    settings = CoupledSettings(2.0 / 3.0 * 0.5**3 / RADIUS / (PER_LOAD * 50.0))
+
+    def jumps(of: slice) -> int:
+        loop = CoupledWear(settings, ConstantLoads(histories[of]), in_turn(contacts[of]))
+        state, _ = loop.begin(histories[of])
+        states = list(islice(loop.march(state), 50))
+        assert states[-1].cycles[-1] == pytest.approx(settings.cycles, rel=1e-12)
+        return len(states)
+
+    assert jumps(slice(0, 2)) <= jumps(slice(0, 1)) + jumps(slice(1, 2))
 
 
 def test_a_jump_has_one_size() -> None:
