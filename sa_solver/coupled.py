@@ -244,8 +244,10 @@ class CoupledContact:
         before = self.half_space.count
         whole, free = self._splitting, list(problem.free)
         splitting = whole.of(problem)
-        finite = last is not None and np.isfinite(last.residuals.largest)
-        state = self._splitting_state(problem, last) if finite else whole.touching(problem)
+        if last is not None and np.isfinite(last.residuals.largest):
+            state = self._splitting_state(problem, last)
+        else:
+            state = whole.touching(problem)
         inner, iterations, message, begun_anew = tolerance, 0, "", False
         while True:
             result = douglas_rachford(

@@ -62,7 +62,7 @@ class CoupledLevel:
     def near(self, problem: CoupledProblem, traction: Array) -> tuple[Array, Mask] | None:
         """The same, without other grids."""
         limit = problem.friction * traction[Z]
-        slipping = (np.hypot(*traction[:Z]) >= limit * (1.0 - ROUNDING)) & (limit > 0.0)
+        slipping = (np.hypot(*traction[:Z]) >= limit * (1.0 - ROUNDING)) & (traction[Z] > 0.0)
         return self._on_cones(problem, traction, slipping)
 
     def search(

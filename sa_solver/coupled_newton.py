@@ -154,13 +154,13 @@ class _FreeParts:
         operator: CoupledOperator,
         friction: float,
         normal: Array,
+        slips: Mask,
         bend: Array,
         yielding: Array,
     ) -> None:
         """``bend`` ``(m,)`` is |Δs|/µp where a cell slips, ``yielding`` D ``(m,)`` [mm/MPa]."""
         self._follows = friction * normal
         x, y = normal
-        slips = (x != 0.0) | (y != 0.0)
         across = np.where(slips, [y * y, -x * y, x * x], [[1.0], [0.0], [1.0]])
         own = operator.compliances
         own_x, own_z = float(own[X, 0]), float(own[Z, 0])
@@ -209,8 +209,8 @@ class _Search:
         self, problem: CoupledProblem, operator: CoupledOperator, traction: Array, slipping: Mask
     ) -> None:
         self._problem, self._operator = problem, operator
-        shapes = np.array([problem.modes.motion(np.eye(6)[k]) for k in problem.free])
-        self._shapes = shapes.reshape(len(problem.free), 3, -1)
+        shapes = [problem.modes.motion(np.eye(6)[k]) for k in problem.free]
+        self._shapes = np.reshape(shapes, (len(shapes), 3, traction[Z].size))
         self._punches = np.zeros_like(self._shapes)
         self._punched: Mask | None = None
         self.iterations = 0
@@ -252,7 +252,7 @@ class _Search:
     def _relative(self) -> Array:
         """``v`` ``(3, nx, ny)`` at the motion last found."""
         relative = self._moved - np.tensordot(self._free_motions, self._shapes, 1)
-        return relative.reshape(self.traction.shape)
+        return np.asarray(relative.reshape(self.traction.shape))
 
     def _supported(self) -> Array:
         """Free motions that leave no work to the pressure, for want of better ones."""
@@ -277,7 +277,7 @@ class _Search:
         bend = np.where(slips, np.maximum(-np.sum(slip * normal, axis=0), 0.0) / limit, 0.0)
         yielding = np.broadcast_to(problem.compliance, self.contact.shape).ravel()[cells]
         self._slip_normal = normal
-        self._parts = _FreeParts(self._operator, problem.friction, normal, bend, yielding)
+        self._parts = _FreeParts(self._operator, problem.friction, normal, slips, bend, yielding)
         self._on_cells = self._shapes[:, :, cells]
         self._set_punches(cells)
 
@@ -289,13 +289,13 @@ class _Search:
         renewed = turned > STALE * count
         punches = self._on_cells if renewed else self._punches[:, :, cells]
         apply = self._inverted if renewed else self._parts.cut
-        self._punch = np.array([apply(punch) for punch in punches]).reshape(len(punches), 3, -1)
+        self._punch = np.array([apply(punch) for punch in punches]).reshape(punches.shape)
         if renewed:
             self._punched = sets
             self._punches = np.zeros_like(self._shapes)
             self._punches[:, :, cells] = self._punch
         on_cells = self._parts.cut
-        shapes = np.array([on_cells(shape) for shape in self._on_cells]).reshape(self._punch.shape)
+        shapes = np.array([on_cells(shape) for shape in self._on_cells]).reshape(punches.shape)
         answers = [self._parts.traction(punch) for punch in self._punch]
         resultants = np.array([self._sums(answer) for answer in answers])
         size = len(punches)
@@ -377,7 +377,7 @@ class _Search:
         slipped = self.slipping.ravel()[cells]
         opposed = np.sum(slip * self._slip_normal, axis=0) < 0.0
         beyond = np.hypot(*reached[:Z]) > problem.friction * np.maximum(reached[Z], 0.0)
-        slips = np.where(slipped, opposed, beyond) & pressed
+        slips = (np.where(slipped, opposed, beyond) | (problem.friction == 0.0)) & pressed
         trial = self._field(reached * pressed)
         traction = balanced(problem, self._operator, trial, self._mask(slips))
         if traction is None:
