@@ -49,7 +49,8 @@ class ContactStart:
     """Where a search may begin if somebody knows a state near the one sought.
 
     Its ``normal`` pressure and its ``shear`` ``(2, nx, ny)`` [MPa], or of unlike bodies both
-    ``together`` ``(3, nx, ny)``; None of what nobody knows. What is found is the same within the tolerance.
+    ``together`` ``(3, nx, ny)``; None of what nobody knows. What is found is the same within the
+    tolerance.
     """
 
     normal: NormalStart | None = None

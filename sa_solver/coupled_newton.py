@@ -31,6 +31,7 @@ import numpy as np
 from sa_solver.coupled_problem import CoupledProblem, coupled_residuals
 from sa_solver.half_space import ALL, HalfSpace, fast_lengths, inverse_symbols, spectral_filter
 from sa_solver.influence import X, Z
+from sa_solver.kernels import add_product, gather_product, spread_product
 from sa_solver.rigid_modes import RANK_CUTOFF
 from sa_solver.tangential_problem import BoxOperator, TangentialProblem
 from sa_solver.transform import SpectralFilter
@@ -47,15 +48,17 @@ ENOUGH = 0.3
 PHASE_STEPS = 16
 """Most directions of a phase, all of which are remembered."""
 
-STALE = 0.01
-"""Punches are computed again once this share of the cells has changed; until then those at hand,
-cut to the free components, do as well."""
+LEAST_PUNCH = 1e-3
+"""Share of the largest pressure added to that of each cell, as the weight of a punch."""
 
 PATIENCE = 8
 """Phases without a lower residual after which the search gives up."""
 
 ROUNDING = 1e-12
 """How far below its limit shear on the limit may be."""
+
+LEAST_PRESSURE = 1e-9
+"""Share of the largest pressure from which on down the curvature 1/p grows no more."""
 
 TINY = 1e-200
 """Keeps divisions by a vanishing size finite."""
@@ -85,8 +88,6 @@ class CoupledOperator:
         """Plan for the box that ``half_space`` covers."""
         self.half_space = half_space
         self.shear = BoxOperator(half_space)
-        self.compliances = np.array([[half_space.self_compliance(k)] for k in ALL])
-        """A cell's own ``(3, 1)`` [mm/MPa]."""
 
     def precondition(self, displacement: Array) -> Array:
         """About K⁻¹ u ``(3, nx, ny)`` [MPa] of ``displacement`` u ``(3, nx, ny)`` [mm]."""
@@ -145,61 +146,62 @@ def newton_on_cones(
 class _FreeParts:
     """The components of traction that are free, on the ``m`` cells of a contact.
 
-    Where a cell slips along ``normal`` ``(2, m)``, 0 where it sticks, what is free is its pressure,
-    which the shear follows, and the direction of its shear.
+    Where a cell slips along ``normal`` ``(2, m)``, what is free is its pressure, which the shear
+    follows, and the direction of its shear. Tensors ``(4, m)`` are xx, xy, yy and zz.
     """
 
     def __init__(
         self,
         operator: CoupledOperator,
-        friction: float,
-        normal: Array,
+        cells: Indices,
         slips: Mask,
+        follows: Array,
+        normal: Array,
         bend: Array,
         yielding: Array,
     ) -> None:
-        """``bend`` ``(m,)`` is |Δs|/µp where a cell slips, ``yielding`` D ``(m,)`` [mm/MPa]."""
-        self._follows = friction * normal
+        """``follows`` ``(2, m)`` is the shear over the pressure of cells where it ``slips``.
+
+        ``bend`` ``(m,)`` is |Δs|/µp there, ``yielding`` D ``(m,)`` [mm/MPa].
+        """
+        self._operator, self.cells, self.follows = operator, cells, follows
         x, y = normal
         across = np.where(slips, [y * y, -x * y, x * x], [[1.0], [0.0], [1.0]])
-        own = operator.compliances
-        own_x, own_z = float(own[X, 0]), float(own[Z, 0])
-        taken, taken_z = own_x / (own_x + bend), own_z / (own_z + yielding)
-        ones = np.ones_like(bend)
-        self._free = (*across, ones)
-        self._bend = (*(bend * across), yielding)
+        own, own_z = (operator.half_space.self_compliance(k) for k in (X, Z))
+        taken, taken_z = own / (own + bend), own_z / (own_z + yielding)
+        rest, rest_z = (1.0 - taken) / (own + bend), (1.0 - taken_z) / (own_z + yielding)
         # (K + D)⁻¹ is about χ K⁻¹ χ and a rest that hardly feels other cells: as in shear alone.
-        self._window = (*(np.sqrt(taken) * across), np.sqrt(taken_z))
-        rest, rest_z = (1.0 - taken) / (own_x + bend), (1.0 - taken_z) / (own_z + yielding)
-        self._rest = (*(rest * across), rest_z)
+        self._window = np.stack([*(np.sqrt(taken) * across), np.sqrt(taken_z)])
+        self._rest = np.stack([*(rest * across), rest_z])
+        self._bend = np.stack([*(bend * across), yielding])
+        self._free = np.stack([*across, np.ones_like(bend)])
 
     def cut(self, fields: Array) -> Array:
-        """The free components of ``(3, m)``."""
-        return _times(self._free, fields)
+        """The free components of ``fields`` ``(k, 3, m)``."""
+        cut = np.zeros_like(fields)
+        for part, field in zip(cut, fields, strict=True):
+            add_product(self._free, field, part)
+        return cut
 
-    def bent(self, parts: Array) -> Array:
-        """Displacement ``(3, m)`` by curvature and local compliance."""
-        return _times(self._bend, parts)
+    def add_bent(self, displacement: Array, parts: Array) -> None:
+        """Add what curvature and local compliance make of ``parts``, both ``(3, m)``."""
+        add_product(self._bend, parts, displacement)
 
-    def inverted(self, displacement: Array, precondition: Callable[[Array], Array]) -> Array:
+    def inverted(self, displacement: Array) -> Array:
         """Free components ``(3, m)`` that cause about this ``displacement`` ``(3, m)`` on them."""
-        inner = precondition(_times(self._window, displacement))
-        parts = _times(self._window, inner)
-        parts += _times(self._rest, displacement)
+        field = np.zeros((3, *self._operator.half_space.grid.shape))
+        spread_product(self._window, displacement, self.cells, field.reshape(3, -1))
+        field = self._operator.precondition(field)
+        parts = np.zeros_like(displacement)
+        gather_product(self._window, field.reshape(3, -1), self.cells, parts)
+        add_product(self._rest, displacement, parts)
         return parts
 
     def traction(self, parts: Array) -> Array:
         """Traction ``(3, m)`` of free components: with the shear that follows the pressure."""
         traction = parts.copy()
-        traction[:Z] += self._follows * parts[Z]
+        traction[:Z] += self.follows * parts[Z]
         return traction
-
-
-def _times(tensor: tuple[Array, ...], fields: Array) -> Array:
-    """Product ``(3, m)`` with the tensor of components xx, xy, yy, zz ``(m,)``."""
-    xx, xy, yy, zz = tensor
-    x, y, z = fields
-    return np.stack([xx * x + xy * y, xy * x + yy * y, zz * z])
 
 
 class _Search:
@@ -211,26 +213,27 @@ class _Search:
         self._problem, self._operator = problem, operator
         shapes = [problem.modes.motion(np.eye(6)[k]) for k in problem.free]
         self._shapes = np.reshape(shapes, (len(shapes), 3, traction[Z].size))
-        self._punches = np.zeros_like(self._shapes)
-        self._punched: Mask | None = None
+        self._images = np.empty((PHASE_STEPS, traction.size))
+        self._motions = np.zeros(len(shapes))
         self.iterations = 0
         self.contact, self.slipping = traction[Z] > 0.0, slipping & (traction[Z] > 0.0)
         self._turned = int(np.count_nonzero(self.contact))
         self._take(traction)
-        self._free_motions = self._supported()
+        self._linearise()
+        self._motions = self._undone(self._moved[:, self._parts.cells])
 
     @property
     def rigid(self) -> Array:
         """Free motions last found ``(6,)``."""
         rigid = np.zeros(6)
-        rigid[list(self._problem.free)] = self._free_motions
+        rigid[list(self._problem.free)] = self._motions
         return rigid
 
     def residual(self) -> float:
         """The largest of the traction last projected, at the motion last found."""
-        problem = self._problem
-        relative = self._relative()
-        return coupled_residuals(problem, self.traction, self._displacement, relative).largest
+        relative = self._relative(self._moved)
+        found = coupled_residuals(self._problem, self.traction, self._displacement, relative)
+        return found.largest
 
     def phase(self, goal: float) -> bool:
         """Directions on the present sets, then a projection; False where none can be balanced.
@@ -239,8 +242,8 @@ class _Search:
         """
         self._linearise()
         share = max(STEADY if self._turned == 0 else SETTLED, ENOUGH * goal)
-        step, image = self._solve(share)
-        return self._project(step, image)
+        step, moved = self._solve(share)
+        return bool(np.all(np.isfinite(step))) and self._project(step, moved)
 
     # -- the linear problem of a phase ----------------------------------------------------------
     def _take(self, traction: Array) -> None:
@@ -249,145 +252,126 @@ class _Search:
         moved = self._problem.relative(traction, self._displacement, np.zeros(6))
         self._moved = moved.reshape(3, -1)
 
-    def _relative(self) -> Array:
-        """``v`` ``(3, nx, ny)`` at the motion last found."""
-        relative = self._moved - np.tensordot(self._free_motions, self._shapes, 1)
-        return np.asarray(relative.reshape(self.traction.shape))
-
-    def _supported(self) -> Array:
-        """Free motions that leave no work to the pressure, for want of better ones."""
-        weight = self.traction[Z].ravel()
-        weighted = self._shapes * weight
-        products = np.tensordot(weighted, self._shapes, ([1, 2], [1, 2]))
-        work = np.tensordot(weighted, self._moved, ([1, 2], [0, 1]))
-        return np.asarray(np.linalg.pinv(products, RANK_CUTOFF, hermitian=True) @ work)
+    def _relative(self, moved: Array) -> Array:
+        """``v`` ``(3, nx, ny)`` where it is ``moved`` ``(3, nx ny)`` but for the free motions."""
+        motion = self._problem.modes.motion(self.rigid)
+        return np.asarray(moved.reshape(motion.shape) - motion)
 
     def _linearise(self) -> None:
         """Free components, curvature and punches at the present traction."""
-        problem, cells = self._problem, np.flatnonzero(self.contact)
-        self._cells = cells
+        friction, cells = self._problem.friction, np.flatnonzero(self.contact)
         slips = self.slipping.ravel()[cells]
-        pressure = self.traction[Z].ravel()[cells]
-        shear = self.traction[:Z].reshape(2, -1)[:, cells]
-        slip = self._relative()[:Z].reshape(2, -1)[:, cells]
+        shear_x, shear_y, pressure = self.traction.reshape(3, -1)[:, cells]
+        slip = self._relative(self._moved).reshape(3, -1)[:Z, cells]
         # Where nothing presses yet, shear will oppose the slip.
-        along = np.where(pressure > 0.0, shear, -slip)
+        along = np.where(pressure > 0.0, [shear_x, shear_y], -slip)
         normal = np.where(slips, along / np.maximum(np.hypot(*along), TINY), 0.0)
-        limit = np.maximum(problem.friction * pressure, TINY)
+        limit = friction * np.maximum(pressure, LEAST_PRESSURE * pressure.max()) + TINY
         bend = np.where(slips, np.maximum(-np.sum(slip * normal, axis=0), 0.0) / limit, 0.0)
-        yielding = np.broadcast_to(problem.compliance, self.contact.shape).ravel()[cells]
-        self._slip_normal = normal
-        self._parts = _FreeParts(self._operator, problem.friction, normal, slips, bend, yielding)
-        self._on_cells = self._shapes[:, :, cells]
-        self._set_punches(cells)
+        yielding = np.broadcast_to(self._problem.compliance, self.contact.shape).ravel()[cells]
+        self._normal = normal
+        self._parts = _FreeParts(
+            self._operator, cells, slips, friction * normal, normal, bend, yielding
+        )
+        self._set_punches(pressure + LEAST_PUNCH * pressure.max())
 
-    def _set_punches(self, cells: Indices) -> None:
-        """Free components that carry the resultants, close to those of rigid punches."""
-        sets = np.stack([self.contact, self.slipping])
-        before, count = self._punched, len(cells)
-        turned = count if before is None else int(np.count_nonzero((sets ^ before).any(axis=0)))
-        renewed = turned > STALE * count
-        punches = self._on_cells if renewed else self._punches[:, :, cells]
-        apply = self._inverted if renewed else self._parts.cut
-        self._punch = np.array([apply(punch) for punch in punches]).reshape(punches.shape)
-        if renewed:
-            self._punched = sets
-            self._punches = np.zeros_like(self._shapes)
-            self._punches[:, :, cells] = self._punch
-        on_cells = self._parts.cut
-        shapes = np.array([on_cells(shape) for shape in self._on_cells]).reshape(punches.shape)
-        answers = [self._parts.traction(punch) for punch in self._punch]
-        resultants = np.array([self._sums(answer) for answer in answers])
-        size = len(punches)
-        self._gain = np.linalg.pinv(resultants.reshape(size, size).T, RANK_CUTOFF)
-        work = np.tensordot(self._punch, shapes, ([1, 2], [1, 2]))
-        self._motion = np.linalg.pinv(work, RANK_CUTOFF)
+    def _set_punches(self, weight: Array) -> None:
+        """Free components that carry the resultants: rigid motions times a ``weight`` ``(m,)``."""
+        parts = self._parts
+        shapes = np.take(self._shapes, parts.cells, axis=2)
+        felt = shapes.copy()
+        felt[:, Z] += np.sum(parts.follows * shapes[:, :Z], axis=1)
+        flat = len(shapes), 3 * len(weight)
+        self._rigid_shapes, self._felt = shapes.reshape(flat), felt.reshape(flat)
+        self._punches = parts.cut(shapes * weight).reshape(flat)
+        self._gain = np.linalg.pinv(self._felt @ self._punches.T, RANK_CUTOFF)
+        self._gain_of_motions = np.linalg.pinv(self._punches @ self._rigid_shapes.T, RANK_CUTOFF)
 
-    def _sums(self, traction: Array) -> Array:
-        """Resultants ``(k,)`` [MPa] of traction ``(3, m)`` on the cells."""
-        return np.asarray(np.tensordot(self._on_cells, traction, ([1, 2], [0, 1])))
-
-    def _inverted(self, displacement: Array) -> Array:
-        return self._parts.inverted(displacement, self._preconditioned)
-
-    def _preconditioned(self, displacement: Array) -> Array:
-        """About K⁻¹ u on the cells, of u there and 0 elsewhere, both ``(3, m)``."""
-        field = self._operator.precondition(self._field(displacement))
-        return field.reshape(3, -1)[:, self._cells]
-
-    def _field(self, values: Array) -> Array:
-        """``(3, nx, ny)`` of values on the cells, 0 off them."""
-        field = np.zeros(self.traction.shape)
-        field.reshape(3, -1)[:, self._cells] = values
-        return field
+    def _undone(self, displacement: Array) -> Array:
+        """Free motions ``(k,)`` that leave a ``displacement`` ``(3, m)`` no work on punches."""
+        return np.asarray(self._gain_of_motions @ (self._punches @ displacement.ravel()))
 
     def _descent(self, displacement: Array) -> tuple[Array, Array]:
         """What ``displacement`` ``(3, m)`` asks of the free components, without resultants.
 
-        And the free motions taken off it first: those that do no work on punches.
+        And the free motions taken off it first.
         """
-        motions = self._motion @ np.tensordot(self._punch, displacement, ([1, 2], [0, 1]))
-        left = displacement - np.tensordot(motions, self._on_cells, 1)
-        parts = self._inverted(left)
-        carried = self._gain @ self._sums(self._parts.traction(parts))
-        parts -= np.tensordot(carried, self._punch, 1)
+        motions = self._undone(displacement)
+        left = displacement - (motions @ self._rigid_shapes).reshape(displacement.shape)
+        parts = self._parts.inverted(left)
+        carried = self._gain @ (self._felt @ parts.ravel())
+        parts -= (carried @ self._punches).reshape(parts.shape)
         return parts, motions
+
+    def _image(self, parts: Array) -> Array:
+        """K t ``(3, nx ny)`` of free components ``(3, m)``: one convolution."""
+        traction = np.zeros_like(self.traction)
+        traction.reshape(3, -1)[:, self._parts.cells] = self._parts.traction(parts)
+        return self._problem.half_space.displacement(traction).reshape(3, -1)
 
     def _solve(self, share: float) -> tuple[Array, Array]:
         """GMRES until the residual has fallen to ``share`` of itself.
 
-        The change of traction ``(3, m)`` and of ``v`` but for the motion ``(3, nx ny)``.
+        The step of the traction ``(3, m)``, and v at its end but for the motion ``(3, nx ny)``.
         """
-        begin, motions = self._descent(self._moved[:, self._cells])
+        cells = self._parts.cells
+        begin, motions = self._descent(self._moved[:, cells])
         size = float(np.linalg.norm(begin))
-        basis, images, moved = [-begin / max(size, TINY)], [], [motions]
+        basis = np.empty((PHASE_STEPS + 1, begin.size))
+        np.multiply(begin.ravel(), -1.0 / max(size, TINY), out=basis[0])
+        undone = [motions]
         hessenberg = np.zeros((PHASE_STEPS + 1, PHASE_STEPS))
-        weights = np.zeros(0)
-        for k in range(PHASE_STEPS):
-            self.iterations += 1
-            traction = self._field(self._parts.traction(basis[k]))
-            image = self._problem.half_space.displacement(traction).reshape(3, -1)
-            answer, motions = self._descent(image[:, self._cells] + self._parts.bent(basis[k]))
-            images.append(image)
-            moved.append(motions)
-            for i, vector in enumerate(basis):
-                hessenberg[i, k] = np.vdot(vector, answer)
-                answer -= hessenberg[i, k] * vector
-            hessenberg[k + 1, k] = np.linalg.norm(answer)
-            wanted = size * np.eye(k + 2)[0]
-            matrix = hessenberg[: k + 2, : k + 1]
-            weights = np.linalg.lstsq(matrix, wanted)[0]
-            left = float(np.linalg.norm(wanted - matrix @ weights))
-            if left <= share * size or hessenberg[k + 1, k] <= TINY:
+        wanted = size * np.eye(PHASE_STEPS + 1)[0]
+        weights, k = np.zeros(0), 0
+        while k < PHASE_STEPS:
+            parts = basis[k].reshape(begin.shape)
+            image = self._image(parts)
+            self._images[k] = image.ravel()
+            displacement = image[:, cells]
+            self._parts.add_bent(displacement, parts)
+            answer, motions = self._descent(displacement)
+            undone.append(motions)
+            next_one = answer.ravel()
+            for i in range(k + 1):
+                hessenberg[i, k] = basis[i] @ next_one
+                next_one -= hessenberg[i, k] * basis[i]
+            hessenberg[k + 1, k] = np.linalg.norm(next_one)
+            k += 1
+            if not np.isfinite(hessenberg[:, k - 1]).all():
+                return np.full_like(begin, np.nan), self._moved
+            matrix = hessenberg[: k + 1, :k]
+            weights = np.linalg.lstsq(matrix, wanted[: k + 1])[0]
+            left = float(np.linalg.norm(wanted[: k + 1] - matrix @ weights))
+            if left <= share * size or hessenberg[k, k - 1] <= TINY:
                 break
-            basis.append(answer / hessenberg[k + 1, k])
-        step = np.tensordot(weights, np.array(basis[: len(weights)]), 1)
-        self._free_motions = moved[0] + np.tensordot(weights, np.array(moved[1:]), 1)
-        return self._parts.traction(step), np.tensordot(weights, np.array(images), 1)
+            np.multiply(next_one, 1.0 / hessenberg[k, k - 1], out=basis[k])
+        self.iterations += k
+        self._motions = undone[0] + weights @ np.array(undone[1:])
+        step = self._parts.traction((weights @ basis[:k]).reshape(begin.shape))
+        return step, self._moved + (weights @ self._images[:k]).reshape(self._moved.shape)
 
     # -- back to the cones ----------------------------------------------------------------------
-    def _project(self, step: Array, image: Array) -> bool:
+    def _project(self, step: Array, moved: Array) -> bool:
         """Back to admissible and balanced tractions on new sets; False where there are none."""
-        problem, cells = self._problem, self._cells
+        problem, cells = self._problem, self._parts.cells
         reached = self.traction.reshape(3, -1)[:, cells] + step
-        relative = (self._moved + image).reshape(self.traction.shape)
-        relative -= np.tensordot(self._free_motions, self._shapes, 1).reshape(relative.shape)
-        slip = relative[:Z].reshape(2, -1)[:, cells]
-        pressed = reached[Z] > 0.0
-        slipped = self.slipping.ravel()[cells]
-        opposed = np.sum(slip * self._slip_normal, axis=0) < 0.0
+        relative = self._relative(moved)
+        slip = relative.reshape(3, -1)[:Z, cells]
+        pressed, slipped = reached[Z] > 0.0, self.slipping.ravel()[cells]
+        opposed = np.sum(slip * self._normal, axis=0) < 0.0
         beyond = np.hypot(*reached[:Z]) > problem.friction * np.maximum(reached[Z], 0.0)
         slips = (np.where(slipped, opposed, beyond) | (problem.friction == 0.0)) & pressed
-        trial = self._field(reached * pressed)
-        traction = balanced(problem, self._operator, trial, self._mask(slips))
+        trial = np.zeros_like(self.traction)
+        trial.reshape(3, -1)[:, cells] = reached * pressed
+        slipping = self._mask(slips)
+        traction = balanced(problem, self._operator, trial, slipping)
         if traction is None:
             return False
-        contact = self._mask(pressed) | ((relative[Z] < 0.0) & ~self.contact)
-        joining = contact & ~self.contact
+        joining = (relative[Z] < 0.0) & ~self.contact
         # Cells released are still on their circle; others the balance may have brought there.
         pushed = np.hypot(*traction[:Z]) >= problem.friction * traction[Z] * (1.0 - ROUNDING)
-        stuck = self._mask(pressed & ~slipped)
-        slipping = self._mask(slips) | joining | (stuck & pushed)
+        contact = self._mask(pressed) | joining
+        slipping |= joining | (self._mask(pressed & ~slipped) & pushed)
         changed = (contact ^ self.contact) | (contact & (slipping ^ self.slipping))
         self._turned = int(np.count_nonzero(changed))
         self.contact, self.slipping = contact, slipping
@@ -397,7 +381,7 @@ class _Search:
     def _mask(self, values: Mask) -> Mask:
         """``(nx, ny)`` of what is true on the cells."""
         mask = np.zeros(self.contact.shape, dtype=bool)
-        mask.ravel()[self._cells] = values
+        mask.ravel()[self._parts.cells] = values
         return mask
 
 
