@@ -203,20 +203,17 @@ class CoupledContact:
             raise CoupledContactError("start belongs to another grid: start from a state on this")
         before = self._level.transformed
         solution, iterations, verified = None, 0, 0
-        begun = self._begun(problem, start)
-        cells = None if begun is None else begun[0][Z] > 0.0
-        while begun is not None and cells is not None and verified < ROUNDS:
-            found = self._level.search(
-                problem, begun, cells, tolerance, NEWTON_ITERATIONS - iterations
-            )
+        begun, missed = self._begun(problem, start), None
+        while begun is not None and verified < ROUNDS:
+            left = NEWTON_ITERATIONS - iterations
+            found = self._level.search(problem, begun, tolerance, left, missed)
             solution = self._state(problem, found.traction, found.rigid)
             iterations, verified = iterations + found.iterations, verified + 1
+            begun = found.traction, found.slipping
+            # A box knows no gap around it.
             missed = solution.gap < -tolerance * solution.displacement[Z].max()
-            cells, begun = solution.pressure > 0.0, (found.traction, found.slipping)
-            if not found.converged or not (missed & ~cells).any():
+            if not (found.converged and (missed & (solution.pressure == 0.0)).any()):
                 break
-            # Of a box, which knows no gap around it.
-            cells = cells | missed
         transformed = self._level.transformed - before
         convolutions = verified + int(np.ceil(transformed / np.prod(self.half_space.padded)))
         if solution is None or solution.residuals.largest > tolerance:
@@ -235,7 +232,7 @@ class CoupledContact:
             begun = self._level.near(problem, start)
             if begun is not None:
                 return begun
-        return self._level.begin(problem, np.zeros_like(problem.offset))
+        return self._level.begin(problem)
 
     def _split(
         self, problem: CoupledProblem, tolerance: float, last: CoupledState | None

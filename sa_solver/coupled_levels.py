@@ -48,19 +48,16 @@ class CoupledLevel:
         self.transformed = 0.0
         self._boxed = lru_cache(BOXES)(self._plan)
 
-    def begin(self, problem: CoupledProblem, traction: Array) -> tuple[Array, Mask] | None:
-        """Admissible, balanced traction ``(3, nx, ny)`` to search from, near one of p >= 0.
+    def begin(self, problem: CoupledProblem) -> tuple[Array, Mask] | None:
+        """Admissible, balanced traction ``(3, nx, ny)`` to search from, and the cells that slip.
 
-        And the cells that slip ``(nx, ny)``. Corrected by the solutions on coarser grids; without
-        any pressure, that without friction. None where there is no such traction.
+        From the solutions on coarser grids, or without friction where there are none. None where
+        there is no such traction.
         """
-        begun = self._corrected(problem, traction)
-        if begun is None and not traction[Z].any():
-            traction = self._pressed(problem)
-        return begun or self.near(problem, traction)
+        return self._from_coarser(problem) or self.near(problem, self._pressed(problem))
 
     def near(self, problem: CoupledProblem, traction: Array) -> tuple[Array, Mask] | None:
-        """The same, without other grids."""
+        """The same near a traction of p >= 0, of which the cells on their circle slip."""
         limit = problem.friction * traction[Z]
         slipping = (np.hypot(*traction[:Z]) >= limit * (1.0 - ROUNDING)) & (traction[Z] > 0.0)
         return self._on_cones(problem, traction, slipping)
@@ -69,15 +66,17 @@ class CoupledLevel:
         self,
         problem: CoupledProblem,
         begun: tuple[Array, Mask],
-        cells: Mask,
         tolerance: float,
         max_iterations: int,
+        missed: Mask | None = None,
     ) -> CoupledIterate:
-        """Newton's method from a traction and its slipping cells, in a box around ``cells``.
+        """Newton's method from a traction and its slipping cells, in a box around the contact.
 
-        The box is enlarged while the contact reaches its sides.
+        And around cells ``missed`` so far. The box is enlarged while the contact reaches its sides.
         """
-        box, (traction, slipping), iterations = Box.around(cells), begun, 0
+        (traction, slipping), iterations = begun, 0
+        pressed = traction[Z] > 0.0
+        box = Box.around(pressed if missed is None else pressed | missed)
         while True:
             operator = self._operator(box)
             before = operator.half_space.count
@@ -118,28 +117,24 @@ class CoupledLevel:
         self._count(self.half_space, state.convolutions / 3.0)
         return traction
 
-    def _corrected(self, problem: CoupledProblem, traction: Array) -> tuple[Array, Mask] | None:
-        """Corrected by the solution on the next coarser grid; None without one."""
+    def _from_coarser(self, problem: CoupledProblem) -> tuple[Array, Mask] | None:
+        """From the solution on the next coarser grid; None without one."""
         if self._coarser is None:
             return None
         level, transfer = self._coarser
-        coarse = level._restricted(problem, transfer)
-        mean = np.array([transfer.averaged(component) for component in traction])
-        before = level.transformed
-        begun = level.begin(coarse, mean)
+        coarse, before = level._restricted(problem, transfer), level.transformed
+        begun = level.begin(coarse)
         if begun is None:
             return None
-        found = level.search(coarse, begun, begun[0][Z] > 0.0, COARSE_TOLERANCE, COARSE_ITERATIONS)
+        found = level.search(coarse, begun, COARSE_TOLERANCE, COARSE_ITERATIONS)
         self.transformed += level.transformed - before
-        change = np.array([transfer.interpolated(part) for part in found.traction - mean])
-        changed = traction + change
-        contact, slipping = (
+        traction = np.array([transfer.interpolated(component) for component in found.traction])
+        pressed, slipping = (
             transfer.interpolated(cells.astype(np.float64)) > 0.5
             for cells in (found.traction[Z] > 0.0, found.slipping)
         )
-        # Interpolation smears pressure over cells beyond the edge: a third more phases.
-        changed[Z] = np.where(contact, np.maximum(changed[Z], 0.0), 0.0)
-        return self._on_cones(problem, changed, slipping & (changed[Z] > 0.0))
+        # Interpolation smears tractions over cells beyond the edge: five directions more.
+        return self._on_cones(problem, traction * pressed, slipping & pressed)
 
     def _restricted(self, fine: CoupledProblem, transfer: GridTransfer) -> CoupledProblem:
         """The problem on this level that is the mean of one on the next finer grid."""

@@ -55,7 +55,8 @@ PATIENCE = 8
 """Phases without a lower residual after which the search gives up."""
 
 ROUNDING = 1e-12
-"""How far below its limit shear on the limit may be."""
+"""How far below its limit shear on the limit may be; and what is left of a direction that lies
+among the others."""
 
 LEAST_PRESSURE = 1e-9
 """Share of the largest pressure from which on down the curvature 1/p grows no more."""
@@ -219,8 +220,8 @@ class _Search:
         self.contact, self.slipping = traction[Z] > 0.0, slipping & (traction[Z] > 0.0)
         self._turned = int(np.count_nonzero(self.contact))
         self._take(traction)
-        self._linearise()
-        self._motions = self._undone(self._moved[:, self._parts.cells])
+        self._motions = self._supported()
+        self._relative = self._left(self._moved)
 
     @property
     def rigid(self) -> Array:
@@ -231,9 +232,8 @@ class _Search:
 
     def residual(self) -> float:
         """The largest of the traction last projected, at the motion last found."""
-        relative = self._relative(self._moved)
-        found = coupled_residuals(self._problem, self.traction, self._displacement, relative)
-        return found.largest
+        fields = self.traction, self._displacement, self._relative
+        return coupled_residuals(self._problem, *fields).largest
 
     def phase(self, goal: float) -> bool:
         """Directions on the present sets, then a projection; False where none can be balanced.
@@ -252,7 +252,14 @@ class _Search:
         moved = self._problem.relative(traction, self._displacement, np.zeros(6))
         self._moved = moved.reshape(3, -1)
 
-    def _relative(self, moved: Array) -> Array:
+    def _supported(self) -> Array:
+        """Free motions ``(k,)`` with which v does no work on the pressure."""
+        shapes = self._shapes.reshape(len(self._shapes), self._moved.size)
+        weighted = (self._shapes * self.traction[Z].ravel()).reshape(shapes.shape)
+        products = weighted @ shapes.T
+        return np.asarray(np.linalg.pinv(products, RANK_CUTOFF) @ (weighted @ self._moved.ravel()))
+
+    def _left(self, moved: Array) -> Array:
         """``v`` ``(3, nx, ny)`` where it is ``moved`` ``(3, nx ny)`` but for the free motions."""
         motion = self._problem.modes.motion(self.rigid)
         return np.asarray(moved.reshape(motion.shape) - motion)
@@ -262,7 +269,7 @@ class _Search:
         friction, cells = self._problem.friction, np.flatnonzero(self.contact)
         slips = self.slipping.ravel()[cells]
         shear_x, shear_y, pressure = self.traction.reshape(3, -1)[:, cells]
-        slip = self._relative(self._moved).reshape(3, -1)[:Z, cells]
+        slip = self._relative.reshape(3, -1)[:Z, cells]
         # Where nothing presses yet, shear will oppose the slip.
         along = np.where(pressure > 0.0, [shear_x, shear_y], -slip)
         normal = np.where(slips, along / np.maximum(np.hypot(*along), TINY), 0.0)
@@ -332,6 +339,7 @@ class _Search:
             answer, motions = self._descent(displacement)
             undone.append(motions)
             next_one = answer.ravel()
+            rounding = ROUNDING * float(np.linalg.norm(next_one)) + TINY
             for i in range(k + 1):
                 hessenberg[i, k] = basis[i] @ next_one
                 next_one -= hessenberg[i, k] * basis[i]
@@ -342,7 +350,7 @@ class _Search:
             matrix = hessenberg[: k + 1, :k]
             weights = np.linalg.lstsq(matrix, wanted[: k + 1])[0]
             left = float(np.linalg.norm(wanted[: k + 1] - matrix @ weights))
-            if left <= share * size or hessenberg[k, k - 1] <= TINY:
+            if left <= share * size or hessenberg[k, k - 1] <= rounding:
                 break
             np.multiply(next_one, 1.0 / hessenberg[k, k - 1], out=basis[k])
         self.iterations += k
@@ -355,7 +363,7 @@ class _Search:
         """Back to admissible and balanced tractions on new sets; False where there are none."""
         problem, cells = self._problem, self._parts.cells
         reached = self.traction.reshape(3, -1)[:, cells] + step
-        relative = self._relative(moved)
+        relative = self._left(moved)
         slip = relative.reshape(3, -1)[:Z, cells]
         pressed, slipped = reached[Z] > 0.0, self.slipping.ravel()[cells]
         opposed = np.sum(slip * self._normal, axis=0) < 0.0
@@ -376,6 +384,7 @@ class _Search:
         self._turned = int(np.count_nonzero(changed))
         self.contact, self.slipping = contact, slipping
         self._take(traction)
+        self._relative = self._left(self._moved)
         return True
 
     def _mask(self, values: Mask) -> Mask:
