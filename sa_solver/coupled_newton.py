@@ -270,8 +270,8 @@ class _Search:
         slips = self.slipping.ravel()[cells]
         shear_x, shear_y, pressure = self.traction.reshape(3, -1)[:, cells]
         slip = self._relative.reshape(3, -1)[:Z, cells]
-        # Where nothing presses yet, shear will oppose the slip.
-        along = np.where(pressure > 0.0, [shear_x, shear_y], -slip)
+        # Where nothing presses yet, shear will oppose the slip; without friction there is none.
+        along = np.where(pressure > 0.0, [shear_x, shear_y], -slip if friction else 0.0)
         normal = np.where(slips, along / np.maximum(np.hypot(*along), TINY), 0.0)
         limit = friction * np.maximum(pressure, LEAST_PRESSURE * pressure.max()) + TINY
         bend = np.where(slips, np.maximum(-np.sum(slip * normal, axis=0), 0.0) / limit, 0.0)
