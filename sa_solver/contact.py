@@ -363,7 +363,7 @@ class FrictionalContact:
             values = load.values.copy()
             for k in PLANAR:
                 values[k] -= before.rigid[k] if load.motion[k] else 0.0
-            start = before.start if start is None else start
+            start = before.traction if start is None else start
             state = self._coupled.solve(
                 height, offset, values, load.motion, tolerance=self.tolerance, start=start
             )
@@ -388,7 +388,6 @@ class FrictionalContact:
             message=state.message,
             convolutions=state.convolutions,
             border_load=state.border_load,
-            start=state.start,
         )
 
     def _slide_together(
@@ -402,7 +401,7 @@ class FrictionalContact:
 
         def solve(shift: Array, tolerance: float, last: CoupledState | None) -> CoupledState:
             values[1:3] = shift
-            start = (last or before).start
+            start = (last or before).traction
             return self._coupled.solve(
                 height, offset, values, motion, tolerance=tolerance, start=start
             )

@@ -48,8 +48,9 @@ class ContactLoad:
 class ContactStart:
     """Where a search may begin if somebody knows a state near the one sought.
 
-    Its ``normal`` pressure and its ``shear`` ``(2, nx, ny)`` [MPa], or of unlike bodies its own
-    ``start``; None of what nobody knows. What is found is the same within the tolerance.
+    Its ``normal`` pressure and its ``shear`` ``(2, nx, ny)`` [MPa], or of unlike bodies both
+    ``together`` ``(3, nx, ny)``; None of what nobody knows. What is found is the same within the
+    tolerance.
     """
 
     normal: NormalStart | None = None
@@ -87,7 +88,6 @@ class ContactState:
     message: str = ""
     convolutions: int = 0
     border_load: float = 0.0
-    start: Array | None = None
 
     @property
     def pressure(self) -> Array:
@@ -108,4 +108,4 @@ class ContactState:
     @property
     def as_start(self) -> ContactStart:
         """To begin from in the search for a state near this one."""
-        return ContactStart(self.pressed, self.shear, self.start)
+        return ContactStart(self.pressed, self.shear, self.traction)

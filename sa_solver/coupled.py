@@ -19,26 +19,28 @@ from functools import cached_property
 
 import numpy as np
 
-from sa_solver.contact_law import coulomb
-from sa_solver.coupled_problem import (
-    CoupledProblem,
-    CoupledResiduals,
-    coupled_residuals,
-)
+from sa_solver.coupled_levels import CoupledLevel, pressed_without_friction
+from sa_solver.coupled_problem import CoupledProblem, CoupledResiduals, coupled_residuals
+from sa_solver.coupled_splitting import CoupledSplitting
 from sa_solver.errors import ContactProblemError
 from sa_solver.friction_limit import largest_share
-from sa_solver.half_space import ALL, HalfSpace, HalfSpaceResolvent
+from sa_solver.half_space import HalfSpace
 from sa_solver.influence import Z
 from sa_solver.normal import NormalContact
 from sa_solver.normal_problem import border_share
-from sa_solver.padded_splitting import PaddedSplitting, RigidResponse
 from sa_solver.rigid_modes import PLANAR, RESULTANTS, RigidModes
 from sa_solver.splitting import douglas_rachford
 from sa_solver.tangential import UNCARRIED, FrictionLimitError, listed
-from sa_solver.types import Array
+from sa_solver.types import Array, Mask
 
 TOLERANCE = 1e-8
 """Default bound on every residual of :class:`CoupledResiduals`."""
+
+NEWTON_ITERATIONS = 200
+"""Directions of Newton's method; 15 to 35 are usual."""
+
+ROUNDS = 4
+"""Most searches in larger and larger boxes."""
 
 ITERATIONS = 2000
 """The splitting takes 40 to 110 on spheres and punches with µ from 0.005 to 1 and β up to 0.5, 200
@@ -55,15 +57,6 @@ three cells, others still had 0.4 to 0.9 after 2000 iterations, and took 70 to 3
 TIGHTENING, TIGHTEST = 0.1, 1e-4
 """The splitting's own residual is no bound on those of the state: its tolerance is lowered by this
 factor until they are met, down to this share of the tolerance asked for."""
-
-SHIFT = 0.75
-"""ρ over the geometric mean of the extreme eigenvalues of K. On spheres and flats 0.5, 0.75, 1 and
-1.5 took 57, 51, 50 and 60 iterations in the mean; lines prefer the lower ones."""
-
-LARGEST_WEIGHT = 60.0
-"""ρ of shear over that of pressure is β/µ between 1 and this. Where pressure drives all cells to
-slip and µ is small, shear changes its sign from one cell to the next: with one ρ for all, lines of
-1024 cells at β 0.5, µ 0.02 took up to 1000 iterations, with this 100 to 300."""
 
 OVERLOAD = 0.999
 """A load is taken to be more than friction can carry where at most this share of it can be: the
@@ -97,8 +90,9 @@ class CoupledState:
     ``resultants`` are (P, Qx, Qy, Mx, My, Mz) [N, N mm] and ``rigid`` the motions (δz, δx, δy, φx,
     φy, φz) [mm, rad], those in the plane being of the increment. ``border_load`` is the share of P
     on the outermost cells: above 0, the grid is too small. ``message`` is empty when
-    ``converged``, else says what is wrong and what to try. ``start``, the splitting's state
-    zero-padded, is what a solve on the same grid can start from.
+    ``converged``, else says what is wrong and what to try. ``convolutions`` of three components
+    are in units of one on the whole grid, by the size of their transforms, rounded up. (Each
+    iteration also transforms unpadded fields, a quarter of a convolution.)
     """
 
     traction: Array
@@ -109,7 +103,6 @@ class CoupledState:
     resultants: Array
     residuals: CoupledResiduals
     border_load: float
-    start: Array | None = None
     converged: bool = False
     message: str = ""
     iterations: int = 0
@@ -125,6 +118,11 @@ class CoupledState:
     def shear(self) -> Array:
         """(qx, qy) ``(2, nx, ny)`` [MPa]."""
         return self.traction[:Z]
+
+    @property
+    def start(self) -> Array:
+        """Start of a next solve on the same grid."""
+        return self.traction
 
     @property
     def touches_border(self) -> bool:
@@ -164,13 +162,7 @@ class CoupledContact:
         self.half_space, self.friction = half_space, friction
         self.grid = half_space.grid
         self._modes = RigidModes(half_space.grid)
-        shares = _shift_shares(half_space, friction)
-        self._resolvent = HalfSpaceResolvent(half_space, ALL, shares)
-        present = list(self._modes.present)
-        motions = np.array([self._modes.motion(np.eye(6)[k]) for k in present])
-        self._response = RigidResponse.of(
-            self._resolvent, motions, lambda traction: self._modes.sums(traction)[present]
-        )
+        self._level = CoupledLevel(half_space)
 
     def solve(
         self,
@@ -206,12 +198,53 @@ class CoupledContact:
     def _search(
         self, problem: CoupledProblem, tolerance: float, start: Array | None
     ) -> CoupledState:
-        """Iterate the splitting until the residuals of its solution are met, or cannot be."""
-        if start is not None and start.shape != (3, *self._resolvent.padded_shape):
+        """Newton's method and, where it gives up, the splitting from where it has got to."""
+        if start is not None and start.shape != problem.offset.shape:
             raise CoupledContactError("start belongs to another grid: start from a state on this")
+        before = self._level.transformed
+        solution, iterations, verified = None, 0, 0
+        begun, missed = self._begun(problem, start), None
+        while begun is not None and verified < ROUNDS:
+            left = NEWTON_ITERATIONS - iterations
+            found = self._level.search(problem, begun, tolerance, left, missed)
+            solution = self._state(problem, found.traction, found.rigid)
+            iterations, verified = iterations + found.iterations, verified + 1
+            begun = found.traction, found.slipping
+            # A box knows no gap around it.
+            missed = solution.gap < -tolerance * solution.displacement[Z].max()
+            if not (found.converged and (missed & (solution.pressure == 0.0)).any()):
+                break
+        transformed = self._level.transformed - before
+        convolutions = verified + int(np.ceil(transformed / np.prod(self.half_space.padded)))
+        if solution is None or solution.residuals.largest > tolerance:
+            solution = self._split(problem, tolerance, solution)
+        else:
+            solution = replace(solution, converged=True)
+        return replace(
+            solution,
+            iterations=iterations + solution.iterations,
+            convolutions=convolutions + solution.convolutions,
+        )
+
+    def _begun(self, problem: CoupledProblem, start: Array | None) -> tuple[Array, Mask] | None:
+        """Traction and slipping cells to search from; None where there are none to be had."""
+        if start is not None and start[Z].any():
+            begun = self._level.near(problem, start)
+            if begun is not None:
+                return begun
+        return self._level.begin(problem)
+
+    def _split(
+        self, problem: CoupledProblem, tolerance: float, last: CoupledState | None
+    ) -> CoupledState:
+        """Iterate the splitting until the residuals of its solution are met, or cannot be."""
         before = self.half_space.count
-        splitting, free = self._splitting(problem), list(problem.free)
-        state = self._touching(problem) if start is None else start
+        whole, free = self._splitting, list(problem.free)
+        splitting = whole.of(problem)
+        if last is not None and np.isfinite(last.residuals.largest):
+            state = self._splitting_state(problem, last)
+        else:
+            state = whole.touching(problem)
         inner, iterations, message, begun_anew = tolerance, 0, "", False
         while True:
             result = douglas_rachford(
@@ -224,7 +257,7 @@ class CoupledContact:
             state, iterations = result.state, iterations + result.iterations
             rigid = np.zeros(6)
             rigid[free] = splitting.rigid
-            solution = self._state(problem, self._resolvent.on_grid(result.solution), rigid)
+            solution = self._state(problem, whole.resolvent.on_grid(result.solution), rigid)
             converged = solution.residuals.largest <= tolerance
             if converged:
                 break
@@ -246,34 +279,21 @@ class CoupledContact:
             message=message,
             iterations=iterations,
             convolutions=self.half_space.count - before,
-            start=state,
         )
 
-    def _splitting(self, problem: CoupledProblem) -> PaddedSplitting:
-        shift = self._resolvent.shift[Z]
-        yielding = shift / (shift + problem.compliance)
+    def _splitting_state(self, problem: CoupledProblem, last: CoupledState) -> Array:
+        """The splitting's state at a ``last`` one."""
+        slip = problem.relative(last.traction, last.displacement, self._free(problem, last.rigid))
+        slip[Z] -= problem.compliance * last.pressure
+        return self._splitting.state(last.traction, slip)
 
-        def law(trial: Array) -> Array:
-            """Coulomb's law, with the compliance of the pressure."""
-            yielded = trial.copy()
-            yielded[Z] *= yielding
-            return coulomb(yielded, self.friction)
+    def _free(self, problem: CoupledProblem, rigid: Array) -> Array:
+        """The part of the motions ``(6,)`` [mm, rad] that is not imposed [mm]."""
+        return np.asarray(rigid * self._modes.lengths - problem.imposed)
 
-        return PaddedSplitting(
-            self._resolvent,
-            self._response.only([self._modes.present.index(k) for k in problem.free]),
-            problem.target,
-            problem.offset,
-            law,
-        )
-
-    def _touching(self, problem: CoupledProblem) -> Array:
-        """The splitting's state ``t + v/ρ`` of bodies that touch without load."""
-        gap = problem.offset[Z]
-        lowest = float(gap.min()) if problem.load is not None else 0.0
-        state = np.zeros((3, *self.grid.shape))
-        state[Z] = np.maximum(0.0, gap - lowest) / self._resolvent.shift[Z]
-        return self._resolvent.padded(state)
+    @cached_property
+    def _splitting(self) -> CoupledSplitting:
+        return CoupledSplitting(self.half_space, self.friction, self._modes)
 
     def _problem(
         self,
@@ -319,24 +339,12 @@ class CoupledContact:
         )
 
     def _pressed(self, problem: CoupledProblem) -> Array:
-        """The splitting's state ``t + v/ρ`` of the bodies pressed without friction."""
-        units = self._modes.lengths * self.grid.cell_area
-        loads = {k: float(problem.target[n] * units[k]) for n, k in enumerate(problem.free)}
-        tilts = [0.0 if k in self._modes.present and k not in loads else None for k in TILTS]
-        compliance = problem.compliance
-        pressed = self._normal.solve(
-            problem.offset[Z],
-            loads.get(0),
-            *(loads.get(k) for k in TILTS),
-            approach=None if 0 in loads else 0.0,
-            tilt_x=tilts[0],
-            tilt_y=tilts[1],
-            compliance=None if isinstance(compliance, float) else compliance,
-        )
-        state = np.zeros((3, *self.grid.shape))
-        elastic = pressed.gap - compliance * pressed.pressure
-        state[Z] = pressed.pressure + elastic / self._resolvent.shift[Z]
-        return self._resolvent.padded(state)
+        """The splitting's state of the bodies pressed without friction."""
+        pressed = pressed_without_friction(problem, self._normal)
+        traction, elastic = np.zeros((2, *problem.offset.shape))
+        traction[Z] = pressed.pressure
+        elastic[Z] = pressed.gap - problem.compliance * pressed.pressure
+        return self._splitting.state(traction, elastic)
 
     @cached_property
     def _normal(self) -> NormalContact:
@@ -363,7 +371,6 @@ class CoupledContact:
             residuals=CoupledResiduals(*[0.0] * 5),
             converged=True,
             border_load=0.0,
-            start=self._resolvent.padded(traction),
         )
 
     def _failure(self, problem: CoupledProblem, state: CoupledState, tolerance: float) -> str:
@@ -460,13 +467,6 @@ class CoupledContact:
                 f"friction cannot carry a shear force of {shear:.6g} N; the largest is µP = "
                 f"{largest:.6g} N: lower the force, or impose the sliding motion instead",
             )
-
-
-def _shift_shares(half_space: HalfSpace, friction: float) -> Array:
-    """ρ of shear, shear and pressure over the geometric mean of K's extreme eigenvalues."""
-    beta = abs(half_space.pair.dundurs_beta)
-    weight = max(1.0, min(LARGEST_WEIGHT, beta / max(friction, np.finfo(float).tiny)))
-    return SHIFT * np.array([weight, weight, 1.0])
 
 
 def _check_field(name: str, field: Array, shape: tuple[int, ...]) -> None:

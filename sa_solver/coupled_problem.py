@@ -11,14 +11,15 @@ the six rigid motions and c their sizes, each imposed or such that its resultant
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
 from sa_solver.contact_law import project_on_disk
 from sa_solver.half_space import HalfSpace
 from sa_solver.influence import X, Z
-from sa_solver.rigid_modes import RigidModes
+from sa_solver.rigid_modes import NORMAL, PLANAR, NormalModes, PlanarModes, RigidModes, Window
 from sa_solver.types import Array
 
 SMALLEST_SHARE = 1e-4
@@ -49,6 +50,37 @@ class CoupledProblem:
     def load(self) -> float | None:
         """P over the cell area [MPa], or None where the approach is imposed instead."""
         return float(self.target[0]) if 0 in self.free else None
+
+    @cached_property
+    def normal(self) -> NormalModes:
+        """The free modes of pressure."""
+        return self.modes.normal(self.free)
+
+    @cached_property
+    def planar(self) -> PlanarModes:
+        """The free modes of shear."""
+        return self.modes.planar(self.free)
+
+    @cached_property
+    def normal_target(self) -> Array:
+        """Sums [MPa] imposed on the free modes of pressure."""
+        return self.target[[k in NORMAL for k in self.free]]
+
+    @cached_property
+    def planar_target(self) -> Array:
+        """Sums [MPa] imposed on the free modes of shear."""
+        return self.target[[k in PLANAR for k in self.free]]
+
+    def cropped(self, window: Window, half_space: HalfSpace) -> CoupledProblem:
+        """The problem with tractions only on the cells of ``window``, those of ``half_space``."""
+        compliance = self.compliance
+        return replace(
+            self,
+            half_space=half_space,
+            modes=self.modes.cropped(window),
+            offset=np.ascontiguousarray(self.offset[:, *window]),
+            compliance=compliance if isinstance(compliance, float) else compliance[window],
+        )
 
     def relative(self, traction: Array, displacement: Array, rigid: Array) -> Array:
         """``v`` ``(3, nx, ny)`` [mm] under tractions t, K t and free motions ``rigid`` ``(6,)``."""

@@ -274,7 +274,6 @@ def _march(
             passed.append(state)
             if not state.converged:
                 break
-        # What a solve on the same grid can start from is not kept: it is larger than the rest.
         states.append(
             replace(
                 state,
@@ -282,7 +281,6 @@ def _march(
                 energy=np.sum([part.energy for part in passed], axis=0),
                 residual=max(part.residual for part in passed),
                 convolutions=sum(part.convolutions for part in passed),
-                start=None,
             )
         )
         passed_row(row, states[-1])

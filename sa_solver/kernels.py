@@ -128,3 +128,34 @@ def add_scaled(total, field, scale):  # type: ignore[no-untyped-def]
         for i in range(rows):
             for j in range(columns):
                 total[k, i, j] += scale * field[k, i, j]
+
+
+@njit(cache=True, nogil=True)
+def spread_product(tensor, values, cells, field):  # type: ignore[no-untyped-def]
+    """Set cells of a field ``(3, n)`` to tensors xx, xy, yy, zz ``(4, m)`` times ``(3, m)``."""
+    for i in range(len(cells)):
+        x, y, cell = values[0, i], values[1, i], cells[i]
+        field[0, cell] = tensor[0, i] * x + tensor[1, i] * y
+        field[1, cell] = tensor[1, i] * x + tensor[2, i] * y
+        field[2, cell] = tensor[3, i] * values[2, i]
+
+
+@njit(cache=True, nogil=True)
+def gather_product(tensor, field, cells, product):  # type: ignore[no-untyped-def]
+    """Add the same tensors times what a ``field`` ``(3, n)`` has on cells to ``product``."""
+    for i in range(len(cells)):
+        cell = cells[i]
+        x, y = field[0, cell], field[1, cell]
+        product[0, i] += tensor[0, i] * x + tensor[1, i] * y
+        product[1, i] += tensor[1, i] * x + tensor[2, i] * y
+        product[2, i] += tensor[3, i] * field[2, cell]
+
+
+@njit(cache=True, nogil=True)
+def add_product(tensor, values, product):  # type: ignore[no-untyped-def]
+    """Add the same tensors times ``values`` ``(3, m)`` to ``product`` ``(3, m)``."""
+    for i in range(values.shape[1]):
+        x, y = values[0, i], values[1, i]
+        product[0, i] += tensor[0, i] * x + tensor[1, i] * y
+        product[1, i] += tensor[1, i] * x + tensor[2, i] * y
+        product[2, i] += tensor[3, i] * values[2, i]

@@ -11,6 +11,7 @@ of u_x and u_y (:class:`PlanarModes`), the contact of dissimilar bodies all six
 
 from __future__ import annotations
 
+from copy import copy
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -314,10 +315,24 @@ class RigidModes:
         self._places = [NORMAL[k] for k in self._normal.free], [PLANAR[k] for k in planar]
         self.present = tuple(sorted([*self._places[0], *self._places[1]]))
 
+    def cropped(self, window: Window) -> RigidModes:
+        """The same modes on part of the cells."""
+        part = copy(self)
+        part._normal, part._planar = self._normal.cropped(window), self._planar.cropped(window)
+        return part
+
+    def normal(self, free: tuple[int, ...]) -> NormalModes:
+        """Those of pressure among the ``free`` ones."""
+        return replace(self._normal, free=tuple(k for k in self._normal.free if NORMAL[k] in free))
+
+    def planar(self, free: tuple[int, ...]) -> PlanarModes:
+        """Those of shear among the ``free`` ones."""
+        return self._planar.only(tuple(k for k in self._planar.free if PLANAR[k] in free))
+
     def motion(self, coefficients: Array) -> Array:
         """The displacement ``(3, nx, ny)`` [mm] with ``coefficients`` ``(6,)``."""
         normal, planar = self._places
-        field = np.zeros((3, *self.grid.shape))
+        field = np.zeros((3, self._normal.x.size, self._normal.y.size))
         self._planar.add_motion(field[:2], coefficients[planar])
         field[2] = self._normal.motion(coefficients[normal])
         return field
