@@ -23,6 +23,7 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
+from scipy.ndimage import binary_erosion
 from scipy.sparse.linalg import LinearOperator, cg
 
 from sa_solver.contact import FrictionalContact
@@ -108,7 +109,8 @@ class TangentialLoop:
     ``force`` [N] on body 2 are ``(k,)``, both from 0 on: first loading, then cycles of two branches
     of ``increments`` each, of which the last counts. ``energy`` [N mm] is dissipated by slip in it;
     ``stiffness`` [N/mm] is that of the stuck contact; ``sliding`` is the share of P on cells that
-    slip as the branches end; ``area`` [mm²] is in contact. ``border_load`` is the largest share of
+    slip as the branches end; ``area`` [mm²] is in contact, ``rim`` [mm²] of it on cells that have a
+    neighbour apart. ``border_load`` is the largest share of
     P on the outermost cells: above 0, the grid may be too small. ``closure`` is how far the cycle
     is from closed (``CLOSED``), ``residual`` the largest of the solver.
     """
@@ -121,6 +123,7 @@ class TangentialLoop:
     stiffness: float
     sliding: float
     area: float
+    rim: float
     border_load: float
     closure: float
     residual: float
@@ -238,15 +241,17 @@ def march_loop(contact: FrictionalContact, height: Array, path: LoopPath) -> Tan
     motions = np.array([state.rigid[path.place] for state in states])
     forces = np.array([state.resultants[path.place] for state in states])
     middle = cycle[path.increments]
+    touching = middle.pressure > 0.0
     return TangentialLoop(
         P=path.P,
         increments=path.increments,
         displacement=motions - pressed.rigid[path.place],
         force=forces,
         energy=float(sum(state.energy.sum() for state in cycle[1:])),
-        stiffness=stuck_stiffness(contact.half_space, middle.pressure > 0.0, path),
+        stiffness=stuck_stiffness(contact.half_space, touching, path),
         sliding=0.5 * (_slipping_share(middle) + _slipping_share(cycle[-1])),
-        area=float(np.count_nonzero(middle.pressure > 0.0)) * contact.grid.cell_area,
+        area=float(np.count_nonzero(touching)) * contact.grid.cell_area,
+        rim=_rim_cells(touching, contact.grid.line) * contact.grid.cell_area,
         border_load=max(state.border_load for state in states),
         closure=_closure(cycle, path),
         residual=max(state.residual for state in states),
@@ -389,6 +394,12 @@ def _closure(cycle: list[ContactState], path: LoopPath) -> float:
     values = np.array([getattr(state, name)[path.place] for state in cycle])
     extent = float(np.ptp(values))
     return abs(float(values[-1] - values[0])) / extent if extent > 0.0 else 0.0
+
+
+def _rim_cells(pressed: Mask, line: bool) -> int:
+    """Pressed cells with a neighbour that is not, or is off the grid."""
+    structure = np.ones((3, 1)) if line else None
+    return int(np.count_nonzero(pressed & ~binary_erosion(pressed, structure)))
 
 
 def _slipping_share(state: ContactState) -> float:

@@ -147,6 +147,9 @@ def test_values_are_those_of_the_loop(sphere):
     assert values["force"] == pytest.approx(FORCE)
     assert values["mu"] == pytest.approx(0.35)
     assert values["area"] == pytest.approx(np.pi * SPHERE.contact.contact_radius**2, rel=0.03)
+    off = abs(values["kt"] - 1.0 / SPHERE.tangential_compliance)
+    assert off < values["kt_error"] < 0.05 * values["kt"]
+    assert values["mu_error"] < 1e-6  # the force is imposed
 
 
 def test_force_beyond_friction_ends_the_run_in_one_line():
@@ -204,11 +207,15 @@ def test_figure_shows_the_loops(written, sphere):
         figure = loops_figure.loops(file, Contents(("sphere",), ("body_1", "body_2"), 1))
     kt = sphere.values["kt"] * 1e-3
     assert f"sphere {kt:.4g} → {kt:.4g} N/µm" in figure.get_suptitle()
-    loop, stiffness, energy = figure.axes
+    loop, stiffness, friction, energy = figure.axes
     assert [line.get_label() for line in loop.lines] == ["unworn", "200 cycles"]
     np.testing.assert_allclose(loop.lines[0].get_xdata(), 1e3 * sphere.displacement)
     np.testing.assert_allclose(stiffness.lines[0].get_ydata(), [kt, kt])
     np.testing.assert_allclose(stiffness.lines[0].get_xdata(), [1.5, 1.5])
+    assert "only mobilised" in friction.get_title()  # at half of what friction bears
+    (bars,) = (bars for bars in stiffness.collections)
+    lower, upper = bars.get_segments()[0][:, 1]
+    assert 0.5 * (upper - lower) == pytest.approx(1e-3 * sphere.values["kt_error"])
     assert energy.get_ylim()[1] > sphere.values["energy_per_loop"]
 
 

@@ -85,6 +85,24 @@ def test_printed_parameters_come_back_as_a_section_to_paste(folder):
     assert "--force" in again.stderr
 
 
+def test_friction_is_of_loops_that_slide(folder):
+    """Computed loops say so: of one that sticks, force over load is less than the coefficient."""
+    slides = ["sliding", *("1" if k != 5 else "0.3" for k in range(26))]
+    lines = [f"{a}, {b}" for a, b in zip(loops_csv().splitlines(), slides, strict=True)]
+    energy, mu, rest = lines[6].split(", ", 2)
+    lines[6] = f"{energy}, {0.5 * float(mu):g}, {rest}"
+    (folder / "loops.csv").write_text("\n".join([*lines, ""]), encoding="utf-8")
+    found = fretscale.fit(folder / "joint.yaml")
+    assert found["joint.friction"].value == pytest.approx(0.11, rel=1e-6)
+    (doubt,) = (doubt for doubt in found.doubts if doubt.startswith("mu: "))
+    assert doubt == "mu: left out where loops do not slide as a whole (loops.csv:7)"
+    text = "\n".join([lines[0], *(line.rpartition(",")[0] + ", 0.5" for line in lines[1:]), ""])
+    (folder / "loops.csv").write_text(text, encoding="utf-8")
+    refused = invoke("fit", folder / "joint.yaml")
+    assert refused.exit_code == 2
+    assert "mu: no loop slides as a whole (column sliding)" in refused.stderr
+
+
 def leaves(node, path=""):
     """Numbers of a section by path."""
     if isinstance(node, dict):

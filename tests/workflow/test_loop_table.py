@@ -51,6 +51,7 @@ def test_measured_tables_may_have_units_of_their_own(tmp_path):
     np.testing.assert_allclose(table.kt, [26500.0, 60000.0])
     np.testing.assert_allclose(table.energy, [0.0, 2.8e6])
     np.testing.assert_allclose(table.mu, [0.5, 0.9])
+    np.testing.assert_array_equal(table.sliding, 1.0)  # they do not say
 
 
 @pytest.mark.parametrize(

@@ -191,9 +191,8 @@ def _solved(
     places = [place for one in series for place in one.column.places]
     doubts = list(notes)
     for doubt in diagnose(fitted, order, files):
-        named = ", ".join(places[k] for k in doubt.data[:MOST_NAMED])
-        more = " ..." if len(doubt.data) > MOST_NAMED else ""
-        where = f" ({named}{more})" if named else ""
+        named = _named([places[k] for k in doubt.data])
+        where = f" ({named})" if named else ""
         doubts.append(": ".join(part for part in (doubt.series, doubt.text + where) if part))
     doubts += [
         f"{parameter.path}: rests on one value, {places[e.heaviest]}; more there would tell"
@@ -241,6 +240,12 @@ def _contradictions(fitted: Fitted) -> list[str]:
     return told
 
 
+def _named(places: Sequence[str]) -> str:
+    """The first of some places."""
+    more = " ..." if len(places) > MOST_NAMED else ""
+    return ", ".join(places[:MOST_NAMED]) + more
+
+
 def _products(fitted: Fit, parameters: Sequence[Parameter]) -> list[str]:
     """What is known of pairs of parameters of which only the product counts."""
     names = [parameter.estimate.name for parameter in parameters]
@@ -275,6 +280,11 @@ def _joint(given: FitInput, file: JointFit) -> Fitted:
                 "one that has, or columns that names it"
             )
     columns, notes = _without_residual(file, columns)
+    notes += [
+        f"{name}: left out where loops do not slide as a whole ({_named(column.left_out)})"
+        for name, column in columns.items()
+        if column.left_out
+    ]
     data = [
         _evolution_data(file, name, section, columns[MEASURED[name]])
         for name, section in file.evolution.given.items()

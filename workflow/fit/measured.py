@@ -14,7 +14,8 @@ from typing import Any
 
 import numpy as np
 
-from sa_solver.types import Array, Indices
+from sa_solver.types import Array, Indices, Mask
+from workflow.analyses.wear.loop_table import SLIDES
 from workflow.case.fields import Quantity, shown
 from workflow.case.input_files import InputFileError
 from workflow.case.sections import Section
@@ -23,6 +24,9 @@ from workflow.fit.schema import Measurement
 
 ENERGY = "energy"
 OF_DEVIATIONS = "_deviation"
+# What a loop tells only where all slides as its branches end, and the column of computed loops
+# that says so. Nothing acts beside these contacts: where they stick, nothing is left of them.
+OF_SLIDING, RESIDUAL, SLIDING = ("mu", "residual_stiffness"), "residual_stiffness", "sliding"
 # Likeness from which on a heading is a slip of the pen for that of deviations.
 NEARLY = 0.85
 # Base units and limits of what may be read.
@@ -38,6 +42,7 @@ QUANTITIES = {
     "volume_1": Quantity("mm^3", at_least=-1e9, at_most=1e9),
     "volume_2": Quantity("mm^3", at_least=-1e9, at_most=1e9),
     "amplitude": Quantity("mm", above=0.0, at_most=1e3),
+    SLIDING: Quantity("1", at_least=0.0, at_most=1.0 + 1e-9),
 }
 
 
@@ -47,7 +52,8 @@ class Column:
 
     ``values`` ``(n,)``, ``against`` what they were measured ``(n,)``, and their ``deviations``
     ``(n,)`` or None if they are not known. ``others`` are beside them by name, ``places`` are
-    ``file:line`` and ``files`` the number of the file of each.
+    ``file:line`` and ``files`` the number of the file of each. Rows ``left_out`` are of loops that
+    do not slide as a whole, ``file:line`` too.
     """
 
     against: Array
@@ -56,6 +62,7 @@ class Column:
     others: Mapping[str, Array]
     places: tuple[str, ...]
     files: Indices
+    left_out: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -67,6 +74,7 @@ class _Part:
     deviations: Array | None
     others: dict[str, Array]
     places: list[str]
+    left_out: list[str]
 
 
 def read_columns(
@@ -105,17 +113,42 @@ def _parts(
         wanted = ", ".join(called[name] for name in names)
         raise InputFileError(f"{table.place}: none of the columns {wanted}; allowed: at least one")
     others = {name: _numbers(table, called, name) for name in beside if called[name] in table.names}
+    slides = np.ones(len(table), dtype=bool)
+    if SLIDING in table.names:
+        slides = _numbers(table, called, SLIDING) >= SLIDES
+        others |= {name: np.where(slides, others[name], 0.0) for name in others if name == RESIDUAL}
     places = [f"{Path(table.file).name}:{line}" for line, _ in table.rows]
-    return {
-        name: _Part(
+    parts = {}
+    for name in found:
+        values = _numbers(table, called, name)
+        part = _Part(
             energy,
-            _numbers(table, called, name),
+            values,
             _deviations(table, called, name, deviations.get(name)),
             others,
             places,
+            [],
         )
-        for name in found
-    }
+        parts[name] = _of_sliding(table, name, part, slides) if name in OF_SLIDING else part
+    return parts
+
+
+def _of_sliding(table: TableFile, name: str, part: _Part, slides: Mask) -> _Part:
+    """The rows of loops that slide as a whole: the others have only mobilised some friction."""
+    if not slides.any():
+        raise InputFileError(
+            f"{table.place}: {name}: no loop slides as a whole (column {SLIDING}), so that it is "
+            "less than the coefficient of friction; allowed: loops of a larger amplitude"
+        )
+    rows = np.flatnonzero(slides)
+    return _Part(
+        part.energy[rows],
+        part.values[rows],
+        None if part.deviations is None else part.deviations[rows],
+        {other: values[rows] for other, values in part.others.items()},
+        [part.places[row] for row in rows],
+        [place for place, taken in zip(part.places, slides, strict=True) if not taken],
+    )
 
 
 def _section(measurement: Measurement, name: str) -> dict[str, Any]:
@@ -195,4 +228,5 @@ def _joined(name: str, parts: Sequence[tuple[int, _Part]]) -> Column:
         },
         places=tuple(place for _, part in parts for place in part.places),
         files=np.repeat([number for number, _ in parts], [len(part.values) for _, part in parts]),
+        left_out=tuple(place for _, part in parts for place in part.left_out),
     )

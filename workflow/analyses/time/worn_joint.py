@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from workflow.analyses.time.case import JointCase, RigCase
-from workflow.analyses.wear.loop_table import read_loop_table
+from workflow.analyses.wear.loop_table import SLIDES, read_loop_table
 from workflow.case.loading import YAML
 from workflow.errors import UserError
 from workflow.shell.analysis import Run
@@ -50,7 +50,7 @@ def with_computed_wear(run: Run[JointCase | RigCase]) -> JointCase | RigCase:
 
 
 def warn_of_table(case: JointCase | RigCase, last: float, reporter: Reporter) -> None:
-    """Say where a table of loops is used beyond its energies, or under another load.
+    """Say where a table of loops is used beyond its energies, under another load, or for friction.
 
     ``last`` is the largest energy that the joint came to [N mm].
     """
@@ -61,6 +61,12 @@ def warn_of_table(case: JointCase | RigCase, last: float, reporter: Reporter) ->
         reporter.warn(
             f"evolution.file: its loops end at {1e-3 * table.energy[-1]:g} J; beyond, up to "
             f"{1e-3 * last:g} J, the last one holds"
+        )
+    if table.sliding.min() < SLIDES:
+        reporter.warn(
+            f"evolution.file: {np.count_nonzero(table.sliding < SLIDES)} of its {len(table.mu)} "
+            "loops do not slide as a whole, and their mu is less than the coefficient of friction: "
+            "run them with a larger loops.amplitude"
         )
     load = case.joint.normal_load
     if load > 0.0 and np.any(np.abs(table.P - load) > SAME_LOAD * load):

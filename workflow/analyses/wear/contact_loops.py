@@ -16,6 +16,7 @@ import numpy as np
 
 from sa_solver.contact import FrictionalContact
 from sa_solver.errors import ContactProblemError
+from sa_solver.loop_errors import loop_errors
 from sa_solver.tangential_loop import (
     CLOSED,
     MOST_CYCLES,
@@ -27,7 +28,7 @@ from sa_solver.types import Array, Tilt
 from wear.interface import InterfaceState
 from wear.stepping import ContactFailure
 from workflow.analyses.wear.case.loops import Loops
-from workflow.analyses.wear.loop_table import COLUMNS, write_loop_table
+from workflow.analyses.wear.loop_table import COLUMNS, SLIDES, write_loop_table
 from workflow.errors import UserError
 from workflow.shell.dataset import Dataset
 from workflow.shell.folder import OutputFolder
@@ -77,8 +78,9 @@ def worn_loop(
     without load.
     """
     path = loop_path(loops, name, state, peak, tilt)
+    height = state.surfaces.gap + _share(path.P, state, peak) * lift
     try:
-        loop = march_loop(contact, state.surfaces.gap + _share(path.P, state, peak) * lift, path)
+        loop = march_loop(contact, height, path)
     except (LoopFailure, ContactProblemError) as error:
         raise ContactFailure(
             f"tangential loop: {error}; allowed: lower loops.force or loops.amplitude"
@@ -88,6 +90,7 @@ def worn_loop(
             f"tangential loop: still open by {loop.closure:.1e} of its range after {MOST_CYCLES} "
             "cycles; allowed: lower loops.amplitude or loops.force"
         )
+    errors = loop_errors(contact, height, path, loop)
     values = {
         "energy": state.energy,
         "P": loop.P,
@@ -100,6 +103,9 @@ def worn_loop(
         "sliding": loop.sliding,
         "residual_stiffness": loop.residual_stiffness,
         "border_load": loop.border_load,
+        "kt_error": errors.stiffness,
+        "mu_error": errors.friction,
+        "energy_per_loop_error": errors.energy,
     }
     return WornLoop(values, loop.displacement, loop.force)
 
@@ -189,7 +195,10 @@ def loops_sentence(name: str, loops: dict[str, Any], per_length: bool) -> str:
     """The loops of an interface, as the summary has them, in a line."""
     first, last = loops["unworn"], loops["worn"]
     per = "/mm" if per_length else ""
+    off = max(loop["kt_error"] / loop["kt"] for loop in (first, last))
+    mu = "mu" if min(first["sliding"], last["sliding"]) >= SLIDES else "mu, only mobilised,"
     return (
-        f"{name}: kt {first['kt'] * 1e-3:.4g} -> {last['kt'] * 1e-3:.4g} N/um{per}, energy per "
+        f"{name}: kt {first['kt'] * 1e-3:.4g} -> {last['kt'] * 1e-3:.4g} N/um{per} (within "
+        f"{off:.1%} by the grid), {mu} {first['mu']:.3g} -> {last['mu']:.3g}, energy per "
         f"loop {first['energy_per_loop']:.4g} -> {last['energy_per_loop']:.4g} mJ{per}"
     )

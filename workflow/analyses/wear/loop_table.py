@@ -57,7 +57,12 @@ COLUMNS = (
     Column("sliding", "1", "1", "share of P on cells that slip as branches end", extensive=False),
     Column("residual_stiffness", "N/mm", "N/mm", "slope of the loop as branches end"),
     Column("border_load", "1", "1", "share of P on the grid's outermost cells", extensive=False),
+    Column("kt_error", "N/mm", "N/mm", "estimated error of kt by grid"),
+    Column("mu_error", "1", "1", "of mu by grid and increments", extensive=False),
+    Column("energy_per_loop_error", "N*mm", "mJ", "of energy_per_loop by grid and increments"),
 )
+# Share of P that slips from which on mu is the coefficient of friction, not only what is mobilised.
+SLIDES = 1.0 - 1e-6
 # Of a table that joint laws read again.
 DIGITS = 12
 # Without these a table is none.
@@ -68,13 +73,15 @@ NEEDED = ("energy", "P", "kt", "mu")
 class LoopTable:
     """What joint laws read of a table of loops, ``(k,)`` each, in base units: see ``COLUMNS``.
 
-    ``energy`` ascends. ``per_length`` says that energies, forces and stiffnesses are per mm.
+    ``energy`` ascends. ``sliding`` is 1 where the table does not say. ``per_length`` says that
+    energies, forces and stiffnesses are per mm.
     """
 
     energy: Array
     P: Array
     kt: Array
     mu: Array
+    sliding: Array
     per_length: bool
 
 
@@ -106,7 +113,9 @@ def read_loop_table(path: Path) -> LoopTable:
     if falls.size:
         line = table.rows[falls[0] + 1][0]
         raise UserError(f"{path}:{line}: the energy falls; allowed: rows in order of their energy")
-    return LoopTable(**{name: columns[name] for name in NEEDED}, per_length=per_length)
+    sliding = columns.get("sliding", np.ones(len(columns["mu"])))
+    needed = {name: columns[name] for name in NEEDED}
+    return LoopTable(**needed, sliding=sliding, per_length=per_length)
 
 
 def _per_length(table: TableFile) -> bool:

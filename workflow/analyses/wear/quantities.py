@@ -16,6 +16,7 @@ from workflow.shell.summary import estimate, number_at, told
 
 # Estimated errors are totals of the error budget.
 BUDGET = "all parts of the error budget below"
+LOOP_ERROR = "grid and increments of the loop; not what wear steps leave of the surfaces"
 STRUCTURE = "structure"
 # Of elements, as gmsh's gamma.
 QUALITY = "inscribed over circumscribed radius, 1: regular"
@@ -133,9 +134,12 @@ def _stressed(case: WearCase, summary: Summary, name: str) -> Iterator[Quantity]
     for moment in MOMENTS:
         path = f"{name}.loops.{moment}"
         text, unit = f"tangential stiffness of the loop, {moment}", f"N/mm{per}"
-        yield of(text, f"{path}.kt", unit, everyday=f"N/um{per}")
+        yield of(text, f"{path}.kt", unit, everyday=f"N/um{per}", **_of_loop(summary, path, "kt"))
+        text = f"largest tangential over normal force of the loop, {moment}"
+        yield of(text, f"{path}.mu", "1", **_of_loop(summary, path, "mu"))
         text = f"energy of the tangential loop, {moment}"
-        yield of(text, f"{path}.energy_per_loop", f"N mm{per}")
+        key = "energy_per_loop"
+        yield of(text, f"{path}.{key}", f"N mm{per}", **_of_loop(summary, path, key))
     error = _budgeted(summary, name, "life")
     for key, (unit, text) in {"von_mises": ("MPa", "von Mises stress"), **PARAMETERS}.items():
         for body in case.bodies:
@@ -145,6 +149,12 @@ def _stressed(case: WearCase, summary: Summary, name: str) -> Iterator[Quantity]
                 yield of(
                     f"largest {text} under the face of {named(body)}, {moment}", path, unit, **known
                 )
+
+
+def _of_loop(summary: Summary, path: str, key: str) -> dict[str, Any]:
+    """The estimated error of a value of a loop."""
+    value, error = (number_at(summary, f"{path}.{name}") for name in (key, f"{key}_error"))
+    return {"error": error / value, "error_of": LOOP_ERROR} if value and error is not None else {}
 
 
 def _budgeted(summary: Summary, name: str, result: str) -> dict[str, Any]:

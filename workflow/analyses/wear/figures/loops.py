@@ -1,4 +1,7 @@
-"""Figure of the tangential loops on worn contacts, and of what they give for joint laws."""
+"""Figure of the tangential loops on worn contacts, and of what they give for joint laws.
+
+Bars are the errors that grid and increments are estimated to leave.
+"""
 
 from __future__ import annotations
 
@@ -11,6 +14,7 @@ from matplotlib.figure import Figure
 
 from sa_solver.types import Array
 from workflow.analyses.wear.layout import Contents
+from workflow.analyses.wear.loop_table import SLIDES
 from workflow.pictures.panels import (
     blocks,
     changes,
@@ -25,6 +29,8 @@ from workflow.pictures.style import BLACK, BLUE, GREEN, HEADROOM, ORANGE, PURPLE
 
 # More loops than this in a panel overlap.
 MOST_LOOPS = 6
+# Values with their estimated errors, and the unit they are drawn in.
+SHOWN = {"kt": PER_MICRON, "mu": 1.0, "energy_per_loop": 1.0}
 COLOURS = (BLUE, ORANGE, GREEN, PURPLE, BLACK)
 
 
@@ -57,20 +63,23 @@ def _draw_loops(axis: Axes, group: h5py.Group) -> None:
 
 
 def _draw_evolution(figure: Any, groups: h5py.Group, per: str) -> None:
-    """Stiffness and energy per loop over the energy that wear has dissipated."""
-    stiffness, energy = figure.subplots(1, 2)
+    """Stiffness, friction and energy per loop over the energy that wear has dissipated."""
+    panels = stiffness, friction, energy = figure.subplots(1, 3)
+    mobilised = any(np.any(_column(group, "sliding") < SLIDES) for group in groups.values())
     for number, (name, group) in enumerate(groups.items()):
         colour = COLOURS[number % len(COLOURS)]
         worn = TO_JOULES * _column(group, "energy")
         # Interfaces under one load are alike: the last must not hide the first.
         size = 8.0 - 4.0 * number / len(groups)
-        look: dict[str, Any] = {"color": colour, "marker": "o", "mfc": "none", "label": name}
-        stiffness.plot(worn, PER_MICRON * _column(group, "kt"), markersize=size, **look)
-        energy.plot(worn, _column(group, "energy_per_loop"), markersize=size, **look)
-    for axis in (stiffness, energy):
+        look = {"color": colour, "marker": "o", "mfc": "none", "label": name, "markersize": size}
+        for axis, (key, scale) in zip(panels, SHOWN.items(), strict=True):
+            values, errors = (scale * _column(group, column) for column in (key, f"{key}_error"))
+            axis.errorbar(worn, values, errors, capsize=2.0, **look)
+    for axis in panels:
         axis.set_xlabel(f"energy dissipated so far [J{per}]")
         axis.set_ylim(0.0, HEADROOM * max(axis.dataLim.y1, 1e-300))
-    stiffness.set(title="stiffness of the stuck contact", ylabel=f"kt [N/µm{per}]")
+    stiffness.set(title="stuck stiffness", ylabel=f"kt [N/µm{per}]")
+    friction.set(title="friction" + ", only mobilised" * mobilised, ylabel="µ")
     energy.set(title="energy per loop", ylabel=f"energy [mJ{per}]")
     if len(groups) > 1:
         legend_below(figure, [stiffness])
