@@ -5,10 +5,13 @@ from __future__ import annotations
 import importlib
 import os
 import sys
+from threading import Lock
 from types import ModuleType
 from typing import Any
 
 INTERFACES = "pyfftw.interfaces"
+
+_LOADING = Lock()
 
 
 class _Later(ModuleType):
@@ -29,8 +32,11 @@ def load_pyfftw() -> Any:
 
     The interfaces to numpy, scipy and dask load ten times as long as the rest.
     """
-    if "pyfftw" in sys.modules:
-        return sys.modules["pyfftw"]
+    with _LOADING:  # a module that another thread has begun to load has not all its names yet
+        return sys.modules.get("pyfftw") or _loaded()
+
+
+def _loaded() -> ModuleType:
     flags = sys.getdlopenflags()
     sys.modules[INTERFACES] = _Later(INTERFACES)
     sys.setdlopenflags(flags | getattr(os, "RTLD_DEEPBIND", 0))

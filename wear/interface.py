@@ -199,7 +199,7 @@ class InterfaceContact:
         self.grid, self.transfer, self.pair = settings.grid, settings.transfer, settings.pair
         self._contact = NormalContact(HalfSpace(settings.grid, settings.pair))
         self._frictional: FrictionalContact | None = None
-        self._spent = Spent()
+        self._spent = self._told = Spent()
         self._current: tuple[tuple[Array, ...], _Loaded] | None = None
         # Called after each increment of a cycle of the half-space with its own friction.
         self.solved: Callable[[], None] = lambda: None
@@ -210,7 +210,6 @@ class InterfaceContact:
 
         At every loaded increment. Raises :class:`MotionError`.
         """
-        before = self._spent
         state = InterfaceState.unworn(
             self.settings.gap,
             loads=history.loads,
@@ -243,7 +242,7 @@ class InterfaceContact:
             pressure=pressure,
             touches_border=any(s.touches_border for s in states),
             largest_residual=max((s.residuals.largest for s in states), default=0.0),
-            spent=self._spent - before + Spent(len(states), result.convolutions),
+            spent=self._newly_spent() + Spent(len(states), result.convolutions),
             stable_cycles=loaded.contact.stable_cycles(state),
             link=state.link,
             cycle=loaded.cycle,
@@ -251,8 +250,7 @@ class InterfaceContact:
 
     def follow(self, state: InterfaceState, history: FaceLoads) -> tuple[InterfaceState, Spent]:
         """The state under the loads of a new solution, and what it took. Raises MotionError."""
-        before, link = self._spent, self._link(history)
-        return self._followed(state, history, link), self._spent - before
+        return self._followed(state, history, self._link(history)), self._newly_spent()
 
     def _followed(self, state: InterfaceState, history: FaceLoads, link: Link) -> InterfaceState:
         if isinstance(state.coarse, InterfaceState):
@@ -275,13 +273,9 @@ class InterfaceContact:
         self, state: InterfaceState, cycles: float, left: float
     ) -> tuple[InterfaceState, Spent]:
         """Wear ``cycles`` of the ``left`` cycles of the run; also what it took."""
-        before = self._spent
         result = advance_cycles(self.settings.stepper, state, cycles, left, self._contact_at)
-        after = result.state
-        assert isinstance(after, InterfaceState)
-        # Friction of the half-space on the new surfaces: for the record now, to wear by next.
-        self._loaded(after)
-        return after, result.spent + self._spent - before
+        assert isinstance(result.state, InterfaceState)
+        return result.state, result.spent + self._newly_spent()
 
     def stable_cycles(self, state: InterfaceState) -> float:
         """Longest explicit step that is stable."""
@@ -363,6 +357,11 @@ class InterfaceContact:
                 self.settings.gross_slip,
             )
         return self._frictional
+
+    def _newly_spent(self) -> Spent:
+        """What cycles of the half-space and links have taken since this was asked for last."""
+        spent, self._told = self._spent - self._told, self._spent
+        return spent
 
     # -- loads -------------------------------------------------------------------------------------
     def _link(self, history: FaceLoads) -> Link:

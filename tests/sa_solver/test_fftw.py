@@ -18,3 +18,19 @@ assert pyfftw.interfaces.cache.is_enabled() is False
 
 def test_interfaces_of_pyfftw_are_loaded_when_they_are_asked_for():
     subprocess.run([sys.executable, "-c", CODE], check=True)
+
+
+AT_ONCE = """
+from concurrent.futures import ThreadPoolExecutor
+from threading import Barrier
+from sa_solver.fftw import load_pyfftw
+start = Barrier(4)
+def loaded(_):
+    start.wait()
+    return load_pyfftw().zeros_aligned(3).size
+assert list(ThreadPoolExecutor(4).map(loaded, range(4))) == [3] * 4
+"""
+
+
+def test_threads_that_are_the_first_to_ask_wait_for_each_other():
+    subprocess.run([sys.executable, "-c", AT_ONCE], check=True)
