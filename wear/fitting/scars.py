@@ -144,7 +144,7 @@ def _lagrange(nodes: Array, place: float) -> Array:
 
 @dataclass(frozen=True)
 class ScarData:
-    """A measured profile, its ``name``, and the runs that compute it.
+    """A measured profile, its ``name``, and the ``runs`` that compute it.
 
     ``depth`` ``(n,)`` [mm], positive where something is worn, at ``x`` ``(n,)`` [mm], with standard
     ``deviations`` ``(n,)`` if they are known. It is that of the ``body``: body_1, body_2, or both
@@ -181,7 +181,7 @@ class ScarData:
 
 @dataclass(frozen=True)
 class ScarFit:
-    """The problem of some :class:`ScarData`.
+    """The ``problem`` of some ``data``.
 
     ``bodies`` are those whose coefficients are the first unknowns, in this order; with
     ``threshold`` that is the next.
