@@ -251,9 +251,9 @@ def scar_problem(data: Sequence[ScarData], threshold: bool = False) -> ScarFit:
 
     The coefficient of each body that has a profile comes first, fitted as its logarithm; then the
     threshold [N mm], if it is asked for; shift [mm], height [mm] and tilt [1] of each profile
-    follow. Raises FitError for profiles that are not in rising order or not finite, or of less than
-    five points, those of both together beside those of each, and a threshold without energies that
-    differ.
+    follow. Raises FitError for profiles that are not in rising order or not finite, have less than
+    five points or no scar, those of both together beside those of each, and a threshold without
+    energies that differ.
 
     Examples
     --------
@@ -366,9 +366,14 @@ def _best_shift(data: ScarData) -> tuple[float, list[float]]:
     """Coefficient, and shift, height and tilt if it has them, of the best of some shifts."""
     length = np.ptp(data.x)
     shifts = [0.0] if data.aligned else np.linspace(-length, length, SHIFTS)
-    _, coefficient, level = min(
+    squares, coefficient, level = min(
         (_linear(data, float(shift)) for shift in shifts), key=lambda f: f[0]
     )
+    if not np.isfinite(squares):
+        raise FitError(
+            f"{data.name}: no scar of the runs is in it, wherever they are laid; allowed: depth, "
+            "above 0 where something is worn"
+        )
     return coefficient, level
 
 

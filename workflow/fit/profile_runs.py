@@ -45,13 +45,14 @@ class RunScar:
     """What a run has worn along x ``(m,)`` [mm], both bodies together: ``depth`` ``(m,)`` [mm].
 
     ``coefficient`` [1/MPa] is the sum of those of the bodies, ``energy`` [N mm] what it has
-    dissipated.
+    dissipated, ``warnings`` what it has warned of.
     """
 
     coefficient: float
     x: Array
     depth: Array
     energy: float
+    warnings: tuple[str, ...] = ()
 
 
 class TestRuns:
@@ -160,7 +161,8 @@ class TestRuns:
                 "coefficients; allowed: a case of one law for both, in which they hardly move over "
                 "each other (wear.motion: neglect), or depth of both together"
             )
-        return RunScar(sum(pair), x, np.asarray(sum(depths)), float(summary[name]["energy"]))
+        energy = float(summary[name]["energy"])
+        return RunScar(sum(pair), x, np.asarray(sum(depths)), energy, tuple(summary["warnings"]))
 
     def _interface(self, number: int, names: Sequence[str]) -> str:
         asked = self.tests[number].interface

@@ -131,7 +131,10 @@ class _Search:
             for of_all in (last, fine)
         ]
         by_finer = scars.moved_by(found, coarse[1] - coarse[0])
-        return self._with_runs(self._fitted(scars, found), missing, by_finer, settled)
+        warned = dict.fromkeys(warning for one in last for warning in one.warnings)
+        fitted = self._fitted(scars, found)
+        doubts = *fitted.doubts, *(f"the runs: {warning}" for warning in warned)
+        return self._with_runs(replace(fitted, doubts=doubts), missing, by_finer, settled)
 
     def _run(self, wanted: Sequence[Pair], finer: Mapping[str, Any] | None = None) -> list[RunScar]:
         return self._runs.scars(wanted, finer, alike=BOTH not in self._bodies)
@@ -204,7 +207,8 @@ class _Search:
             if not body.logarithmic:
                 break
             path = fitted.parameters[place].path
-            numbers[path] = {"for_want_of_runs": missing[place], "by_finer": by_finer[place]}
+            errors = {"for_want_of_runs": missing[place], "by_finer": by_finer[place]}
+            numbers[path] = {name: float(error) for name, error in errors.items()}
             deviation = float(np.sqrt(fitted.fit.covariance[place, place]))
             told.append(
                 f"{path}: off by about {missing[place]:.2g} for want of runs, and "
