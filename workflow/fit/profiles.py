@@ -134,7 +134,7 @@ class _Search:
         warned = dict.fromkeys(warning for one in last for warning in one.warnings)
         fitted = self._fitted(scars, found)
         doubts = *fitted.doubts, *(f"the runs: {warning}" for warning in warned)
-        return self._with_runs(replace(fitted, doubts=doubts), missing, by_finer, settled)
+        return self._with_runs(replace(fitted, doubts=doubts), scars, missing, by_finer, settled)
 
     def _run(self, wanted: Sequence[Pair], finer: Mapping[str, Any] | None = None) -> list[RunScar]:
         return self._runs.scars(wanted, finer, alike=BOTH not in self._bodies)
@@ -199,25 +199,29 @@ class _Search:
         here = scars.problem.places == place
         return lambda _: lambda values: scars.predict(values)[here]
 
-    def _with_runs(self, fitted: Fitted, missing: Array, by_finer: Array, settled: bool) -> Fitted:
+    def _with_runs(
+        self, fitted: Fitted, scars: ScarFit, missing: Array, by_finer: Array, settled: bool
+    ) -> Fitted:
         """The result with how many runs it took, and their errors."""
         how = ", ".join(f"{path}: {scalar(value)}" for path, value in self._file.finer.items())
         told, doubts, numbers = [], list(fitted.doubts), {}
-        for place, body in enumerate(fitted.fit.problem.unknowns):
-            if not body.logarithmic:
-                break
-            path = fitted.parameters[place].path
-            errors = {"for_want_of_runs": missing[place], "by_finer": by_finer[place]}
-            numbers[path] = {name: float(error) for name, error in errors.items()}
+        for place in range(_count(scars)):
+            parameter, off, finer = fitted.parameters[place], missing[place], by_finer[place]
             deviation = float(np.sqrt(fitted.fit.covariance[place, place]))
-            told.append(
-                f"{path}: off by about {missing[place]:.2g} for want of runs, and "
-                f"{by_finer[place]:+.2g} with finer ones ({how}), relative; its standard "
-                f"deviation is {deviation:.2g}"
+            # A coefficient is fitted as its logarithm: what it is off by is relative.
+            size = (
+                1.0 if fitted.fit.problem.unknowns[place].logarithmic else fitted.fit.values[place]
             )
-            if abs(by_finer[place]) > TOO_COARSE * deviation:
+            errors = {"for_want_of_runs": off / size, "by_finer": finer / size}
+            numbers[parameter.path] = {name: float(error) for name, error in errors.items()}
+            told.append(
+                f"{parameter.path}: off by about {off / size:.2g} for want of runs, and "
+                f"{finer / size:+.2g} with finer ones ({how}), relative; its standard deviation is "
+                f"{deviation / size:.2g}"
+            )
+            if abs(finer) > TOO_COARSE * deviation:
                 doubts.append(
-                    f"{path}: finer runs move it by {abs(by_finer[place]) / deviation:.2g} "
+                    f"{parameter.path}: finer runs move it by {abs(finer) / deviation:.2g} "
                     "standard deviations, which the bounds do not have; make the cases finer"
                 )
         if not settled:
@@ -238,11 +242,17 @@ def _computed(scars: Sequence[RunScar]) -> ComputedScars:
     return ComputedScars(np.array([scar.coefficient for scar in scars]), x, depth)
 
 
+def _count(scars: ScarFit) -> int:
+    """Of the unknowns that are of the wear, not of a scan: they come first."""
+    return len(scars.bodies) + scars.threshold
+
+
 def _are_enough(scars: ScarFit, found: Fit, missing: Array) -> bool:
     """Whether runs are near enough to what was found; NaN, of a single one, is not."""
-    count = len(scars.bodies)
+    count = _count(scars)
     deviations = np.sqrt(np.diag(found.covariance))[:count]
-    return bool(np.all(np.abs(missing[:count]) <= np.maximum(ENOUGH * deviations, LEAST)))
+    sizes = np.where(scars.problem.logarithmic, 1.0, np.abs(found.values))[:count]
+    return bool(np.all(np.abs(missing[:count]) <= np.maximum(ENOUGH * deviations, LEAST * sizes)))
 
 
 def _path(name: str) -> tuple[str, str]:

@@ -174,18 +174,24 @@ def _profiles(fitted: Fitted, file: ProfileFit) -> list[Row]:
             rows += _body(fitted, body)
         else:
             held = _held(getattr(wear, body).coefficient, "um^3/J", "coefficient")
-            rows.append(Row(body, [held]))
+            rows.append(Row(body, [held, *_threshold(fitted, body)]))
     return [Row("wear", rows)]
+
+
+def _threshold(fitted: Fitted, body: str) -> list[Row]:
+    """The evolution of a body, if the fit asks for a threshold: its own, or that of all."""
+    own = f"wear.{body}.threshold"
+    path = own if own in fitted.by_path else "wear.threshold"
+    if path not in fitted.by_path:
+        return []
+    threshold = _row(fitted, path, "threshold")
+    return [Row("evolution", [Row("scope", "global"), threshold], off=threshold.off)]
 
 
 def _body(fitted: Fitted, body: str) -> list[Row]:
     """The entries of a body; of both together that of each is left to be decided."""
     entries = [_row(fitted, f"wear.{body}.coefficient", "coefficient")]
-    own = f"wear.{body}.threshold"
-    if (path := own if own in fitted.by_path else "wear.threshold") in fitted.by_path:
-        threshold = _row(fitted, path, "threshold")
-        scope = Row("scope", "global")
-        entries.append(Row("evolution", [scope, threshold], off=threshold.off))
+    entries += _threshold(fitted, body)
     if (path := f"wear.{body}.intercept") in fitted.by_path:
         found = _row(fitted, path, "intercept")
         comment = f"{found.comment}; a case has none: its volumes are less by so much"
