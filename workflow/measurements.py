@@ -66,16 +66,16 @@ def fit(file: Path, out: Path | None, force: bool) -> None:
     """Find parameters of a case from measurements.
 
     FIT is a YAML file that names tables of measurements and what is free: `fretscale new` writes
-    fit_joint, fit_loops and fit_wear. Tells values with their standard deviations and 95 % bounds,
-    what the data do not determine, and what speaks against the fit; with --out writes the section
-    of a case.
+    fit_joint, fit_loops, fit_wear and fit_profiles. Tells values with their standard deviations and
+    95 % bounds, what the data do not determine, and what speaks against the fit; with --out writes
+    the section of a case. fit_profiles needs it for its runs, which another call takes up.
     """
-    from workflow.fit.fitting import run_fit
     from workflow.fit.report import report
-    from workflow.fit.running import write_fit
+    from workflow.fit.running import run_fit, write_fit
     from workflow.fit.schema import load_fit
+    from workflow.shell.screen import Loudness
 
-    fitted = run_fit(load_fit(file))
+    fitted = run_fit(load_fit(file), out, force, Loudness.NORMAL)
     for line in report(fitted):
         click.echo(line)
     if out is not None:

@@ -246,6 +246,7 @@ def test_files_of_two_materials_are_told(folder):
 @pytest.mark.parametrize("kind", FITS)
 def test_every_comment_of_a_template_may_be_opened(folder, kind):
     (folder / "measured.csv").write_text(loops_csv(), encoding="utf-8")
+    (folder / "test.yaml").write_text("a case, which is read when it is run", encoding="utf-8")
     file, seen = folder / "template.yaml", set()
     file.write_text(fit_template(kind), encoding="utf-8")
     load_fit(file)
@@ -254,7 +255,7 @@ def test_every_comment_of_a_template_may_be_opened(folder, kind):
             text = text.replace("law: energy ", "law: energy_amplitude ")
         file.write_text(text, encoding="utf-8")
         load_fit(file)
-    assert len(seen) == {"fit_joint": 9, "fit_loops": 5, "fit_wear": 3}[kind]
+    assert len(seen) == {"fit_joint": 9, "fit_loops": 5, "fit_wear": 3, "fit_profiles": 3}[kind]
 
 
 @pytest.mark.parametrize(

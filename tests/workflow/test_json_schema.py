@@ -112,6 +112,7 @@ def test_templates_are_valid(validator, kind):
         ("sweep", "values: [0.3, 0.4, 0.5]", "value: 0.3"),
         ("fit_joint", "change: free", "change: fre"),
         ("fit_wear", "law: energy ", "law: archard "),
+        ("fit_profiles", "aligned: false", "aligned: no x"),
     ],
 )
 def test_wrong_files_are_not(validator, kind, old, new):

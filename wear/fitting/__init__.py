@@ -19,6 +19,8 @@ What is fitted
     - ``mean_loop``, ``LoopData``: the mean of all loops of a record.
     - ``volume_problem``: wear coefficients from worn volumes.
     - ``VolumeData``, ``VolumeLaw``: the volumes, and what of the law is asked for.
+    - ``scar_problem``: wear coefficients from depths and profiles, through a model's runs.
+    - ``ScarData``, ``ComputedScars``: a measured profile, and those of runs of the model.
 
 A slope of measured points, with what it is known to:
 
@@ -45,16 +47,19 @@ if TYPE_CHECKING:
     from wear.fitting.least_squares import Fit, fit
     from wear.fitting.loops import LoopData, loop_problem, mean_loop
     from wear.fitting.problem import FitError, FitProblem, Series, Unknown
+    from wear.fitting.scars import ComputedScars, ScarData, scar_problem
     from wear.fitting.volumes import VolumeData, VolumeLaw, volume_problem
 
 __all__ = [
     "Common",
+    "ComputedScars",
     "Estimate",
     "EvolutionData",
     "Fit",
     "FitError",
     "FitProblem",
     "LoopData",
+    "ScarData",
     "Series",
     "Unknown",
     "VolumeData",
@@ -65,6 +70,7 @@ __all__ = [
     "fit",
     "loop_problem",
     "mean_loop",
+    "scar_problem",
     "volume_problem",
 ]
 
@@ -78,6 +84,7 @@ __getattr__, __dir__ = lazy_names(
         "least_squares": ("Fit", "fit"),
         "loops": ("LoopData", "loop_problem", "mean_loop"),
         "problem": ("FitError", "FitProblem", "Series", "Unknown"),
+        "scars": ("ComputedScars", "ScarData", "scar_problem"),
         "volumes": ("VolumeData", "VolumeLaw", "volume_problem"),
     },
 )

@@ -13,7 +13,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path as Pathname
-from typing import Any, Literal, Self, get_args
+from typing import Annotated, Any, Literal, Self, get_args
 
 from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler, ValidationInfo
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
@@ -326,6 +326,38 @@ class Text(Entry):
 
     def json_schema(self) -> dict[str, Any]:
         return {"type": "string", "minLength": 1}
+
+
+@dataclass(frozen=True)
+class Value(Entry):
+    """Whatever a leaf of a case can be."""
+
+    @property
+    def allowed(self) -> str:
+        return "a number, text, a switch, or a list of them"
+
+    def parse(self, value: object) -> Any:
+        if isinstance(value, list | tuple) and value:
+            return tuple(self.parse(item) for item in value)
+        if isinstance(value, bool | str):
+            return value
+        if isinstance(value, int | float) and is_finite(value):
+            return value
+        raise self.refusal(value, "not the value of an entry")
+
+    def json_schema(self) -> dict[str, Any]:
+        return {}
+
+
+AnyValue = Annotated[Any, Value()]
+
+
+def is_finite(number: float) -> bool:
+    """Whether a number, a whole one of any length, is finite as a float."""
+    try:
+        return math.isfinite(number)
+    except OverflowError:
+        return False
 
 
 @dataclass(frozen=True)

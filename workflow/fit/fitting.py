@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -123,7 +123,8 @@ class FittedSeries:
 class Fitted:
     """The result: the fit, its parameters by their paths in a case, data, and ``doubts``.
 
-    ``tests`` has what each file says of a parameter, by path, where there are several tables.
+    ``tests`` has what each file says of a parameter, by path, where there are several tables. Of a
+    fit through runs ``told`` and ``runs`` say how many there were, and what is wrong for them.
     """
 
     given: FitInput
@@ -132,6 +133,8 @@ class Fitted:
     series: tuple[FittedSeries, ...]
     doubts: tuple[str, ...]
     tests: Mapping[str, Common]
+    told: tuple[str, ...] = ()
+    runs: Mapping[str, Any] = field(default_factory=dict)
 
     def shown_tests(self, path: str) -> list[tuple[str, float, float, float]]:
         """Files of a parameter's :class:`Common`: name, share, own value and its deviation."""
@@ -161,26 +164,14 @@ class Fitted:
         return {parameter.path: parameter for parameter in self.parameters}
 
 
-def run_fit(given: FitInput) -> Fitted:
-    """Fit what the file of a fit names.
-
-    Raises CaseError and InputFileError with file and line, UserError for data that allow no fit,
-    ConvergenceError where no start leads to a solution.
-    """
-    if isinstance(given.file, JointFit):
-        return _joint(given, given.file)
-    if isinstance(given.file, LoopFit):
-        return _loops(given, given.file)
-    return _wear(given, given.file)
-
-
-def _solved(
+def solved(
     given: FitInput,
     fitted: Fit,
     paths: Sequence[tuple[str, str]],
     series: Sequence[FittedSeries],
     notes: Sequence[str],
 ) -> Fitted:
+    """The result of a fit whose parameters have these ``paths`` and units."""
     called = {one.name: path for one, (path, _) in zip(fitted.estimates, paths, strict=True)}
     parameters = tuple(
         Parameter(path, unit, replace(estimate, doubt=_in_paths(estimate.doubt, called)))
@@ -213,11 +204,16 @@ def _solved(
 def _tests(
     fitted: Fit, parameters: Sequence[Parameter], series: Sequence[FittedSeries], files: Indices
 ) -> dict[str, Common]:
-    """What each table says of the parameters; loops are records that differ as strokes do."""
-    if series[0].along != ENERGY or len(np.unique(files)) < 2:
+    """What each table says of the parameters; loops are records that differ as strokes do.
+
+    The place of a profile is its own, and no other's.
+    """
+    if series[0].along == DISPLACEMENT or len(np.unique(files)) < 2:
         return {}
     paths = {parameter.estimate.name: parameter.path for parameter in parameters}
-    return {paths[one.name]: one for one in common_over(fitted, files)}
+    own = tuple(f"{one.name}." for one in series)
+    found = {paths[one.name]: one for one in common_over(fitted, files)}
+    return {path: one for path, one in found.items() if not path.startswith(own)}
 
 
 def _contradictions(fitted: Fitted) -> list[str]:
@@ -269,7 +265,8 @@ def _in_paths(text: str, called: Mapping[str, str]) -> str:
 # --- joints -------------------------------------------------------------------------------------
 
 
-def _joint(given: FitInput, file: JointFit) -> Fitted:
+def fit_joint(given: FitInput, file: JointFit) -> Fitted:
+    """How the parameters of a joint evolve. Raises as :func:`workflow.fit.running.run_fit`."""
     names = [MEASURED[name] for name in file.evolution.given]
     columns = read_columns(file.measurements, names, beside=("residual_stiffness",), ascending=True)
     for name in file.evolution.given:
@@ -305,7 +302,7 @@ def _joint(given: FitInput, file: JointFit) -> Fitted:
         for one in problem.data
     ]
     paths = [_joint_path(unknown.name) for unknown in problem.problem.unknowns]
-    return _solved(given, fitted, paths, series, notes)
+    return solved(given, fitted, paths, series, notes)
 
 
 def _evolution_data(file: JointFit, name: str, section: Section, column: Column) -> EvolutionData:
@@ -352,7 +349,8 @@ def _without_residual(
 # --- loops --------------------------------------------------------------------------------------
 
 
-def _loops(given: FitInput, file: LoopFit) -> Fitted:
+def fit_loops(given: FitInput, file: LoopFit) -> Fitted:
+    """A law of loops. Raises as :func:`workflow.fit.running.run_fit`."""
     entries = file.joint.model_dump(exclude={"law"})
     # A normal load that is not given is that of each record.
     entries["normal_load"] = np.nan if file.joint.normal_load is None else entries["normal_load"]
@@ -383,7 +381,7 @@ def _loops(given: FitInput, file: LoopFit) -> Fitted:
         for number, (one, measurement) in enumerate(zip(loops, file.measurements, strict=True))
     ]
     paths = [_loop_path(unknown.name) for unknown in problem.problem.unknowns]
-    return _solved(given, fitted, paths, series, [])
+    return solved(given, fitted, paths, series, [])
 
 
 def _loop_name(file: LoopFit, number: int) -> str:
@@ -408,7 +406,8 @@ def _loop_path(name: str) -> tuple[str, str]:
 # --- wear ---------------------------------------------------------------------------------------
 
 
-def _wear(given: FitInput, file: WearFit) -> Fitted:
+def fit_wear(given: FitInput, file: WearFit) -> Fitted:
+    """Wear coefficients of volumes. Raises as :func:`workflow.fit.running.run_fit`."""
     columns = read_columns(file.measurements, list(VOLUMES), beside=("amplitude",))
     if "volume" in columns and len(columns) > 1:
         raise UserError(
@@ -447,7 +446,7 @@ def _wear(given: FitInput, file: WearFit) -> Fitted:
         for one, column in zip(problem.data, columns.values(), strict=True)
     ]
     paths = [_wear_path(unknown.name) for unknown in problem.problem.unknowns]
-    return _solved(given, fitted, paths, series, [])
+    return solved(given, fitted, paths, series, [])
 
 
 def _wear_path(name: str) -> tuple[str, str]:

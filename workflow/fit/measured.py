@@ -20,9 +20,9 @@ from workflow.case.fields import Quantity, shown
 from workflow.case.input_files import InputFileError
 from workflow.case.sections import Section
 from workflow.case.table_file import TableFile, read_table_file
-from workflow.fit.schema import Measurement
+from workflow.fit.measurement import Measurement
 
-ENERGY = "energy"
+ENERGY, PLACE = "energy", "x"
 OF_DEVIATIONS = "_deviation"
 # What a loop tells only where all slides as its branches end, and the column of computed loops
 # that says so. Nothing acts beside these contacts: where they stick, nothing is left of them.
@@ -43,6 +43,10 @@ QUANTITIES = {
     "volume_2": Quantity("mm^3", at_least=-1e9, at_most=1e9),
     "amplitude": Quantity("mm", above=0.0, at_most=1e3),
     SLIDING: Quantity("1", at_least=0.0, at_most=1.0 + 1e-9),
+    PLACE: Quantity("mm", at_least=-1e6, at_most=1e6),
+    "depth": Quantity("mm", at_least=-1e3, at_most=1e3),
+    "depth_1": Quantity("mm", at_least=-1e3, at_most=1e3),
+    "depth_2": Quantity("mm", at_least=-1e3, at_most=1e3),
 }
 
 
@@ -69,7 +73,7 @@ class Column:
 class _Part:
     """The same of one file."""
 
-    energy: Array
+    against: Array
     values: Array
     deviations: Array | None
     others: dict[str, Array]
@@ -82,32 +86,37 @@ def read_columns(
     names: Sequence[str],
     beside: Sequence[str] = (),
     ascending: bool = False,
+    along: str = ENERGY,
 ) -> dict[str, Column]:
     """The columns of ``names`` that the files have, with those ``beside`` them where there are.
 
-    Rows of a file are in order of their energy where ``ascending``. Raises InputFileError, with
-    file and line.
+    They were measured ``along`` another column, in the order of which the rows of a file are where
+    ``ascending``. Raises InputFileError, with file and line.
     """
     parts: dict[str, list[tuple[int, _Part]]] = {}
     for number, measurement in enumerate(measurements):
-        for name, part in _parts(measurement, names, beside, ascending).items():
+        for name, part in _parts(measurement, names, beside, ascending, along).items():
             parts.setdefault(name, []).append((number, part))
     return {name: _joined(name, parts[name]) for name in names if name in parts}
 
 
 def _parts(
-    measurement: Measurement, names: Sequence[str], beside: Sequence[str], ascending: bool
+    measurement: Measurement,
+    names: Sequence[str],
+    beside: Sequence[str],
+    ascending: bool,
+    along: str,
 ) -> dict[str, _Part]:
     table = read_table_file(measurement.file)
     headings, deviations = _section(measurement, "columns"), _section(measurement, "deviations")
     called = {name: headings.get(name) or name for name in QUANTITIES}
-    table.require([called[ENERGY]], "a column of that name, or one that columns.energy names")
+    table.require([called[along]], f"a column of that name, or one that columns.{along} names")
     for name, heading in headings.items():
         table.require([heading], f"the heading that columns.{name} names")
     _check_slips(table, [called[name] for name in names])
-    energy = _numbers(table, called, ENERGY)
+    against = _numbers(table, called, along)
     if ascending:
-        _check_order(table, energy, called[ENERGY])
+        _check_order(table, against, called[along], along)
     found = [name for name in names if called[name] in table.names]
     if not found:
         wanted = ", ".join(called[name] for name in names)
@@ -122,7 +131,7 @@ def _parts(
     for name in found:
         values = _numbers(table, called, name)
         part = _Part(
-            energy,
+            against,
             values,
             _deviations(table, called, name, deviations.get(name)),
             others,
@@ -142,7 +151,7 @@ def _of_sliding(table: TableFile, name: str, part: _Part, slides: Mask) -> _Part
         )
     rows = np.flatnonzero(slides)
     return _Part(
-        part.energy[rows],
+        part.against[rows],
         part.values[rows],
         None if part.deviations is None else part.deviations[rows],
         {other: values[rows] for other, values in part.others.items()},
@@ -184,12 +193,17 @@ def _check_slips(table: TableFile, headings: Sequence[str]) -> None:
             )
 
 
-def _check_order(table: TableFile, energy: Array, heading: str) -> None:
-    falls = np.flatnonzero(np.diff(energy) < 0.0)
-    if falls.size:
-        raise table.refusal(
-            int(falls[0]) + 1, heading, "the energy falls", "rows in order of their energy"
+def _check_order(table: TableFile, against: Array, heading: str, along: str) -> None:
+    """Refuse an energy that falls, and a place that does not rise."""
+    steps = np.diff(against)
+    wrong = np.flatnonzero(steps < 0.0 if along == ENERGY else steps <= 0.0)
+    if wrong.size:
+        how, order = (
+            ("the energy falls", "rows in order of their energy")
+            if along == ENERGY
+            else ("does not rise", "rows in order of their place, each once")
         )
+        raise table.refusal(int(wrong[0]) + 1, heading, how, order)
 
 
 def _deviations(
@@ -220,7 +234,7 @@ def _joined(name: str, parts: Sequence[tuple[int, _Part]]) -> Column:
         )
     others = set.intersection(*(set(part.others) for _, part in parts))
     return Column(
-        against=np.concatenate([part.energy for _, part in parts]),
+        against=np.concatenate([part.against for _, part in parts]),
         values=np.concatenate([part.values for _, part in parts]),
         deviations=np.concatenate(known) if known else None,
         others={

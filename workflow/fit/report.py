@@ -89,7 +89,7 @@ def _scatter(fitted: Fitted, place: int) -> float:
 def _notes(fitted: Fitted) -> list[str]:
     found = fitted.fit
     how = "normal, of the given standard deviations" if found.known else "Student's"
-    lines = [f"+- is one standard deviation; bounds are {how}"]
+    lines = [*fitted.told, f"+- is one standard deviation; bounds are {how}"]
     lines += [
         f"{parameter.path}: the model bends within its bounds, which are those of its profile"
         for parameter in fitted.parameters
@@ -143,6 +143,7 @@ def summary(fitted: Fitted, section: str) -> dict[str, Any]:
         "tests": {path: _of_tests(fitted, path) for path in fitted.tests},
         "excess": _finite(found.excess),
         "starts": {"tried": found.tried, "reached": found.reached},
+        **({"runs": dict(fitted.runs)} if fitted.runs else {}),
         "doubts": list(fitted.doubts),
         "section": section,
         "versions": versions(),

@@ -4,11 +4,15 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from workflow.fit.fitting import Fitted
+from workflow.errors import UserError
+from workflow.fit.fitting import Fitted, fit_joint, fit_loops, fit_wear
+from workflow.fit.profile_schema import ProfileFit
 from workflow.fit.report import data_columns, parameter_columns, summary
+from workflow.fit.schema import FitInput, JointFit, LoopFit
 from workflow.fit.section import section_of
 from workflow.shell.folder import OutputFolder
 from workflow.shell.lock import locked
+from workflow.shell.screen import Loudness
 from workflow.shell.store import write_text
 from workflow.shell.tables import write_table
 
@@ -21,6 +25,31 @@ FILES = {
 }
 SUMMARY = "summary.json"
 DIGITS = 12
+
+
+def run_fit(
+    given: FitInput,
+    out: Path | None = None,
+    force: bool = False,
+    loudness: Loudness = Loudness.QUIET,
+) -> Fitted:
+    """Fit what the file of a fit names; runs that it needs are kept below ``out``.
+
+    Raises CaseError and InputFileError with file and line, UserError for data that allow no fit or
+    a folder that has another, unless ``force``, ConvergenceError where no start leads to a
+    solution, MethodFailed for a run that fails.
+    """
+    there = [] if out is None else [name for name in (*FILES, SUMMARY) if (out / name).exists()]
+    if there and not force:
+        raise UserError(f"{out}/{there[0]}: exists; give another folder, or --force")
+    file = given.file
+    if isinstance(file, ProfileFit):
+        from workflow.fit.profiles import fit_profiles  # all that runs a case
+
+        return fit_profiles(given, file, out, loudness)
+    if isinstance(file, JointFit):
+        return fit_joint(given, file)
+    return fit_loops(given, file) if isinstance(file, LoopFit) else fit_wear(given, file)
 
 
 def write_fit(fitted: Fitted, out: Path, force: bool = False) -> list[Path]:

@@ -18,10 +18,12 @@ from workflow.analyses.rig.joint_sections import (
     ResidualStiffness,
 )
 from workflow.analyses.wear.case.evolution import PositiveEnergy
-from workflow.case.fields import Entry, File, Quantity, Word
+from workflow.case.fields import Entry, Quantity, Word
 from workflow.case.loading import validated, word_at
 from workflow.case.sections import Length, Section, Title, disagreement, entry
 from workflow.case.source import Source, read_text
+from workflow.fit.measurement import KIND, Heading, Measurement
+from workflow.fit.profile_schema import ProfileFit
 
 FREE: Literal["free"] = "free"
 Free = Literal["free"]
@@ -60,15 +62,7 @@ FreeSlope = Annotated[float | Free, _or_free(Slope)]
 FreeFinal = Annotated[float | Free, _or_free(Final)]
 FreeShare = Annotated[float | Free, _or_free(Part)]
 
-Heading = Annotated[str, Field(min_length=1)]
-Csv = Annotated[str, File((".csv",))]
 RESIDUAL = "slope when all slides"
-
-
-class Measurement(Section):
-    """A table that was measured."""
-
-    file: Csv = entry("CSV, headings with units, as seen from this folder", "measured.csv")
 
 
 # --- joints -------------------------------------------------------------------------------------
@@ -209,9 +203,7 @@ class JointFit(Section):
     """How a joint's parameters follow the energy that it has dissipated."""
 
     title: Title = entry("one line", "Joint of the friction rig, test 1")
-    fit: Literal["joint_evolution"] = entry(
-        "joint_evolution, joint_law or wear_coefficient", "joint_evolution"
-    )
+    fit: Literal["joint_evolution"] = entry(KIND, "joint_evolution")
     measurements: tuple[JointMeasurement, ...] = entry("tables", min_length=1)
     law: Literal["bouc_wen", "jenkins", "uniform_iwan", "four_parameter_iwan"] = entry(
         "bouc_wen: its stiffness is all of kt; jenkins, uniform_iwan or four_parameter_iwan: kt "
@@ -299,9 +291,7 @@ class WearFit(Section):
     """Wear coefficients from volumes against dissipated energy."""
 
     title: Title = entry("one line", "Wear coefficient of the fretting tests")
-    fit: Literal["wear_coefficient"] = entry(
-        "joint_evolution, joint_law or wear_coefficient", "wear_coefficient"
-    )
+    fit: Literal["wear_coefficient"] = entry(KIND, "wear_coefficient")
     measurements: tuple[WearMeasurement, ...] = entry("tables: a row for each test", min_length=1)
     wear: FreeWear = entry("what the volumes follow")
 
@@ -389,7 +379,7 @@ class LoopFit(Section):
     """A joint law from measured hysteresis loops."""
 
     title: Title = entry("one line", "Joint of the friction rig, as new")
-    fit: Literal["joint_law"] = entry("joint_evolution, joint_law or wear_coefficient", "joint_law")
+    fit: Literal["joint_law"] = entry(KIND, "joint_law")
     measurements: tuple[LoopMeasurement, ...] = entry(
         "records: of several strokes all are fitted together", min_length=1
     )
@@ -399,10 +389,12 @@ class LoopFit(Section):
     ] = entry("the law")
 
 
-KINDS: Mapping[str, type[JointFit] | type[LoopFit] | type[WearFit]] = {
+AnyFile = JointFit | LoopFit | WearFit | ProfileFit
+KINDS: Mapping[str, type[AnyFile]] = {
     "joint_evolution": JointFit,
     "joint_law": LoopFit,
     "wear_coefficient": WearFit,
+    "wear_profiles": ProfileFit,
 }
 
 
@@ -411,7 +403,7 @@ class FitInput:
     """The file of a fit, read, and where its entries were written."""
 
     name: str
-    file: JointFit | LoopFit | WearFit
+    file: AnyFile
     source: Source
     text: str
 

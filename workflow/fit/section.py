@@ -7,11 +7,15 @@ refused until somebody decides it.
 from __future__ import annotations
 
 import math
+from pathlib import Path
+from typing import Any
 
 from workflow.case.sections import Section
 from workflow.case.writing import Row, render
 from workflow.fit.fitting import JOINT_UNITS, UNITS, Fitted, Parameter
+from workflow.fit.profile_schema import ProfileFit
 from workflow.fit.schema import FREE, JointFit, LoopFit, WearFit
+from workflow.kinds import load_case
 
 # Of a deviation; the value ends with the same digit. Of numbers without one, or beyond it.
 DIGITS, MOST_DIGITS = 2, 9
@@ -68,7 +72,9 @@ def bounds_text(lower: float, upper: float, deviation: float) -> str:
 def section_of(fitted: Fitted) -> str:
     """The sections of a case, as YAML."""
     file = fitted.given.file
-    if isinstance(file, WearFit):
+    if isinstance(file, ProfileFit):
+        rows = _profiles(fitted, file)
+    elif isinstance(file, WearFit):
         rows = _wear(fitted, file)
     else:
         rows = _joint(fitted, file) if isinstance(file, JointFit) else _law(fitted, file)
@@ -164,23 +170,45 @@ def _wear(fitted: Fitted, file: WearFit) -> list[Row]:
         found = _row(fitted, "wear.exponent", "exponent")
         comment = f"{found.comment}; energy_amplitude has 1, energy 0"
         rows.append(Row("exponent", found.value, comment, off=True))
-    bodies = [
-        name
-        for name in ("both", "body_1", "body_2")
-        if f"wear.{name}.coefficient" in fitted.by_path
-    ]
-    for body in bodies:
+    for body in _bodies(fitted):
         rows += _body(fitted, body)
     return [Row("wear", rows)]
+
+
+def _bodies(fitted: Fitted) -> list[str]:
+    names = ("both", "body_1", "body_2")
+    return [name for name in names if f"wear.{name}.coefficient" in fitted.by_path]
+
+
+def _profiles(fitted: Fitted, file: ProfileFit) -> list[Row]:
+    """As of volumes, with what the case of the first test has held."""
+    wear: Any = load_case(Path(file.measurements[0].case)).wear  # type: ignore[attr-defined]
+    rows, bodies = [Row("law", wear.law)], _bodies(fitted)
+    if wear.reference_amplitude is not None:
+        rows.append(_held(wear.reference_amplitude, "um", "reference_amplitude"))
+    for body in bodies if bodies == ["both"] else ("body_1", "body_2"):
+        if body in bodies:
+            rows += _body(fitted, body)
+        else:
+            held = _held(getattr(wear, body).coefficient, "um^3/J", "coefficient")
+            rows.append(Row(body, [held, *_threshold(fitted, body)]))
+    return [Row("wear", rows)]
+
+
+def _threshold(fitted: Fitted, body: str) -> list[Row]:
+    """The evolution of a body, if the fit asks for a threshold: its own, or that of all."""
+    own = f"wear.{body}.threshold"
+    path = own if own in fitted.by_path else "wear.threshold"
+    if path not in fitted.by_path:
+        return []
+    threshold = _row(fitted, path, "threshold")
+    return [Row("evolution", [Row("scope", "global"), threshold], off=threshold.off)]
 
 
 def _body(fitted: Fitted, body: str) -> list[Row]:
     """The entries of a body; of both together that of each is left to be decided."""
     entries = [_row(fitted, f"wear.{body}.coefficient", "coefficient")]
-    if (path := f"wear.{body}.threshold") in fitted.by_path:
-        threshold = _row(fitted, path, "threshold")
-        scope = Row("scope", "global")
-        entries.append(Row("evolution", [scope, threshold], off=threshold.off))
+    entries += _threshold(fitted, body)
     if (path := f"wear.{body}.intercept") in fitted.by_path:
         found = _row(fitted, path, "intercept")
         comment = f"{found.comment}; a case has none: its volumes are less by so much"

@@ -9,9 +9,9 @@ from typing import Any, NamedTuple
 
 from sa_solver.types import Array
 from workflow.case.source import IN_PYTHON
-from workflow.fit.fitting import Fitted, run_fit
+from workflow.fit.fitting import Fitted
 from workflow.fit.report import report, summary
-from workflow.fit.running import write_fit
+from workflow.fit.running import run_fit, write_fit
 from workflow.fit.schema import load_fit, parse_fit, text_of
 from workflow.fit.section import section_of
 
@@ -24,10 +24,11 @@ def fit(
 ) -> FitResult:
     """Find parameters of a case from measurements.
 
-    ``asked`` is what ``fretscale new fit_joint``, ``fit_loops`` or ``fit_wear`` writes: the path of
-    such a file, or a dictionary of its entries, whose tables are looked for from the current
-    folder. With ``out`` the section of a case, tables, summary and figure are written there, over
-    what an earlier one has left if ``force``.
+    ``asked`` is what ``fretscale new`` writes as ``fit_joint``, ``fit_loops``, ``fit_wear`` or
+    ``fit_profiles``: the path of such a file, or a dictionary of its entries, whose tables are
+    looked for from the current folder. With ``out`` the section of a case, tables, summary and
+    figure are written there, over what an earlier one has left if ``force``; ``fit_profiles`` needs
+    it for its runs.
 
     Returns the parameters with their bounds. Raises :class:`CaseError` and :class:`UserError` for a
     file, tables or data that allow no fit, in the words of the command; :class:`FretscaleError`
@@ -54,10 +55,12 @@ def fit(
     >>> print(f"{alpha.value:.0f} {alpha.unit}, {alpha.lower:.0f} to {alpha.upper:.0f}")
     1503 um^3/J, 1488 to 1519
     """
-    if isinstance(asked, Mapping):
-        fitted = run_fit(parse_fit(text_of(asked), IN_PYTHON))
-    else:
-        fitted = run_fit(load_fit(Path(asked)))
+    given = (
+        parse_fit(text_of(asked), IN_PYTHON)
+        if isinstance(asked, Mapping)
+        else load_fit(Path(asked))
+    )
+    fitted = run_fit(given, None if out is None else Path(out), force)
     if out is not None:
         write_fit(fitted, Path(out), force)
     return FitResult(fitted)

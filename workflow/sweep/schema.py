@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,7 +10,7 @@ from typing import Annotated, Any, ClassVar, Literal
 from pydantic import Field, create_model, model_validator
 
 from workflow.case import units
-from workflow.case.fields import Entry, File, Whole, shown
+from workflow.case.fields import AnyValue, Entry, File, Whole, is_finite, shown
 from workflow.case.loading import validated
 from workflow.case.sections import Section, Title, disagreement, entry, one_of
 from workflow.case.source import Source, read_text
@@ -62,15 +61,7 @@ def amount_of(value: object) -> Amount | None:
         return Amount(float(number), unit)
     if isinstance(value, bool) or not isinstance(value, int | float):
         return None
-    return Amount(float(value)) if _is_finite(value) else None
-
-
-def _is_finite(number: float) -> bool:
-    """Whether a number, a whole one of any length, is finite as a float."""
-    try:
-        return math.isfinite(number)
-    except OverflowError:
-        return False
+    return Amount(float(value)) if is_finite(value) else None
 
 
 @dataclass(frozen=True)
@@ -95,30 +86,8 @@ class Quantity(Entry):
         return {"anyOf": [{"type": "number"}, {"type": "string"}]}
 
 
-@dataclass(frozen=True)
-class Value(Entry):
-    """Whatever a leaf of a case can be."""
-
-    @property
-    def allowed(self) -> str:
-        return "a number, text, a switch, or a list of them"
-
-    def parse(self, value: object) -> Any:
-        if isinstance(value, list | tuple) and value:
-            return tuple(self.parse(item) for item in value)
-        if isinstance(value, bool | str):
-            return value
-        if isinstance(value, int | float) and _is_finite(value):
-            return value
-        raise self.refusal(value, "not the value of an entry")
-
-    def json_schema(self) -> dict[str, Any]:
-        return {}
-
-
 AnyAmount = Annotated[Amount, Quantity()]
 PositiveAmount = Annotated[Amount, Quantity(positive=True)]
-AnyValue = Annotated[Any, Value()]
 Scale = Literal["linear", "log"]
 
 

@@ -67,19 +67,28 @@ def worn_depths(folder: Path, names: Iterable[str]) -> WornDepths:
     return depths
 
 
-def middle_sections(folder: Path, names: Iterable[str]) -> dict[str, dict[str, float]]:
-    """Largest depth [mm] and worn area [mm²] of each body in the middle of each face.
+def middle_profiles(folder: Path, names: Iterable[str]) -> dict[str, tuple[Array, Array, Array]]:
+    """Places x ``(nx,)`` [mm] of each face, and worn depths ``(nx,)`` of its bodies in its middle.
 
     A line contact is its own middle section: two and three dimensions can be compared by it.
     """
-    sections = {}
+    profiles = {}
     for name, (grid, *depths) in worn_depths(folder, names).items():
         half = grid.shape[1] // 2
         rows = slice(max(0, half - MIDDLE_ROWS), half + MIDDLE_ROWS)
-        profiles = [np.mean(depth[:, rows] if half else depth, axis=1) for depth in depths]
+        body_1, body_2 = (np.mean(d[:, rows] if half else d, axis=1) for d in depths)
+        profiles[name] = grid.x.ravel(), body_1, body_2
+    return profiles
+
+
+def middle_sections(folder: Path, names: Iterable[str]) -> dict[str, dict[str, float]]:
+    """Largest depth [mm] and worn area [mm²] of each body in the middle of each face."""
+    sections = {}
+    for name, (x, *profiles) in middle_profiles(folder, names).items():
+        pitch = float(x[1] - x[0])
         sections[name] = {
             **{f"depth_{k}": float(depth.max()) for k, depth in enumerate(profiles, 1)},
-            **{f"area_{k}": float(d.sum()) * grid.pitch[0] for k, d in enumerate(profiles, 1)},
+            **{f"area_{k}": float(d.sum()) * pitch for k, d in enumerate(profiles, 1)},
         }
     return sections
 
