@@ -50,7 +50,12 @@ NEEDS = {
     "structure.modes": ["structure.retained=[pad, ring, tip]"],
     "  # instead of forces and mass, with wear.level": ["wear.force=", "wear.level=1"],
     "ring": RING,
-    "  # instead of forces, with wear.level": ["structure.driven=", "wear.force=", "wear.level=1"],
+    "  # instead of forces, with wear.level": [
+        "structure.driven=",
+        "wear.force=",
+        "wear.level=1",
+        "excitation.forces.0.points=pad",
+    ],
     "wear.level": ["forces=", f"excitation={EXCITED['excitation'][ALWAYS]}"],
 }
 
