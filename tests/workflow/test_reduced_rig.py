@@ -10,6 +10,7 @@ import scipy.linalg as sl
 from fe_models.dynamics.excitation import HammerBlow
 from fe_models.dynamics.newmark import TimeStepControl
 from fe_models.reduction import ReducedModel, load_reduced, save_reduced
+from tests.conftest import CASES
 from tests.workflow.time_scenes import MASS, RIG, STIFF, refused, run
 from wear.joints.law import march_joints
 from workflow.analyses.rig.building import rig_model
@@ -338,6 +339,16 @@ def test_points_that_are_not_there_are_refused(specimen, override, words):
     code, message = refused(specimen, SPECIMEN, override)
     assert code == 2
     assert words in message
+
+
+def test_points_of_specimens_are_known_before_they_are_meshed():
+    """Their number is that of the case: nine by nine nodes of the pad, eight of the ring."""
+    case = str(CASES / "rig_reduced.yaml")
+    with pytest.raises(
+        CaseError, match=r"no such point; allowed: pad, pad 1 to pad 81, ring, .* 8"
+    ):
+        load_case(case, ["structure.joints.0.points=pad 82"])
+    load_case(case, ["structure.joints.0.points=pad 81", "structure.joints.0.against=ring 8"])
 
 
 def test_a_displacement_that_is_not_there_is_refused(two_masses):

@@ -262,10 +262,15 @@ class MatrixBody(JointedBody, Matrices):
         if isinstance(self.driven, LoadCase) and self.driven.load > count:
             allowed = f"1 to {count}" if count else "points, as there are no loads"
             raise disagreement(f"{self.driven.load}: no such load; allowed: {allowed}", "driven")
-        if len(matrices.unknowns) <= SMALL:
+        if self.small:
             with refusing(self):
                 self.reduced()
         return self
+
+    @property
+    def small(self) -> bool:
+        """Whether the model is soon built."""
+        return len(self.matrices.read().unknowns) <= SMALL
 
     def _check_points(self) -> None:
         """Refuse points that there are not."""
@@ -354,30 +359,6 @@ class MatrixBody(JointedBody, Matrices):
             model, light = without_massless(model, tuple(self.laden))
         check_definite(model, self.laden)
         return model, light
-
-    def known_model(self) -> tuple[ReducedModel, tuple[str, ...]] | None:
-        """As :meth:`reduced` gives it, before a run: of many unknowns only the names are right.
-
-        None of as many that are all kept. Raises ``MatrixError``.
-        """
-        from fe_models.reduction import ReducedModel
-
-        matrices = self.matrices.read()
-        if len(matrices.unknowns) <= SMALL:
-            model, light = self.reduced()
-            return model, light if self.massless is None else ()
-        wanted = set(self.kept)
-        names = [u.name for u in matrices.unknowns if u.point in wanted and u.direction != "modal"]
-        modes = self.modes or 0
-        size = len(names) + modes
-        if not self.retained or size > SMALL:
-            return None
-        loads = np.zeros((size, matrices.loads.shape[1]))
-        shapes = np.zeros((len(names), modes))
-        kept, none = np.arange(len(names)), np.zeros((size, size))
-        return ReducedModel(
-            *(kept, none, np.eye(size), loads, shapes, np.zeros(modes)), names=tuple(names)
-        ), ()
 
     def memory(self) -> Memory:
         """Of the model: dense matrices, and to reduce large ones their factors."""

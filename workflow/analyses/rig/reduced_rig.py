@@ -26,6 +26,7 @@ from workflow.analyses.rig.places import Moved
 from workflow.analyses.rig.point_body import PointBody
 from workflow.analyses.rig.rig_model import JointEntry, JointNodes, RigModel
 from workflow.analyses.rig.ring import RingOfSectors, with_next
+from workflow.analyses.rig.stand_in import matrices_by_name, specimen_by_name
 from workflow.analyses.rig.structure import JointedBody, JointPlaces, ReducedBody, own_laws
 from workflow.analyses.specimens.case import SpecimensCase
 from workflow.analyses.specimens.memory import memory
@@ -61,9 +62,9 @@ def known_rig_model(
     ring: RingOfSectors | None = None,
     engine_order: int = 1,
 ) -> RigModel | None:
-    """The same before a run, as far as its places: None of a body that only a run reduces.
+    """The same before a run, as far as its places; None where these are too many to look at.
 
-    Large matrices, which take long to reduce, are stood for by masses that have their names.
+    What a run reduces first, which may take long, is stood for: :mod:`.stand_in`.
     """
     found = _known_body(body)
     return None if found is None else _rig_of(found, body, joint, ring, engine_order)
@@ -236,13 +237,18 @@ def _reduced_body(
 
 
 def _known_body(body: JointedBody) -> tuple[ReducedModel, tuple[str, ...]] | None:
-    """The model that a run would find, or one with its names; None where neither is known."""
+    """The model that a run would find, or what stands for it; None where neither is known."""
     if isinstance(body, PointBody):
         return body.body(), ()
+    if isinstance(body, MatrixBody) and body.small:
+        model, massless = body.reduced()
+        return model, massless if body.massless is None else ()
     if isinstance(body, MatrixBody):
-        return body.known_model()
-    assert isinstance(body, ReducedBody)
-    return (body.stored(), ()) if body.body is None else None
+        named = matrices_by_name(body)
+    else:
+        assert isinstance(body, ReducedBody)
+        named = body.stored() if body.body is None else specimen_by_name(body.file)
+    return None if named is None else (named, ())
 
 
 def _of_matrices(
