@@ -203,10 +203,12 @@ class Resampled:
 
     ``lost`` is the root mean square [mm] of what they do not carry: the scan less the surface with
     these means, over the points within the grid. 0 where no point lies wholly within it.
+    ``beyond`` is the share of the cells whose middle lies beyond the border of the scan.
     """
 
     heights: Array
     lost: float
+    beyond: float
 
 
 def resampled(
@@ -247,12 +249,13 @@ def resampled(
             f"a scan of {scan.heights.shape[1]} columns: give a profile, of one column, in a line "
             "contact, and more of them elsewhere"
         )
+    off = _share_beyond(scan, grid, shift, angle)
     if not grid.line:
         scan = _turned(scan, grid, shift, angle, beyond)
     elif angle:
         raise InputError(f"a profile turned by {angle:g} rad: give 0 in a line contact")
     heights, points = _on_grid(scan, grid, shift, beyond)
-    return Resampled(heights, _lost(points, scan.pitch, heights, grid, shift))
+    return Resampled(heights, _lost(points, scan.pitch, heights, grid, shift), off)
 
 
 def cell_means(values: Array, known: Array, wanted: Array) -> Array:
@@ -274,6 +277,19 @@ def cell_means(values: Array, known: Array, wanted: Array) -> Array:
     heights /= np.diff(wanted).reshape(-1, *[1] * (values.ndim - 1))
     heights += mean
     return heights
+
+
+def _share_beyond(scan: Scan, grid: Grid, shift: tuple[float, float], angle: float) -> float:
+    """Share of the cells whose middle is not on the scan."""
+    cos, sin = np.cos(angle), np.sin(angle)
+    x, y = grid.x - shift[0], grid.y - (0.0 if grid.line else shift[1])
+    room = [
+        0.5 * size + ROUNDING * pitch for size, pitch in zip(scan.size, scan.pitch, strict=True)
+    ]
+    off = np.abs(cos * x + sin * y) > room[0]
+    if not grid.line:
+        off = off | (np.abs(cos * y - sin * x) > room[1])
+    return float(off.mean())
 
 
 def _edges(count: int, pitch: float, middle: float = 0.0) -> Array:
