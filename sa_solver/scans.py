@@ -36,6 +36,10 @@ TERMS: dict[Level, tuple[tuple[int, int], ...]] = {
 ROUNDING = 1e-6
 """Share of a point's pitch by which a grid of the scan's own size may reach beyond it."""
 
+MOST_POINTS = 5e7
+"""Points over a grid that are taken: 400 MB for each of the few copies that resampling has. More
+come of a scan that is mirrored over a grid many times its size."""
+
 QUARTER = 1e-9
 """Angle [rad] from a multiple of 90° up to which points are turned without interpolation."""
 
@@ -302,6 +306,7 @@ def _on_grid(
 ) -> tuple[Array, Array]:
     """Means over the cells, and the points of the scan, mirrored as far as the grid reaches."""
     points, axes = scan.heights, (0,) if grid.line else (0, 1)
+    _check_points(scan, grid, axes)
     for axis in axes:
         reach = 0.5 * grid.size[axis] + abs(shift[axis]) - 0.5 * scan.size[axis]
         more = int(np.ceil(reach / scan.pitch[axis] - ROUNDING))
@@ -316,6 +321,16 @@ def _on_grid(
         wanted = np.clip(wanted, known[0], known[-1])  # rounding of a grid as large as the scan
         heights = np.moveaxis(cell_means(np.moveaxis(heights, axis, 0), known, wanted), 0, axis)
     return np.ascontiguousarray(heights), points
+
+
+def _check_points(scan: Scan, grid: Grid, axes: tuple[int, ...]) -> None:
+    """Refuse a scan that would have too many points over the grid."""
+    points = float(np.prod([grid.size[axis] / scan.pitch[axis] for axis in axes]))
+    if points > MOST_POINTS:
+        raise InputError(
+            f"{points:.2g} points of the scan's pitch over the grid: take the means of several "
+            "points, or a smaller grid"
+        )
 
 
 def _check_reach(beyond: Beyond, grid: Grid, scan: Scan, shift: tuple[float, float]) -> None:

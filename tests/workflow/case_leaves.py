@@ -33,7 +33,7 @@ GAPS = {
     "paraboloid": {"shape": "paraboloid", "radius_x": "1 m", "radius_y": "1 m"},
     "heights": {"shape": "heights", "file": "gap.npy"},
 }
-SURFACE = {"file": "disk.npy", "unit": "um", "pitch": ["4 um", "4 um"]}
+SURFACE = {"file": "disk.npy", "unit": "um", "pitch": ["20 um", "20 um"]}
 SURFACES = {"body_1": SURFACE, "body_2": SURFACE}
 INTERFACE = {
     "name": "interface",
@@ -98,6 +98,7 @@ GIVEN = {
     "mesh": {
         "load_path.mix": {ALWAYS: [{"share": 1, "factors": [1]}]},
         "structure.contacts.0.gap": GAPS,
+        "structure.contacts.0.surfaces": {ALWAYS: SURFACES},
         "structure.contacts.0.friction": {ALWAYS: {"coefficient": 0.4}},
         **{
             f"structure.contacts.0.{section}": given

@@ -319,7 +319,7 @@ def folders(tmp_path_factory: pytest.TempPathFactory, template_files: Path) -> d
         shutil.copytree(template_files, made[kind], dirs_exist_ok=True)
         np.save(made[kind] / "gap.npy", np.zeros(CELLS.get(kind, (0, 0))))
         # A scan of more than the size of the template's grid, or a profile.
-        np.save(made[kind] / "disk.npy", np.zeros((600, 1 if "line" in kind else 300)))
+        np.save(made[kind] / "disk.npy", np.zeros((600, 1 if "line" in kind else 600)))
         (made[kind] / "history.csv").write_text("P,Qx\n1,0\n1,0.1\n", encoding="utf-8")
         (made[kind] / "force.csv").write_text("time,force\n0,0\n1,5\n", encoding="utf-8")
         period = "phase [deg],force\n0,0\n90,5\n270,-5\n360,0\n"

@@ -45,7 +45,9 @@ class MeasuredSurface(Section):
         "of bare heights: m, mm, um or nm; other files say it", "um", default=None
     )
     pitch: tuple[Length, Length] | None = entry(
-        "of bare heights along x, along y; other files say it [mm]", ["4 um", "4 um"], default=None
+        "of bare heights along x, along y; other files say it [mm]",
+        ["20 um", "20 um"],
+        default=None,
     )
     level: Level = entry(
         "what is taken off: none, mean, plane, or form (second order)", "plane", default="plane"
@@ -189,11 +191,11 @@ class MeasuredSurfaces(Section):
             }
         return numbers
 
-    def told(self, grid: Grid) -> dict[str, str]:
+    def told(self, summary: Mapping[str, Mapping[str, Any]]) -> dict[str, str]:
         """The same in a line each, by body."""
         return {
             name: f"{_in_words(numbers)}{self.bodies[name].place}"
-            for name, numbers in self.summary(grid).items()
+            for name, numbers in summary.items()
         }
 
     def doubts(self, grid: Grid, key: str = KEY) -> Iterator[str]:
@@ -214,9 +216,12 @@ def _in_words(numbers: Mapping[str, Any]) -> str:
     (nx, ny), pitch = numbers["points"], numbers["pitch"]
     steps = [plain(step, "mm", 4) for step in pitch]
     apart = steps[0] if ny == 1 or steps[0] == steps[1] else " x ".join(steps)
-    beyond = f", mirrored over {shares(numbers['beyond'])} of it" if numbers["beyond"] else ""
+    lost = numbers.get("lost_by_nodes")
+    nodes = "" if lost is None else f", {plain(lost, 'mm', 3)} finer than the nodes"
+    share = numbers["beyond"]
+    beyond = f", mirrored over {shares(share)} of the grid" if share else ""
     missing = f", {numbers['missing']:.2g} of them filled in" if numbers["missing"] else ""
     return (
         f"{nx} x {ny} points {apart} apart{missing}, {plain(numbers['rms'], 'mm', 3)} rms, "
-        f"{plain(numbers['lost'], 'mm', 3)} of it finer than the grid{beyond}"
+        f"{plain(numbers['lost'], 'mm', 3)} of it finer than the grid{nodes}{beyond}"
     )

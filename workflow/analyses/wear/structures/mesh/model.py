@@ -189,7 +189,7 @@ class MeshModel:
         """What of measured surfaces the nodes of the structure do not carry."""
         for name, face in self._scanned.items():
             for body, numbers in face.summary().items():
-                lost, height = numbers["lost_by_nodes"], numbers["rms_on_grid"]
+                lost, height = numbers["lost_by_nodes"], numbers["rms"]
                 if lost > LOST * height:
                     reporter.say(
                         f"{name}: {plain(lost, 'mm', 3)} of the surface of body {body[-1]}, "
