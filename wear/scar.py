@@ -405,7 +405,8 @@ def _weights(overlay: _Overlay, area: Mask) -> Array:
     that was filled in for it.
     """
     seen = area & overlay.seen
-    weights = np.where(seen, np.count_nonzero(area) / max(np.count_nonzero(seen), 1), 0.0)
+    own = int(np.count_nonzero(seen))
+    weights = np.where(seen, np.count_nonzero(area) / max(own, 1), 0.0)
     sums = np.array([column[area].sum() for column in overlay.columns])
     return np.asarray(weights - np.tensordot(sums, overlay.told, 1))
 

@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 from ruamel.yaml import YAML
 
+from fe_models.remesh import form_of
 from fe_models.transfer import FaceTransfer
-from sa_solver import Grid
+from sa_solver import ElasticPair, Grid, Material
+from sa_solver.reference.hertz import HertzCylinder
 from tests.workflow.commands import invoke
 from tests.workflow.mesh_scenes import pressed_blocks, refused, run
 from tests.workflow.plane_blocks import RADIUS, Blocks, solved
@@ -56,6 +58,10 @@ def test_a_form_from_scans_is_the_form(tmp_path):
     pulled = nodes.force[:, 2]
     np.testing.assert_allclose(scanned.force[:, 2], pulled, rtol=0.0, atol=1e-3 * pulled.max())
     np.testing.assert_allclose(scanned.loads.P, [50.0, 25.0], rtol=1e-5)
+    # Meshes that are written have the form on body 2.
+    mesh = MeshModel(load_case(path)).mesh()
+    (face,), form = mesh.interfaces, form_of(mesh)
+    np.testing.assert_allclose(form[1][face.nodes_2, 1], face.gap, atol=1e-12)
 
 
 @pytest.fixture
@@ -117,6 +123,22 @@ def test_scans_that_do_not_fit_a_face_are_refused(blocks):
     mirrored = "structure.contacts.0.surfaces.body_1.beyond=mirrored"
     told = invoke("check", blocks, "--set", mirrored).stdout
     assert "mirrored over 12.5 % of the grid, middle at 0.2 mm, 0 mm" in told
+
+
+def test_a_scan_on_flat_bodies_is_pressed_as_a_cylinder(tmp_path):
+    """Hertz's peak, but for the 1.03 % by which these bodies are no half-planes: so the form given.
+
+    Elements are two thirds of the half-width of the contact.
+    """
+    steel = Material(200e3, 0.3)
+    hertz = HertzCylinder(250.0, 30.0, ElasticPair(steel, steel).contact_modulus)
+    blocks = Blocks((-15, 15), 12, (-6, 6), 10, (-1, 1), strips=512, materials=({}, {}))
+    path = blocks.press(tmp_path, 0.2, 250.0)
+    x = (np.arange(600) + 0.5) / 600 * 13.0 - 6.5
+    np.save(tmp_path / "upper.npy", -(x[:, None] ** 2) / 60.0)
+    with_surfaces(path, body_2={"file": "upper.npy", **BARE, "pitch": [13.0 / 600, 1.0]})
+    _, _, first = solved(path)
+    assert first.pressure.max() == pytest.approx(hertz.peak_pressure, rel=0.015)
 
 
 @pytest.mark.slow
