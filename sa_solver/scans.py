@@ -36,6 +36,10 @@ TERMS: dict[Level, tuple[tuple[int, int], ...]] = {
 ROUNDING = 1e-6
 """Share of a point's pitch by which a grid of the scan's own size may reach beyond it."""
 
+MOST_POINTS = 5e7
+"""Points over a grid that are taken: 400 MB for each of the few copies that resampling has. More
+come of a scan that is mirrored over a grid many times its size."""
+
 QUARTER = 1e-9
 """Angle [rad] from a multiple of 90° up to which points are turned without interpolation."""
 
@@ -203,10 +207,12 @@ class Resampled:
 
     ``lost`` is the root mean square [mm] of what they do not carry: the scan less the surface with
     these means, over the points within the grid. 0 where no point lies wholly within it.
+    ``beyond`` is the share of the cells whose middle lies beyond the border of the scan.
     """
 
     heights: Array
     lost: float
+    beyond: float
 
 
 def resampled(
@@ -247,12 +253,13 @@ def resampled(
             f"a scan of {scan.heights.shape[1]} columns: give a profile, of one column, in a line "
             "contact, and more of them elsewhere"
         )
+    off = _share_beyond(scan, grid, shift, angle)
     if not grid.line:
         scan = _turned(scan, grid, shift, angle, beyond)
     elif angle:
         raise InputError(f"a profile turned by {angle:g} rad: give 0 in a line contact")
     heights, points = _on_grid(scan, grid, shift, beyond)
-    return Resampled(heights, _lost(points, scan.pitch, heights, grid, shift))
+    return Resampled(heights, _lost(points, scan.pitch, heights, grid, shift), off)
 
 
 def cell_means(values: Array, known: Array, wanted: Array) -> Array:
@@ -276,6 +283,19 @@ def cell_means(values: Array, known: Array, wanted: Array) -> Array:
     return heights
 
 
+def _share_beyond(scan: Scan, grid: Grid, shift: tuple[float, float], angle: float) -> float:
+    """Share of the cells whose middle is not on the scan."""
+    cos, sin = np.cos(angle), np.sin(angle)
+    x, y = grid.x - shift[0], grid.y - (0.0 if grid.line else shift[1])
+    room = [
+        0.5 * size + ROUNDING * pitch for size, pitch in zip(scan.size, scan.pitch, strict=True)
+    ]
+    off = np.abs(cos * x + sin * y) > room[0]
+    if not grid.line:
+        off = off | (np.abs(cos * y - sin * x) > room[1])
+    return float(off.mean())
+
+
 def _edges(count: int, pitch: float, middle: float = 0.0) -> Array:
     """Edges ``(count + 1,)`` of cells about their ``middle``."""
     return middle + (np.arange(count + 1.0) - 0.5 * count) * pitch
@@ -286,6 +306,7 @@ def _on_grid(
 ) -> tuple[Array, Array]:
     """Means over the cells, and the points of the scan, mirrored as far as the grid reaches."""
     points, axes = scan.heights, (0,) if grid.line else (0, 1)
+    _check_points(scan, grid, axes)
     for axis in axes:
         reach = 0.5 * grid.size[axis] + abs(shift[axis]) - 0.5 * scan.size[axis]
         more = int(np.ceil(reach / scan.pitch[axis] - ROUNDING))
@@ -300,6 +321,16 @@ def _on_grid(
         wanted = np.clip(wanted, known[0], known[-1])  # rounding of a grid as large as the scan
         heights = np.moveaxis(cell_means(np.moveaxis(heights, axis, 0), known, wanted), 0, axis)
     return np.ascontiguousarray(heights), points
+
+
+def _check_points(scan: Scan, grid: Grid, axes: tuple[int, ...]) -> None:
+    """Refuse a scan that would have too many points over the grid."""
+    points = float(np.prod([grid.size[axis] / scan.pitch[axis] for axis in axes]))
+    if points > MOST_POINTS:
+        raise InputError(
+            f"{points:.2g} points of the scan's pitch over the grid: take the means of several "
+            "points, or a smaller grid"
+        )
 
 
 def _check_reach(beyond: Beyond, grid: Grid, scan: Scan, shift: tuple[float, float]) -> None:

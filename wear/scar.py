@@ -15,6 +15,7 @@ stripes: noise is taken to be the same in all directions.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -30,8 +31,8 @@ FARTHEST = 0.25
 """Largest shift that is looked for, in the size of the scans."""
 
 SAME_PLACE, MOST_SHIFTS = 1e-3, 30
-"""Change of the shift in points at which it is found, and cap on the changes: they halve at least
-where the roughness is seen by several points a wave."""
+"""Change of the shift in points at which it is found, and cap on the changes: they fall by a factor
+of ten and more where the roughness is seen by several points a wave."""
 
 CLEAR = 3.0
 """Standard deviations of smoothed noise above which a depth is worn."""
@@ -46,6 +47,10 @@ points, the scar's too, and makes a bowl of the rim."""
 MARGIN = 0.15
 """What is added around a worn area that was found, in the radius of a disk as large: its edge runs
 out below the noise."""
+
+SOFTENED = 1.0
+"""Deviation in points of the mean that slopes of one scan are taken of: of white noise a quarter is
+left, of waves of ten points 80 %."""
 
 FEWEST_PATCHES = 5
 """Independent patches of a rim below which its noise is hardly known: t is 2.6 there."""
@@ -76,11 +81,13 @@ class Scar:
 
     ``depth`` ``(nx, ny)`` [mm] is what it lost, NaN where either scan has no point, and ``worn``
     the area ``(nx, ny)`` that counts. ``volume`` [mm³] is the sum over it and ``volume_error`` its
-    95 % bound; ``deepest`` [mm] the largest mean of 3 x 3 points, ``depth_error`` that of one such
-    mean: the largest of many is too large by about as much. ``noise`` [mm] is the root mean square
+    95 % bound; ``deepest`` [mm] the largest mean of 3 x 3 points, ``depth_error`` that of the mean
+    there, what plane and shift leave among it: the largest of many is too large by about as much as
+    its noise. ``noise`` [mm] is the root mean square
     over the rim, ``length`` [mm] how far it is correlated, and ``patches`` how many independent
     ones the rim has: below 5 (``sure`` is false) errors are hardly known.
-    ``shift`` [mm] is where the second scan lies on the first, None where no roughness tells it.
+    ``shift`` [mm] is where the second scan lies on the first, None where no roughness tells it, and
+    ``shift_error`` [mm] its 95 % bounds.
     ``missing`` is the share of the worn area without a depth of its own, which its surroundings
     give.
     """
@@ -96,6 +103,7 @@ class Scar:
     length: float
     patches: float
     shift: tuple[float, float] | None
+    shift_error: tuple[float, float] | None
     missing: float
 
     @property
@@ -179,7 +187,12 @@ class _Overlay:
     """Two scans on the same points, and the second as it lies on the first.
 
     ``depth`` ``(nx, ny)`` [mm] is that of the first less the second, without the plane and shift
-    that the rim tells; ``columns`` are what these are fitted by. ``shift`` is in points.
+    that the rim tells; ``columns`` are what these add to it, and ``told`` ``(c, nx, ny)`` what the
+    depth of each point, of the rim, adds to the factor of each column. ``shift`` is in points.
+
+    A shift is told by slopes. Those of either scan have noise, which squares of one scan's would
+    take for roughness, and a shift be found too small: products of both have none of it in the mean
+    (instrumental variables; Reiersøl 1941, doi:10.2307/1907171).
     """
 
     def __init__(self, before: Scan, after: Scan, gone: tuple[Mask, Mask]) -> None:
@@ -192,19 +205,29 @@ class _Overlay:
         self.recognised = False
         self.lay(np.ones((nx, ny), dtype=bool))
 
+    @cached_property
+    def _smooth_slopes(self) -> list[Array]:
+        """Those of the second scan along x and y, with little of their noise."""
+        from scipy import ndimage
+
+        smooth = ndimage.gaussian_filter(self.after.heights, SOFTENED)
+        return [-np.gradient(smooth, axis=axis) for axis in (0, 1)]
+
     def lay(self, rim: Mask) -> Array:
         """Lay the scans over each other by ``rim`` as far as it goes; the change of shift."""
         moved, self.seen = _moved(self.before.heights, self.gone[0], self.shift)
         self.seen &= ~self.gone[1]
         self.rim = rim & self.seen
-        columns = list(self._plane)
+        columns, others = list(self._plane), list(self._plane)
         if self.recognised:
             columns += [-np.gradient(moved, axis=axis) for axis in (0, 1)]
+            others += self._smooth_slopes
         depth = moved - self.after.heights
-        rows = np.stack([column[self.rim] for column in columns], axis=1)
-        self.inverse = np.linalg.pinv(rows.T @ rows, hermitian=True)
-        factors = self.inverse @ (rows.T @ depth[self.rim])
-        self.columns = columns
+        rows, by = (np.stack([one[self.rim] for one in each]) for each in (columns, others))
+        told = np.linalg.pinv(by @ rows.T) @ by
+        factors = told @ depth[self.rim]
+        self.columns, self.told = columns, np.zeros((len(columns), *depth.shape))
+        self.told[:, self.rim] = told
         self.depth = depth - sum(
             factor * column for factor, column in zip(factors, columns, strict=True)
         )
@@ -213,7 +236,7 @@ class _Overlay:
     def align(self, rim: Mask) -> None:
         """Shift and plane by the ``rim``: the shift by correlation first, then to parts of a point.
 
-        Gauss and Newton's method on the squares of what is left of the rim.
+        By Newton's method, on what is left of the rim.
         """
         seen = rim & ~(self.gone[0] | self.gone[1])
         if np.count_nonzero(seen) < FEWEST_POINTS:
@@ -337,21 +360,25 @@ def _measured(overlay: _Overlay, worn: Mask) -> Scar:
     depth = filled(own).heights
     missing = 1.0 - np.count_nonzero(seen) / np.count_nonzero(worn)
     noise = _Noise.of(overlay.depth, rim, len(overlay.columns))
-    means = ndimage.uniform_filter(depth, 3)
-    whole = ndimage.binary_erosion(rim, np.ones((3, 3)))
-    bound = _t95(noise.patches) * np.sqrt(noise.variance_of(_weights(overlay, worn)))
+    means = np.where(worn, ndimage.uniform_filter(depth, 3), -np.inf)
+    there = _block(means)
+    t95 = _t95(noise.patches)
+    bound = t95 * np.sqrt(noise.variance_of(_weights(overlay, worn)))
+    at_one = t95 * np.sqrt(noise.variance_of(_weights(overlay, there))) / np.count_nonzero(there)
+    off = [t95 * np.sqrt(noise.variance_of(weights)) for weights in overlay.told[3:]]
     return Scar(
         depth=own.heights,
         worn=worn,
         pitch=overlay.pitch,
         volume=float(depth[worn].sum()) * dx * dy,
         volume_error=float(bound * dx * dy),
-        deepest=float(means[worn].max()),
-        depth_error=_t95(noise.patches) * rms(means[whole]),
+        deepest=float(means.max()),
+        depth_error=float(at_one),
         noise=rms(overlay.depth[rim]),
         length=noise.length * float(np.sqrt(dx * dy)),
         patches=noise.patches,
         shift=(overlay.shift[0] * dx, overlay.shift[1] * dy) if overlay.recognised else None,
+        shift_error=(float(off[0] * dx), float(off[1] * dy)) if overlay.recognised else None,
         missing=missing,
     )
 
@@ -363,18 +390,25 @@ def _t95(freedom: float) -> float:
     return float(stats.t.ppf(0.975, max(freedom, 1.0)))
 
 
-def _weights(overlay: _Overlay, worn: Mask) -> Array:
-    """What the depth of each point ``(nx, ny)`` adds to the sum over the worn area.
+def _block(means: Array) -> Mask:
+    """The points ``(nx, ny)`` that the largest of ``means`` over 3 x 3 is the mean of."""
+    row, column = np.unravel_index(int(np.argmax(means)), means.shape)
+    block = np.zeros(means.shape, dtype=bool)
+    block[max(row - 1, 0) : row + 2, max(column - 1, 0) : column + 2] = True
+    return block
+
+
+def _weights(overlay: _Overlay, area: Mask) -> Array:
+    """What the depth of each point ``(nx, ny)`` adds to the sum over an area.
 
     Those of the rim count through the plane and shift that are fitted to them, those around a point
     that was filled in for it.
     """
-    seen = worn & overlay.seen
-    weights = np.where(seen, np.count_nonzero(worn) / np.count_nonzero(seen), 0.0)
-    sums = np.array([column[worn].sum() for column in overlay.columns])
-    for factor, column in zip(overlay.inverse @ sums, overlay.columns, strict=True):
-        weights -= np.where(overlay.rim, factor * column, 0.0)
-    return weights
+    seen = area & overlay.seen
+    own = int(np.count_nonzero(seen))
+    weights = np.where(seen, np.count_nonzero(area) / max(own, 1), 0.0)
+    sums = np.array([column[area].sum() for column in overlay.columns])
+    return np.asarray(weights - np.tensordot(sums, overlay.told, 1))
 
 
 @dataclass(frozen=True)

@@ -39,6 +39,17 @@ class CaseError(UserError, ValueError):
     """A case file that cannot be run; one line ``file:line: key: ...`` for each thing wrong."""
 
 
+class EntryError(UserError):
+    """An entry of a case that the others do not suit: its ``key``, and the ``message`` about it."""
+
+    def __init__(self, key: str, message: str) -> None:
+        super().__init__(key, message)
+        self.key, self.message = key, message
+
+    def __str__(self) -> str:
+        return f"{self.key}: {self.message}"
+
+
 class MethodFailed(Ending):
     """A numerical method did not converge; the message carries its residual and a remedy."""
 

@@ -88,8 +88,12 @@ def test_what_turns_and_goes_on_mirrored_is_the_mirrored_scan():
     grid = Grid.covering((4.0, 3.0), (40, 30))
     with pytest.raises(InputError, match="2 mm x 3 mm, ends within the grid of 4 mm x 3 mm"):
         resampled(scan, grid)
-    got = resampled(scan, grid, beyond="mirrored").heights
-    np.testing.assert_allclose(got, np.pad(scan.heights, ((10, 10), (0, 0)), "symmetric"))
+    got = resampled(scan, grid, beyond="mirrored")
+    np.testing.assert_allclose(got.heights, np.pad(scan.heights, ((10, 10), (0, 0)), "symmetric"))
+    assert got.beyond == 0.5
+    assert resampled(scan, grid, shift=(0.5, 0.0), beyond="mirrored").beyond == 0.5
+    turned = resampled(scan, grid, angle=0.5 * np.pi, beyond="mirrored")
+    assert turned.beyond == pytest.approx(0.5)  # 2 x 3 mm of 4 x 3 mm, whichever way round
     # Its corners turn out of a square.
     square = Scan(RNG(2).normal(size=(20, 20)), (0.1, 0.1))
     with pytest.raises(InputError, match="where it is put"):

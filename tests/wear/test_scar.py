@@ -59,6 +59,7 @@ def test_a_tilted_scan_with_missing_points_gives_its_volume(given):
     assert abs(got.volume - volume) < got.volume_error < 0.01 * volume
     assert got.deepest == pytest.approx(DEEPEST, abs=2.0 * got.depth_error)
     np.testing.assert_allclose(got.shift, shift, atol=0.1 * before.pitch[0])
+    assert np.all(np.array(got.shift_error) < 0.1 * before.pitch[0])
     assert 0.05 < got.missing < 0.15
     assert got.sure
     # Two scans of such noise, the first smoothed a little where it was moved.
@@ -117,5 +118,11 @@ def test_bounds_cover_the_truth(waves):
     errors = np.array([scar.volume - volume for scar, volume in found])
     bounds = np.array([scar.volume_error for scar, _ in found])
     assert np.count_nonzero(np.abs(errors) < bounds) >= 90
+    shifts = np.array([(scar.shift, scar.shift_error) for scar, _ in found])
+    beside = np.abs(shifts[:, 0] - [trial[4] for trial in tried]) < shifts[:, 1]
+    assert np.all(np.count_nonzero(beside, axis=0) >= 90)
+    # The middle of the cap, as any point that is worn: flat, and its truth known.
+    depths = np.array([np.nanmean(scar.depth[49:52, 49:52]) for scar, _ in found])
+    assert np.count_nonzero(np.abs(depths - DEEPEST) < [s.depth_error for s, _ in found]) >= 90
     assert np.mean(bounds) < 1.5 * 1.96 * errors.std()
     assert abs(errors.mean()) < 3.0 * errors.std() / 10.0

@@ -13,14 +13,17 @@ from fe_models.reduction import ReducedModel
 from workflow.case.sections import Section, sections_of
 from workflow.kinds import kinds, template
 
+
+def row_in_space(points):
+    """Springs of 1 between points in a row that nothing holds, alike along all three axes."""
+    stretch = np.eye(points - 1, points, k=1) - np.eye(points - 1, points)
+    return np.kron(np.eye(3), stretch.T @ stretch)
+
+
 BODY = ReducedModel(
-    kept=np.arange(1),
-    stiffness=np.eye(1),
-    mass=np.eye(1),
-    loads=np.zeros((1, 0)),
-    mode_shapes=np.zeros((1, 0)),
-    frequencies=np.zeros(0),
-    names=("pad 1 x",),
+    *(np.arange(12), 1e3 * row_in_space(4), 1e-3 * np.eye(12)),
+    *(np.zeros((12, 0)), np.zeros((12, 0)), np.zeros(0)),
+    names=tuple(f"{p} {axis}" for axis in "xyz" for p in ("pad 1", "pad 2", "ring 1", "ring 2")),
 )
 LENGTHS = {"cycles": 1e5, "step": {"kind": "implicit", "cycles": 5000}}
 ARCHARD_BODY = {"coefficient": 1e-4, "hardness": "3.5 GPa"}
@@ -30,7 +33,7 @@ GAPS = {
     "paraboloid": {"shape": "paraboloid", "radius_x": "1 m", "radius_y": "1 m"},
     "heights": {"shape": "heights", "file": "gap.npy"},
 }
-SURFACE = {"file": "disk.npy", "unit": "um", "pitch": ["4 um", "4 um"]}
+SURFACE = {"file": "disk.npy", "unit": "um", "pitch": ["20 um", "20 um"]}
 SURFACES = {"body_1": SURFACE, "body_2": SURFACE}
 INTERFACE = {
     "name": "interface",
@@ -97,6 +100,7 @@ GIVEN = {
     "mesh": {
         "load_path.mix": {ALWAYS: [{"share": 1, "factors": [1]}]},
         "structure.contacts.0.gap": GAPS,
+        "structure.contacts.0.surfaces": {ALWAYS: SURFACES},
         "structure.contacts.0.friction": {ALWAYS: {"coefficient": 0.4}},
         **{
             f"structure.contacts.0.{section}": given
@@ -185,23 +189,33 @@ EVOLUTION = {
     for name in ("friction", "stiffness", "residual_stiffness", "normal_load")
 }
 GIVEN["joint"] = {"joint": JOINTS, **EVOLUTION, "reported": {ALWAYS: TOLD}}
-DASHPOTS = [{"points": "m1", "coefficient": 1}]
 DAMPING = {
     "structure.damping.rayleigh": {
         "factors": {"kind": "factors", "mass_factor": 1, "stiffness_factor": 1},
         "ratios": {"kind": "ratios", "frequencies": [0.5, 2], "ratios": [0.5, 0.5]},
     },
-    "structure.damping.dashpots": {ALWAYS: DASHPOTS},
-}
-# What takes the place of the template's forces, and of the one that wears.
-PULLED = {"points": "m1", "amplitude": 1}
-EXCITED = {
-    "excitation": {ALWAYS: {"forces": [PULLED]}},
-    "excitation.records": {ALWAYS: [{"points": "m1", "file": "period.csv"}]},
-    "excitation.base": {
-        kind: [{"kind": kind, "amplitude": 1}] for kind in ("displacement", "acceleration")
+    "structure.damping.dashpots": {
+        ALWAYS: [{"points": "m1", "coefficient": 1}],
+        **{
+            kind: [{"points": "pad", "coefficient": 1}]
+            for kind in ("reduced", "matrices", "points")
+        },
     },
 }
+
+
+def excited(point):
+    """What takes the place of the template's forces, and of the one that wears."""
+    return {
+        "excitation": {ALWAYS: {"forces": [{"points": point, "amplitude": 1}]}},
+        "excitation.records": {ALWAYS: [{"points": point, "file": "period.csv"}]},
+        "excitation.base": {
+            kind: [{"kind": kind, "amplitude": 1}] for kind in ("displacement", "acceleration")
+        },
+    }
+
+
+EXCITED = excited("m1")
 WORN_SO = ["forces=", "wear.force=", "wear.level=1"]
 SHAKEN = {
     "vibration": ["forces="],
@@ -232,10 +246,10 @@ MATRICES = {
 POINTS = {
     **{name: value for name, value in REDUCED.items() if name != "file"},
     "kind": "points",
-    "points": [{"name": "ring", "mass": 1}, {"name": "pad", "mass": 1}],
-    "directions": "x",
+    "points": [{"name": name, "mass": 1} for name in ("pad", "ring", "left", "right")],
+    "directions": "xyz",
 }
-FACES = [{"points": "pad", "next_points": "ring"}]
+FACES = [{"points": "right", "next_points": "left"}]
 FRICTION_RIG = {
     "kind": "friction_rig",
     "specimens": "specimens_rig.yaml",
@@ -282,7 +296,7 @@ GIVEN["reduced_wear"] = {
     "structure.driven": {"load": {"load": 1}},
     "joint.pressed": {ALWAYS: {"points": "ring", "direction": "-z"}},
     **DAMPING,
-    **EXCITED,
+    **excited("pad"),
     **laws({"force": 1, "frequency": 1, "cycles": [10]}, "body_1", "body_2"),
 }
 GIVEN["rig"] = GIVEN["joint"] | {
@@ -390,7 +404,8 @@ class Leaf:
         if self.key.startswith("excitation."):
             return SHAKEN.get(self.kind, [])
         if self.key == "wear.level":
-            return [f"excitation={EXCITED['excitation'][ALWAYS]}", *SHAKEN[self.kind]]
+            given = GIVEN[self.kind]["excitation"][ALWAYS]
+            return [f"excitation={given}", *SHAKEN[self.kind]]
         return []
 
     @property

@@ -19,7 +19,7 @@ from fe_models.reduction import save_reduced
 from sa_solver.types import Array, Frame, Grid
 from tests.conftest import CASES
 from tests.wheels import sector, shoe
-from tests.workflow.case_leaves import BODY, CELLS
+from tests.workflow.case_leaves import BODY, CELLS, row_in_space
 from tests.workflow.commands import invoke, runs_here
 from tests.workflow.mesh_scenes import pressed_blocks
 from workflow.analyses.wear import contact_workers
@@ -273,11 +273,12 @@ def renamed(body: Body, name: str, names: dict[str, str]) -> Body:
 
 
 def write_matrices_of_templates(folder: Path) -> None:
-    """A row of masses from the ground over pads and rings to a tip, in files of several kinds."""
-    inner = [f"inner {number} x" for number in range(1, 36)]
-    names = ["pad 1 x", "pad 2 x", "ring 1 x", "ring 2 x", *inner, "tip x"]
+    """A row of masses over pads and rings to a tip, in files of several kinds."""
+    inner = [f"inner {number}" for number in range(1, 36)]
+    points = ["pad 1", "pad 2", "ring 1", "ring 2", *inner, "tip"]
+    names = [f"{point} {axis}" for axis in "yzx" for point in points]
     size = len(names)
-    stiffness = 2.0 * np.eye(size) - np.eye(size, k=1) - np.eye(size, k=-1)
+    stiffness = row_in_space(len(points))
     matrices = {"k": 1e3 * stiffness, "m": 1e-3 * np.eye(size), "c": 1e-3 * stiffness}
     matrices |= {"f": np.eye(size, 1, k=1 - size)}
     np.savez(folder / "matrices.npz", **matrices, names=names)
@@ -318,7 +319,7 @@ def folders(tmp_path_factory: pytest.TempPathFactory, template_files: Path) -> d
         shutil.copytree(template_files, made[kind], dirs_exist_ok=True)
         np.save(made[kind] / "gap.npy", np.zeros(CELLS.get(kind, (0, 0))))
         # A scan of more than the size of the template's grid, or a profile.
-        np.save(made[kind] / "disk.npy", np.zeros((600, 1 if "line" in kind else 300)))
+        np.save(made[kind] / "disk.npy", np.zeros((600, 1 if "line" in kind else 600)))
         (made[kind] / "history.csv").write_text("P,Qx\n1,0\n1,0.1\n", encoding="utf-8")
         (made[kind] / "force.csv").write_text("time,force\n0,0\n1,5\n", encoding="utf-8")
         period = "phase [deg],force\n0,0\n90,5\n270,-5\n360,0\n"

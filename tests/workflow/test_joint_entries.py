@@ -22,7 +22,7 @@ from workflow.analyses.vibration.figures.shares import joint_states
 from workflow.analyses.vibration.model import VibrationModel
 from workflow.analyses.vibration.outcome import Contents
 from workflow.errors import UserError
-from workflow.kinds import load_case, parse_case
+from workflow.kinds import load_case, parse_case, template
 from workflow.pictures.style import STYLE
 from workflow.shell.reporter import Reporter
 
@@ -377,14 +377,17 @@ def test_nonsense_in_a_row_is_refused(tmp_path, overrides, key, said):
 @pytest.mark.parametrize(
     ("overrides", "said"),
     [
-        (["structure.further_masses.0.name=block"], "structure.further_masses.0.name: 'block'"),
+        (
+            ["structure.further_masses.0.name=block"],
+            "further_masses.0.name=block: 'block': a point",
+        ),
         (["structure.further_masses.0.directions=x"], "damper does not move along y; allowed: x"),
         (
             ["structure.joints.0.against=damper"],
-            "structure.joints.0.against: damper against itself",
+            "structure.joints.0.against=damper: damper against itself",
         ),
         ([f"joint={SLIDER}"], "jenkins: given, but every entry of joints has a law of its own"),
-        (["structure.joints.0.points=dumper"], "structure.joints.0.points: 'dumper'"),
+        (["structure.joints.0.points=dumper"], "structure.joints.0.points=dumper: 'dumper': no"),
     ],
 )
 def test_nonsense_beside_a_body_is_refused(body, overrides, said):
@@ -394,7 +397,8 @@ def test_nonsense_beside_a_body_is_refused(body, overrides, said):
 
 
 def test_a_contact_that_wears_is_alone():
-    """Joints beside it are refused, not left out."""
+    """Joints beside it are refused, and none are offered."""
+    assert "joints" not in template("vibration_wear")
     cases = Path(__file__).parents[2] / "cases"
     joints = f"structure.joints=[{{points: m2, joint: {STOP}}}]"
     with pytest.raises(UserError, match=r"structure\.joints.*the contact that wears alone"):

@@ -11,6 +11,7 @@ from tests.conftest import CASES
 from tests.workflow.commands import command
 from tests.workflow.test_reduced_rig import TWO_MASSES
 from tests.workflow.time_scenes import MASS, STIFF, refused, run
+from workflow.analyses.rig import matrix_body
 from workflow.analyses.rig.building import rig_model
 from workflow.case.writing import dump_case
 from workflow.errors import CaseError, UserError
@@ -188,6 +189,23 @@ def test_more_than_the_memory_ends_before_it_begins(two, monkeypatch):
     ended = command("check", two / "case.yaml")
     assert ended.exit_code == 4
     assert "give structure.retained and structure.modes" in ended.stderr
+
+
+SHAKEN = "excitation={{forces: [{{points: {}, amplitude: 1}}]}}"
+
+
+@pytest.mark.parametrize("retained", [(), ("structure.retained=[block]", "structure.modes=0")])
+def test_places_are_known_before_large_matrices_are_reduced(two, monkeypatch, retained):
+    """Of those too that a check does not reduce: they are stood for by their names."""
+    if retained:
+        monkeypatch.setattr(matrix_body, "SMALL", 1)
+    driven = ("forces=", "structure.driven=", *retained)
+    places = [f"structure.{name}.points=block" for name in ("joints.0", "seen")]
+    said = told(two, *driven, *places, SHAKEN.format("tip"))
+    assert "excitation.forces.0.points: 'tip': no such point; allowed: block" in said
+    dashpot = "structure.damping={dashpots: [{points: block, direction: y, coefficient: 1}]}"
+    assert "block does not move along y; allowed: x" in told(two, *places, *retained, dashpot)[:400]
+    parse_case(OWN, str(two / "case.yaml"), [*driven, *places, SHAKEN.format("block")])
 
 
 # --- without mass -------------------------------------------------------------------------------

@@ -326,12 +326,12 @@ def test_a_row_of_masses_has_no_friction_contact():
     ("override", "words"),
     [
         ("structure.driven.points=nose",
-         "structure.driven.points: 'nose': no such point; allowed: pad, pad 1 to pad 9, ring, "
-         "ring 1 to ring 4"),
-        ("structure.joints.0.points=pad 10", "structure.joints.0.points: 'pad 10': no such point"),
-        ("structure.joints.0.against=ring", "joints.0.against: 4 points for 9; allowed: as many"),
+         "--set structure.driven.points=nose: 'nose': no such point; allowed: pad, pad 1 to pad 9, "
+         "ring, ring 1 to ring 4"),
+        ("structure.joints.0.points=pad 10", "joints.0.points=pad 10: 'pad 10': no such point"),
+        ("structure.joints.0.against=ring", "against=ring: 4 points for 9; allowed: as many"),
         ("structure.joints.0.against=pad", "pad 1 against itself"),
-        ("structure.masses.0.points=rim", "structure.masses.0.points: 'rim'"),
+        ("structure.masses.0.points=rim", "'rim': no such point"),
     ],
 )  # fmt: skip
 def test_points_that_are_not_there_are_refused(specimen, override, words):
@@ -340,9 +340,19 @@ def test_points_that_are_not_there_are_refused(specimen, override, words):
     assert words in message
 
 
+def test_points_of_specimens_are_known_before_they_are_meshed():
+    """Their number is that of the case: nine by nine nodes of the pad, eight of the ring."""
+    case = str(CASES / "rig_reduced.yaml")
+    with pytest.raises(
+        CaseError, match=r"no such point; allowed: pad, pad 1 to pad 81, ring, .* 8"
+    ):
+        load_case(case, ["structure.joints.0.points=pad 82"])
+    load_case(case, ["structure.joints.0.points=pad 81", "structure.joints.0.against=ring 8"])
+
+
 def test_a_displacement_that_is_not_there_is_refused(two_masses):
     with pytest.raises(
-        UserError, match=r"driven\.direction: block does not move along z; allowed: x"
+        UserError, match=r"driven\.direction=z: block does not move along z; allowed: x"
     ):
         rig_of(two_masses, "structure.driven.direction=z", text=AS_A_BODY)
 

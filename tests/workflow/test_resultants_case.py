@@ -116,6 +116,7 @@ def test_template_works_without_its_comment_signs(tmp_path):
     (tmp_path / "loads.csv").write_text(text, encoding="utf-8")
     for number in (1, 2):
         write_nodes(tmp_path / f"nodes_{number}.csv", np.linspace(-5, 5, 4), np.linspace(-9, 9, 4))
+    np.save(tmp_path / "disk.npy", np.zeros((560, 3010), dtype=np.int8))
     head, rest = template("resultants").split("  # interfaces:")
     interfaces, tail = rest.split("\n\n", 1)
     lines = [uncommented(line) for line in interfaces.splitlines()[1:]]

@@ -48,11 +48,25 @@ NEEDS = {
     "  # size: 2 mm  # for CAD files only": CAD,
     "structure.cyclic": [SECTOR],
     **{f"structure.matrices.{part}": [APART] for part in APART_MATRICES},
+    # Points as far apart as takes a scan over all of the template's face.
+    **{
+        f"{key}.surfaces{body}": [f"{place}.surfaces{body or '.body_1'}.pitch=[0.1, 0.2]"]
+        for key, place in (
+            ("structure", "structure"),
+            ("structure.interfaces", "structure.interfaces.0"),
+        )
+        for body in ("", ".body_2")
+    },
     "structure.retained": ["structure.modes=20"],
     "structure.modes": ["structure.retained=[pad, ring, tip]"],
     "  # instead of forces and mass, with wear.level": ["wear.force=", "wear.level=1"],
     "ring": RING,
-    "  # instead of forces, with wear.level": ["structure.driven=", "wear.force=", "wear.level=1"],
+    "  # instead of forces, with wear.level": [
+        "structure.driven=",
+        "wear.force=",
+        "wear.level=1",
+        "excitation.forces.0.points=pad",
+    ],
     "wear.level": ["forces=", f"excitation={EXCITED['excitation'][ALWAYS]}"],
 }
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from typing import Annotated, Any, ClassVar, Literal, Self, get_args
 
 from pydantic import (
@@ -39,6 +40,7 @@ from workflow.case.fields import (
 )
 from workflow.case.materials import MATERIALS, near
 from workflow.case.source import Source
+from workflow.errors import EntryError
 
 # Limits are wide: they catch a forgotten unit or a slipped exponent, not an unusual machine.
 Length = Annotated[float, Quantity("mm", above=0.0, at_most=1e4)]
@@ -69,6 +71,15 @@ def entry(description: str, example: object = None, **settings: Any) -> Any:
 def disagreement(message: str, *keys: str) -> PydanticCustomError:
     """Entries that are fine one by one but not together; the first key is the one to look at."""
     return PydanticCustomError("disagreement", "{message}", {"message": message, "keys": keys})
+
+
+@contextmanager
+def in_its_place() -> Iterator[None]:
+    """What does not suit other entries of a case is refused where it stands."""
+    try:
+        yield
+    except EntryError as error:
+        raise disagreement(error.message, error.key) from error
 
 
 def one_of(*keys: str) -> dict[str, Any]:

@@ -91,12 +91,13 @@ def report(scar: Scar) -> list[str]:
         f"rim      {plain(scar.noise, 'mm', 3)} rms, correlated over "
         f"{plain(scar.length, 'mm', 3)}: {scar.patches:.0f} independent patches",
     ]
-    if scar.shift is None:
+    if scar.shift is None or scar.shift_error is None:
         lines.append(
             "the rims have no roughness in common: laid over each other by their plane alone"
         )
     else:
-        shift = [plain(by, "mm", 4) for by in scar.shift]
+        pairs = zip(scar.shift, scar.shift_error, strict=True)
+        shift = [f"{plain(by, 'mm', 4)} +- {plain(error, 'mm', 2)}" for by, error in pairs]
         lines.append(f"laid over each other: the second lies {shift[0]}, {shift[1]} off the first")
     if scar.missing:
         lines.append(f"{scar.missing:.1%} of the worn area are missing points, laid in between")

@@ -40,7 +40,7 @@ def write_surface(
         cycles = float(results[f"surfaces/{name}/{jump}"].attrs["cycles"])
     if grid.line:
         raise UserError(f"{folder}: a line contact; allowed: a contact over an area")
-    lower = _measured_lower(load_case(run.case), grid)
+    lower = _measured_lower(load_case(run.case), name, grid)
     # In the frame body 1 begins flat, and all of the gap is body 2's.
     out = heights + lower if body == "1" else -(heights + lower)
     scan = Scan(out, grid.pitch)
@@ -79,8 +79,10 @@ def _chosen(faces: Sequence[str], interface: str | None) -> str:
     return interface
 
 
-def _measured_lower(case: Case, grid: Grid) -> Array | float:
-    """What was measured of body 1, on the grid [mm]; 0 where nothing was."""
-    surfaces = getattr(case.structure, "surfaces", None)
-    on = {} if surfaces is None else surfaces.on(grid)
-    return on["body_1"].heights if "body_1" in on else 0.0
+def _measured_lower(case: Case, name: str, grid: Grid) -> Array | float:
+    """What was measured of body 1 of an interface, on the grid [mm]; 0 where nothing was."""
+    for face in getattr(case, "scanned", tuple)():
+        if face.name == name and face.surfaces.body_1 is not None:
+            lower: Array = face.surfaces.body_1.on(grid, 1).heights
+            return lower
+    return 0.0

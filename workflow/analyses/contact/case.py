@@ -420,7 +420,8 @@ def surface_doubts(bodies: Bodies, grid: Grid) -> Iterator[str]:
 
 def surfaces_in_words(bodies: Bodies, grid: Grid) -> list[tuple[str, str]]:
     """A row for each measured surface."""
-    told = {} if bodies.surfaces is None else bodies.surfaces.told(grid)
+    surfaces = bodies.surfaces
+    told = {} if surfaces is None else surfaces.told(surfaces.summary(grid))
     return [(f"surface {name[-1]}", text) for name, text in told.items()]
 
 

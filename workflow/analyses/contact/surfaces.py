@@ -7,14 +7,14 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Annotated, Any, ClassVar
 
-from pydantic import model_validator
+from pydantic import StrictBool, model_validator
 
 from sa_solver.errors import InputError
 from sa_solver.scans import Beyond, Level, Resampled, Scan, filled, levelled, resampled, rms
 from sa_solver.types import Array, Grid
 from workflow.case.fields import File, Quantity, Word, split_dataset
 from workflow.case.input_files import InputFileError
-from workflow.case.plain import plain
+from workflow.case.plain import plain, shares
 from workflow.case.scan_files import ENDINGS, UNITS, read_scan
 from workflow.case.sections import Length, Section, disagreement, entry, one_of
 
@@ -25,6 +25,8 @@ Share = Annotated[float, Quantity("1", at_least=0.0, at_most=0.5)]
 LOST = 0.3
 # A height [mm] below which there is no roughness to lose.
 SMOOTH = 1e-9
+# Where a case has them unless told otherwise.
+KEY = "structure.surfaces"
 # Over the shorter side, heights of more are no roughness, nor are those of less [mm].
 STEEP, FINE = 0.1, 1e-7
 
@@ -43,7 +45,9 @@ class MeasuredSurface(Section):
         "of bare heights: m, mm, um or nm; other files say it", "um", default=None
     )
     pitch: tuple[Length, Length] | None = entry(
-        "of bare heights along x, along y; other files say it [mm]", ["4 um", "4 um"], default=None
+        "of bare heights along x, along y; other files say it [mm]",
+        ["20 um", "20 um"],
+        default=None,
     )
     level: Level = entry(
         "what is taken off: none, mean, plane, or form (second order)", "plane", default="plane"
@@ -53,8 +57,15 @@ class MeasuredSurface(Section):
         "5 %",
         default=0.05,
     )
+    flipped: StrictBool = entry(
+        "whether it is seen through the body, so that its columns run against y",
+        False,
+        default=False,
+    )
     shift: tuple[Shift, Shift] = entry(
-        "where its middle lies on the grid, along x, along y [mm]", [0, 0], default=(0.0, 0.0)
+        "where its middle lies from that of the contact's grid, along x, along y [mm]",
+        [0, 0],
+        default=(0.0, 0.0),
     )
     angle: Angle = entry(
         "how far it is turned on the face, from x to y [rad]", "0 deg", default=0.0
@@ -85,8 +96,22 @@ class MeasuredSurface(Section):
 
     def on(self, grid: Grid, number: int) -> Resampled:
         """On the grid of the contact, as body 1 or 2. Raises InputError."""
-        scan = self.scan() if number == 1 else self.scan().turned_over
+        below = (number == 1) != self.flipped
+        scan = self.scan() if below else self.scan().turned_over
         return resampled(scan, grid, self.shift, self.angle, self.beyond)
+
+    @property
+    def place(self) -> str:
+        """How it lies on the face, in words; nothing where that is as it is measured."""
+        parts = []
+        if any(self.shift):
+            x, y = (plain(by, "mm", 4) for by in self.shift)
+            parts.append(f"middle at {x}, {y}")
+        if self.angle:
+            parts.append(f"turned by {plain(self.angle, 'rad')} from x to y")
+        if self.flipped:
+            parts.append("flipped")
+        return "".join(f", {part}" for part in parts)
 
 
 def _stamp(file: str) -> tuple[int, int] | None:
@@ -140,15 +165,14 @@ class MeasuredSurfaces(Section):
         """What they add to the gap of the unloaded bodies ``(nx, ny)`` [mm]."""
         return -sum((on.heights for on in self.on(grid).values()), start=0.0 * (grid.x + grid.y))
 
-    def check(self, grid: Grid) -> None:
-        """Refuse those that the grid does not fit."""
+    def check(self, grid: Grid, key: str = KEY, size: str = "contact.size") -> None:
+        """Refuse, at ``key``, those that the grid does not fit; ``size`` says how large it is."""
         for name, surface in self.bodies.items():
             try:
                 surface.on(grid, int(name[-1]))
             except InputError as error:
-                key = f"structure.surfaces.{name}"
                 raise disagreement(
-                    f"{surface.file}: {error}", f"{key}.file", "contact.size"
+                    f"{surface.file}: {error}", f"{key}.{name}.file", size
                 ) from error
 
     def summary(self, grid: Grid) -> dict[str, Any]:
@@ -163,24 +187,28 @@ class MeasuredSurfaces(Section):
                 "rms": rms(self.bodies[name].scan().heights),
                 "rms_on_grid": rms(on.heights),
                 "lost": on.lost,
+                "beyond": on.beyond,
             }
         return numbers
 
-    def told(self, grid: Grid) -> dict[str, str]:
+    def told(self, summary: Mapping[str, Mapping[str, Any]]) -> dict[str, str]:
         """The same in a line each, by body."""
-        return {name: _in_words(numbers) for name, numbers in self.summary(grid).items()}
+        return {
+            name: f"{_in_words(numbers)}{self.bodies[name].place}"
+            for name, numbers in summary.items()
+        }
 
-    def doubts(self, grid: Grid) -> Iterator[str]:
+    def doubts(self, grid: Grid, key: str = KEY) -> Iterator[str]:
         """About units, and grids that do not carry the roughness."""
         for name, numbers in self.summary(grid).items():
-            key = f"structure.surfaces.{name}"
             height = numbers["rms"]
             if height > STEEP * min(grid.size[: 1 if grid.line else 2]) or SMOOTH < height < FINE:
-                yield f"{key}: heights of {plain(height, 'mm', 3)} rms: is their unit right?"
+                yield f"{key}.{name}: heights of {plain(height, 'mm', 3)} rms: is their unit right?"
             if height > SMOOTH and numbers["lost"] > LOST * height:
+                lost = f"{plain(numbers['lost'], 'mm', 3)} of {plain(height, 'mm', 3)} rms"
                 yield (
-                    f"{key}: {plain(numbers['lost'], 'mm', 3)} of {plain(height, 'mm', 3)} rms is "
-                    "finer than the cells, which do not carry it: take more of them"
+                    f"{key}.{name}: {lost} is finer than the cells, which do not carry it: take "
+                    "more of them"
                 )
 
 
@@ -188,8 +216,12 @@ def _in_words(numbers: Mapping[str, Any]) -> str:
     (nx, ny), pitch = numbers["points"], numbers["pitch"]
     steps = [plain(step, "mm", 4) for step in pitch]
     apart = steps[0] if ny == 1 or steps[0] == steps[1] else " x ".join(steps)
+    lost = numbers.get("lost_by_nodes")
+    nodes = "" if lost is None else f", {plain(lost, 'mm', 3)} finer than the nodes"
+    share = numbers["beyond"]
+    beyond = f", mirrored over {shares(share)} of the grid" if share else ""
     missing = f", {numbers['missing']:.2g} of them filled in" if numbers["missing"] else ""
     return (
         f"{nx} x {ny} points {apart} apart{missing}, {plain(numbers['rms'], 'mm', 3)} rms, "
-        f"{plain(numbers['lost'], 'mm', 3)} of it finer than the grid"
+        f"{plain(numbers['lost'], 'mm', 3)} of it finer than the grid{nodes}{beyond}"
     )

@@ -14,15 +14,15 @@ from workflow.analyses.rig.damping import Damping
 from workflow.analyses.rig.friction_rig import friction_rig_model
 from workflow.analyses.rig.joint_sections import ElasticJoint, Joint
 from workflow.analyses.rig.place_names import PlaceNames, in_a_row
-from workflow.analyses.rig.reduced_rig import reduced_rig_model
+from workflow.analyses.rig.reduced_rig import known_rig_model, reduced_rig_model
 from workflow.analyses.rig.rig_model import JointEntry, RigModel
 from workflow.analyses.rig.ring import RingOfSectors
-from workflow.analyses.rig.structure import FrictionRig, JointedBody, Rig, joints_of
+from workflow.analyses.rig.structure import FrictionRig, JointedBody, RowOfMasses, joints_of
 from workflow.shell.reporter import Reporter
 
 
 def rig_model(
-    structure: Rig | JointedBody | FrictionRig,
+    structure: RowOfMasses | JointedBody | FrictionRig,
     joint: Joint | ElasticJoint | None,
     mass: int | None,
     reporter: Reporter,
@@ -44,7 +44,27 @@ def rig_model(
     return row_of_masses(structure, mass or 1, joint is not None)
 
 
-def row_of_masses(rig: Rig, driven: int = 1, shared: bool = True) -> RigModel:
+def known_rig(
+    structure: RowOfMasses | JointedBody | FrictionRig,
+    joint: Joint | ElasticJoint | None,
+    mass: int | None,
+    ring: RingOfSectors | None = None,
+    engine_order: int = 1,
+) -> RigModel | None:
+    """The same as far as it is known before a run, for what a case says of its places.
+
+    None of a structure whose bodies only a run meshes and reduces. Raises EntryError where the case
+    names what there is not.
+    """
+    if isinstance(structure, JointedBody):
+        built = known_rig_model(structure, joint, ring, engine_order)
+        return None if built is None else _damped(built, structure.damping)
+    if isinstance(structure, FrictionRig):
+        return None
+    return row_of_masses(structure, mass or 1, joint is not None)
+
+
+def row_of_masses(rig: RowOfMasses, driven: int = 1, shared: bool = True) -> RigModel:
     """Masses m1, m2, ... in a row from the ground on, with joints.
 
     Where there is a ``shared`` law that no entry has, one more is between the last and the ground.
@@ -77,7 +97,7 @@ def row_of_masses(rig: Rig, driven: int = 1, shared: bool = True) -> RigModel:
 def _damped(rig: RigModel, damping: Damping | None) -> RigModel:
     """A rig with the damping that it has beside that of its modes.
 
-    Raises UserError for dashpots at places that there are not.
+    Raises EntryError for dashpots at places that there are not.
     """
     if damping is None:
         return rig

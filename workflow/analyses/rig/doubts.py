@@ -8,7 +8,7 @@ import numpy as np
 
 from sa_solver.types import Array
 from workflow.analyses.rig.matrix_body import MatrixBody
-from workflow.analyses.rig.structure import FrictionRig, Rig, joints_of
+from workflow.analyses.rig.structure import FrictionRig, RowOfMasses, joints_of
 from workflow.case.sections import Section
 
 # Of a force at one frequency: so many times away from every mode it hardly is meant to be.
@@ -29,7 +29,7 @@ def about_modes(
     Some may have a ``shared`` law. Between both every mode moves as the joint slips. A reduced body
     is not looked at.
     """
-    if not isinstance(structure, Rig | FrictionRig):
+    if not isinstance(structure, RowOfMasses | FrictionRig):
         return
     opened, stuck = (modes(structure, held, shared) for held in (0.0, stiffness))
     low, high = span
@@ -51,7 +51,7 @@ def about_matrices(structure: Section, highest: float) -> Iterator[str]:
         yield from structure.doubts(highest)
 
 
-def _stretches(structure: Rig | FrictionRig, shared: bool) -> Array:
+def _stretches(structure: RowOfMasses | FrictionRig, shared: bool) -> Array:
     """What joints stretch by ``(j, n)``."""
     unit = np.eye(len(structure.masses))
     if isinstance(structure, FrictionRig):
@@ -65,7 +65,7 @@ def _stretches(structure: Rig | FrictionRig, shared: bool) -> Array:
     )
 
 
-def modes(structure: Rig | FrictionRig, stiffness: float, shared: bool = True) -> Array:
+def modes(structure: RowOfMasses | FrictionRig, stiffness: float, shared: bool = True) -> Array:
     """Natural frequencies [Hz] of the masses in a row, whose joints have a stiffness [N/mm]."""
     masses, springs = np.array(structure.masses), np.array(structure.springs)
     matrix = np.diag(springs + np.append(springs[1:], 0.0))

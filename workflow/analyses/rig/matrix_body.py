@@ -262,10 +262,15 @@ class MatrixBody(JointedBody, Matrices):
         if isinstance(self.driven, LoadCase) and self.driven.load > count:
             allowed = f"1 to {count}" if count else "points, as there are no loads"
             raise disagreement(f"{self.driven.load}: no such load; allowed: {allowed}", "driven")
-        if len(matrices.unknowns) <= SMALL:
+        if self.small:
             with refusing(self):
                 self.reduced()
         return self
+
+    @property
+    def small(self) -> bool:
+        """Whether the model is soon built."""
+        return len(self.matrices.read().unknowns) <= SMALL
 
     def _check_points(self) -> None:
         """Refuse points that there are not."""

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from fe_models.dynamics.rig import Link
 from workflow.analyses.rig.places import Against, Moved
 from workflow.analyses.rig.point_kinds import known, matching
-from workflow.errors import UserError
+from workflow.errors import EntryError
 
 
 class PlaceNames:
@@ -23,10 +23,10 @@ class PlaceNames:
         self._points = list(dict.fromkeys(name.rpartition(" ")[0] for name in self.names))
 
     def of(self, wanted: str, key: str) -> list[str]:
-        """The point of that name, or all of that kind. Raises UserError if there is none."""
+        """The point of that name, or all of that kind. Raises EntryError if there is none."""
         found = matching(self._points, wanted)
         if not found:
-            raise UserError(f"{key}: '{wanted}': no such point; allowed: {known(self._points)}")
+            raise EntryError(key, f"'{wanted}': no such point; allowed: {known(self._points)}")
         return found
 
     def names_of(self, point: str) -> list[str]:
@@ -42,13 +42,13 @@ class PlaceNames:
         if len(opposites) == 1:
             opposites *= len(points)
         if len(opposites) != len(points):
-            raise UserError(
-                f"{key}.against: {len(opposites)} points for {len(points)}; allowed: as many, or "
-                "one"
+            raise EntryError(
+                f"{key}.against",
+                f"{len(opposites)} points for {len(points)}; allowed: as many, or one",
             )
         for point, opposite in zip(points, opposites, strict=True):
             if point == opposite:
-                raise UserError(f"{key}.against: {point} against itself; allowed: others")
+                raise EntryError(f"{key}.against", f"{point} against itself; allowed: others")
         return list(zip(points, opposites, strict=True))
 
     def links(self, connection: Against, key: str) -> list[Link]:
@@ -68,13 +68,11 @@ class PlaceNames:
         ]
 
     def moving(self, point: str, axis: str, key: str) -> str:
-        """The displacement of a point along an axis. Raises UserError if it has none."""
+        """The displacement of a point along an axis. Raises EntryError if it has none."""
         name = f"{point} {axis}"
         if name not in self.names:
             axes = [other for other in "xyz" if f"{point} {other}" in self.names]
-            raise UserError(
-                f"{key}: {point} does not move along {axis}; allowed: {', '.join(axes)}"
-            )
+            raise EntryError(key, f"{point} does not move along {axis}; allowed: {', '.join(axes)}")
         return self._known_as.get(name, name)
 
     def _known(self, name: str | None) -> str | None:

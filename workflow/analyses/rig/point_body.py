@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 class PointMass(Section):
     """A point with mass."""
 
-    name: Title = entry("by which joints, springs and forces know it", "m1")
+    name: Title = entry("by which joints, springs and forces know it", "pad")
     mass: Mass = entry("in every direction in which it moves [t]", "1.2 kg")
 
 
@@ -31,7 +31,7 @@ class PointBody(JointedBody):
         "their names and masses"
     )
     directions: Literal["x", "y", "z", "xy", "xz", "yz", "xyz"] = entry(
-        "in which all of them move: one, two, or xyz", "x"
+        "in which all of them move: one, two, or xyz", "xyz"
     )
 
     @model_validator(mode="after")

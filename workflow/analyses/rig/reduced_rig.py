@@ -26,12 +26,13 @@ from workflow.analyses.rig.places import Moved
 from workflow.analyses.rig.point_body import PointBody
 from workflow.analyses.rig.rig_model import JointEntry, JointNodes, RigModel
 from workflow.analyses.rig.ring import RingOfSectors, with_next
+from workflow.analyses.rig.stand_in import matrices_by_name, specimen_by_name
 from workflow.analyses.rig.structure import JointedBody, JointPlaces, ReducedBody, own_laws
 from workflow.analyses.specimens.case import SpecimensCase
 from workflow.analyses.specimens.memory import memory
 from workflow.analyses.specimens.model import SpecimensModel
 from workflow.case.loading import load_case
-from workflow.errors import UserError
+from workflow.errors import EntryError, UserError
 from workflow.shell.reporter import Reporter
 
 AXES = "xyz"
@@ -51,13 +52,39 @@ def reduced_rig_model(
     points that it does not have.
     """
     with reporter.stage("reduction", "steps") as told:
-        reduced, massless = _reduced_body(body, reporter, told)
+        found = _reduced_body(body, reporter, told)
+    return _rig_of(found, body, joint, ring, engine_order)
+
+
+def known_rig_model(
+    body: JointedBody,
+    joint: Joint | ElasticJoint | None,
+    ring: RingOfSectors | None = None,
+    engine_order: int = 1,
+) -> RigModel | None:
+    """The same before a run, as far as its places; None where these are too many to look at.
+
+    What a run reduces first, which may take long, is stood for: :mod:`.stand_in`.
+    """
+    found = _known_body(body)
+    return None if found is None else _rig_of(found, body, joint, ring, engine_order)
+
+
+def _rig_of(
+    found: tuple[ReducedModel, tuple[str, ...]],
+    body: JointedBody,
+    joint: Joint | ElasticJoint | None,
+    ring: RingOfSectors | None,
+    engine_order: int,
+) -> RigModel:
+    """The rig on the model that was found of a body, which has not all names."""
+    reduced, massless = found
     try:
         return _rig_on(reduced, body, [own or joint for own in own_laws(body)], ring, engine_order)
-    except UserError as error:
+    except EntryError as error:
         if not massless:
             raise
-        raise UserError(f"{error}{_told(massless)}") from error
+        raise EntryError(error.key, f"{error.message}{_told(massless)}") from error
 
 
 def _rig_on(
@@ -69,9 +96,10 @@ def _rig_on(
 ) -> RigModel:
     """The rig on a reduced model, whose entries of joints have these laws."""
     if reduced.names is None:
-        raise UserError(
-            "structure.file: a model whose kept displacements have no names; allowed: one of a "
-            "specimens run, or written with names"
+        raise EntryError(
+            "structure.file",
+            "a model whose kept displacements have no names; allowed: one of a specimens run, or "
+            "written with names",
         )
     further = _further_masses(body, reduced.names)
     points, ring, sector = _Points([*reduced.names, *further]), None, None
@@ -97,7 +125,7 @@ def _rig_on(
         driven = _driven(body, reduced, model, points, sector)
         seen = _shape(model, points, body.seen, "structure.seen")
     except RigError as error:
-        raise UserError(f"structure: {error}") from error
+        raise EntryError("structure", str(error)) from error
     label = f"{body.seen.points} {body.seen.direction}"
     entries = tuple(
         JointEntry(
@@ -208,6 +236,21 @@ def _reduced_body(
     return specimens.reduction.models[body.body - 1], ()
 
 
+def _known_body(body: JointedBody) -> tuple[ReducedModel, tuple[str, ...]] | None:
+    """The model that a run would find, or what stands for it; None where neither is known."""
+    if isinstance(body, PointBody):
+        return body.body(), ()
+    if isinstance(body, MatrixBody) and body.small:
+        model, massless = body.reduced()
+        return model, massless if body.massless is None else ()
+    if isinstance(body, MatrixBody):
+        named = matrices_by_name(body)
+    else:
+        assert isinstance(body, ReducedBody)
+        named = body.stored() if body.body is None else specimen_by_name(body.file)
+    return None if named is None else (named, ())
+
+
 def _of_matrices(
     body: MatrixBody, reporter: Reporter, progress: Progress
 ) -> tuple[ReducedModel, tuple[str, ...]]:
@@ -288,9 +331,10 @@ def _further_masses(body: JointedBody, names: Sequence[str]) -> dict[str, float]
     points = {name.rpartition(" ")[0] for name in names}
     for number, mass in enumerate(body.further_masses):
         if mass.name in points:
-            raise UserError(
-                f"structure.further_masses.{number}.name: '{mass.name}': a point of the body; "
-                "allowed: others, or structure.masses, which adds to points"
+            raise EntryError(
+                f"structure.further_masses.{number}.name",
+                f"'{mass.name}': a point of the body; allowed: others, or structure.masses, which "
+                "adds to points",
             )
     return {
         f"{mass.name} {axis}": mass.mass for mass in body.further_masses for axis in mass.directions

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 from workflow.analyses.rig.places import NEXT
 from workflow.case.fields import Whole
 from workflow.case.sections import Section, Title, entry
-from workflow.errors import UserError
+from workflow.errors import EntryError
 
 if TYPE_CHECKING:
     from fe_models.dynamics.sector import Ring
@@ -56,7 +56,7 @@ class RingOfSectors(Section):
     def of_order(self, engine_order: int, names: PlaceNames) -> Ring:
         """The ring under an engine order, of a sector with these places.
 
-        Raises UserError for faces that do not fit each other.
+        Raises EntryError for faces that do not fit each other.
         """
         from fe_models.dynamics.sector import Ring
 
@@ -66,15 +66,16 @@ class RingOfSectors(Section):
             here = names.of(face.points, f"{key}.points")
             there = names.of(face.next_points, f"{key}.next_points")
             if len(here) != len(there):
-                raise UserError(
-                    f"{key}.next_points: {len(there)} points for {len(here)}; allowed: as many"
+                raise EntryError(
+                    f"{key}.next_points", f"{len(there)} points for {len(here)}; allowed: as many"
                 )
             for point, other in zip(here, there, strict=True):
                 moving = {name.rpartition(" ")[2] for name in names.names_of(point)}
                 if moving != {name.rpartition(" ")[2] for name in names.names_of(other)}:
-                    raise UserError(
-                        f"{key}.points: {point} does not move as {other} does; allowed: points "
-                        "that move in the same directions"
+                    raise EntryError(
+                        f"{key}.points",
+                        f"{point} does not move as {other} does; allowed: points that move in the "
+                        "same directions",
                     )
                 ties |= {f"{point} {axis}": f"{other} {axis}" for axis in moving}
         return Ring(self.sectors, engine_order, ties, self._about)

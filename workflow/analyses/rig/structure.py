@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 
@@ -63,8 +63,12 @@ class RowJoint(JointPlaces):
     )
 
 
-class Rig(Section):
-    """Masses in a row on springs from the ground on."""
+class RowOfMasses(Section):
+    """Masses in a row on springs from the ground on, of which the last one has the joint."""
+
+    refused: ClassVar[Mapping[str, str]] = {
+        "joints": "given; allowed: leave them out: the contact that wears alone is the joint"
+    }
 
     kind: Literal["rig"] = entry("masses in a row", "rig")
     masses: Annotated[tuple[Mass, ...], Field(min_length=1, max_length=20)] = entry(
@@ -74,13 +78,44 @@ class Rig(Section):
         "each between its mass and the one before, or the ground [N/mm]",
         ["1.4 N/um", "273 N/um"],
     )
+    damping_ratio: DampingRatios = entry(f"without the joint, {OF_MODES}", 0.001)
+    damping: Damping | None = entry("added to that of the modes", default=None)
+
+    @model_validator(mode="after")
+    def _damps_its_own(self) -> RowOfMasses:
+        count = len(self.masses)
+        if len(self.damping_ratio) > count:
+            raise disagreement(
+                f"{len(self.damping_ratio)} ratios for {count} modes; allowed: as many or fewer",
+                "damping_ratio",
+            )
+        return self
+
+    @model_validator(mode="after")
+    def _a_spring_per_mass(self) -> RowOfMasses:
+        if len(self.springs) != len(self.masses):
+            raise disagreement(
+                f"{len(self.springs)} springs for {len(self.masses)} masses; allowed: as many",
+                *("springs", "masses"),
+            )
+        return self
+
+    @property
+    def text(self) -> str:
+        """The rig in a few words."""
+        return f"rig of {_on_springs(self.masses, self.springs)}"
+
+
+class Rig(RowOfMasses):
+    """Masses in a row on springs from the ground on, with joints anywhere between them."""
+
+    refused: ClassVar[Mapping[str, str]] = {}
+
     joints: tuple[RowJoint, ...] = entry(
         "where they are; the case's joint is between the last mass and the ground where no entry "
         "takes it",
         default=(),
     )
-    damping_ratio: DampingRatios = entry(f"without the joint, {OF_MODES}", 0.001)
-    damping: Damping | None = entry("added to that of the modes", default=None)
 
     @model_validator(mode="after")
     def _joins_its_own(self) -> Rig:
@@ -104,30 +139,10 @@ class Rig(Section):
                 )
         return self
 
-    @model_validator(mode="after")
-    def _damps_its_own(self) -> Rig:
-        count = len(self.masses)
-        if len(self.damping_ratio) > count:
-            raise disagreement(
-                f"{len(self.damping_ratio)} ratios for {count} modes; allowed: as many or fewer",
-                "damping_ratio",
-            )
-        return self
-
-    @model_validator(mode="after")
-    def _a_spring_per_mass(self) -> Rig:
-        if len(self.springs) != len(self.masses):
-            raise disagreement(
-                f"{len(self.springs)} springs for {len(self.masses)} masses; allowed: as many",
-                *("springs", "masses"),
-            )
-        return self
-
     @property
     def text(self) -> str:
-        """The rig in a few words."""
         joints = f", joints {joined(self.joints)}" if self.joints else ""
-        return f"rig of {_on_springs(self.masses, self.springs)}{joints}"
+        return f"{super().text}{joints}"
 
 
 class AddedMass(Points):
@@ -324,10 +339,11 @@ def joints_of(structure: Section, shared: bool = True) -> tuple[JointPlaces, ...
     Where there is a ``shared`` law, of the case, and no entry has it, it is that of a joint between
     the last mass of a row and the ground.
     """
-    if isinstance(structure, Rig):
-        taken = any(joint.joint is None for joint in structure.joints)
+    if isinstance(structure, RowOfMasses):
+        joints = structure.joints if isinstance(structure, Rig) else ()
+        taken = any(joint.joint is None for joint in joints)
         last = () if taken or not shared else (RowJoint(points=f"m{len(structure.masses)}"),)
-        return (*structure.joints, *last)
+        return (*joints, *last)
     return structure.joints if isinstance(structure, JointedBody) else ()
 
 
@@ -348,11 +364,7 @@ def joint_rows(
 
 
 def refuse_own_joints(structure: Section, otherwise: str) -> None:
-    """Refuse joints in a row of masses, and laws of their own; ``otherwise`` is what may be."""
-    if isinstance(structure, Rig) and structure.joints:
-        raise disagreement(
-            f"{len(structure.joints)}: given; allowed: {otherwise}", "structure.joints"
-        )
+    """Refuse laws that joints of a body have of their own; ``otherwise`` is what may be."""
     if not isinstance(structure, JointedBody):
         return
     for number, law in enumerate(own_laws(structure)):
@@ -363,10 +375,10 @@ def refuse_own_joints(structure: Section, otherwise: str) -> None:
             )
 
 
-def structure_outline(structure: Rig | JointedBody | FrictionRig) -> list[tuple[str, str]]:
+def structure_outline(structure: RowOfMasses | JointedBody | FrictionRig) -> list[tuple[str, str]]:
     """What holds the joints, and the bodies that another case describes."""
     damping = damping_text(structure.damping_ratio, structure.damping)
-    below = [] if isinstance(structure, Rig) else structure.outline()
+    below = [] if isinstance(structure, RowOfMasses) else structure.outline()
     return [("structure", f"{structure.text}, {damping}"), *below]
 
 
@@ -392,7 +404,7 @@ def refuse_missing_mass(structure: Section, mass: int | None, key: str, otherwis
     """
     if mass is None:
         return
-    if not isinstance(structure, Rig):
+    if not isinstance(structure, RowOfMasses):
         raise disagreement(f"{mass}: given beside {otherwise}", key)
     count = len(structure.masses)
     if mass > count:

@@ -42,6 +42,7 @@ from workflow.case.sections import (
     Title,
     disagreement,
     entry,
+    in_its_place,
     one_of,
 )
 
@@ -229,6 +230,15 @@ class RigCase(TimeCase):
                 "jenkins, which it is along one",
                 "joint.law",
             )
+        return self
+
+    @model_validator(mode="after")
+    def _has_its_places(self) -> RigCase:
+        # Imported here: it builds the structure, as far as that is known.
+        from workflow.analyses.rig.building import known_rig
+
+        with in_its_place():
+            known_rig(self.structure, self.joint, self.excitation.mass)
         return self
 
     @model_validator(mode="after")

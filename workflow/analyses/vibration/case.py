@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import pairwise
 from math import pi
-from typing import Annotated, Any, ClassVar, Literal
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 from pydantic import Field, StrictBool, model_validator
 
@@ -24,6 +24,7 @@ from workflow.analyses.rig.structure import (
     FrictionRig,
     ReducedBody,
     Rig,
+    RowOfMasses,
     driven_place,
     joint_rows,
     own_laws,
@@ -45,6 +46,9 @@ from workflow.case.plain import shares
 from workflow.case.sections import Case, Title, disagreement, entry, one_of
 from workflow.case.source import Source
 
+if TYPE_CHECKING:
+    from workflow.analyses.rig.rig_model import RigModel
+
 
 class VibrationCaseBase(Case):
     """A structure under forces a sin(2π frequency t), for all frequencies of a span."""
@@ -56,7 +60,7 @@ class VibrationCaseBase(Case):
 
     title: Title = entry("one line", "Forced response of a friction rig")
     analysis: Literal["vibration"] = entry("what is computed", "vibration")
-    structure: Rig | ReducedBody | MatrixBody | PointBody | FrictionRig = entry(
+    structure: RowOfMasses | ReducedBody | MatrixBody | PointBody | FrictionRig = entry(
         "what holds the joints"
     )
     forces: Annotated[tuple[DrivingForce, ...], Field(min_length=1, max_length=100)] | None = entry(
@@ -124,6 +128,19 @@ class VibrationCaseBase(Case):
                 *("resolution.samples", "excitation"),
             )
         return self
+
+    def _in_place(
+        self,
+        joint: Joint | ElasticJoint | None,
+        mass: int | None = None,
+        ring: RingOfSectors | None = None,
+    ) -> RigModel | None:
+        """The rig, as far as it is known before a run; places that it has not are refused."""
+        # Imported here: it builds the structure.
+        from workflow.analyses.vibration.places import check_places
+
+        highest, order = self.resolution.harmonics[-1], round(self.engine_order or 1)
+        return check_places(self.structure, self.excitation, highest, joint, mass, ring, order)
 
     @property
     def amount(self) -> Amount:
@@ -483,6 +500,17 @@ class VibrationCase(DrivenMass):
                 )
         if any(after <= before for before, after in pairwise(self.at)):
             raise disagreement("not ascending; allowed: each frequency above the last", "at")
+        return self
+
+    @model_validator(mode="after")
+    def _has_its_places(self) -> VibrationCase:
+        rig = self._in_place(self.joint, self.mass, self.ring)
+        if rig is not None and self.modes is not None:
+            count, highest = len(rig.model.mass), max(self.modes.numbers)
+            if highest > count:
+                raise disagreement(
+                    f"{highest}: no such mode; allowed: 1 to {count}", "modes.numbers"
+                )
         return self
 
     @property

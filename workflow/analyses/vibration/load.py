@@ -14,7 +14,6 @@ from fe_models.dynamics.rig import unit_force
 from sa_solver.types import Array
 from workflow.analyses.rig.places import Moved
 from workflow.analyses.rig.rig_model import RigModel
-from workflow.analyses.vibration.case import VibrationCaseBase
 from workflow.analyses.vibration.excitation import (
     FORCE,
     LEVEL,
@@ -23,7 +22,7 @@ from workflow.analyses.vibration.excitation import (
     VibrationExcitation,
     waves_of,
 )
-from workflow.errors import UserError
+from workflow.errors import EntryError
 
 # What forces leave of each other, over all of them, where they cancel: rounding.
 CANCELLED = 1e-12
@@ -70,12 +69,15 @@ class Driving:
         return replace(motion, motion=absolute)
 
 
-def driving_of(case: VibrationCaseBase, rig: RigModel) -> Driving:
-    """What drives a rig. Raises UserError for places and directions that it has not."""
-    if case.excitation is None:
+def driving_of(excitation: VibrationExcitation | None, rig: RigModel, highest: int) -> Driving:
+    """What drives a rig, without an excitation its own force; records up to a harmonic.
+
+    Raises EntryError for places and directions that it has not.
+    """
+    if excitation is None:
         # The force is a sine: Re (-i) exp(iωt).
         return Driving(PeriodicLoad({1: -1j * rig.driven}))
-    return _driven_by(case.excitation, rig, case.resolution.harmonics[-1])
+    return _driven_by(excitation, rig, highest)
 
 
 def _driven_by(excitation: VibrationExcitation, rig: RigModel, highest: int) -> Driving:
@@ -96,15 +98,17 @@ def _driven_by(excitation: VibrationExcitation, rig: RigModel, highest: int) -> 
     ground = []
     for number, motion in enumerate(excitation.base):
         if not rig.translations:
-            raise UserError(
-                f"excitation.base.{number}: the reduced body is held inside, and does not move "
+            raise EntryError(
+                f"excitation.base.{number}",
+                "the reduced body is held inside, and does not move "
                 "with the ground as a whole; allowed: a body reduced with what holds it among its "
-                "kept points, or forces"
+                "kept points, or forces",
             )
         if motion.direction not in rig.translations:
-            raise UserError(
-                f"excitation.base.{number}.direction: {motion.direction}: the structure does not "
-                f"move so; allowed: {', '.join(rig.translations)}"
+            raise EntryError(
+                f"excitation.base.{number}.direction",
+                f"{motion.direction}: the structure does not "
+                f"move so; allowed: {', '.join(rig.translations)}",
             )
         along = rig.translations[motion.direction]
         wave = complex(-1j * motion.amplitude * np.exp(1j * motion.phase))
@@ -115,9 +119,10 @@ def _driven_by(excitation: VibrationExcitation, rig: RigModel, highest: int) -> 
             inertial[motion.harmonic] += wave * along.inertia
         ground.append(MovingGround(motion.harmonic, wave, accelerated, along.rigid))
     if not excitation.base and float(np.linalg.norm(waves[1])) <= CANCELLED * parts:
-        raise UserError(
-            "excitation: the parts of harmonic 1 cancel each other, and nothing drives at the "
-            "frequency; allowed: parts that leave something of each other"
+        raise EntryError(
+            "excitation",
+            "the parts of harmonic 1 cancel each other, and nothing drives at the "
+            "frequency; allowed: parts that leave something of each other",
         )
     load = PeriodicLoad(dict(waves), inertial=dict(inertial))
     return Driving(load, tuple(ground), LEVEL, tuple(excitation.left_out(highest)))

@@ -67,7 +67,7 @@ class VibrationModel:
         static = rig.preload(law)
         if rig.pressing is not None:
             static = case.laws[0].normal_load * rig.pressing
-        driving = driving_of(case, rig)
+        driving = driving_of(case.excitation, rig, case.resolution.harmonics[-1])
         of_joints = (
             law.march(threads) if isinstance(law, MixedLaw) else PeriodicMarch(law, threads),
             replace(driving.load, static=static if static.any() else None),

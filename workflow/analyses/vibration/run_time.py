@@ -6,7 +6,7 @@ from math import log
 
 from workflow.analyses.rig.matrix_body import MatrixBody
 from workflow.analyses.rig.point_body import PointBody
-from workflow.analyses.rig.structure import FrictionRig, ReducedBody, Rig
+from workflow.analyses.rig.structure import FrictionRig, ReducedBody, RowOfMasses, joints_of
 from workflow.analyses.specimens.case import SpecimensCase
 from workflow.analyses.specimens.run_time import reduction_of
 from workflow.analyses.vibration.case import VibrationCase, VibrationCaseBase
@@ -78,8 +78,8 @@ def stability_time(case: VibrationCase) -> float:
 
 def _directions(case: VibrationCaseBase) -> int:
     """Of all joints."""
-    if isinstance(case.structure, Rig):
-        return len(case.structure.joints) or 1
+    if isinstance(case.structure, RowOfMasses):
+        return len(joints_of(case.structure, shared=False)) or 1
     joints = JOINTS
     if isinstance(case.structure, MatrixBody | PointBody):
         joints = case.structure.joint_count

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from itertools import pairwise
 from pathlib import Path
-from typing import Annotated, Any, ClassVar
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 from pydantic import Field, StrictBool, model_validator
 
@@ -14,7 +14,13 @@ from workflow.analyses.rig.doubts import AWAY, about_modes
 from workflow.analyses.rig.excitation import DrivingForce, Frequency
 from workflow.analyses.rig.joint_sections import FrictionContactJoint, JenkinsJoint, Joint
 from workflow.analyses.rig.matrix_body import MatrixBody
-from workflow.analyses.rig.structure import FrictionRig, ReducedBody, Rig, structure_outline
+from workflow.analyses.rig.structure import (
+    FrictionRig,
+    ReducedBody,
+    Rig,
+    RowOfMasses,
+    structure_outline,
+)
 from workflow.analyses.vibration.case import DrivenMass, VibrationCase, VibrationCaseBase, wears
 from workflow.analyses.vibration.excitation import Level, VibrationExcitation
 from workflow.analyses.vibration_wear.node_contacts import NodeContacts, PadContacts
@@ -24,8 +30,11 @@ from workflow.analyses.wear.structures.bodies.case import BodiesWearCase, Recipr
 from workflow.case.fields import Quantity
 from workflow.case.loading import YAML, CaseFile, load_case, outline_of
 from workflow.case.plain import entries, plain, times
-from workflow.case.sections import Section, Title, disagreement, entry, one_of
+from workflow.case.sections import Section, Title, disagreement, entry, in_its_place, one_of
 from workflow.case.source import Source
+
+if TYPE_CHECKING:
+    from workflow.analyses.rig.rig_model import RigModel
 
 # Rows of the contact's own case that are told, and what they are called.
 OF_CONTACT = {
@@ -151,7 +160,9 @@ class VibrationWearCaseBase(VibrationCaseBase):
     """A rig on a contact that it wears, and its response to forces a sin(2π frequency t)."""
 
     title: Title = entry("one line", "Forced response of a friction rig as it wears")
-    structure: Rig | FrictionRig | ReducedBody | MatrixBody = entry("what holds the contact")
+    structure: RowOfMasses | FrictionRig | ReducedBody | MatrixBody = entry(
+        "what holds the contact"
+    )
     excitation: VibrationExcitation | None = entry(
         "instead of forces and mass, with wear.level: forces at any places, records, motion of the "
         "ground",
@@ -204,6 +215,8 @@ class VibrationWearCaseBase(VibrationCaseBase):
         """The vibration case with this joint, driven at the mass of this number."""
         shared = [name for name in VibrationCaseBase.model_fields if name not in NOT_OF_A_STATE]
         entries = {name: getattr(self, name) for name in shared}
+        if isinstance(self.structure, RowOfMasses):
+            entries["structure"] = Rig(**dict(self.structure))
         return VibrationCase(joint=joint, mass=mass, **entries)
 
 
@@ -212,8 +225,13 @@ class VibrationWearCase(VibrationWearCaseBase, DrivenMass):
 
     about: ClassVar[str] = "the steady vibration of a rig on a ball or flat that it wears"
 
-    structure: Rig = entry("what holds the contact")
+    structure: RowOfMasses = entry("what holds the contact")
     contact: WornContact = entry("between the last mass and the ground")
+
+    @model_validator(mode="after")
+    def _has_its_places(self) -> VibrationWearCase:
+        self._in_place(None, self.mass)
+        return self
 
     def with_joint(self, normal_load: float, friction: float, stiffness: float) -> VibrationCase:
         """The vibration case of one state of the contact, whose joint is described by these."""
@@ -251,15 +269,31 @@ class NodesWearCase(VibrationWearCaseBase):
             )
         return self
 
+    @model_validator(mode="after")
+    def _has_its_places(self) -> NodesWearCase:
+        rig = self._in_place(self._law)
+        if rig is not None:
+            with in_its_place():
+                self._check_contacts(rig)
+        return self
+
+    def _check_contacts(self, rig: RigModel) -> None:
+        """Raise EntryError for contacts that the rig has not."""
+
     @property
     def contacts(self) -> bool:
         return True
 
     @property
+    def _law(self) -> FrictionContactJoint:
+        """That of all contacts before they wear."""
+        shared = FrictionContactJoint.model_fields.keys() & PadContacts.model_fields.keys()
+        return FrictionContactJoint(**self.joint.model_dump(include=shared))
+
+    @property
     def unworn(self) -> VibrationCase:
         """The vibration case before the first cycle."""
-        shared = FrictionContactJoint.model_fields.keys() & PadContacts.model_fields.keys()
-        return self._of_a_state(FrictionContactJoint(**self.joint.model_dump(include=shared)))
+        return self._of_a_state(self._law)
 
     def outline(self) -> list[tuple[str, str]]:
         joint = self.joint
@@ -292,6 +326,12 @@ class ReducedWearCase(NodesWearCase):
     )
     joint: NodeContacts = entry("all contacts together")
     wear: WearOfBody = entry("how the contacts wear")
+
+    def _check_contacts(self, rig: RigModel) -> None:
+        if self.joint.pressed is not None:
+            rig.place_names.shared(self.joint.pressed, "joint.pressed")
+        assert rig.nodes is not None
+        self.joint.of_points(rig.nodes.names)
 
     @property
     def laws(self) -> tuple[WearLaw, WearLaw]:

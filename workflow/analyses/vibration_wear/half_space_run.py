@@ -63,7 +63,7 @@ def wear_half_space(
     bodies = load_case(case.contact.file, [BodiesWearCase])
     rig, wear = row_of_masses(case.structure, case.mass or 1), case.wear
     resolution = Resolution(case.harmonics, case.resolution.samples)
-    driving = driving_of(case, rig)
+    driving = driving_of(case.excitation, rig, case.resolution.harmonics[-1])
     contact = VibratingContact(bodies, rig, driving, case.wearing, wear.frequency, resolution)
     stepper = SubcyclingStepper(stepper_of(bodies.wear), contact.alike_cycles, steps)
     with reporter.stage("contact, first cycle"):

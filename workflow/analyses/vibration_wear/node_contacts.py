@@ -17,7 +17,7 @@ from workflow.case.fields import File, Quantity, shown
 from workflow.case.input_files import InputFileError
 from workflow.case.sections import disagreement, entry
 from workflow.case.table_file import TableFile, read_table_file
-from workflow.errors import UserError
+from workflow.errors import EntryError
 
 WearingFriction = Annotated[float, Quantity("1", above=0.0, at_most=10.0)]
 Area = Quantity("mm^2", above=0.0, at_most=1e8)
@@ -135,7 +135,7 @@ class NodeContacts(PadContacts):
     def of_points(self, points: Sequence[str]) -> tuple[Array, Array]:
         """Area [mm²] and gap [mm] of contacts at these points ``(j,)``.
 
-        Raises UserError for a file of nodes that has others.
+        Raises EntryError for a file of nodes that has others.
         """
         count = len(points)
         area, gap = np.full(count, (self.area or 0.0) / count), np.zeros(count)
@@ -145,7 +145,7 @@ class NodeContacts(PadContacts):
         try:
             rows = table.order(points)
         except InputFileError as error:
-            raise UserError(f"joint.nodes: {error}") from error
+            raise EntryError("joint.nodes", str(error)) from error
         return (
             area if table.area is None else table.area[rows],
             gap if table.gap is None else table.gap[rows],

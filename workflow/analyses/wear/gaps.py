@@ -11,6 +11,7 @@ from scipy.interpolate import make_interp_spline
 
 from sa_solver.shapes import rounded_edge
 from sa_solver.types import Array, Grid
+from workflow.analyses.contact.surfaces import MeasuredSurfaces
 from workflow.analyses.wear.case.gaps import GapShape, HeightsGap, ParaboloidGap, RoundedGap
 from workflow.case.input_files import read_heights
 
@@ -35,10 +36,35 @@ class GridHeights:
         return heights
 
 
+@dataclass(frozen=True)
+class MeasuredGap:
+    """Gap of a ``form`` [mm] and of measured ``surfaces``, of the cells of any grid over a face.
+
+    ``face`` is the grid that tells its size.
+    """
+
+    form: GapFunction
+    surfaces: MeasuredSurfaces
+    face: Grid
+
+    def __call__(self, x: Array, y: Array) -> Array:
+        """Means over cells at ``x`` ``(n, 1)`` and ``y`` ``(1, m)``, which cover the face."""
+        grid = Grid.over(self.face.size, (x.size, y.size), self.face.line)
+        # No other places are asked for.
+        assert np.allclose(grid.x, x)
+        assert np.allclose(grid.y, y)
+        return self.form(x, y) + self.surfaces.gap(grid)
+
+
+def with_measured(form: GapFunction, surfaces: MeasuredSurfaces | None, face: Grid) -> GapFunction:
+    """The gap of a form, and of measured surfaces where there are any."""
+    return form if surfaces is None else MeasuredGap(form, surfaces, face)
+
+
 def gap_over(shape: GapShape | None, heights: Array | None, grid: Grid) -> GapFunction:
     """Gap [mm] at x and y of a face that ``grid`` covers.
 
-    ``heights`` on the grid count where the case gives no shape.
+    ``heights`` on the grid count where the case gives no shape; without either it is 0.
     """
     match shape:
         case RoundedGap():
@@ -47,8 +73,13 @@ def gap_over(shape: GapShape | None, heights: Array | None, grid: Grid) -> GapFu
             return partial(_paraboloid, shape)
         case HeightsGap():
             return GridHeights(grid, read_heights(shape.file))
-    assert heights is not None  # a case without either is refused
-    return GridHeights(grid, heights)
+    if heights is not None:
+        return GridHeights(grid, heights)
+    return _plane
+
+
+def _plane(x: Array, y: Array) -> Array:
+    return np.zeros_like(x + y)
 
 
 def _rounded(shape: RoundedGap, size: tuple[float, float], line: bool, x: Array, y: Array) -> Array:

@@ -13,6 +13,7 @@ from pydantic import model_validator
 from sa_solver.types import Material as ElasticMaterial
 from workflow.analyses.wear.case.evolution import EvolvingFriction
 from workflow.analyses.wear.case.loops import Loops
+from workflow.analyses.wear.case.scanned import ScannedFace
 from workflow.analyses.wear.case.sections import (
     BodiesThatWear,
     Contact,
@@ -30,7 +31,7 @@ from workflow.case.sections import Case, Section, Title, disagreement, entry
 # What the summary and the results call their own entries.
 RESERVED = (
     *("title", "assumed", "per_length", "cycles", "jumps", "work", "structure", "kinetics"),
-    *("warnings", "seconds", "versions", "choice"),
+    *("surfaces", "warnings", "seconds", "versions", "choice"),
 )
 # Of increments that are auto: those of a leg that leave 1 %, more or less, for seven dovetails, and
 # the most of a cycle that are ever chosen.
@@ -207,13 +208,19 @@ class WearCase(Case):
         if (sides := self.face_sides()) is not None:
             yield from uneven_cells(sides, self.contact.grid)
 
+    def scanned(self) -> Iterator[ScannedFace]:
+        """The contact faces that have surfaces as measured."""
+        yield from ()
+
     def told_surfaces(self) -> dict[str, Any]:
         """What the summary has of surfaces as measured; nothing where there are none."""
-        return {}
+        faces = {face.name: face.summary() for face in self.scanned()}
+        return {"surfaces": faces} if faces else {}
 
     def surface_doubts(self) -> Iterator[str]:
         """About surfaces as measured, for a run to warn of."""
-        yield from ()
+        for face in self.scanned():
+            yield from face.doubts()
 
     @property
     def yields(self) -> list[float | None]:

@@ -30,7 +30,6 @@ from workflow.analyses.contact.case import (
     check_surfaces,
     elastic,
     require_shape,
-    surface_doubts,
     surfaces_in_words,
     touches_along_a_line,
     unworn_contact,
@@ -38,7 +37,9 @@ from workflow.analyses.contact.case import (
 from workflow.analyses.contact.doubts import about_grid, about_pressure, about_shear
 from workflow.analyses.contact.load_path import Leg, LegsOrFile, LegT, LineLeg
 from workflow.analyses.contact.load_table import LoadTable
+from workflow.analyses.contact.surfaces import KEY
 from workflow.analyses.wear.case.base import WearCase
+from workflow.analyses.wear.case.scanned import ScannedFace
 from workflow.analyses.wear.case.sections import Contact, Cycles, PressingForce, Wear
 from workflow.case.doubts import heights, long_stroke
 from workflow.case.fields import Quantity, Whole
@@ -55,6 +56,8 @@ Direction = Annotated[
 ]
 Increments = Annotated[int, Whole(1, 1000)]
 
+# Of the only contact.
+NAME = "interface"
 FLAT = "flat"
 SHIFTS = "shift_x", "shift_y"
 # What shears a contact otherwise than by moving all of it.
@@ -279,8 +282,9 @@ class TwoBodiesWearCase(WearCase):
         surfaces = self.structure.surfaces
         return {} if surfaces is None else {"surfaces": surfaces.summary(self.grid)}
 
-    def surface_doubts(self) -> Iterator[str]:
-        yield from surface_doubts(self.structure, self.grid)
+    def scanned(self) -> Iterator[ScannedFace]:
+        if self.structure.surfaces is not None:
+            yield ScannedFace(NAME, KEY, self.structure.surfaces, self.grid)
 
     def material(self, number: int) -> ElasticMaterial:
         return elastic(getattr(self.materials, self.bodies[number - 1]))

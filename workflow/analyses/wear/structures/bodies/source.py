@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -16,8 +15,7 @@ from wear.drive import Drive
 from wear.face_loads import CycleLoads
 from workflow.analyses.contact.bodies import bulk_strain
 from workflow.analyses.contact.case import Heights, Shape
-from workflow.analyses.contact.surfaces import MeasuredSurfaces
-from workflow.analyses.wear.gaps import GapFunction, GridHeights
+from workflow.analyses.wear.gaps import GapFunction, GridHeights, with_measured
 from workflow.analyses.wear.load_source import (
     COARSER,
     ContactFace,
@@ -27,6 +25,7 @@ from workflow.analyses.wear.load_source import (
     nominal_face,
 )
 from workflow.analyses.wear.structures.bodies.case import (
+    NAME,
     SHIFTS,
     BodiesWearCase,
     LineBodiesWearCase,
@@ -36,7 +35,6 @@ from workflow.analyses.wear.structures.bodies.case import (
 )
 from workflow.case.input_files import read_heights
 
-NAME = "interface"
 REMEDY = "enlarge contact.size, and contact.grid with it"
 
 
@@ -145,30 +143,10 @@ class BodiesSource(UncoupledSource):
         return self._case.grid
 
 
-@dataclass(frozen=True)
-class MeasuredGap:
-    """Gap of a ``form`` [mm] and of measured ``surfaces``, of the cells of any grid over a face.
-
-    ``face`` is the grid that tells its size.
-    """
-
-    form: GapFunction
-    surfaces: MeasuredSurfaces
-    face: Grid
-
-    def __call__(self, x: Array, y: Array) -> Array:
-        """Means over cells at ``x`` ``(n, 1)`` and ``y`` ``(1, m)``, which cover the face."""
-        grid = Grid.over(self.face.size, (x.size, y.size), self.face.line)
-        # No other places are asked for.
-        assert np.allclose(grid.x, x)
-        assert np.allclose(grid.y, y)
-        return self.form(x, y) + self.surfaces.gap(grid)
-
-
 def gap_of(bodies: Shape | Heights, grid: Grid) -> GapFunction:
     """Gap [mm] of the unloaded bodies at x and y of the face that ``grid`` covers."""
     if isinstance(bodies, Heights):
         form: GapFunction = GridHeights(grid, read_heights(bodies.file))
     else:
         form = bodies.height
-    return form if bodies.surfaces is None else MeasuredGap(form, bodies.surfaces, grid)
+    return with_measured(form, bodies.surfaces, grid)

@@ -53,6 +53,9 @@ class Dovetail(Section):
     """Blade root in a disk sector, in contact along two flanks (dovetail attachment)."""
 
     in_schema: ClassVar[Mapping[str, Any]] = together("end_width", "end_radius")
+    refused: ClassVar[Mapping[str, str]] = {
+        "surfaces": "as measured: not of flanks; allowed: in kind mesh, resultants or bodies"
+    }
 
     kind: Literal["dovetail"] = entry("what the structure is", "dovetail")
     dimension: Literal[2, 3] = entry(

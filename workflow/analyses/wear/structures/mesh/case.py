@@ -8,16 +8,17 @@ from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self
 
-import numpy as np
 from pydantic import model_validator
 
 from fe_models.mesh import MeshError, StructureMesh
+from sa_solver.types import Grid
 from workflow.analyses.wear.case.base import (
     ContactTerms,
     FiniteElementCase,
     check_interface_name,
 )
-from workflow.analyses.wear.case.gaps import Gap, HeightsGap, check_gap
+from workflow.analyses.wear.case.gaps import check_gap
+from workflow.analyses.wear.case.scanned import ScannedFace
 from workflow.analyses.wear.case.sections import (
     TwoBodies,
     Wear,
@@ -37,10 +38,11 @@ from workflow.analyses.wear.structures.mesh.elements import (
     folded_elements,
 )
 from workflow.analyses.wear.structures.mesh.faces import (
+    check_mirrored,
+    check_whole,
     face_size,
     hardly_met,
     outline_of,
-    planes_of_symmetry,
 )
 from workflow.analyses.wear.structures.mesh.legs import Legs
 from workflow.analyses.wear.structures.mesh.load import Name
@@ -53,7 +55,6 @@ from workflow.analyses.wear.structures.mesh.pretension import check_bolts
 from workflow.analyses.wear.structures.mesh.temperatures import check_temperatures
 from workflow.case.changing import changed
 from workflow.case.fields import AUTO, File
-from workflow.case.input_files import read_heights
 from workflow.case.plain import counted, listed, told_of_body
 from workflow.case.sections import Length, Section, Title, disagreement, entry
 
@@ -67,9 +68,6 @@ ENDINGS = (
     ".msh", ".inp", ".step", ".stp", ".brep", ".vtu", ".vtk", ".xdmf", ".med", ".bdf", ".mesh",
     ".nas", ".fem", ".unv", ".cdb", ".odb", ".cae", ".db", ".igs", ".iges",
 )  # fmt: skip
-
-# Heights on both sides of a plane of symmetry may differ by this share of their range: files round.
-MIRRORED = 1e-6
 
 Stamp = tuple[int, int]
 
@@ -236,6 +234,7 @@ class MeshCase(FiniteElementCase):
                 ("face", outline_of(mesh, interface, pair.gap))
                 for interface, pair in zip(mesh.interfaces, structure.contacts, strict=True)
             ),
+            *(row for face in self.scanned() for row in face.outline()),
             *(
                 ("material", f"{body.name}: {told_of_body(body.material)}")
                 for body in structure.other_bodies
@@ -262,6 +261,7 @@ class MeshCase(FiniteElementCase):
         for index, interface in enumerate(mesh.interfaces):
             for doubt in filter(None, (hardly_met(mesh, interface), apart(mesh, interface))):
                 yield f"structure.contacts.{index}: {doubt}"
+        yield from self.surface_doubts()
 
     @model_validator(mode="after")
     def _size_is_for_cad(self) -> MeshCase:
@@ -351,6 +351,14 @@ class MeshCase(FiniteElementCase):
             grid=pair.grid or self.contact.grid,
         )
 
+    def scanned(self) -> Iterator[ScannedFace]:
+        faces = self.structure.mesh(self.mesh.size, self.mesh.order).interfaces
+        for index, (pair, face) in enumerate(zip(self.structure.contacts, faces, strict=True)):
+            if pair.surfaces is not None:
+                grid = Grid.over(face_size(face), self.terms(pair.name).grid, face.line)
+                key = f"structure.contacts.{index}.surfaces"
+                yield ScannedFace(pair.name, key, pair.surfaces, grid, face)
+
     @property
     def contact_names(self) -> tuple[str, ...]:
         return tuple(pair.name for pair in self.structure.contacts)
@@ -422,11 +430,15 @@ class MeshCase(FiniteElementCase):
         for index, (pair, face) in enumerate(zip(structure.contacts, interfaces, strict=True)):
             grid = pair.grid or self.contact.grid
             check_rows(grid, face.line, f"structure.contacts.{index}.grid" if pair.grid else None)
+            key = f"structure.contacts.{index}"
             if pair.gap is not None:
                 cells = grid[0], 1 if face.line else grid[1]
-                key = f"structure.contacts.{index}.gap"
-                check_gap(pair.gap, face_size(face), cells, face.line, key)
-                _check_mirrored(pair.gap, face.planes, key)
+                check_gap(pair.gap, face_size(face), cells, face.line, f"{key}.gap")
+                check_mirrored(pair.gap, face.planes, f"{key}.gap")
+            if pair.surfaces is not None:
+                check_whole(face.planes, f"{key}.surfaces")
+                over = Grid.over(face_size(face), grid, face.line)
+                pair.surfaces.check(over, f"{key}.surfaces", "mesh")
 
     def _check_supports(self, imported: ImportedMesh) -> None:
         """Build what holds the bodies, on elements of order 1 and without forces."""
@@ -453,21 +465,6 @@ class MeshCase(FiniteElementCase):
                 "its half-space would be a strip as wide as the slice; allowed: the section as a "
                 "plane mesh",
                 "structure.supports",
-            )
-
-
-def _check_mirrored(gap: Gap, planes: Sequence[int], key: str) -> None:
-    """Refuse heights that are not their own image across the ``planes`` that cut their face."""
-    if not isinstance(gap, HeightsGap):
-        return
-    heights = read_heights(gap.file)
-    for axis in planes:
-        apart = np.abs(heights - np.flip(heights, axis)).max()
-        if apart > MIRRORED * np.ptp(heights):
-            raise disagreement(
-                f"{gap.file}: not the same on both sides of {planes_of_symmetry([axis])}, by up to "
-                f"{apart:.3g} mm; allowed: heights that are, over the whole face, or a mesh of it",
-                key,
             )
 
 

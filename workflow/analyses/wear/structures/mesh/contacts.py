@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 import numpy as np
 from pydantic import model_validator
 
+from workflow.analyses.contact.surfaces import MeasuredSurfaces
 from workflow.analyses.wear.case.evolution import EvolvingFriction
 from workflow.analyses.wear.case.gaps import Gap
 from workflow.analyses.wear.case.sections import Density, Laws, Solid, TwoBodies
@@ -63,6 +64,11 @@ class ContactPair(Section):
         [1.0, 0.0, 0.0],
     )
     gap: Gap | None = entry("of the unloaded bodies, beside that of their meshes", default=None)
+    surfaces: MeasuredSurfaces | None = entry(
+        "as measured, on top of gap and meshes: rows along x of the contact, about the middle of "
+        "its grid",
+        default=None,
+    )
     bodies: tuple[Name, Name] | None = entry(
         "body 1 and body 2 of this contact; without it those of the structure",
         ["disk", "blade"],

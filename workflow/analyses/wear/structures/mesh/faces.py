@@ -7,13 +7,17 @@ from collections.abc import Sequence
 import numpy as np
 
 from fe_models.mesh import Interface, StructureMesh
+from workflow.analyses.wear.case.gaps import Gap, HeightsGap
+from workflow.case.input_files import read_heights
 from workflow.case.plain import counted, shape_in_words
-from workflow.case.sections import Section
+from workflow.case.sections import Section, disagreement
 
 AXIS_NAMES = "xy"
 # Faces are shared but for rounding; and usually the smaller one all but for the clearance of a
 # bolt's hole, an eighth of what is under its head.
 SHARED, WHOLE = 1e-6, 0.8
+# Heights on both sides of a plane of symmetry may differ by this share of their range: files round.
+MIRRORED = 1e-6
 
 
 def face_size(face: Interface) -> tuple[float, float]:
@@ -96,3 +100,28 @@ def hardly_met(mesh: StructureMesh, interface: Interface) -> str:
         f"{interface.name}: its faces share {shared:.4g} {_unit(interface)} of {whole[0]:.4g} and "
         f"{whole[1]:.4g}; if one is in several parts, name them all, as in face_2: [a, b]"
     )
+
+
+def check_mirrored(gap: Gap, planes: Sequence[int], key: str) -> None:
+    """Refuse heights that are not their own image across the ``planes`` that cut their face."""
+    if not isinstance(gap, HeightsGap):
+        return
+    heights = read_heights(gap.file)
+    for axis in planes:
+        apart = np.abs(heights - np.flip(heights, axis)).max()
+        if apart > MIRRORED * np.ptp(heights):
+            raise disagreement(
+                f"{gap.file}: not the same on both sides of {planes_of_symmetry([axis])}, by up to "
+                f"{apart:.3g} mm; allowed: heights that are, over the whole face, or a mesh of it",
+                key,
+            )
+
+
+def check_whole(planes: Sequence[int], key: str) -> None:
+    """Refuse surfaces as measured, which are never their own image across ``planes``."""
+    if planes:
+        raise disagreement(
+            f"on a face that {planes_of_symmetry(planes)} cuts, across which no measured surface "
+            "is its own image; allowed: on a mesh of the whole face",
+            key,
+        )

@@ -18,13 +18,16 @@ from fe_models.relinearised import Softening
 from fe_models.structure import Structure
 from sa_solver.shapes import PARTING_SLOPE
 from sa_solver.types import Array, Grid, Indices
-from workflow.analyses.wear.gaps import GapFunction, gap_over
+from workflow.analyses.contact.surfaces import LOST
+from workflow.analyses.wear.case.scanned import ScannedFace
+from workflow.analyses.wear.gaps import GapFunction, gap_over, with_measured
 from workflow.analyses.wear.load_source import ContactFace
 from workflow.analyses.wear.structure_stage import MissionLoads
 from workflow.analyses.wear.structures.mesh.case import MeshCase
 from workflow.analyses.wear.structures.mesh.faces import face_size, planes_of_symmetry
 from workflow.analyses.wear.structures.mesh.loads import RotationLoad
 from workflow.analyses.wear.structures.mesh.pretension import BoltLoad
+from workflow.case.plain import plain
 from workflow.shell.reporter import Reporter
 
 
@@ -97,13 +100,22 @@ class MeshModel:
         return self._case.structure.mesh(self._case.mesh.size, self.order)
 
     def _with_gap(self, interface: Interface) -> Interface:
-        """The interface with the gap of the case on top of the meshes'."""
-        extra = self._case_gap(interface)
-        if extra is None:
-            return interface
-        points = interface.coordinates[:, :, None, None]
-        at_nodes = np.array([float(extra(x, y)[0, 0]) for x, y in points])
-        return replace(interface, gap=interface.gap + at_nodes)
+        """The interface with the gap of the case on top of the meshes'.
+
+        Of surfaces as measured, nodes have the means about them.
+        """
+        extra, gap = self._case_gap(interface), interface.gap
+        if extra is not None:
+            points = interface.coordinates[:, :, None, None]
+            gap = gap + np.array([float(extra(x, y)[0, 0]) for x, y in points])
+        if interface.name in self._scanned:
+            gap = gap + self._scanned[interface.name].at_nodes()
+        return interface if gap is interface.gap else replace(interface, gap=gap)
+
+    @cached_property
+    def _scanned(self) -> dict[str, ScannedFace]:
+        """Faces with surfaces as measured, by name."""
+        return {face.name: face for face in self._case.scanned()}
 
     def _case_gap(self, interface: Interface) -> GapFunction | None:
         """The gap that the case gives an interface, if it does."""
@@ -142,14 +154,21 @@ class MeshModel:
     def contact_face(self, interface: Interface) -> ContactFace:
         size, extra = face_size(interface), self._case_gap(interface)
         face = whole_face(interface)
-        return ContactFace(face, size, _MeshGap(face, extra), _coarse(face, size))
+        gap: GapFunction = _MeshGap(face, extra)
+        if interface.name in self._scanned:
+            scanned = self._scanned[interface.name]
+            gap = with_measured(gap, scanned.surfaces, scanned.grid)
+        return ContactFace(face, size, gap, _coarse(face, size))
 
     def node_numbers(self, place: int) -> Indices:
         numbers = self._case.structure.read(self._case.mesh.size).node_numbers
         return numbers[self._mesh.bodies[place].name]
 
     def warn(self, structure: Structure, reporter: Reporter) -> None:
-        """What is told of contacts that planes of symmetry cut, and supports that are none."""
+        """Of contacts that planes of symmetry cut, supports that are none, and surfaces as
+        measured that are finer than the mesh.
+        """
+        self._tell_of_surfaces(reporter)
         for interface in structure.mesh.interfaces:
             name, planes = interface.name, interface.planes
             if planes:
@@ -165,6 +184,18 @@ class MeshModel:
                     "have on it: the structure knows of them, the half-space of the contact does "
                     "not, whose pressure is that of a face that ends there; mesh the whole face"
                 )
+
+    def _tell_of_surfaces(self, reporter: Reporter) -> None:
+        """What of measured surfaces the nodes of the structure do not carry."""
+        for name, face in self._scanned.items():
+            for body, numbers in face.summary().items():
+                lost, height = numbers["lost_by_nodes"], numbers["rms"]
+                if lost > LOST * height:
+                    reporter.say(
+                        f"{name}: {plain(lost, 'mm', 3)} of the surface of body {body[-1]}, "
+                        f"{plain(height, 'mm', 3)} rms, is finer than the nodes of the face: the "
+                        "structure has means about them, the half-space all that the grid carries"
+                    )
 
 
 class _MeshGap:

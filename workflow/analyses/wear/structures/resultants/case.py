@@ -9,10 +9,12 @@ from typing import Annotated, ClassVar, Literal
 import numpy as np
 from pydantic import model_validator
 
-from sa_solver.types import Frame, LoadHistory
+from sa_solver.types import Frame, Grid, LoadHistory
 from workflow.analyses.contact.case import BodyMaterial
+from workflow.analyses.contact.surfaces import MeasuredSurfaces
 from workflow.analyses.wear.case.base import WearCase, check_interface_name
 from workflow.analyses.wear.case.gaps import Gap, GapShape, check_cells, check_gap
+from workflow.analyses.wear.case.scanned import ScannedFace
 from workflow.analyses.wear.case.sections import Contact, TwoBodies, Wear, check_rows
 from workflow.analyses.wear.structures.resultants.faces import FaceError
 from workflow.analyses.wear.structures.resultants.imported import ImportedLoads
@@ -82,6 +84,7 @@ class ImportedInterface(Section):
     name: Title = entry("as in the file; 'interface' where it has no names", "interface")
     size: Sizes | None = entry("instead of structure.size [mm]", ["11 mm", "60 mm"], default=None)
     gap: Gap | None = entry("instead of structure.gap", default=None)
+    surfaces: MeasuredSurfaces | None = entry("instead of structure.surfaces", default=None)
     frame: FaceFrame | None = entry("where the face lies; instead of the file's", default=None)
     nodes: NodeTables | None = entry("where the worn surfaces go to; needs a frame", default=None)
 
@@ -103,6 +106,10 @@ class Resultants(Section):
     )
     gap: Gap | None = entry(
         "distance of the unloaded bodies over every face; without it 'height' of an HDF5 file",
+        default=None,
+    )
+    surfaces: MeasuredSurfaces | None = entry(
+        "as measured, on top of the gap, or all of it where there is none; of every face",
         default=None,
     )
     interfaces: tuple[ImportedInterface, ...] = entry(
@@ -135,6 +142,10 @@ class Resultants(Section):
     def gap_of(self, name: str) -> GapShape | None:
         """Gap over a face, None where the file has it."""
         return self._interface(name).gap or self.gap
+
+    def surfaces_of(self, name: str) -> MeasuredSurfaces | None:
+        """Measured surfaces of a face."""
+        return self._interface(name).surfaces or self.surfaces
 
     def frame_of(self, name: str) -> Frame | None:
         """Frame of a face where the case gives one."""
@@ -230,17 +241,31 @@ class ResultantsCase(WearCase):
             *(
                 (
                     "face",
-                    f"{name}, {_ranges(imported.loads, unit)}, {self._shape(name)}, "
+                    f"{name}, {_ranges(imported.loads, unit)}, {self._shape(name, imported)}, "
                     f"tilt {imported.tilt}",
                 )
                 for name, imported in loads.items()
             ),
+            *(row for face in self.scanned() for row in face.outline()),
         ]
 
-    def _shape(self, name: str) -> str:
+    def scanned(self) -> Iterator[ScannedFace]:
+        for name in self.loads():
+            yield from self._scanned(name)
+
+    def _scanned(self, name: str) -> Iterator[ScannedFace]:
+        """The face of that name, if it has surfaces as measured."""
+        structure = self.structure
+        surfaces = structure.surfaces_of(name)
+        if surfaces is not None:
+            grid = Grid.over(structure.size_of(name), self.contact.grid, structure.line)
+            yield ScannedFace(name, structure.key_of(name, "surfaces"), surfaces, grid)
+
+    def _shape(self, name: str, loads: ImportedLoads) -> str:
         size, gap = self.structure.size_of(name), self.structure.gap_of(name)
+        unnamed = "plane" if loads.height is None else "heights of the file"
         sides = f"{size[0]:g} mm" if self.structure.line else f"{size[0]:g} x {size[1]:g} mm"
-        return f"{sides}, {'heights of the file' if gap is None else shape_in_words(gap)}"
+        return f"{sides}, {unnamed if gap is None else shape_in_words(gap)}"
 
     def doubts(self) -> Iterator[str]:
         yield from super().doubts()
@@ -251,6 +276,7 @@ class ResultantsCase(WearCase):
             )
             if not self.structure.line:
                 yield from uneven_cells(sides, self.cells)
+        yield from self.surface_doubts()
 
     @model_validator(mode="after")
     def _loads_can_be_used(self) -> ResultantsCase:
@@ -294,17 +320,18 @@ class ResultantsCase(WearCase):
 
     def _check_gap(self, name: str, loads: ImportedLoads) -> None:
         structure, gap = self.structure, self.structure.gap_of(name)
-        key = structure.key_of(name, "gap")
+        key, beside = structure.key_of(name, "gap"), structure.key_of(name, "size")
+        for face in self._scanned(name):
+            face.surfaces.check(face.grid, face.key, beside)
         if gap is not None:
-            beside = structure.key_of(name, "size")
             check_gap(gap, structure.size_of(name), self.cells, structure.line, key, beside)
-        elif loads.height is None:
+        elif loads.height is None and structure.surfaces_of(name) is None:
             raise disagreement(
                 f"missing, and {structure.file} has no height of {name}; allowed: shape rounded, "
-                "paraboloid or heights, with the entries of each",
+                "paraboloid or heights, with the entries of each, or surfaces as measured",
                 key,
             )
-        else:
+        elif loads.height is not None:
             check_cells(loads.height.shape, structure.file, self.cells)
 
     def _check_nodes(self, name: str, loads: ImportedLoads) -> None:

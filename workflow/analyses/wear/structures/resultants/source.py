@@ -12,7 +12,7 @@ from sa_solver.ties import first_largest
 from sa_solver.types import Array, Frame, Grid
 from wear.drive import Drive
 from wear.face_loads import CycleLoads
-from workflow.analyses.wear.gaps import gap_over
+from workflow.analyses.wear.gaps import gap_over, with_measured
 from workflow.analyses.wear.load_source import (
     BODIES,
     COARSER,
@@ -85,7 +85,8 @@ class ResultantsSource(UncoupledSource):
         structure = self._case.structure
         grid = Grid.over(structure.size_of(name), self._case.contact.grid, self.line)
         face = self._face(name, imported, grid.size)
-        gap = gap_over(structure.gap_of(name), imported.height, grid)
+        form = gap_over(structure.gap_of(name), imported.height, grid)
+        gap = with_measured(form, structure.surfaces_of(name), grid)
         coarse = self._coarse(imported, grid)
         return ContactFace(
             face, grid.size, gap, coarse, REMEDY, drive=Drive.by_forces(imported.tilt)
