@@ -146,21 +146,22 @@ def test_what_is_no_field_of_heights_is_one_line(tmp_path, spoil, name):
     ("name", "value", "words"),
     [
         ("stiffness", np.zeros(3), "stiffness: shape (3,)"),
-        ("stiffness", np.full((2, 2), np.nan), "stiffness: not all finite numbers"),
-        ("names", np.arange(2.0), "names: not texts"),
+        ("stiffness", np.full((6, 6), np.nan), "stiffness: not all finite numbers"),
+        ("names", np.arange(6.0), "names: not texts"),
         ("kept", None, "no dataset kept"),
     ],
 )
 def test_a_reduced_body_is_read_by_check(tmp_path, name, value, words):
+    names = [f"{point} {axis}".encode() for point in ("pad 1", "ring 1") for axis in "xyz"]
     whole = {
-        "kept": np.arange(2),
-        "stiffness": np.eye(2),
-        "mass": np.eye(2),
-        "loads": np.zeros((2, 1)),
-        "mode_shapes": np.zeros((2, 0)),
+        "kept": np.arange(6),
+        "stiffness": np.eye(6),
+        "mass": np.eye(6),
+        "loads": np.zeros((6, 1)),
+        "mode_shapes": np.zeros((6, 0)),
         "frequencies": np.zeros(0),
-        "names": np.array([b"pad 1 x", b"pad 2 x"]),
-        "places": np.zeros((2, 3)),
+        "names": np.array(names),
+        "places": np.zeros((6, 3)),
     }
     path = tmp_path / "case.yaml"
     text = (CASES / "rig_reduced.yaml").read_text(encoding="utf-8")

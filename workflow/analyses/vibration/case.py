@@ -509,7 +509,8 @@ class VibrationCase(DrivenMass):
             count, highest = len(rig.model.mass), max(self.modes.numbers)
             if highest > count:
                 raise disagreement(
-                    f"{highest}: no such mode; allowed: 1 to {count}", "modes.numbers"
+                    f"mode {highest}: the structure has 1 to {count}; allowed: one of these",
+                    "modes.numbers",
                 )
         return self
 
