@@ -148,7 +148,7 @@ def _function(fitted: Fitted, name: str, section: Section) -> list[Row]:
 def entries_of(fitted: Fitted, path: str) -> list[str]:
     """The entries of a case that have the parameter: none of what no case has."""
     file, name = fitted.given.file, path.rpartition(".")[2]
-    if isinstance(file, WearFit):
+    if isinstance(file, WearFit | ProfileFit):
         if path.startswith("wear.both.") or name not in ("coefficient", "threshold"):
             return []
         return [path.replace(".threshold", ".evolution.threshold")]
