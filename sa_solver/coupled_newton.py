@@ -374,6 +374,10 @@ class _Search:
         slipping = self._mask(slips)
         traction = balanced(problem, self._operator, trial, slipping)
         if traction is None:
+            # Too much of the shear is held on circles: those that slip are left to the balance.
+            slipping, slipped = np.zeros_like(slipping), np.zeros_like(slipped)
+            traction = balanced(problem, self._operator, trial, slipping)
+        if traction is None:
             return False
         joining = (relative[Z] < 0.0) & ~self.contact
         # Cells released are still on their circle; others the balance may have brought there.
