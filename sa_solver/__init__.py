@@ -54,7 +54,7 @@ if TYPE_CHECKING:
     from sa_solver.errors import ConvergenceError, FretscaleError, InputError
     from sa_solver.half_space import HalfSpace
     from sa_solver.history import ContactLoadPath, march_history
-    from sa_solver.loop_errors import loop_errors
+    from sa_solver.loop_accuracy import loop_errors
     from sa_solver.normal import NormalContact
     from sa_solver.partial_slip import partial_slip_curve
     from sa_solver.subsurface import SubsurfaceStress
@@ -95,7 +95,7 @@ __getattr__, __dir__ = lazy_names(
         "errors": ("ConvergenceError", "FretscaleError", "InputError"),
         "half_space": ("HalfSpace",),
         "history": ("ContactLoadPath", "march_history"),
-        "loop_errors": ("loop_errors",),
+        "loop_accuracy": ("loop_errors",),
         "normal": ("NormalContact",),
         "partial_slip": ("partial_slip_curve",),
         "subsurface": ("SubsurfaceStress",),
