@@ -53,7 +53,8 @@ def loop_errors(
     Mech. 16, 259):
 
     >>> from sa_solver import ElasticPair, FrictionalContact, Grid, HalfSpace, LoopPath, Material
-    >>> from sa_solver import loop_errors, march_loop
+    >>> from sa_solver import march_loop
+    >>> from sa_solver.loop_accuracy import loop_errors
     >>> from sa_solver.reference.mindlin import ShearedSphere
     >>> body = Material(young=115e3, poisson=0.3)
     >>> sphere = ShearedSphere(400.0, 10.0, body, body, 0.7)
