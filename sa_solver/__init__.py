@@ -18,7 +18,6 @@ What is solved
     - ``march_history``: the states along a path, all of them or only those that count.
     - ``LoopPath``: a motion or force to and fro.
     - ``march_loop``: the hysteresis loop that it leads to, with stiffness and friction.
-    - ``loop_errors``: what grid and increments leave of these.
     - ``partial_slip_curve``: force against motion up to sliding, from normal problems alone.
     - ``SubsurfaceStress``: stress inside either body under the tractions.
 
@@ -54,7 +53,6 @@ if TYPE_CHECKING:
     from sa_solver.errors import ConvergenceError, FretscaleError, InputError
     from sa_solver.half_space import HalfSpace
     from sa_solver.history import ContactLoadPath, march_history
-    from sa_solver.loop_errors import loop_errors
     from sa_solver.normal import NormalContact
     from sa_solver.partial_slip import partial_slip_curve
     from sa_solver.subsurface import SubsurfaceStress
@@ -80,7 +78,6 @@ __all__ = [
     "NormalContact",
     "SubsurfaceStress",
     "TangentialContact",
-    "loop_errors",
     "march_history",
     "march_loop",
     "partial_slip_curve",
@@ -95,7 +92,6 @@ __getattr__, __dir__ = lazy_names(
         "errors": ("ConvergenceError", "FretscaleError", "InputError"),
         "half_space": ("HalfSpace",),
         "history": ("ContactLoadPath", "march_history"),
-        "loop_errors": ("loop_errors",),
         "normal": ("NormalContact",),
         "partial_slip": ("partial_slip_curve",),
         "subsurface": ("SubsurfaceStress",),

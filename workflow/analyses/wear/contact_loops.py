@@ -16,7 +16,7 @@ import numpy as np
 
 from sa_solver.contact import FrictionalContact
 from sa_solver.errors import ContactProblemError
-from sa_solver.loop_errors import loop_errors
+from sa_solver.loop_accuracy import loop_errors
 from sa_solver.tangential_loop import (
     CLOSED,
     MOST_CYCLES,

@@ -5,7 +5,7 @@ import pytest
 
 from sa_solver.contact import FrictionalContact
 from sa_solver.half_space import HalfSpace
-from sa_solver.loop_errors import LoopErrors, loop_errors
+from sa_solver.loop_accuracy import LoopErrors, loop_errors
 from sa_solver.reference.mindlin import ShearedSphere
 from sa_solver.tangential_loop import LoopPath, march_loop
 from sa_solver.types import ElasticPair, Grid, Material
