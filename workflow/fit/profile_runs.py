@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 
 from sa_solver.types import Array
-from workflow.analyses.wear.case.base import WearCase
 from workflow.analyses.wear.case.worn_bodies import WornByEnergy, WornByEnergyAmplitude
 from workflow.analyses.wear.measures import PLAIN, interfaces, middle_profiles
 from workflow.case.units import to_base
@@ -19,6 +18,7 @@ from workflow.case.writing import scalar
 from workflow.errors import CaseError, MethodFailed, UserError
 from workflow.fit.profile_schema import ProfileFit, ProfileMeasurement
 from workflow.fit.schema import FitInput
+from workflow.kinds import analysis_of
 from workflow.runs.job import Finished, Job
 from workflow.runs.jobs import run_jobs
 from workflow.shell.reporter import Reporter, telling
@@ -26,7 +26,7 @@ from workflow.shell.reporter import Reporter, telling
 Pair = tuple[float, float]
 """Wear coefficients of body 1 and body 2 [1/MPa]."""
 
-UNIT = "um^3/J"
+WEAR, UNIT = "wear", "um^3/J"
 # Of a coefficient that is run: far below what any fit tells, and a name for the folder.
 SIGNIFICANT = 5
 # What no fit reads of a run.
@@ -84,7 +84,7 @@ class TestRuns:
 
     def own(self, number: int) -> Pair:
         """The coefficients that the case of a test has."""
-        wear: Any = self.cases[number].wear
+        wear = self.cases[number].wear
         return wear.body_1.coefficient, wear.body_2.coefficient
 
     def scars(
@@ -126,11 +126,11 @@ class TestRuns:
             name = f"{name}_finer_{said}"
         return Job(name, Path(test.case), tuple(overrides))
 
-    def _case(self, number: int, test: ProfileMeasurement) -> WearCase:
+    def _case(self, number: int, test: ProfileMeasurement) -> Any:
         """The case of a test. Raises CaseError."""
         case, place = Job("", Path(test.case)).load(), self.place(number, "case")
         bodies = [getattr(getattr(case, "wear", None), name, None) for name in ("body_1", "body_2")]
-        if not isinstance(case, WearCase) or None in bodies:
+        if analysis_of(case).name != WEAR or None in bodies:
             raise CaseError(
                 f"{place}: no wear of body_1 and body_2; allowed: a wear case with these"
             )
