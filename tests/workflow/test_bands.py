@@ -196,8 +196,8 @@ def test_fits_that_do_not_go_with_a_sweep(load, text, changes, words):
 
 def test_shared_rates_go_to_all_entries_that_have_them(tmp_path):
     """Li's table: one rate of two functions is one column of a sample, two entries of a case."""
-    from workflow.fit.fitting import run_fit
     from workflow.fit.report import summary
+    from workflow.fit.running import run_fit
     from workflow.fit.schema import load_fit
 
     energy = np.linspace(0.0, 8.0, 20)
