@@ -85,7 +85,9 @@ def run_time(case: WearCase, extent: Extent) -> RunTime:
         begun += solves(2 * extent.increments, cells, FRICTIONAL)
         worn += solves(steps * extent.increments, cells, FRICTIONAL)
     if case.loops.wanted:
-        worn += solves(jumps * BRANCHES * case.loops.increments, cells, NORMAL)
+        increments = jumps * BRANCHES * case.loops.increments
+        # And a loop of half as many cells along each side and increments, for its errors.
+        worn += solves(increments, cells, NORMAL) + solves(increments // 2, cells // 4, NORMAL)
     if case.contact.method == "nodes":
         begun, worn = 0.0, steps * CYCLES_IN_A_STEP * _structural_cycle(extent)
     worn += jumps * JUMP
