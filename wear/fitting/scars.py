@@ -274,6 +274,8 @@ def scar_problem(data: Sequence[ScarData], threshold: bool = False) -> ScarFit:
     _check_together(data, bodies, threshold)
     known = np.concatenate([one.runs.coefficients for one in data])
     lower, upper = LEAST * known.min(), MOST * known.max()
+    # The solver's difference step is 6e-6 for whatever is below 1: of 1e-9 /MPa as it is, far too
+    # long where depth is not proportional to it. A logarithm has the step of its own size.
     unknowns = [Unknown(f"{b}.{COEFFICIENT}", lower, upper, logarithmic=True) for b in bodies]
     if threshold:
         largest = _largest_threshold(data)
