@@ -25,8 +25,17 @@ def loops(
     Tells friction, stiffness and energy of each of them.
 
     FILE is CSV with headings such as `displacement [um], force [N]`, and `time [s]` where samples
-    are not evenly spaced, and `normal_load [N]` where it is known.
+    are not evenly spaced, and `normal_load [N]` where it is known. Of the folder of a wear run with
+    loops, those are read in the same way.
     """
+    if file.is_dir():
+        from workflow.commands.computed_loops import report_of_run
+
+        if out is not None or normal_load is not None or columns:
+            raise click.UsageError("a run has its loads and tables; allowed: no options beside it")
+        for line in report_of_run(file):
+            click.echo(line)
+        return
     from workflow.commands.loops import loops_of_file, report, write_loops
 
     measured = loops_of_file(file, columns, normal_load)

@@ -165,7 +165,7 @@ def test_force_beyond_friction_ends_the_run_in_one_line():
 def with_loops(root, loop, line=False):
     """Results with loops of jumps 0 and 2, as after ``every: end``."""
     folder = OutputFolder(root)
-    folder.jumps.mkdir()
+    folder.jumps.mkdir(parents=True)
     for jump in range(3):
         arrays = kept_loops(["sphere"], [loop]) if jump != 1 else {"other": np.zeros(1)}
         write_arrays(folder.jump(jump), arrays, {"cycles": 100.0 * jump})
@@ -200,6 +200,30 @@ def test_results_have_the_loops_of_their_jumps(written, sphere):
             for dataset in group["00002"].values()
             for attribute in ("unit", "description")
         )
+
+
+def test_computed_loops_are_read_as_measured_ones(tmp_path):
+    """The slope after the reversals is Mindlin's, but for the parabola's 0.4 % and 16 cells."""
+    size = 2.2 * SPHERE.contact.contact_radius
+    grid = Grid.covering((size, size), (16, 16))
+    contact = FrictionalContact(HalfSpace(grid, ElasticPair(BODY, BODY)), SPHERE.friction)
+    amplitude = 3.0 * SPHERE.displacement(SPHERE.sliding_force)
+    asked = Loops(amplitude=amplitude, increments=48)
+    loop = worn_loop(contact, asked, "sphere", state(grid=grid), 1)
+    with_loops(tmp_path, loop)
+    few = worn_loop(contact, Loops(amplitude=amplitude), "sphere", state(grid=grid), 1)
+    refused = invoke("loops", with_loops(tmp_path / "few", few).root)
+    assert refused.exit_code == 2
+    assert "more loops.increments" in refused.stderr
+    done = invoke("loops", tmp_path)
+    assert (done.exit_code, done.stderr) == (0, "")
+    name, headings, unworn, worn, *_ = done.stdout.splitlines()
+    assert (name, headings.split()[-1]) == ("sphere", "mu")
+    _, energy, kt, stuck, _, mu = map(float, worn.split())
+    assert (energy, stuck) == (1.5, pytest.approx(1e-3 * loop.values["kt"], rel=1e-3))
+    assert kt == pytest.approx(1e-3 / SPHERE.tangential_compliance, rel=0.02)
+    assert mu == pytest.approx(0.7, rel=2e-3)
+    assert unworn.split()[1:] == worn.split()[1:]
 
 
 def test_figure_shows_the_loops(written, sphere):
