@@ -170,7 +170,7 @@ def with_loops(root, loop, line=False):
         arrays = kept_loops(["sphere"], [loop]) if jump != 1 else {"other": np.zeros(1)}
         write_arrays(folder.jump(jump), arrays, {"cycles": 100.0 * jump})
     with writing(folder.results, line) as writer:
-        write_loops(writer, folder, 2)
+        write_loops(writer, folder, 2, line)
         writer.put_grid("grid/sphere", Grid((32, 32), (0.1, 0.1)))
     return folder
 
@@ -316,6 +316,11 @@ def test_run_writes_a_table_for_every_interface(rubbed):
         assert table.P[0] == pytest.approx(summary[name]["peak_load"]["unworn"]["P"], rel=1e-9)
         np.testing.assert_allclose(table.mu, 0.4, rtol=2e-3)
         np.testing.assert_array_equal(table.sliding, 1.0)
+        with h5py.File(rubbed.folder / "results.h5") as results:
+            over = results[f"loops_over_energy/{name}"]
+            for column in ("energy", "kt", "kt_error", "mu"):
+                np.testing.assert_allclose(over[column], getattr(table, column), rtol=1e-9)
+            assert [over[column].attrs["unit"] for column in ("energy", "kt")] == ["N mm", "N/mm"]
         # Wear widens a rounded contact, which stiffens it.
         assert table.area[-1] > table.area[0]
         assert table.kt[-1] > table.kt[0]

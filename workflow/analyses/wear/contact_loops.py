@@ -28,7 +28,7 @@ from sa_solver.types import Array, Tilt
 from wear.interface import InterfaceState
 from wear.stepping import ContactFailure
 from workflow.analyses.wear.case.loops import Loops
-from workflow.analyses.wear.loop_table import COLUMNS, SLIDES, write_loop_table
+from workflow.analyses.wear.loop_table import COLUMNS, SLIDES, Column, write_loop_table
 from workflow.errors import UserError
 from workflow.shell.dataset import Dataset
 from workflow.shell.folder import OutputFolder
@@ -38,7 +38,8 @@ from workflow.shell.results import ResultsWriter
 # Measured by every loop; cycles come from the jump.
 MEASURED = tuple(column.name for column in COLUMNS if column.name != "cycles")
 # Interfaces and jumps are groups of a file.
-LOOPS = "loops"
+LOOPS, LOOPS_OVER_ENERGY = "loops", "loops_over_energy"
+OVER_ENERGY = "energy", "kt", "kt_error", "mu", "mu_error"
 
 
 @dataclass(frozen=True)
@@ -148,13 +149,34 @@ def kept_loops(names: Sequence[str], loops: Sequence[WornLoop]) -> dict[str, Arr
 # --- writing ------------------------------------------------------------------------------------
 
 
-def write_loops(writer: ResultsWriter, folder: OutputFolder, jumps: int) -> None:
-    """Copy the loops of all jumps, 0 to ``jumps``, into the results: /loops/<interface>/<jump>."""
+def write_loops(writer: ResultsWriter, folder: OutputFolder, jumps: int, per_length: bool) -> None:
+    """Copy the loops of all jumps, 0 to ``jumps``, into the results: /loops/<interface>/<jump>.
+
+    What they measure is there against energy too: /loops_over_energy/<interface>.
+    """
+    measured: dict[str, list[list[float]]] = {}
     for jump in range(jumps + 1):
         with h5py.File(folder.jump(jump), "r") as file:
             cycles = float(file.attrs["cycles"])
             for name, kept in file.get(LOOPS, {}).items():
                 _write_loop(writer, f"{LOOPS}/{name}/{jump:05d}", kept, cycles)
+                measured.setdefault(name, []).append(kept["values"][()].tolist())
+    for name, rows in measured.items():
+        columns = dict(zip(MEASURED, np.array(rows).T, strict=True))
+        over = {
+            column.name: Dataset(
+                columns[column.name], _unit(column, per_length), column.description
+            )
+            for column in COLUMNS
+            if column.name in OVER_ENERGY
+        }
+        writer.put(f"{LOOPS_OVER_ENERGY}/{name}", over)
+
+
+def _unit(column: Column, per_length: bool) -> str:
+    """Of a dataset. Whoever writes it knows energies per mm, but not stiffnesses."""
+    energy = column.name == "energy"
+    return "N mm" if energy else column.units(per_length)[0]
 
 
 def _write_loop(writer: ResultsWriter, place: str, kept: h5py.Group, cycles: float) -> None:

@@ -41,6 +41,18 @@ CURVES = (
     ),
     CurvesOf("pressure across the middle, worn", "grid/*", "contact/*/-1/pressure", ("mm", "MPa")),
     CurvesOf("tangential loop, worn", "loops/*/-1/displacement", "loops/*/-1/force", ("mm", "N")),
+    CurvesOf(
+        "kt of tangential loops",
+        "loops_over_energy/*/energy",
+        "loops_over_energy/*/kt",
+        ("N mm", ""),
+    ),
+    CurvesOf(
+        "mu of tangential loops",
+        "loops_over_energy/*/energy",
+        "loops_over_energy/*/mu",
+        ("N mm", "1"),
+    ),
 )
 
 

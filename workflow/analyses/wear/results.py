@@ -176,7 +176,7 @@ def _write_results(
                 write_comparison(writer, stage.name, first.cycle, loads, source.peak)
         recorded = _write_jumps(writer, outcome, run.folder)
         _write_kinetics(writer, outcome, recorded)
-        write_loops(writer, run.folder, outcome.state.jump)
+        write_loops(writer, run.folder, outcome.state.jump, outcome.source.line)
         if structure is not None:
             structure.write(writer, case.accuracy)
             structure.bolts.write(writer, run.folder, outcome.state.jump)
