@@ -1,5 +1,7 @@
 """Tangential loops of a wear run: what is imposed, kept, written, and drawn."""
 
+import os
+import shutil
 from types import SimpleNamespace
 
 import h5py
@@ -29,6 +31,7 @@ from workflow.analyses.wear.layout import Contents
 from workflow.analyses.wear.loop_table import COLUMNS
 from workflow.case.fields import Quantity
 from workflow.case.table_file import read_columns
+from workflow.commands.computed_loops import report_of_loops
 from workflow.errors import CaseError, UserError
 from workflow.kinds import load_case
 from workflow.shell.folder import OutputFolder
@@ -210,14 +213,8 @@ def test_computed_loops_are_read_as_measured_ones(tmp_path):
     amplitude = 3.0 * SPHERE.displacement(SPHERE.sliding_force)
     asked = Loops(amplitude=amplitude, increments=48)
     loop = worn_loop(contact, asked, "sphere", state(grid=grid), 1)
-    with_loops(tmp_path, loop)
-    few = worn_loop(contact, Loops(amplitude=amplitude), "sphere", state(grid=grid), 1)
-    refused = invoke("loops", with_loops(tmp_path / "few", few).root)
-    assert refused.exit_code == 2
-    assert "more loops.increments" in refused.stderr
-    done = invoke("loops", tmp_path)
-    assert (done.exit_code, done.stderr) == (0, "")
-    name, headings, unworn, worn, *_ = done.stdout.splitlines()
+    with h5py.File(with_loops(tmp_path, loop).results) as file:
+        name, headings, unworn, worn, *_ = report_of_loops(file["loops"])
     assert (name, headings.split()[-1]) == ("sphere", "mu")
     _, energy, kt, stuck, _, mu = map(float, worn.split())
     assert (energy, stuck) == (1.5, pytest.approx(1e-3 * loop.values["kt"], rel=1e-3))
@@ -300,6 +297,16 @@ def rubbed(start_balls, tmp_path_factory):
     run = start_balls(tmp_path_factory.mktemp("rubbed") / "out", *ASKED)
     assert run.ending.exit_code == 0, run.ending.stderr
     return run
+
+
+def test_loops_are_read_only_of_a_run_as_it_was_written(rubbed, tmp_path):
+    """Three increments are too few to be read as a record; a damaged file is not believed."""
+    refused = invoke("loops", rubbed.folder)
+    assert (refused.exit_code, "more loops.increments" in refused.stderr) == (2, True)
+    shutil.copytree(rubbed.folder, tmp_path / "cut")
+    os.truncate(tmp_path / "cut/results.h5", 5000)
+    refused = invoke("loops", tmp_path / "cut")
+    assert (refused.exit_code, "not as the run" in refused.stderr) == (2, True)
 
 
 def test_run_writes_a_table_for_every_interface(rubbed):

@@ -9,27 +9,38 @@ import h5py
 
 from wear.joints.loop_record import MeasuredLoopError
 from wear.joints.measured_loops import measure_loops
+from workflow.case.input_files import open_hdf5
 from workflow.errors import UserError
+from workflow.runs.provenance import case_values
 from workflow.shell.folder import OutputFolder
 
-HEADINGS = ("cycles", "energy [J]", "kt [N/um]", "stuck", "+-", "mu")
-WIDTH = 12
+HEADINGS = ("cycles", "energy [J{per}]", "kt [N/um{per}]", "stuck", "+-", "mu")
+WIDTH = 15
 
 
 def report_of_run(path: Path) -> list[str]:
-    """A row for each loop of the run in the folder ``path``; per mm where its contacts are lines.
+    """A row for each loop of the run in the folder ``path``.
 
-    Raises UserError for a folder without loops, or whose loops have too few increments.
+    Raises UserError for a folder without loops, results that are not those of its run, and loops of
+    too few increments.
     """
-    results = OutputFolder(path).results
-    if not results.is_file():
-        raise UserError(f"{path}: no results of a run; allowed: a record, or a finished wear run")
-    with h5py.File(results, "r") as file:
+    run = OutputFolder(path)
+    if not run.results.is_file():
+        raise UserError(
+            f"{path}: a directory without results of a run; allowed: a record, or a finished wear "
+            "run"
+        )
+    run.check_results(case_values(run))
+    with open_hdf5(str(run.results)) as file:
         if "loops" not in file:
             raise UserError(f"{path}: no loops; allowed: a wear run with loops.amplitude or force")
-        lines = [line for name, group in file["loops"].items() for line in _rows(name, group)]
+        return report_of_loops(file["loops"])
+
+
+def report_of_loops(loops: h5py.Group) -> list[str]:
+    """The same of the group of loops in the results. Raises UserError for too few increments."""
     return [
-        *lines,
+        *(line for name, group in loops.items() for line in _rows(name, group)),
         "kt is the slope right after a reversal, as of measured loops; stuck is that of the "
         "contact with all stuck, +- what the grid leaves of it",
         "mu in brackets is only what is mobilised: these loops do not slide",
@@ -37,10 +48,13 @@ def report_of_run(path: Path) -> list[str]:
 
 
 def _rows(name: str, group: h5py.Group) -> Iterator[str]:
+    per = "/mm" if any(kept["force"].attrs["unit"] == "N/mm" for kept in group.values()) else ""
     yield name
-    yield "".join(f"{cell:>{WIDTH}}" for cell in HEADINGS)
+    yield "".join(f"{cell.format(per=per):>{WIDTH}}" for cell in HEADINGS)
     for jump, kept in group.items():
         values = kept.attrs
+        if "kt_error" not in values:
+            raise UserError(f"loops of {name}: of an earlier version; allowed: those of a new run")
         try:
             loops = measure_loops(kept["displacement"][()], kept["force"][()], float(values["P"]))
         except MeasuredLoopError as error:
