@@ -31,7 +31,7 @@ import numpy as np
 from sa_solver.coupled_problem import CoupledProblem, coupled_residuals
 from sa_solver.half_space import ALL, HalfSpace, fast_lengths, inverse_symbols, spectral_filter
 from sa_solver.influence import X, Z
-from sa_solver.kernels import add_product, gather_product, spread_product
+from sa_solver.loops import add_product, gather_product, spread_product
 from sa_solver.rigid_modes import RANK_CUTOFF
 from sa_solver.tangential_problem import BoxOperator, TangentialProblem
 from sa_solver.transform import SpectralFilter

@@ -19,7 +19,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sa_solver.kernels import add_scaled, tensor_product
+from sa_solver.loops import add_scaled, tensor_product
 from sa_solver.rigid_modes import RANK_CUTOFF
 from sa_solver.tangential_problem import TangentialProblem, dot, squared
 from sa_solver.types import Array, Mask

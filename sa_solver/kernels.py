@@ -1,7 +1,8 @@
 """Loops over the cells of a grid that are compiled, where numpy would pass over memory many times.
 
-None calls another, so that what is kept of each stays right as long as this file does. Sums keep
-the order in which they are written: a function gives the same digits on every machine.
+They are called through their namesakes in :mod:`sa_solver.loops`. None calls another, so that what
+is kept of each stays right as long as this file does. Sums keep the order in which they are
+written: a function gives the same digits on every machine.
 """
 
 from __future__ import annotations

@@ -13,19 +13,16 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sa_solver.fftw import plan
+from sa_solver.loops import Spectrum, join_four, join_two, split_in_four, split_in_two
 from sa_solver.types import Indices
-
-Spectrum = NDArray[np.complex128]
 
 PARTS = {256: 2, 512: 4, 1024: 4, 2048: 4, 4096: 4}
 """Parts of columns by their length. Other lengths gain nothing."""
 
 LARGE = 40_000
-"""Complex numbers of a spectrum from which on compiled loops pay. The compiler takes a fifth of a
-second to load, more than a solution on a smaller grid wins."""
+"""Complex numbers of a spectrum from which on parts pay: smaller ones stay in the cache."""
 
 
 class PrunedColumns:
@@ -66,12 +63,7 @@ def _steps(spectrum: Spectrum, parts: int) -> tuple[Callable[[], Any], Callable[
     """What takes columns apart, and puts them together."""
     if parts == 1:
         return _nothing, _nothing
-    from sa_solver import kernels
-
-    split, join = {
-        2: (kernels.split_in_two, kernels.join_two),
-        4: (kernels.split_in_four, kernels.join_four),
-    }[parts]
+    split, join = {2: (split_in_two, join_two), 4: (split_in_four, join_four)}[parts]
     steps = np.arange(parts)[:, None] * np.arange(len(spectrum) // parts)
     turns = np.exp(-2j * np.pi / len(spectrum) * steps)
     return lambda: split(spectrum, turns), lambda: join(spectrum, turns)

@@ -8,13 +8,12 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sa_solver.fftw import load_pyfftw, plan
-from sa_solver.pruned import LARGE, PrunedColumns
+from sa_solver.loops import Spectra, multiply_spectra, multiply_spectrum
+from sa_solver.pruned import PrunedColumns
 from sa_solver.types import Array, Indices
 
-Spectra = NDArray[np.complex128]
 Multiplication = Callable[[Spectra], None]
 
 SPARE_COLUMNS = 4
@@ -100,18 +99,7 @@ class SpectralFilter:
 
 def _by_one(symbol: Array) -> Multiplication:
     """Multiplies a spectrum by one symbol."""
-    if symbol.size >= LARGE:
-        from sa_solver.kernels import multiply_spectrum
-
-        return lambda spectra: multiply_spectrum(spectra[0], symbol)
-    # As pairs of reals: numpy would make a real factor complex first.
-    pairs = np.repeat(symbol, 2, axis=1)
-
-    def multiply(spectra: Spectra) -> None:
-        spectrum: Array = spectra[0].view(np.float64)
-        spectrum *= pairs
-
-    return multiply
+    return lambda spectra: multiply_spectrum(spectra[0], symbol)
 
 
 def _by_several(
@@ -120,9 +108,6 @@ def _by_several(
     imaginary: tuple[Sequence[int], Sequence[int]],
 ) -> Multiplication:
     """Replaces the inputs among spectra, whose rows have an ``order``, by the outputs."""
-    # A fifth of a second to import: where it is used.
-    from sa_solver.kernels import multiply_spectra
-
     rows = [list(row) for row in symbols]
     place: dict[int, int] = {}
     # Symmetric kernels give some of their symbols twice.

@@ -37,6 +37,5 @@ def test_frequencies_and_back(length: int, rows: int):
 
 
 def test_small_spectra_stay_whole():
-    """And so do not load the compiler."""
     spectrum = np.zeros((256, 16), complex)
     assert PrunedColumns(spectrum, 128).order[1] == 1
