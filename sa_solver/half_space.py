@@ -13,8 +13,9 @@ import numpy as np
 import scipy.fft
 
 from sa_solver.errors import InputError
-from sa_solver.influence import X, Y, Z, rectangle_influence, strip_influence
+from sa_solver.influence import X, Y, Z
 from sa_solver.pruned import LARGE
+from sa_solver.symbols import Coefficients, symbol_of
 from sa_solver.transform import SpectralFilter, Transform
 from sa_solver.types import Array, ElasticPair, Grid
 
@@ -80,6 +81,7 @@ class HalfSpace:
                 f"{grid.size[0]:g} mm, and infinity: give the depth of the bodies"
             )
         self.padded = padded_shape(grid)
+        self._coefficients = Coefficients(grid, pair, self.datum, self.padded)
         self.count = 0
         self._filters: dict[tuple[Components, Components], SpectralFilter] = {}
         self._symbols: dict[tuple[int, int, GridShape], Array] = {}
@@ -88,7 +90,11 @@ class HalfSpace:
 
     def on(self, grid: Grid) -> HalfSpace:
         """The same bodies under another ``grid``."""
-        return HalfSpace(grid, self.pair, self.datum)
+        half_space = HalfSpace(grid, self.pair, self.datum)
+        half_space._coefficients = Coefficients(
+            grid, self.pair, self.datum, half_space.padded, self._coefficients
+        )
+        return half_space
 
     def normal(self, pressure: Array) -> Array:
         """``u_z`` under ``pressure`` alone, both ``(nx, ny)`` [MPa] → [mm]."""
@@ -124,8 +130,8 @@ class HalfSpace:
 
     def self_compliance(self, component: int) -> float:
         """Displacement at the centre of a cell under unit traction on it [mm/MPa]."""
-        edges = [np.array([-0.5, 0.5]) * pitch for pitch in self.grid.pitch]
-        return float(self._influence(edges[0], edges[1], component, component)[0, 0])
+        edges_x, edges_y = (np.array([-0.5, 0.5]) * pitch for pitch in self.grid.pitch)
+        return float(self._coefficients.between(edges_x, edges_y, component, component)[0, 0])
 
     def _convolve(self, fields: Array, rows: Components, columns: Components) -> Array:
         self.count += 1
@@ -135,21 +141,11 @@ class HalfSpace:
             self._filters[rows, columns] = spectral_filter(transform, symbols, rows, columns)
         return self._filters[rows, columns].apply(fields)
 
-    def _influence(self, edges_x: Array, edges_y: Array, row: int, column: int) -> Array:
-        if self.grid.line:
-            return strip_influence(edges_x, self.pair, row, column, self.datum)[:, None]
-        return rectangle_influence(edges_x, edges_y, self.pair, row, column)
-
     def _compute_symbol(self, row: int, column: int, period: GridShape) -> Array:
-        """DFT of a quarter of the kernel, continued by its parity along x and along y."""
-        edges_x, edges_y = map(quarter_edges, period, self.grid.pitch)
-        kernel = self._influence(edges_x, edges_y, row, column)
-        for axis, m in enumerate(period):
-            kernel = continued(kernel, axis, m, odd=(row == axis) != (column == axis))
-        spectrum = scipy.fft.rfft2(kernel)
-        # -i times the symbol of an odd kernel from (x, y) to z is its real counterpart.
-        symbol = spectrum.real if (row == Z) == (column == Z) else -spectrum.imag
-        return np.ascontiguousarray(symbol)
+        odd = (row == X) != (column == X), (row == Y) != (column == Y)
+        symbol = symbol_of(self._coefficients.quarter(row, column, period), period, odd)
+        # Of a kernel that is odd along both axes the DFT is minus the sum over sines.
+        return -symbol if all(odd) else symbol
 
 
 def spectral_filter(
@@ -185,22 +181,6 @@ def _fast_length(count: int) -> int:
 def _power_of_two(count: int) -> int:
     """The next one."""
     return 1 << (int(count) - 1).bit_length()
-
-
-def quarter_edges(period: int, pitch: float) -> Array:
-    """Edges about the distances 0 to period//2 [mm]."""
-    return (np.arange(period // 2 + 2, dtype=np.float64) - 0.5) * pitch
-
-
-def continued(kernel: Array, axis: int, period: int, odd: bool) -> Array:
-    """A kernel at distances 0 to period//2 along ``axis``, continued to a whole period."""
-    kernel = np.moveaxis(kernel, axis, 0)[: period // 2 + 1]
-    mirrored = kernel[1 : (period + 1) // 2][::-1]
-    if odd:
-        kernel, mirrored = kernel.copy(), -mirrored
-        if period % 2 == 0:
-            kernel[-1] = 0.0  # as far from one image as from the next, which cancels it
-    return np.moveaxis(np.concatenate([kernel, mirrored]), 0, axis)
 
 
 class HalfSpaceResolvent:

@@ -28,7 +28,7 @@ import numpy as np
 import scipy.fft
 
 from sa_solver.errors import InputError
-from sa_solver.half_space import continued, padded_shape, quarter_edges
+from sa_solver.half_space import padded_shape
 from sa_solver.subsurface_influence import (
     INDICES,
     XX,
@@ -40,6 +40,7 @@ from sa_solver.subsurface_influence import (
     rectangle_stress,
     strip_stress,
 )
+from sa_solver.symbols import continued, quarter_edges, symbol_of
 from sa_solver.transform import SpectralFilter, Transform
 from sa_solver.types import Array, Grid, Material
 
@@ -193,13 +194,14 @@ class SubsurfaceStress:
         return SpectralFilter(transform, symbols, (SHEAR, outputs))
 
     def _symbol(self, kernel: Array, component: int, traction: int) -> Array:
-        for axis, period in enumerate(self._padded):
-            kernel = continued(kernel, axis, period, _odd(component, traction, axis))
-        spectrum = scipy.fft.rfft2(kernel)
-        shear_stress = component in (YZ, ZX)
-        if shear_stress == (traction in SHEAR):
-            return np.ascontiguousarray(spectrum.real)
-        return np.ascontiguousarray(spectrum.imag if shear_stress else -spectrum.imag)
+        along_x, along_y = odd = (
+            _odd(component, traction, 0),
+            _odd(component, traction, 1),
+        )
+        symbol = symbol_of(kernel, self._padded, odd)
+        # What a kernel odd along one axis has of i is counted in the units of its components.
+        turned = component in (YZ, ZX) and along_x != along_y
+        return -symbol if turned or (along_x and along_y) else symbol
 
 
 def _odd(component: int, traction: int, axis: int) -> bool:
