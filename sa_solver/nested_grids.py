@@ -68,7 +68,6 @@ def _interpolation(fine: int, coarse: int) -> Any:
 
 
 def _sparse(weights: Array, columns: Any, size: int) -> Any:
-    rows = np.broadcast_to(np.arange(len(weights))[:, None], columns.shape)
     kept = weights > 0.0
-    shape = (len(weights), size)
-    return scipy.sparse.csr_array((weights[kept], (rows[kept], columns[kept])), shape=shape)
+    starts = np.concatenate([[0], np.cumsum(kept.sum(axis=1))])
+    return scipy.sparse.csr_array((weights[kept], columns[kept], starts), (len(weights), size))

@@ -36,9 +36,9 @@ class Transform:
         fftw = load_pyfftw()
         self.shape, self.padded = shape, padded
         rows, columns = shape[0], padded[1] // 2 + 1
-        self._field = fftw.zeros_aligned((rows, padded[1]), dtype=np.float64)
+        self._field = fftw.empty_aligned((rows, padded[1]), dtype=np.float64)
         stored = (components, padded[0], columns + SPARE_COLUMNS)
-        self.spectra: Spectra = fftw.zeros_aligned(stored, dtype=np.complex128)[:, :, :columns]
+        self.spectra: Spectra = fftw.empty_aligned(stored, dtype=np.complex128)[:, :, :columns]
         self._columns = [PrunedColumns(spectrum, rows) for spectrum in self.spectra]
         self._forward = [plan(self._field, filled, 1) for filled in self.spectra[:, :rows]]
         self._backward = [plan(filled, self._field, 1, True) for filled in self.spectra[:, :rows]]
