@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
-import scipy.sparse
 
 from sa_solver.half_space import HalfSpace
-from sa_solver.types import Array, Grid
+from sa_solver.types import Array, Grid, Indices
 
 COARSEST = 32
 """Cells across below which a grid is not coarsened: there a solve costs less than its set-up."""
@@ -44,30 +43,44 @@ class GridTransfer:
         return _along_both(self._interpolation, field)
 
 
-def _along_both(matrices: Any, field: Array) -> Array:
-    along_x, along_y = matrices
-    return np.ascontiguousarray((along_y @ (along_x @ field).T).T)
+@dataclass(frozen=True)
+class _Sums:
+    """Weighted sums of a few rows each: of row ``cells[i, k]`` times ``weights[i, k]`` over k."""
+
+    cells: Indices
+    weights: Array
+
+    def of(self, field: Array) -> Array:
+        """From rows of a field ``(n, k)`` to those of another."""
+        first, *others = zip(self.cells.T, self.weights.T[:, :, None], strict=True)
+        total: Array = field[first[0]] * first[1]
+        for cells, weights in others:
+            part = field[cells]
+            part *= weights
+            total += part
+        return total
 
 
-def _averages(fine: int, coarse: int) -> Any:
-    """Overlap of coarse cells with fine ones over a coarse cell's length, ``(coarse, fine)``."""
+def _along_both(sums: list[_Sums], field: Array) -> Array:
+    along_x, along_y = sums
+    return np.ascontiguousarray(along_y.of(np.ascontiguousarray(along_x.of(field).T)).T)
+
+
+def _averages(fine: int, coarse: int) -> _Sums:
+    """Overlap of coarse cells with fine ones over a coarse cell's length."""
     edges = np.arange(coarse + 1) * (fine / coarse)
     first = np.floor(edges[:-1]).astype(int)
     # Fine cells are between half as long and as long as coarse ones: three cover one.
     cells = first[:, None] + np.arange(3)
     overlap = np.minimum(cells + 1, edges[1:, None]) - np.maximum(cells, edges[:-1, None])
-    return _sparse(np.maximum(overlap, 0.0) * (coarse / fine), cells, fine)
+    # Those beyond the last cell have no weight.
+    return _Sums(np.minimum(cells, fine - 1), np.maximum(overlap, 0.0) * (coarse / fine))
 
 
-def _interpolation(fine: int, coarse: int) -> Any:
-    """Weights of coarse cells at the centres of fine ones, ``(fine, coarse)``."""
+def _interpolation(fine: int, coarse: int) -> _Sums:
+    """Weights of coarse cells at the centres of fine ones."""
     place = np.clip((np.arange(fine) + 0.5) * (coarse / fine) - 0.5, 0.0, coarse - 1)
     first = np.floor(place).astype(int)
     right = place - first
-    return _sparse(np.stack([1.0 - right, right], axis=1), first[:, None] + np.arange(2), coarse)
-
-
-def _sparse(weights: Array, columns: Any, size: int) -> Any:
-    kept = weights > 0.0
-    starts = np.concatenate([[0], np.cumsum(kept.sum(axis=1))])
-    return scipy.sparse.csr_array((weights[kept], columns[kept], starts), (len(weights), size))
+    cells = np.minimum(first[:, None] + np.arange(2), coarse - 1)
+    return _Sums(cells, np.stack([1.0 - right, right], axis=1))

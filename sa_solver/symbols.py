@@ -1,14 +1,13 @@
 """Symbols: Fourier transforms of influence coefficients on a grid made periodic.
 
 Coefficients are even or odd along each axis, so those at distances from zero to half a period tell
-all, and cosine or sine transforms of these are their spectrum: an eighth of the memory and a
-quarter of the time of a transform of the whole.
+all, and their spectrum is found along one axis after the other from half of the other: with half
+of the work and of the memory of a transform of the whole.
 """
 
 from __future__ import annotations
 
 import numpy as np
-import scipy.fft
 
 from sa_solver.influence import rectangle_influence, strip_influence
 from sa_solver.types import Array, ElasticPair, Grid
@@ -109,16 +108,8 @@ def symbol_of(quarter: Array, period: Period, odd: Odd) -> Array:
 
 def _half_spectrum(kernel: Array, axis: int, period: int, odd: bool) -> Array:
     """Those sums along one axis, at frequencies 0 to ``period``//2."""
-    if period % 2 or period < 4:
-        spectrum = scipy.fft.rfft(continued(kernel, axis, period, odd), axis=axis)
-        return np.asarray(-spectrum.imag if odd else spectrum.real)
-    if not odd:
-        return np.asarray(scipy.fft.dct(kernel, 1, axis=axis))
-    # As far from one image as from the next, which cancels it; and of its own sign at 0.
-    inner = (slice(None),) * axis + (slice(1, -1),)
-    sums = np.zeros(kernel.shape)
-    sums[inner] = scipy.fft.dst(kernel[inner], 1, axis=axis)
-    return sums
+    spectrum = np.fft.rfft(continued(kernel, axis, period, odd), axis=axis)
+    return -spectrum.imag if odd else spectrum.real
 
 
 def continued(kernel: Array, axis: int, period: int, odd: bool) -> Array:
