@@ -82,7 +82,9 @@ class _BesideHere:
         pass
 
 
-def _in_order(tasks: Sequence[processes.Task], _: Any, done: Callable[[], None]) -> list[Any]:
+def _in_order(
+    tasks: Sequence[processes.Task], beside: Any, done: Callable[[], None], own: int
+) -> list[Any]:
     return processes.share_out(tasks, done=done)
 
 

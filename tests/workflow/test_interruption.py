@@ -377,6 +377,10 @@ def test_tasks_are_shared_with_a_process_beside():
         _, *numbers, process = workers.share_out(tasks, beside, lambda: told.append(1))
     assert (numbers, len(told)) == ([1, 2], 4)
     assert process != os.getpid()
+    with closing(workers.Beside()) as beside:
+        *own, process = workers.share_out([(os.getpid, ())] * 3, beside, own=2)
+    assert own == [os.getpid()] * 2
+    assert process != os.getpid()
     assert workers.share_out(tasks)[-1] == os.getpid()
 
 

@@ -24,7 +24,7 @@ import h5py
 
 from sa_solver.types import Progress, Tally, unseen
 from workflow.case.sections import Output
-from workflow.shell.analysis import Pictures
+from workflow.shell.analysis import Pictures, Share
 from workflow.shell.folder import OutputFolder
 from workflow.shell.processes import Beside, Task, share_out
 
@@ -35,12 +35,13 @@ def write_pictures(
     pictures: Callable[[], Pictures],
     contents: Any,
     beside: Beside | None = None,
+    share: Share = "pictures",
     progress: Progress = unseen,
 ) -> dict[str, str]:
     """Write the pictures of the results in a folder that a case asks for in its ``output``.
 
     ``contents`` is what the results hold, as ``pictures`` are told it. A process ``beside`` this
-    one takes its share of the work, and ``progress`` is told what is done. Returns the figures as
+    one has a ``share`` of the work, and ``progress`` is told what is done. Returns the figures as
     SVG texts by their names, in the order in which they are to be looked at, if they are to go into
     a report.
     """
@@ -54,15 +55,19 @@ def write_pictures(
         if output.paraview:
             paraview = stack.enter_context(folder.filling("paraview", "files for ParaView"))
             tasks.append((write_paraview, (*told, paraview)))
-        written = share_out(tasks, beside, Tally(progress, len(tasks)))
+        there = beside if share != "nothing" else None
+        own = len(names) if share == "files" else 0
+        written = share_out(tasks, there, Tally(progress, len(tasks)), own)
     return dict(zip(names, written, strict=False)) if output.report else {}
 
 
-def load_what_draws(pictures: Callable[[], Pictures], output: Output) -> None:
+def load_what_draws(
+    pictures: Callable[[], Pictures], output: Output, share: Share = "pictures"
+) -> None:
     """Do beforehand what a process begins to draw with: two seconds of imports."""
-    from workflow.pictures import style  # noqa: F401
-
     pictures()
+    if share == "pictures":
+        from workflow.pictures import style  # noqa: F401
     if output.paraview:
         import pyvista  # noqa: F401
 

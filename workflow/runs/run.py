@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager
 from functools import partial
 from pathlib import Path
@@ -20,7 +20,7 @@ from workflow.report.writing import pictures_of, write_page
 from workflow.runs.first_look import first_look
 from workflow.runs.provenance import case_values, provenance_of
 from workflow.shell import checkpoint
-from workflow.shell.analysis import Analysis, Run, Summary
+from workflow.shell.analysis import Analysis, Pictures, Run, Share, Summary
 from workflow.shell.checkpoint import Checkpoint
 from workflow.shell.folder import ASIDE, MANIFEST, OutputFolder
 from workflow.shell.forecast import in_words
@@ -219,17 +219,16 @@ def _run(
     def draw(contents: Any) -> None:
         with reporter.stage("paraview and figures", "pictures") as told:
             if pictures is not None:
-                drawn.extend(pictures().figures_of(contents))
-                sharing = beside if analysis.draws_beside else None
+                drawn.extend(_names(pictures, case, contents))
                 figures.update(
-                    write_pictures(case.output, folder, pictures, contents, sharing, told)
+                    write_pictures(case.output, folder, pictures, contents, beside, share, told)
                 )
 
     def report(summary: Summary) -> None:
         if case.output.report:
             _report(run, summary, figures)
 
-    pictures = pictures_of(analysis, case)
+    pictures, share = pictures_of(analysis, case), _share(analysis, case)
     figures: dict[str, str] = {}
     drawn: list[str] = []
     expected = analysis.run_time(case)
@@ -260,12 +259,24 @@ def _run(
             report=report,
             beside=beside,
         )
-        if analysis.draws_beside and case.output.figure_formats:
-            beside.begin(load_what_draws, pictures, case.output)
+        if share != "nothing":
+            beside.begin(load_what_draws, pictures, case.output, share)
         with telling(reporter):
             analysis.run(run)
         for line in first_look(folder.root, drawn):
             reporter.say(line)
+
+
+def _names(pictures: Callable[[], Pictures], case: Case, contents: Any) -> list[str]:
+    """Figures of a run. Where none are asked for, what draws is not loaded."""
+    return list(pictures().figures_of(contents)) if case.output.figure_formats else []
+
+
+def _share(analysis: Analysis, case: Case) -> Share:
+    """What of the pictures of a run the process beside it has a share of."""
+    output = case.output
+    alone = analysis.beside == "files" and not output.paraview
+    return "nothing" if alone or not output.figure_formats else analysis.beside
 
 
 def _announce(case: Case, expected: RunTime, resume: bool, reporter: Reporter) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Generic, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, Literal, TypeVar
 
 from workflow.case.sections import Case
 from workflow.shell.memory import Memory
@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 
 AnyCase = TypeVar("AnyCase", bound=Case)
 Summary = Mapping[str, Any]
+Share = Literal["nothing", "files", "pictures"]
+"""What of its pictures a run shares with a second process: files for ParaView, or figures too."""
 
 
 @dataclass(frozen=True)
@@ -113,7 +115,8 @@ class Analysis(Generic[AnyCase]):
     ``cases`` are its kinds of case by the names that ``fretscale new`` has for them; these say
     themselves how they are told apart, what they would run and on how many cores. ``memory`` is
     what a run needs before anything is meshed, ``run_time`` about how long it takes, ``pictures``
-    how its results are shown; where it ``draws_beside``, two processes share them.
+    how its results are shown, and ``beside`` what of these a second process has a share of: not
+    figures where to draw them takes less than the half second in which it would load what draws.
     ``resumable`` are runs that leave a checkpoint to go on from (:mod:`workflow.shell.checkpoint`),
     by their steps (:mod:`workflow.shell.steps`) or a state of their own.
     ``quantities`` are the main results, for all that show or compare runs, ``curves`` what is drawn
@@ -131,7 +134,7 @@ class Analysis(Generic[AnyCase]):
     quantities: Callable[[AnyCase, Summary], Sequence[Quantity]] = no_quantities
     curves: Sequence[CurvesOf] = ()
     pictures: Callable[[], Pictures] | None = None
-    draws_beside: bool = False
+    beside: Share = "nothing"
     resumable: bool = False
     choose: Callable[[AnyCase], tuple[AnyCase, dict[str, Any] | None]] = as_written
     comparison: Comparison[AnyCase] = Comparison()

@@ -138,15 +138,16 @@ class Beside:
 
 
 def share_out(
-    tasks: Sequence[Task], beside: Beside | None = None, done: Done = _unheard
+    tasks: Sequence[Task], beside: Beside | None = None, done: Done = _unheard, own: int = 0
 ) -> list[Any]:
     """Do tasks, those from the beginning on here, those from the end on in a process ``beside``.
 
-    ``done`` is called whenever one is. Returns what each of them returned. Raises what one of them
-    raised; if that was one here, or Ctrl-C, the process beside ends as it is.
+    The first ``own`` are done here in any case. ``done`` is called whenever one is. Returns what
+    each of them returned. Raises what one of them raised; if that was one here, or Ctrl-C, the
+    process beside ends as it is.
     """
     answers: list[Any] = [None] * len(tasks)
-    left = deque(range(len(tasks)))
+    first, left = deque(range(own)), deque(range(own, len(tasks)))
 
     def work(take: Callable[[], int], do: Callable[..., Any]) -> None:
         while True:
@@ -159,7 +160,8 @@ def share_out(
             done()
 
     def here() -> None:
-        work(left.popleft, lambda function, *arguments: function(*arguments))
+        for numbers in (first, left):
+            work(numbers.popleft, lambda function, *arguments: function(*arguments))
 
     if beside is None:
         here()

@@ -1,10 +1,19 @@
 """Contact of two bodies along a path of loads: no structure, no wear."""
 
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, Any
+
 from workflow.analyses.contact.case import BodiesCase, ContactCase, LineContactCase
 from workflow.analyses.contact.memory import memory
 from workflow.analyses.contact.quantities import CURVES, main_results
 from workflow.analyses.contact.run_time import run_time
 from workflow.shell.analysis import Analysis, Comparison, Pictures, Run, Summary, expected
+
+if TYPE_CHECKING:
+    import h5py
+    from matplotlib.figure import Figure
 
 __all__ = ["ANALYSIS"]
 
@@ -28,12 +37,17 @@ def _quantities(case: BodiesCase, summary: Summary) -> list[str]:
 
 
 def _pictures() -> Pictures:
-    # Plots take a second to load: where they are drawn.
     from workflow.analyses.contact.datasets import Contents
-    from workflow.analyses.contact.figures import figures_of
     from workflow.analyses.contact.paraview import write_contact
 
-    return Pictures(figures_of, write_contact, contents=Contents)
+    return Pictures(_figures_of, write_contact, contents=Contents)
+
+
+def _figures_of(contents: Any) -> Mapping[str, Callable[[h5py.File], Figure]]:
+    # Plots take half a second to load: where they are drawn.
+    from workflow.analyses.contact.figures import figures_of
+
+    return figures_of(contents)
 
 
 ANALYSIS: Analysis[BodiesCase] = Analysis(
@@ -46,5 +60,5 @@ ANALYSIS: Analysis[BodiesCase] = Analysis(
     quantities=main_results,
     curves=CURVES,
     comparison=Comparison(quantities=_quantities, at_the_end=AT_THE_END),
-    draws_beside=True,
+    beside="files",
 )
