@@ -15,7 +15,6 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-import scipy.sparse as sp
 
 from sa_solver.types import Array, Indices, Mask
 
@@ -187,6 +186,9 @@ def _fitted(points: Array, facets: Indices) -> Surface:
 
 def _quadratics(points: Array, facets: Indices) -> tuple[Array, Array]:
     """Second derivatives ``(n, 2, 2)`` of the fits at the vertices, and the most they leave."""
+    # A tenth of a second to import, which `fretscale check` need not wait for.
+    import scipy.sparse as sp
+
     count, corners = len(points), facets.shape[1]
     pairs = np.concatenate([facets[:, [a, b]] for a in range(corners) for b in range(corners)])
     beside = sp.csr_matrix((np.ones(len(pairs)), pairs.T), shape=(count, count))
