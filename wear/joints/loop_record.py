@@ -8,7 +8,6 @@ from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
-from scipy.signal import savgol_filter
 
 from sa_solver.errors import InputError
 from sa_solver.types import Array, Indices
@@ -248,6 +247,9 @@ def _smoothed(motion: Array, branches: Sequence[LoopBranch]) -> Array:
     half = int(0.5 * SMOOTHING * period)
     if 2 * half + 1 < FEWEST_SMOOTHED:
         return motion
+    # Half a second to import: where it is used.
+    from scipy.signal import savgol_filter
+
     smooth: Array = savgol_filter(motion, 2 * half + 1, 3)
     taken = motion - smooth
     if taken[1:] @ taken[:-1] > SIGNAL * (taken @ taken):

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
-from scipy.interpolate import make_interp_spline
 
 from sa_solver.shapes import rounded_edge
 from sa_solver.types import Array, Grid
@@ -100,4 +99,7 @@ def _linear(known: Array, wanted: Array) -> Array:
     """Weights ``(m, n)`` of values at ``known`` ``(n,)``, ascending, for those at ``wanted``."""
     if len(known) == 1:
         return np.ones((len(wanted), 1))
+    # A fifth of a second to import: where it is used.
+    from scipy.interpolate import make_interp_spline
+
     return np.asarray(make_interp_spline(known, np.eye(len(known)), k=1)(wanted))
