@@ -28,6 +28,8 @@ def friction_rig_model(rig: FrictionRig, reporter: Reporter) -> RigModel:
     with reporter.stage("reduction", "steps") as told:
         key, file = "structure.specimens", rig.specimens
         bodies = reduced_specimens(key, file, reporter, told, rig.target_distance)
+    for finer in bodies.case.finer_than_nodes(half_space=False):
+        reporter.say(finer)
     try:
         specimens = bodies.reduction.models
         ratios = np.array(rig.damping_ratio)

@@ -70,9 +70,13 @@ def run_specimens(run: Run[SpecimensCase]) -> None:
 
 
 def _compute(case: SpecimensCase, reporter: Reporter, steps: Steps) -> SpecimensOutcome:
+    for doubt in case.surface_doubts():
+        reporter.warn(doubt)
     model = SpecimensModel(case)
     with reporter.stage("mesh"):
         nodes = model.node_count()
+    for finer in case.finer_than_nodes():
+        reporter.say(finer)
     memory(case, nodes).check()
     with reporter.stage("reduction", "steps") as told:
         model.prepare(told)
@@ -114,7 +118,7 @@ def _fret(
         )
         kept = tuple(map(KeptState, _chosen(blocks), curves))
     grid = half_space.grid
-    height = model.specimen.gap(grid.x, grid.y)
+    height = model.gap(grid)
     path = 0.5 * conditions.stroke * rising(HALF_SPACE_POINTS)
     with reporter.stage("half-space"):
         first, last = (
