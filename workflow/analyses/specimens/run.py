@@ -43,6 +43,8 @@ KEPT_STATES = 13
 # Points of first loading, denser where it begins (a power of even steps).
 CURVE_POINTS, CURVE_POWER = 61, 2.0
 HALF_SPACE_POINTS = 13
+# Of surfaces as measured, where what is finer than the nodes of the pad is.
+FINER = "these wear, and only the half-space beside them has all that its grid carries"
 # Increments of the marched cycle in a quarter of it: 16 leave 2e-3 of the energy of Masing's loop.
 QUARTER = 16
 # Of the work for a force, what wear is; the rest are the half-space and the marched cycle.
@@ -75,7 +77,7 @@ def _compute(case: SpecimensCase, reporter: Reporter, steps: Steps) -> Specimens
     model = SpecimensModel(case)
     with reporter.stage("mesh"):
         nodes = model.node_count()
-    for finer in case.finer_than_nodes():
+    for finer in case.finer_than_nodes(FINER):
         reporter.say(finer)
     memory(case, nodes).check()
     with reporter.stage("reduction", "steps") as told:

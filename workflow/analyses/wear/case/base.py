@@ -226,6 +226,13 @@ class FiniteElementCase(WearCase):
     nonlinearity: Nonlinearity = entry("geometric, of the structure", default=Nonlinearity())
     coupling: Coupling = entry("worn surfaces back to the structure", default=Coupling())
 
+    def told_of_nodes(self) -> Iterator[str]:
+        """What of surfaces as measured is finer than the nodes of the structure."""
+        half_space = "the half-space has all that the grid carries"
+        yield from self.finer_than_nodes(
+            "nothing has more" if self.contact.method == "nodes" else half_space
+        )
+
     @property
     @abstractmethod
     def legs(self) -> tuple[int, ...]:

@@ -108,16 +108,15 @@ class ScannedFace:
         """About units, and a grid that does not carry the roughness."""
         yield from self.surfaces.doubts(self.grid, self.key)
 
-    def finer_than_nodes(self, half_space: bool) -> Iterator[str]:
-        """What the nodes of the structure do not carry, which a ``half_space`` may have."""
-        rest = "the half-space has all that the grid carries" if half_space else "nothing has more"
+    def finer_than_nodes(self, rest: str) -> Iterator[str]:
+        """What the nodes of the structure do not carry; ``rest`` says what does."""
         for name, numbers in self.summary().items():
             lost, height = numbers["lost_by_nodes"], numbers["rms"]
             if lost > LOST * height:
                 yield (
                     f"{self.name}, {name.replace('_', ' ')}: {plain(lost, 'mm', 3)} of the surface "
                     f"as measured, {plain(height, 'mm', 3)} rms, is finer than the nodes of the "
-                    f"face: the structure has means about them, {rest}"
+                    f"face, which have means about them; {rest}"
                 )
 
 
@@ -138,7 +137,7 @@ class WithScans:
         for face in self.scanned():
             yield from face.doubts()
 
-    def finer_than_nodes(self, half_space: bool = True) -> Iterator[str]:
-        """What of them is finer than the nodes of a structure of ours."""
+    def finer_than_nodes(self, rest: str) -> Iterator[str]:
+        """What of them is finer than the nodes of a structure; ``rest`` says what has it."""
         for face in self.scanned():
-            yield from face.finer_than_nodes(half_space)
+            yield from face.finer_than_nodes(rest)

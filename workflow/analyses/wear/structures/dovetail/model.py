@@ -107,7 +107,7 @@ class DovetailModel:
         """Self-locking joints, sides that a moment would move, and surfaces as measured that are
         finer than the mesh.
         """
-        for told in self._case.finer_than_nodes(self._case.contact.method != "nodes"):
+        for told in self._case.told_of_nodes():
             reporter.say(told)
         if self._scanned and self._case.structure.dimension == 3:
             reporter.say(

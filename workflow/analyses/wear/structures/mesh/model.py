@@ -165,7 +165,7 @@ class MeshModel:
         """Of contacts that planes of symmetry cut, supports that are none, and surfaces as
         measured that are finer than the mesh.
         """
-        for told in self._case.finer_than_nodes(self._case.contact.method != "nodes"):
+        for told in self._case.told_of_nodes():
             reporter.say(told)
         for interface in structure.mesh.interfaces:
             name, planes = interface.name, interface.planes
