@@ -123,13 +123,14 @@ def _stamp(file: str) -> tuple[int, int] | None:
     return found.st_mtime_ns, found.st_size
 
 
-# Scans of millions of points take seconds, and are asked for wherever a case is looked at.
-@lru_cache(maxsize=2)
+# Scans of millions of points take seconds, and are asked for wherever a case is looked at: as many
+# as two flanks have.
+@lru_cache(maxsize=4)
 def _read(file: str, stamp: object, unit: str | None, pitch: tuple[float, float] | None) -> Scan:
     return read_scan(file, unit, pitch)
 
 
-@lru_cache(maxsize=2)
+@lru_cache(maxsize=4)
 def _prepared(scan: Scan, level: Level, missing: float) -> Scan:
     return filled(levelled(scan, level), missing)
 
