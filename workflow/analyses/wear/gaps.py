@@ -10,7 +10,7 @@ import numpy as np
 
 from sa_solver.shapes import rounded_edge
 from sa_solver.types import Array, Grid
-from workflow.analyses.contact.surfaces import MeasuredSurfaces
+from workflow.analyses.contact.surfaces import SurfacesOfTwo
 from workflow.analyses.wear.case.gaps import GapShape, HeightsGap, ParaboloidGap, RoundedGap
 from workflow.case.input_files import read_heights
 
@@ -43,7 +43,7 @@ class MeasuredGap:
     """
 
     form: GapFunction
-    surfaces: MeasuredSurfaces
+    surfaces: SurfacesOfTwo
     face: Grid
 
     def __call__(self, x: Array, y: Array) -> Array:
@@ -55,7 +55,7 @@ class MeasuredGap:
         return self.form(x, y) + self.surfaces.gap(grid)
 
 
-def with_measured(form: GapFunction, surfaces: MeasuredSurfaces | None, face: Grid) -> GapFunction:
+def with_measured(form: GapFunction, surfaces: SurfacesOfTwo | None, face: Grid) -> GapFunction:
     """The gap of a form, and of measured surfaces where there are any."""
     return form if surfaces is None else MeasuredGap(form, surfaces, face)
 
