@@ -17,7 +17,7 @@ import scipy.sparse as sp
 
 from fe_models.elasticity import ElasticBody
 from fe_models.linear_solver import _Checked
-from sa_solver.half_space import HalfSpace
+from sa_solver.symbols import Coefficients
 
 SIZE = 1e-13
 SEED = int(os.environ.get("SEED", "1"))
@@ -68,7 +68,7 @@ def perturb_property(owner, name):
 
 
 def pytest_configure():
-    perturb(HalfSpace, "_influence")
+    perturb(Coefficients, "quarter")
     perturb_property(ElasticBody, "stiffness")
     perturb_property(ElasticBody, "mass")
     perturb(_Checked, "__call__")

@@ -127,6 +127,22 @@ def test_parts_are_those_of_the_full_vector(grid, pair):
         np.testing.assert_allclose(part, whole, rtol=0, atol=ROUNDING * scale)
 
 
+@pytest.mark.parametrize("grid", [Grid((16, 13), (0.3, 0.5)), Grid.strips(2.0, 16)])
+@pytest.mark.parametrize(("cells", "larger"), [((9, 7), 1.0), ((8, 6), 2.0), ((5, 4), 3.1)])
+def test_coefficients_from_a_finer_grid_are_those_of_the_grid(grid, cells, larger):
+    """Of boxes in it, and of larger cells in the same proportion, which is what lines have not."""
+    if grid.line:
+        other = Grid.strips(larger * grid.pitch[0] * cells[0], cells[0])
+    else:
+        other = Grid(cells, (larger * grid.pitch[0], larger * grid.pitch[1]))
+    taken = HalfSpace(grid, DISSIMILAR).on(other)
+    own = HalfSpace(other, DISSIMILAR, taken.datum)
+    for row, column in np.ndindex(3, 3):
+        expected = own.symbol(row, column)
+        error = np.abs(taken.symbol(row, column) - expected).max()
+        assert error <= ROUNDING * np.abs(own.symbol(Z, Z)).max()
+
+
 def test_identical_bodies_have_no_cross_terms_at_all():
     grid = GRIDS["odd"]
     half_space = HalfSpace(grid, SIMILAR)
