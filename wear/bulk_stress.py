@@ -38,6 +38,9 @@ from wear.link import Link, Transfer, fitted_alike, linked
 
 RIGID = Material(np.inf, 0.0)
 
+FIRST, SECOND = ((1, 0), (0, 1)), ((2, 0), (1, 1), (0, 2))
+"""Orders along x and y of the derivatives that are needed."""
+
 SIDE: dict[int, float] = {1: -1.0, 2: 1.0}
 """Of the face on which a body lies, along z; the motion of body 2 relative to body 1 has it too."""
 
@@ -66,32 +69,48 @@ class BulkStress:
 
         ``depth`` may be an array that makes ``(nx, ny)`` of the shape of the places.
         """
-        side = SIDE[self.body]
-        z = side * depth
-        rest = replace(self.rest, coefficients=side * self.rest.coefficients)
-        x, y, xx, xy, yy = (
-            np.moveaxis(rest.derivative(places, orders), 1, 0)
-            for orders in ((1, 0), (0, 1), (2, 0), (1, 1), (0, 2))
-        )
+        rest, z = self._moved, SIDE[self.body] * depth
+        xx, xy, yy = (rest.derivative(places, orders, (0, 1)) for orders in SECOND)
         poisson, shear = self.material.poisson, self.material.shear_modulus
         plane = self.material.young / (1.0 - poisson**2)
-        along_x, along_y = x[0] - z * xx[2], y[1] - z * yy[2]
-        stress = np.zeros((len(along_x), 6, *along_x.shape[1:]))
-        stress[:, XX] = plane * (along_x + poisson * along_y)
-        stress[:, YY] = plane * (along_y + poisson * along_x)
-        stress[:, XY] = shear * (x[1] + y[0] - 2.0 * z * xy[2])
-        stress[:, ZX] = -z * (plane * (xx[0] + poisson * xy[1]) + shear * (xy[1] + yy[0]))
-        stress[:, YZ] = -z * (plane * (yy[1] + poisson * xy[0]) + shear * (xy[0] + xx[1]))
+        face = self.along_face(places, depth)
+        stress = np.zeros((len(face), 6, *face.shape[2:]))
+        stress[:, [XX, YY, XY]] = face
+        along_x = plane * (xx[:, 0] + poisson * xy[:, 1]) + shear * (xy[:, 1] + yy[:, 0])
+        along_y = plane * (yy[:, 1] + poisson * xy[:, 0]) + shear * (xy[:, 0] + xx[:, 1])
         if self.expansion is not None:
-            held = self.material.young / (1.0 - poisson)
-            hot, by_x, by_y = (
-                held * self.expansion.derivative(places, orders)
-                for orders in ((0, 0), (1, 0), (0, 1))
-            )
-            stress[:, [XX, YY]] -= (hot[:, 0] + z * hot[:, 1])[:, None]
-            stress[:, ZX] += z * by_x[:, 0]
-            stress[:, YZ] += z * by_y[:, 0]
+            by_x, by_y = (self.expansion.derivative(places, orders, (0,)) for orders in FIRST)
+            along_x -= self._held * by_x[:, 0]
+            along_y -= self._held * by_y[:, 0]
+        stress[:, ZX], stress[:, YZ] = -z * along_x, -z * along_y
         return stress
+
+    def along_face(self, places: Array, depth: float | Array) -> Array:
+        """Its components xx, yy and xy ``(t, 3, nx, ny)``, which take a third of the time."""
+        rest, z = self._moved, SIDE[self.body] * depth
+        x, y = (rest.derivative(places, orders, (0, 1)) for orders in FIRST)
+        xx, xy, yy = (rest.derivative(places, orders, (2,))[:, 0] for orders in SECOND)
+        along_x, along_y = x[:, 0] - z * xx, y[:, 1] - z * yy
+        poisson = self.material.poisson
+        plane = self.material.young / (1.0 - poisson**2)
+        stress = np.empty((len(along_x), 3, *along_x.shape[1:]))
+        stress[:, 0] = plane * (along_x + poisson * along_y)
+        stress[:, 1] = plane * (along_y + poisson * along_x)
+        stress[:, 2] = self.material.shear_modulus * (x[:, 1] + y[:, 0] - 2.0 * z * xy)
+        if self.expansion is not None:
+            hot, by_z = np.moveaxis(self.expansion.derivative(places, (0, 0), (0, 1)), 1, 0)
+            stress[:, :2] -= (self._held * (hot + z * by_z))[:, None]
+        return stress
+
+    @property
+    def _moved(self) -> Link:
+        """r, on whichever side the body lies."""
+        return replace(self.rest, coefficients=SIDE[self.body] * self.rest.coefficients)
+
+    @property
+    def _held(self) -> float:
+        """Stress of a strain that is held along the face [MPa]."""
+        return self.material.young / (1.0 - self.material.poisson)
 
 
 class BodyFace:

@@ -19,6 +19,7 @@ imposed, and are the tilt of the structure where the tilt is held.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Protocol
 
@@ -230,8 +231,10 @@ class Link:
         """d ``(t, 3, nx, ny)`` [mm] at places ``(2, nx, ny)`` of the face [mm]."""
         return self._of(_products(places.reshape(2, -1).T, self.region, self.degrees), places)
 
-    def derivative(self, places: Array, orders: tuple[int, int]) -> Array:
-        """Derivatives of d of such ``orders`` along x and y ``(t, 3, nx, ny)`` [mm^(1 - orders)].
+    def derivative(
+        self, places: Array, orders: tuple[int, int], components: Sequence[int] = (0, 1, 2)
+    ) -> Array:
+        """Derivatives of d of such ``orders`` along x and y ``(t, c, nx, ny)`` [mm^(1 - orders)].
 
         At ``places`` ``(2, nx, ny)`` [mm]; beyond the region those at its border.
         """
@@ -239,12 +242,13 @@ class Link:
         scaled = np.clip(_scaled(places.reshape(2, -1).T, self.region), -1.0, 1.0).T
         along_x, along_y = map(_derived, scaled, self.degrees, size, orders)
         products = along_x[:, :, None] * along_y[:, None, :]
-        return self._of(products.reshape(len(along_x), -1), places)
+        return self._of(products.reshape(len(along_x), -1), places, components)
 
-    def _of(self, basis: Array, places: Array) -> Array:
-        """Sums of a ``basis`` ``(nx ny, m)`` at ``places``, ``(t, 3, nx, ny)``."""
-        rows = self.coefficients.reshape(-1, basis.shape[1]) @ basis.T
-        return rows.reshape(len(self.coefficients), 3, *places.shape[1:])
+    def _of(self, basis: Array, places: Array, components: Sequence[int] = (0, 1, 2)) -> Array:
+        """Sums of a ``basis`` ``(nx ny, m)`` at ``places``, ``(t, c, nx, ny)``."""
+        coefficients = self.coefficients[:, list(components)]
+        rows = coefficients.reshape(-1, basis.shape[1]) @ basis.T
+        return rows.reshape(*coefficients.shape[:2], *places.shape[1:])
 
     def without_shift(self) -> Link:
         """The same without what moves the bodies as a whole: far away that may be any length."""
