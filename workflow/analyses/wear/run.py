@@ -13,6 +13,7 @@ from wear.interface import FirstContact, MotionError
 from wear.stepping import ContactFailure
 from wear.tractions import CycleTractions
 from workflow.analyses.wear import checkpoint
+from workflow.analyses.wear.budget.finding import Begun, lives_of_companions
 from workflow.analyses.wear.case.base import WearCase
 from workflow.analyses.wear.choice import report_choice
 from workflow.analyses.wear.contact_stage import ContactStage
@@ -51,9 +52,9 @@ def run_wear(run: Run[WearCase]) -> None:
     folder = run.folder
     report_choice(run.choice, run.reporter, again=run.resume)
     try:
-        outcome = _compute(run)
+        outcome, lives = _compute(run)
         with one_thread():
-            write_output(outcome, run)
+            write_output(outcome, lives, run)
     except (ContactFailure, NormalContactError, MethodFailed) as error:
         remedy = f"; the state is kept, see `{folder.resume_command}`"
         raise MethodFailed(f"{error}{remedy if folder.checkpoint.exists() else ''}") from error
@@ -67,8 +68,8 @@ def run_wear(run: Run[WearCase]) -> None:
         raise UserError(f"{folder.case}: structure: {error}") from error
 
 
-def _compute(run: Run[WearCase]) -> Outcome:
-    """The run up to its end, without its files."""
+def _compute(run: Run[WearCase]) -> tuple[Outcome, Begun]:
+    """The run up to its end, without its files; and the lives of companions beside it."""
     case, reporter = run.case, run.reporter
     # First, so that a state that cannot be gone on from is told before anything is computed.
     kept = checkpoint.restored(run, run.kept) if run.kept else None
@@ -79,6 +80,7 @@ def _compute(run: Run[WearCase]) -> Outcome:
     with contact_workers(case, faces if _worn_apart(case, source) else ()) as workers:
         with heard_stage(reporter, source, "condensation", "steps"):
             source.prepare()
+        lives = lives_of_companions(case, source, reporter, run.beside)
         with one_thread():
             with heard_stage(reporter, source, "structural friction", "increments"):
                 unworn = source.unworn()
@@ -98,7 +100,7 @@ def _compute(run: Run[WearCase]) -> Outcome:
         InterfaceOutcome(*column, state.cycles, state.kinetics[:, number])
         for number, column in enumerate(zip(*columns, strict=True))
     ]
-    return Outcome(case, source, state, interfaces)
+    return Outcome(case, source, state, interfaces), lives
 
 
 def _contacts(
