@@ -35,7 +35,6 @@ def error_budget(outcome: Outcome, reporter: Reporter, begun: Begun) -> dict[str
         lives = begun(followed(outcome), progress)
         names = [contact.stage.name for contact in outcome.interfaces]
         probed = [{part: by_name[name] for part, by_name in lives.items()} for name in names]
-        # Each solves the last cycle again, on the surfaces of other steps.
         errors = at_once(
             [
                 partial(errors_of, outcome.case, contact, outcome.source.peak, told)
