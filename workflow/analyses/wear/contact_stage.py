@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -81,6 +81,13 @@ class ContactStage(InterfaceContact):
         surfaces = state.surfaces
         to_1 = self.transfer_of(1)
         return to_1.to_nodes(surfaces.depth_1), self.transfer.to_nodes(surfaces.depth_2)
+
+    def seen(self, state: InterfaceState, increment: int) -> InterfaceState:
+        """What :meth:`fields` of an increment need of a state: a tenth where slips are given."""
+        if self.settings.method == "full":
+            return state
+        starts = {t: start for t, start in state.starts.items() if t == increment}
+        return replace(state, starts=starts, coarse=None)
 
     def end(self, state: InterfaceState) -> ContactEnd:
         """A cycle on the surfaces of a state that a run ends with."""

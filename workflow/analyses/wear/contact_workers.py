@@ -67,7 +67,9 @@ class StagedContacts(Heard, Contacts):
 
     def fields(self, states: Sequence[InterfaceState], increment: int) -> list[ContactFields]:
         """Tractions and slip of an increment on the present surfaces."""
-        return self.call("fields", states, self.each(increment))
+        pairs = zip(self.stages, states, strict=True)
+        seen = [stage.seen(state, increment) for stage, state in pairs]
+        return self.call("fields", seen, self.each(increment))
 
     def loops(self, states: Sequence[InterfaceState], increment: int) -> list[WornLoop]:
         """Tangential loops on the present surfaces, under the loads of an increment."""
