@@ -21,6 +21,7 @@ Source: Liu & Wang 2002, J. Tribol. 124, 36, doi:10.1115/1.1401017 (convolution 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import lru_cache
 from typing import Literal
 
@@ -51,8 +52,8 @@ SHEAR = (0, 1)
 """The tractions along the surface."""
 
 INSIDE = (XX, YY, ZZ, XY, YZ, ZX)
-AT_SURFACE = (XX, YY, XY)
-"""Components that convolutions give: at the surface the others are the tractions."""
+ALONG_SURFACE = (XX, YY, XY)
+"""Components that convolutions give at the surface, where the others are the tractions."""
 
 MIRROR: dict[int, Array] = {1: np.array([-1.0, -1.0, 1.0]), 2: np.ones(3)}
 """Tractions on the half-space z > 0 that a body is or mirrors, over those on body 2."""
@@ -109,8 +110,9 @@ class SubsurfaceStress:
         """
         self._check(traction, depth)
         self.count += 1
+        rows = ALONG_SURFACE if depth == 0.0 else INSIDE
         stress = np.empty((6, *self.grid.shape))
-        stress[list(self._convolved(depth))] = self._filter(depth).apply(self._felt(traction))
+        stress[list(rows)] = self._filter(depth, rows).apply(self._felt(traction))
         if depth == 0.0:
             # So that they are what the other body feels to the last digit.
             stress[[ZX, YZ, ZZ]] = -traction
@@ -118,40 +120,44 @@ class SubsurfaceStress:
             stress[[YZ, ZX]] *= self._mirror[0]
         return stress
 
+    def along_surface(self, traction: Array, depth: float) -> Array:
+        """Its components xx, yy and xy alone, ``(3, nx, ny)``, with half as many transforms."""
+        self._check(traction, depth)
+        self.count += 1
+        return self._filter(depth, ALONG_SURFACE).apply(self._felt(traction))
+
     def section(self, traction: Array, axis: Literal["x", "y"], at: float, depths: Array) -> Array:
         """Stress ``(6, n, len(depths))`` in a plane normal to the surface, n cells along ``axis``.
 
-        The section along x lies at y = ``at`` [mm], moved to the centre of the nearest row, and the
-        other way round; ``depths`` >= 0 [mm]. ``traction`` as in :meth:`at_depth`. Transforms go
-        along the section only, rows without load are left out, and those as far on either side go
-        together: a tenth of the cost of as many planes, each with new symbols.
-
-        Raises SubsurfaceError for another shape, a depth below 0, a plane off the grid or a section
-        along y of a line contact.
+        As of :func:`sections`.
         """
-        for depth in depths:
-            self._check(traction, float(depth))
+        return sections([(self, traction, depths)], axis, at)[0]
+
+    def _sources(self, traction: Array, axis: Literal["x", "y"], at: float) -> Array | None:
+        """Spectra along a section of the rows of cells: see :func:`_folded`; None without load."""
         if axis not in ("x", "y") or (axis == "y" and self.grid.line):
             raise SubsurfaceError(f"section along {axis}: must be x or, but for lines, y")
-        along = 0 if axis == "x" else 1
+        along = "xy".index(axis)
         row = self._nearest_row(1 - along, at)
         felt = np.moveaxis(self._felt(traction), along + 1, 1)
-        stress = np.zeros((6, felt.shape[1], len(depths)))
         loaded = np.flatnonzero(felt.any(axis=(0, 1)))
         if len(loaded) == 0:
-            return stress
-        period, away = self._padded[along], row - np.arange(loaded[0], loaded[-1] + 1)
-        sources = felt[:, :, loaded[0] : loaded[-1] + 1]
-        spectra = _folded(scipy.fft.rfft(sources, period, axis=1), away)
-        rows = np.arange(spectra.shape[-1] + 1, dtype=np.float64) - 0.5
+            return None
+        rows = slice(loaded[0], loaded[-1] + 1)
+        spectra = scipy.fft.rfft(felt[:, :, rows], self._padded[along], axis=1)
+        return _folded(spectra, row - np.arange(rows.start, rows.stop))
+
+    def _along_section(
+        self, sources: Sequence[Array], axis: Literal["x", "y"], depth: float
+    ) -> list[Array]:
+        """Stress ``(6, n)`` at a depth of the section under each of the ``sources``."""
+        along = "xy".index(axis)
+        period, count = self._padded[along], self.grid.shape[along]
+        rows = np.arange(max(spectra.shape[-1] for spectra in sources) + 1, dtype=np.float64) - 0.5
         edges = [quarter_edges(period, self.grid.pitch[along]), rows * self.grid.pitch[1 - along]]
-        for column, depth in enumerate(depths):
-            kernels = self._influence(edges if along == 0 else edges[::-1], float(depth))
-            kernels = np.moveaxis(kernels, along + 2, 2)
-            whole = _along_rows(kernels, spectra, along, period)
-            stress[:, :, column] = whole[:, : felt.shape[1]]
-        stress[[YZ, ZX]] *= self._mirror[0]
-        return stress
+        kernels = self._influence(edges if along == 0 else edges[::-1], depth)
+        kernels = np.moveaxis(kernels, along + 2, 2)
+        return [whole[:, :count] for whole in _along_rows(kernels, sources, along, period)]
 
     def _nearest_row(self, axis: int, at: float) -> int:
         centres = (self.grid.x[:, 0], self.grid.y[0])[axis]
@@ -161,30 +167,26 @@ class SubsurfaceStress:
             )
         return int(np.argmin(np.abs(centres - at)))
 
-    def _check(self, traction: Array, depth: float) -> None:
+    def _check(self, traction: Array, *depths: float) -> None:
         if traction.shape != (3, *self.grid.shape):
             raise SubsurfaceError(
                 f"tractions of shape {traction.shape}: must be {(3, *self.grid.shape)}"
             )
-        if not 0.0 <= depth < np.inf:
-            raise SubsurfaceError(f"depth {depth:g} mm: must be 0 or more")
+        for depth in depths:
+            if not 0.0 <= depth < np.inf:
+                raise SubsurfaceError(f"depth {depth:g} mm: must be 0 or more")
 
     def _felt(self, traction: Array) -> Array:
         """Tractions on the half-space z > 0 that the body is or mirrors."""
         return traction * self._mirror[:, None, None]
-
-    @staticmethod
-    def _convolved(depth: float) -> tuple[int, ...]:
-        return AT_SURFACE if depth == 0.0 else INSIDE
 
     def _influence(self, edges: list[Array], depth: float) -> Array:
         if self.grid.line:
             return strip_stress(edges[0], depth, self.poisson)[..., None]
         return rectangle_stress(edges[0], edges[1], depth, self.poisson)
 
-    def _plan(self, depth: float) -> SpectralFilter:
-        """Real symbols, with shear tractions and shear stress along z in units of i."""
-        rows = self._convolved(depth)
+    def _plan(self, depth: float, rows: Sequence[int]) -> SpectralFilter:
+        """Real symbols of such components, with shear tractions and yz and zx in units of i."""
         edges = list(map(quarter_edges, self._padded, self.grid.pitch))
         kernels = self._influence(edges, depth)
         symbols = [[self._symbol(kernels[i, k], i, k) for k in range(3)] for i in rows]
@@ -202,6 +204,59 @@ class SubsurfaceStress:
         # What a kernel odd along one axis has of i is counted in the units of its components.
         turned = component in (YZ, ZX) and along_x != along_y
         return -symbol if turned or (along_x and along_y) else symbol
+
+
+def sections(
+    wanted: Sequence[tuple[SubsurfaceStress, Array, Array]], axis: Literal["x", "y"], at: float
+) -> list[Array]:
+    """Stress ``(6, n, k)`` in a plane normal to the surface, n cells along ``axis``, of each body.
+
+    Each that is ``wanted`` is a body, its tractions as :meth:`SubsurfaceStress.at_depth` has them,
+    and depths ``(k,)`` >= 0 [mm]. The section along x lies at y = ``at`` [mm], moved to the centre
+    of the nearest row, and the other way round. Transforms go along the section only, rows without
+    load are left out, and those as far on either side go together: a tenth of the cost of as many
+    planes, each with new symbols. Coefficients of influence, most of that, are shared by those of
+    one grid and Poisson's ratio at depths that they have in common.
+
+    Raises SubsurfaceError for another shape, a depth below 0, a plane off the grid or a section
+    along y of a line contact.
+
+    Examples
+    --------
+    Bodies that are pressed without friction fare alike:
+
+    >>> import numpy as np
+    >>> from sa_solver import Grid, Material, SubsurfaceStress
+    >>> from sa_solver.subsurface import sections
+    >>> grid, steel = Grid.strips(2.0, 50), Material(young=210e3, poisson=0.3)
+    >>> traction = np.zeros((3, 50, 1))
+    >>> traction[2] = 1000.0 * np.sqrt(np.maximum(0.0, 1.0 - (grid.x / 0.5) ** 2))
+    >>> bodies = [SubsurfaceStress(grid, steel, number) for number in (1, 2)]
+    >>> depths = np.array([0.1, 0.2])
+    >>> one, two = sections([(body, traction, depths) for body in bodies], "x", 0.0)
+    >>> print(one.shape, np.abs(one[:4] - two[:4]).max())
+    (6, 50, 2) 0.0
+    """
+    stresses: list[Array] = []
+    shared: dict[tuple[Grid, float, float], list[tuple[SubsurfaceStress, Array, Array]]] = {}
+    for body, traction, depths in wanted:
+        body._check(traction, *depths.tolist())
+        spectra = body._sources(traction, axis, at)
+        stress = np.zeros((6, body.grid.shape["xy".index(axis)], len(depths)))
+        stresses.append(stress)
+        if spectra is None:
+            continue
+        for column, depth in enumerate(depths.tolist()):
+            alike = shared.setdefault((body.grid, body.poisson, depth), [])
+            alike.append((body, spectra, stress[:, :, column]))
+    for (_, _, depth), alike in shared.items():
+        bodies, sources, columns = zip(*alike, strict=True)
+        found = bodies[0]._along_section(sources, axis, depth)
+        for column, stress in zip(columns, found, strict=True):
+            column[:] = stress
+    for (body, *_), stress in zip(wanted, stresses, strict=True):
+        stress[[YZ, ZX]] *= body._mirror[0]
+    return stresses
 
 
 def _odd(component: int, traction: int, axis: int) -> bool:
@@ -222,16 +277,17 @@ def _folded(spectra: Array, away: Array) -> Array:
     return folded
 
 
-def _along_rows(kernels: Array, spectra: Array, along: int, period: int) -> Array:
-    """Convolution along the rows of cells, summed over them, ``(6, period)``.
+def _along_rows(kernels: Array, sources: Sequence[Array], along: int, period: int) -> list[Array]:
+    """Convolutions along the rows of cells, summed over them, ``(6, period)`` each.
 
-    ``kernels`` ``(6, 3, distance, row)`` and folded ``spectra`` of the tractions; ``along`` is the
-    direction of the rows.
+    ``kernels`` ``(6, 3, distance, row)`` and ``sources``, folded spectra of the tractions of as
+    many rows or fewer; ``along`` is the direction of the rows.
     """
-    total = np.zeros((6, spectra.shape[2]), dtype=np.complex128)
+    totals = [np.zeros((6, spectra.shape[2]), dtype=np.complex128) for spectra in sources]
     for i, k in np.ndindex(6, 3):
         whole = continued(kernels[i, k], 0, period, _odd(i, k, along))
-        rows = spectra[int(_odd(i, k, 1 - along)), k]
-        total[i] += np.einsum("fr,fr->f", scipy.fft.rfft(whole, axis=0), rows)
-    stress: Array = scipy.fft.irfft(total, period, axis=1)
-    return stress
+        transformed = scipy.fft.rfft(whole, axis=0)
+        for total, spectra in zip(totals, sources, strict=True):
+            rows = spectra[int(_odd(i, k, 1 - along)), k]
+            total[i] += np.einsum("fr,fr->f", transformed[:, : rows.shape[1]], rows)
+    return [scipy.fft.irfft(total, period, axis=1) for total in totals]

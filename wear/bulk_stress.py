@@ -38,6 +38,9 @@ from wear.link import Link, Transfer, fitted_alike, linked
 
 RIGID = Material(np.inf, 0.0)
 
+SECOND = ((2, 0), (1, 1), (0, 2))
+"""Orders along x and y of second derivatives."""
+
 SIDE: dict[int, float] = {1: -1.0, 2: 1.0}
 """Of the face on which a body lies, along z; the motion of body 2 relative to body 1 has it too."""
 
@@ -66,32 +69,60 @@ class BulkStress:
 
         ``depth`` may be an array that makes ``(nx, ny)`` of the shape of the places.
         """
-        side = SIDE[self.body]
-        z = side * depth
-        rest = replace(self.rest, coefficients=side * self.rest.coefficients)
-        x, y, xx, xy, yy = (
-            np.moveaxis(rest.derivative(places, orders), 1, 0)
-            for orders in ((1, 0), (0, 1), (2, 0), (1, 1), (0, 2))
-        )
-        poisson, shear = self.material.poisson, self.material.shear_modulus
-        plane = self.material.young / (1.0 - poisson**2)
-        along_x, along_y = x[0] - z * xx[2], y[1] - z * yy[2]
-        stress = np.zeros((len(along_x), 6, *along_x.shape[1:]))
-        stress[:, XX] = plane * (along_x + poisson * along_y)
-        stress[:, YY] = plane * (along_y + poisson * along_x)
-        stress[:, XY] = shear * (x[1] + y[0] - 2.0 * z * xy[2])
-        stress[:, ZX] = -z * (plane * (xx[0] + poisson * xy[1]) + shear * (xy[1] + yy[0]))
-        stress[:, YZ] = -z * (plane * (yy[1] + poisson * xy[0]) + shear * (xy[0] + xx[1]))
-        if self.expansion is not None:
-            held = self.material.young / (1.0 - poisson)
-            hot, by_x, by_y = (
-                held * self.expansion.derivative(places, orders)
-                for orders in ((0, 0), (1, 0), (0, 1))
-            )
-            stress[:, [XX, YY]] -= (hot[:, 0] + z * hot[:, 1])[:, None]
-            stress[:, ZX] += z * by_x[:, 0]
-            stress[:, YZ] += z * by_y[:, 0]
+        face = self.along_face(places, depth)
+        across = -SIDE[self.body] * depth * self.rest.sums(self._across, places)
+        stress = np.zeros((len(face), 6, *face.shape[2:]))
+        stress[:, [XX, YY, XY]], stress[:, [YZ, ZX]] = face, across
         return stress
+
+    def along_face(self, places: Array, depth: float | Array) -> Array:
+        """Its components xx, yy and xy alone, ``(t, 3, nx, ny)``."""
+        z, flat, bent = SIDE[self.body] * depth, self._flat, self._bent
+        if np.ndim(z) == 0:
+            return self.rest.sums(flat - z * bent, places)
+        return self.rest.sums(flat, places) - z * self.rest.sums(bent, places)
+
+    # Coefficients of polynomials like those of r, of expansion too: stress is made of derivatives.
+
+    @property
+    def _flat(self) -> Array:
+        """Of xx, yy and xy on the face ``(t, 3, a, b)``."""
+        x, y = (self._moved(orders) for orders in ((1, 0), (0, 1)))
+        return self._plane(x[:, 0], y[:, 1], x[:, 1] + y[:, 0], self._hot((0, 0))[:, 0])
+
+    @property
+    def _bent(self) -> Array:
+        """By how much these grow along -z ``(t, 3, a, b)``."""
+        xx, xy, yy = (self._moved(orders)[:, 2] for orders in SECOND)
+        return self._plane(xx, yy, 2.0 * xy, -self._hot((0, 0))[:, 1])
+
+    @property
+    def _across(self) -> Array:
+        """By how much yz and zx grow along -z ``(t, 2, a, b)``."""
+        xx, xy, yy = (self._moved(orders) for orders in SECOND)
+        by_x, by_y = (self._hot(orders)[:, 0] for orders in ((1, 0), (0, 1)))
+        along_x = self._plane(xx[:, 0], xy[:, 1], xy[:, 0] + xx[:, 1], by_x)
+        along_y = self._plane(xy[:, 0], yy[:, 1], yy[:, 0] + xy[:, 1], by_y)
+        return np.stack([along_x[:, 2] + along_y[:, 1], along_x[:, 0] + along_y[:, 2]], axis=1)
+
+    def _plane(self, x: Array, y: Array, sheared: Array, hot: Array) -> Array:
+        """Plane stress ``(t, 3, a, b)`` of strains along x and y, shear strain and expansion."""
+        material = self.material
+        plane = material.young / (1.0 - material.poisson**2)
+        held = material.young / (1.0 - material.poisson) * hot
+        along_x = plane * (x + material.poisson * y) - held
+        along_y = plane * (y + material.poisson * x) - held
+        return np.stack([along_x, along_y, material.shear_modulus * sheared], axis=1)
+
+    def _moved(self, orders: tuple[int, int]) -> Array:
+        """Derivatives of r, on whichever side the body lies ``(t, 3, a, b)``."""
+        return SIDE[self.body] * self.rest.derived(orders)
+
+    def _hot(self, orders: tuple[int, int]) -> Array:
+        """Derivatives of expansion and of its slope along z, if any ``(t, 2, a, b)``."""
+        if self.expansion is None:
+            return np.zeros_like(self.rest.coefficients[:, :2])
+        return self.expansion.derived(orders)[:, :2]
 
 
 class BodyFace:

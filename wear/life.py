@@ -29,6 +29,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from sa_solver.errors import InputError
+from sa_solver.subsurface_influence import XX, XY, YY
 from sa_solver.types import Array, Material
 from wear.smallest_circle import smallest_circle
 
@@ -94,9 +95,14 @@ def ruiz(stress: Array, work: Array) -> Ruiz:
     0.1 20.0
     """
     _check(stress)
-    xx, yy, xy = stress[:, 0], stress[:, 1], stress[:, 3]
-    principal = 0.5 * (xx + yy) + np.hypot(0.5 * (xx - yy), xy)
+    principal = tension_along(*(stress[:, component] for component in (XX, YY, XY)))
     return Ruiz(work, np.maximum(0.0, principal.max(axis=0)))
+
+
+def tension_along(xx: Array, yy: Array, xy: Array) -> Array:
+    """Largest principal stress in the plane of the surface."""
+    principal: Array = 0.5 * (xx + yy) + np.hypot(0.5 * (xx - yy), xy)
+    return principal
 
 
 @dataclass(frozen=True)

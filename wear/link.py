@@ -228,23 +228,25 @@ class Link:
 
     def fields(self, places: Array) -> Array:
         """d ``(t, 3, nx, ny)`` [mm] at places ``(2, nx, ny)`` of the face [mm]."""
-        return self._of(_products(places.reshape(2, -1).T, self.region, self.degrees), places)
+        basis = _products(places.reshape(2, -1).T, self.region, self.degrees)
+        return _summed(self.coefficients, basis, places)
 
-    def derivative(self, places: Array, orders: tuple[int, int]) -> Array:
-        """Derivatives of d of such ``orders`` along x and y ``(t, 3, nx, ny)`` [mm^(1 - orders)].
+    def derived(self, orders: tuple[int, int]) -> Array:
+        """Coefficients ``(t, 3, a, b)`` of derivatives of d along x and y [mm^(1 - orders)]."""
+        coefficients, size = self.coefficients, self.region[1] - self.region[0]
+        for axis, (order, length) in enumerate(zip(orders, size.tolist(), strict=True), start=2):
+            coefficients = _derived(coefficients, axis, order, length)
+        return coefficients
+
+    def sums(self, coefficients: Array, places: Array) -> Array:
+        """The same polynomials with such ``coefficients`` ``(t, c, a, b)``: ``(t, c, nx, ny)``.
 
         At ``places`` ``(2, nx, ny)`` [mm]; beyond the region those at its border.
         """
-        size = self.region[1] - self.region[0]
         scaled = np.clip(_scaled(places.reshape(2, -1).T, self.region), -1.0, 1.0).T
-        along_x, along_y = map(_derived, scaled, self.degrees, size, orders)
+        along_x, along_y = map(legvander, scaled, self.degrees)
         products = along_x[:, :, None] * along_y[:, None, :]
-        return self._of(products.reshape(len(along_x), -1), places)
-
-    def _of(self, basis: Array, places: Array) -> Array:
-        """Sums of a ``basis`` ``(nx ny, m)`` at ``places``, ``(t, 3, nx, ny)``."""
-        rows = self.coefficients.reshape(-1, basis.shape[1]) @ basis.T
-        return rows.reshape(len(self.coefficients), 3, *places.shape[1:])
+        return _summed(coefficients, products.reshape(len(along_x), -1), places)
 
     def without_shift(self) -> Link:
         """The same without what moves the bodies as a whole: far away that may be any length."""
@@ -415,14 +417,23 @@ def _scaled(points: Array, region: Array) -> Array:
     return scaled
 
 
-def _derived(scaled: Array, degree: int, size: float, order: int) -> Array:
-    """Derivatives ``(n, degree + 1)`` of Legendre's polynomials over a length of so much [mm]."""
-    if order == 0:
-        return np.asarray(legvander(scaled, degree), dtype=np.float64)
-    if order > degree:
-        return np.zeros((len(scaled), degree + 1))
-    derived: Array = legvander(scaled, degree - order) @ legder(np.eye(degree + 1), order)
-    return (2.0 / size) ** order * derived
+def _summed(coefficients: Array, basis: Array, places: Array) -> Array:
+    """Sums ``(t, c, nx, ny)`` of a ``basis`` ``(nx ny, m)`` at ``places``."""
+    rows = coefficients.reshape(-1, basis.shape[1]) @ basis.T
+    return rows.reshape(*coefficients.shape[:2], *places.shape[1:])
+
+
+def _derived(coefficients: Array, axis: int, order: int, length: float) -> Array:
+    """Those of derivatives along an ``axis``, of as many of Legendre's polynomials over a length.
+
+    In mm.
+    """
+    derived, left = np.zeros_like(coefficients), coefficients.shape[axis] - order
+    if left > 0:
+        lower = np.moveaxis(derived, axis, 0)[:left]
+        scale = 2.0 / length if order else 1.0
+        lower[:] = np.moveaxis(legder(coefficients, order, scl=scale, axis=axis), axis, 0)
+    return derived
 
 
 def _quality(face: Transfer, near: Mask, d: Array, deflection: Array, residual: Array) -> Array:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -54,7 +55,7 @@ class CycleTractions:
     slip: Array
     unknown: Array
 
-    @property
+    @cached_property
     def work(self) -> Array:
         """Friction work per area of each increment ``(t, nx, ny)`` [N/mm]."""
         loads, limit = self.loads, self.friction * self.pressure

@@ -12,7 +12,7 @@ from sa_solver.reference.subsurface import (
     sphere_axis_stress,
     sphere_surface_stress,
 )
-from sa_solver.subsurface import SubsurfaceError, SubsurfaceStress
+from sa_solver.subsurface import SubsurfaceError, SubsurfaceStress, sections
 from sa_solver.subsurface_influence import (
     INDICES,
     XX,
@@ -384,3 +384,25 @@ def test_what_does_not_fit_is_refused():
         SubsurfaceStress(plane, STEEL, 1).at_depth(np.ones((3, 5, 4)), 0.0)
     with pytest.raises(SubsurfaceError, match="depth"):
         SubsurfaceStress(plane, STEEL, 1).at_depth(np.ones((3, 4, 5)), -0.1)
+
+
+@pytest.mark.parametrize("axis", ["x", "y"])
+def test_sections_together_are_those_of_each(axis):
+    """What they share is the same for each, whatever rows are loaded and depths asked for."""
+    grid = Grid.covering((2.0, 3.0), (10, 12))
+    one, other = random_traction(grid), np.roll(random_traction(grid, 4), 3, axis=1)
+    bodies = [SubsurfaceStress(grid, Material(1.0, poisson), 1) for poisson in (0.3, 0.3, 0.1)]
+    bodies.append(SubsurfaceStress(grid, Material(2.0, 0.3), 2))
+    depths = [np.array(some) for some in ([0.0, 0.1, 0.5], [0.5, 0.2], [0.1, 0.5], [0.1])]
+    wanted = list(zip(bodies, (one, other, one, 0.0 * one), depths, strict=True))
+    for together, (body, traction, deep) in zip(sections(wanted, axis, 0.3), wanted, strict=True):
+        np.testing.assert_array_equal(together, body.section(traction, axis, 0.3, deep))
+
+
+@pytest.mark.parametrize("depth", [0.0, 0.2])
+@pytest.mark.parametrize("body", [1, 2])
+def test_stress_along_the_surface_alone_is_that_of_all(body, depth):
+    grid = Grid.covering((2.0, 3.0), (10, 12))
+    traction, solver = random_traction(grid), SubsurfaceStress(grid, STEEL, body)
+    every, alone = solver.at_depth(traction, depth), solver.along_surface(traction, depth)
+    np.testing.assert_array_equal(alone, every[[XX, YY, XY]])

@@ -64,6 +64,9 @@ class InThisProcess:
             for answer, share in zip(self._answering, shares, strict=True)
         ]
 
+    def begin(self, method: str, *arguments: Sequence[Any]) -> Callable[[], list[Any]]:
+        return lambda: self.call(method, *arguments)
+
 
 @contextmanager
 def _workers(

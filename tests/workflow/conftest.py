@@ -23,7 +23,7 @@ from tests.workflow.case_leaves import BODY, CELLS, row_in_space
 from tests.workflow.commands import invoke, runs_here
 from tests.workflow.mesh_scenes import pressed_blocks
 from workflow.analyses.wear import contact_workers
-from workflow.analyses.wear import results as wear_results
+from workflow.analyses.wear import run as wear_run
 from workflow.analyses.wear.layout import Contents
 from workflow.kinds import kinds
 from workflow.pictures import drawing
@@ -412,7 +412,7 @@ def _without_companions() -> Iterator[None]:
     They are for test_error_budget.py.
     """
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(wear_results, "lives_of_companions", lambda *_: lambda _: {})
+        patch.setattr(wear_run, "lives_of_companions", lambda *_: lambda *_: {})
         yield
 
 

@@ -14,7 +14,7 @@ from sa_solver.subsurface import SubsurfaceStress
 from sa_solver.types import Array, Frame, Grid, Material
 from tests.conftest import CASES
 from wear.bulk_stress import SIDE
-from wear.life import smith_watson_topper
+from wear.life import ruiz, smith_watson_topper
 from workflow.analyses.wear.body_stress import (
     Planes,
     StressedBody,
@@ -94,6 +94,17 @@ def test_without_a_structure_it_is_that_of_the_tractions(coarse: Flank, body) ->
     assert not history[peak].any()
     direct = solver.at_depth(alone.traction(1), DEPTH)
     np.testing.assert_allclose(history[1], direct, atol=1e-10 * np.abs(direct).max())
+
+
+@pytest.mark.parametrize("body", [1, 2])
+def test_the_largest_tension_is_that_of_the_history(coarse: Flank, body) -> None:
+    stressed, known = coarse.bodies[body - 1], coarse.stuck < 0.5
+    bulk = stressed.bulk(coarse.cycle)
+    history = stressed.history(coarse.cycle, bulk, DEPTH, known)
+    expected = ruiz(history, np.zeros(history.shape[2:])).tension
+    tension = stressed.tension(coarse.cycle, bulk, DEPTH, known)
+    assert tension.max() > 0.0
+    np.testing.assert_allclose(tension, expected, atol=1e-12 * expected.max())
 
 
 @pytest.mark.parametrize("body", [1, 2])

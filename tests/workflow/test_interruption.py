@@ -300,7 +300,7 @@ def die(messages, answers, code):
 @pytest.mark.slow
 def test_worker_that_dies_is_one_line():
     with workers._processes(die, [(9,)]) as processes, pytest.raises(MethodFailed, match="gone"):
-        workers._answers(processes)
+        workers._answers([workers._Hearing(process, lambda: None) for process in processes])
 
 
 def stepwise(to, done):

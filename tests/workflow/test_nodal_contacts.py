@@ -81,7 +81,7 @@ def test_forces_stay_those_of_the_balance(coarse) -> None:
     """Also on the cells that are written, which lose no volume either."""
     wearing, states = coarse
     state = states[-1]
-    tractions = wearing.contacts.tractions(state.interfaces)
+    tractions = [end.tractions for end in wearing.contacts.ends(state.interfaces)()]
     for stage, face, on_cells in zip(
         wearing.contacts.stages, state.interfaces, tractions, strict=True
     ):

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, Literal
 
 import h5py
 import numpy as np
@@ -15,9 +15,10 @@ from tests.marks import slow
 from tests.workflow.conftest import contents_of
 from tests.workflow.shown_files import check_arrays, check_scene
 from wear.bulk_stress import BulkStress
+from wear.face_loads import CycleLoads
 from wear.link import Link
 from wear.tractions import CycleTractions
-from workflow.analyses.wear.body_stress import Planes
+from workflow.analyses.wear.body_stress import Planes, StressedBody, StressedCycle
 from workflow.analyses.wear.case.sections import ContactStress, Life
 from workflow.analyses.wear.contact_stress import (
     _report_carried,
@@ -182,13 +183,16 @@ def reversed_cycle(grid: Grid) -> CycleTractions:
     return CycleTractions(loads, 0.5, both, shear, slip, np.zeros(2))
 
 
-def history(grid: Grid, body: Any, cycle: CycleTractions, known: np.ndarray) -> Array:
-    """Stress 0.02 mm below the surface, under the tractions alone."""
-    solver = SubsurfaceStress(grid, METAL, body)
-    tractions = np.concatenate([cycle.shear, cycle.pressure[:, None]], axis=1)
-    stress = np.stack([solver.at_depth(traction, 0.02) for traction in tractions])
-    stress[~known] = 0.0
-    return stress
+def maps(
+    life: Life, grid: Grid, body: Literal[1, 2], cycle: CycleTractions, known: np.ndarray
+) -> dict[str, Array]:
+    """Maps at the critical distance, under the tractions alone."""
+    transfer = SimpleNamespace(inside=np.ones(grid.shape, dtype=bool))
+    stage = SimpleNamespace(grid=grid, transfer=transfer, transfer_of=lambda _: transfer)
+    stressed = StressedBody(stage, METAL, body)  # type: ignore[arg-type]
+    alone = StressedCycle(cycle, CycleLoads(cycle.loads, cycle.slip))
+    found = life_maps(life, (stressed, alone, None), known)
+    return {name: quantity.values for name, quantity in found.items()}
 
 
 def test_symmetric_load_fares_both_flanks_alike(normal: Any) -> None:
@@ -209,10 +213,7 @@ def test_reversed_sliding_is_alike_in_both_bodies_and_at_both_ends(parameter: st
     cycle, life = reversed_cycle(grid), Life.model_validate({"parameter": parameter})
     known = np.ones(2, dtype=bool)
     name = "cracking_parameter" if parameter == "ruiz" else parameter
-    value, of_body_2 = (
-        life_maps(life, history(grid, n, cycle, known), METAL, cycle, known, False)[name].values
-        for n in (1, 2)
-    )
+    value, of_body_2 = (maps(life, grid, n, cycle, known)[name] for n in (1, 2))
     scale = value.max()
     assert scale > 0.0
     # The search for the worst plane is not symmetric: see wear.life.PlaneSearch.
@@ -228,13 +229,7 @@ def test_reversed_sliding_is_alike_in_both_bodies_and_at_both_ends(parameter: st
 def test_increments_with_unknown_shear_add_work_but_no_stress() -> None:
     grid = Grid.covering((2.0, 2.0), (20, 16))
     cycle, both, one = reversed_cycle(grid), np.array([True, True]), np.array([True, False])
-    every, first = (
-        {name: quantity.values for name, quantity in maps.items()}
-        for maps in (
-            life_maps(Life(), history(grid, 2, cycle, known), METAL, cycle, known, False)
-            for known in (both, one)
-        )
-    )
+    every, first = (maps(Life(), grid, 2, cycle, known) for known in (both, one))
     np.testing.assert_array_equal(every["friction_parameter"], first["friction_parameter"])
     # Sliding along x, body 2 is pulled at +x; the tension at -x belongs to the way back.
     assert every["tension"][:6].max() > 10.0 * first["tension"][:6].max()

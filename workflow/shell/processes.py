@@ -16,6 +16,7 @@ from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
+from functools import partial
 from queue import SimpleQueue
 from typing import IO, Any
 
@@ -90,10 +91,19 @@ class Workers:
         ``done`` is called whenever one of them says that something is done. Raises what one of them
         raised, once all have answered; :class:`MethodFailed` if one is gone.
         """
+        return self.begin(method, *arguments, done=done)()
+
+    def begin(
+        self, method: str, *arguments: Sequence[Any], done: Done = _unheard
+    ) -> Callable[[], list[Any]]:
+        """Begin with such a call; what is returned waits for the answers, and raises as it does.
+
+        Nothing else may be asked of the workers before.
+        """
         shares = zip(*arguments, strict=True)
         for process, share in zip(self._processes, shares, strict=True):
             process.tell(method, share)
-        return _answers(self._processes, done)
+        return partial(_answers, [_Hearing(process, done) for process in self._processes])
 
 
 @contextmanager
@@ -235,9 +245,8 @@ class _Hearing:
         return self._answer
 
 
-def _answers(processes: list[Process], done: Done = _unheard) -> list[Any]:
+def _answers(hearings: list[_Hearing]) -> list[Any]:
     """An answer from every process; raises the first that is an exception."""
-    hearings = [_Hearing(process, done) for process in processes]
     answers = [hearing.answer() for hearing in hearings]
     for answer in answers:
         if isinstance(answer, Exception):

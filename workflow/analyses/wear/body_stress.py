@@ -8,16 +8,19 @@ there the stress is the mesh's, to which fine tractions differ from nodal forces
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 
 from fe_models.cut_face import WholeStress
+from sa_solver import subsurface
 from sa_solver.subsurface import SubsurfaceStress
 from sa_solver.types import Array, Grid, Mask, Material
 from wear.bulk_stress import SIDE, BodyFace, BulkStress
 from wear.face_loads import FaceLoads
+from wear.life import tension_along
 from wear.sticking import with_sticking_shear
 from wear.tractions import CycleTractions
 from workflow.analyses.wear.case.sections import ContactStress
@@ -38,9 +41,12 @@ class Planes:
         first, share = settings.life.depth, np.linspace(0.0, 1.0, settings.points)
         self.depths: Array = first + (settings.depth - first) * share**2
 
-    def section(self, stress: SubsurfaceStress, traction: Array, depths: Array) -> Array:
-        """Stress ``(6, n, k)`` in the section at ``depths`` under ``traction`` ``(3, nx, ny)``."""
-        return stress.section(traction, "y" if self._along else "x", self.at, depths)
+    def sections(self, wanted: Sequence[tuple[SubsurfaceStress, Array, Array]]) -> list[Array]:
+        """Stress ``(6, n, k)`` in the section of bodies under tractions at depths, each as wanted.
+
+        See :func:`sa_solver.subsurface.sections`.
+        """
+        return subsurface.sections(wanted, "y" if self._along else "x", self.at)
 
     def row(self, values: np.ndarray) -> np.ndarray:
         """Those of the section ``(c, n, 1)`` of values at cells ``(c, nx, ny)``."""
@@ -110,25 +116,50 @@ class StressedBody:
         return self._face.bulk_stress(cycle.loads.loads, cycle.loads.force, moved, expansion)
 
     def history(
-        self, cycle: StressedCycle, bulk: BulkStress | None, depth: float, known: np.ndarray
+        self, cycle: StressedCycle, bulk: BulkStress | None, depth: float, known: Mask
     ) -> Array:
         """Stress ``(t, 6, nx, ny)`` at ``depth``; 0 in increments that are not ``known`` ``(t,)``.
 
         It is 0 outside the body, too. Without a structure it is that of the contact alone.
         """
-        pressed = cycle.tractions.pressure.any(axis=(1, 2))
         stress = np.zeros((len(known), 6, *self._stage.grid.shape))
         if bulk is not None:
             stress += bulk.at(self._stage.transfer.places, depth)
-        for t in np.flatnonzero(known & pressed).tolist():
+        for t in self._acting(cycle, known):
             stress[t] += self._solver.at_depth(cycle.traction(t), depth)
         stress[~known] = 0.0
+        stress[:, :, ~self._below(cycle, depth)] = 0.0
+        return stress
+
+    def tension(
+        self, cycle: StressedCycle, bulk: BulkStress | None, depth: float, known: Mask
+    ) -> Array:
+        """The largest tension along the face ``(nx, ny)`` of that history [MPa], 0 without any."""
+        tension = np.zeros(self._stage.grid.shape)
+        carried = np.zeros((len(known), 3, *tension.shape))
+        if bulk is not None:
+            carried = bulk.along_face(self._stage.transfer.places, depth)
+        acting = self._acting(cycle, known)
+        for t in np.flatnonzero(known).tolist():
+            stress = carried[t]
+            if t in acting:
+                stress = stress + self._solver.along_surface(cycle.traction(t), depth)
+            np.maximum(tension, tension_along(*stress), out=tension)
+        tension[~self._below(cycle, depth)] = 0.0
+        return tension
+
+    def _acting(self, cycle: StressedCycle, known: Mask) -> list[int]:
+        """The increments that are ``known`` in which tractions act."""
+        pressed = cycle.tractions.pressure.any(axis=(1, 2))
+        return np.flatnonzero(known & pressed).tolist()
+
+    def _below(self, cycle: StressedCycle, depth: float) -> Mask:
+        """Which cells ``(nx, ny)`` have the body below them at such a depth."""
         grid = self._stage.grid
         x, y = grid.centres.reshape(2, -1)
         places = np.stack([x, y, np.full_like(x, SIDE[self.number] * depth)], axis=1)
         there = self._there(cycle, places, self._on_face.ravel())
-        stress[:, :, ~there.reshape(grid.shape)] = 0.0
-        return stress
+        return there.reshape(grid.shape)
 
     def _there(self, cycle: StressedCycle, points: Array, on_face: Mask) -> Mask:
         """Which ``points`` ``(n, 3)`` are in the body: below its contact face, or in its mesh.
@@ -146,30 +177,51 @@ class StressedBody:
     def section(
         self, cycle: StressedCycle, bulk: BulkStress | None, planes: Planes, peak: int
     ) -> Array:
-        """Stress ``(6, n, k)`` in the section at peak load; not a number outside the body.
+        """Stress ``(6, n, k)`` in the section at peak load, as of :func:`sections`."""
+        return sections([(self, cycle, bulk)], planes, peak)[0]
 
-        Without a structure it is that of the contact alone. From one element's depth h on it is
-        that of the mesh, and that of half-spaces under what fine tractions have beside nodal
-        forces. Above, what is not the contact's own is as on the face, with its slope there and the
-        value that it has at h.
-        """
-        fine = cycle.traction(peak)
+    def section_parts(
+        self, cycle: StressedCycle, bulk: BulkStress | None, planes: Planes, peak: int
+    ) -> tuple[list[tuple[SubsurfaceStress, Array, Array]], Callable[[list[Array]], Array]]:
+        """What :func:`sections` wants of half-spaces, and what makes the body's stress of that."""
+        fine, solver = cycle.traction(peak), self._solver
         if bulk is None or cycle.fields is None or cycle.loads.force is None:
-            return planes.section(self._solver, fine, planes.depths)
-        face, field = self._stage.face, cycle.fields[self.number - 1]
+            return [(solver, fine, planes.depths)], lambda contact: contact[0]
+        face, field, places = self._stage.face, cycle.fields[self.number - 1], planes.points
         whole = field.body.depth(face.name)
         near, below = np.split(planes.depths, [np.searchsorted(planes.depths, whole)])
         heights = SIDE[self.number] * np.append(whole, below)
-        mesh = field.at(planes.points(heights), face.frame).reshape(6, -1, len(heights))
         nodal = self._stage.transfer.spread(cycle.loads.force[peak])
         row = planes.row(self._stage.transfer.places)
         surface = bulk.increment(peak).at(row, np.append(whole, near))[0]
-        at_whole = mesh[..., :1] - planes.section(self._solver, nodal, np.array([whole]))
-        # Where the mesh ends above that depth, nothing but the face tells.
-        bend = np.nan_to_num(at_whole - surface[..., :1]) * (near / whole) ** 2
-        shallow = planes.section(self._solver, fine, near) + surface[..., 1:] + bend
-        on_face = np.repeat(planes.row(self._on_face[None])[0], len(near), axis=1)
-        places = planes.points(SIDE[self.number] * near)
-        shallow[:, ~self._there(cycle, places, on_face.ravel()).reshape(on_face.shape)] = np.nan
-        deep = planes.section(self._solver, fine - nodal, below) + mesh[..., 1:]
-        return np.concatenate([shallow, deep], axis=2)
+
+        def joined(contact: list[Array]) -> Array:
+            of_nodal, shallow, deep = contact
+            mesh = field.at(places(heights), face.frame).reshape(6, -1, len(heights))
+            # Where the mesh ends above that depth, nothing but the face tells.
+            bend = np.nan_to_num(mesh[..., :1] - of_nodal - surface[..., :1])
+            shallow = shallow + surface[..., 1:] + bend * (near / whole) ** 2
+            on_face = np.repeat(planes.row(self._on_face[None])[0], len(near), axis=1)
+            there = self._there(cycle, places(SIDE[self.number] * near), on_face.ravel())
+            shallow[:, ~there.reshape(on_face.shape)] = np.nan
+            return np.concatenate([shallow, deep + mesh[..., 1:]], axis=2)
+
+        wanted = [(nodal, np.array([whole])), (fine, near), (fine - nodal, below)]
+        return [(solver, *tractions) for tractions in wanted], joined
+
+
+Stressed = tuple[StressedBody, StressedCycle, BulkStress | None]
+"""A body, what is known of the contact over a cycle, and what the structure carries past it."""
+
+
+def sections(stressed: Sequence[Stressed], planes: Planes, peak: int) -> list[Array]:
+    """Stress ``(6, n, k)`` of each in the section at peak load; not a number outside the body.
+
+    Without a structure it is that of the contact alone. From one element's depth h on it is that of
+    the mesh, and that of half-spaces under what fine tractions have beside nodal forces. Above,
+    what is not the contact's own is as on the face, with its slope there and the value that it has
+    at h. What coefficients of influence these have in common they share.
+    """
+    parts = [body.section_parts(cycle, bulk, planes, peak) for body, cycle, bulk in stressed]
+    found = iter(planes.sections([part for tractions, _ in parts for part in tractions]))
+    return [joined([next(found) for _ in tractions]) for tractions, joined in parts]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -14,8 +15,9 @@ from sa_solver.types import Array, ElasticPair, Grid, LoadHistory
 from wear.implicit import ImplicitStepper, SecondOrderStepper
 from wear.interface import InterfaceContact, InterfaceSettings, InterfaceState
 from wear.link import Link
-from wear.steppers import ErrorControl, ExplicitStepper, Stepper
+from wear.steppers import ErrorControl, ExplicitStepper, Stepper, step_errors
 from wear.stepping import WearingContact, WearState
+from wear.tractions import CycleTractions
 from workflow.analyses.wear.case.base import ContactTerms, WearCase
 from workflow.analyses.wear.case.sections import ContactStress, Duration
 from workflow.analyses.wear.contact_loops import WornLoop, worn_loop
@@ -23,6 +25,18 @@ from workflow.analyses.wear.load_source import ContactFace
 from workflow.errors import UserError
 
 WearStepper = Stepper[WearState, WearingContact]
+
+
+@dataclass(frozen=True)
+class ContactEnd:
+    """A cycle on the surfaces that a run ends with.
+
+    Its ``tractions``, and the ``pressure_of_companion`` ``(t, nx, ny)`` [MPa] on the surfaces that
+    steps of twice the length leave; None where nothing is told by that.
+    """
+
+    tractions: CycleTractions
+    pressure_of_companion: Array | None
 
 
 class ContactStage(InterfaceContact):
@@ -67,6 +81,20 @@ class ContactStage(InterfaceContact):
         surfaces = state.surfaces
         to_1 = self.transfer_of(1)
         return to_1.to_nodes(surfaces.depth_1), self.transfer.to_nodes(surfaces.depth_2)
+
+    def seen(self, state: InterfaceState, increment: int) -> InterfaceState:
+        """What :meth:`fields` of an increment need of a state: a tenth where slips are given."""
+        if self.settings.method == "full":
+            return state
+        starts = {t: start for t, start in state.starts.items() if t == increment}
+        return replace(state, starts=starts, coarse=None)
+
+    def end(self, state: InterfaceState) -> ContactEnd:
+        """A cycle on the surfaces of a state that a run ends with."""
+        companion, pressure = state.coarse, None
+        if step_errors(state, self.areas) is not None and isinstance(companion, InterfaceState):
+            pressure = self.tractions(companion).pressure
+        return ContactEnd(self.tractions(state), pressure)
 
     def loop(self, state: InterfaceState, peak: int) -> WornLoop:
         """The tangential loop that the case asks for, on the present surfaces."""

@@ -19,11 +19,17 @@ from fe_models.elasticity import von_mises
 from sa_solver.subsurface import COMPONENTS
 from sa_solver.threads import at_once
 from sa_solver.ties import first_largest
-from sa_solver.types import Array, Material, Progress, Tally
+from sa_solver.types import Array, Mask, Material, Progress, Tally
 from wear.bulk_stress import BulkStress
-from wear.life import Ruiz, findley, ruiz, smith_watson_topper
+from wear.life import Ruiz, findley, smith_watson_topper
 from wear.tractions import CycleTractions
-from workflow.analyses.wear.body_stress import Planes, StressedBody, StressedCycle
+from workflow.analyses.wear.body_stress import (
+    Planes,
+    Stressed,
+    StressedBody,
+    StressedCycle,
+    sections,
+)
 from workflow.analyses.wear.case.base import ContactTerms, WearCase
 from workflow.analyses.wear.case.sections import ContactStress, Life
 from workflow.analyses.wear.contact_stage import ContactStage
@@ -218,37 +224,55 @@ def _interface_stress(
     planes = Planes(case.stress, stage.grid)
     terms = case.terms(stage.name)
     bodies = [StressedBody(stage, terms.materials[n - 1], n) for n in terms.strained]
+    stressed = [[(body, cycle, body.bulk(cycle)) for body in bodies] for cycle in cycles]
+    drawn = _drawn(case.stress, stressed, planes, peak)
     moments = {
-        moment: _moment(case.stress, peak, planes, bodies, cycle, done)
-        for moment, cycle in zip(MOMENTS, cycles, strict=True)
+        moment: _moment(case.stress.life, bodies_then, sections_then, done)
+        for moment, bodies_then, sections_then in zip(MOMENTS, stressed, drawn, strict=True)
     }
     convolutions = sum(body.convolutions for body in bodies)
     return InterfaceStress(stage.name, case, terms, planes, moments, convolutions)
 
 
+def _drawn(
+    settings: ContactStress, stressed: Sequence[Sequence[Stressed]], planes: Planes, peak: int
+) -> list[list[Array | None]]:
+    """Sections of all bodies by moment, None where none is asked for."""
+    if settings.section == "none":
+        return [[None for _ in bodies] for bodies in stressed]
+    found = iter(sections([one for bodies in stressed for one in bodies], planes, peak))
+    return [[next(found) for _ in bodies] for bodies in stressed]
+
+
 def _moment(
-    settings: ContactStress,
-    peak: int,
-    planes: Planes,
-    bodies: Sequence[StressedBody],
-    cycle: StressedCycle,
+    life: Life,
+    stressed: Sequence[Stressed],
+    drawn: Sequence[Array | None],
     done: Callable[[], None],
 ) -> ContactMoment:
-    known = cycle.tractions.unknown <= STUCK_SHARE
-    bulks = [body.bulk(cycle) for body in bodies]
+    cycle = stressed[0][1].tractions
+    known = cycle.unknown <= STUCK_SHARE
     stresses: dict[Literal[1, 2], BodyStress] = {}
-    for body, bulk in zip(bodies, bulks, strict=True):
-        section, maps = None, {}
-        if settings.section != "none":
-            section = body.section(cycle, bulk, planes, peak)
-        if settings.life.parameter != "none" and known.any():
-            history = body.history(cycle, bulk, settings.life.depth, known)
-            told = cycle.tractions, known, bulk is not None
-            maps = life_maps(settings.life, history, body.material, *told)
-        stresses[body.number] = BodyStress(section, maps)
+    for one, section in zip(stressed, drawn, strict=True):
+        mapped = life.parameter != "none" and known.any()
+        stresses[one[0].number] = BodyStress(section, life_maps(life, one, known) if mapped else {})
         done()
-    carried = tuple(filter(None, bulks))
+    carried = tuple(bulk for *_, bulk in stressed if bulk is not None)
     return ContactMoment(stresses, carried, np.flatnonzero(~known))
+
+
+def life_maps(life: Life, stressed: Stressed, known: Mask) -> dict[str, Dataset]:
+    """Maps of the parameter and of what it is made of, at the critical distance, by name.
+
+    Stress is that of the ``known`` ``(t,)`` increments, of all cycles of a mix together; friction
+    work that of all increments in a mean cycle.
+    """
+    body, cycle, bulk = stressed
+    if life.parameter == "ruiz":
+        tension = body.tension(cycle, bulk, life.depth, known)
+        return ruiz_maps(Ruiz(mean_work(cycle.tractions), tension), bulk is not None)
+    history = body.history(cycle, bulk, life.depth, known)[known]
+    return plane_maps(life, history, body.material, bulk is not None)
 
 
 def _whose(bulk: bool) -> str:
@@ -266,30 +290,22 @@ def _section(stress: Array, bulk: bool) -> dict[str, Dataset]:
     }
 
 
-def life_maps(
-    life: Life,
-    history: Array,
-    material: Material,
-    cycle: CycleTractions,
-    known: np.ndarray,
-    bulk: bool,
-) -> dict[str, Dataset]:
-    """Maps of the parameter and of what it is made of, at the critical distance, by name.
+def mean_work(cycle: CycleTractions) -> Array:
+    """Friction work per area of all increments in a mean cycle ``(nx, ny)`` [N/mm]."""
+    return np.tensordot(cycle.loads.share, cycle.work, 1)
 
-    Stress is the ``history`` ``(t, 6, nx, ny)`` of the ``known`` ``(t,)`` increments, 0 in others,
-    of all cycles of a mix together, with or without ``bulk`` stress; friction work that of all
-    increments in a mean cycle.
+
+def plane_maps(life: Life, history: Array, material: Material, bulk: bool) -> dict[str, Dataset]:
+    """Maps of a parameter of critical planes from a stress ``history`` ``(t, 6, nx, ny)``.
+
+    With or without ``bulk`` stress in it.
     """
-    if life.parameter == "ruiz":
-        # Without stress, an increment adds its work and leaves the largest tension as it is.
-        work = np.tensordot(cycle.loads.share, cycle.work, 1)
-        return _ruiz_maps(ruiz(history, work), bulk)
     if life.parameter == "findley":
-        plane = findley(history[known], life.sensitivity)
+        plane = findley(history, life.sensitivity)
         what = "shear stress amplitude plus k largest normal stress, worst plane"
         amplitude = "shear_amplitude", "MPa", "amplitude of the shear stress on the worst plane"
     else:
-        plane = smith_watson_topper(history[known], material)
+        plane = smith_watson_topper(history, material)
         what = "largest normal stress times strain amplitude, worst plane"
         amplitude = "strain_amplitude", "1", "amplitude of the normal strain on the worst plane"
     name, unit, of_amplitude = amplitude
@@ -303,7 +319,8 @@ def life_maps(
     }
 
 
-def _ruiz_maps(parameters: Ruiz, bulk: bool) -> dict[str, Dataset]:
+def ruiz_maps(parameters: Ruiz, bulk: bool) -> dict[str, Dataset]:
+    """Maps of Ruiz's parameters, with or without ``bulk`` stress in the tension."""
     work = "Ruiz's F1: a quarter of the friction work of a cycle per area"
     tension = f"largest tension along the surface over a cycle, {_whose(bulk)}"
     cracking = "Ruiz's F2: F1 times tension"

@@ -12,11 +12,11 @@ from wear.contacts import Contacts
 from wear.coupled import CoupledState
 from wear.face_loads import FaceLoads
 from wear.interface import FirstContact, InterfaceState
-from wear.tractions import ContactFields, CycleTractions
+from wear.tractions import ContactFields
 from wear.worn import Spent
 from workflow.analyses.wear.case.base import WearCase
 from workflow.analyses.wear.contact_loops import WornLoop
-from workflow.analyses.wear.contact_stage import ContactStage
+from workflow.analyses.wear.contact_stage import ContactEnd, ContactStage
 from workflow.analyses.wear.heard import Heard
 from workflow.analyses.wear.load_source import ContactFace
 from workflow.shell.processes import Done, Workers, workers
@@ -67,15 +67,17 @@ class StagedContacts(Heard, Contacts):
 
     def fields(self, states: Sequence[InterfaceState], increment: int) -> list[ContactFields]:
         """Tractions and slip of an increment on the present surfaces."""
-        return self.call("fields", states, self.each(increment))
+        pairs = zip(self.stages, states, strict=True)
+        seen = [stage.seen(state, increment) for stage, state in pairs]
+        return self.call("fields", seen, self.each(increment))
 
     def loops(self, states: Sequence[InterfaceState], increment: int) -> list[WornLoop]:
         """Tangential loops on the present surfaces, under the loads of an increment."""
         return self.call("loop", states, self.each(increment))
 
-    def tractions(self, states: Sequence[InterfaceState]) -> list[CycleTractions]:
-        """Tractions of a cycle on the present surfaces."""
-        return self.call("tractions", states)
+    def ends(self, states: Sequence[InterfaceState]) -> Callable[[], list[ContactEnd]]:
+        """What tells the cycle on the surfaces at the end; they may find it while others work."""
+        return partial(self.call, "end", states)
 
 
 class ContactProcesses(StagedContacts):
@@ -100,6 +102,9 @@ class ContactProcesses(StagedContacts):
 
     def call(self, method: str, *arguments: Sequence[Any]) -> list[Any]:
         return self._team.call(method, *arguments)
+
+    def ends(self, states: Sequence[InterfaceState]) -> Callable[[], list[ContactEnd]]:
+        return self._team.begin("end", states)
 
     def _counted(self, method: str, *arguments: Sequence[Any]) -> list[Any]:
         """What they answer; the next jump is expected to take as many increments as this did."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -15,7 +16,7 @@ from wear.kinetics import LinearRegime, linear_regime
 from wear.steppers import step_errors
 from wear.tractions import CycleTractions, increments_error
 from workflow.analyses.wear.case.base import WearCase
-from workflow.analyses.wear.contact_stage import ContactStage
+from workflow.analyses.wear.contact_stage import ContactEnd, ContactStage
 from workflow.analyses.wear.load_source import LoadSource
 
 # Order of the pressure at worn edges in the length of steps that go over increments to and fro: 4,
@@ -28,16 +29,16 @@ AT_EDGES = 1.5
 class InterfaceOutcome:
     """What a wear run found of one contact.
 
-    ``unworn`` are its loads before wear and ``first`` the contact of that cycle; ``state`` and
-    ``worn`` are its surfaces at the end and the tractions of a cycle on them, None where no stress
-    is asked for. ``kinetics`` ``(j, 5)`` are those at ``cycles`` ``(j,)``.
+    ``unworn`` are its loads before wear and ``first`` the contact of that cycle; ``state`` has its
+    surfaces at the end, and ``told`` tells a cycle on them. ``kinetics`` ``(j, 5)`` are those at
+    ``cycles`` ``(j,)``.
     """
 
     stage: ContactStage
     unworn: FaceLoads
     first: FirstContact
     state: InterfaceState
-    worn: CycleTractions | None
+    told: Callable[[], ContactEnd]
     cycles: Array
     kinetics: Array
 
@@ -86,11 +87,11 @@ class InterfaceOutcome:
         over the largest pressure: over 2^p - 1, p being :data:`AT_EDGES`, but for increments that
         wear in turn. Next to worn edges of surfaces that move over each other it has no order.
         """
-        left, companion = step_errors(self.state, self.stage.areas), self.state.coarse
-        if left is None or not isinstance(companion, InterfaceState):
+        left, other = step_errors(self.state, self.stage.areas), self.ended.pressure_of_companion
+        if left is None or other is None:
             return None
         pressure = self.end.pressure
-        change = np.abs(pressure - self.stage.tractions(companion).pressure)
+        change = np.abs(pressure - other)
         in_turn = len(self.state.paths) > 0 or self.state.order == 1.0
         share = 1.0 if in_turn else 1.0 / (2.0**AT_EDGES - 1.0)
         return left | {"pressure": share * float(change.max() / pressure.max())}
@@ -107,8 +108,13 @@ class InterfaceOutcome:
 
     @cached_property
     def end(self) -> CycleTractions:
-        """The tractions of a cycle at the end, of whatever is asked for."""
-        return self.stage.tractions(self.state) if self.worn is None else self.worn
+        """The tractions of a cycle at the end."""
+        return self.ended.tractions
+
+    @cached_property
+    def ended(self) -> ContactEnd:
+        """A cycle at the end, waited for."""
+        return self.told()
 
 
 @dataclass(frozen=True)

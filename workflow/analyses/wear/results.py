@@ -14,7 +14,7 @@ from wear.contacts import KINETICS
 from wear.kinetics import LinearRegime
 from workflow.analyses.contact.datasets import LOADS, pressure_field, traction_fields
 from workflow.analyses.wear.body_stress import StressedCycle, with_known_shear
-from workflow.analyses.wear.budget.finding import error_budget, lives_of_companions
+from workflow.analyses.wear.budget.finding import Begun, error_budget
 from workflow.analyses.wear.budget.report import Budget, datasets_of, sentences, summary_of
 from workflow.analyses.wear.case.base import WearCase
 from workflow.analyses.wear.comparison import comparison_summary, write_comparison
@@ -79,11 +79,13 @@ class PeakHistory:
         return {"peak_pressure": pressures, "contact_width": widths, "area": self.area[-1]}
 
 
-def write_output(outcome: Outcome, run: Run[WearCase]) -> None:
-    """Write all files of a finished run; the summary comes last and marks it as finished."""
+def write_output(outcome: Outcome, lives: Begun, run: Run[WearCase]) -> None:
+    """Write all files of a finished run; the summary comes last and marks it as finished.
+
+    ``lives`` are those of companions, which have begun already.
+    """
     case, source, state = outcome.case, outcome.source, outcome.state
     folder, reporter = run.folder, run.reporter
-    lives = lives_of_companions(outcome, reporter, run.beside)
     stages = [contact.stage for contact in outcome.interfaces]
     structure = None
     if isinstance(source, StructureStage):

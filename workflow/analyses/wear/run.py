@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from contextlib import ExitStack
+from functools import cache, partial
+from threading import Lock
 
 from fe_models.blas_threads import one_thread
 from fe_models.mesh import MeshError
@@ -11,11 +14,11 @@ from wear.coupled import CoupledSettings, CoupledState, CoupledWear, JumpSize, S
 from wear.face_loads import FaceLoads
 from wear.interface import FirstContact, MotionError
 from wear.stepping import ContactFailure
-from wear.tractions import CycleTractions
 from workflow.analyses.wear import checkpoint
+from workflow.analyses.wear.budget.finding import Begun, lives_of_companions
 from workflow.analyses.wear.case.base import WearCase
 from workflow.analyses.wear.choice import report_choice
-from workflow.analyses.wear.contact_stage import ContactStage
+from workflow.analyses.wear.contact_stage import ContactEnd, ContactStage
 from workflow.analyses.wear.contact_workers import (
     ContactProcesses,
     StagedContacts,
@@ -51,9 +54,10 @@ def run_wear(run: Run[WearCase]) -> None:
     folder = run.folder
     report_choice(run.choice, run.reporter, again=run.resume)
     try:
-        outcome = _compute(run)
-        with one_thread():
-            write_output(outcome, run)
+        with ExitStack() as working:
+            outcome, lives = _compute(run, working)
+            with one_thread():
+                write_output(outcome, lives, run)
     except (ContactFailure, NormalContactError, MethodFailed) as error:
         remedy = f"; the state is kept, see `{folder.resume_command}`"
         raise MethodFailed(f"{error}{remedy if folder.checkpoint.exists() else ''}") from error
@@ -67,8 +71,12 @@ def run_wear(run: Run[WearCase]) -> None:
         raise UserError(f"{folder.case}: structure: {error}") from error
 
 
-def _compute(run: Run[WearCase]) -> Outcome:
-    """The run up to its end, without its files."""
+def _compute(run: Run[WearCase], working: ExitStack) -> tuple[Outcome, Begun]:
+    """The run up to its end, without its files; and the lives of companions beside it.
+
+    What its contacts find last they may find while the structure is stressed, ``working`` until
+    they have told.
+    """
     case, reporter = run.case, run.reporter
     # First, so that a state that cannot be gone on from is told before anything is computed.
     kept = checkpoint.restored(run, run.kept) if run.kept else None
@@ -76,29 +84,47 @@ def _compute(run: Run[WearCase]) -> Outcome:
         reporter.warn(doubt)
     source = structure_of(case).source(case)
     faces = meshed_faces(case, source, reporter)
-    with contact_workers(case, faces if _worn_apart(case, source) else ()) as workers:
-        with heard_stage(reporter, source, "condensation", "steps"):
-            source.prepare()
-        with one_thread():
-            with heard_stage(reporter, source, "structural friction", "increments"):
-                unworn = source.unworn()
-            if isinstance(source, StructureStage):
-                _check_structure(case, source, reporter)
-            if isinstance(source, ResultantsSource):
-                warn_of_file(source, reporter)
-            with reporter.stage("contact set-up"):
-                contacts = _contacts(case, source, faces, workers)
-            state, first = _march(run, source, contacts, unworn, kept)
-            worn: Sequence[CycleTractions | None] = contacts.each(None)
-            if case.stress.wanted:
-                with reporter.stage("stress under the contacts"):
-                    worn = contacts.tractions(state.interfaces)
-    columns = contacts.stages, unworn, first, state.interfaces, worn
+    workers = working.enter_context(
+        contact_workers(case, faces if _worn_apart(case, source) else ())
+    )
+    with heard_stage(reporter, source, "condensation", "steps"):
+        source.prepare()
+    lives = lives_of_companions(case, source, reporter, run.beside)
+    with one_thread():
+        with heard_stage(reporter, source, "structural friction", "increments"):
+            unworn = source.unworn()
+        if isinstance(source, StructureStage):
+            _check_structure(case, source, reporter)
+        if isinstance(source, ResultantsSource):
+            warn_of_file(source, reporter)
+        with reporter.stage("contact set-up"):
+            contacts = _contacts(case, source, faces, workers)
+        state, first = _march(run, source, contacts, unworn, kept)
+        ends = _told_once(contacts.ends(state.interfaces), working, len(faces))
+    columns = contacts.stages, unworn, first, state.interfaces, ends
     interfaces = [
         InterfaceOutcome(*column, state.cycles, state.kinetics[:, number])
         for number, column in enumerate(zip(*columns, strict=True))
     ]
-    return Outcome(case, source, state, interfaces)
+    return Outcome(case, source, state, interfaces), lives
+
+
+def _told_once(
+    answers: Callable[[], list[ContactEnd]], working: ExitStack, contacts: int
+) -> list[Callable[[], ContactEnd]]:
+    """What tells each of the ends, whatever threads ask; with the first they are all told."""
+
+    @cache
+    def told() -> list[ContactEnd]:
+        with working:  # until then
+            return answers()
+
+    def tell(number: int) -> ContactEnd:
+        with asking:
+            return told()[number]
+
+    asking = Lock()
+    return [partial(tell, number) for number in range(contacts)]
 
 
 def _contacts(

@@ -89,34 +89,31 @@ class Companions(Generic[AnyWearCase]):
         self,
         source: LoadSource | None,
         source_of: Callable[[AnyWearCase], LoadSource],
-        followed: Array,
         failed: Callable[[str, Exception], None],
         progress: Progress = unseen,
-    ) -> dict[str, Worn]:
+    ) -> tuple[dict[str, Worn], float]:
         """Relative errors of what is worn and of pressures: by how much the run tells too much.
 
-        What ``mesh``, ``grid`` and ``link`` leave, and under ``coupling`` loads that follow wear
-        after such shares of all cycles as ``followed`` has. ``source`` is that of the case itself,
-        not needed where another structure is in its place.
+        What ``mesh``, ``grid`` and ``link`` leave, and under ``coupling`` loads that do not follow
+        wear at all, of which those that do it late have the share :func:`late`. How fast these come
+        to rest is returned beside. ``source`` is that of the case itself, not needed where another
+        structure is in its place.
         Parts of which a life fails are left out and given to ``failed``; ``progress`` is told how
         many have been lived, that of ``own`` first. Raises :data:`LIFE_FAILURES` where that fails.
         """
-        errors, parts = {}, self._parts(source, source_of, followed)
+        errors, (parts, following) = {}, self._parts(source, source_of)
         for lived, (part, told) in enumerate(parts.items(), 1):
             progress(lived, 1 + len(parts))
             try:
                 errors[part] = told()
             except LIFE_FAILURES as error:
                 failed(part, error)
-        return errors
+        return errors, _rest(following()) if "coupling" in errors else 0.0
 
     def _parts(
-        self,
-        source: LoadSource | None,
-        source_of: Callable[[AnyWearCase], LoadSource],
-        followed: Array,
-    ) -> dict[str, Callable[[], Worn]]:
-        """What tells each part, once ``own`` has lived."""
+        self, source: LoadSource | None, source_of: Callable[[AnyWearCase], LoadSource]
+    ) -> tuple[dict[str, Callable[[], Worn]], Callable[[], Lived]]:
+        """What tells each part, once ``own`` has lived; and its life under loads that follow."""
         shared = source if source is not None and self.same else source_of(self.own)
         # Where loads follow wear, what the mesh makes of it counts as well.
         follows = self.own.recoupling.resultants != "constant"
@@ -128,6 +125,10 @@ class Companions(Generic[AnyWearCase]):
         def apart() -> Worn:
             """Under unworn loads, which are enough for what the contacts alone make of them."""
             return _worn(live(self.own, shared, "constant", life)) if follows else own
+
+        @cache
+        def following() -> Lived:
+            return life if follows else live(self.own, shared, "every", life)
 
         parts = dict[str, Callable[[], Worn]]()
         if (finer := self.finer) is not None:
@@ -141,22 +142,17 @@ class Companions(Generic[AnyWearCase]):
         if (linked := self.linked) is not None:
             parts["link"] = lambda: _apart(apart(), _worn(live(linked, shared)), 1.0)
         if self.coupled and follows:
-            parts["coupling"] = lambda: _apart(own, apart(), -late(_rest(life), followed))
+            parts["coupling"] = lambda: _apart(own, apart(), -1.0)
         elif self.coupled:
-            parts["coupling"] = lambda: self._followed(life, shared, followed)
-        return parts
+            parts["coupling"] = lambda: _apart(own, _worn(following()), 1.0)
+        return parts, following
 
     def _of_grids(self, errors: Worn) -> Worn:
         """Errors of ``contact.grid`` as those of each contact's own."""
         return {
-            name: {key: error * self.finer_cells.get(name, 1.0) for key, error in numbers.items()}
+            name: scaled({name: numbers}, self.finer_cells.get(name, 1.0))[name]
             for name, numbers in errors.items()
         }
-
-    def _followed(self, life: Lived, source: LoadSource, followed: Array) -> Worn:
-        """What would change of a ``life`` under unworn loads if these followed wear."""
-        other = live(self.own, source, "every", life)
-        return _apart(_worn(life), _worn(other), late(_rest(other), followed))
 
 
 def late(rest: float, followed: Array) -> float:
@@ -232,6 +228,14 @@ def _apart(own: Worn, other: Worn, share: float) -> Worn:
             for key, value in numbers.items()
         }
         for name, numbers in own.items()
+    }
+
+
+def scaled(errors: Worn, share: float) -> Worn:
+    """A share of errors."""
+    return {
+        name: {key: share * error for key, error in numbers.items()}
+        for name, numbers in errors.items()
     }
 
 

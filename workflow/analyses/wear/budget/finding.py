@@ -10,7 +10,7 @@ import numpy as np
 
 from sa_solver.threads import at_once
 from sa_solver.types import Array, Progress, unseen
-from workflow.analyses.wear.budget.companions import Companions
+from workflow.analyses.wear.budget.companions import Companions, late, scaled
 from workflow.analyses.wear.budget.lives import LIFE_FAILURES, Worn
 from workflow.analyses.wear.budget.parts import Errors, errors_of
 from workflow.analyses.wear.case.base import WearCase
@@ -22,8 +22,8 @@ from workflow.shell.processes import Beside
 from workflow.shell.reporter import Reporter
 
 Lives = dict[str, Worn]  # by part
-Told = tuple[Lives, list[tuple[str, str]]]  # and the parts that failed, with why
-Begun = Callable[[Progress], Lives]
+Told = tuple[Lives, float, list[tuple[str, str]]]  # how fast loads rest, parts that failed and why
+Begun = Callable[[Array, Progress], Lives]
 
 
 def error_budget(outcome: Outcome, reporter: Reporter, begun: Begun) -> dict[str, Errors]:
@@ -32,10 +32,9 @@ def error_budget(outcome: Outcome, reporter: Reporter, begun: Begun) -> dict[str
     ``begun`` are the lives of companions.
     """
     with reporter.stage("error budget", "short lives") as progress:
-        lives = begun(progress)
+        lives = begun(followed(outcome), progress)
         names = [contact.stage.name for contact in outcome.interfaces]
         probed = [{part: by_name[name] for part, by_name in lives.items()} for name in names]
-        # Each solves the last cycle again, on the surfaces of other steps.
         errors = at_once(
             [
                 partial(errors_of, outcome.case, contact, outcome.source.peak, told)
@@ -45,35 +44,38 @@ def error_budget(outcome: Outcome, reporter: Reporter, begun: Begun) -> dict[str
         return dict(zip(names, errors, strict=True))
 
 
-def lives_of_companions(outcome: Outcome, reporter: Reporter, beside: Beside) -> Begun:
-    """What companions tell; nothing where none are asked for, or of parts that fail.
+def lives_of_companions(
+    case: WearCase, source: LoadSource, reporter: Reporter, beside: Beside
+) -> Begun:
+    """What companions tell, once it is known when loads followed wear (see :func:`followed`).
 
-    They begin to live at once, in a process beside this one, unless that would need a copy of a
-    large structure: then when they are asked.
+    Nothing where none are asked for, or of parts that fail. They begin to live at once, in a
+    process beside this one, unless that would need a copy of a large structure: then when they are
+    asked.
     """
-    case, source = outcome.case, outcome.source
     if case.error_budget == "known" or case.contact.method == "nodes":
-        return lambda _: {}
+        return lambda *_: {}
     companions: Companions[Any] = Companions.of(case, structure_of(case).finer(case), source.line)
 
-    def heard(told: Told) -> Lives:
-        lives, failures = told
+    def heard(told: Told, shares: Array) -> Lives:
+        lives, rest, failures = told
         for part, error in failures:
             reporter.log(f"error budget: {part} unknown, a short life failed: {error}")
+        if "coupling" in lives:
+            lives["coupling"] = scaled(lives["coupling"], late(rest, shares))
         return lives
 
-    of = case, companions, source if companions.same else None, followed(outcome)
+    of = case, companions, source if companions.same else None
     if companions.same and not (source.line and isinstance(source, StructureStage)):
-        return lambda progress: heard(_lived(*of, progress))
+        return lambda shares, progress: heard(_lived(*of, progress), shares)
     answer = beside.begin(_lived, *of)
-    return lambda _: heard(answer())
+    return lambda shares, _: heard(answer(), shares)
 
 
 def _lived(
     case: WearCase,
     companions: Companions[Any],
     source: LoadSource | None,
-    followed: Array,
     progress: Progress = unseen,
 ) -> Told:
     """What companions tell of a case, whose own ``source`` those have that live on it."""
@@ -84,10 +86,10 @@ def _lived(
 
     try:
         source_of = structure_of(case).source
-        return companions.errors(source, source_of, followed, failed, progress), failures
+        return *companions.errors(source, source_of, failed, progress), failures
     except LIFE_FAILURES as error:
         failed("mesh, grid and coupling", error)
-        return {}, failures
+        return {}, 0.0, failures
 
 
 def followed(outcome: Outcome) -> Array:
