@@ -21,9 +21,9 @@ from sa_solver.types import Array, Indices
 Spectrum = NDArray[np.complex128]
 Spectra = NDArray[np.complex128]
 
-PAYS = 100_000_000
+PAYS = 150_000_000
 """Numbers after which a process turns to compiled loops. Numpy has then lost as much time, at 3 to
-6 ns each, as loading the compiler and its loops takes."""
+4 ns each in whole runs, as loading the compiler and its loops takes: half a second."""
 
 CALL = 3_000
 """Numbers that a call counts for besides its own: 10 to 20 us, however few those are."""
