@@ -19,10 +19,14 @@ from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
-from scipy.linalg.blas import dsymv
+from numpy.typing import NDArray
+from scipy.linalg.blas import dsymv, ssymv
 from scipy.spatial import cKDTree
 
 from sa_solver.types import Array, Indices
+
+# Of double or single precision.
+Matrix = NDArray[np.float64] | NDArray[np.float32]
 
 # Nodes are each other's mirror images when they are within this share of the body's size: meshes
 # built as mirror images are so to rounding.
@@ -103,7 +107,7 @@ class SplitMatrix:
     """The symmetric matrix ``(n, n)`` Q₊ A₊ Q₊ᵀ + Q₋ A₋ Q₋ᵀ of dense ``blocks`` A₊ and A₋."""
 
     mirror: Mirror
-    blocks: tuple[Array, Array]
+    blocks: tuple[Matrix, Matrix]
 
     def __len__(self) -> int:
         return len(self.mirror.partner)
@@ -117,16 +121,23 @@ class SplitMatrix:
     def __array__(self, dtype: Any = None, copy: bool | None = None) -> Array:
         return np.asarray(self @ np.eye(len(self)), dtype)
 
+    def in_single_precision(self) -> SplitMatrix:
+        """The matrix with its blocks rounded, which takes half the memory."""
+        symmetric, antisymmetric = (block.astype(np.float32) for block in self.blocks)
+        return SplitMatrix(self.mirror, (symmetric, antisymmetric))
 
-def symmetric_product(matrix: Array, vectors: Array) -> Array:
+
+def symmetric_product(matrix: Matrix, vectors: Array) -> Array:
     """A symmetric ``matrix`` ``(n, n)`` times ``vectors`` ``(n,)`` or ``(n, m)``.
 
-    Of a large one, a product waits for memory: for one vector half of the matrix is read.
+    Of a large one, a product waits for memory: for one vector half of the matrix is read. One of
+    single precision has such products.
     """
     if vectors.ndim == 2:
-        return matrix @ vectors
+        return np.asarray(matrix @ vectors)
     by_columns = matrix if matrix.flags.f_contiguous else matrix.T
-    return np.asarray(dsymv(1.0, by_columns, vectors))
+    product = ssymv if matrix.dtype == np.float32 else dsymv
+    return np.asarray(product(1.0, by_columns, vectors))
 
 
 def mirror_of_nodes(nodes: Array, axes: tuple[int, ...], axis: int) -> Mirror | None:
