@@ -101,8 +101,9 @@ class ElasticBody:
     def stiffness(self) -> sp.csr_matrix:
         """Stiffness matrix ``(size, size)`` [N/mm].
 
-        Its blocks of two nodes are λ F + G Fᵀ + G tr(F) with F_ab = ∫ ∂a φi ∂b φj, which are summed
-        over the elements at once: three times faster than form by form, thirty than the vector form.
+        Its blocks of two nodes are λ F + G Fᵀ + G tr(F) with F_ab = ∫ ∂a φi ∂b φj. Summing these
+        pair by pair of nodes takes a third of the time of scikit-fem's scalar forms, and these a
+        tenth of that of its vector form.
         Whatever the shape of the elements, it has entries between all components of their nodes.
         """
         sums, d = _NodePairs(self.element_nodes), self.dimension
