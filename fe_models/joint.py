@@ -252,21 +252,35 @@ def _joined(faces: _Faces, projection: sp.csr_matrix | None) -> tuple[Array, Arr
         carried = coupling @ projection
         if between is not None:
             carried = carried + projection.T @ between
-    factor = sl.cholesky(stiffness_1 + carried, lower=True, overwrite_a=True)
+    factor = sl.cholesky(_by_columns(stiffness_1 + carried), lower=True, overwrite_a=True)
     # K C⁻¹ Kᵀ = XᵀX with X = L⁻¹ Kᵀ: half the work of solving with both factors.
     half = sl.solve_triangular(factor, coupling, lower=True, check_finite=False)
-    stiffness = stiffness_2 - half.T @ half
+    stiffness = half.T @ half
+    np.subtract(stiffness_2, stiffness, out=stiffness)
     loads = half.T @ sl.solve_triangular(factor, loads_1 + transferred, lower=True) - loads_2
     return stiffness, loads
 
 
+def _by_columns(symmetric: Matrix) -> Matrix:
+    """The same matrix as LAPACK takes it without a copy."""
+    return symmetric if symmetric.flags.f_contiguous else symmetric.T
+
+
+def _shifted(stiffness: Matrix, shift: float) -> Array:
+    """H + shift, by columns."""
+    shifted = np.array(_by_columns(stiffness), np.float64, order="K")
+    shifted[np.diag_indices_from(shifted)] += shift
+    return shifted
+
+
 def _shifted_inverse(stiffness: Matrix, rho: float) -> Array:
     """(H + ρ)⁻¹, symmetric to the last bit."""
-    shifted = stiffness.copy()
-    shifted[np.diag_indices_from(shifted)] += rho
-    factor = sl.cholesky(shifted, lower=True, overwrite_a=True, check_finite=False)
-    inverse, _ = sl.lapack.dpotri(factor, lower=1, overwrite_c=1)
-    return np.asarray(np.tril(inverse) + np.tril(inverse, -1).T)
+    factor = sl.cholesky(_shifted(stiffness, rho), lower=True, overwrite_a=True, check_finite=False)
+    # Nothing is above the diagonal of either.
+    lower, _ = sl.lapack.dpotri(factor, lower=1, overwrite_c=1)
+    inverse = lower + lower.T
+    inverse[np.diag_indices_from(inverse)] = np.diag(lower)
+    return np.asarray(inverse)
 
 
 def _spectrum(stiffness: Array, free: int) -> tuple[int, float, float]:
@@ -282,9 +296,7 @@ def _spectrum(stiffness: Array, free: int) -> tuple[int, float, float]:
     with one_thread(len(stiffness)):
         (largest,) = extreme(product, 1)
     shift = SPECTRUM_SHIFT * largest
-    shifted = stiffness.copy()
-    shifted[np.diag_indices_from(shifted)] += shift
-    factors = sl.cho_factor(shifted, lower=True, overwrite_a=True)
+    factors = sl.cho_factor(_shifted(stiffness, shift), lower=True, overwrite_a=True)
     inverse = LinearOperator(
         stiffness.shape,
         matvec=lambda v: sl.cho_solve(factors, v, check_finite=False),

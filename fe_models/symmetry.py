@@ -114,8 +114,9 @@ class SplitMatrix:
 
     def __matmul__(self, vectors: Array) -> Array:
         basis, transposed = self.mirror.basis
-        parts = np.split(transposed @ vectors, [len(self.blocks[0])])
-        images = [symmetric_product(*pair) for pair in zip(self.blocks, parts, strict=True)]
+        parts, symmetric = transposed @ vectors, len(self.blocks[0])
+        pairs = zip(self.blocks, (parts[:symmetric], parts[symmetric:]), strict=True)
+        images = [symmetric_product(*pair) for pair in pairs]
         return np.asarray(basis @ np.concatenate(images))
 
     def __array__(self, dtype: Any = None, copy: bool | None = None) -> Array:
