@@ -131,13 +131,13 @@ class FrictionalContact:
         """
         known = start or ContactStart()
         if not self.half_space.pair.similar:
-            return self._together(before, height, load, known.together)
+            return self._together(before, height, load, known)
         normal = self._press(before, height, load, known.normal)
         limit = self.friction * normal.pressure
         offset, area = self.offset(before, load), self.grid.cell_area
         sliding = self._slides(limit, load)
         if sliding:
-            tangential, creeps = self._slide(before, limit, offset, load)
+            tangential, creeps = self._slide(before, limit, offset, load, known)
             held = self._held(before, limit, offset, load) if creeps else None
             tangential, sliding = (tangential, True) if held is None else (held, False)
         elif self.two_normal_problems(before, load) and abs(load.values[1]) < limit.sum() * area:
@@ -145,8 +145,8 @@ class FrictionalContact:
                 self.normal, height, normal, self.friction, load.values[1], self.tolerance
             )
         else:
-            shear = before.shear if known.shear is None else known.shear
-            tangential = self._shear(before, limit, offset, load, shear)
+            begin = ContactStart(shear=before.shear) if known.shear is None else known
+            tangential = self._shear(before, limit, offset, load, begin)
         return self._state(before, load, normal, tangential, sliding)
 
     def two_normal_problems(self, before: ContactState, load: ContactLoad) -> bool:
@@ -203,7 +203,12 @@ class FrictionalContact:
         )
 
     def _shear(
-        self, before: ContactState, limit: Array, offset: Array, load: ContactLoad, start: Array
+        self,
+        before: ContactState,
+        limit: Array,
+        offset: Array,
+        load: ContactLoad,
+        start: ContactStart,
     ) -> TangentialState:
         names = ("Qx", "Qy", "Mz"), ("shift_x", "shift_y", "twist")
         imposed: dict[str, float] = {}
@@ -211,7 +216,12 @@ class FrictionalContact:
             value = load.values[k] - (before.rigid[k] if load.motion[k] else 0.0)
             imposed[names[load.motion[k]][place]] = float(value)
         return self.tangential.solve(
-            limit, offset, **imposed, tolerance=self.tolerance, start=start
+            limit,
+            offset,
+            **imposed,
+            tolerance=self.tolerance,
+            start=start.shear,
+            slipping=start.slipping,
         )
 
     def _held(
@@ -223,26 +233,40 @@ class FrictionalContact:
         increment is to be believed, not its energy.
         """
         try:
-            state = self._shear(before, limit, offset, load, before.shear)
+            state = self._shear(before, limit, offset, load, ContactStart(shear=before.shear))
         except FrictionLimitError:
             return None
         return state if state.converged else None
 
     def _slide(
-        self, before: ContactState, limit: Array, offset: Array, load: ContactLoad
+        self,
+        before: ContactState,
+        limit: Array,
+        offset: Array,
+        load: ContactLoad,
+        known: ContactStart,
     ) -> tuple[TangentialState, bool]:
         """Gross slip by the energy of ``load``, and whether it creeps."""
         shear = limit * sliding_direction(load.values[1:3])[:, None, None]
         twist = {} if self.grid.line else {"twist": 0.0}
+        begin = (shear, None) if known.shear is None else (known.shear, known.slipping)
 
         def solve(shift: Array, tolerance: float, last: TangentialState | None) -> TangentialState:
             x, y = map(float, shift)
-            start = shear if last is None else last.shear
+            start, slipping = begin if last is None else (last.shear, None)
             return self.tangential.solve(
-                limit, offset, shift_x=x, shift_y=y, **twist, tolerance=tolerance, start=start
+                limit,
+                offset,
+                shift_x=x,
+                shift_y=y,
+                **twist,
+                tolerance=tolerance,
+                start=start,
+                slipping=slipping,
             )
 
-        return self._by_energy(solve, lambda state: limit, before, shear, offset, load)
+        near = _increment(before, known)
+        return self._by_energy(solve, lambda state: limit, before, shear, offset, load, near)
 
     def _by_energy(
         self,
@@ -252,11 +276,13 @@ class FrictionalContact:
         shear: Array,
         offset: Array,
         load: ContactLoad,
+        near: Array | None = None,
     ) -> tuple[_State, bool]:
         """Gross slip by the energy of ``load``, and whether it creeps.
 
         ``solve`` finds the state for a motion (Δδx, Δδy), to a tolerance, from the last one;
-        ``limit_of`` gives its µp, and ``shear`` ``(2, nx, ny)`` is about that of sliding.
+        ``limit_of`` gives its µp, and ``shear`` ``(2, nx, ny)`` is about that of sliding. A motion
+        ``near`` the one sought may be known.
         """
         assert load.energy is not None
         last: deque[_State] = deque(maxlen=1)
@@ -273,7 +299,9 @@ class FrictionalContact:
         stored = float(np.vdot(shear, self.half_space.shear(shear) + offset)) * self.grid.cell_area
         force = load.values[1:3]
         carried = 0.5 * self.friction * float(before.resultants[0] + load.values[0])
-        slip = gross_slip(slide, carried, load.energy, force, self.tolerance, self._sliding, stored)
+        slip = gross_slip(
+            *(slide, carried, load.energy, force, self.tolerance, self._sliding, stored, near)
+        )
         message = last[0].message or slip.message
         state = replace(last[0], convolutions=spent, converged=not message, message=message)
         return state, slip.creeps
@@ -348,9 +376,10 @@ class FrictionalContact:
         return CoupledContact(self.half_space, self.friction)
 
     def _together(
-        self, before: ContactState, height: Array, load: ContactLoad, start: Array | None
+        self, before: ContactState, height: Array, load: ContactLoad, known: ContactStart
     ) -> ContactState:
         offset = self.offset(before, load)
+        start = before.traction if known.together is None else known.together
         sliding = False
         if load.energy is not None:
             # The pressure hardly changes with shear: that without friction will do to judge it.
@@ -358,12 +387,12 @@ class FrictionalContact:
             limit = self.friction * self._press(before, height, load, unsheared).pressure
             sliding = self._slides(limit, load)
         if sliding:
-            state = self._slide_together(before, height, offset, load, limit)
+            near = _increment(before, known)
+            state = self._slide_together(before, height, offset, load, limit, start, near)
         else:
             values = load.values.copy()
             for k in PLANAR:
                 values[k] -= before.rigid[k] if load.motion[k] else 0.0
-            start = before.traction if start is None else start
             state = self._coupled.solve(
                 height, offset, values, load.motion, tolerance=self.tolerance, start=start
             )
@@ -391,9 +420,16 @@ class FrictionalContact:
         )
 
     def _slide_together(
-        self, before: ContactState, height: Array, offset: Array, load: ContactLoad, limit: Array
+        self,
+        before: ContactState,
+        height: Array,
+        offset: Array,
+        load: ContactLoad,
+        limit: Array,
+        start: Array,
+        near: Array | None,
     ) -> CoupledState:
-        """Gross slip by the energy of ``load``."""
+        """Gross slip by the energy of ``load``, from tractions and perhaps a motion near it."""
         values = load.values.copy()
         values[5] = 0.0
         motion = (load.motion[0], True, True, load.motion[3], load.motion[4], not self.grid.line)
@@ -401,12 +437,17 @@ class FrictionalContact:
 
         def solve(shift: Array, tolerance: float, last: CoupledState | None) -> CoupledState:
             values[1:3] = shift
-            start = (last or before).traction
+            begin = start if last is None else last.traction
             return self._coupled.solve(
-                height, offset, values, motion, tolerance=tolerance, start=start
+                height, offset, values, motion, tolerance=tolerance, start=begin
             )
 
         def limit_of(state: CoupledState) -> Array:
             return np.asarray(self.friction * state.pressure)
 
-        return self._by_energy(solve, limit_of, before, shear, offset, load)[0]
+        return self._by_energy(solve, limit_of, before, shear, offset, load, near)[0]
+
+
+def _increment(before: ContactState, known: ContactStart) -> Array | None:
+    """The motion (Δδx, Δδy) [mm] that leads from one to the other, if that is known."""
+    return None if known.motion is None else known.motion - before.rigid[1:3]

@@ -48,13 +48,16 @@ class ContactLoad:
 class ContactStart:
     """Where a search may begin if somebody knows a state near the one sought.
 
-    Its ``normal`` pressure and its ``shear`` ``(2, nx, ny)`` [MPa], or of unlike bodies both
-    ``together`` ``(3, nx, ny)``; None of what nobody knows. What is found is the same within the
-    tolerance.
+    Its ``normal`` pressure, its ``shear`` ``(2, nx, ny)`` [MPa] with the cells ``slipping``
+    ``(nx, ny)`` and the ``motion`` (δx, δy) [mm] since the bodies were apart, or of unlike bodies
+    both tractions ``together`` ``(3, nx, ny)``; None of what nobody knows. What is found is the
+    same within the tolerance.
     """
 
     normal: NormalStart | None = None
     shear: Array | None = None
+    slipping: Mask | None = None
+    motion: Array | None = None
     together: Array | None = None
 
 
@@ -101,6 +104,12 @@ class ContactState:
         return self.traction[:2]
 
     @property
+    def slipping(self) -> Mask:
+        """Cells of the contact that do not stick ``(nx, ny)``."""
+        slipping: Mask = (self.pressure > 0.0) & ~self.sticking
+        return slipping
+
+    @property
     def pressed(self) -> NormalStart:
         """To begin from in the search for pressures near this one's."""
         return NormalStart(self.pressure, self.displacement[2])
@@ -108,4 +117,5 @@ class ContactState:
     @property
     def as_start(self) -> ContactStart:
         """To begin from in the search for a state near this one."""
-        return ContactStart(self.pressed, self.shear, self.traction)
+        motion = self.rigid[1:3]
+        return ContactStart(self.pressed, self.shear, self.slipping, motion, self.traction)

@@ -31,7 +31,8 @@ LOOSER = 0.01
 
 FLATTEST = 0.05
 """Least of µP that a longer motion is taken to dissipate more per length, as the contact begins to
-slide: where the last two motions say less, they are too near each other to say anything."""
+slide, and least part of its own turn that a turned motion is taken to turn force or energies: where
+the last two motions say less, they are too near each other to say anything."""
 
 ITERATIONS = 30
 """Contact problems solved; 3 to 8 are usual."""
@@ -71,40 +72,64 @@ def gross_slip(
     tolerance: float,
     direction: SlidingRule = "force",
     stored: float = 0.0,
+    near: Array | None = None,
 ) -> GrossSlip:
     """Slide a contact until it dissipates ``energy`` (Edx, Edy) [N mm], their sum above 0.
 
     ``slide`` solves it for a motion (Δδx, Δδy) [mm] to a tolerance and gives its shear force (Qx,
     Qy) [N] and energy (Edx, Edy) [N mm]: its last state is the one sought. ``carried`` is µP [N],
     P the mean of both ends, and ``force`` the given (Qx, Qy) [N]. ``stored`` [N mm] is the work
-    that the shear of sliding does on its own displacement, about: it makes the first guess good.
+    that the shear of sliding does on its own displacement, about: it makes the first guess good. A
+    motion ``near`` the one sought makes a better one.
 
     While all slips, a longer motion dissipates µP more per length, and a turned one turns force and
     shares of energy with it: both are corrected at once by what is missing. Where some cells still
-    stick it dissipates less, as much as the last two motions tell.
+    stick it dissipates less, and where friction holds sideways slip back it turns less: as much as
+    the last two motions tell.
     """
     total = float(energy.sum())
     wanted = angle = _angle(force if direction == "force" else np.sqrt(energy.clip(0.0)))
     length = max(0.0, total + stored) / carried
-    inner, slope, last = LOOSEST, carried, (length, 0.0)
+    inner, by_length, by_angle = LOOSEST, _Secant(carried), _Secant(1.0)
+    if near is not None and near.any():
+        inner = LOOSER * LOOSEST
+        length, angle = float(np.linalg.norm(near)), _angle(near)
     for _ in range(ITERATIONS):
         shear, spent = slide(length * sliding_direction(force, angle), max(inner, tolerance))
         measured = _angle(shear if direction == "force" else np.sqrt(spent.clip(0.0)))
-        missing = total - float(spent.sum())
-        longer, more = length - last[0], last[1] - missing
-        if longer * more > 0.0:
-            slope = min(max(more / longer, FLATTEST * carried), carried)
-        last = length, missing
-        turned = float(np.clip(angle + wanted - measured, 0.0, 0.5 * np.pi))
-        change = max(abs(missing) / total, abs(turned - angle))
+        missing, turn = total - float(spent.sum()), wanted - measured
+        longer, turned = by_length.change(length, missing), by_angle.change(angle, turn)
+        turn = float(np.clip(angle + turn, 0.0, 0.5 * np.pi)) - angle
+        change = max(abs(missing) / total, abs(turn))
         if change <= ACCURACY and inner <= tolerance:
             break
         inner = max(tolerance, LOOSER * min(change, inner))
-        length = max(0.0, length + missing / slope)
-        angle = turned
+        length = max(0.0, length + longer)
+        angle = float(np.clip(angle + turned, 0.0, 0.5 * np.pi))
     lacking = abs(missing) / total
     creeps = length == 0.0 and missing < -ACCURACY * total
     return GrossSlip(max(lacking, abs(wanted - measured)), lacking, creeps)
+
+
+class _Secant:
+    """The slope of what is missing of one number against that number, from its last two values.
+
+    It is ``steepest`` until two are known, and at least :data:`FLATTEST` times that.
+    """
+
+    def __init__(self, steepest: float) -> None:
+        self._steepest = self._slope = steepest
+        self._last: tuple[float, float] | None = None
+
+    def change(self, value: float, missing: float) -> float:
+        """Of the number, for what is ``missing`` at this ``value``."""
+        if self._last is not None:
+            further, less = value - self._last[0], self._last[1] - missing
+            if further * less > 0.0:
+                slope = max(less / further, FLATTEST * self._steepest)
+                self._slope = min(slope, self._steepest)
+        self._last = value, missing
+        return missing / self._slope
 
 
 def sliding_direction(force: Array, angle: float | None = None) -> Array:

@@ -162,11 +162,13 @@ class TangentialContact:
         twist: float | None = None,
         tolerance: float = TOLERANCE,
         start: Array | None = None,
+        slipping: Mask | None = None,
     ) -> TangentialState:
         """Shear and slip of one increment.
 
         ``limit`` is µp ``(nx, ny)`` [MPa], ``offset`` ``(2, nx, ny)`` [mm] (0 if None), ``start`` a
-        shear field to begin from. Of ``Qx`` [N] and ``shift_x`` [mm], ``Qy`` and ``shift_y``,
+        shear field to begin from, taken to its limit where cells are known to be ``slipping``
+        ``(nx, ny)``. Of ``Qx`` [N] and ``shift_x`` [mm], ``Qy`` and ``shift_y``,
         ``Mz`` [N mm] and ``twist`` [rad], the motion counts where it is given. A line grid knows
         no twist.
 
@@ -192,10 +194,10 @@ class TangentialContact:
         window, level = self._box(limit)
         problem = self._problem(window, level, limit, offset, forces, imposed, free)
         before = level.half_space.count
-        begin = np.zeros_like(problem.offset)
-        if start is not None:
-            begin += start[:, *window] * problem.pressed
-        shear = problem.balanced(begin) if begin.any() else level.begin(problem, begin)
+        begin, on_circle = _begun(problem, window, start, slipping)
+        shear = problem.balanced(begin, on_circle) if on_circle.any() else None
+        if shear is None:
+            shear = problem.balanced(begin) if begin.any() else level.begin(problem, begin)
         if shear is None:
             raise self._beyond_friction(problem, forces)
         solution = newton_on_disks(problem, shear, tolerance, ITERATIONS)
@@ -369,6 +371,22 @@ def listed(places: Sequence[int], forces: Array) -> str:
     """Shear forces and moment by their places, 0 to 2, for a message."""
     pairs = zip(places, forces, strict=True)
     return ", ".join(f"{NAMES[k]} = {force:.6g} {UNITS[k]}" for k, force in pairs)
+
+
+def _begun(
+    problem: TangentialProblem, window: Window, start: Array | None, slipping: Mask | None
+) -> tuple[Array, Mask]:
+    """Shear to begin from, on the ``window``, and the cells that are on their circle."""
+    shear = np.zeros_like(problem.offset)
+    if start is None:
+        return shear, np.zeros_like(problem.pressed)
+    shear += start[:, *window] * problem.pressed
+    if slipping is None:
+        return shear, np.zeros_like(problem.pressed)
+    magnitude = np.sqrt(squared(shear))
+    on_circle = slipping[window] & (magnitude > 0.0)
+    shear *= np.divide(problem.limit, magnitude, out=np.ones_like(magnitude), where=on_circle)
+    return shear, on_circle
 
 
 def _slides(problem: TangentialProblem, solution: DiskSolution) -> bool:

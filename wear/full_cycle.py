@@ -7,8 +7,8 @@ imposed instead (:mod:`wear.drive`).
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -16,7 +16,7 @@ from sa_solver.contact import FrictionalContact
 from sa_solver.contact_state import ContactLoad, ContactStart, ContactState
 from sa_solver.errors import ContactProblemError
 from sa_solver.normal import NormalStart
-from sa_solver.types import Array, LoadHistory
+from sa_solver.types import Array, LoadHistory, Mask
 from wear.drive import Drive
 from wear.stepping import ContactFailure
 
@@ -30,13 +30,51 @@ NEARLY_CLOSED = 2e-2
 """What is left of that after so many passes is more than this only where the cycle drifts."""
 
 
+@dataclass(frozen=True)
+class CycleStart:
+    """What a cycle near this one may begin from: its shear, where it slips and how it moves.
+
+    ``shear`` ``(t, 2, nx, ny)`` [MPa], ``slipping`` ``(t, nx, ny)``, ``motion`` ``(t, 2)`` [mm].
+    """
+
+    shear: Array
+    slipping: Mask
+    motion: Array
+
+    @classmethod
+    def of(cls, cycle: Sequence[ContactState]) -> CycleStart:
+        """That of a cycle found."""
+        return cls(
+            shear=np.stack([state.shear for state in cycle]),
+            slipping=np.stack([state.slipping for state in cycle]),
+            motion=np.stack([state.rigid[1:3] for state in cycle]),
+        )
+
+
+def starts_near(
+    known: CycleStart | None, pressed: Mapping[int, NormalStart], count: int
+) -> list[ContactStart]:
+    """Where ``count`` increments may begin: from those of a cycle, and what has ``pressed`` some.
+
+    Their numbers are those of the increments; the pressures may be newer than the cycle.
+    """
+    if known is None:
+        return [ContactStart(pressed.get(t)) for t in range(count)]
+    starts = []
+    for t, (shear, slipping, motion) in enumerate(zip(*vars(known).values(), strict=True)):
+        normal = pressed.get(t)
+        together = None if normal is None else np.stack([*shear, normal.pressure])
+        starts.append(ContactStart(normal, shear, slipping, motion, together))
+    return starts
+
+
 def march_cycle(
     contact: FrictionalContact,
     height: Array,
     loads: LoadHistory,
     drive: Drive | None = None,
     moved: Array | None = None,
-    starts: Mapping[int, NormalStart] | None = None,
+    starts: Sequence[ContactStart] | None = None,
     solved: Callable[[], None] = lambda: None,
 ) -> list[ContactState]:
     """States at the ends of the increments of one closed cycle, on surfaces that do not change.
@@ -47,8 +85,8 @@ def march_cycle(
     cycle of its own, begun with the bodies apart. A ``drive`` may impose motions in the place of
     forces; without one all is forces. What the bodies' own deformation has ``moved``
     ``(t, 3, nx, ny)`` [mm] at the end of an increment lies along the surfaces in its first two
-    components; the third is part of ``height``. ``starts`` are pressures near those of some
-    increments, by their number. ``solved`` is called after every increment, in every pass.
+    components; the third is part of ``height``. ``starts`` are near the states of all increments.
+    ``solved`` is called after every increment, in every pass.
 
     Raises :class:`ContactFailure` where an increment does not converge, its load is more than the
     contact can carry, or the cycle does not repeat.
@@ -56,14 +94,14 @@ def march_cycle(
     states: list[ContactState] = []
     heights = np.broadcast_to(height, (len(loads), *contact.grid.shape))
     imposed = (drive or Drive()).increments(loads)
+    begun = starts or [ContactStart()] * len(loads)
     for mission in loads.missions:
         increments = imposed[mission]
         if moved is not None:
             pairs = zip(increments, moved[mission, :2], strict=True)
             increments = [replace(load, along=along) for load, along in pairs]
-        begun = [ContactStart((starts or {}).get(t)) for t in range(mission.start, mission.stop)]
-        first = mission.start
-        states += _closed_cycle(contact, heights[mission], increments, begun, first, solved)
+        cycle = contact, heights[mission], increments, begun[mission], mission.start, solved
+        states += _closed_cycle(*cycle)
     return states
 
 
@@ -71,7 +109,7 @@ def _closed_cycle(
     contact: FrictionalContact,
     heights: Array,
     loads: list[ContactLoad],
-    starts: list[ContactStart],
+    starts: Sequence[ContactStart],
     first: int,
     solved: Callable[[], None],
 ) -> list[ContactState]:
@@ -90,8 +128,7 @@ def _closed_cycle(
             state = _advance(contact, state, height, load, start, t)
             states.append(state)
             solved()
-        # Not shear: where bodies stick it would keep what the last search left of slip.
-        starts = [replace(ended.as_start, shear=None) for ended in states]
+        starts = [ended.as_start for ended in states]
         limit = contact.friction * max(float(s.pressure.max()) for s in states)
         change = float(np.abs(state.shear - begun.shear).max())
         if apart or (passed > 1 and change <= CLOSED * limit):

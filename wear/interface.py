@@ -25,7 +25,7 @@ from sa_solver.ties import first_largest
 from sa_solver.types import Array, ElasticPair, Grid, LoadHistory
 from wear.drive import Drive
 from wear.face_loads import FaceLoads
-from wear.full_cycle import march_cycle
+from wear.full_cycle import CycleStart, march_cycle, starts_near
 from wear.laws import EvolvingLaw, WearLaw
 from wear.link import Link, Transfer, linked
 from wear.marching import advance_cycles
@@ -109,7 +109,8 @@ class InterfaceState(WearState):
     source, ``pressed`` ``(n,)`` how the largest of ``loads`` was shared out over the nodes then,
     none where the source does not know its nodes; ``paths`` ``(t, 3, 2)`` [mm] lead body 2 round
     its place in each state, none where its motion is too little to follow
-    (:func:`wear.moving.followed`).
+    (:func:`wear.moving.followed`); ``start`` is a :class:`wear.full_cycle.CycleStart` where the
+    half-space has a cycle of its own (method full).
     """
 
     loads: LoadHistory
@@ -231,6 +232,7 @@ class InterfaceContact:
             depth_rate=depth_rate,
             volume_rate=volume_rate,
             starts=starts,
+            start=loaded.contact.start,
             pressed=self._pressed(starts, history),
             paths=self._paths(loaded.slip, starts, history.loads),
         )
@@ -392,7 +394,7 @@ class InterfaceContact:
             # What it starts from leaves its rounding, which a run that goes on must find again.
             starts = [start.pressure for start in state.starts.values()]
             key = *key, state.surfaces.gap, state.surfaces.depth_1, np.array([*state.starts])
-            key = *key, *starts
+            key = *key, *starts, *(vars(state.start).values() if state.start else ())
         if self._current is not None and all(map(np.array_equal, self._current[0], key)):
             return self._current[1]
         slip, ways = self.transfer.to_cells(state.slip), passages(self.grid, state.paths)
@@ -410,7 +412,8 @@ class InterfaceContact:
                 lifted = np.stack([lift(increment.shear) for increment in cycle])
                 sliding = replace(sliding, uplift=lifted if uplift is None else uplift + lifted)
         contact = WearingContact(
-            self._contact, settings.laws, friction, sliding, settings.tolerance
+            *(self._contact, settings.laws, friction, sliding, settings.tolerance),
+            start=CycleStart.of(cycle) if cycle else None,
         )
         self._current = key, _Loaded(contact, slip, cycle)
         return self._current[1]
@@ -421,7 +424,8 @@ class InterfaceContact:
         """The closed cycle with its own friction, on surfaces ``moved`` ``(t, 3, nx, ny)`` [mm]."""
         gaps = np.stack([sliding.gap(state.surfaces, t) for t in range(len(state.loads))])
         contact = self.frictional(state.energy)
-        drive, starts = self.settings.drive, state.starts
+        known = state.start if isinstance(state.start, CycleStart) else None
+        drive, starts = self.settings.drive, starts_near(known, state.starts, len(state.loads))
         cycle = tuple(march_cycle(contact, gaps, state.loads, drive, moved, starts, self.solved))
         self._spent += Spent(len(cycle), sum(increment.convolutions for increment in cycle))
         return cycle

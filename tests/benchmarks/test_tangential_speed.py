@@ -139,4 +139,4 @@ def test_the_cycle_worn_a_little(record: dict[str, float]) -> None:
     largest = max(state.pressure.max() for state in cold)
     for one, other in zip(cold, warm, strict=True):
         np.testing.assert_allclose(one.pressure, other.pressure, atol=1e-4 * largest)
-    assert counts[1] <= counts[0]
+    assert counts[1] <= 0.65 * counts[0]

@@ -101,6 +101,24 @@ def test_solves_stay_few(monkeypatch):
     assert slide(BALL, (5.0, 2.0), (1.0, 1.0)).error < 1e-5
 
 
+@pytest.mark.parametrize("known", [False, True])
+def test_a_force_that_turns_less_than_the_motion_takes_few_solves(known):
+    """By 0.3 of what the motion turns; correcting by all that is missing would take 40 solves."""
+    solves = []
+
+    def solve(shift, tolerance):
+        solves.append(shift)
+        length, angle = np.hypot(*shift), 0.2 + 0.3 * np.arctan2(shift[1], shift[0])
+        return 100.0 * np.array([np.cos(angle), np.sin(angle)]), np.array([100.0 * length, 0.0])
+
+    force = np.array([np.cos(0.29), np.sin(0.29)])
+    near = 0.03 * np.array([np.cos(0.3), np.sin(0.3)]) if known else None
+    slip = gross_slip(solve, 100.0, np.array([3.0, 0.0]), force, 1e-8, near=near)
+    assert slip.error <= module.ACCURACY
+    assert np.arctan2(*solves[-1][::-1]) == pytest.approx(0.3, abs=1e-5)
+    assert len(solves) <= (2 if known else 5)
+
+
 @pytest.mark.parametrize("energy", [0.1, 0.01])
 def test_a_contact_that_begins_to_slide_meets_its_energy(energy):
     """Where a sixth or a third of the cells still stick, a motion dissipates far less than µP."""

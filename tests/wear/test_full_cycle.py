@@ -10,7 +10,7 @@ from sa_solver.contact import FrictionalContact
 from sa_solver.contact_state import ContactLoad
 from sa_solver.half_space import HalfSpace
 from sa_solver.types import ElasticPair, Grid, LoadHistory, Material
-from wear.full_cycle import CLOSED, march_cycle
+from wear.full_cycle import CLOSED, CycleStart, march_cycle, starts_near
 from wear.stepping import ContactFailure
 
 TITANIUM, STEEL = Material(115e3, 0.29), Material(200e3, 0.3)
@@ -101,6 +101,27 @@ def test_the_next_pass_knows_the_last_one():
         atol = CLOSED * FRICTION * float(state.pressure.max())
         np.testing.assert_allclose(state.shear, passes[t].shear, rtol=0, atol=atol)
     assert sum(passed.convolutions for passed in passes) < 0.75 * convolutions
+
+
+@pytest.mark.parametrize("first", [TITANIUM, STEEL], ids=["alike", "unlike"])
+def test_a_cycle_is_found_again_from_what_is_kept_of_it(first):
+    """The same, at a sixth of the work; on surfaces worn by 10 nm at less than cold."""
+    loads, solver = mission(), contact(ElasticPair(first, TITANIUM))
+    found = march_cycle(solver, GAP, loads)
+    pressed = {t: state.pressed for t, state in enumerate(found) if loads.P[t] > 0.0}
+    starts = starts_near(CycleStart.of(found), pressed, len(loads))
+    again = march_cycle(solver, GAP, loads, starts=starts)
+    largest = max(float(state.pressure.max()) for state in found)
+    for one, other in zip(found, again, strict=True):
+        np.testing.assert_allclose(one.traction, other.traction, rtol=0, atol=1e-5 * largest)
+    work = [sum(state.convolutions for state in states) for states in (again, found)]
+    assert work[0] < work[1] / 6
+    worn = GAP + 1e-5 * found[1].pressure / found[1].pressure.max()
+    near, cold = (march_cycle(solver, worn, loads, starts=known) for known in (starts, None))
+    work = [sum(state.convolutions for state in states) for states in (near, cold)]
+    assert work[0] < 0.7 * work[1]
+    for one, other in zip(near, cold, strict=True):
+        np.testing.assert_allclose(one.traction, other.traction, rtol=0, atol=1e-5 * largest)
 
 
 def test_no_load_no_slip():

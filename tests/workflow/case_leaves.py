@@ -35,6 +35,11 @@ GAPS = {
 }
 SURFACE = {"file": "disk.npy", "unit": "um", "pitch": ["20 um", "20 um"]}
 SURFACES = {"body_1": SURFACE, "body_2": SURFACE}
+# Points as far apart as takes a scan over all of a flank.
+ON_FLANK = SURFACE | {"pitch": [0.1, 0.2], "beyond": "mirrored"}
+FLANK_SURFACES = {
+    flank: {"disk": ON_FLANK, "blade": ON_FLANK} for flank in ("intrados", "extrados")
+}
 INTERFACE = {
     "name": "interface",
     "size": [11, 60],
@@ -96,7 +101,11 @@ BOLTED = [
 SHANK = {"name": "bolt", "body": "blade", "through": [0, 0, 2], "axis": [0, 0, 1]}
 # Sections that the templates do not have: kind of case, key of the section, its own kinds.
 GIVEN = {
-    "dovetail": {"load_path.mix": {ALWAYS: [{"share": 1}]}, **wear("blade", "disk")},
+    "dovetail": {
+        "structure.surfaces": {ALWAYS: FLANK_SURFACES},
+        "load_path.mix": {ALWAYS: [{"share": 1}]},
+        **wear("blade", "disk"),
+    },
     "mesh": {
         "load_path.mix": {ALWAYS: [{"share": 1, "factors": [1]}]},
         "structure.contacts.0.gap": GAPS,
@@ -137,6 +146,7 @@ GIVEN = {
     },
     "specimens": {
         "structure.form": {ALWAYS: {"along": "1 m", "across": "50 mm"}},
+        "structure.surfaces": {ALWAYS: SURFACES},
         "wear.reported": {ALWAYS: REPORTED},
         **laws({"cycles": 1e5}, "body_1", "body_2"),
     },

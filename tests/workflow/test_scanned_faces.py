@@ -141,6 +141,27 @@ def test_a_scan_on_flat_bodies_is_pressed_as_a_cylinder(tmp_path):
     assert first.pressure.max() == pytest.approx(hertz.peak_pressure, rel=0.015)
 
 
+def test_half_a_face_takes_scans_that_are_their_own_image(tmp_path):
+    """Its nodes have what they have on the whole; others are refused."""
+    x = (np.arange(150) + 0.5) * 0.4 - 30.0
+    np.save(tmp_path / "arc.npy", -(x[:, None] ** 2) / (2.0 * RADIUS))
+    np.save(tmp_path / "slope.npy", 1e-3 * x[:, None])
+    scan = {**BARE, "pitch": [0.4, 1.0]}
+    found = []
+    for half, low in ((False, -40), (True, 0)):
+        blocks = Blocks((low, 40), 40, (low // 2, 20), 20, (low // 2, 14), strips=127, half=half)
+        path = with_surfaces(blocks.press(tmp_path, 1.0, 50.0), body_2={"file": "arc.npy", **scan})
+        (face,) = MeshModel(load_case(path)).mesh().interfaces
+        found.append(dict(zip(np.round(face.coordinates[:, 0], 6), face.gap, strict=True)))
+    whole, part = found
+    assert min(part) == 0.0
+    for place, gap in part.items():
+        assert gap == pytest.approx(whole[place], abs=1e-12)
+    said = refused(with_surfaces(path, body_1={"file": "slope.npy", **scan}))
+    assert "body_1.file: " in said
+    assert "slope.npy: not the same on both sides of the plane of symmetry across x" in said
+
+
 @pytest.mark.slow
 def test_a_run_keeps_what_was_measured(blocks, tmp_path):
     """Pressed flat blocks that wear: the unworn lower surface is the scan, and so is the gap."""

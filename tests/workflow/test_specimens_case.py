@@ -17,6 +17,7 @@ from tests.workflow.shown_files import check_arrays, check_scene, total
 from wear.link import LARGEST_RESIDUAL
 from workflow.analyses.specimens.case import SpecimensCase
 from workflow.analyses.specimens.half_space import NodeGrid, PadHalfSpace
+from workflow.analyses.specimens.model import SpecimensModel
 from workflow.case.writing import dump_case
 from workflow.errors import CaseError
 from workflow.kinds import load_case, parse_case, template
@@ -440,3 +441,62 @@ def test_shipped_cases_meet_their_expectations(name, tmp_path):
     assert load_case(path).expect
     done = invoke("verify", path, "--out", tmp_path / "out")
     assert done.exit_code == 0, (done.stdout, done.stderr)
+
+
+# --- surfaces as measured -------------------------------------------------------------------------
+
+
+def as_scans(folder, name, heights):
+    """Heights [mm] of a specimen along and across its own strip, as a scan of either of them."""
+    np.save(folder / f"{name}.npy", heights)
+    scan = {"file": f"{name}.npy", "unit": "mm", "level": "none", "pitch": ["10 um", "10 um"]}
+    return {"body_1": scan, "body_2": scan | {"angle": "90 deg"}}
+
+
+def model_of(folder, surfaces, *overrides):
+    changes = [f"structure.surfaces={surfaces}", "structure.form=null", *overrides]
+    return SpecimensModel(parse_case(SMALL, str(folder / "small.yaml"), changes))
+
+
+def test_scans_of_specimens_lie_as_their_strips_do(folder):
+    """Planes: body 2 is body 1 turned about the line x = y, which swaps along and across."""
+    u, v = np.meshgrid(*2 * [(np.arange(120) - 59.5) * 0.01], indexing="ij")
+    surfaces = as_scans(folder, "plane", 1e-3 * u + 3e-3 * v)
+    only = ({"body_1": surfaces["body_1"]}, {"body_2": surfaces["body_2"]})
+    for given, (along_x, along_y) in zip(only, ((1e-3, 3e-3), (3e-3, 1e-3)), strict=True):
+        model = model_of(folder, given)
+        grid, face = model.case.pad_grid, model.face
+        expected = -along_x * grid.x - along_y * grid.y
+        np.testing.assert_allclose(model.gap(grid), expected, atol=1e-12)
+        # Eight cells a facet, of a sixth of a mm.
+        expected = -(face.coordinates @ [along_x, along_y])
+        np.testing.assert_allclose(face.gap, expected, atol=4e-3 / 6 / 128)
+
+
+@pytest.mark.slow
+def test_a_form_from_scans_of_specimens_is_the_form(folder):
+    """Radii along and across each strip: the finer the pad's squares the more so."""
+
+    def sagitta(x, radius):
+        return x**2 / (radius + np.sqrt(radius**2 - x**2))
+
+    u = (np.arange(120) - 59.5) * 0.01
+    surfaces = as_scans(folder, "form", -np.add.outer(sagitta(u, 1000.0), sagitta(u, 50.0)))
+    off = []
+    for squares in (6, 12):
+        finer = f"mesh={{pad_elements: {squares}, size: 4 mm, order: 1}}", "reduction.modes=2"
+        scanned = model_of(folder, surfaces, *finer)
+        formed = SpecimensModel(parse_case(SMALL, str(folder / "small.yaml"), finer))
+        exact = formed.pair.normal(formed.face.gap, 250.0).pressure
+        found = scanned.pair.normal(scanned.face.gap, 250.0)
+        # The reduced models do not know of the form.
+        assert scanned.from_cache
+        assert found.force.sum() == pytest.approx(250.0, rel=SOLVER)
+        off.append(np.abs(found.pressure - exact).max() / exact.max())
+    assert off[0] < 0.02
+    assert off[1] < 0.6 * off[0]
+    grid = scanned.case.pad_grid
+    half_space = scanned.gap(grid) - formed.gap(grid)
+    # Means of cells and of points against their middles: pitch²/24 R each, of all radii.
+    expected = (grid.pitch[0] ** 2 - 0.01**2) / 24.0 * 2.0 * (1.0 / 1000.0 + 1.0 / 50.0)
+    np.testing.assert_allclose(half_space, expected, rtol=1e-3)

@@ -49,13 +49,20 @@ NEEDS = {
     "structure.cyclic": [SECTOR],
     **{f"structure.matrices.{part}": [APART] for part in APART_MATRICES},
     # Points as far apart as takes a scan over all of the template's face.
+    " surfaces:  # as measured, on top of the gap, or": [
+        "structure.surfaces.body_1.pitch=[0.1, 0.2]"
+    ],
+    " intrados:  # flank at": ["structure.surfaces.intrados.disk.pitch=[0.1, 0.2]"],
     **{
-        f"{key}.surfaces{body}": [f"{place}.surfaces{body or '.body_1'}.pitch=[0.1, 0.2]"]
+        f"structure.{key}": [f"structure.{place}.pitch=[0.1, 0.2]"]
         for key, place in (
-            ("structure", "structure"),
-            ("structure.interfaces", "structure.interfaces.0"),
+            ("surfaces.body_2", "surfaces.body_2"),
+            ("surfaces.intrados.blade", "surfaces.intrados.blade"),
+            ("surfaces.extrados", "surfaces.extrados.disk"),
+            ("surfaces.extrados.blade", "surfaces.extrados.blade"),
+            ("interfaces.surfaces", "interfaces.0.surfaces.body_1"),
+            ("interfaces.surfaces.body_2", "interfaces.0.surfaces.body_2"),
         )
-        for body in ("", ".body_2")
     },
     "structure.retained": ["structure.modes=20"],
     "structure.modes": ["structure.retained=[pad, ring, tip]"],

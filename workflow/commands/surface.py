@@ -82,7 +82,7 @@ def _chosen(faces: Sequence[str], interface: str | None) -> str:
 def _measured_lower(case: Case, name: str, grid: Grid) -> Array | float:
     """What was measured of body 1 of an interface, on the grid [mm]; 0 where nothing was."""
     for face in getattr(case, "scanned", tuple)():
-        if face.name == name and face.surfaces.body_1 is not None:
-            lower: Array = face.surfaces.body_1.on(grid, 1).heights
-            return lower
+        if face.name == name and (lower := face.surfaces.of(1, grid)) is not None:
+            heights: Array = lower.heights
+            return heights
     return 0.0

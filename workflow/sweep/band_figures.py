@@ -1,9 +1,10 @@
-"""Figures of a sample: 95 % bands of the curves that its kind of run is compared by."""
+"""Figures of a sweep: 95 % bands of the curves that its kind of run is compared by."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -20,7 +21,8 @@ from workflow.pictures.style import BLACK, BLUE, ORANGE, write_figures
 from workflow.shell.analysis import Analysis
 from workflow.shell.curves import Curve, curves_in
 from workflow.shell.folder import OutputFolder
-from workflow.sweep.bands import FEWEST, Piece, curve_band
+from workflow.sweep.bands import FEWEST, Piece, curve_band, quantiles
+from workflow.sweep.first_order import sides
 from workflow.sweep.table import Row
 
 # Of a row of panels, and of title and legend [inches].
@@ -32,8 +34,30 @@ Curves = dict[str, list[Curve]]
 """Curves of the runs by title."""
 
 
+@dataclass(frozen=True)
+class Way:
+    """How a band is made of runs: of how many at least, its ``sides``, and what they are called."""
+
+    fewest: int
+    sides: Callable[[Array], Array]
+    band: str
+    middle: str
+
+
+OF_A_SAMPLE = Way(FEWEST, quantiles, "95 % of the runs at each place", "median")
+
+
+def to_first_order(runs: int) -> Way:
+    """That of all ``runs`` about one in the middle."""
+    return Way(runs, sides, "95 % to first order", "best values")
+
+
 def write_band_figures(
-    title: str, analysis: Analysis[Any], rows: Sequence[Row], folder: Path
+    title: str,
+    analysis: Analysis[Any],
+    rows: Sequence[Row],
+    folder: Path,
+    way: Way = OF_A_SAMPLE,
 ) -> list[Path]:
     """Draw the bands of all curves that enough runs have, a figure for each horizontal axis.
 
@@ -41,10 +65,10 @@ def write_band_figures(
     """
     figures: dict[str, Curves] = {}
     for name, curves in _curves(analysis, rows).items():
-        if len(curves) >= FEWEST and _changes(curves):
+        if len(curves) >= way.fewest and _changes(curves):
             along = re.sub(r"[^\w-]+", "_", curves[0].x_name)
             figures.setdefault(f"bands_over_{along}", {})[name] = curves
-    drawn = {name: partial(_draw, title, curves) for name, curves in figures.items()}
+    drawn = {name: partial(_draw, title, way, curves) for name, curves in figures.items()}
     return write_figures(drawn.items(), folder)
 
 
@@ -70,24 +94,24 @@ def _changes(curves: Sequence[Curve]) -> bool:
     )
 
 
-def _draw(title: str, panels: Curves) -> Figure:
+def _draw(title: str, way: Way, panels: Curves) -> Figure:
     columns = min(len(panels), 2)
     most = max(map(len, panels.values()))
     figure = new_figure(f"{title}: {most} runs", REST + ROW * -(-len(panels) // columns))
     axes = panel_grid(figure, len(panels), columns)
     for axis, (name, curves) in zip(axes, panels.items(), strict=True):
-        _draw_panel(axis, name, curves)
+        _draw_panel(axis, way, name, curves)
     legend_below(figure, axes)
     return figure
 
 
-def _draw_panel(axis: Axes, name: str, curves: Sequence[Curve]) -> None:
+def _draw_panel(axis: Axes, way: Way, name: str, curves: Sequence[Curve]) -> None:
     first = curves[0]
     x_unit, x_size = suited(max(_largest(curve.x) for curve in curves), first.x_unit)
     y_unit, y_size = suited(max(_largest(curve.y) for curve in curves), first.y_unit)
     shown = [(curve.x / x_size, curve.y / y_size) for curve in curves]
-    if pieces := curve_band(shown):
-        _draw_band(axis, pieces)
+    if pieces := curve_band(shown, way.fewest, way.sides):
+        _draw_band(axis, way, pieces)
         axis.set_title(name)
     else:
         for number, (x, y) in enumerate(shown[:MOST_RUNS]):
@@ -99,10 +123,10 @@ def _draw_panel(axis: Axes, name: str, curves: Sequence[Curve]) -> None:
     axis.set_ylabel(_label(first.y_name, y_unit))
 
 
-def _draw_band(axis: Axes, pieces: Sequence[Piece]) -> None:
+def _draw_band(axis: Axes, way: Way, pieces: Sequence[Piece]) -> None:
     look: dict[str, Any] = {"color": BLUE, "alpha": 0.3, "lw": 0}
     for number, piece in enumerate(pieces):
-        labels = (None, None) if number else ("95 % of the runs at each place", "median")
+        labels = (None, None) if number else (way.band, way.middle)
         axis.fill_between(piece.places, piece.lower, piece.upper, label=labels[0], **look)
         axis.plot(piece.places, piece.median, color=ORANGE, label=labels[1])
 

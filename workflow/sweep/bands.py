@@ -9,7 +9,7 @@ mostly better.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -62,16 +62,26 @@ def _known_within(ordered: Array, quantile: float) -> list[float | None]:
     return [low, high]
 
 
-def curve_band(curves: Sequence[tuple[Array, Array]]) -> list[Piece]:
+def quantiles(values: Array) -> Array:
+    """Lower side, median and upper side ``(3, m)`` of what a sample gives ``(runs, m)``."""
+    return np.quantile(values, [LOWER, 0.5, UPPER], axis=0, method="weibull")
+
+
+def curve_band(
+    curves: Sequence[tuple[Array, Array]],
+    fewest: int = FEWEST,
+    sides: Callable[[Array], Array] = quantiles,
+) -> list[Piece]:
     """The band of curves, each x and y ``(n,)``, piece by piece between their turns in x.
 
-    Empty where they do not turn alike, or are too few: there is no place to compare them at. It
-    ends where the first of them does: those that go on, as runs that dissipate more, are not all.
+    ``sides`` are those of the values at a place. Empty where curves do not turn alike, or are too
+    few: there is no place to compare them at. It ends where the first of them does: those that go
+    on, as runs that dissipate more, are not all.
     """
     cut = [_pieces(x, y) for x, y in curves if len(x) > 1]
-    if len(cut) < FEWEST or len({len(pieces) for pieces in cut}) > 1:
+    if len(cut) < fewest or len({len(pieces) for pieces in cut}) > 1:
         return []
-    return [_band(pieces) for pieces in zip(*cut, strict=True)]
+    return [_band(pieces, sides) for pieces in zip(*cut, strict=True)]
 
 
 def _pieces(x: Array, y: Array) -> list[tuple[Array, Array]]:
@@ -89,12 +99,11 @@ def _ascending(x: Array, y: Array) -> tuple[Array, Array]:
     return (x, y) if x[-1] >= x[0] else (x[::-1], y[::-1])
 
 
-def _band(pieces: Sequence[tuple[Array, Array]]) -> Piece:
+def _band(pieces: Sequence[tuple[Array, Array]], sides: Callable[[Array], Array]) -> Piece:
     first, last = max(x[0] for x, _ in pieces), min(x[-1] for x, _ in pieces)
     places = np.unique(np.concatenate([x for x, _ in pieces]))
     places = places[(places >= first) & (places <= last)]
     if len(places) > MOST_PLACES:
         places = places[np.linspace(0, len(places) - 1, MOST_PLACES).round().astype(int)]
     values = np.array([np.interp(places, x, y) for x, y in pieces])
-    sides = np.quantile(values, [LOWER, 0.5, UPPER], axis=0, method="weibull")
-    return Piece(places, *sides)
+    return Piece(places, *sides(values))

@@ -1,4 +1,4 @@
-"""From what varies to the runs: a grid, values in step, or a Latin hypercube."""
+"""From what varies to the runs: a grid, values in step, a Latin hypercube, or steps to a side."""
 
 from __future__ import annotations
 
@@ -16,7 +16,9 @@ from sa_solver.types import Array
 from workflow.case.writing import scalar
 from workflow.errors import CaseError
 from workflow.runs.job import Job
-from workflow.sweep.schema import MOST_RUNS, Amount, LogNormal, Normal, Sweep, Variation
+from workflow.sweep.first_order import positions
+from workflow.sweep.fitted import REACH, FittedParameter, FittedSample
+from workflow.sweep.schema import DRAWN, MOST_RUNS, Amount, LogNormal, Normal, Sweep, Variation
 
 # Of a folder; what is longer is called by its hash.
 LONGEST_NAME = 100
@@ -42,8 +44,8 @@ def runs_of(sweep: Sweep) -> list[Run]:
     """The runs of a sweep; a sample may draw the same one twice. Raises CaseError."""
     varied = sweep.file.variations()
     paths = list(varied)
-    if sweep.file.design == "sample":
-        columns = _sampled(sweep)
+    if sweep.file.design in DRAWN:
+        columns = _sampled(sweep) if sweep.file.design == "sample" else _stepped(sweep)
         paths, rows = list(columns), list(zip(*columns.values(), strict=True))
     else:
         rows = _combined(sweep, [_listed(variation) for variation in varied.values()])
@@ -133,6 +135,32 @@ def _quantiles(distribution: Any, share: Array) -> tuple[Amount, Array]:
         return median, median.number * distribution.factor ** ndtri(share)
     first, last = distribution.ends
     return first, _between(first, last, share, "linear")
+
+
+# --- to first order -----------------------------------------------------------------------------
+
+
+def _stepped(sweep: Sweep) -> dict[str, list[Any]]:
+    """Each of the independent normal numbers at either end of its 95 %, and all together."""
+    known = sweep.fitted or FittedSample((), np.eye(0))
+    varied = sweep.file.variations().items()
+    known = known.beside([_normal(name, variation.distribution) for name, variation in varied])
+    return known.given(positions(len(known.parameters)))
+
+
+def _normal(name: str, distribution: Any) -> FittedParameter:
+    """An entry of a normal or lognormal distribution as a parameter of a fit would be."""
+    logarithmic = isinstance(distribution, LogNormal)
+    best = distribution.median if logarithmic else distribution.mean
+    if logarithmic:
+        factor = distribution.factor**REACH
+        bounds = best.number / factor, best.number * factor
+    else:
+        reach = REACH * distribution.deviation.number
+        bounds = best.number - reach, best.number + reach
+    return FittedParameter(
+        name, best.number, best.unit or "1", bounds, (-np.inf, np.inf), logarithmic, (name,)
+    )
 
 
 # --- names --------------------------------------------------------------------------------------

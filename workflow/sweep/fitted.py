@@ -81,12 +81,22 @@ class FittedSample:
         """What each entry is given, of independent shares ``(n, p)`` from 0 to 1."""
         from scipy.special import ndtri
 
-        values = self.draw(ndtri(shares))
+        return self.given(ndtri(shares))
+
+    def given(self, normal: Array) -> dict[str, list[float | str]]:
+        """The same, of independent standard normal numbers ``(n, p)``."""
         return {
             entry: [parameter.written(float(value)) for value in column]
-            for parameter, column in zip(self.parameters, values.T, strict=True)
+            for parameter, column in zip(self.parameters, self.draw(normal).T, strict=True)
             for entry in parameter.entries
         }
+
+    def beside(self, others: Sequence[FittedParameter]) -> FittedSample:
+        """These, and after them others of which each is known for itself."""
+        here, count = len(self.parameters), len(self.parameters) + len(others)
+        correlation = np.eye(count)
+        correlation[:here, :here] = self.correlation
+        return FittedSample((*self.parameters, *others), correlation)
 
 
 def read_fit(path: Path) -> FittedSample:

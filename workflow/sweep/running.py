@@ -13,6 +13,8 @@ from contextlib import closing
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from sa_solver.types import Array
 from workflow.case.plain import counted
 from workflow.errors import CaseError, UserError
@@ -28,7 +30,8 @@ from workflow.shell.store import write_text
 from workflow.shell.versions import versions
 from workflow.sweep.bands import FEWEST, band_of
 from workflow.sweep.design import Run, runs_of
-from workflow.sweep.schema import Sweep, load_sweep
+from workflow.sweep.first_order import LINEAR, first_order
+from workflow.sweep.schema import DRAWN, Sweep, load_sweep
 from workflow.sweep.table import Row, columns_of, spread, unit_of, varied_in, write_sweep_table
 
 FILE, RUNS, TABLE, LOG = "sweep.yaml", "runs", "sweep.csv", "sweep.log"
@@ -73,8 +76,8 @@ def run_sweep(
             _write_summary(sweep, rows, folder)
             failed = sum(not row.done for row in rows)
             reporter.say(f"{len(rows) - failed} runs done, {failed} failed: {out / TABLE}")
-            if few := _few(sweep, len(rows) - failed):
-                reporter.say(f"  {few}")
+            if lacking := _lacking(sweep, rows):
+                reporter.say(f"  {lacking}")
             # Of what neither wears nor is a contact there are none, and no folder.
             if figures := sorted((out / FIGURES).glob("*")) if failed < len(rows) else []:
                 reporter.say(f"  figure    {figures[0]}")
@@ -176,9 +179,9 @@ def _write_summary(sweep: Sweep, rows: list[Row], folder: OutputFolder) -> None:
         "runs": len(rows),
         "failed": {row.run.name: row.finished.error for row in rows if not row.done},
         "found": {
-            name: {"unit": unit_of(name, rows), **statistics} | _band(sweep, values)
+            name: {"unit": unit_of(name, rows), **found}
             for name, values in columns.items()
-            if (statistics := spread(values)) is not None
+            if (found := _found(sweep, values)) is not None
         },
         "seconds": round(sum(row.seconds or 0.0 for row in rows), 2),
         "versions": versions(),
@@ -186,18 +189,47 @@ def _write_summary(sweep: Sweep, rows: list[Row], folder: OutputFolder) -> None:
     folder.write_summary(summary)
 
 
-def _band(sweep: Sweep, values: Array) -> dict[str, Any]:
-    """The 95 % band of numbers, of a sample."""
-    if sweep.file.design != "sample":
-        return {}
-    return {"band": band_of(values)}
+def _found(sweep: Sweep, values: Array) -> dict[str, Any] | None:
+    """What the runs say of a number; of a sample and to first order with its 95 % band."""
+    if sweep.file.design == "linear":
+        return _stepped(values)
+    statistics = spread(values)
+    if statistics is None or sweep.file.design != "sample":
+        return statistics
+    return statistics | {"band": band_of(values)}
 
 
-def _few(sweep: Sweep, done: int) -> str:
-    """What so few runs of a sample cannot tell, empty if they can."""
-    if sweep.file.design != "sample" or done >= FEWEST:
+def _stepped(values: Array) -> dict[str, Any] | None:
+    """A number to first order, and how far the runs are off a line in half widths of its band."""
+    if not np.isfinite(values[0]):
+        return None
+    if not np.all(np.isfinite(values)):
+        return {"best": float(values[0]), "band": None, "bent": None}
+    found = first_order(values)
+    return {"best": float(found.middle), "band": found.told(), "bent": found.bent}
+
+
+def _lacking(sweep: Sweep, rows: Sequence[Row]) -> str:
+    """What bands the runs cannot tell, empty if they tell all."""
+    done = sum(row.done for row in rows)
+    if sweep.file.design == "sample" and done < FEWEST:
+        return f"no 95 % bands: {counted(done, 'run')} done; they take {FEWEST}"
+    if sweep.file.design != "linear":
         return ""
-    return f"no 95 % bands: {counted(done, 'run')} done; they take {FEWEST}"
+    if done < len(rows):
+        return "no 95 % bands: to first order they take all runs"
+    bent = [name for name, values in columns_of(rows).items() if _bent(values)]
+    if not bent:
+        return ""
+    return (
+        f"{counted(len(bent), 'number')} not linear within {LINEAR:.0%} and without a band, such "
+        f"as {bent[0]}: take design: sample"
+    )
+
+
+def _bent(values: Array) -> bool:
+    found = _stepped(values)
+    return found is not None and found["band"] is None
 
 
 def _title(sweep: Sweep, rows: Sequence[Row]) -> str:
@@ -215,8 +247,13 @@ def _write_figures(sweep: Sweep, rows: list[Row], folder: OutputFolder) -> None:
 
     with folder.filling(FIGURES, "figures of the results") as figures:
         write_sweep_figures(_title(sweep, rows), rows, figures)
-        if sweep.file.design == "sample":
-            from workflow.sweep.band_figures import write_band_figures
+        if sweep.file.design in DRAWN:
+            from workflow.sweep.band_figures import (
+                OF_A_SAMPLE,
+                to_first_order,
+                write_band_figures,
+            )
 
             analysis = analysis_of(rows[0].run.job(sweep).load())
-            write_band_figures(_title(sweep, rows), analysis, rows, figures)
+            way = OF_A_SAMPLE if sweep.file.design == "sample" else to_first_order(len(rows))
+            write_band_figures(_title(sweep, rows), analysis, rows, figures, way)

@@ -20,6 +20,8 @@ from workflow.sweep.fitted import FittedSample, read_fit
 
 # Beyond it a sweep is a slip of the pen: a run takes seconds at least.
 MOST_RUNS = 10_000
+# Designs of what is known with its uncertainty.
+DRAWN = "sample", "linear"
 # Of what is computed from a range or a distribution: what the table says is what was run.
 SIGNIFICANT = 6
 
@@ -208,13 +210,14 @@ class SweepFile(Section):
         "what each entry is given, by its dotted path in the case", default=Section()
     )
     fit: Annotated[str, File((".json",))] | None = entry(
-        "summary.json of a fit: its parameters vary too, as it knows them; for design: sample",
+        "summary.json of a fit: its parameters vary too, as it knows them; for design: sample or "
+        "linear",
         "wear/summary.json",
         default=None,
     )
-    design: Literal["grid", "zip", "sample"] = entry(
+    design: Literal["grid", "zip", "sample", "linear"] = entry(
         "grid: every value with every other; zip: first with first, second with second; sample: "
-        "a Latin hypercube",
+        "a Latin hypercube; linear: bands to first order, of a fit or normal distributions",
         "grid",
         default="grid",
     )
@@ -296,8 +299,10 @@ def _disagreements(sweep: Sweep) -> Iterator[str]:
         if file.samples is None:
             needed = "missing, the number of runs such as 50"
         yield f"{place(('samples',))[1]}: samples: {needed}; allowed: with design: sample"
-    if file.design != "sample":
-        for name, variation in varied.items():
+    for name, variation in varied.items():
+        if file.design == "linear":
+            yield from _not_normal(sweep, name, variation)
+        elif file.design != "sample":
             yield from _without_sample(sweep, name, variation)
 
 
@@ -320,8 +325,18 @@ def _beside_a_fit(sweep: Sweep) -> Iterator[str]:
         if name in varied or name in file.set:
             where = place(("vary" if name in varied else "set", name))[1]
             yield f"{where}: {name}: the fit gives it too; allowed: one of them"
-    if file.design != "sample":
-        yield f"{place(('fit',))[1]}: fit: in design: {file.design}; allowed: design: sample"
+    if file.design not in DRAWN:
+        allowed = " or ".join(DRAWN)
+        yield f"{place(('fit',))[1]}: fit: in design: {file.design}; allowed: design: {allowed}"
+
+
+def _not_normal(sweep: Sweep, name: str, variation: Variation) -> Iterator[str]:
+    """What a band to first order cannot be made of."""
+    if not isinstance(variation.distribution, Normal | LogNormal):
+        yield (
+            f"{sweep.place(name)}: in design: linear; allowed: a distribution of kind normal or "
+            "lognormal"
+        )
 
 
 def _without_sample(sweep: Sweep, name: str, variation: Variation) -> Iterator[str]:

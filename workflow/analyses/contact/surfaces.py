@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from functools import lru_cache
 from pathlib import Path
-from typing import Annotated, Any, ClassVar
+from typing import Annotated, Any, ClassVar, Self
 
 from pydantic import StrictBool, model_validator
 
@@ -123,43 +123,47 @@ def _stamp(file: str) -> tuple[int, int] | None:
     return found.st_mtime_ns, found.st_size
 
 
-# Scans of millions of points take seconds, and are asked for wherever a case is looked at.
-@lru_cache(maxsize=2)
+# Scans of millions of points take seconds, and are asked for wherever a case is looked at: as many
+# as two flanks have.
+@lru_cache(maxsize=4)
 def _read(file: str, stamp: object, unit: str | None, pitch: tuple[float, float] | None) -> Scan:
     return read_scan(file, unit, pitch)
 
 
-@lru_cache(maxsize=2)
+@lru_cache(maxsize=4)
 def _prepared(scan: Scan, level: Level, missing: float) -> Scan:
     return filled(levelled(scan, level), missing)
 
 
-class MeasuredSurfaces(Section):
-    """Those of either body or both: heights out of it, which come on top of the form."""
+class SurfacesOfTwo(Section):
+    """Base of those of either body or both: heights out of it, which come on top of the form."""
 
-    also_filled_in: ClassVar[tuple[str, ...]] = ("body_1",)
-    in_schema: ClassVar[Mapping[str, Any]] = one_of("body_1", "body_2")
-
-    body_1: MeasuredSurface | None = entry("of the lower body, seen from above", default=None)
-    body_2: MeasuredSurface | None = entry(
-        "of the upper body, seen from below: turned over about x", default=None
-    )
+    # What body 1 and body 2 are called.
+    names: ClassVar[tuple[str, str]]
 
     @model_validator(mode="after")
-    def _is_one(self) -> MeasuredSurfaces:
+    def _is_one(self) -> Self:
         if not self.bodies:
-            raise disagreement("no surface; allowed: body_1, body_2 or both", "body_1")
+            raise disagreement(
+                f"no surface; allowed: {', '.join(self.names)} or both", self.names[0]
+            )
         return self
 
     @property
     def bodies(self) -> dict[str, MeasuredSurface]:
-        """Those that there are."""
-        both = {"body_1": self.body_1, "body_2": self.body_2}
+        """Those that there are, by what their body is called."""
+        both = {name: getattr(self, name) for name in self.names}
         return {name: surface for name, surface in both.items() if surface is not None}
+
+    def of(self, number: int, grid: Grid) -> Resampled | None:
+        """That of body 1 or 2 on a grid; None where it has none. Raises InputError."""
+        surface: MeasuredSurface | None = getattr(self, self.names[number - 1])
+        return None if surface is None else surface.on(grid, number)
 
     def on(self, grid: Grid) -> dict[str, Resampled]:
         """Each on a grid, by body. Raises InputError."""
-        return {name: surface.on(grid, int(name[-1])) for name, surface in self.bodies.items()}
+        both = {name: self.of(number, grid) for number, name in enumerate(self.names, 1)}
+        return {name: surface for name, surface in both.items() if surface is not None}
 
     def gap(self, grid: Grid) -> Array:
         """What they add to the gap of the unloaded bodies ``(nx, ny)`` [mm]."""
@@ -167,13 +171,12 @@ class MeasuredSurfaces(Section):
 
     def check(self, grid: Grid, key: str = KEY, size: str = "contact.size") -> None:
         """Refuse, at ``key``, those that the grid does not fit; ``size`` says how large it is."""
-        for name, surface in self.bodies.items():
+        for number, name in enumerate(self.names, 1):
             try:
-                surface.on(grid, int(name[-1]))
+                self.of(number, grid)
             except InputError as error:
-                raise disagreement(
-                    f"{surface.file}: {error}", f"{key}.{name}.file", size
-                ) from error
+                file = self.bodies[name].file
+                raise disagreement(f"{file}: {error}", f"{key}.{name}.file", size) from error
 
     def summary(self, grid: Grid) -> dict[str, Any]:
         """Numbers of each, in base units: points, pitch, share missing, and what the grid lost."""
@@ -210,6 +213,19 @@ class MeasuredSurfaces(Section):
                     f"{key}.{name}: {lost} is finer than the cells, which do not carry it: take "
                     "more of them"
                 )
+
+
+class MeasuredSurfaces(SurfacesOfTwo):
+    """Those of the lower body, the upper one or both."""
+
+    names: ClassVar[tuple[str, str]] = ("body_1", "body_2")
+    also_filled_in: ClassVar[tuple[str, ...]] = ("body_1",)
+    in_schema: ClassVar[Mapping[str, Any]] = one_of("body_1", "body_2")
+
+    body_1: MeasuredSurface | None = entry("of the lower body, seen from above", default=None)
+    body_2: MeasuredSurface | None = entry(
+        "of the upper body, seen from below: turned over about x", default=None
+    )
 
 
 def _in_words(numbers: Mapping[str, Any]) -> str:

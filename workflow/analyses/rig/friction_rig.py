@@ -28,6 +28,8 @@ def friction_rig_model(rig: FrictionRig, reporter: Reporter) -> RigModel:
     with reporter.stage("reduction", "steps") as told:
         key, file = "structure.specimens", rig.specimens
         bodies = reduced_specimens(key, file, reporter, told, rig.target_distance)
+    for finer in bodies.case.finer_than_nodes("no rig has more"):
+        reporter.say(finer)
     try:
         specimens = bodies.reduction.models
         ratios = np.array(rig.damping_ratio)
@@ -45,7 +47,8 @@ def friction_rig_model(rig: FrictionRig, reporter: Reporter) -> RigModel:
         pressing=-unit_force(model, "m2 z"),
         stretch=unit_force(model, "upper target 1 x") - unit_force(model, "lower target 1 x"),
         places=face.coordinates,
-        gap=face.gap,
+        # The upper one comes down to where the pads first meet.
+        gap=face.gap - face.gap.min(),
         area=face.nodal_areas,
         translations=_translations(rig, specimens, model.names),
     )

@@ -31,7 +31,12 @@ if TYPE_CHECKING:
 # Names of displacements that are those of modes, whichever body has them.
 MODE = r"(.* )?mode \d+"
 # Rows of specimens that a rig tells, and what it calls them.
-OF_SPECIMENS = {"structure": "specimens", "material": "material", "wear law": "wear law"}
+OF_SPECIMENS = {
+    "structure": "specimens",
+    **{f"surface {body}": f"surface {body}" for body in (1, 2)},
+    "material": "material",
+    "wear law": "wear law",
+}
 Mass = Annotated[float, Quantity("t", above=0.0, at_most=1e3, range_text="above 0 to 1e6 kg")]
 Spring = Annotated[float, Quantity("N/mm", at_least=0.0, at_most=1e12, range_text="0 to 1e6 kN/um")]
 

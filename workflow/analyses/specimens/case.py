@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from functools import lru_cache
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 from pydantic import Field, model_validator
 
+from sa_solver.types import Grid
 from sa_solver.types import Material as ElasticMaterial
 from wear.laws import WearLaw
 from workflow.analyses.contact.doubts import about_pressure
+from workflow.analyses.contact.surfaces import KEY, MeasuredSurfaces
 from workflow.analyses.wear.case.evolution import PositiveEnergy
+from workflow.analyses.wear.case.scanned import ScannedFace, WithScans
 from workflow.analyses.wear.case.sections import (
     Cycles,
     Laws,
@@ -39,6 +43,7 @@ from workflow.case.sections import (
 
 if TYPE_CHECKING:
     from fe_models.geometry.specimens import Specimen
+    from fe_models.mesh import StructureMesh
 
 # Of matrices; the first if nothing is said.
 MATRIX_FORMATS = "npz", "mat", "mtx"
@@ -67,6 +72,11 @@ class Specimens(Section):
         "points of the ring that are kept, a multiple of 4", 16, default=16
     )
     form: Form | None = entry("of the strips; without it they are flat", default=None)
+    surfaces: MeasuredSurfaces | None = entry(
+        "of the pads as measured, on top of the form: rows along x, which is along body 1's strip, "
+        "about the middle of the pad; with angle: 90 deg along body 2's",
+        default=None,
+    )
 
     @model_validator(mode="after")
     def _can_be_drawn(self) -> Specimens:
@@ -84,7 +94,14 @@ class Specimens(Section):
         from fe_models.geometry.specimens import Specimen
 
         radii = None if self.form is None else (self.form.along, self.form.across)
-        return Specimen(**self.model_dump(exclude={"kind", "form"}), radii=radii, **settings)
+        sizes = self.model_dump(exclude={"kind", "form", "surfaces"})
+        return Specimen(**sizes, radii=radii, **settings)
+
+
+# A look at the case and the run that follows it share what they find.
+@lru_cache(maxsize=1)
+def _meshed(specimen: Specimen, size: float) -> StructureMesh:
+    return specimen.mesh(size)
 
 
 class FrettingLoads(Section):
@@ -220,7 +237,7 @@ class SpecimensOutput(Output):
         return MATRIX_FORMATS[:1] if self.matrices else ()
 
 
-class SpecimensCase(Case):
+class SpecimensCase(WithScans, Case):
     """Two specimens of a friction rig, on their reduced models and on a half-space."""
 
     about: ClassVar[str] = "two crossed specimens of a friction rig that wear each other"
@@ -251,6 +268,21 @@ class SpecimensCase(Case):
         """The specimen as the mesher takes it."""
         return self.structure.geometry(pad_elements=self.mesh.pad_elements)
 
+    def meshed(self) -> StructureMesh:
+        """Both specimens, made once, without surfaces as measured. Raises MeshError."""
+        return _meshed(self.geometry(), self.mesh.size)
+
+    @property
+    def pad_grid(self) -> Grid:
+        """The grid of the half-space."""
+        side = self.structure.strip_width
+        return Grid.covering((side, side), self.contact.grid)
+
+    def scanned(self) -> Iterator[ScannedFace]:
+        if self.structure.surfaces is not None:
+            (face,) = self.meshed().interfaces
+            yield ScannedFace("pad", KEY, self.structure.surfaces, self.pad_grid, face)
+
     def outline(self) -> list[tuple[str, str]]:
         form, wear = self.structure.form, self.wear
         pad = self.structure.strip_width
@@ -270,6 +302,7 @@ class SpecimensCase(Case):
         cells, stroke = " x ".join(map(str, self.contact.grid)), plain(self.load_path.stroke, "mm")
         return [
             ("structure", f"pads of {pad:g} x {pad:g} mm with {nodes} nodes, {shape}"),
+            *(row for face in self.scanned() for row in face.outline()),
             ("load path", f"{forces} N{' in turn' * several}, stroke {stroke}"),
             *of_bodies("material", self.materials),
             ("friction", f"{self.friction.coefficient:g}"),
@@ -289,6 +322,13 @@ class SpecimensCase(Case):
         for index, force in enumerate(self.load_path.normal_forces):
             path = f"load_path.normal_forces.{index}"
             yield from about_pressure(path, force / side**2, bodies)
+        yield from self.surface_doubts()
+
+    @model_validator(mode="after")
+    def _surfaces_fit(self) -> SpecimensCase:
+        if self.structure.surfaces is not None:
+            self.structure.surfaces.check(self.pad_grid, size="structure.strip_width")
+        return self
 
     @model_validator(mode="after")
     def _reported_forces_run(self) -> SpecimensCase:

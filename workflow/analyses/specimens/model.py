@@ -13,7 +13,7 @@ from fe_models.mesh import Interface, StructureMesh
 from fe_models.reduced_contact import ReducedPair
 from fe_models.reduction import ReducedModel, free_frequencies
 from fe_models.specimens import STEPS, pad_stiffness, reduced_specimens, specimen_matrices
-from sa_solver.types import Array, Progress, Tally, unseen
+from sa_solver.types import Array, Grid, Progress, Tally, unseen
 from workflow.analyses.specimens.case import SpecimensCase
 from workflow.shell.cache import content_key, load_arrays, save_arrays
 
@@ -48,8 +48,11 @@ class SpecimensModel:
     @cached_property
     def mesh(self) -> StructureMesh:
         """Both specimens; raises :class:`~fe_models.mesh.MeshError`."""
-        mesh = self.case.mesh
-        return self.specimen.mesh(mesh.size).weighted(mesh.order)
+        mesh = self.case.meshed()
+        (face,) = mesh.interfaces
+        for scanned in self.case.scanned():
+            face = replace(face, gap=face.gap + scanned.at_nodes())
+        return replace(mesh, interfaces=(face,)).weighted(self.case.mesh.order)
 
     @property
     def face(self) -> Interface:
@@ -57,11 +60,17 @@ class SpecimensModel:
         (face,) = self.mesh.interfaces
         return face
 
+    def gap(self, grid: Grid) -> Array:
+        """Distance of the unloaded, unworn pads over the cells of a grid ``(nx, ny)`` [mm]."""
+        gap = self.specimen.gap(grid.x, grid.y)
+        surfaces = self.case.structure.surfaces
+        return gap if surfaces is None else gap + surfaces.gap(grid)
+
     @cached_property
     def reduction(self) -> SpecimenReduction:
         """Reduced models and frequencies, from the cache when they are there.
 
-        The form is a gap: flat and curved specimens share them.
+        Form and surfaces as measured are a gap: all specimens share them.
         """
         case = self.case
         flat = replace(self.specimen, radii=None)

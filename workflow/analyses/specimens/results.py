@@ -180,6 +180,7 @@ def _summary(outcome: SpecimensOutcome, reporter: Reporter) -> dict[str, Any]:
     coefficients = wear.body_1.rate(1.0), wear.body_2.rate(1.0)  # what is reported is of energy
     return {
         "structure": {"nodes": model.node_count(), "pad_nodes": len(model.face)},
+        **model.case.told_surfaces(),
         "frequencies": frequencies(outcome),
         "tied_pad": tied_pad(outcome.bulk),
         "explanation": explanation(outcome),

@@ -43,6 +43,8 @@ KEPT_STATES = 13
 # Points of first loading, denser where it begins (a power of even steps).
 CURVE_POINTS, CURVE_POWER = 61, 2.0
 HALF_SPACE_POINTS = 13
+# Of surfaces as measured, where what is finer than the nodes of the pad is.
+FINER = "these wear, and only the half-space beside them has all that its grid carries"
 # Increments of the marched cycle in a quarter of it: 16 leave 2e-3 of the energy of Masing's loop.
 QUARTER = 16
 # Of the work for a force, what wear is; the rest are the half-space and the marched cycle.
@@ -70,9 +72,13 @@ def run_specimens(run: Run[SpecimensCase]) -> None:
 
 
 def _compute(case: SpecimensCase, reporter: Reporter, steps: Steps) -> SpecimensOutcome:
+    for doubt in case.surface_doubts():
+        reporter.warn(doubt)
     model = SpecimensModel(case)
     with reporter.stage("mesh"):
         nodes = model.node_count()
+    for finer in case.finer_than_nodes(FINER):
+        reporter.say(finer)
     memory(case, nodes).check()
     with reporter.stage("reduction", "steps") as told:
         model.prepare(told)
@@ -114,7 +120,7 @@ def _fret(
         )
         kept = tuple(map(KeptState, _chosen(blocks), curves))
     grid = half_space.grid
-    height = model.specimen.gap(grid.x, grid.y)
+    height = model.gap(grid)
     path = 0.5 * conditions.stroke * rising(HALF_SPACE_POINTS)
     with reporter.stage("half-space"):
         first, last = (

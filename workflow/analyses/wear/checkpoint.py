@@ -11,6 +11,7 @@ import numpy as np
 from sa_solver.normal import NormalStart
 from sa_solver.types import LoadHistory
 from wear.coupled import CoupledState
+from wear.full_cycle import CycleStart
 from wear.interface import InterfaceState
 from wear.link import Link
 from wear.surfaces import Surfaces
@@ -26,6 +27,8 @@ PARTS: dict[str, Any] = {"surfaces": Surfaces, "loads": LoadHistory, "link": Lin
 ARRAYS = ("slip", "pressed", "paths")
 # Where it has what solves start from: the increments, and of all of them these fields.
 INCREMENTS, START = "starts/increments", ("pressure", "displacement")
+# Where it has what the half-space's own cycle starts from.
+CYCLE = "cycle_start"
 # Where it has its companion.
 COARSE = "coarse"
 SCALARS = ("energy", "depth_rate", "volume_rate", "next_cycles", "order")
@@ -56,6 +59,8 @@ def _arrays_of(interface: InterfaceState, group: str) -> dict[str, object]:
         for name in START:
             fields_of_all = [getattr(start, name) for start in interface.starts.values()]
             arrays[f"{group}/starts/{name}"] = np.stack(fields_of_all)
+    if isinstance(interface.start, CycleStart):
+        arrays |= {f"{group}/{CYCLE}/{name}": of for name, of in vars(interface.start).items()}
     if isinstance(interface.coarse, InterfaceState):
         arrays |= _arrays_of(interface.coarse, f"{group}/{COARSE}")
     return arrays
@@ -90,6 +95,9 @@ def _load_interface(arrays: Mapping[str, Any], group: str) -> InterfaceState:
         increment: NormalStart(*(arrays[f"{group}/starts/{name}"][number] for name in START))
         for number, increment in enumerate(increments)
     }
+    cycle, start = f"{group}/{CYCLE}", None
+    if f"{cycle}/shear" in arrays:
+        start = CycleStart(**{f.name: arrays[f"{cycle}/{f.name}"] for f in fields(CycleStart)})
     companion = f"{group}/{COARSE}"
     coarse = _load_interface(arrays, companion) if f"{companion}/scalars" in arrays else None
     scalars = dict(zip(SCALARS, arrays[f"{group}/scalars"].tolist(), strict=True))
@@ -98,4 +106,4 @@ def _load_interface(arrays: Mapping[str, Any], group: str) -> InterfaceState:
         for part, kind in PARTS.items()
     }
     given = parts | {name: arrays[f"{group}/{name}"] for name in ARRAYS} | scalars
-    return InterfaceState(starts=starts, coarse=coarse, **given)
+    return InterfaceState(starts=starts, start=start, coarse=coarse, **given)

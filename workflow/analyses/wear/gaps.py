@@ -11,7 +11,7 @@ from scipy.interpolate import make_interp_spline
 
 from sa_solver.shapes import rounded_edge
 from sa_solver.types import Array, Grid
-from workflow.analyses.contact.surfaces import MeasuredSurfaces
+from workflow.analyses.contact.surfaces import SurfacesOfTwo
 from workflow.analyses.wear.case.gaps import GapShape, HeightsGap, ParaboloidGap, RoundedGap
 from workflow.case.input_files import read_heights
 
@@ -44,7 +44,7 @@ class MeasuredGap:
     """
 
     form: GapFunction
-    surfaces: MeasuredSurfaces
+    surfaces: SurfacesOfTwo
     face: Grid
 
     def __call__(self, x: Array, y: Array) -> Array:
@@ -56,7 +56,7 @@ class MeasuredGap:
         return self.form(x, y) + self.surfaces.gap(grid)
 
 
-def with_measured(form: GapFunction, surfaces: MeasuredSurfaces | None, face: Grid) -> GapFunction:
+def with_measured(form: GapFunction, surfaces: SurfacesOfTwo | None, face: Grid) -> GapFunction:
     """The gap of a form, and of measured surfaces where there are any."""
     return form if surfaces is None else MeasuredGap(form, surfaces, face)
 

@@ -293,7 +293,8 @@ class StructureStage(Heard):
         loads = [path.tolist() for path in (mission.preload, mission.amplitudes)]
         stiffness = self.model.nonlinearity.stiffness
         at = None if stiffness == "linear" else self._peak_amplitudes.tolist()
-        key = content_key(*self.model.key, *loads, stiffness, at, self.model.friction)
+        gaps = [interface.gap.tobytes() for interface in self.mesh.interfaces]
+        key = content_key(*self.model.key, *loads, stiffness, at, self.model.friction, gaps)
         cycle = load_cycle(key, self.structure, friction)
         if cycle is None:
             cycle = self._cycle(mission, self._no_wear(), None, None)

@@ -13,7 +13,7 @@ from pydantic import model_validator
 from sa_solver.types import Material as ElasticMaterial
 from workflow.analyses.wear.case.evolution import EvolvingFriction
 from workflow.analyses.wear.case.loops import Loops
-from workflow.analyses.wear.case.scanned import ScannedFace
+from workflow.analyses.wear.case.scanned import WithScans
 from workflow.analyses.wear.case.sections import (
     BodiesThatWear,
     Contact,
@@ -64,7 +64,7 @@ class ContactTerms:
         return tuple(n for n in bodies if isfinite(self.materials[n - 1].young))
 
 
-class WearCase(Case):
+class WearCase(WithScans, Case):
     """One case: where its loads come from, its contacts and how they wear.
 
     Each kind of structure narrows ``structure``, ``materials`` and ``wear`` to its own.
@@ -208,20 +208,6 @@ class WearCase(Case):
         if (sides := self.face_sides()) is not None:
             yield from uneven_cells(sides, self.contact.grid)
 
-    def scanned(self) -> Iterator[ScannedFace]:
-        """The contact faces that have surfaces as measured."""
-        yield from ()
-
-    def told_surfaces(self) -> dict[str, Any]:
-        """What the summary has of surfaces as measured; nothing where there are none."""
-        faces = {face.name: face.summary() for face in self.scanned()}
-        return {"surfaces": faces} if faces else {}
-
-    def surface_doubts(self) -> Iterator[str]:
-        """About surfaces as measured, for a run to warn of."""
-        for face in self.scanned():
-            yield from face.doubts()
-
     @property
     def yields(self) -> list[float | None]:
         """Yield stresses of the bodies that have one [MPa]."""
@@ -239,6 +225,13 @@ class FiniteElementCase(WearCase):
 
     nonlinearity: Nonlinearity = entry("geometric, of the structure", default=Nonlinearity())
     coupling: Coupling = entry("worn surfaces back to the structure", default=Coupling())
+
+    def told_of_nodes(self) -> Iterator[str]:
+        """What of surfaces as measured is finer than the nodes of the structure."""
+        half_space = "the half-space has all that the grid carries"
+        yield from self.finer_than_nodes(
+            "nothing has more" if self.contact.method == "nodes" else half_space
+        )
 
     @property
     @abstractmethod

@@ -23,8 +23,8 @@ from workflow.analyses.wear.budget.lives import STEPS, TOLERANCE, live, shortene
 from workflow.analyses.wear.case.sections import Contact
 from workflow.analyses.wear.fidelity.estimate import Numbers
 from workflow.analyses.wear.structure_stage import StructureStage
-from workflow.analyses.wear.structures.dovetail.case import DovetailCase
-from workflow.analyses.wear.structures.dovetail.model import SIDES, DovetailModel
+from workflow.analyses.wear.structures.dovetail.case import SIDES, DovetailCase
+from workflow.analyses.wear.structures.dovetail.model import DovetailModel
 from workflow.case.changing import changed
 from workflow.errors import MethodFailed
 
@@ -40,8 +40,7 @@ def plane_section(case: DovetailCase) -> DovetailCase:
     return shortened(
         case,
         {
-            "structure.dimension": 2,
-            "structure.skew": 0.0,
+            **case.to_plane,
             "mesh.flank_nodes": (NODES, NODES),
             "mesh.notch": NOTCH,
             "mesh.size": case.structure.face_width / 2.0,

@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from functools import lru_cache
 from math import cos, pi, radians, sin, tan
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 from pydantic import field_validator, model_validator
 from pydantic_core import PydanticCustomError
 
-from fe_models.mesh import MeshError
+from fe_models.mesh import MeshError, StructureMesh
+from sa_solver.types import Grid
 from workflow.analyses.wear.case.base import FiniteElementCase
 from workflow.analyses.wear.case.gaps import check_arcs
+from workflow.analyses.wear.case.scanned import ScannedFace
 from workflow.analyses.wear.case.sections import (
     BladeAndDiskMaterials,
     DovetailWear,
@@ -19,6 +22,7 @@ from workflow.analyses.wear.case.sections import (
     check_rows,
     check_shares,
 )
+from workflow.analyses.wear.structures.dovetail.flank_surfaces import MeasuredFlanks
 from workflow.case.doubts import pressed
 from workflow.case.fields import AUTO, Auto, OrAuto, Quantity, Whole
 from workflow.case.plain import plain, shares
@@ -45,6 +49,10 @@ RotationSpeed = Annotated[
 Moment = Annotated[
     float, Quantity("N*mm", at_least=-1e9, at_most=1e9, range_text="-1e6 N*m to 1e6 N*m")
 ]
+# Where a case has surfaces as measured.
+SURFACES = "structure.surfaces"
+# The flank at X > 0 and the one at X < 0.
+SIDES = {"intrados": 1, "extrados": -1}
 LegIncrements = Annotated[int, Whole(1, 10_000)]
 FlankNodes = Annotated[int, Whole(3, 2000)]
 
@@ -53,10 +61,6 @@ class Dovetail(Section):
     """Blade root in a disk sector, in contact along two flanks (dovetail attachment)."""
 
     in_schema: ClassVar[Mapping[str, Any]] = together("end_width", "end_radius")
-    refused: ClassVar[Mapping[str, str]] = {
-        "surfaces": "as measured: not of flanks; allowed: in kind mesh, resultants or bodies"
-    }
-
     kind: Literal["dovetail"] = entry("what the structure is", "dovetail")
     dimension: Literal[2, 3] = entry(
         "3, or 2: the section in the middle of the slot in plane strain, loads per length",
@@ -93,6 +97,11 @@ class Dovetail(Section):
         "of the disk's sector: guided along their planes, or cyclic: as those of the next sectors",
         "guided",
         default="guided",
+    )
+    surfaces: MeasuredFlanks | None = entry(
+        "of the flanks as measured, on top of their form, about the middle of each; of dimension "
+        "2 profiles, the same all along the slot",
+        default=None,
     )
 
     @property
@@ -184,7 +193,23 @@ class Dovetail(Section):
         """The joint as the mesher takes it."""
         from fe_models.geometry.dovetail import Dovetail as Geometry
 
-        return Geometry(**self.model_dump(exclude={"kind", "dimension", "sides"}))
+        return Geometry(**self.model_dump(exclude={"kind", "dimension", "sides", "surfaces"}))
+
+    def meshed(self, mesh: Mesh) -> StructureMesh:
+        """Both bodies, made once, without surfaces as measured. Raises MeshError."""
+        return _meshed(self.geometry(), mesh.flank_nodes, mesh.size, self.dimension, mesh.notch)
+
+
+# A look at the case and the run that follows it share what they find.
+@lru_cache(maxsize=1)
+def _meshed(
+    geometry: Geometry,
+    flank_nodes: tuple[int, int],
+    size: float,
+    dimension: Literal[2, 3],
+    notch: int,
+) -> StructureMesh:
+    return geometry.mesh(flank_nodes, size, dimension, notch)
 
 
 def _require_below(section: Section, key: str, limit: float, name: str) -> None:
@@ -325,6 +350,7 @@ class DovetailCase(FiniteElementCase):
         rows = [
             ("structure", f"dovetail in {self.structure.dimension}-D, {nodes} nodes on a flank"),
             ("flanks", self.structure.flanks),
+            *(row for face in self.scanned() for row in face.outline()),
             ("load path", f"{self.increments_outline}{peak}{missions}"),
             ("peak load", ", ".join(self._peak_loads())),
         ]
@@ -349,6 +375,25 @@ class DovetailCase(FiniteElementCase):
         speed = path.missions()[path.heaviest]["rotation_speed"]
         return float(path.airfoil_mass * path.airfoil_radius * speed**2)
 
+    @property
+    def to_plane(self) -> dict[str, Any]:
+        """Entries that differ in the section in plane strain: a flank's surfaces are none of it."""
+        entries: dict[str, Any] = {"structure.dimension": 2, "structure.skew": 0.0}
+        return entries | ({} if self.structure.dimension == 2 else {SURFACES: None})
+
+    def scanned(self) -> Iterator[ScannedFace]:
+        if self.structure.surfaces is None:
+            return
+        faces = {face.name: face for face in self.structure.meshed(self.mesh).interfaces}
+        for name, surfaces in self.structure.surfaces.flanks.items():
+            grid = self._flank_grid(name)
+            yield ScannedFace(name, f"{SURFACES}.{name}", surfaces, grid, faces[name])
+
+    def _flank_grid(self, name: str) -> Grid:
+        """The grid over a flank."""
+        size = self.structure.geometry().flank_size(SIDES[name])
+        return Grid.over(size, self.contact.grid, self.structure.dimension == 2)
+
     def face_sides(self) -> tuple[float, float]:
         return self.structure.face_width, self.structure.slot_length
 
@@ -365,6 +410,7 @@ class DovetailCase(FiniteElementCase):
                 f"blade off a flank: more than the pull of {plain(self._pull, 'N')} on half of "
                 f"the neck, {plain(arm, 'mm')}"
             )
+        yield from self.surface_doubts()
 
     @property
     def cores(self) -> int:
@@ -383,6 +429,22 @@ class DovetailCase(FiniteElementCase):
     @model_validator(mode="after")
     def _grid_fits(self) -> DovetailCase:
         check_rows(self.contact.grid, line=self.structure.dimension == 2)
+        return self
+
+    @model_validator(mode="after")
+    def _surfaces_fit(self) -> DovetailCase:
+        """Refuse surfaces as measured that no flank has room for, or that no probe knows."""
+        if self.structure.surfaces is None:
+            return self
+        if self.fidelity == "auto":
+            raise disagreement(
+                "auto: looks at two dimensions and three, and surfaces as measured are of one of "
+                "them; allowed: fidelity fixed, or no structure.surfaces",
+                *("fidelity", SURFACES),
+            )
+        sizes = "structure.flank_length"
+        for name, surfaces in self.structure.surfaces.flanks.items():
+            surfaces.check(self._flank_grid(name), f"{SURFACES}.{name}", sizes)
         return self
 
     @model_validator(mode="after")

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from functools import partial
+from dataclasses import replace
+from functools import cached_property, partial
 from typing import Self
 
 import numpy as np
@@ -12,14 +13,13 @@ from fe_models.mesh import Interface, StructureMesh
 from fe_models.pretension import Bolt
 from fe_models.relinearised import Softening
 from fe_models.structure import Structure
+from workflow.analyses.wear.case.scanned import ScannedFace
+from workflow.analyses.wear.gaps import GapFunction, with_measured
 from workflow.analyses.wear.load_source import ContactFace
 from workflow.analyses.wear.structure_stage import MissionLoads
-from workflow.analyses.wear.structures.dovetail.case import DovetailCase
+from workflow.analyses.wear.structures.dovetail.case import SIDES, DovetailCase
 from workflow.case.changing import changed
 from workflow.shell.reporter import Reporter
-
-# The flank at X > 0 and the one at X < 0.
-SIDES = {"intrados": 1, "extrados": -1}
 
 
 class DovetailModel:
@@ -39,7 +39,7 @@ class DovetailModel:
     @classmethod
     def in_plane(cls, case: DovetailCase) -> Self:
         """The section of a case in plane strain, under the same missions."""
-        return cls(changed(case, {"structure.dimension": 2, "structure.skew": 0.0}))
+        return cls(changed(case, case.to_plane))
 
     @property
     def key(self) -> tuple[object, ...]:
@@ -61,9 +61,19 @@ class DovetailModel:
         return f"raise mesh.notch{along}{', or take mesh.order: 2' if self.order == 1 else ''}"
 
     def mesh(self) -> StructureMesh:
-        mesh = self._case.mesh
-        dimension = self._case.structure.dimension
-        return self.dovetail.mesh(mesh.flank_nodes, mesh.size, dimension, mesh.notch)
+        meshed = self._case.structure.meshed(self._case.mesh)
+        return replace(meshed, interfaces=tuple(map(self._with_gap, meshed.interfaces)))
+
+    def _with_gap(self, flank: Interface) -> Interface:
+        """The flank with what surfaces as measured add to its gap."""
+        if flank.name not in self._scanned:
+            return flank
+        return replace(flank, gap=flank.gap + self._scanned[flank.name].at_nodes())
+
+    @cached_property
+    def _scanned(self) -> dict[str, ScannedFace]:
+        """Flanks with surfaces as measured, by name."""
+        return {face.name: face for face in self._case.scanned()}
 
     def structure(self, mesh: StructureMesh) -> Structure:
         disk, blade = self._case.material(1), self._case.material(2)
@@ -82,7 +92,10 @@ class DovetailModel:
 
     def contact_face(self, interface: Interface) -> ContactFace:
         side = SIDES[interface.name]
-        gap = partial(self.dovetail.flank_gap, side=side)
+        gap: GapFunction = partial(self.dovetail.flank_gap, side=side)
+        if interface.name in self._scanned:
+            scanned = self._scanned[interface.name]
+            gap = with_measured(gap, scanned.surfaces, scanned.grid)
         nodes = self._case.mesh.flank_nodes
         widen = "widen structure.edge_width or structure.end_width"
         return ContactFace(interface, self.dovetail.flank_size(side), gap, nodes, widen)
@@ -91,7 +104,16 @@ class DovetailModel:
         """Nobody but us knows the nodes."""
 
     def warn(self, structure: Structure, reporter: Reporter) -> None:
-        """Self-locking joints, and sides that a moment would move."""
+        """Self-locking joints, sides that a moment would move, and surfaces as measured that are
+        finer than the mesh.
+        """
+        for told in self._case.told_of_nodes():
+            reporter.say(told)
+        if self._scanned and self._case.structure.dimension == 3:
+            reporter.say(
+                "structure.surfaces: the section by which increments are chosen and the error of "
+                "the mesh is estimated is without them"
+            )
         moments = any(mission["aerodynamic_moment"] for mission in self._case.load_path.missions())
         if moments and self._case.structure.sides == "guided" and self.dovetail.skew == 0.0:
             reporter.say(

@@ -39,7 +39,6 @@ from workflow.analyses.wear.structures.mesh.elements import (
 )
 from workflow.analyses.wear.structures.mesh.faces import (
     check_mirrored,
-    check_whole,
     face_size,
     hardly_met,
     outline_of,
@@ -436,9 +435,10 @@ class MeshCase(FiniteElementCase):
                 check_gap(pair.gap, face_size(face), cells, face.line, f"{key}.gap")
                 check_mirrored(pair.gap, face.planes, f"{key}.gap")
             if pair.surfaces is not None:
-                check_whole(face.planes, f"{key}.surfaces")
                 over = Grid.over(face_size(face), grid, face.line)
                 pair.surfaces.check(over, f"{key}.surfaces", "mesh")
+                scanned = ScannedFace(pair.name, f"{key}.surfaces", pair.surfaces, over, face)
+                scanned.check_mirrored()
 
     def _check_supports(self, imported: ImportedMesh) -> None:
         """Build what holds the bodies, on elements of order 1 and without forces."""

@@ -8,6 +8,7 @@ import numpy as np
 
 from fe_models.mesh import Interface, StructureMesh
 from workflow.analyses.wear.case.gaps import Gap, HeightsGap
+from workflow.analyses.wear.case.scanned import MIRRORED
 from workflow.case.input_files import read_heights
 from workflow.case.plain import counted, shape_in_words
 from workflow.case.sections import Section, disagreement
@@ -16,8 +17,6 @@ AXIS_NAMES = "xy"
 # Faces are shared but for rounding; and usually the smaller one all but for the clearance of a
 # bolt's hole, an eighth of what is under its head.
 SHARED, WHOLE = 1e-6, 0.8
-# Heights on both sides of a plane of symmetry may differ by this share of their range: files round.
-MIRRORED = 1e-6
 
 
 def face_size(face: Interface) -> tuple[float, float]:
@@ -115,13 +114,3 @@ def check_mirrored(gap: Gap, planes: Sequence[int], key: str) -> None:
                 f"{apart:.3g} mm; allowed: heights that are, over the whole face, or a mesh of it",
                 key,
             )
-
-
-def check_whole(planes: Sequence[int], key: str) -> None:
-    """Refuse surfaces as measured, which are never their own image across ``planes``."""
-    if planes:
-        raise disagreement(
-            f"on a face that {planes_of_symmetry(planes)} cuts, across which no measured surface "
-            "is its own image; allowed: on a mesh of the whole face",
-            key,
-        )

@@ -18,7 +18,6 @@ from fe_models.relinearised import Softening
 from fe_models.structure import Structure
 from sa_solver.shapes import PARTING_SLOPE
 from sa_solver.types import Array, Grid, Indices
-from workflow.analyses.contact.surfaces import LOST
 from workflow.analyses.wear.case.scanned import ScannedFace
 from workflow.analyses.wear.gaps import GapFunction, gap_over, with_measured
 from workflow.analyses.wear.load_source import ContactFace
@@ -27,7 +26,6 @@ from workflow.analyses.wear.structures.mesh.case import MeshCase
 from workflow.analyses.wear.structures.mesh.faces import face_size, planes_of_symmetry
 from workflow.analyses.wear.structures.mesh.loads import RotationLoad
 from workflow.analyses.wear.structures.mesh.pretension import BoltLoad
-from workflow.case.plain import plain
 from workflow.shell.reporter import Reporter
 
 
@@ -51,13 +49,12 @@ class MeshModel:
         contents = Path(structure.file).read_bytes()
         loads = [(load.model_dump(exclude={"path"}), load.contents) for load in structure.loads]
         # What contacts are made of does not change how the bodies deform.
-        of_contacts = {"__all__": {"friction", "wear", "grid"}}
+        of_contacts = {"__all__": {"friction", "wear", "grid", "gap", "surfaces"}}
         described = structure.model_dump(
             exclude={"file": True, "loads": True, "contacts": of_contacts}
         )
-        gaps = [interface.gap.tobytes() for interface in self._mesh.interfaces]
         materials = [solid.elastic() for solid in self._case.solids.values()]
-        return contents, described, loads, gaps, self._case.mesh, materials
+        return contents, described, loads, self._case.mesh, materials
 
     @property
     def missions(self) -> tuple[MissionLoads, ...]:
@@ -168,7 +165,8 @@ class MeshModel:
         """Of contacts that planes of symmetry cut, supports that are none, and surfaces as
         measured that are finer than the mesh.
         """
-        self._tell_of_surfaces(reporter)
+        for told in self._case.told_of_nodes():
+            reporter.say(told)
         for interface in structure.mesh.interfaces:
             name, planes = interface.name, interface.planes
             if planes:
@@ -184,18 +182,6 @@ class MeshModel:
                     "have on it: the structure knows of them, the half-space of the contact does "
                     "not, whose pressure is that of a face that ends there; mesh the whole face"
                 )
-
-    def _tell_of_surfaces(self, reporter: Reporter) -> None:
-        """What of measured surfaces the nodes of the structure do not carry."""
-        for name, face in self._scanned.items():
-            for body, numbers in face.summary().items():
-                lost, height = numbers["lost_by_nodes"], numbers["rms"]
-                if lost > LOST * height:
-                    reporter.say(
-                        f"{name}: {plain(lost, 'mm', 3)} of the surface of body {body[-1]}, "
-                        f"{plain(height, 'mm', 3)} rms, is finer than the nodes of the face: the "
-                        "structure has means about them, the half-space all that the grid carries"
-                    )
 
 
 class _MeshGap:
