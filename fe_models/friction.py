@@ -27,9 +27,11 @@ TOLERANCE = 1e-7
 LOAD_FLOOR = 1e-3
 # An increment needs 5 to 100 iterations; one that takes more than this walks in circles.
 MAX_ITERATIONS = 1000
+# A first increment, which may be a leap, that takes more than this gets on better from the heaviest
+# load: rounding decides whether some thousand iterations are enough for worn faces to meet.
+LEAP = 200
 # On the way to a light load what is left of the heaviest falls by this factor from one solution to
-# the next, which takes 50 iterations each. In one leap, to 1/5000, rounding decided whether 1000
-# were enough.
+# the next, which takes 50 iterations each.
 LIGHTENED = 0.1
 
 
@@ -95,11 +97,10 @@ class FrictionalJoint:
         for increment, load in enumerate(loads):
             if states:
                 starts = _starts(states, guesses, loads[: increment + 1, 0])
+                state, ended = self._solve(load, gap, displacement, starts, floor)
             else:
                 starts = [*guesses[:1], *guesses[-1:], *self._with_images(_at_rest(gap, load))]
-            state, ended = self._solve(load, gap, displacement, starts, floor)
-            if not state.converged and not states:
-                state, ended = self._lightened(heaviest, load, gap, displacement, starts, floor)
+                state, ended = self._first(heaviest, load, gap, displacement, starts, floor)
             states.append(ended)
             displacement = state.displacement
             yield state
@@ -111,6 +112,23 @@ class FrictionalJoint:
         """
         with one_thread(self._joint.widest):
             return np.stack([vectors, self._joint.product(vectors.T).T], axis=1)
+
+    def _first(
+        self,
+        heaviest: Array,
+        load: Array,
+        gap: Array,
+        previous: Array,
+        starts: list[Array],
+        floor: float,
+    ) -> tuple[FrictionState, Array]:
+        """The first increment: in a short leap, from the heaviest load, or in a long leap."""
+        solved = self._solve(load, gap, previous, starts, floor, LEAP)
+        if not solved[0].converged:
+            solved = self._lightened(heaviest, load, gap, previous, starts, floor)
+        if not solved[0].converged:
+            solved = self._solve(load, gap, previous, starts, floor)
+        return solved
 
     def _lightened(
         self,
@@ -134,15 +152,23 @@ class FrictionalJoint:
         return self._solve(load, gap, previous, [ended], floor)
 
     def _solve(
-        self, load: Array, gap: Array, previous: Array, starts: list[Array], floor: float
+        self,
+        load: Array,
+        gap: Array,
+        previous: Array,
+        starts: list[Array],
+        floor: float,
+        most: int | None = None,
     ) -> tuple[FrictionState, Array]:
         """One increment, its residual relative to the load, which counts as ``floor`` at least.
 
         And the splitting's state with its image. ``load`` and ``starts`` have theirs, ``(2, d n)``.
+        It takes as many iterations as all starts may, unless told how many at ``most``.
         """
         with one_thread(self._joint.widest):
             problem = _Problem(self._joint, self._friction, load, gap, previous)
-            return problem.solve(starts, max(float(np.linalg.norm(load[0])), floor))
+            most = most or 2 * len(starts) * MAX_ITERATIONS
+            return problem.solve(starts, max(float(np.linalg.norm(load[0])), floor), most)
 
 
 class _Problem:
@@ -166,11 +192,11 @@ class _Problem:
         self._axes = AXES[len(forces) // len(gap)]
         self._exact = np.zeros_like(load)
 
-    def solve(self, starts: list[Array], scale: float) -> tuple[FrictionState, Array]:
+    def solve(self, starts: list[Array], scale: float, most: int) -> tuple[FrictionState, Array]:
         """Split from the most promising start, and from the others should it fail.
 
-        First so that no extrapolation throws a body off, then so that one may fly to its contacts.
-        The state is given with its image.
+        First so that no extrapolation throws a body off, then so that one may fly to its contacts,
+        in ``most`` iterations together. The state is given with its image.
         """
         iterations = 0
         promising = sorted(starts, key=self._distance)
@@ -182,14 +208,14 @@ class _Problem:
                 start[0],
                 scale=scale / self._rho,
                 tolerance=TOLERANCE,
-                max_iterations=MAX_ITERATIONS,
+                max_iterations=min(MAX_ITERATIONS, most - iterations),
                 returning=returning,
                 refresh=self._refresh,
             )
             iterations += split.iterations
-            if split.converged:
+            if split.converged or iterations >= most:
                 break
-        else:
+        if not split.converged:
             self._refresh(split.state)
         return self._state(split, iterations), self._exact
 
