@@ -55,9 +55,10 @@ TINY = np.finfo(float).tiny
 """Keeps divisions by a vanishing size finite."""
 
 REFRESHED = 1e4
-"""An elastic step that is exact near one state only is told of the present one where that is farther
-from it than so many steps: of a matrix in single precision the error is then 1/2000 of the step. It
-takes as many iterations as in double precision, and so it did at a tenth and ten times of this."""
+"""An elastic step that is exact near one state only is told of the present one where that is
+farther from it than so many steps: of a matrix in single precision the error is then 1/2000 of the
+step. It takes as many iterations as in double precision, and so it did with a tenth and ten times
+of this."""
 
 HARDLY_CHANGED = 1e-3
 """So it is where the residual changes by less than this share of itself: whether a body is at
