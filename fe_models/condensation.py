@@ -41,3 +41,13 @@ def condense_body(
     every = np.zeros((len(kept), loads.shape[1]))
     every[:, acting] = some
     return static, every
+
+
+def renamed(condensed: Condensed, names: sp.csr_matrix) -> Condensed:
+    """A condensed body in other coordinates: each row of ``names`` has one entry, 1 or -1."""
+    static, loads = condensed
+    old, sign = names.indices, np.round(names.data)
+    static, loads = static[np.ix_(old, old)], sign[:, None] * loads[old]
+    static *= sign
+    static *= sign[:, None]
+    return static, loads

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import cached_property
 
 import numpy as np
@@ -101,27 +101,29 @@ class ElasticBody:
     def stiffness(self) -> sp.csr_matrix:
         """Stiffness matrix ``(size, size)`` [N/mm].
 
-        Built from the scalar forms ∫ ∂a φi ∂b φj, which do not depend on the material: ten times
-        faster than the vector form.
+        Its blocks of two nodes are λ F + G Fᵀ + G tr(F) with F_ab = ∫ ∂a φi ∂b φj. Summing these
+        pair by pair of nodes takes a third of the time of scikit-fem's scalar forms, and these a
+        tenth of that of its vector form.
+        Whatever the shape of the elements, it has entries between all components of their nodes.
         """
-        forms = {
-            (a, b): BilinearForm(lambda u, v, w, a=a, b=b: grad(v)[a] * grad(u)[b])
-            .assemble(self._basis)
-            .tocsr()
-            for a in range(self.dimension)
-            for b in range(a, self.dimension)
-        }
-        forms |= {(b, a): form.T.tocsr() for (a, b), form in forms.items() if a != b}
-        laplace = sum(forms[a, a] for a in range(self.dimension))
+        sums, d = _NodePairs(self.element_nodes), self.dimension
+        gradients = [np.asarray(field.grad) for (field,) in self._basis.basis]
+        weights = self._basis.dx
+        if self.order == 1:
+            # The same all over the element.
+            gradients = [gradient[..., :1] for gradient in gradients]
+            weights = weights.sum(axis=1, keepdims=True)
+        forms = np.empty((d, d, len(sums.columns)))
+        for a, b in np.ndindex(d, d):
+            weighted = [gradient[a] * weights for gradient in gradients]
+            forms[a, b] = sums.of(
+                [np.einsum("eq,eq->e", one, two[b]) for one in weighted for two in gradients]
+            )
         lame, shear = self.material.lame, self.material.shear_modulus
-        stiffness = sp.csr_matrix((self.size, self.size))
-        for (a, b), form in forms.items():
-            block = lame * form + shear * form.T
-            if a == b:
-                block += shear * laplace
-            place = sp.csr_matrix(([1.0], ([a], [b])), shape=(self.dimension,) * 2)
-            stiffness += sp.kron(block, place, format="csr")
-        return stiffness
+        blocks = lame * forms + shear * forms.swapaxes(0, 1)
+        blocks[range(d), range(d)] += shear * np.trace(forms)
+        by_pair = np.ascontiguousarray(np.moveaxis(blocks, -1, 0))
+        return sp.bsr_matrix((by_pair, sums.columns, sums.pointers), (self.size,) * 2).tocsr()
 
     @cached_property
     def mass(self) -> sp.csr_matrix:
@@ -302,6 +304,30 @@ class ElasticBody:
             mapping, degree = mapping_of(self.body), max(INTEGRATED, degree or 0)
         facets = mesh.boundaries[boundary] if isinstance(boundary, str) else boundary
         return FacetBasis(mesh, element or self._element(), mapping, degree, facets=facets)
+
+
+class _NodePairs:
+    """All pairs of nodes that share an element, row by row, and sums over the elements of each.
+
+    ``nodes`` are those of the elements ``(k, m)``; ``columns`` and ``pointers`` as of a sparse
+    matrix of the nodes, which every one of them has a row in.
+    """
+
+    def __init__(self, nodes: Indices) -> None:
+        k, elements = nodes.shape
+        size = int(nodes.max()) + 1
+        pairs = (nodes.astype(np.int64)[:, None] * size + nodes).ravel()
+        order = np.argsort(pairs, kind="stable")
+        ordered = pairs[order]
+        first = np.flatnonzero(np.diff(ordered, prepend=-1))
+        rows, self.columns = np.divmod(ordered[first], size)
+        self.pointers = np.searchsorted(rows, np.arange(size + 1))
+        added = np.ones(len(order)), order, np.append(first, len(order))
+        self._sum = sp.csr_matrix(added, shape=(len(first), k * k * elements))
+
+    def of(self, values: Sequence[Array]) -> Array:
+        """Sums ``(pairs,)`` of ``k²`` values ``(m,)``, of each node with each in their order."""
+        return np.asarray(self._sum @ np.concatenate(values))
 
 
 def _normal_integrals(basis: FacetBasis) -> Array:

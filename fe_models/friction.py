@@ -27,9 +27,11 @@ TOLERANCE = 1e-7
 LOAD_FLOOR = 1e-3
 # An increment needs 5 to 100 iterations; one that takes more than this walks in circles.
 MAX_ITERATIONS = 1000
+# A first increment, which may be a leap, that takes more than this gets on better from the heaviest
+# load: rounding decides whether some thousand iterations are enough for worn faces to meet.
+LEAP = 200
 # On the way to a light load what is left of the heaviest falls by this factor from one solution to
-# the next, which takes 50 iterations each. In one leap, to 1/5000, rounding decided whether 1000
-# were enough.
+# the next, which takes 50 iterations each.
 LIGHTENED = 0.1
 
 
@@ -86,19 +88,47 @@ class FrictionalJoint:
         ``state`` of every increment of a similar path: they save iterations and change nothing
         else.
         """
-        loads = amplitudes @ self._joint.loads.T
-        floor = LOAD_FLOOR * np.linalg.norm(loads, axis=1).max()
+        loads = np.tensordot(amplitudes, self._with_images(self._joint.loads.T), 1)
+        guesses = self._with_images(np.array(guess).reshape(-1, loads.shape[-1]))
+        sizes = np.linalg.norm(loads[:, 0], axis=1)
+        floor, heaviest = LOAD_FLOOR * sizes.max(), loads[np.argmax(sizes)]
         displacement = np.zeros((3, len(gap))) if previous is None else previous
-        heaviest = loads[np.argmax(np.linalg.norm(loads, axis=1))]
         states: list[Array] = []
         for increment, load in enumerate(loads):
-            starts = _starts(states, guess, loads[: increment + 1], gap)
-            state = self._solve(load, gap, displacement, starts, floor)
-            if not state.converged and not states:
-                state = self._lightened(heaviest, load, gap, displacement, starts, floor)
-            states.append(state.state)
+            if states:
+                starts = _starts(states, guesses, loads[: increment + 1, 0])
+                state, ended = self._solve(load, gap, displacement, starts, floor)
+            else:
+                starts = [*guesses[:1], *guesses[-1:], *self._with_images(_at_rest(gap, load))]
+                state, ended = self._first(heaviest, load, gap, displacement, starts, floor)
+            states.append(ended)
             displacement = state.displacement
             yield state
+
+    def _with_images(self, vectors: Array) -> Array:
+        """``vectors`` ``(m, d n)``, and what the resolvent makes of each: ``(m, 2, d n)``.
+
+        Of sums of them it makes the sums: no product is needed to look at a start.
+        """
+        with one_thread(self._joint.widest):
+            return np.stack([vectors, self._joint.product(vectors.T).T], axis=1)
+
+    def _first(
+        self,
+        heaviest: Array,
+        load: Array,
+        gap: Array,
+        previous: Array,
+        starts: list[Array],
+        floor: float,
+    ) -> tuple[FrictionState, Array]:
+        """The first increment: in a short leap, from the heaviest load, or in a long leap."""
+        solved = self._solve(load, gap, previous, starts, floor, LEAP)
+        if not solved[0].converged:
+            solved = self._lightened(heaviest, load, gap, previous, starts, floor)
+        if not solved[0].converged:
+            solved = self._solve(load, gap, previous, starts, floor)
+        return solved
 
     def _lightened(
         self,
@@ -108,30 +138,45 @@ class FrictionalJoint:
         previous: Array,
         starts: list[Array],
         floor: float,
-    ) -> FrictionState:
+    ) -> tuple[FrictionState, Array]:
         """An increment from where the heaviest load takes the bodies, by ever lighter ones.
 
         A light load would take a body long to where worn faces meet: pressed hard it is there at
         once, and what a tenth of the load does is always near.
         """
         more = heaviest - load
-        state = self._solve(heaviest, gap, previous, starts, floor)
-        while np.linalg.norm(more) > np.linalg.norm(load) > 0.0:
+        _, ended = self._solve(heaviest, gap, previous, starts, floor)
+        while np.linalg.norm(more[0]) > np.linalg.norm(load[0]) > 0.0:
             more = LIGHTENED * more
-            state = self._solve(load + more, gap, previous, [state.state], floor)
-        return self._solve(load, gap, previous, [state.state], floor)
+            _, ended = self._solve(load + more, gap, previous, [ended], floor)
+        return self._solve(load, gap, previous, [ended], floor)
 
     def _solve(
-        self, load: Array, gap: Array, previous: Array, starts: list[Array], floor: float
-    ) -> FrictionState:
-        """One increment, its residual relative to the load, which counts as ``floor`` at least."""
+        self,
+        load: Array,
+        gap: Array,
+        previous: Array,
+        starts: list[Array],
+        floor: float,
+        most: int | None = None,
+    ) -> tuple[FrictionState, Array]:
+        """One increment, its residual relative to the load, which counts as ``floor`` at least.
+
+        And the splitting's state with its image. ``load`` and ``starts`` have theirs, ``(2, d n)``.
+        It takes as many iterations as all starts may, unless told how many at ``most``.
+        """
         with one_thread(self._joint.widest):
             problem = _Problem(self._joint, self._friction, load, gap, previous)
-            return problem.solve(starts, max(float(np.linalg.norm(load)), floor))
+            most = most or 2 * len(starts) * MAX_ITERATIONS
+            return problem.solve(starts, max(float(np.linalg.norm(load[0])), floor), most)
 
 
 class _Problem:
-    """One increment: the two steps of the splitting under one load."""
+    """One increment: the two steps of the splitting under one load.
+
+    Products are of single precision with how far the splitting has moved since the last one of
+    double precision: in half the time, and exact where it ends.
+    """
 
     def __init__(
         self,
@@ -141,35 +186,48 @@ class _Problem:
         gap: Array,
         previous: Array,
     ) -> None:
-        self._inverse, self._rho, self._friction = joint.inverse, joint.rho, friction
+        self._joint, self._rho, self._friction = joint, joint.rho, friction
         self._gap, self._previous = gap, previous
-        self._axes = AXES[len(load) // len(gap)]
-        self._offset = joint.inverse @ load
+        forces, self._offset = load
+        self._axes = AXES[len(forces) // len(gap)]
+        self._exact = np.zeros_like(load)
 
-    def solve(self, starts: list[Array], scale: float) -> FrictionState:
+    def solve(self, starts: list[Array], scale: float, most: int) -> tuple[FrictionState, Array]:
         """Split from the most promising start, and from the others should it fail.
 
-        First so that no extrapolation throws a body off, then so that one may fly to its contacts.
+        First so that no extrapolation throws a body off, then so that one may fly to its contacts,
+        in ``most`` iterations together. The state is given with its image.
         """
         iterations = 0
         promising = sorted(starts, key=self._distance)
         for returning, start in product((True, False), promising):
+            self._exact = start
             split = douglas_rachford(
                 self._elastic,
                 self._law,
-                start,
+                start[0],
                 scale=scale / self._rho,
                 tolerance=TOLERANCE,
-                max_iterations=MAX_ITERATIONS,
+                max_iterations=min(MAX_ITERATIONS, most - iterations),
                 returning=returning,
+                refresh=self._refresh,
             )
             iterations += split.iterations
-            if split.converged:
+            if split.converged or iterations >= most:
                 break
-        return self._state(split, iterations)
+        if not split.converged:
+            self._refresh(split.state)
+        return self._state(split, iterations), self._exact
 
     def _elastic(self, state: Array) -> Array:
-        return self._rho * (self._inverse @ state) - self._offset
+        known, image = self._exact
+        moved = state - known
+        if moved.any():
+            image = image + self._joint.rounded_product(moved)
+        return self._rho * image - self._offset
+
+    def _refresh(self, state: Array) -> None:
+        self._exact = np.stack([state, self._joint.product(state)])
 
     def _law(self, trial: Array) -> Array:
         nodal = self._nodal(trial)
@@ -191,8 +249,9 @@ class _Problem:
 
     def _distance(self, start: Array) -> float:
         """How far a start is from a solution: the splitting's first step."""
-        elastic = self._elastic(start)
-        return float(np.linalg.norm(self._law(2.0 * elastic - start) - elastic))
+        state, image = start
+        elastic = self._rho * image - self._offset
+        return float(np.linalg.norm(self._law(2.0 * elastic - state) - elastic))
 
     def _state(self, split: SplittingResult, iterations: int) -> FrictionState:
         stick = self._sticking_force(self._nodal(2.0 * split.elastic - split.state))
@@ -209,25 +268,30 @@ class _Problem:
         )
 
 
-def _starts(states: list[Array], guess: Sequence[Array], loads: Array, gap: Array) -> list[Array]:
-    """Where the next increment, whose load is the last of ``loads``, may start from.
+def _starts(states: list[Array], guesses: Array, loads: Array) -> list[Array]:
+    """Where the next increment, whose load is the last of ``loads`` ``(t, d n)``, may start from.
 
     The previous state; the change that the guess makes there; and the change in proportion to the
-    load, as long as that goes on in the same sense. The first one from rest or, where no node
-    touches, from where all do: a body that floats would be long on its way there.
+    load, as long as that goes on in the same sense. States have their images.
     """
     increment = len(states)
-    if not states:
-        rest = np.zeros((len(gap), loads.shape[1] // len(gap)))
-        if gap.min() > 0.0:
-            rest[:, -1] = -gap
-        return [*guess[:1], *guess[-1:], rest.ravel()]
     starts = [states[-1]]
-    if increment < len(guess):
-        starts.append(guess[increment] + states[-1] - guess[increment - 1])
+    if increment < len(guesses):
+        starts.append(guesses[increment] + states[-1] - guesses[increment - 1])
     if increment > 1:
         step, before = np.diff(loads[-3:], axis=0)[::-1]
         if step @ before > 0.0:
             ratio = (step @ before) / (before @ before)
             starts.append(states[-1] + ratio * (states[-1] - states[-2]))
     return starts
+
+
+def _at_rest(gap: Array, load: Array) -> Array:
+    """Where the first increment may start from ``(1, d n)``: rest or, where no node touches, all.
+
+    A body that floats would be long on its way there.
+    """
+    rest = np.zeros((len(gap), load.shape[-1] // len(gap)))
+    if gap.min() > 0.0:
+        rest[:, -1] = -gap
+    return rest.reshape(1, -1)

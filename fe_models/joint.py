@@ -19,10 +19,10 @@ left out of S and N, and so is their w, which no force acts on: supports carry i
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import partial
-from typing import NamedTuple
+from functools import cached_property, partial
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 import scipy.linalg as sl
@@ -32,8 +32,11 @@ from scipy.sparse.linalg import LinearOperator, eigsh
 
 from fe_models.blas_threads import one_thread
 from fe_models.condensation import Condensed
-from fe_models.symmetry import Mirror, SplitMatrix, symmetric_product
+from fe_models.symmetry import Matrix, Mirror, SplitMatrix, symmetric_product
+from sa_solver.threads import at_once
 from sa_solver.types import Array, Indices
+
+T = TypeVar("T")
 
 # Eigenvalues below this share of the largest are rigid motions; elastic ones start near 1e-3.
 RIGID_LIMIT = 1e-7
@@ -80,7 +83,8 @@ class JointStiffness:
         """
         rho = float(np.sqrt(self.smallest * self.largest))
         if isinstance(self.stiffness, SplitMatrix):
-            symmetric, antisymmetric = (_shifted_inverse(b, rho) for b in self.stiffness.blocks)
+            jobs = [partial(_shifted_inverse, block, rho) for block in self.stiffness.blocks]
+            symmetric, antisymmetric = _side_by_side(jobs)
             split = SplitMatrix(self.stiffness.mirror, (symmetric, antisymmetric))
             return JointResolvent(split, rho, self.loads, self.rigid_modes)
         inverse = _shifted_inverse(self.stiffness, rho)
@@ -106,6 +110,20 @@ class JointResolvent:
     rho: float
     loads: Array
     rigid_modes: int
+
+    def product(self, vectors: Array) -> Array:
+        """(H + ρ)⁻¹ times ``vectors`` ``(d n,)`` or ``(d n, m)``."""
+        return _product(self.inverse, vectors)
+
+    def rounded_product(self, vector: Array) -> Array:
+        """The same in single precision, of one vector ``(d n,)``: in half the time."""
+        return _product(self._rounded, vector)
+
+    @cached_property
+    def _rounded(self) -> Matrix | SplitMatrix:
+        if isinstance(self.inverse, SplitMatrix):
+            return self.inverse.in_single_precision()
+        return self.inverse.astype(np.float32)
 
     @property
     def widest(self) -> int:
@@ -150,16 +168,39 @@ def join(
 
 
 def join_halves(
-    halves_1: tuple[Condensed, ...], halves_2: tuple[Condensed, ...], mirror: Mirror
+    halves_1: Sequence[Condensed], halves_2: Sequence[Condensed], mirror: Mirror
 ) -> JointStiffness:
     """Join two bodies that meet node to node, condensed in halves of the same ``mirror``."""
-    pairs = zip(halves_1, halves_2, strict=True)
-    joined = [_joined(_Faces(one, two, None), None) for one, two in pairs]
-    (symmetric, symmetric_loads), (antisymmetric, antisymmetric_loads) = joined
-    counts, smallest, largest = zip(*(_spectrum(block, 1) for block, _ in joined), strict=True)
+    jobs = [partial(_joined_half, *pair) for pair in zip(halves_1, halves_2, strict=True)]
+    joined = _side_by_side(jobs)
+    (symmetric, symmetric_loads), (antisymmetric, antisymmetric_loads) = (
+        half for half, _ in joined
+    )
+    counts, smallest, largest = zip(*(spectrum for _, spectrum in joined), strict=True)
     loads = mirror.bases[0] @ symmetric_loads + mirror.bases[1] @ antisymmetric_loads
     stiffness = SplitMatrix(mirror, (symmetric, antisymmetric))
     return JointStiffness(stiffness, loads, sum(counts), min(smallest), max(largest))
+
+
+def _joined_half(
+    half_1: Condensed, half_2: Condensed
+) -> tuple[Condensed, tuple[int, float, float]]:
+    """H and f0 of a half, and the spectrum of H."""
+    stiffness, loads = _joined(_Faces(half_1, half_2, None), None)
+    return (stiffness, loads), _spectrum(stiffness, 1)
+
+
+def _side_by_side(jobs: Sequence[Callable[[], T]]) -> list[T]:
+    """What jobs of dense algebra give, by one thread each: as fast as one by one by all."""
+    with one_thread():
+        return at_once(jobs)
+
+
+def _product(matrix: Matrix | SplitMatrix, vectors: Array) -> Array:
+    """A symmetric matrix times ``vectors`` ``(n,)`` or ``(n, m)``."""
+    if isinstance(matrix, SplitMatrix):
+        return matrix @ vectors
+    return symmetric_product(matrix, vectors)
 
 
 class _Faces(NamedTuple):
@@ -211,21 +252,35 @@ def _joined(faces: _Faces, projection: sp.csr_matrix | None) -> tuple[Array, Arr
         carried = coupling @ projection
         if between is not None:
             carried = carried + projection.T @ between
-    factor = sl.cholesky(stiffness_1 + carried, lower=True, overwrite_a=True)
+    factor = sl.cholesky(_by_columns(stiffness_1 + carried), lower=True, overwrite_a=True)
     # K C⁻¹ Kᵀ = XᵀX with X = L⁻¹ Kᵀ: half the work of solving with both factors.
     half = sl.solve_triangular(factor, coupling, lower=True, check_finite=False)
-    stiffness = stiffness_2 - half.T @ half
+    stiffness = half.T @ half
+    np.subtract(stiffness_2, stiffness, out=stiffness)
     loads = half.T @ sl.solve_triangular(factor, loads_1 + transferred, lower=True) - loads_2
     return stiffness, loads
 
 
-def _shifted_inverse(stiffness: Array, rho: float) -> Array:
+def _by_columns(symmetric: Matrix) -> Matrix:
+    """The same matrix as LAPACK takes it without a copy."""
+    return symmetric if symmetric.flags.f_contiguous else symmetric.T
+
+
+def _shifted(stiffness: Matrix, shift: float) -> Array:
+    """H + shift, by columns."""
+    shifted = np.array(_by_columns(stiffness), np.float64, order="K")
+    shifted[np.diag_indices_from(shifted)] += shift
+    return shifted
+
+
+def _shifted_inverse(stiffness: Matrix, rho: float) -> Array:
     """(H + ρ)⁻¹, symmetric to the last bit."""
-    shifted = stiffness.copy()
-    shifted[np.diag_indices_from(shifted)] += rho
-    factor = sl.cholesky(shifted, lower=True, overwrite_a=True, check_finite=False)
-    inverse, _ = sl.lapack.dpotri(factor, lower=1, overwrite_c=1)
-    return np.asarray(np.tril(inverse) + np.tril(inverse, -1).T)
+    factor = sl.cholesky(_shifted(stiffness, rho), lower=True, overwrite_a=True, check_finite=False)
+    # Nothing is above the diagonal of either.
+    lower, _ = sl.lapack.dpotri(factor, lower=1, overwrite_c=1)
+    inverse = lower + lower.T
+    inverse[np.diag_indices_from(inverse)] = np.diag(lower)
+    return np.asarray(inverse)
 
 
 def _spectrum(stiffness: Array, free: int) -> tuple[int, float, float]:
@@ -241,9 +296,7 @@ def _spectrum(stiffness: Array, free: int) -> tuple[int, float, float]:
     with one_thread(len(stiffness)):
         (largest,) = extreme(product, 1)
     shift = SPECTRUM_SHIFT * largest
-    shifted = stiffness.copy()
-    shifted[np.diag_indices_from(shifted)] += shift
-    factors = sl.cho_factor(shifted, lower=True, overwrite_a=True)
+    factors = sl.cho_factor(_shifted(stiffness, shift), lower=True, overwrite_a=True)
     inverse = LinearOperator(
         stiffness.shape,
         matvec=lambda v: sl.cho_solve(factors, v, check_finite=False),

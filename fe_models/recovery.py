@@ -164,8 +164,8 @@ class StressRecovery:
 
     def _without_tractions(self, stress: Array, thermal: Array | float, vertices: Indices) -> Array:
         """P σ P with P along the surface, where nothing acts on it."""
-        along = self._along_surface[vertices].transpose(1, 2, 0)
-        tensor = np.einsum("abn,bcn,cdn->adn", along, tensors(stress), along)
+        along = self._along_surface[vertices]
+        tensor = np.moveaxis(along @ np.moveaxis(tensors(stress), -1, 0) @ along, 0, -1)
         if self._elastic.dimension == 2:
             tensor[1, 1] = self._elastic.material.poisson * (tensor[0, 0] + tensor[2, 2])
             tensor[1, 1] -= self._elastic.material.young * thermal

@@ -210,12 +210,13 @@ class Structure:
             if on_1 is None or on_1 != body_2.on_interface(mirrors[1]):
                 continue
             done = self._steps(progress)
-            halves_1, halves_2 = self.at_once(
-                partial(body_1.condense_halves, mirrors[0], on_1, done, keep),
-                partial(body_2.condense_halves, mirrors[1], on_1, done, keep),
+            halves = self.at_once(
+                partial(body_1.halves, mirrors[0], on_1, done, keep),
+                partial(body_2.halves, mirrors[1], on_1, done, keep),
             )
-            if halves_1 is not None and halves_2 is not None:
-                joint = join_halves(halves_1, halves_2, on_1)
+            if halves[0] is not None and halves[1] is not None:
+                condensed = self.at_once(*halves[0], *halves[1])
+                joint = join_halves(condensed[:2], condensed[2:], on_1)
                 done()
                 return joint
         return None

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 import scipy.linalg as sl
@@ -11,7 +11,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.sparse.linalg import spsolve
 
-from fe_models.condensation import Condensed, Keep, condense_body, made_anew
+from fe_models.condensation import Condensed, Keep, condense_body, made_anew, renamed
 from fe_models.constraints import Constraints
 from fe_models.cyclic import Cuts
 from fe_models.elasticity import ElasticBody
@@ -160,14 +160,14 @@ class SupportedBody:
         """What a mirror of all displacements does to the interface's; None if it leaves them."""
         return mirror.restricted(self._interface)
 
-    def condense_halves(
+    def halves(
         self,
         mirror: Mirror,
         on_interface: Mirror,
         done: Callable[[], None] = lambda: None,
         keep: Keep = made_anew,
-    ) -> tuple[Condensed, ...] | None:
-        """As :meth:`condense`, but symmetric and antisymmetric displacements apart.
+    ) -> list[Callable[[], Condensed]] | None:
+        """What condenses symmetric, and what antisymmetric displacements, as :meth:`condense`.
 
         The coordinates are those of the bases of ``on_interface``, the mirror there. ``done`` is
         called after each half. None if the stiffness is not its own mirror image.
@@ -176,21 +176,20 @@ class SupportedBody:
         stiffnesses = halves(stiffness, mirror)
         if stiffnesses is None:
             return None
-        condensed = []
-        for part, basis, coordinates in zip(
-            stiffnesses, mirror.bases, on_interface.bases, strict=True
-        ):
+
+        def condensed(part: sp.csr_matrix, basis: sp.csr_matrix, to: sp.csr_matrix) -> Condensed:
             on_faces = basis[self._interface]
             kept = np.unique(on_faces.indices)
-            static, forces = condense_body(part, basis.T @ loads, kept, keep)
+            half = condense_body(part, basis.T @ loads, kept, keep)
             # The same motions, in another order and some with the opposite sign.
-            renamed = coordinates.T @ on_faces[:, kept]
-            half = renamed @ (renamed @ static).T, renamed @ forces
+            half = renamed(half, (to.T @ on_faces[:, kept]).tocsr())
             if self._springs is not None:
-                half = self._springs.removed(*half, coordinates)
-            condensed.append(half)
+                half = self._springs.removed(*half, to)
             done()
-        return tuple(condensed)
+            return half
+
+        parts = zip(stiffnesses, mirror.bases, on_interface.bases, strict=True)
+        return [partial(condensed, *part) for part in parts]
 
     def recover(
         self, interface_displacement: Array, interface_forces: Array, amplitudes: Array

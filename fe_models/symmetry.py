@@ -19,10 +19,14 @@ from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
-from scipy.linalg.blas import dsymv
+from numpy.typing import NDArray
+from scipy.linalg.blas import dsymv, ssymv
 from scipy.spatial import cKDTree
 
 from sa_solver.types import Array, Indices
+
+# Of double or single precision.
+Matrix = NDArray[np.float64] | NDArray[np.float32]
 
 # Nodes are each other's mirror images when they are within this share of the body's size: meshes
 # built as mirror images are so to rounding.
@@ -103,30 +107,38 @@ class SplitMatrix:
     """The symmetric matrix ``(n, n)`` Q₊ A₊ Q₊ᵀ + Q₋ A₋ Q₋ᵀ of dense ``blocks`` A₊ and A₋."""
 
     mirror: Mirror
-    blocks: tuple[Array, Array]
+    blocks: tuple[Matrix, Matrix]
 
     def __len__(self) -> int:
         return len(self.mirror.partner)
 
     def __matmul__(self, vectors: Array) -> Array:
         basis, transposed = self.mirror.basis
-        parts = np.split(transposed @ vectors, [len(self.blocks[0])])
-        images = [symmetric_product(*pair) for pair in zip(self.blocks, parts, strict=True)]
+        parts, symmetric = transposed @ vectors, len(self.blocks[0])
+        pairs = zip(self.blocks, (parts[:symmetric], parts[symmetric:]), strict=True)
+        images = [symmetric_product(*pair) for pair in pairs]
         return np.asarray(basis @ np.concatenate(images))
 
     def __array__(self, dtype: Any = None, copy: bool | None = None) -> Array:
         return np.asarray(self @ np.eye(len(self)), dtype)
 
+    def in_single_precision(self) -> SplitMatrix:
+        """The matrix with its blocks rounded, which takes half the memory."""
+        symmetric, antisymmetric = (block.astype(np.float32) for block in self.blocks)
+        return SplitMatrix(self.mirror, (symmetric, antisymmetric))
 
-def symmetric_product(matrix: Array, vectors: Array) -> Array:
+
+def symmetric_product(matrix: Matrix, vectors: Array) -> Array:
     """A symmetric ``matrix`` ``(n, n)`` times ``vectors`` ``(n,)`` or ``(n, m)``.
 
-    Of a large one, a product waits for memory: for one vector half of the matrix is read.
+    Of a large one, a product waits for memory: for one vector half of the matrix is read. One of
+    single precision has such products.
     """
     if vectors.ndim == 2:
-        return matrix @ vectors
+        return np.asarray(matrix @ vectors)
     by_columns = matrix if matrix.flags.f_contiguous else matrix.T
-    return np.asarray(dsymv(1.0, by_columns, vectors))
+    product = ssymv if matrix.dtype == np.float32 else dsymv
+    return np.asarray(product(1.0, by_columns, vectors))
 
 
 def mirror_of_nodes(nodes: Array, axes: tuple[int, ...], axis: int) -> Mirror | None:
@@ -150,12 +162,26 @@ def mirror_of_nodes(nodes: Array, axes: tuple[int, ...], axis: int) -> Mirror | 
 
 def halves(matrix: sp.csr_matrix, mirror: Mirror) -> tuple[sp.csr_matrix, ...] | None:
     """K₊ and K₋ of a symmetric sparse matrix; None if the mirror does not leave it as it is."""
-    symmetric, antisymmetric = mirror.bases
-    on_antisymmetric = (matrix @ antisymmetric).tocsr()
-    coupling = (symmetric.T @ on_antisymmetric).tocsr()
-    if np.abs(coupling.data).max(initial=0.0) > UNCOUPLED * np.abs(matrix.data).max():
+    if not _is_mirrored(matrix, mirror):
         return None
-    return (
-        (symmetric.T @ matrix @ symmetric).tocsr(),
-        (antisymmetric.T @ on_antisymmetric).tocsr(),
-    )
+    return tuple(_half(matrix, mirror, basis) for basis in mirror.bases)
+
+
+def _is_mirrored(matrix: sp.csr_matrix, mirror: Mirror) -> bool:
+    """Whether the forces of a random displacement's image are the image of its forces."""
+    displacement = np.random.default_rng(0).standard_normal(matrix.shape[0])
+    image = mirror.matrix()
+    apart = np.abs(matrix @ (image @ displacement) - image @ (matrix @ displacement))
+    most = np.abs(matrix.data).max(initial=0.0) * np.abs(displacement).max()
+    return bool(apart.max(initial=0.0) <= UNCOUPLED * most)
+
+
+def _half(matrix: sp.csr_matrix, mirror: Mirror, basis: sp.csr_matrix) -> sp.csr_matrix:
+    """QᵀKQ from the rows of K of one unknown of each pair: those of its image say the same."""
+    columns = basis.tocsc()
+    first = columns.indices[columns.indptr[:-1]]
+    alone = np.diff(columns.indptr) == 1
+    half = (matrix[first] @ basis).tocsr()
+    # Of a pair q = (e ± e')/√2 the row of e is half of √2 qᵀK; one alone is all of its own.
+    half.data *= np.repeat(np.where(alone, 1.0, np.sqrt(2.0)), np.diff(half.indptr))
+    return half

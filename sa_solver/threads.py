@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from functools import cache
 from typing import TypeVar
 
 T = TypeVar("T")
@@ -38,3 +39,24 @@ def at_once(jobs: Sequence[Callable[[], T]]) -> list[T]:
         return [job() for job in jobs]
     with ThreadPoolExecutor(shared) as pool:
         return list(pool.map(lambda job: job(), jobs))
+
+
+def begun(job: Callable[[], T]) -> Callable[[], T]:
+    """Begin with a job beside what is to come; what is returned gives what it gives, or raises.
+
+    Where a single thread may work it is done when that is asked for.
+
+    Examples
+    --------
+    >>> from functools import partial
+    >>> from sa_solver.threads import begun
+    >>> power = begun(partial(pow, 2, 10))
+    >>> print(power())
+    1024
+    """
+    if threads() < 2:
+        return cache(job)
+    pool = ThreadPoolExecutor(1)
+    answer = pool.submit(job)
+    pool.shutdown(wait=False)
+    return answer.result

@@ -1,6 +1,7 @@
 """Contact laws, and the splitting against independent solvers of small dense problems."""
 
 import itertools
+from functools import partial
 
 import numpy as np
 import pytest
@@ -95,6 +96,34 @@ def test_acceleration_pays_and_a_warm_start_ends_at_once(monkeypatch):
     assert solve(accelerated.state).iterations == 1
     monkeypatch.setattr(AndersonMemory, "next_state", unaccelerated)
     assert accelerated.iterations < 0.5 * solve(np.zeros((6, 10))).iterations
+
+
+def test_a_step_in_single_precision_ends_exact():
+    """With what changed since it was refreshed: as many iterations, and no error at the end."""
+    matrix, vector = linear_complementarity(60, 7)
+    shift = np.sqrt(np.linalg.eigvalsh(matrix)[[0, -1]].prod())
+    inverse = np.linalg.inv(matrix + shift * np.eye(60))
+    known, rounded = np.zeros((2, 60)), inverse.astype(np.float32)
+    refreshed = []
+
+    def refresh(state):
+        known[:] = state, inverse @ state
+        refreshed.append(state)
+
+    def near(state):
+        image = known[1] + rounded @ (state - known[0]).astype(np.float32)
+        return shift * image - inverse @ vector
+
+    def exact(state):
+        return inverse @ (shift * state - vector)
+
+    solve = partial(douglas_rachford, local_law=unilateral, start=np.zeros(60), tolerance=1e-11)
+    result, expected = solve(near, refresh=refresh), solve(exact)
+    assert result.converged
+    assert result.iterations <= 1.1 * expected.iterations
+    assert 3 <= len(refreshed) <= 6
+    np.testing.assert_allclose(result.elastic, exact(result.state), rtol=0, atol=1e-14)
+    np.testing.assert_allclose(result.solution, expected.solution, rtol=0, atol=1e-9)
 
 
 def test_failure_is_said():

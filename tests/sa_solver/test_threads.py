@@ -6,7 +6,7 @@ from functools import partial
 
 import pytest
 
-from sa_solver.threads import THREADS, at_once, threads
+from sa_solver.threads import THREADS, at_once, begun, threads
 
 
 def _after(seconds: float, value: int) -> int:
@@ -45,3 +45,15 @@ def test_what_a_job_raises_is_raised_and_later_jobs_do_not_begin(
     with pytest.raises(ZeroDivisionError):
         at_once(jobs)
     assert begun == []
+
+
+@pytest.mark.parametrize("allowed", ["1", "2"])
+def test_a_job_that_is_begun_is_done_once(monkeypatch: pytest.MonkeyPatch, allowed: str) -> None:
+    """Beside what comes after it where two threads may work, and else when it is asked for."""
+    monkeypatch.setenv(THREADS, allowed)
+    where: list[int] = []
+    answer = begun(lambda: where.append(threading.get_ident()) or len(where))
+    assert [answer(), answer()] == [1, 1]
+    assert (where == [threading.get_ident()]) == (allowed == "1")
+    with pytest.raises(ZeroDivisionError):
+        begun(_fail)()

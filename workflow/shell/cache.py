@@ -10,6 +10,7 @@ import logging
 import os
 import re
 from collections.abc import Callable, Sequence
+from functools import cache
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -43,13 +44,19 @@ def cache_folder() -> Path:
 
 def content_key(*parts: object) -> str:
     """Hash of the parts, of the structural code and of the packages it relies on."""
-    digest = hashlib.sha256(repr(parts).encode())
+    return hashlib.sha256(repr(parts).encode() + _code()).hexdigest()[:32]
+
+
+@cache
+def _code() -> bytes:
+    """Digest of the structural code and of the packages it relies on, read once."""
+    digest = hashlib.sha256()
     for package in (fe_models, sa_solver):
         assert package.__file__ is not None
         for source in sorted(Path(package.__file__).parent.rglob("*.py")):
             digest.update(source.read_bytes())
     digest.update(repr([(name, version(name)) for name in SOLVERS]).encode())
-    return digest.hexdigest()[:32]
+    return digest.digest()
 
 
 def load_joint(key: str) -> JointResolvent | None:

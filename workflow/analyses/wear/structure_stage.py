@@ -23,6 +23,7 @@ from fe_models.relinearised import (
     relinearised,
     stress_stiffened,
 )
+from fe_models.remesh import worn_mesh
 from fe_models.stress import CycleStress, cycle_stress
 from fe_models.structure import CycleSolution, InterfaceHistory, Structure, mixed
 from sa_solver.types import Array, Indices, LoadHistory
@@ -127,6 +128,7 @@ class StructureStage(Heard):
         self.peak = model.peak
         self.from_cache = False
         self._worn: tuple[Array, CycleSolution] | None = None
+        self._on_worn: tuple[StructureMesh, Structure] | None = None
 
     @cached_property
     def mesh(self) -> StructureMesh:
@@ -435,11 +437,26 @@ class StructureStage(Heard):
         ]
         return dict(zip(states, self.structure.at_once(*jobs), strict=True))
 
+    def worn_mesh(self, depths: list[tuple[Array, Array]]) -> StructureMesh:
+        """The mesh with faces that have lost nodal ``depths`` ``(n,)`` of body 1 and 2 [mm].
+
+        The structure on it is built and assembled, for :meth:`stresses`. Raises as
+        :func:`fe_models.remesh.worn_mesh`.
+        """
+        mesh = worn_mesh(self.mesh, depths)
+        structure = self._on(mesh)
+        # Its stiffness tells, and is kept.
+        _ = [body.is_held for body in structure.bodies]
+        self._on_worn = mesh, structure
+        return mesh
+
     def _on(self, mesh: StructureMesh) -> Structure:
         """The structure on the unworn or the worn mesh."""
-        return (
-            self.structure if mesh is self.mesh else self._prestressed(self.model.structure(mesh))
-        )
+        if mesh is self.mesh:
+            return self.structure
+        if self._on_worn is not None and mesh is self._on_worn[0]:
+            return self._on_worn[1]
+        return self._prestressed(self.model.structure(mesh))
 
     def _stress(
         self,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -14,9 +14,10 @@ from fe_models.elasticity import maximum_principal, von_mises
 from fe_models.mesh import Body, Interface, MeshError, StructureMesh, write_msh
 from fe_models.mesh_quality import element_sizes, elements_across, radius_ratios
 from fe_models.nonlinear import NonlinearCheck
-from fe_models.remesh import form_of, formed_mesh, worn_mesh, worn_volume
+from fe_models.remesh import form_of, formed_mesh, worn_volume
 from fe_models.stress import CycleStress, PeakStress, StressField, SurfaceHistory, steps
 from fe_models.structure import CycleSolution, InterfaceHistory
+from sa_solver.threads import begun
 from sa_solver.types import Array, LoadHistory, Tally
 from wear.coupled import CoupledState
 from workflow.analyses.wear.bolts import BoltTensions
@@ -285,6 +286,10 @@ def worn_structure(
     bodies are told over the increments too.
     """
     pairs = list(zip(contacts, state.interfaces, strict=True))
+    depths = [contact.depths_of_bodies(interface) for contact, interface in pairs]
+    meshed = list(map(meshed_depths, stage.mesh.interfaces, depths))
+    # Friction takes one thread, and knows the worn faces by their gaps.
+    worn = begun(partial(stage.worn_mesh, meshed))
     with heard_stage(reporter, stage, "structural friction", "increments"):
         cycle = stage.worn_cycle(
             [contact.nodal_depth(interface) for contact, interface in pairs],
@@ -293,11 +298,10 @@ def worn_structure(
             else None,
         )
     with reporter.stage("re-meshing"):
-        depths = [contact.depths_of_bodies(interface) for contact, interface in pairs]
-        mesh = worn_mesh(stage.mesh, list(map(meshed_depths, stage.mesh.interfaces, depths)))
+        mesh = worn()
         written = _formed({"unworn": stage.mesh, "worn": mesh}, reporter)
-        with replacing(folder.reserve("worn.msh", "the mesh with the worn faces")) as partial:
-            write_msh(partial, written["worn"])
+        with replacing(folder.reserve("worn.msh", "the mesh with the worn faces")) as unfinished:
+            write_msh(unfinished, written["worn"])
     with reporter.stage("stress", "steps") as told:
         done = Tally(told, 2 * steps(len(mesh.bodies)))
         shown = shown_increments(len(cycle.fields()["force"]), stage.peak) if moves else []
