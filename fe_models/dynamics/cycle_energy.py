@@ -84,17 +84,19 @@ def largest_kinetic_energy(problem: HarmonicBalance, solution: HarmonicSolution)
         moved = _taken(solution.motion, np.array([model.mass for model in models]))
         return float(0.5 * (2.0 * np.pi * solution.frequency * orders) ** 2 @ moved)
     rates = 2j * np.pi * solution.frequency * orders[:, None] * solution.motion
-    # Energy at the turn τ is a sum over pairs of harmonics: their masses, once for all times.
-    moved = _times(rates, mass)
-    pairs, crossed = moved @ rates.T, moved @ rates.conj().T
+    # Of the turn τ energy is a series in twice the harmonics, from their sums and differences.
+    moved, order = _times(rates, mass), orders.astype(int)
+    crossed, apart = moved @ rates.conj().T, order[:, None] - order
+    series = np.zeros(2 * int(order[-1]) + 1, complex)
+    np.add.at(series, order[:, None] + order, moved @ rates.T)
+    np.add.at(series, np.abs(apart), np.where(apart < 0, crossed.conj(), crossed))
+    turns = 2j * np.pi * np.arange(len(series))
 
     def energy(turn: float) -> float:
-        turning = np.exp(2j * np.pi * turn * orders)
-        whole = turning @ pairs @ turning + turning @ crossed @ turning.conj()
-        return float(0.25 * whole.real)
+        return float(0.25 * (series @ np.exp(turn * turns)).real)
 
-    times = TIMES_PER_PERIOD * int(orders[-1])
-    best = int(np.argmax([energy(time / times) for time in range(times)]))
+    times = TIMES_PER_PERIOD * int(order[-1])
+    best = int(np.argmax(np.fft.ifft(series, times).real))
     peak = minimize_scalar(
         lambda step: -energy((best + step) / times),
         bounds=(-1.0, 1.0),
