@@ -267,6 +267,24 @@ def _repeat(gradient: Array, kept: Array) -> bool:
 
 
 @compiled(nogil=True, error_model="numpy")
+def _move_up(gradient: Array, weights: Array, taken: Array) -> int:
+    """Move rows of a gradient ``(n, m)`` that are not 0 to its beginning: how many there are.
+
+    Their ``weights``, columns of ``(m, n)``, are ``taken`` ``(n, m)``. A joint that slips follows
+    nothing: of one that slides most of the time little is left to be summed.
+    """
+    count = 0
+    for t in range(len(gradient)):
+        if not np.any(gradient[t]):
+            continue
+        for c in range(gradient.shape[1]):
+            gradient[count, c] = gradient[t, c]
+            taken[count, c] = weights[c, t]
+        count += 1
+    return count
+
+
+@compiled(nogil=True, error_model="numpy")
 def differentiate_sliders(period: Period, joints: DrivenJoints) -> None:
     """Write the derivatives of joints that have settled.
 
@@ -276,6 +294,7 @@ def differentiate_sliders(period: Period, joints: DrivenJoints) -> None:
     way_in = rows_from_rest(period.lead)
     gradient, kept = np.empty((samples + 1, size)), np.empty(samples + 1)
     entering, forgotten = np.zeros((len(way_in), size)), np.empty(len(way_in))
+    weights = np.empty((samples, size))
     # Needed for residual stiffness only: for one joint as much work as all the rest.
     beside = largest(joints.parameters[:, 2]) > 0.0
     shares = np.dot(period.weights, period.basis) if beside else np.zeros((size, size))
@@ -291,7 +310,8 @@ def differentiate_sliders(period: Period, joints: DrivenJoints) -> None:
                 _copy(gradient[-1], gradient[0])
                 stretch = _carried(slider, stretch, path, period.basis, gradient, kept)
         _copy(gradient[-1], gradient[0])
-        slopes = np.dot(period.weights, gradient[:-1])
+        following = _move_up(gradient[:-1], period.weights, weights)
+        slopes = np.dot(weights[:following].T, gradient[:following])
         for row in range(size):
             for c in range(size):
                 joints.jacobian[j, row, c] = slider.spring * slopes[row, c]
