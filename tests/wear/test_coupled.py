@@ -38,6 +38,7 @@ from wear.coupled import (
 from wear.drive import Drive
 from wear.evolution import EnergyTable
 from wear.face_loads import CycleLoads
+from wear.full_cycle import CycleStart
 from wear.implicit import ImplicitStepper
 from wear.interface import InterfaceContact, InterfaceSettings, InterfaceState, MotionError
 from wear.laws import EnergyLaw, EvolvingLaw
@@ -408,7 +409,7 @@ def numbers(state: InterfaceState) -> dict[str, object]:
     """All that a state is, by name."""
     parts: dict[str, object] = {}
     for name, value in vars(state).items():
-        if name in ("surfaces", "loads", "link"):
+        if name in ("surfaces", "loads", "link") or isinstance(value, CycleStart):
             parts |= {f"{name}.{part}": field for part, field in vars(value).items()}
         elif name == "starts":
             for t, start in value.items():
