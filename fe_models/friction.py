@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import product
+from typing import NamedTuple
 
 import numpy as np
 
@@ -94,13 +95,14 @@ class FrictionalJoint:
         floor, heaviest = LOAD_FLOOR * sizes.max(), loads[np.argmax(sizes)]
         displacement = np.zeros((3, len(gap))) if previous is None else previous
         states: list[Array] = []
-        for increment, load in enumerate(loads):
+        for number, load in enumerate(loads):
+            increment = _Increment(load, gap, displacement, floor)
             if states:
-                starts = _starts(states, guesses, loads[: increment + 1, 0])
-                state, ended = self._solve(load, gap, displacement, starts, floor)
+                starts = _starts(states, guesses, loads[: number + 1, 0])
+                state, ended = self._solve(increment, starts)
             else:
                 starts = [*guesses[:1], *guesses[-1:], *self._with_images(_at_rest(gap, load))]
-                state, ended = self._first(heaviest, load, gap, displacement, starts, floor)
+                state, ended = self._first(increment, heaviest, starts)
             states.append(ended)
             displacement = state.displacement
             yield state
@@ -114,61 +116,61 @@ class FrictionalJoint:
             return np.stack([vectors, self._joint.product(vectors.T).T], axis=1)
 
     def _first(
-        self,
-        heaviest: Array,
-        load: Array,
-        gap: Array,
-        previous: Array,
-        starts: list[Array],
-        floor: float,
+        self, increment: _Increment, heaviest: Array, starts: list[Array]
     ) -> tuple[FrictionState, Array]:
         """The first increment: in a short leap, from the heaviest load, or in a long leap."""
-        solved = self._solve(load, gap, previous, starts, floor, LEAP)
+        solved = self._solve(increment, starts, LEAP)
         if not solved[0].converged:
-            solved = self._lightened(heaviest, load, gap, previous, starts, floor)
+            solved = self._lightened(increment, heaviest, starts)
         if not solved[0].converged:
-            solved = self._solve(load, gap, previous, starts, floor)
+            solved = self._solve(increment, starts)
         return solved
 
     def _lightened(
-        self,
-        heaviest: Array,
-        load: Array,
-        gap: Array,
-        previous: Array,
-        starts: list[Array],
-        floor: float,
+        self, increment: _Increment, heaviest: Array, starts: list[Array]
     ) -> tuple[FrictionState, Array]:
         """An increment from where the heaviest load takes the bodies, by ever lighter ones.
 
         A light load would take a body long to where worn faces meet: pressed hard it is there at
         once, and what a tenth of the load does is always near.
         """
+        load = increment.load
         more = heaviest - load
-        _, ended = self._solve(heaviest, gap, previous, starts, floor)
+        _, ended = self._solve(increment._replace(load=heaviest), starts)
         while np.linalg.norm(more[0]) > np.linalg.norm(load[0]) > 0.0:
             more = LIGHTENED * more
-            _, ended = self._solve(load + more, gap, previous, [ended], floor)
-        return self._solve(load, gap, previous, [ended], floor)
+            _, ended = self._solve(increment._replace(load=load + more), [ended])
+        return self._solve(increment, [ended])
 
     def _solve(
-        self,
-        load: Array,
-        gap: Array,
-        previous: Array,
-        starts: list[Array],
-        floor: float,
-        most: int | None = None,
+        self, increment: _Increment, starts: list[Array], most: int | None = None
     ) -> tuple[FrictionState, Array]:
-        """One increment, its residual relative to the load, which counts as ``floor`` at least.
+        """One increment, and the splitting's state with its image; ``starts`` have theirs.
 
-        And the splitting's state with its image. ``load`` and ``starts`` have theirs, ``(2, d n)``.
         It takes as many iterations as all starts may, unless told how many at ``most``.
         """
         with one_thread(self._joint.widest):
-            problem = _Problem(self._joint, self._friction, load, gap, previous)
+            problem = _Problem(self._joint, self._friction, increment)
             most = most or 2 * len(starts) * MAX_ITERATIONS
-            return problem.solve(starts, max(float(np.linalg.norm(load[0])), floor), most)
+            return problem.solve(starts, most)
+
+
+class _Increment(NamedTuple):
+    """One increment: its ``load`` with the image ``(2, d n)``, and whence it leads.
+
+    ``gap`` ``(n,)`` and ``previous`` ``(3, n)`` as of :meth:`FrictionalJoint.march`. Residuals are
+    relative to the load, which counts as ``floor`` at least [N].
+    """
+
+    load: Array
+    gap: Array
+    previous: Array
+    floor: float
+
+    @property
+    def scale(self) -> float:
+        """The force that residuals are relative to [N]."""
+        return max(float(np.linalg.norm(self.load[0])), self.floor)
 
 
 class _Problem:
@@ -179,20 +181,16 @@ class _Problem:
     """
 
     def __init__(
-        self,
-        joint: JointResolvent,
-        friction: float | Array,
-        load: Array,
-        gap: Array,
-        previous: Array,
+        self, joint: JointResolvent, friction: float | Array, increment: _Increment
     ) -> None:
         self._joint, self._rho, self._friction = joint, joint.rho, friction
-        self._gap, self._previous = gap, previous
-        forces, self._offset = load
-        self._axes = AXES[len(forces) // len(gap)]
-        self._exact = np.zeros_like(load)
+        self._gap, self._previous = increment.gap, increment.previous
+        forces, self._offset = increment.load
+        self._axes = AXES[len(forces) // len(self._gap)]
+        self._scale = increment.scale / self._rho
+        self._exact = np.zeros_like(increment.load)
 
-    def solve(self, starts: list[Array], scale: float, most: int) -> tuple[FrictionState, Array]:
+    def solve(self, starts: list[Array], most: int) -> tuple[FrictionState, Array]:
         """Split from the most promising start, and from the others should it fail.
 
         First so that no extrapolation throws a body off, then so that one may fly to its contacts,
@@ -206,7 +204,7 @@ class _Problem:
                 self._elastic,
                 self._law,
                 start[0],
-                scale=scale / self._rho,
+                scale=self._scale,
                 tolerance=TOLERANCE,
                 max_iterations=min(MAX_ITERATIONS, most - iterations),
                 returning=returning,

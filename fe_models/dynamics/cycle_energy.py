@@ -85,17 +85,17 @@ def largest_kinetic_energy(problem: HarmonicBalance, solution: HarmonicSolution)
         return float(0.5 * (2.0 * np.pi * solution.frequency * orders) ** 2 @ moved)
     rates = 2j * np.pi * solution.frequency * orders[:, None] * solution.motion
     # Of the turn τ energy is a series in twice the harmonics, from their sums and differences.
-    moved, order = _times(rates, mass), orders.astype(int)
-    crossed, apart = moved @ rates.conj().T, order[:, None] - order
-    series = np.zeros(2 * int(order[-1]) + 1, complex)
-    np.add.at(series, order[:, None] + order, moved @ rates.T)
+    moved, apart = _times(rates, mass), orders[:, None] - orders
+    crossed = moved @ rates.conj().T
+    series = np.zeros(2 * int(orders[-1]) + 1, complex)
+    np.add.at(series, orders[:, None] + orders, moved @ rates.T)
     np.add.at(series, np.abs(apart), np.where(apart < 0, crossed.conj(), crossed))
     turns = 2j * np.pi * np.arange(len(series))
 
     def energy(turn: float) -> float:
         return float(0.25 * (series @ np.exp(turn * turns)).real)
 
-    times = TIMES_PER_PERIOD * int(order[-1])
+    times = TIMES_PER_PERIOD * int(orders[-1])
     best = int(np.argmax(np.fft.ifft(series, times).real))
     peak = minimize_scalar(
         lambda step: -energy((best + step) / times),
