@@ -200,12 +200,12 @@ def _judged(
     """A rung whose error is known."""
     result, seconds = _timed(work)
     point, wrong = Point(rung, own, "", {}, Cost(seconds, 0, 0)), error(result)
-    return Judged(point, wrong, "", wrong, False, False, False)
+    return Judged(point, wrong, "", wrong, seconds, False, False, False)
 
 
 def _ladder(axis: Axis, rungs: list[Judged]) -> Ladder:
     """Such rungs, the efficient ones marked."""
-    flags = efficient([rung.point.cost.seconds for rung in rungs], [rung.error for rung in rungs])
+    flags = efficient([rung.seconds for rung in rungs], [rung.error for rung in rungs])
     marked = [replace(rung, by_seconds=flag) for rung, flag in zip(rungs, flags, strict=True)]
     return Ladder(axis, tuple(marked), {}, {})
 

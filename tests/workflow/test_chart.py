@@ -1,6 +1,7 @@
 """Charts without runs: frontier, Richardson, ladders, costs with a cache, axes of each case."""
 
 import json
+from dataclasses import replace
 from itertools import pairwise, product
 from pathlib import Path
 
@@ -119,6 +120,30 @@ def point(name: str, step: float | None, values: dict[str, float], seconds: floa
     """A rung that took ten convolutions per second; ``own`` is the case as written."""
     cost = Cost(seconds, round(10 * seconds), 1)
     return Point(Rung(name, (f"a={name}",), step), name == "own", name, values, cost)
+
+
+def test_a_busy_machine_changes_no_choice():
+    """A coarser grid seems to take longer than a finer one, and is taken all the same."""
+    errors = {"16": 0.3, "32": 0.008, "64": 0.002, "128": 0.0005}
+    seconds = {"16": 2.0, "32": 5.0, "64": 4.0, "128": 6.0}
+    points = [
+        point(name, 1.0 / int(name), {"depth": 1.0 + error}, seconds[name])
+        for name, error in errors.items()
+    ]
+    ladder = judge(GRID, points, {"depth": 1.0}, {})
+    for accuracy, name in {0.01: "32", 0.005: "64", 0.001: "128"}.items():
+        chosen = ladder.cheapest(accuracy)
+        assert chosen is not None
+        assert chosen.name == name
+    assert ladder.scatter == pytest.approx(5.0 / 4.0 - 1.0)
+    assert [rung.seconds for rung in ladder.rungs] == [2.0, 4.0, 4.0, 6.0]
+    # Two ways to the same error, apart by less than the clock has shown to be wrong.
+    ways = [point(name, None, {"depth": 1.0}, spent) for name, spent in (("a", 3.0), ("b", 3.5))]
+    ways[0] = replace(ways[0], cost=Cost(3.0, 100, 1))
+    both = judge(GRID, [*points, *ways], {"depth": 1.0}, {})
+    chosen = both.cheapest(1e-4)
+    assert chosen is not None
+    assert chosen.name == "b"
 
 
 def second_order(closed: float = 1.0) -> list[Point]:

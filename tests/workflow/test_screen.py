@@ -51,11 +51,20 @@ def test_the_log_has_all_however_quiet_it_is(
 
 
 @pytest.fixture
-def terminal(monkeypatch: pytest.MonkeyPatch) -> Callable[[], str]:
-    """A terminal of 80 columns in place of stderr; what has been on it."""
+def terminal(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> Callable[[], str]:
+    """A terminal in place of stderr, of 80 columns or as many as asked for; what has been on it.
+
+    It moves its cursor, whatever terminal the tests are run on.
+    """
     shown = io.StringIO()
-    wide = Console(file=shown, force_terminal=True, width=80, highlight=False)
-    monkeypatch.setattr(screen, "console", lambda: wide)
+    console = Console(
+        file=shown,
+        force_terminal=True,
+        width=getattr(request, "param", 80),
+        highlight=False,
+        _environ={"TERM": "xterm"},
+    )
+    monkeypatch.setattr(screen, "console", lambda: console)
     monkeypatch.setattr(screen, "BRIEF", -1.0)
     return shown.getvalue
 
@@ -96,30 +105,25 @@ def test_a_row_is_no_longer_than_the_terminal(terminal: Callable[[], str], tmp_p
     assert "…" in terminal()
 
 
-def test_a_narrow_terminal_tells_how_far_it_is_and_no_more(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+@pytest.mark.parametrize("terminal", [40], indirect=True)
+def test_a_narrow_terminal_tells_how_far_it_is_and_no_more(terminal: Callable[[], str]) -> None:
     """Of 40 columns a bar and a forecast would leave no room for it."""
-    shown = io.StringIO()
-    narrow = Console(file=shown, force_terminal=True, width=40, highlight=False)
-    monkeypatch.setattr(screen, "console", lambda: narrow)
-    monkeypatch.setattr(screen, "BRIEF", -1.0)
     rows = screen.Screen(on=True)
     with rows.row("condensation") as row:
         row.show(0.4, "2 of 5 steps", "about 20 min more")
         rows._rows.refresh()
     rows.close()
-    (line,) = {line for line in shown.getvalue().splitlines() if "2 of 5 steps" in line}
+    (line,) = {line for line in terminal().splitlines() if "2 of 5 steps" in line}
     assert "condensation" in line
 
 
 def test_a_terminal_that_only_prints_is_told_by_lines(
-    terminal: Callable[[], str], monkeypatch: pytest.MonkeyPatch
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setenv("TERM", "dumb")
-    assert not screen.Screen(on=True).on
-    monkeypatch.setenv("TERM", "xterm")
-    assert screen.Screen(on=True).on
+    for kind, shows_rows in {"dumb": False, "xterm": True}.items():
+        console = Console(file=io.StringIO(), force_terminal=True, _environ={"TERM": kind})
+        monkeypatch.setattr(screen, "console", lambda console=console: console)
+        assert screen.Screen(on=True).on is shows_rows
 
 
 def test_where_there_is_no_terminal_a_line_now_and_then(

@@ -177,7 +177,7 @@ def _draw_baseline(axis: Axes, rungs: Sequence[Judged], cost: str, bottom: float
 def _frontier(rungs: Sequence[Judged], cost: str) -> list[Judged]:
     """The efficient rungs, the cheapest first."""
     efficient = [rung for rung in rungs if getattr(rung, f"by_{cost}")]
-    return sorted(efficient, key=lambda rung: getattr(rung.point.cost, cost))
+    return sorted(efficient, key=lambda rung: rung.bound, reverse=True)
 
 
 def _draw_frontier(axis: Axes, rungs: Sequence[Judged], cost: str, bottom: float) -> None:

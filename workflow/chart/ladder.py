@@ -13,8 +13,10 @@ from workflow.shell.convergence import Convergence, richardson
 
 # Changes of a quantity below this share of it are rounding, and no sign of convergence or its lack.
 ROUNDING = 1e-12
-# Times of the same run differ by this share on a machine that does little else.
+# Times of the same run differ by this share at least, even on a machine that does little else.
 TIMING = 0.1
+# Seconds of a log have two digits behind the point.
+SHORTEST = 1e-2
 
 
 @dataclass(frozen=True)
@@ -53,12 +55,14 @@ class Judged:
 
     ``error`` is its largest relative difference, that of ``worst``; with the floor of the reference
     no more than ``bound``. ``unresolved``: less than the references themselves are known to.
+    ``seconds`` is the cost that choices go by: see :func:`seconds_by_work`.
     """
 
     point: Point
     error: float
     worst: str
     bound: float
+    seconds: float
     unresolved: bool
     by_seconds: bool
     by_convolutions: bool
@@ -87,23 +91,51 @@ class Ladder:
         """The settings of the case itself, where they ran."""
         return next((rung for rung in self.rungs if rung.point.baseline), None)
 
-    def cheapest(self, accuracy: float) -> Judged | None:
-        """The rung of fewest seconds whose error is at most ``accuracy`` for sure.
+    @property
+    def scatter(self) -> float:
+        """Share by which the measured times disagree with the order of the work they measure."""
+        excess = [rung.point.cost.seconds / rung.seconds - 1.0 for rung in self.rungs]
+        return max([TIMING, *excess])
 
-        Of those as quick but for what a busy machine makes of it, the one of fewest convolutions.
+    def cheapest(self, accuracy: float) -> Judged | None:
+        """Return the rung of least cost whose error is at most ``accuracy`` for sure.
+
+        On a branch that is the coarsest such rung, whatever the clock says. Branches are compared
+        by seconds, and by convolutions where their seconds differ by no more than times do.
         """
         met = [rung for rung in self.rungs if rung.bound <= accuracy]
-        least = min((rung.point.cost.seconds for rung in met), default=0.0)
-        quick = [rung for rung in met if rung.point.cost.seconds <= (1.0 + TIMING) * least]
+        met = [rung for rung in met if not any(_finer(rung.point, other.point) for other in met)]
+        least = min((rung.seconds for rung in met), default=0.0)
+        quick = [rung for rung in met if rung.seconds <= (1.0 + self.scatter) * least]
         return min(quick, key=lambda rung: rung.point.cost.convolutions, default=None)
 
     def options(self) -> list[Option]:
-        """The rungs as choices, their costs over that of the case's own settings."""
+        """Return the rungs as choices, their costs over that of the case's own settings."""
         baseline = self.baseline
         if baseline is None:
             return []
-        unit = max(baseline.point.cost.seconds, 1e-2)  # seconds are logged to a hundredth
-        return [Option(r.name, r.point.cost.seconds / unit, r.bound) for r in self.rungs]
+        return [Option(r.name, r.seconds / baseline.seconds, r.bound) for r in self.rungs]
+
+
+def seconds_by_work(points: Sequence[Point]) -> list[float]:
+    """Return the seconds of each rung, no more than those of any finer rung of its branch.
+
+    A coarser rung does less of the same work: by what it took longer, the machine was busy with
+    something else. Seconds are logged to a hundredth, and none are fewer.
+    """
+    seconds = [max(point.cost.seconds, SHORTEST) for point in points]
+    return [
+        min([own, *(s for s, other in zip(seconds, points, strict=True) if _finer(other, point))])
+        for own, point in zip(seconds, points, strict=True)
+    ]
+
+
+def _finer(one: Point, other: Point) -> bool:
+    """Return whether ``one`` is a finer rung of the branch of ``other``."""
+    step, coarser = one.rung.step, other.rung.step
+    if one.rung.branch != other.rung.branch or step is None or coarser is None:
+        return False
+    return step < coarser
 
 
 def judge(
@@ -126,7 +158,7 @@ def judge(
         references = {q: replace(reference, floor=inf) for q, reference in references.items()}
     references = {q: reference for q, reference in references.items() if reference.value}
     errors = [_errors(point, references) for point in points]
-    seconds = [point.cost.seconds for point in points]
+    seconds = seconds_by_work(points)
     convolutions = [float(point.cost.convolutions) for point in points]
     bounds = [
         max((e + references[q].floor for q, e in relative.items()), default=inf)
@@ -135,11 +167,12 @@ def judge(
     flags = zip(efficient(seconds, bounds), efficient(convolutions, bounds), strict=True)
     floor = max((reference.floor for reference in references.values()), default=0.0)
     judged = []
-    for point, relative, bound, (quick, few) in zip(points, errors, bounds, flags, strict=True):
+    rows = zip(points, errors, bounds, seconds, flags, strict=True)
+    for point, relative, bound, spent, (quick, few) in rows:
         worst = max(relative, key=lambda q: relative[q], default="")
         error = relative.get(worst, inf)
         worst = worst if error > 0.0 else ""
-        judged.append(Judged(point, error, worst, bound, error < floor, quick, few))
+        judged.append(Judged(point, error, worst, bound, spent, error < floor, quick, few))
     return Ladder(axis, tuple(judged), references, failed)
 
 

@@ -11,6 +11,7 @@ import os
 import pickle
 import signal
 import subprocess
+import sys
 import threading
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
@@ -289,9 +290,11 @@ def _bytes(stream: IO[bytes], number: int) -> bytes:
 def main() -> None:
     """Do what is told on stdin, and leave Ctrl-C to the parent."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    # Whatever a library prints is no part of the answer.
+    # Whatever a library prints is no part of the answer. It goes to stderr line by line: what is in
+    # a buffer is lost where the parent ends this process.
     answers = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)
+    sys.stdout = sys.stderr
     messages: SimpleQueue[bytes] = SimpleQueue()
     threading.Thread(target=_listen, args=(messages,), daemon=True).start()
     # Here, for what is imported with a message may want to be in the main thread.
