@@ -12,7 +12,7 @@ PYHARM := .venv/pyharm/.installed
 # compiled of them is kept for the other process, those that they start, and the next time.
 TESTING := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 MKL_NUM_THREADS=1 PYTHONDONTWRITEBYTECODE=
 
-.PHONY: run test test-full bench lint docs docs-gallery docs-figures install clean
+.PHONY: run test test-slow test-full bench lint docs docs-gallery docs-figures install clean
 .DEFAULT_GOAL := run
 
 run: $(INSTALLED)
@@ -24,7 +24,9 @@ test: $(TESTABLE)
 	@$(MAKE) --no-print-directory lint
 	$(TESTING) $(BIN)/python -m pytest -q -n 2 --dist worksteal
 
-test-full: test
+test-full: test test-slow
+
+test-slow: $(TESTABLE)
 	@echo 'fretscale: the tests of more than a few seconds: about 18 minutes on two cores.'
 	$(TESTING) $(BIN)/python -m pytest -q -n 2 --dist worksteal -m slow
 

@@ -66,7 +66,7 @@ nb_execution_mode = "cache"
 nb_execution_cache_path = str(BUILT / "executed" / digest())
 nb_execution_in_temp = True
 nb_execution_show_tb = True  # a cell that fails is a warning, hence an error of the build
-nb_execution_timeout = 240
+nb_execution_timeout = -1  # however busy the machine is
 nb_merge_streams = True
 nb_render_markdown_format = "myst"
 

@@ -28,11 +28,11 @@ Command = TypeVar("Command", bound=Callable[..., Any])
 TO_TRY = """\
 Three things to try:
 
-  fretscale new bodies ball.yaml           write a case: a ball on a flat
+  fretscale new bodies_wear ball.yaml      write a case: a ball wears on a flat
   fretscale check ball.yaml                what it would run, and how long
-  fretscale run ball.yaml --out out/ball   run it: a picture in ten seconds
+  fretscale run ball.yaml --out out/ball   run it: pictures in half a minute
 
-All commands: `fretscale -h`; a ball that wears: `fretscale new bodies_wear`.
+All commands: `fretscale -h`; a case of few lines: `fretscale new KIND --short`.
 """
 
 
@@ -361,11 +361,9 @@ def describe(
 
 def _kinds() -> dict[str, str]:
     """What ``new`` writes: each kind of case, and other files, in a line of plain words."""
-    from workflow.fit.template import FITS
-    from workflow.kinds import about
-    from workflow.sweep.template import ABOUT, SWEEP
+    from workflow.templates import offered
 
-    return {**about(), SWEEP: ABOUT, **{name: text for name, (_, text) in FITS.items()}}
+    return offered()
 
 
 class _Kind(click.ParamType):
@@ -394,30 +392,22 @@ class _KindsInHelp(click.Command):
 @cli.command(cls=_KindsInHelp)
 @click.argument("kind", required=False, type=_Kind())
 @click.argument("file", required=False, type=click.Path(path_type=Path))
-def new(kind: str | None, file: Path | None) -> None:
-    """Write a commented case to FILE; without KIND list the kinds."""
-    from workflow.fit.template import FITS, fit_template
-    from workflow.kinds import template
-    from workflow.sweep.template import SWEEP, sweep_template
+@click.option("--short", is_flag=True, help="Only what must be given, in some twenty lines.")
+def new(kind: str | None, file: Path | None, short: bool) -> None:
+    """Write a commented case to FILE; without KIND list the kinds.
+
+    Example files that the case names are written beside it, where they are not there yet.
+    """
+    from workflow.templates import text_of, write_new
 
     if kind is None:
         for name, text in _kinds().items():
             click.echo(f"{name:<18} {text}")
-        return
-    if kind not in _kinds():
-        raise errors.UserError(f"{kind}: no such kind of case; allowed: {', '.join(_kinds())}")
-    if kind in FITS:
-        text = fit_template(kind)
+    elif file is None:
+        click.echo(text_of(kind, short), nl=False)
     else:
-        text = sweep_template() if kind == SWEEP else template(kind)
-    if file is None:
-        click.echo(text, nl=False)
-        return
-    try:
-        with file.open("x", encoding="utf-8") as stream:
-            stream.write(text)
-    except FileExistsError:
-        raise errors.UserError(f"{file}: exists; give another name or remove it") from None
+        for companion in write_new(kind, file, short)[1:]:
+            click.echo(f"{companion}: an example, which {file} names; replace it by yours")
 
 
 @cli.command()

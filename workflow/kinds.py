@@ -13,6 +13,7 @@ from typing import Any
 from workflow.case import loading
 from workflow.case.json_schema import json_schema as write_schema
 from workflow.case.sections import Case, Section
+from workflow.case.template import short_template
 from workflow.case.template import template as write_template
 from workflow.shell.analysis import Analysis
 
@@ -70,9 +71,10 @@ def _those_called(called: object) -> list[type[Case]]:
     return list(kinds(called if isinstance(called, str) else None).values())
 
 
-def template(kind: str) -> str:
-    """A commented case of a kind, ready to run."""
-    return write_template(kinds()[kind])
+def template(kind: str, short: bool = False) -> str:
+    """A commented case of a kind, ready to run: with all its entries, or only those it needs."""
+    model = kinds()[kind]
+    return short_template(model) if short else write_template(model)
 
 
 def json_schema(others: Mapping[str, tuple[type[Section], str]] = NOTHING) -> dict[str, Any]:

@@ -226,6 +226,8 @@ def results(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 # --- files of the templates ----------------------------------------------------------------------
 
+# Nodes of the pad of specimens_coarse.yaml.
+PADS = 81
 LOADS = "P,Qx,Qy,Mx,My,Mz,Edx,Edy\n1,0,0,0,0,0,0,0\n"
 NODES = "node,X,Y,Z\n1,15,0,245\n2,14,0,246\n3,15,1,245\n"
 # Corner and size of the boxes of the joint [mm], and the heights of their named faces.
@@ -326,7 +328,8 @@ def folders(tmp_path_factory: pytest.TempPathFactory, template_files: Path) -> d
         (made[kind] / "period.csv").write_text(period, encoding="utf-8")
         shutil.copy(CASES / "specimens_coarse.yaml", made[kind] / "specimens.yaml")
         write_matrices_of_templates(made[kind])
-        (made[kind] / "nodes.csv").write_text("point,area\npad 1,1\npad 2,1\n", encoding="utf-8")
+        rows = "".join(f"pad {number},1\n" for number in range(1, PADS + 1))
+        (made[kind] / "nodes.csv").write_text(f"point,area\n{rows}", encoding="utf-8")
         (made[kind] / "loops.csv").write_text("energy,P,kt,mu\n0,1,1,1\n", encoding="utf-8")
         (made[kind] / "measured.csv").write_text("at,values\n0,1\n", encoding="utf-8")
     return made

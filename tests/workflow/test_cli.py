@@ -114,6 +114,66 @@ def test_new_writes_a_case_that_checks(tmp_path, template_files, kind, words):
     assert "exists" in again.stderr
 
 
+@pytest.mark.parametrize("options", [[], ["--short"]])
+@pytest.mark.parametrize("kind", [*kinds(), "sweep"])
+def test_new_brings_what_the_case_names(kind, options, tmp_path):
+    """All but the mesh of the user's own structure; each example is a right case too."""
+    path = tmp_path / "mine.yaml"
+    if kind == "sweep":
+        options = []
+    written = invoke("new", kind, path, *options)
+    assert written.exit_code == 0, written.stderr
+    if kind == "mesh":
+        return
+    beside = [file for file in tmp_path.iterdir() if file != path]
+    assert sorted(line.split(": ")[0] for line in written.stdout.splitlines()) == sorted(
+        map(str, beside)
+    )
+    cases = [file for file in (path, *beside) if file.suffix == ".yaml" and kind != "sweep"]
+    for case in cases:
+        checked = invoke("check", case)
+        assert checked.exit_code == 0, checked.stderr
+    if options:
+        assert len(path.read_text("utf-8").splitlines()) < 50
+    # What is there is left as it is.
+    path.unlink()
+    for file in beside:
+        file.write_text("mine", encoding="utf-8")
+    assert invoke("new", kind, path, *options).stdout == ""
+    assert [file.read_text("utf-8") for file in beside] == ["mine"] * len(beside)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "kind", ["resultants", "vibration_wear", "friction_rig_wear", "reduced_wear"]
+)
+def test_examples_run_to_their_end(kind, tmp_path):
+    path = tmp_path / "mine.yaml"
+    invoke("new", kind, path, "--short")
+    quick = ["--set", "output.figures=false", "--set", "output.paraview=false"]
+    ended = invoke("run", path, "--out", tmp_path / "out", *quick)
+    assert ended.exit_code == 0, ended.stderr
+
+
+@pytest.mark.parametrize(
+    ("kind", "arguments", "named"),
+    [
+        ("sweep", ["check"], "sweep"),
+        ("fit_joint", ["check"], "fit"),
+        ("sweep", ["fit", "--out", "out"], "sweep"),
+        ("bodies", ["sweep", "--out", "out"], "run"),
+        ("bodies", ["fit", "--out", "out"], "run"),
+    ],
+)
+def test_the_file_of_another_command_names_that_command(kind, arguments, named, tmp_path):
+    path = tmp_path / "mine.yaml"
+    invoke("new", kind, path)
+    name, *options = arguments
+    ended = invoke(name, path, *options)
+    assert ended.exit_code == 2
+    assert f"`fretscale {named} {path}" in ended.stderr
+
+
 def test_new_alone_lists_the_kinds_in_plain_words():
     lines = invoke("new").stdout.splitlines()
     assert [line.split()[0] for line in lines] == [*kinds(), "sweep", *FITS]

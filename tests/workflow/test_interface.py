@@ -317,3 +317,14 @@ def test_results_may_lie_without_the_files_that_they_came_from(ball, tmp_path, m
         lambda self: (s := kept(self)) | {"digests": s["digests"] | gone},
     )
     assert fretscale.open(folder).title == ball.title
+
+
+def test_main_results_print_as_a_table(ball):
+    lines = str(ball.main).splitlines()
+    rows = [line for line in lines if line.startswith("  ")]
+    assert len(rows) == len(ball.main)
+    for row, result in zip(rows, ball.main, strict=True):
+        assert row.split("  ")[1].strip() == result.name
+    # Values begin in one column.
+    (load,) = (row for row in rows if "normal force" in row)
+    assert load.endswith("400 N")

@@ -19,6 +19,8 @@ from workflow.errors import CaseError
 AnyCase = TypeVar("AnyCase", bound=Case)
 AnySection = TypeVar("AnySection", bound=Section)
 YAML = ".yaml"
+# Commands that take a file, and the key by which such a file is known.
+KNOWN_BY = {"sweep": "case", "fit": "fit", "run": "analysis"}
 
 Kinds = Sequence[type[AnyCase]] | Callable[[object], Sequence[type[AnyCase]]]
 """Kinds of cases, or what gives those of the analysis that a case calls by a word."""
@@ -51,6 +53,7 @@ def parse_case(
     Files that the case names are looked for from the folder of ``name``.
     """
     source = Source(name, text, overrides)
+    check_command(source, "run")
     known = kinds(source.at(("analysis",))) if callable(kinds) else kinds
     return validated(source, _kind_of_case(source, known), within)
 
@@ -119,6 +122,16 @@ def _kind_of_case(source: Source, kinds: Sequence[type[AnyCase]]) -> type[AnyCas
         if path == ("analysis",):
             kinds = [kind for kind in kinds if kind.suits(source)] or kinds
     return kinds[0]
+
+
+def check_command(source: Source, command: str) -> None:
+    """Raise OtherKind where the file is known to be one that another command takes."""
+    taken_by = next((word for word, key in KNOWN_BY.items() if source.at((key,)) is not None), None)
+    if taken_by is not None and taken_by != command:
+        raise OtherKind(
+            f"{source.name}: a {taken_by.replace('run', 'case')}; "
+            f"run it with `fretscale {taken_by} {source.name} --out DIR`"
+        )
 
 
 def word_at(source: Source, path: KeyPath, allowed: tuple[str, ...]) -> str:

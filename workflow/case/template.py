@@ -9,6 +9,7 @@ from pydantic.fields import FieldInfo
 
 from workflow.case.sections import (
     KINDS_ARE_NAMED_BY,
+    ElasticBody,
     Section,
     entries_of,
     sections_of,
@@ -25,6 +26,11 @@ HEADER = f"""\
 # wrong with a case, `fretscale run` runs it. Entries behind a # are optional: those said to be
 # `or` another kind take the place of the section above, those `also` stand below it.
 """
+SHORT_HEADER = """\
+# What must be given; `fretscale new KIND` shows every entry that there is, and its default.
+"""
+# Of the bodies of a case of few lines.
+MATERIAL = "Ti-6Al-4V"
 # Optional entries the template fills in: a material that can yield, the length of a run, legs that
 # press, a face with all edges rounded, a joint whose friction rises and
 # a mass and expands.
@@ -37,6 +43,34 @@ FILLED_IN = (
 def template(model: type[Section], header: str = HEADER) -> str:
     """A commented case of a kind, or another file, ready to run, with every entry there is."""
     return header + render(_rows(model, set()))
+
+
+def short_template(model: type[Section]) -> str:
+    """Return a case of a kind, ready to run, with what must be given and no more.
+
+    Materials are named; all else has its default.
+    """
+    return SHORT_HEADER + render(_needed(model))
+
+
+def _needed(model: type[Section]) -> list[Row]:
+    """Return the entries of a section that must be given, or that its template fills in."""
+    filled_in = (*(FILLED_IN if model.filled_in else ()), *model.also_filled_in)
+    rows = []
+    for name, field in entries_of(model).items():
+        given = field.is_required() or name in filled_in
+        value: Any = (field.examples or [None])[0]
+        if sections := list(sections_of(field.annotation)):
+            value = _needed(sections[0])
+            within = any(row.key not in KINDS_ARE_NAMED_BY for row in value)
+            given = given or (within and field.default not in (None, ()))
+            if issubclass(sections[0], ElasticBody):
+                value = MATERIAL
+            if get_origin(field.annotation) is tuple:
+                value = [value]
+        if given:
+            rows.append(Row(name, value, field.description or ""))
+    return rows
 
 
 def _rows(model: type[Section], shown: set[tuple[type[Section], ...]]) -> list[Row]:

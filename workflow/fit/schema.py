@@ -19,7 +19,7 @@ from workflow.analyses.rig.joint_sections import (
 )
 from workflow.analyses.wear.case.evolution import PositiveEnergy
 from workflow.case.fields import Entry, Quantity, Word
-from workflow.case.loading import validated, word_at
+from workflow.case.loading import check_command, validated, word_at
 from workflow.case.sections import Length, Section, Title, disagreement, entry
 from workflow.case.source import Source, read_text
 from workflow.fit.measurement import KIND, Heading, Measurement
@@ -416,6 +416,7 @@ def load_fit(path: Path) -> FitInput:
 def parse_fit(text: str, name: str) -> FitInput:
     """As :func:`load_fit`, of a text; ``name`` stands for the file in messages."""
     source = Source(name, text)
+    check_command(source, "fit")
     kind = KINDS[word_at(source, ("fit",), tuple(KINDS))]
     return FitInput(name, validated(source, kind), source, text)
 

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from workflow.case.plain import counted
+from workflow.case.readable import percent, readable
 from workflow.case.sections import Case
 from workflow.interface.datasets import File, Group
 from workflow.kinds import analysis_of, load_case
@@ -68,6 +69,30 @@ class MainResult(NamedTuple):
     error: float | None
 
 
+class MainResults(tuple[MainResult, ...]):
+    """The main results of a run; printed, they are a table with units and estimated errors."""
+
+    __slots__ = ()
+
+    def __repr__(self) -> str:
+        rows = [
+            (
+                f"  {result.name}",
+                str(readable(result.value, result.unit, result.error)),
+                "" if result.error is None else f"± {percent(result.error)}",
+            )
+            for result in self
+        ]
+        widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+        lines, group = [], ""
+        for result, row in zip(self, rows, strict=True):
+            lines += [result.of] if result.of != group else []
+            group = result.of
+            cells = [cell.ljust(width) for cell, width in zip(row, widths, strict=True)]
+            lines.append("  ".join(cells).rstrip())
+        return "\n".join(lines)
+
+
 class Results(Group):
     """The results of a run: ``summary`` has the numbers, names lead to all that was computed.
 
@@ -115,13 +140,13 @@ class Results(Group):
         return load_case(OutputFolder(self.folder).case)
 
     @property
-    def main(self) -> list[MainResult]:
+    def main(self) -> MainResults:
         """The main results, as the report and ``fretscale compare`` have them."""
-        told = analysis_of(self.case).quantities(self.case, self.summary)
-        return [
+        found = analysis_of(self.case).quantities(self.case, self.summary)
+        return MainResults(
             MainResult(q.group, q.name, required_number(self.summary, q.path), q.unit, q.error)
-            for q in told
-        ]
+            for q in found
+        )
 
     def report(self, out: str | os.PathLike[str] | None = None) -> Path:
         """Write ``report.html`` of the run anew, into its folder or a file ``out``; its path."""

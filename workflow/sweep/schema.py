@@ -11,7 +11,7 @@ from pydantic import Field, create_model, model_validator
 
 from workflow.case import units
 from workflow.case.fields import AnyValue, Entry, File, Whole, is_finite, shown
-from workflow.case.loading import validated
+from workflow.case.loading import check_command, validated
 from workflow.case.sections import Section, Title, disagreement, entry, one_of
 from workflow.case.source import Source, read_text
 from workflow.case.writing import scalar
@@ -259,6 +259,7 @@ class Sweep:
 def load_sweep(path: Path) -> Sweep:
     """Read the file of a sweep. Raises CaseError, a line ``file:line: key: ...`` for each thing."""
     source = Source(str(path), read_text(path))
+    check_command(source, "sweep")
     file = validated(source, _kind_of(source))
     sweep = Sweep(str(path), file, source, _fitted(source, file))
     if wrong := list(_disagreements(sweep)):

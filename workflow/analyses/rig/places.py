@@ -30,6 +30,6 @@ class Against(Moved):
     against: Title | None = entry(
         "other points, as many, or one for all; of a ring's sector also those of the next, as next "
         "tip; without it the ground",
-        "ring",
+        "ring 1",
         default=None,
     )

@@ -185,7 +185,7 @@ class StoredBody(Section):
     file: Annotated[str, CaseFile((".h5", YAML), (SpecimensCase,), "specimens")] = entry(
         "body_1.h5 or body_2.h5 of a specimens run; or the specimens case itself, whose body is "
         "reduced first; its points are pad 1, pad 2, ... and ring 1, ring 2, ...",
-        "body_2.h5",
+        "specimens.yaml",
     )
     body: Annotated[int, Whole(1, 2)] | None = entry(
         "of a specimens case: 1 below its pad, or 2 above", 2, default=None
@@ -195,7 +195,7 @@ class StoredBody(Section):
 class JointedBody(Section, ABC):
     """A body with joints, masses and springs at its points."""
 
-    also_filled_in: ClassVar[tuple[str, ...]] = ("driven",)
+    also_filled_in: ClassVar[tuple[str, ...]] = ("driven", "body")
 
     joints: tuple[JointPlaces, ...] = entry("where they are", min_length=1)
     masses: tuple[AddedMass, ...] = entry("added, moving in x, y and z", default=())
