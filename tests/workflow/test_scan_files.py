@@ -1,7 +1,9 @@
 """Measured surfaces: read from every kind of file, refused with their place, and in a contact."""
 
 import builtins
+import re
 import warnings
+from pathlib import Path
 
 import h5py
 import numpy as np
@@ -9,10 +11,11 @@ import pytest
 
 from sa_solver import Grid
 from sa_solver.scans import Scan, resampled
+from tests.workflow import scan_corpus
 from tests.workflow.scenes import BALL
 from workflow.analyses.wear.structures.bodies.source import BodiesSource
 from workflow.case.input_files import InputFileError
-from workflow.case.scan_files import WRITTEN, read_scan, write_scan
+from workflow.case.scan_files import ENDINGS, PROFILOMETER, WRITTEN, read_scan, write_scan
 from workflow.errors import CaseError, UserError
 from workflow.kinds import load_case, parse_case, template
 
@@ -28,24 +31,59 @@ def scan():
     return Scan(heights, PITCH)
 
 
-@pytest.mark.parametrize("ending", [*WRITTEN, ".tmd"])
+@pytest.mark.parametrize("ending", WRITTEN)
 def test_profilometer_files_come_back(scan, ending, tmp_path):
     """Those that the library writes, by it and by us: heights and pitch to 1e-6."""
     import surfalize
 
-    paths = [tmp_path / f"theirs{ending}"]
+    paths = [tmp_path / f"theirs{ending}", tmp_path / f"ours{ending}"]
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # of steps that differ
         surfalize.Surface(1e3 * scan.heights.T, *(1e3 * p for p in PITCH)).save(str(paths[0]))
-    if ending in WRITTEN:
-        paths.append(tmp_path / f"ours{ending}")
-        write_scan(paths[1], scan)
+    write_scan(paths[1], scan)
     for path in paths:
         got = read_scan(str(path), None, None)
         np.testing.assert_array_equal(got.measured, scan.measured)
         error = np.nanmax(np.abs(got.heights - scan.heights)) / np.nanstd(scan.heights)
         assert error < 1e-6
         assert got.pitch == pytest.approx(scan.pitch, rel=1e-6)
+
+
+def corpus(folder, name, content):
+    path = folder / name
+    path.write_bytes(content if isinstance(content, bytes) else content.encode())
+    return path
+
+
+@pytest.mark.parametrize("name", [*scan_corpus.BINARY, *scan_corpus.TEXT, *scan_corpus.BARE])
+def test_what_instruments_write_has_its_heights_and_pitch(name, tmp_path):
+    """Of each format that is offered, packed from its description: to rounding in 4 bytes."""
+    content, unit, pitch = scan_corpus.BARE.get(name, (None, None, None))
+    if content is None:
+        content = {**scan_corpus.BINARY, **scan_corpus.TEXT}[name]
+    beside = pitch and tuple(1e-3 * step for step in pitch)
+    got = read_scan(str(corpus(tmp_path, name, content)), unit, beside)
+    whole = name.endswith(scan_corpus.WITHOUT_GAPS)
+    lines = scan_corpus.WHOLE if whole else scan_corpus.LINES
+    np.testing.assert_allclose(1e3 * got.heights, lines.T, rtol=1e-6, atol=1e-6)
+    assert got.pitch == pytest.approx((1e-3 * scan_corpus.DX, 1e-3 * scan_corpus.DY), rel=1e-6)
+
+
+def test_all_formats_of_instruments_are_in_the_corpus_and_the_documentation():
+    packed = {"." + name.split(".")[1] for name in scan_corpus.BINARY}
+    assert packed == set(PROFILOMETER)
+    text = (Path(__file__).parents[2] / "docs" / "analyses.md").read_text("utf-8")
+    files = text[text.index("- **Files.**") : text.index("- **Signs.**")]
+    assert set(re.findall(r"`(\.\w+)`", files)) >= set(ENDINGS) - {".npz", ".h5"}
+
+
+@pytest.mark.parametrize("name", scan_corpus.REFUSED)
+def test_what_cannot_be_read_is_refused_with_reason_and_remedy(name, tmp_path):
+    content, *words = scan_corpus.REFUSED[name]
+    with pytest.raises(InputFileError) as refused:
+        read_scan(str(corpus(tmp_path, name, content)), None, None)
+    (line,) = str(refused.value).splitlines()
+    assert all(word in line for word in words), line
 
 
 def test_bare_heights_and_tables_come_back(scan, tmp_path):
@@ -110,7 +148,7 @@ def test_a_file_under_another_name_is_not_guessed(scan, tmp_path):
     """The library would read it by the first of its readers that makes numbers of it."""
     write_scan(tmp_path / "s.x3p", scan)
     (tmp_path / "s.x3p").rename(tmp_path / "s.al3d")
-    with pytest.raises(InputFileError, match=r"cannot be read as '.al3d'"):
+    with pytest.raises(InputFileError, match="of another kind than its name says"):
         read_scan(str(tmp_path / "s.al3d"), None, None)
     with pytest.raises(UserError, match=r"no such format; allowed: .x3p, .sur"):
         write_scan(tmp_path / "s.plu", scan)
@@ -127,6 +165,8 @@ def test_without_the_library_it_is_said_how_to_get_it(tmp_path, monkeypatch):
     monkeypatch.setattr(builtins, "__import__", without)
     with pytest.raises(InputFileError, match=r"pip install 'fretscale\[profilometer\]'"):
         read_scan(str(tmp_path / "s.sur"), None, None)
+    path = corpus(tmp_path, "s.plu", scan_corpus.BINARY["s.plu"])
+    assert read_scan(str(path), None, None).heights.shape == (scan_corpus.NX, scan_corpus.NY)
 
 
 # --- in a contact -------------------------------------------------------------------------------
