@@ -13,6 +13,7 @@ from sa_solver import Grid
 from sa_solver.scans import Scan, resampled
 from tests.workflow import scan_corpus
 from tests.workflow.scenes import BALL
+from workflow.analyses.contact.surfaces import MeasuredSurfaces
 from workflow.analyses.wear.structures.bodies.source import BodiesSource
 from workflow.case.input_files import InputFileError
 from workflow.case.scan_files import ENDINGS, PROFILOMETER, WRITTEN, read_scan, write_scan
@@ -185,6 +186,15 @@ def both(tmp_path):
     for number, each in enumerate(heights, start=1):
         write_scan(tmp_path / f"{number}.x3p", Scan(each, grid.pitch))
     return tmp_path, grid, *heights
+
+
+def test_points_that_only_a_probe_of_atoms_resolves_are_a_doubt(tmp_path):
+    write_scan(tmp_path / "near.x3p", Scan(1e-6 * np.eye(4), (5e-6, 5e-6)))
+    surfaces = MeasuredSurfaces.model_validate(
+        {"body_1": {"file": "near.x3p"}}, context={"folder": str(tmp_path)}
+    )
+    (doubt,) = surfaces.doubts(Grid.covering((2e-5, 2e-5), (4, 4)))
+    assert "points 5 nm apart: is their unit right?" in doubt
 
 
 def test_a_gap_from_files_is_the_same_as_one_that_is_made(both):

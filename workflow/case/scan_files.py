@@ -57,6 +57,8 @@ NOT_MEASURED = "", "nan"
 # such are), heights of many times its size, and points [mm] that far apart or near. Probes resolve
 # a tenth of a nanometre.
 LEAST_HEIGHT, STEEPEST, PITCHES = 1e-30, 10.0, (1e-7, 1e2)
+# Points so near [mm] are those of a probe of atomic force, or their unit is wrong.
+NEAR = 1e-5
 # What Gwyddion writes above heights, in the language of its user.
 GWYDDION = re.compile(
     r"\s*#.*\n"
@@ -284,7 +286,9 @@ def _read_profilometer(file: Path) -> Scan:
     if wrong := unreadable(file):
         raise InputFileError(f"{file}: {wrong}; allowed: a scan")
     try:
-        return own(file.read_bytes()) if own else _by_library(library, file)
+        # Numbers that overflow are found in the heights.
+        with np.errstate(over="ignore", invalid="ignore"):
+            return own(file.read_bytes()) if own else _by_library(library, file)
     except InputError as error:
         raise InputFileError(f"{file}: {error}; allowed: a scan in this format") from error
     except Exception as error:  # damage ends in a dozen ways
