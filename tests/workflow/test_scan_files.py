@@ -42,6 +42,10 @@ def test_profilometer_files_come_back(scan, ending, tmp_path):
         warnings.simplefilter("ignore")  # of steps that differ
         surfalize.Surface(1e3 * scan.heights.T, *(1e3 * p for p in PITCH)).save(str(paths[0]))
     write_scan(paths[1], scan)
+    if ending == ".sur":
+        assert "µ".encode() not in paths[1].read_bytes()[:512]  # of which others make "Âµ"
+        with pytest.raises(UserError, match="one height and missing points"):
+            write_scan(paths[1], Scan(0.0 * scan.heights, PITCH))
     for path in paths:
         got = read_scan(str(path), None, None)
         np.testing.assert_array_equal(got.measured, scan.measured)

@@ -330,8 +330,13 @@ def write_scan(file: Path, scan: Scan) -> None:
     if ending not in WRITTEN:
         raise UserError(f"{file}: no such format; allowed: {', '.join((*WRITTEN, '.npz'))}")
     lines = TO_MICRONS * scan.heights.T
+    if ending == ".sur" and scan.missing and np.nanmin(lines) == np.nanmax(lines):
+        raise UserError(
+            f"{file}: one height and missing points, of which .sur keeps neither; allowed: .x3p"
+        )
     # A surface of one height leaves the library 0 / 0, which it writes rightly nevertheless.
     with warnings.catch_warnings(), np.errstate(invalid="ignore"):
         warnings.filterwarnings("ignore", message="The surface has different pixel size")
         steps = [TO_MICRONS * step for step in scan.pitch]
-        _surfalize(file).Surface(lines, *steps).save(str(file))
+        # The unit in .sur is Latin-1, which other programs do not know in UTF-8.
+        _surfalize(file).Surface(lines, *steps).save(str(file), encoding="latin-1")
