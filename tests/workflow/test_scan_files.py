@@ -78,8 +78,9 @@ def test_all_formats_of_instruments_are_in_the_corpus_and_the_documentation():
     packed = {"." + name.split(".")[1] for name in scan_corpus.BINARY}
     assert packed == set(PROFILOMETER)
     text = (Path(__file__).parents[2] / "docs" / "analyses.md").read_text("utf-8")
-    files = text[text.index("- **Files.**") : text.index("- **Signs.**")]
-    assert set(re.findall(r"`(\.\w+)`", files)) >= set(ENDINGS) - {".npz", ".h5"}
+    files = text[text.index("- **Files of") : text.index("- **Plausible.**")]
+    refused = {".nms", ".zmg", ".zon"}
+    assert set(re.findall(r"`(\.\w+)`", files)) == {*ENDINGS, *refused}
 
 
 @pytest.mark.parametrize("name", scan_corpus.REFUSED)
@@ -122,6 +123,7 @@ REFUSED = [
     ("too few points", "s.csv", "1,2\n3,4\n", BARE, "2 x 2 points; allowed: at least 4"),
     ("not rectangular", "s.csv", "1,2\n3\n", BARE, "s.csv:2: 1 values; allowed: 2"),
     ("words", "s.csv", "1,2\n3,four\n", BARE, "s.csv:2: 'four': not a number"),
+    ("decimal commas", "s.txt", "1,5\t2,5\n" * 4, BARE, "s.txt:1: 1,5: a decimal comma"),
     ("nothing but gaps", "s.csv", "nan,\n" * 5, BARE, "a scan without a point"),
     ("a unit of another kind", "s.csv", "x [N],y,z\n1,2,3\n", {}, "s.csv:1: x: "),
     ("a column less", "s.csv", "x,z\n1,2\n", {}, "s.csv:1: no column y"),

@@ -189,7 +189,7 @@ def _read_gwyddion(file: str, header: dict[str, str]) -> Scan:
 
 def _is_word(cell: str) -> bool:
     try:
-        float(cell or "0")
+        float(cell.replace(",", ".") or "0")
     except ValueError:
         return True
     return False
