@@ -262,7 +262,7 @@ TEXT = {
 # Files without units, and what is beside them.
 BARE = {
     "points.txt": (points("", " "), "um", None),
-    "points.xyz": (points("", "\t"), "um", None),
+    "points.xyz": (points("", "\t"), "um", (DX, DY)),
     "points.csv": (points(""), "um", None),
     "matrix.txt": ("\n".join("  ".join(r) for r in zip(*_HEIGHTS, strict=True)), "um", (DX, DY)),
     "matrix.csv": ("\n".join(";".join(r) for r in zip(*_HEIGHTS, strict=True)), "um", (DX, DY)),

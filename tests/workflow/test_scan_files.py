@@ -123,6 +123,7 @@ REFUSED = [
     ("too few points", "s.csv", "1,2\n3,4\n", BARE, "2 x 2 points; allowed: at least 4"),
     ("not rectangular", "s.csv", "1,2\n3\n", BARE, "s.csv:2: 1 values; allowed: 2"),
     ("words", "s.csv", "1,2\n3,four\n", BARE, "s.csv:2: 'four': not a number"),
+    ("another pitch", "s.txt", "0 0 1\n1 0 1\n", BARE, "points 1 µm apart, not 4 µm"),
     ("decimal commas", "s.txt", "1,5\t2,5\n" * 4, BARE, "s.txt:1: 1,5: a decimal comma"),
     ("nothing but gaps", "s.csv", "nan,\n" * 5, BARE, "a scan without a point"),
     ("a unit of another kind", "s.csv", "x [N],y,z\n1,2,3\n", {}, "s.csv:1: x: "),

@@ -166,12 +166,20 @@ def _read_text(file: str, unit: str | None, pitch: tuple[float, float] | None) -
         return _read_points(TableFile(file, *rows[0], tuple(rows[1:])), "mm")
     if len(rows[0][1]) != 3:
         return _bare(file, _read_matrix(file), unit, pitch)
-    if unit is None or pitch is not None:
+    if unit is None:
         raise InputFileError(
-            f"{file}: points x, y, z without a unit; allowed: {HEADINGS}, or a unit of all three "
-            "and no pitch beside the file"
+            f"{file}: points x, y, z without a unit; allowed: {HEADINGS}, or the unit of all three "
+            "beside the file"
         )
-    return _read_points(TableFile(file, rows[0][0], ("x", "y", "z"), tuple(rows)), unit)
+    scan = _read_points(TableFile(file, rows[0][0], ("x", "y", "z"), tuple(rows)), unit)
+    own, beside = scan.pitch, pitch or scan.pitch
+    axes = [axis for axis in (0, 1) if scan.heights.shape[axis] > 1]
+    if any(abs(own[axis] - beside[axis]) > REGULAR * own[axis] for axis in axes):
+        apart, given = (
+            " x ".join(plain(of[axis], "mm", 3) for axis in axes) for of in (own, beside)
+        )
+        raise InputFileError(f"{file}: points {apart} apart, not {given}; allowed: no other pitch")
+    return scan
 
 
 def _read_gwyddion(file: str, header: dict[str, str]) -> Scan:

@@ -50,7 +50,8 @@ def _read(path: Path, bare: tuple[str, str, str] | None) -> Scan:
     try:
         return read_scan(str(path), unit, (pitch[0], pitch[1]) if pitch else None)
     except InputFileError as error:
-        raise UserError(f"{error} (--bare UNIT DX DY)" if bare is None else str(error)) from error
+        beside = " (--bare UNIT DX DY)" if "beside the file" in str(error) else ""
+        raise UserError(f"{error}{beside}") from error
 
 
 def _length(place: str, text: str) -> float:
