@@ -269,6 +269,7 @@ BARE = {
 }
 # What cannot be read, and a part of what is said of it: why, and what to do.
 REFUSED = {
+    "empty.txt": (gwyddion(ENGLISH).partition(" m\n")[0].encode() + b" m\n", "empty", "rows"),
     "no_unit.txt": (points("", " ").encode(), "without a unit", "headings such as x [mm]"),
     "tabs_german.txt": (points("x [um]\ty [um]\tz [um]", "\t", True).encode(), "a decimal comma",
                         "semicolons"),

@@ -155,12 +155,12 @@ def _implausible(scan: Scan) -> str:
 
 def _read_text(file: str, unit: str | None, pitch: tuple[float, float] | None) -> Scan:
     """Gwyddion's text, a table of points, or bare heights. Raises InputFileError."""
-    if header := GWYDDION.match("\n".join(text_of(file)[:LONGEST_HEADER].splitlines())):
-        _check_own_units(file, unit, pitch)
-        return _read_gwyddion(file, header.groupdict())
     rows = csv_rows(file, blanks=True)
     if not rows:
         raise InputFileError(f"{file}:1: empty; allowed: rows of heights, or of points x, y, z")
+    if header := GWYDDION.match("\n".join(text_of(file)[:LONGEST_HEADER].splitlines())):
+        _check_own_units(file, unit, pitch)
+        return _read_gwyddion(file, header.groupdict())
     if any(_is_word(cell) for cell in rows[0][1]):
         _check_own_units(file, unit, pitch)
         return _read_points(TableFile(file, *rows[0], tuple(rows[1:])), "mm")
