@@ -85,7 +85,8 @@ class Scar:
     there, what plane and shift leave among it: the largest of many is too large by about as much as
     its noise. ``noise`` [mm] is the root mean square
     over the rim, ``length`` [mm] how far it is correlated, and ``patches`` how many independent
-    ones the rim has: below 5 (``sure`` is false) errors are hardly known.
+    ones the rim has: below 5 (``sure`` is false) errors are hardly known. Where the rim has no
+    noise at all, which no two measurements have, all bounds, ``length`` and ``patches`` are None.
     ``shift`` [mm] is where the second scan lies on the first, None where no roughness tells it, and
     ``shift_error`` [mm] its 95 % bounds.
     ``missing`` is the share of the worn area without a depth of its own, which its surroundings
@@ -96,20 +97,20 @@ class Scar:
     worn: Mask
     pitch: tuple[float, float]
     volume: float
-    volume_error: float
+    volume_error: float | None
     deepest: float
-    depth_error: float
+    depth_error: float | None
     noise: float
-    length: float
-    patches: float
+    length: float | None
+    patches: float | None
     shift: tuple[float, float] | None
     shift_error: tuple[float, float] | None
     missing: float
 
     @property
     def sure(self) -> bool:
-        """Whether the rim is large enough for its noise to be known."""
-        return self.patches >= FEWEST_PATCHES
+        """Whether the rim has noise, and is large enough for it to be known."""
+        return self.patches is not None and self.patches >= FEWEST_PATCHES
 
     @property
     def area(self) -> float:
@@ -125,7 +126,8 @@ def measure_scar(before: Scan, after: Scan, worn: Mask | None = None) -> Scar:
     than noise, and some more around it. Scans of other points are averaged onto those of the
     coarser one, as far as both reach.
 
-    Raises InputError where nothing clear is found, or not enough rim is left.
+    Raises InputError where nothing clear is found, or not enough rim is left, or where heights are
+    so large that their squares are no numbers.
 
     Examples
     --------
@@ -174,6 +176,11 @@ def _on_same_points(before: Scan, after: Scan, given: bool) -> tuple[Scan, Scan,
         raise InputError("a worn area on points that are not used: give the coarser scan last")
     sizes = after.size if given else tuple(map(min, zip(before.size, after.size, strict=True)))
     shape = (int(sizes[0] / pitch[0] + ALIKE), int(sizes[1] / pitch[1] + ALIKE))
+    if shape[0] * shape[1] < FEWEST_POINTS:
+        raise InputError(
+            f"{shape[0]} x {shape[1]} points of {pitch[0]:.3g} x {pitch[1]:.3g} mm in both scans: "
+            f"give scans of one body, with {FEWEST_POINTS} points or more, each in its own unit"
+        )
     grid = Grid(shape, (pitch[0], pitch[1]))
     first, second = (Scan(resampled(filled(scan), grid).heights, grid.pitch) for scan in scans)
     shares = [
@@ -214,10 +221,14 @@ class _Overlay:
         return [-np.gradient(smooth, axis=axis) for axis in (0, 1)]
 
     def lay(self, rim: Mask) -> Array:
-        """Lay the scans over each other by ``rim`` as far as it goes; the change of shift."""
+        """Lay the scans over each other by ``rim`` as far as it goes; the change of shift.
+
+        Raises InputError where it goes hardly anywhere, as after a shift that left the scan.
+        """
         moved, self.seen = _moved(self.before.heights, self.gone[0], self.shift)
         self.seen &= ~self.gone[1]
         self.rim = rim & self.seen
+        _check_rim(self.rim)
         columns, others = list(self._plane), list(self._plane)
         if self.recognised:
             columns += [-np.gradient(moved, axis=axis) for axis in (0, 1)]
@@ -239,11 +250,7 @@ class _Overlay:
         By Newton's method, on what is left of the rim.
         """
         seen = rim & ~(self.gone[0] | self.gone[1])
-        if np.count_nonzero(seen) < FEWEST_POINTS:
-            raise InputError(
-                f"{np.count_nonzero(seen)} points around the worn area: give scans that reach "
-                "farther"
-            )
+        _check_rim(seen)
         self.recognised = False
         self.shift, likeness = _correlated(self.before, self.after, seen)
         if likeness < RECOGNISED:
@@ -290,6 +297,14 @@ class _Overlay:
             # The scar hides the roughness that both have in common, until it is left out.
             (self.align if share or not self.recognised else self.lay)(~worn)
         return worn
+
+
+def _check_rim(rim: Mask) -> None:
+    """Raise InputError where so few points are left that nothing is measured."""
+    if np.count_nonzero(rim) < FEWEST_POINTS:
+        raise InputError(
+            f"{np.count_nonzero(rim)} points around the worn area: give scans that reach farther"
+        )
 
 
 def _moved(heights: Array, gone: Mask, shift: Array) -> tuple[Array, Mask]:
@@ -362,23 +377,27 @@ def _measured(overlay: _Overlay, worn: Mask) -> Scar:
     noise = _Noise.of(overlay.depth, rim, len(overlay.columns))
     means = np.where(worn, ndimage.uniform_filter(depth, 3), -np.inf)
     there = _block(means)
-    t95 = _t95(noise.patches)
-    bound = t95 * np.sqrt(noise.variance_of(_weights(overlay, worn)))
-    at_one = t95 * np.sqrt(noise.variance_of(_weights(overlay, there))) / np.count_nonzero(there)
-    off = [t95 * np.sqrt(noise.variance_of(weights)) for weights in overlay.told[3:]]
+    volume, deepest = float(depth[worn].sum()) * dx * dy, float(means.max())
+    bounds = None
+    if noise is not None:
+        bounds = [noise.bound(_weights(overlay, area)) for area in (worn, there)]
+        bounds += [noise.bound(weights) for weights in overlay.told[3:]]
+    if not np.isfinite([volume, deepest, *(bounds or ())]).all():
+        highest = max(np.abs(heights).max() for heights in (overlay.before.heights, depth))
+        raise InputError(f"heights of {highest:.1g} mm: give scans in their unit, or measure again")
     return Scar(
         depth=own.heights,
         worn=worn,
         pitch=overlay.pitch,
-        volume=float(depth[worn].sum()) * dx * dy,
-        volume_error=float(bound * dx * dy),
-        deepest=float(means.max()),
-        depth_error=float(at_one),
+        volume=volume,
+        volume_error=bounds[0] * dx * dy if bounds else None,
+        deepest=deepest,
+        depth_error=bounds[1] / np.count_nonzero(there) if bounds else None,
         noise=rms(overlay.depth[rim]),
-        length=noise.length * float(np.sqrt(dx * dy)),
-        patches=noise.patches,
+        length=noise.length * float(np.sqrt(dx * dy)) if noise else None,
+        patches=noise.patches if noise else None,
         shift=(overlay.shift[0] * dx, overlay.shift[1] * dy) if overlay.recognised else None,
-        shift_error=(float(off[0] * dx), float(off[1] * dy)) if overlay.recognised else None,
+        shift_error=(bounds[2] * dx, bounds[3] * dy) if bounds and overlay.recognised else None,
         missing=missing,
     )
 
@@ -423,10 +442,11 @@ class _Noise:
     patches: float
 
     @classmethod
-    def of(cls, depth: Array, rim: Mask, fitted: int) -> _Noise:
+    def of(cls, depth: Array, rim: Mask, fitted: int) -> _Noise | None:
         """That of the ``depth`` over a rim to which so many parameters were ``fitted``.
 
-        It ends soon behind where it first falls to 0. What the fit has taken is added again.
+        None where there is none: of a scan and itself, or of surfaces that were computed. It ends
+        soon behind where it first falls to 0. What the fit has taken is added again.
         """
         values = _lags(np.where(rim, depth, 0.0))
         pairs = _lags(rim.astype(np.float64))
@@ -443,9 +463,15 @@ class _Noise:
         # A parameter takes the variance of a mean over the rim off all of it.
         mean = float(found @ of_ring) / (1.0 - min(fitted * patch / points, 0.5))
         covariance = found + fitted * mean / points
+        if covariance[0] == 0.0:
+            return None
         # White noise has no less than its own variance, whatever chance makes of its neighbours.
         length = float(np.sqrt(max(mean / covariance[0], 1.0)))
         return cls(covariance, length, float(points / patch))
+
+    def bound(self, weights: Array) -> float:
+        """95 % bound of the sum with such ``weights`` ``(nx, ny)``."""
+        return _t95(self.patches) * float(np.sqrt(self.variance_of(weights)))
 
     def variance_of(self, weights: Array) -> float:
         """Variance of the sum with such ``weights`` ``(nx, ny)``."""

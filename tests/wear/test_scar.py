@@ -83,6 +83,18 @@ def test_no_noise_no_error():
     assert got.shift is None
 
 
+@pytest.mark.parametrize("given", [True, False], ids=["given", "found"])
+def test_without_noise_no_error_is_known(given):
+    """A box of 20 x 10 points and 1 µm in a plane, to the last digit: its volume, and no bounds."""
+    box = np.zeros((60, 50))
+    box[20:40, 25:35] = 1e-3
+    before = Scan(np.zeros(box.shape), (0.01, 0.02))
+    scar = measure_scar(before, Scan(-box, before.pitch), box > 0.0 if given else None)
+    assert scar.volume == pytest.approx(200 * 1e-3 * 0.01 * 0.02, rel=1e-12)
+    assert (scar.volume_error, scar.depth_error, scar.shift_error) == (None, None, None)
+    assert (scar.length, scar.patches, scar.sure) == (None, None, False)
+
+
 def test_scans_of_other_points():
     """The second of half the pitch and less reach: averaged onto the first's."""
     before, _, _, _, _ = scans(3, cells=80, noise=0.0, most_shift=0.0)
@@ -104,6 +116,9 @@ def test_what_cannot_be_told_is_refused():
         measure_scar(before, after, np.ones_like(disk))
     with pytest.raises(InputError, match=r"worn area of \(3, 3\) points"):
         measure_scar(before, after, np.ones((3, 3), dtype=bool))
+    for pitch in (before.pitch[0] * 1e3, before.pitch[0] * 1e-3):
+        with pytest.raises(InputError, match="mm in both scans: give scans of one body"):
+            measure_scar(before, Scan(after.heights, (pitch, pitch)))
     profile = Scan(np.zeros((9, 1)), (1.0, 1.0))
     with pytest.raises(InputError, match="a profile has no volume"):
         measure_scar(profile, profile)

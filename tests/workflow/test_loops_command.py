@@ -129,7 +129,7 @@ GOOD = "displacement [um],force [N]\n" + "".join(f"{k % 7},{k % 5}\n" for k in r
     [
         ("", [], ":1: no rows"),
         ("displacement [um]\n1\n", [], "no column force"),
-        ("displacement [um];force [N]\n1;2\n", [], "this file has 'displacement [um];force [N]'"),
+        ("displacement [um]|force [N]\n1|2\n", [], "this file has 'displacement [um]|force [N]'"),
         ("displacement [um],force [N]\n", [], "no rows"),
         ("displacement [N],force [N]\n1,2\n", [], "displacement"),
         ("displacement [furlongz],force [N]\n1,2\n", [], ":1: displacement"),

@@ -1,7 +1,9 @@
 """Measured surfaces: read from every kind of file, refused with their place, and in a contact."""
 
 import builtins
+import re
 import warnings
+from pathlib import Path
 
 import h5py
 import numpy as np
@@ -9,10 +11,12 @@ import pytest
 
 from sa_solver import Grid
 from sa_solver.scans import Scan, resampled
+from tests.workflow import scan_corpus
 from tests.workflow.scenes import BALL
+from workflow.analyses.contact.surfaces import MeasuredSurfaces
 from workflow.analyses.wear.structures.bodies.source import BodiesSource
 from workflow.case.input_files import InputFileError
-from workflow.case.scan_files import WRITTEN, read_scan, write_scan
+from workflow.case.scan_files import ENDINGS, PROFILOMETER, WRITTEN, read_scan, write_scan
 from workflow.errors import CaseError, UserError
 from workflow.kinds import load_case, parse_case, template
 
@@ -28,24 +32,64 @@ def scan():
     return Scan(heights, PITCH)
 
 
-@pytest.mark.parametrize("ending", [*WRITTEN, ".tmd"])
+@pytest.mark.parametrize("ending", WRITTEN)
 def test_profilometer_files_come_back(scan, ending, tmp_path):
     """Those that the library writes, by it and by us: heights and pitch to 1e-6."""
     import surfalize
 
-    paths = [tmp_path / f"theirs{ending}"]
+    paths = [tmp_path / f"theirs{ending}", tmp_path / f"ours{ending}"]
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # of steps that differ
         surfalize.Surface(1e3 * scan.heights.T, *(1e3 * p for p in PITCH)).save(str(paths[0]))
-    if ending in WRITTEN:
-        paths.append(tmp_path / f"ours{ending}")
-        write_scan(paths[1], scan)
+    write_scan(paths[1], scan)
+    if ending == ".sur":
+        assert "µ".encode() not in paths[1].read_bytes()[:512]  # of which others make "Âµ"
+        with pytest.raises(UserError, match="one height and missing points"):
+            write_scan(paths[1], Scan(0.0 * scan.heights, PITCH))
     for path in paths:
         got = read_scan(str(path), None, None)
         np.testing.assert_array_equal(got.measured, scan.measured)
         error = np.nanmax(np.abs(got.heights - scan.heights)) / np.nanstd(scan.heights)
         assert error < 1e-6
         assert got.pitch == pytest.approx(scan.pitch, rel=1e-6)
+
+
+def corpus(folder, name, content):
+    path = folder / name
+    path.write_bytes(content if isinstance(content, bytes) else content.encode())
+    return path
+
+
+@pytest.mark.parametrize("name", [*scan_corpus.BINARY, *scan_corpus.TEXT, *scan_corpus.BARE])
+def test_what_instruments_write_has_its_heights_and_pitch(name, tmp_path):
+    """Of each format that is offered, packed from its description: to rounding in 4 bytes."""
+    content, unit, pitch = scan_corpus.BARE.get(name, (None, None, None))
+    if content is None:
+        content = {**scan_corpus.BINARY, **scan_corpus.TEXT}[name]
+    beside = pitch and tuple(1e-3 * step for step in pitch)
+    got = read_scan(str(corpus(tmp_path, name, content)), unit, beside)
+    whole = name.endswith(scan_corpus.WITHOUT_GAPS)
+    lines = scan_corpus.WHOLE if whole else scan_corpus.LINES
+    np.testing.assert_allclose(1e3 * got.heights, lines.T, rtol=1e-6, atol=1e-6)
+    assert got.pitch == pytest.approx((1e-3 * scan_corpus.DX, 1e-3 * scan_corpus.DY), rel=1e-6)
+
+
+def test_all_formats_of_instruments_are_in_the_corpus_and_the_documentation():
+    packed = {"." + name.split(".")[1] for name in scan_corpus.BINARY}
+    assert packed == set(PROFILOMETER)
+    text = (Path(__file__).parents[2] / "docs" / "analyses.md").read_text("utf-8")
+    files = text[text.index("- **Files of") : text.index("- **Plausible.**")]
+    refused = {".nms", ".zmg", ".zon"}
+    assert set(re.findall(r"`(\.\w+)`", files)) == {*ENDINGS, *refused}
+
+
+@pytest.mark.parametrize("name", scan_corpus.REFUSED)
+def test_what_cannot_be_read_is_refused_with_reason_and_remedy(name, tmp_path):
+    content, *words = scan_corpus.REFUSED[name]
+    with pytest.raises(InputFileError) as refused:
+        read_scan(str(corpus(tmp_path, name, content)), None, None)
+    (line,) = str(refused.value).splitlines()
+    assert all(word in line for word in words), line
 
 
 def test_bare_heights_and_tables_come_back(scan, tmp_path):
@@ -79,6 +123,8 @@ REFUSED = [
     ("too few points", "s.csv", "1,2\n3,4\n", BARE, "2 x 2 points; allowed: at least 4"),
     ("not rectangular", "s.csv", "1,2\n3\n", BARE, "s.csv:2: 1 values; allowed: 2"),
     ("words", "s.csv", "1,2\n3,four\n", BARE, "s.csv:2: 'four': not a number"),
+    ("another pitch", "s.txt", "0 0 1\n1 0 1\n", BARE, "points 1 µm apart, not 4 µm"),
+    ("decimal commas", "s.txt", "1,5\t2,5\n" * 4, BARE, "s.txt:1: 1,5: a decimal comma"),
     ("nothing but gaps", "s.csv", "nan,\n" * 5, BARE, "a scan without a point"),
     ("a unit of another kind", "s.csv", "x [N],y,z\n1,2,3\n", {}, "s.csv:1: x: "),
     ("a column less", "s.csv", "x,z\n1,2\n", {}, "s.csv:1: no column y"),
@@ -110,7 +156,7 @@ def test_a_file_under_another_name_is_not_guessed(scan, tmp_path):
     """The library would read it by the first of its readers that makes numbers of it."""
     write_scan(tmp_path / "s.x3p", scan)
     (tmp_path / "s.x3p").rename(tmp_path / "s.al3d")
-    with pytest.raises(InputFileError, match=r"cannot be read as '.al3d'"):
+    with pytest.raises(InputFileError, match="of another kind than its name says"):
         read_scan(str(tmp_path / "s.al3d"), None, None)
     with pytest.raises(UserError, match=r"no such format; allowed: .x3p, .sur"):
         write_scan(tmp_path / "s.plu", scan)
@@ -127,6 +173,8 @@ def test_without_the_library_it_is_said_how_to_get_it(tmp_path, monkeypatch):
     monkeypatch.setattr(builtins, "__import__", without)
     with pytest.raises(InputFileError, match=r"pip install 'fretscale\[profilometer\]'"):
         read_scan(str(tmp_path / "s.sur"), None, None)
+    path = corpus(tmp_path, "s.plu", scan_corpus.BINARY["s.plu"])
+    assert read_scan(str(path), None, None).heights.shape == (scan_corpus.NX, scan_corpus.NY)
 
 
 # --- in a contact -------------------------------------------------------------------------------
@@ -145,6 +193,15 @@ def both(tmp_path):
     for number, each in enumerate(heights, start=1):
         write_scan(tmp_path / f"{number}.x3p", Scan(each, grid.pitch))
     return tmp_path, grid, *heights
+
+
+def test_points_that_only_a_probe_of_atoms_resolves_are_a_doubt(tmp_path):
+    write_scan(tmp_path / "near.x3p", Scan(1e-6 * np.eye(4), (5e-6, 5e-6)))
+    surfaces = MeasuredSurfaces.model_validate(
+        {"body_1": {"file": "near.x3p"}}, context={"folder": str(tmp_path)}
+    )
+    (doubt,) = surfaces.doubts(Grid.covering((2e-5, 2e-5), (4, 4)))
+    assert "points 5 nm apart: is their unit right?" in doubt
 
 
 def test_a_gap_from_files_is_the_same_as_one_that_is_made(both):

@@ -1,6 +1,7 @@
 """``fretscale scar`` and ``fretscale surface``: scans in, numbers out; surfaces out as scans."""
 
 import json
+import warnings
 
 import numpy as np
 import pytest
@@ -86,6 +87,43 @@ def test_files_mixed_up_are_told(pair):
     assert "no area clearly deeper than noise" in ended.stderr
     given = command("scar", pair[1], pair[0], "--worn", "-0.33,0.33,-0.33,0.33")
     assert "doubt: no volume that differs from none; are the files in order?" in given.stdout
+
+
+def test_a_scan_and_itself_have_no_error_that_is_told(pair, tmp_path):
+    done = command("scar", pair[0], pair[0], "--worn", "-0.3,0.3,-0.3,0.3", "--out", tmp_path)
+    assert (done.exit_code, done.stderr) == (0, "")
+    assert done.stdout.splitlines()[0] == "volume   0 um^3 (0 mm^3), its error unknown"
+    assert "doubt: both scans are the same around the worn area" in done.stdout
+    assert (tmp_path / "scar.csv").read_text("utf-8").splitlines()[1] == "volume [mm^3],0,"
+    assert "nan" not in done.stdout + (tmp_path / "scar.csv").read_text("utf-8")
+
+
+# Place, and what is there in a damaged file of 96 x 96 points, in the header and in the heights.
+DAMAGE = {
+    "points far apart.sur": (120, np.float32(1e4).tobytes()),
+    "points close together.sur": (120, np.float32(1e-9).tobytes()),
+    "heights of kilometres.sur": (128, np.float32(1e3).tobytes()),
+    "heights of kilometres.sdf": (48, np.float64(1e9).tobytes()),
+    "one huge height.sdf": (20_000, np.float64(1e250).tobytes()),
+    "zeros up to the end.sdf": (200, bytes(96 * 96 * 8)),
+    "cut off.sdf": (-9, b""),
+    "cut off.x3p": (-9, b""),
+}
+
+
+@pytest.mark.parametrize("name", DAMAGE)
+def test_a_damaged_scan_gives_no_numbers(pair, name, tmp_path):
+    """Refused in one line, without warnings, and NaN is no result."""
+    path = tmp_path / name
+    write_scan(path, read_scan(str(pair[1]), None, None))
+    raw, (place, wrong) = bytearray(path.read_bytes()), DAMAGE[name]
+    raw[place : place + len(wrong) if wrong else None] = wrong[: len(raw) - place]
+    path.write_bytes(raw)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", RuntimeWarning)
+        ended = command("scar", pair[0], path)
+    assert ended.exit_code == 2, ended.stdout
+    assert len(ended.stderr.splitlines()) == 1
 
 
 @pytest.mark.slow

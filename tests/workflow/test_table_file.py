@@ -6,31 +6,67 @@ import pytest
 from workflow.analyses.rig.excitation import RECORDED, Recorded
 from workflow.analyses.wear.loop_table import read_loop_table
 from workflow.case.fields import Quantity
-from workflow.case.input_files import InputFileError
+from workflow.case.input_files import InputFileError, read_heights
 from workflow.case.loop_file import read_loop_file
 from workflow.case.table_file import read_table_file
 
 # A byte-order mark, comments before and among the rows, empty lines, quotes, spaces and units.
-AWKWARD = '\ufeff# rig 1, run 7\r\n\r\n"{}" , {}{}\r\n 0.5 ,2{}\r\n  # paused, "here\r\n1,"3"{}\r\n'
+AWKWARD = (
+    '\ufeff# rig 1, 20 \xb0C\r\n\r\n"{}" , {}{}\r\n 0.5 ,2{}\r\n  # paused, "here\r\n1,"3"{}\r\n'
+)
 
 
-def awkward(path, first, second, more=("", "", "")):
-    path.write_bytes(AWKWARD.format(first, second, *more).encode("utf-8"))
+def awkward(path, first, second, more=("", "", ""), how=("utf-8", True)):
+    encoding, marked = how
+    text = AWKWARD.format(first, second, *more)
+    path.write_bytes((text if marked else text[1:]).encode(encoding))
     return path
 
 
-def test_every_reader_takes_the_same_files(tmp_path):
-    path = awkward(tmp_path / "loops.csv", "energy [J]", "kt [N/um]", (",P,mu", ",1,1", ",1,1"))
+ENCODINGS = [("utf-8", True), ("utf-16-le", True), ("utf-16-be", True)]
+ENCODINGS += [("utf-8", False), ("utf-16-le", False), ("utf-16-be", False), ("latin-1", False)]
+
+
+@pytest.mark.parametrize("how", ENCODINGS)
+def test_every_reader_takes_the_same_files(how, tmp_path):
+    more = (",P,mu", ",1,1", ",1,1")
+    path = awkward(tmp_path / "loops.csv", "energy [J]", "kt [N/um]", more, how)
     table = read_loop_table(path)
     np.testing.assert_allclose(table.energy, [500.0, 1000.0], rtol=1e-15)
     np.testing.assert_allclose(table.kt, [2e3, 3e3], rtol=1e-15)
-    record = read_loop_file(awkward(tmp_path / "record.csv", "displacement [um]", "force [kN]"), {})
+    path = awkward(tmp_path / "record.csv", "displacement [µm]", "force [kN]", ("",) * 3, how)
+    record = read_loop_file(path, {})
     np.testing.assert_allclose(record["displacement"], [5e-4, 1e-3], rtol=1e-15)
     np.testing.assert_allclose(record["force"], [2e3, 3e3], rtol=1e-15)
-    path = awkward(tmp_path / "force.csv", "time [ms]", "force [kN]")
+    path = awkward(tmp_path / "force.csv", "time [ms]", "force [kN]", ("",) * 3, how)
     times, force = Recorded(kind="recorded", file=str(path)).read()
     np.testing.assert_allclose(times, [5e-4, 1e-3], rtol=1e-15)
     np.testing.assert_allclose(force, [2e3, 3e3], rtol=1e-15)
+
+
+# Records of 0.5 um and 1 um at 2 kN and -3 kN, as programs of several languages and makers write.
+RECORDS = [
+    "displacement (µm);force (kN)\r\n0,5;2\r\n1,0;-3,0e0\r\n",
+    "displacement in µm\tforce in kN\n0.5\t2\n1\t-3\n",
+    "displacement / µm, force / kN, channel (left)\n0.5, 2, 1\n1, -3, 1\n",
+    '"displacement [µm]","force [kN]"\n"0.5","2"\n"1","-3"\n',
+]
+
+
+@pytest.mark.parametrize("text", RECORDS)
+@pytest.mark.parametrize("encoding", ["utf-8-sig", "utf-16", "latin-1"])
+def test_records_have_the_units_that_their_program_wrote(text, encoding, tmp_path):
+    path = tmp_path / "record.csv"
+    path.write_bytes(text.encode(encoding))
+    record = read_loop_file(path, {})
+    np.testing.assert_allclose(record["displacement"], [5e-4, 1e-3], rtol=1e-15)
+    np.testing.assert_allclose(record["force"], [2e3, -3e3], rtol=1e-15)
+
+
+def test_heights_come_in_any_encoding(tmp_path):
+    path = tmp_path / "gap.csv"
+    path.write_bytes("# µ\r\n0,1e-3\r\n2e-3,0\r\n".encode("utf-16"))
+    assert read_heights(str(path)).tolist() == [[0.0, 1e-3], [2e-3, 0.0]]
 
 
 def test_other_columns_of_a_record_are_left_alone(tmp_path):
@@ -59,6 +95,9 @@ def forces(path):
         ),
         ("time,force\n1,2\n#\n\n1,2,3\n", ":5: 3 values; allowed: 2, as the header"),
         ("time,force\n1,two\n", ":2: force: 'two': not a number; allowed: numbers"),
+        ("time\tforce\n1,5\t2,5\n", ":2: force: 2,5: a decimal comma; allowed: a point"),
+        ("time,force (MN)\n1,2\n1,2e9\n", ":3: force: 2e9: out of range; allowed: at least"),
+        ("time,force (left)\n1,2\n", ":1: no column force; this file has 'time', 'force (left)'"),
         ("time,force\n1,1_0\n", ":2: force: '1_0': not a number"),
         ("time,force\n1,\n", ":2: force: '': not a number"),
         ("time,force\n1,inf\n", ":2: force: inf: not a finite number"),

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import codecs
 import csv
+import io
+import re
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -18,6 +21,12 @@ if TYPE_CHECKING:
     import h5py
 
 COMMENT = "#"
+# Control characters that no text has; a page break and Windows' end of file may be in it.
+NO_TEXT = re.compile(r"[\x00-\x08\x0e-\x19\x1b-\x1f\x7f]")
+QUOTED = re.compile(r'"[^"]*"')
+DECIMAL_COMMA = re.compile(r"^([-+]?\d*),(\d+(?:[eE][-+]?\d+)?)$")
+# Blanks between a heading and its unit in brackets.
+BEFORE_UNIT = re.compile(r"\s+(?=[\[(])")
 # What h5py makes of links that lead nowhere; damage ends in more ways.
 HDF5_ERRORS = OSError, RuntimeError, LookupError
 
@@ -26,25 +35,69 @@ class InputFileError(UserError, ValueError):
     """A file that cannot be taken; ``file:line: what is wrong; what is allowed``."""
 
 
-def csv_rows(file: str | Path) -> list[tuple[int, tuple[str, ...]]]:
+def text_of(file: str | Path) -> str:
+    """Return the text of a file in UTF-8, UTF-16 or, where it is neither, in Latin-1.
+
+    Byte order marks are passed over. UTF-16 without one is known by its zero bytes, which other
+    text has not. Raises InputFileError.
+    """
+    allowed = "; allowed: text in UTF-8, UTF-16 or Latin-1"
+    if wrong := unreadable(Path(file)):
+        raise InputFileError(f"{file}: {wrong}{allowed}")
+    try:
+        raw = Path(file).read_bytes()
+        if raw.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+            text = raw.decode("utf-16")
+        elif 0 in raw[:2]:
+            text = raw.decode("utf-16-be" if raw[0] == 0 else "utf-16-le")
+        else:
+            text = _utf_8_or_latin_1(raw)
+    except (OSError, UnicodeDecodeError) as error:
+        raise _unreadable(str(file), error, allowed) from error
+    if NO_TEXT.search(text):
+        raise InputFileError(f"{file}: cannot be read (bytes that are no text){allowed}")
+    return text
+
+
+def _utf_8_or_latin_1(raw: bytes) -> str:
+    try:
+        return raw.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        return raw.decode("latin-1")
+
+
+def csv_rows(file: str | Path, blanks: bool = False) -> list[tuple[int, tuple[str, ...]]]:
     """Line number and cells of every row of a CSV file that is neither empty nor a comment.
 
-    Comments begin with ``#``; a byte-order mark is passed over. Raises InputFileError.
+    Comments begin with ``#``. Cells end at semicolons, tabs or commas, whichever the first row has
+    in this order; with ``blanks`` at blanks where it has none of them. Beside semicolons a comma
+    within a number is a decimal comma, as programs write it that are set to such a language.
+    Raises InputFileError.
     """
-    if wrong := unreadable(Path(file)):
-        raise InputFileError(f"{file}: {wrong}; allowed: a CSV file")
+    # Empty in place of comments, so that they still count.
+    lines = [
+        "\n" if line.lstrip().startswith(COMMENT) else line
+        for line in io.StringIO(text_of(file), newline="")
+    ]
+    first = QUOTED.sub("", next((line for line in lines if line.strip()), ""))
+    separator = next((at for at in (";", "\t", ",") if at in first and f",{at}" not in first), ",")
+    if blanks and not any(at in first for at in ",;\t"):
+        separator = " "
+        lines = [BEFORE_UNIT.sub("", line.strip()) + "\n" for line in lines]
+    reader = csv.reader(lines, delimiter=separator, skipinitialspace=separator == " ")
     try:
-        with Path(file).open(newline="", encoding="utf-8-sig") as stream:
-            # Empty in place of comments, so that they still count.
-            lines = ("\n" if line.lstrip().startswith(COMMENT) else line for line in stream)
-            reader = csv.reader(lines)
-            return [
-                (reader.line_num, tuple(cell.strip() for cell in cells))
-                for cells in reader
-                if any(cell.strip() for cell in cells)
-            ]
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        rows = [
+            (reader.line_num, tuple(cell.strip() for cell in cells))
+            for cells in reader
+            if any(cell.strip() for cell in cells)
+        ]
+    except csv.Error as error:
         raise _unreadable(str(file), error, "; allowed: a CSV file") from error
+    if separator != ";":
+        return rows
+    return [
+        (line, tuple(DECIMAL_COMMA.sub(r"\1.\2", cell) for cell in cells)) for line, cells in rows
+    ]
 
 
 def check_widths(file: str | Path, rows: Sequence[tuple[int, tuple[str, ...]]], first: str) -> None:
@@ -59,6 +112,10 @@ def check_widths(file: str | Path, rows: Sequence[tuple[int, tuple[str, ...]]], 
 
 def number_in(place: str, cell: str) -> float:
     """The number that a cell says. Raises InputFileError where it is none, or not finite."""
+    if DECIMAL_COMMA.match(cell):
+        raise InputFileError(
+            f"{place}: {cell}: a decimal comma; allowed: a point, or semicolons between the cells"
+        )
     try:
         # Python would take 1_000 for a number.
         number = float("" if "_" in cell else cell)

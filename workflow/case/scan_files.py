@@ -1,15 +1,17 @@
 """Measured surfaces in files: profilometers' own, tables of points, and bare heights.
 
-Profilometers' files say their units and pitch themselves, and are read and written by surfalize.
-Their lines go along x and follow each other along y.
+Profilometers' files say their units and pitch themselves. Most are read and written by surfalize,
+those that it reads wrongly by :mod:`workflow.case.instrument_files`. Their lines go along x and
+follow each other along y.
 """
 
 from __future__ import annotations
 
+import re
 import warnings
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -23,22 +25,27 @@ from workflow.case.input_files import (
     csv_rows,
     number_in,
     read_array,
+    text_of,
 )
-from workflow.case.table_file import TableFile, read_table_file
-from workflow.case.units import to_base
+from workflow.case.instrument_files import READERS
+from workflow.case.plain import plain
+from workflow.case.table_file import TableFile
+from workflow.case.units import UnitError, to_base
 from workflow.errors import UserError, one_line
 
 if TYPE_CHECKING:
     from types import ModuleType
 
-# Of the many that the library reads, those of profilometers that say their units and pitch.
+# Of the many that the library reads, those that a second reader (SurfaceTopography 1.27) takes for
+# the same heights and pitch. Of .nms, .zmg and .zon it does not: pitch, sign and missing points.
 PROFILOMETER = (
     *(".x3p", ".sur", ".al3d", ".plu", ".plux", ".sdf", ".opd", ".os3d", ".tmd", ".gwy"),
-    *(".vk4", ".vk6", ".vk7", ".zon", ".zmg", ".nms"),
+    *(".vk4", ".vk6", ".vk7"),
 )
 WRITTEN = ".x3p", ".sur", ".al3d", ".sdf"
-BARE = ".npy", ".npz", ".csv", ".h5"
-ENDINGS = (*PROFILOMETER, *BARE)
+TEXT = ".csv", ".txt", ".xyz"
+BARE = ".npy", ".npz", ".h5"
+ENDINGS = (*PROFILOMETER, *TEXT, *BARE)
 UNITS = "m", "mm", "um", "nm"
 TO_MICRONS = 1e3
 # Points along a direction below which there is no surface to speak of.
@@ -46,37 +53,61 @@ FEWEST = 4
 # Share of a step by which the points of a table may lie beside a regular grid.
 REGULAR = 0.01
 NOT_MEASURED = "", "nan"
+# What no scan is: heights below the least of any float that was meant (counts that were read as
+# such are), heights of many times its size, and points [mm] that far apart or near. Probes resolve
+# a tenth of a nanometre.
+LEAST_HEIGHT, STEEPEST, PITCHES = 1e-30, 10.0, (1e-7, 1e2)
+# Points so near [mm] are those of a probe of atomic force, or their unit is wrong.
+NEAR = 1e-5
+# What Gwyddion writes above heights, in the language of its user.
+GWYDDION = re.compile(
+    r"\s*#.*\n"
+    r"# (?:Width|Šířka|Breite|Anchura|Largeur|Larghezza|幅|폭|Largura|Ширина):"
+    r"\s*(?P<width>\S+)\s+(?P<x_unit>\S+)\n"
+    r"# [^:\n]+:\s*(?P<height>\S+)\s+(?P<y_unit>\S+)\n"
+    r"# [^:\n]+:\s*(?P<z_unit>\S+)\n"
+)
+LONGEST_HEADER = 5000
+HEADINGS = "headings such as x [mm], y [mm], z [um] in the first row"
 
 
 def read_scan(file: str, unit: str | None, pitch: tuple[float, float] | None) -> Scan:
     """The scan in a file, its heights and pitch in mm, NaN where points are missing.
 
     ``unit`` of the heights and ``pitch`` [mm] are for files of bare heights, which do not say them:
-    ``.npy``, ``.npz:array``, ``.h5:dataset`` and ``.csv``, rows along x and columns along y. A CSV
-    file with headings ``x, y, z`` is a table of points of a regular grid, each in any order.
-    Raises InputFileError.
+    ``.npy``, ``.npz:array``, ``.h5:dataset`` and text, rows along x and columns along y. Text with
+    headings ``x, y, z`` is a table of points of a regular grid, each in any order; three columns
+    without headings are such points in ``unit``. Raises InputFileError.
     """
     name, _ = split_dataset(file)
-    if Path(name).suffix.lower() in PROFILOMETER:
+    ending = Path(name).suffix.lower()
+    if ending not in ENDINGS:
+        raise InputFileError(
+            f"{file}: no scan in a format that is read; allowed: {', '.join(ENDINGS)}: export it "
+            "as .x3p, .sur or x, y, z in text"
+        )
+    if ending in PROFILOMETER:
         _check_own_units(file, unit, pitch)
         return _checked(file, lambda: _read_profilometer(Path(name)))
-    if name.endswith(".csv") and _has_headings(name):
-        _check_own_units(file, unit, pitch)
-        return _checked(file, lambda: _read_points(read_table_file(name)))
+    if ending in TEXT:
+        return _checked(file, lambda: _read_text(name, unit, pitch))
+    return _checked(file, lambda: _bare(file, read_array(file), unit, pitch))
+
+
+def _bare(file: str, heights: Array, unit: str | None, pitch: tuple[float, float] | None) -> Scan:
+    """Heights in rows along x. Raises InputFileError."""
     if unit is None or pitch is None:
         missing = " and ".join(key for key, at in (("unit", unit), ("pitch", pitch)) if at is None)
         raise InputFileError(
             f"{file}: bare heights do not say their {missing}; allowed: both beside the file"
         )
-    heights = _read_matrix(name) if name.endswith(".csv") else read_array(file)
     if heights.dtype.kind not in "iuf" or heights.ndim not in (1, 2) or heights.size == 0:
         raise InputFileError(
             f"{file}: {heights.ndim} dimensions of type {heights.dtype}; "
             "allowed: numbers in rows along x and columns along y"
         )
-    scale = to_base(f"1 {unit}", "mm")
     rows = heights.reshape(len(heights), -1)
-    return _checked(file, lambda: Scan(rows.astype(np.float64) * scale, pitch))
+    return Scan(rows.astype(np.float64) * to_base(f"1 {unit}", "mm"), pitch)
 
 
 def _check_own_units(file: str, unit: str | None, pitch: tuple[float, float] | None) -> None:
@@ -99,21 +130,74 @@ def _checked(file: str, read: Callable[[], Scan]) -> Scan:
         )
     if np.any(np.isinf(scan.heights)):
         raise InputFileError(f"{file}: infinite heights; allowed: numbers, and NaN where missing")
+    if wrong := _implausible(scan):
+        raise InputFileError(f"{file}: {wrong}: it is damaged or in another unit; allowed: a scan")
     return scan
+
+
+def _implausible(scan: Scan) -> str:
+    """What no measured surface has, empty where there is nothing of the kind."""
+    heights = np.abs(scan.heights[scan.measured])
+    range_, size = float(np.ptp(scan.heights[scan.measured])), max(scan.size)
+    tiny = heights[(heights > 0.0) & (heights < LEAST_HEIGHT)]
+    if tiny.size:
+        return f"heights of {tiny[0]:.1g} mm"
+    if range_ > STEEPEST * size:
+        return f"heights that differ by {plain(range_, 'mm', 3)} over {plain(size, 'mm', 3)}"
+    for step in scan.pitch:
+        if not PITCHES[0] <= step <= PITCHES[1]:
+            return f"points {plain(step, 'mm', 3)} apart"
+    return ""
 
 
 # --- bare heights and tables --------------------------------------------------------------------
 
 
-def _has_headings(file: str) -> bool:
-    """Whether the first row has words in it."""
-    rows = csv_rows(file)
-    return bool(rows) and any(_is_word(cell) for cell in rows[0][1])
+def _read_text(file: str, unit: str | None, pitch: tuple[float, float] | None) -> Scan:
+    """Gwyddion's text, a table of points, or bare heights. Raises InputFileError."""
+    rows = csv_rows(file, blanks=True)
+    if not rows:
+        raise InputFileError(f"{file}:1: empty; allowed: rows of heights, or of points x, y, z")
+    if header := GWYDDION.match("\n".join(text_of(file)[:LONGEST_HEADER].splitlines())):
+        _check_own_units(file, unit, pitch)
+        return _read_gwyddion(file, header.groupdict())
+    if any(_is_word(cell) for cell in rows[0][1]):
+        _check_own_units(file, unit, pitch)
+        return _read_points(TableFile(file, *rows[0], tuple(rows[1:])), "mm")
+    if len(rows[0][1]) != 3:
+        return _bare(file, _read_matrix(file), unit, pitch)
+    if unit is None:
+        raise InputFileError(
+            f"{file}: points x, y, z without a unit; allowed: {HEADINGS}, or the unit of all three "
+            "beside the file"
+        )
+    scan = _read_points(TableFile(file, rows[0][0], ("x", "y", "z"), tuple(rows)), unit)
+    own, beside = scan.pitch, pitch or scan.pitch
+    axes = [axis for axis in (0, 1) if scan.heights.shape[axis] > 1]
+    if any(abs(own[axis] - beside[axis]) > REGULAR * own[axis] for axis in axes):
+        apart, given = (
+            " x ".join(plain(of[axis], "mm", 3) for axis in axes) for of in (own, beside)
+        )
+        raise InputFileError(f"{file}: points {apart} apart, not {given}; allowed: no other pitch")
+    return scan
+
+
+def _read_gwyddion(file: str, header: dict[str, str]) -> Scan:
+    """Heights in lines along x, below their width, height and unit."""
+    lines = _read_matrix(file)
+    sizes = (f"{header['width']} {header['x_unit']}", f"{header['height']} {header['y_unit']}")
+    try:
+        width, height = (to_base(size, "mm") for size in sizes)
+        scale = to_base(f"1 {header['z_unit']}", "mm")
+    except UnitError as error:
+        raise InputFileError(f"{file}: {error}; allowed: widths and heights in lengths") from error
+    ny, nx = lines.shape
+    return Scan(scale * lines.T, (width / nx, height / ny))
 
 
 def _is_word(cell: str) -> bool:
     try:
-        float(cell or "0")
+        float(cell.replace(",", ".") or "0")
     except ValueError:
         return True
     return False
@@ -121,23 +205,36 @@ def _is_word(cell: str) -> bool:
 
 def _read_matrix(file: str) -> Array:
     """Heights in rows along x; NaN where a cell is empty or says so."""
-    rows = csv_rows(file)
-    if not rows:
-        raise InputFileError(f"{file}:1: empty; allowed: rows of heights")
+    rows = csv_rows(file, blanks=True)
     check_widths(file, rows, "first row")
     return np.array([[_height(f"{file}:{line}", cell) for cell in row] for line, row in rows])
 
 
 def _height(place: str, cell: str) -> float:
-    return np.nan if cell.lower() in NOT_MEASURED else number_in(place, cell)
+    if cell.lower() in NOT_MEASURED:
+        return np.nan
+    try:
+        return number_in(place, cell)
+    except InputFileError as error:
+        raise InputFileError(f"{error}, and NaN or nothing where one is missing") from None
 
 
-def _read_points(table: TableFile) -> Scan:
-    """A table of points x, y, z that lie on a regular grid, in any order; some may be missing."""
+def _read_points(table: TableFile, unit: str) -> Scan:
+    """A table of points x, y, z that lie on a regular grid, in any order; some may be missing.
+
+    ``unit`` is that of columns whose headings have none.
+    """
     table.check(dict.fromkeys(("x", "y", "z"), "mm"))
-    table.require(("x", "y", "z"), "x, y and z, each with its unit in brackets")
-    x, y = (table.column(name, Quantity("mm")) for name in ("x", "y"))
-    scale = to_base(f"1 {table.unit('z') or 'mm'}", "mm")
+    table.require(("x", "y", "z"), HEADINGS)
+    if not table.rows:
+        raise InputFileError(f"{table.place}: no rows; allowed: a row for each point")
+    check_widths(table.file, [(table.line, table.headings), *table.rows], "header")
+    scale = to_base(f"1 {unit}", "mm")
+    x, y = (
+        table.column(name, Quantity("mm")) * (1.0 if table.unit(name) else scale)
+        for name in ("x", "y")
+    )
+    scale = to_base(f"1 {table.unit('z') or unit}", "mm")
     z = np.array(
         [
             scale * _height(f"{table.file}:{line}: z", cell)
@@ -192,23 +289,40 @@ def _surfalize(file: Path) -> ModuleType:
 
 
 def _read_profilometer(file: Path) -> Scan:
-    library = _surfalize(file)
+    own = READERS.get(file.suffix.lower())
+    library = None if own else _surfalize(file)
     if wrong := unreadable(file):
         raise InputFileError(f"{file}: {wrong}; allowed: a scan")
     try:
-        with warnings.catch_warnings():
-            # It would take a file that is none of its kind by the first reader that makes
-            # numbers of it.
-            warnings.filterwarnings("error", message="The file suffix indicates")
-            warnings.filterwarnings("ignore", message="The surface has different pixel size")
-            surface = library.Surface.load(str(file))
-            lines = np.asarray(surface.data, dtype=np.float64)
-            pitch = float(surface.step_x), float(surface.step_y)
+        # Numbers that overflow are found in the heights.
+        with np.errstate(over="ignore", invalid="ignore"):
+            return own(file.read_bytes()) if own else _by_library(library, file)
+    except InputError as error:
+        raise InputFileError(f"{file}: {error}; allowed: a scan in this format") from error
     except Exception as error:  # damage ends in a dozen ways
         raise InputFileError(
             f"{file}: cannot be read as {shown(file.suffix)} ({one_line(error)}); allowed: a scan "
-            "in this format"
+            "in this format: export it again, or as .x3p"
         ) from error
+
+
+def _by_library(library: Any, file: Path) -> Scan:
+    with warnings.catch_warnings():
+        # It would take a file that is none of its kind by the first reader that makes numbers of
+        # it.
+        warnings.filterwarnings("error", message="The file suffix indicates")
+        warnings.filterwarnings("ignore", message="The surface has different pixel size")
+        try:
+            surface = library.Surface.load(str(file))
+        except UserWarning:
+            raise InputError("it is damaged, or of another kind than its name says") from None
+        lines = np.asarray(surface.data, dtype=np.float64)
+        pitch = float(surface.step_x), float(surface.step_y)
+    if surface.metadata.get("inverted"):
+        raise InputError(
+            "its heights are marked as inverted, which some programs take for their sign and some "
+            "for a note: export it without, or as .x3p"
+        )
     return Scan(lines.T / TO_MICRONS, (pitch[0] / TO_MICRONS, pitch[1] / TO_MICRONS))
 
 
@@ -224,8 +338,13 @@ def write_scan(file: Path, scan: Scan) -> None:
     if ending not in WRITTEN:
         raise UserError(f"{file}: no such format; allowed: {', '.join((*WRITTEN, '.npz'))}")
     lines = TO_MICRONS * scan.heights.T
+    if ending == ".sur" and scan.missing and np.nanmin(lines) == np.nanmax(lines):
+        raise UserError(
+            f"{file}: one height and missing points, of which .sur keeps neither; allowed: .x3p"
+        )
     # A surface of one height leaves the library 0 / 0, which it writes rightly nevertheless.
     with warnings.catch_warnings(), np.errstate(invalid="ignore"):
         warnings.filterwarnings("ignore", message="The surface has different pixel size")
         steps = [TO_MICRONS * step for step in scan.pitch]
-        _surfalize(file).Surface(lines, *steps).save(str(file))
+        # The unit in .sur is Latin-1, which other programs do not know in UTF-8.
+        _surfalize(file).Surface(lines, *steps).save(str(file), encoding="latin-1")

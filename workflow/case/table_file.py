@@ -2,6 +2,7 @@
 
 The first row has the headings, each a name with a unit in brackets, or without one in the base
 unit. Lines that begin with ``#`` are comments, empty ones and a byte-order mark are passed over.
+Encodings and separators are those of :func:`workflow.case.input_files.csv_rows`.
 """
 
 from __future__ import annotations
@@ -9,7 +10,9 @@ from __future__ import annotations
 import difflib
 import re
 from collections.abc import Iterable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -20,6 +23,8 @@ from workflow.case.input_files import InputFileError, check_widths, csv_rows, nu
 from workflow.case.units import UnitError, to_base
 
 HEADING = re.compile(r"(?P<name>[^\[\]]*?)\s*(?:\[\s*(?P<unit>[^\[\]]*?)\s*\])?")
+# Other ways to write a unit, taken for one where it is: "force (left)" is a name.
+ELSEWHERE = re.compile(r"(?P<name>.+?)\s*(?:\((?P<in_brackets>.+)\)|\s(?:in|/)\s+(?P<after>\S+))")
 
 
 @dataclass(frozen=True)
@@ -65,6 +70,8 @@ class TableFile:
         missing = [name for name in names if name not in self.names]
         if missing:
             there = ", ".join(shown(heading) for heading in self.headings)
+            if any(name in self.headings for name in missing):
+                there += ", each called without its unit"
             raise InputFileError(
                 f"{self.place}: no column {', '.join(missing)}; this file has {there}; "
                 f"allowed: {allowed}"
@@ -153,7 +160,13 @@ def check_unit(place: str, unit: str, base: str) -> None:
         raise InputFileError(f"{place}: {error}; allowed: {allowed}") from error
 
 
+@cache
 def _name_and_unit(heading: str) -> tuple[str, str]:
-    """Name and unit of a heading; one in other brackets is a name as a whole."""
+    """Name and unit of a heading: in brackets, in parentheses, or behind ``in`` or a slash."""
+    if match := ELSEWHERE.fullmatch(heading):
+        unit = (match["in_brackets"] or match["after"]).strip()
+        with suppress(UnitError):
+            to_base(f"1 {unit}", None)
+            return match["name"], unit
     match = HEADING.fullmatch(heading)
     return (match["name"], match["unit"] or "") if match else (heading, "")

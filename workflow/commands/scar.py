@@ -12,7 +12,7 @@ from sa_solver.types import Mask
 from wear.scar import Scar, measure_scar
 from workflow.case.input_files import InputFileError
 from workflow.case.plain import plain
-from workflow.case.scan_files import UNITS, read_scan
+from workflow.case.scan_files import NEAR, UNITS, read_scan
 from workflow.case.units import UnitError, to_base
 from workflow.errors import UserError
 from workflow.shell.folder import OutputFolder
@@ -50,7 +50,8 @@ def _read(path: Path, bare: tuple[str, str, str] | None) -> Scan:
     try:
         return read_scan(str(path), unit, (pitch[0], pitch[1]) if pitch else None)
     except InputFileError as error:
-        raise UserError(f"{error} (--bare UNIT DX DY)" if bare is None else str(error)) from error
+        beside = " (--bare UNIT DX DY)" if "beside the file" in str(error) else ""
+        raise UserError(f"{error}{beside}") from error
 
 
 def _length(place: str, text: str) -> float:
@@ -82,23 +83,37 @@ def _rectangle(text: str, scan: Scan) -> Mask:
 
 def report(scar: Scar) -> list[str]:
     """What was lost, with 95 % bounds, how the scans were laid over each other, and doubts."""
-    volume, error = PER_MICRON * scar.volume, PER_MICRON * scar.volume_error
-    lines = [
-        f"volume   {volume:.4g} +- {error:.2g} um^3 ({scar.volume:.4g} mm^3), 95 %",
-        f"deepest  {TO_MICRONS * scar.deepest:.4g} +- {TO_MICRONS * scar.depth_error:.2g} um "
-        "(the largest mean of 3 x 3 points)",
-        f"area     {scar.area:.4g} mm^2",
-        f"rim      {plain(scar.noise, 'mm', 3)} rms, correlated over "
-        f"{plain(scar.length, 'mm', 3)}: {scar.patches:.0f} independent patches",
-    ]
-    if scar.shift is None or scar.shift_error is None:
+    mean = "(the largest mean of 3 x 3 points)"
+    volume, deepest = PER_MICRON * scar.volume, TO_MICRONS * scar.deepest
+    if scar.volume_error is None or scar.depth_error is None:
+        lines = [
+            f"volume   {volume:.4g} um^3 ({scar.volume:.4g} mm^3), its error unknown",
+            f"deepest  {deepest:.4g} um {mean}, its error unknown",
+        ]
+    else:
+        lines = [
+            f"volume   {volume:.4g} +- {PER_MICRON * scar.volume_error:.2g} um^3 "
+            f"({scar.volume:.4g} mm^3), 95 %",
+            f"deepest  {deepest:.4g} +- {TO_MICRONS * scar.depth_error:.2g} um {mean}",
+        ]
+    lines.append(f"area     {scar.area:.4g} mm^2")
+    if scar.length is None or scar.patches is None:
+        lines.append("rim      no noise at all")
+    else:
+        lines.append(
+            f"rim      {plain(scar.noise, 'mm', 3)} rms, correlated over "
+            f"{plain(scar.length, 'mm', 3)}: {scar.patches:.0f} independent patches"
+        )
+    if scar.shift is None:
         lines.append(
             "the rims have no roughness in common: laid over each other by their plane alone"
         )
     else:
-        pairs = zip(scar.shift, scar.shift_error, strict=True)
-        shift = [f"{plain(by, 'mm', 4)} +- {plain(error, 'mm', 2)}" for by, error in pairs]
-        lines.append(f"laid over each other: the second lies {shift[0]}, {shift[1]} off the first")
+        errors = [f" +- {plain(error, 'mm', 2)}" for error in scar.shift_error or ()] or ["", ""]
+        x, y = (
+            f"{plain(by, 'mm', 4)}{error}" for by, error in zip(scar.shift, errors, strict=True)
+        )
+        lines.append(f"laid over each other: the second lies {x}, {y} off the first")
     if scar.missing:
         lines.append(f"{scar.missing:.1%} of the worn area are missing points, laid in between")
     return [*lines, *_doubts(scar)]
@@ -106,12 +121,19 @@ def report(scar: Scar) -> list[str]:
 
 def _doubts(scar: Scar) -> list[str]:
     doubts = []
-    if not scar.sure:
+    if (step := min(scar.pitch)) < NEAR:
+        doubts.append(f"doubt: points {plain(step, 'mm', 3)} apart: is their unit right?")
+    if scar.patches is None:
+        doubts.append(
+            "doubt: both scans are the same around the worn area, to the last digit, as no two "
+            "measurements are: no error can be told; are they one file, damaged, or computed?"
+        )
+    elif not scar.sure:
         doubts.append(
             "doubt: the noise is correlated over so much of the rim that it is hardly known: "
             "the errors are about right at best; scans that reach farther tell more"
         )
-    if scar.volume < scar.volume_error:
+    if scar.volume <= (scar.volume_error or 0.0):
         doubts.append("doubt: no volume that differs from none; are the files in order?")
     return doubts
 
@@ -140,13 +162,18 @@ def write_scar(scar: Scar, out: Path, title: str, force: bool) -> list[Path]:
 
 def _table(scar: Scar) -> list[str]:
     rows = {
-        "volume [mm^3]": (scar.volume, f"{scar.volume_error:.6g}"),
-        "deepest [mm]": (scar.deepest, f"{scar.depth_error:.6g}"),
-        "area [mm^2]": (scar.area, ""),
-        "noise [mm]": (scar.noise, ""),
-        "correlated [mm]": (scar.length, ""),
-        "patches [1]": (scar.patches, ""),
-        "missing [1]": (scar.missing, ""),
+        "volume [mm^3]": (scar.volume, scar.volume_error),
+        "deepest [mm]": (scar.deepest, scar.depth_error),
+        "area [mm^2]": (scar.area, None),
+        "noise [mm]": (scar.noise, None),
+        "correlated [mm]": (scar.length, None),
+        "patches [1]": (scar.patches, None),
+        "missing [1]": (scar.missing, None),
     }
-    told = [f"{name},{value:.10g},{bound}" for name, (value, bound) in rows.items()]
+    told = [f"{name},{_cell(value, 10)},{_cell(bound, 6)}" for name, (value, bound) in rows.items()]
     return ["quantity,value,bound 95 %", *told]
+
+
+def _cell(value: float | None, digits: int) -> str:
+    """A number in a table, nothing where it is unknown."""
+    return "" if value is None else f"{value:.{digits}g}"

@@ -25,8 +25,8 @@ def write_figure(scar: Scar, name: str, path: Path) -> None:
 
 def figure(scar: Scar, name: str) -> Figure:
     """The map with what counts as worn, and the depth along x and along y."""
-    volume, error = (PER_CUBE * one for one in (scar.volume, scar.volume_error))
-    drawn = new_figure(f"{name}: {volume:.4g} ± {error:.2g} µm³ worn", 6.0)
+    error = "" if scar.volume_error is None else f" ± {PER_CUBE * scar.volume_error:.2g}"
+    drawn = new_figure(f"{name}: {PER_CUBE * scar.volume:.4g}{error} µm³ worn", 6.0)
     left, right = drawn.subfigures(1, 2, squeeze=False, width_ratios=(1.2, 1.0))[0]
     x, y = (
         (np.arange(count) - 0.5 * (count - 1)) * pitch

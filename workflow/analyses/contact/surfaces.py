@@ -15,7 +15,7 @@ from sa_solver.types import Array, Grid
 from workflow.case.fields import File, Quantity, Word, split_dataset
 from workflow.case.input_files import InputFileError
 from workflow.case.plain import plain, shares
-from workflow.case.scan_files import ENDINGS, UNITS, read_scan
+from workflow.case.scan_files import ENDINGS, NEAR, UNITS, read_scan
 from workflow.case.sections import Length, Section, disagreement, entry, one_of
 
 Shift = Annotated[float, Quantity("mm", at_least=-1e4, at_most=1e4, range_text="-10 to 10 m")]
@@ -37,12 +37,14 @@ class MeasuredSurface(Section):
     also_filled_in: ClassVar[tuple[str, ...]] = ("unit", "pitch")
 
     file: Annotated[str, File(ENDINGS)] = entry(
-        "of a profilometer (.sur, .x3p, .al3d, .plu, ...), x, y, z (.csv), or bare heights "
-        "(.npy, .csv; with a colon .npz:array, .h5:dataset)",
+        "of a profilometer (.sur, .x3p, .al3d, .plu, ...), x, y, z (.csv, .txt, .xyz), or bare "
+        "heights (.npy, .csv, .txt; with a colon .npz:array, .h5:dataset)",
         "disk.npy",
     )
     unit: Annotated[str, Word(UNITS)] | None = entry(
-        "of bare heights: m, mm, um or nm; other files say it", "um", default=None
+        "of bare heights, or of x, y, z without headings: m, mm, um or nm; other files say it",
+        "um",
+        default=None,
     )
     pitch: tuple[Length, Length] | None = entry(
         "of bare heights along x, along y; other files say it [mm]",
@@ -207,6 +209,8 @@ class SurfacesOfTwo(Section):
             height = numbers["rms"]
             if height > STEEP * min(grid.size[: 1 if grid.line else 2]) or SMOOTH < height < FINE:
                 yield f"{key}.{name}: heights of {plain(height, 'mm', 3)} rms: is their unit right?"
+            if (step := min(numbers["pitch"])) < NEAR:
+                yield f"{key}.{name}: points {plain(step, 'mm', 3)} apart: is their unit right?"
             if height > SMOOTH and numbers["lost"] > LOST * height:
                 lost = f"{plain(numbers['lost'], 'mm', 3)} of {plain(height, 'mm', 3)} rms"
                 yield (
