@@ -13,6 +13,7 @@ from itertools import pairwise
 import numpy as np
 
 from fe_models.curved_face import Midsides
+from fe_models.geometry.length_unit import LengthUnit
 from fe_models.geometry.scene import Scene
 from fe_models.mesh import MeshError
 from sa_solver.types import Array, Indices
@@ -54,10 +55,11 @@ Blocks = list[tuple[str, Indices]]
 class GroupedMesh:
     """Nodes and named groups of a file; nothing of it is checked.
 
-    ``points`` ``(n, 3)`` [mm] and ``numbers`` ``(n,)``, the file's own node numbers; per name the
-    elements of a body, the facets of a surface and the rows of a node set. ``midsides`` are the
-    points in the middle of edges that elements of second order have, ``left`` lines of the file
-    that say more than a mesh and are not taken over, ``scene`` what a case could have of them.
+    ``points`` ``(n, 3)`` [mm], from a reader in ``unit``, which is the file's, and ``numbers``
+    ``(n,)``, the file's own node numbers; per name the elements of a body, the facets of a surface
+    and the rows of a node set. ``midsides`` are the points in the middle of edges that elements of
+    second order have, ``left`` lines of the file that say more than a mesh and are not taken over,
+    ``scene`` what a case could have of them.
     """
 
     points: Array
@@ -68,6 +70,7 @@ class GroupedMesh:
     midsides: Midsides | None = None
     left: tuple[str, ...] = ()
     scene: Scene = field(default_factory=Scene)
+    unit: LengthUnit = field(default_factory=LengthUnit)
 
 
 def midsides_of(points: Array, blocks: Iterable[tuple[str, Indices]]) -> Midsides | None:

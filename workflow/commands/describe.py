@@ -18,10 +18,13 @@ from workflow.shell.store import replacing
 FIGURE, PARAVIEW = "assembly.png", "assembly.vtu"
 
 
-def read_file(file: Path, size: str | None) -> ImportedMesh:
-    """The bodies of a mesh or CAD file; ``size`` with its unit. Raises UserError."""
+def read_file(file: Path, size: str | None, unit: str | None) -> ImportedMesh:
+    """Bodies of a mesh or CAD file; ``size`` with its unit, ``unit`` of lengths in the file.
+
+    Raises UserError.
+    """
     try:
-        return read_bodies(file, None if size is None else _length(size))
+        return read_bodies(file, None if size is None else _length(size), unit)
     except MeshError as error:
         raise UserError(str(error)) from error
 
