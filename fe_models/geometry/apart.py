@@ -12,6 +12,7 @@ import signal
 import subprocess
 import sys
 import threading
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -24,6 +25,8 @@ from fe_models.mesh import MeshError
 COMMAND = "from fe_models.geometry.apart import main; main()"
 # Exit code of a process that got signal 9, as the system sends it where memory runs out.
 KILLED = -9
+# Processor time of reading a shape [s], and of each megabyte of it: ten times what it takes.
+LONGEST_READ, LONGEST_READ_OF_A_MB = 20.0, 50.0
 # Letters of what a library says of a file that it cannot read.
 LONGEST = 160
 
@@ -82,6 +85,29 @@ def read_apart(read: Callable[..., GroupedMesh], path: Path, *arguments: Any) ->
         raise mesh
     assert isinstance(mesh, GroupedMesh)
     return mesh
+
+
+@contextmanager
+def cpu_limited(path: Path) -> Iterator[None]:
+    """End the process where a file takes far more of its processor time than files of its size do.
+
+    Damage may send a library round in circles. Only POSIX systems have such a limit.
+    """
+    try:
+        import resource
+    except ImportError:
+        yield
+        return
+    soft, hard = resource.getrlimit(resource.RLIMIT_CPU)
+    limit = int(
+        time.process_time() + LONGEST_READ + LONGEST_READ_OF_A_MB * path.stat().st_size / 1e6
+    )
+    if soft == resource.RLIM_INFINITY or limit < soft:
+        resource.setrlimit(resource.RLIMIT_CPU, (limit, hard))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_CPU, (soft, hard))
 
 
 def _ending(code: int) -> str:

@@ -7,6 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from fe_models.geometry.apart import cpu_limited
 from fe_models.geometry.gmsh_file import EntityGroup, first_line, grouped_entities
 from fe_models.geometry.grouped import GroupedMesh
 from fe_models.geometry.length_unit import LengthUnit
@@ -62,7 +63,8 @@ def _meshed(path: Path, plain: Path, size: float, unit: LengthUnit) -> GroupedMe
         gmsh.option.setNumber("Mesh.MeshSizeMin", size)
         gmsh.option.setNumber("Mesh.MeshSizeMax", size)
         try:
-            gmsh.model.occ.importShapes(str(plain))
+            with cpu_limited(plain):
+                gmsh.model.occ.importShapes(str(plain))
             gmsh.model.occ.synchronize()
         except Exception as error:  # gmsh raises nothing more specific
             raise MeshError(f"{path}: gmsh cannot read it: {first_line(error)}") from None

@@ -79,7 +79,9 @@ def _converted(scene: Scene, length: float, force: float) -> Scene:
         loads=tuple(
             replace(
                 load,
-                value=_times(load.value, of_loads.get(load.kind, 1.0)),
+                value=of_loads.get(load.kind, 1.0) * load.value
+                if isinstance(load.value, float)
+                else _times(load.value, of_loads.get(load.kind, 1.0)),
                 through=_times(load.through, length),
             )
             for load in scene.loads
@@ -87,8 +89,6 @@ def _converted(scene: Scene, length: float, force: float) -> Scene:
     )
 
 
-def _times(value: float | Vector, factor: float) -> float | Vector:
-    if isinstance(value, float):
-        return factor * value
-    x, y, z = value
+def _times(vector: Vector, factor: float) -> Vector:
+    x, y, z = vector
     return factor * x, factor * y, factor * z
