@@ -8,7 +8,7 @@ CAD = (".step", ".stp", ".brep")
 NASTRAN = (".bdf", ".nas", ".fem", ".dat")
 EXODUS = (".e", ".exo", ".ex2", ".exii", ".g", ".gen")
 # Formats of meshio with solid elements, by far not all that it knows.
-MESHIO = (".vtu", ".vtk", ".xdmf", ".med", ".mesh", ".meshb", ".vol", ".su2", ".avs", ".tec")
+MESHIO = (".vtu", ".vtk", ".xdmf", ".med", ".mesh", ".meshb", ".vol", ".su2", ".avs")
 READ = (".msh", ".inp", *NASTRAN, ".unv", *EXODUS, *MESHIO, *CAD)
 # Files of programs whose own formats nothing here reads.
 OWN_FORMATS = {

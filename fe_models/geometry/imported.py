@@ -34,9 +34,8 @@ from sa_solver.types import Array, Indices
 PLANE = 1e-9
 # Closed surfaces have no mean normal: theirs is rounding, below this share of the area.
 CLOSED = 1e-9
-# Lines by which a ``.dat`` is Nastran's, and those of Tecplot.
-DAT = re.compile(r"\s*(GRID|BEGIN\s+BULK|CEND|VARIABLES|ZONE)\b", re.IGNORECASE)
-NASTRAN_BEGINS = frozenset({"GRID", "BEGIN", "CEND"})
+# Lines by which a ``.dat`` is Nastran's.
+BULK_DATA = re.compile(r"\s*(GRID|BEGIN\s+BULK|CEND)\b", re.IGNORECASE)
 # Why lengths are in a unit that was asked for.
 GIVEN = "as given"
 
@@ -180,16 +179,13 @@ def _grouped(path: Path, size: float | None, unit: str | None) -> GroupedMesh:
 
 
 def _read_dat(path: Path) -> GroupedMesh:
-    """Read a ``.dat``, which may be of Nastran or of Tecplot, and is much else besides."""
+    """Read a ``.dat`` of Nastran; files of many other programs end so, too."""
     with open_text(path) as file:
-        found = [match[1].split()[0].upper() for line in file if (match := DAT.match(line))]
-    if NASTRAN_BEGINS.intersection(found):
-        return read_nastran(path)
-    if found:
-        return read_meshio(path)
+        if any(BULK_DATA.match(line) for line in file):
+            return read_nastran(path)
     raise MeshError(
-        f"{path}: neither Nastran's bulk data (GRID, CTETRA, ...) nor Tecplot's; what Abaqus "
-        f"prints into .dat is no mesh, nor is an Ansys input read: {EXPORT}"
+        f"{path}: has no bulk data of Nastran (GRID, CTETRA, ...); what Abaqus prints into a .dat, "
+        f"Ansys' input and Tecplot's files are not read: {EXPORT}"
     )
 
 
