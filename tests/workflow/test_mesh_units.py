@@ -7,7 +7,7 @@ import pytest
 
 from fe_models.geometry.imported import read_bodies
 from tests.fe_models import cae_files
-from tests.fe_models.test_cae_files import CUBE, group
+from tests.fe_models.test_cae_files import group
 from tests.workflow.commands import invoke
 from tests.workflow.mesh_scenes import refused, run, write_case
 from tests.workflow.test_offered_case import deck, offered
@@ -107,16 +107,16 @@ def test_what_a_file_in_inches_says_is_offered_in_our_units(tmp_path):
 
 
 def cubes_of_salome():
-    """Two cubes of 1 on each other, which say that they are in metres, and their faces."""
-    points = np.array([*CUBE, *((x, y, z + 1) for x, y, z in CUBE)], dtype=float)
-    text = cae_files.universal(points, {"hexahedron": np.arange(16).reshape(2, 8)})
+    """A column of two cubes of 1 below another cube, which says that it is in metres."""
+    points = [(x, y, z) for z in (0, 1, 2, 2, 3) for x, y in ((0, 0), (1, 0), (1, 1), (0, 1))]
+    cells = np.array([range(8), range(4, 12), range(12, 20)])
+    text = cae_files.universal(np.array(points, dtype=float), {"hexahedron": cells})
     text = text.rstrip("\n").removesuffix("    -1")
-    faces = ("base", "low", "foot", "high")
-    for number in range(4):
-        text += "".join(f"{v:10d}" for v in (11 + number, 94, 1, 1, 7, 4)) + "\n"
-        text += "".join(f"{4 * number + corner:10d}" for corner in (1, 2, 3, 4)) + "\n"
-    named = [group(n, name, 8, [n]) for n, name in ((1, "lower"), (2, "upper"))]
-    named += [group(n, name, 8, [n]) for n, name in enumerate(faces, start=11)]
+    named = [group(1, "lower", 8, [1, 2]), group(2, "upper", 8, [3])]
+    for number, (name, layer) in enumerate({"base": 0, "low": 2, "foot": 3, "high": 4}.items(), 11):
+        text += "".join(f"{v:10d}" for v in (number, 94, 1, 1, 7, 4)) + "\n"
+        text += "".join(f"{4 * layer + corner:10d}" for corner in (1, 2, 3, 4)) + "\n"
+        named.append(group(number, name, 8, [number]))
     units = "    -1\n   164\n         1  SI: Meter (newton)         2\n   1.   1.   1.\n    -1\n"
     return f"{units}{text}    -1\n    -1\n  2467\n{''.join(named)}    -1\n"
 
@@ -132,9 +132,9 @@ def test_metres_of_a_universal_file_are_asked_about(tmp_path):
     }  # fmt: skip
     case = write_case(tmp_path / "cubes.yaml", structure, {"increments": [1, 1]}, grid=(8, 8))
     said = _said(case)
-    assert "in m, as cubes.unv:2 says, converted to mm; bodies within 1000 x 1000 x 2000" in said
+    assert "in m, as cubes.unv:2 says, converted to mm; bodies within 1000 x 1000 x 3000" in said
     assert "doubt: structure.length_unit: lengths are in m, as cubes.unv:2 says" in said
-    for unit, sides in (("mm", "1 x 1 x 2 mm"), ("m", "1000 x 1000 x 2000 mm")):
+    for unit, sides in (("mm", "1 x 1 x 3 mm"), ("m", "1000 x 1000 x 3000 mm")):
         said = _said(case, "--set", f"structure.length_unit={unit}")
         assert "doubt: structure.length_unit" not in said
         assert f"bodies within {sides}" in said
