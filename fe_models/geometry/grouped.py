@@ -7,7 +7,7 @@ diagonals of the quadrilaterals between them, whatever they are split from.
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
 import numpy as np
@@ -71,6 +71,16 @@ class GroupedMesh:
     left: tuple[str, ...] = ()
     scene: Scene = field(default_factory=Scene)
     unit: LengthUnit = field(default_factory=LengthUnit)
+
+    def in_millimetres(self) -> GroupedMesh:
+        """Return a mesh with lengths in its ``unit`` in mm, and what it says in N, mm and t."""
+        size, midsides = self.unit.size, self.midsides
+        if size == 1.0:
+            return self
+        if midsides is not None:
+            midsides = replace(midsides, points=size * midsides.points)
+        scene = self.scene.converted(size, self.unit.force)
+        return replace(self, points=size * self.points, midsides=midsides, scene=scene)
 
 
 def midsides_of(points: Array, blocks: Iterable[tuple[str, Indices]]) -> Midsides | None:

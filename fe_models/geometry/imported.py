@@ -19,7 +19,7 @@ from fe_models.geometry.endings import CAD, EXODUS, EXPORT, NASTRAN, why_not_rea
 from fe_models.geometry.exodus import read_exodus
 from fe_models.geometry.gmsh_file import read_msh
 from fe_models.geometry.grouped import DIMENSION, Blocks, GroupedMesh, nodes_of, split_blocks
-from fe_models.geometry.length_unit import SIZES, LengthUnit, in_millimetres
+from fe_models.geometry.length_unit import SIZES, LengthUnit
 from fe_models.geometry.meshio_file import read_meshio
 from fe_models.geometry.nastran import read_nastran
 from fe_models.geometry.scene import Scene
@@ -175,7 +175,7 @@ def _grouped(path: Path, size: float | None, unit: str | None) -> GroupedMesh:
         mesh = read_apart(read_msh, path)
     else:
         mesh = _READERS.get(suffix, read_meshio)(path)
-    return in_millimetres(mesh if unit is None else replace(mesh, unit=given))
+    return (mesh if unit is None else replace(mesh, unit=given)).in_millimetres()
 
 
 def _read_dat(path: Path) -> GroupedMesh:

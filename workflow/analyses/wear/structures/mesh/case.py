@@ -260,7 +260,7 @@ class MeshCase(FiniteElementCase):
                 f"materials not taken over, the first {left[0]}; all of them: fretscale describe, "
                 "as a case: fretscale describe --case"
             )
-        yield from size_doubts(self, imported)
+        yield from size_doubts(imported, self.solids, self.structure.loads)
         mesh = self.structure.mesh(self.mesh.size, self.mesh.order)
         yield from (f"mesh.order: {doubt}" for doubt in folded_elements(mesh, imported))
         for index, interface in enumerate(mesh.interfaces):

@@ -5,7 +5,7 @@ A mesh in m that is taken as mm is a thousand times too small, and nothing in it
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
@@ -26,7 +26,7 @@ from workflow.case.plain import plain
 if TYPE_CHECKING:
     from fe_models.geometry.imported import ImportedMesh
     from fe_models.mesh import Body
-    from workflow.analyses.wear.structures.mesh.case import MeshCase
+    from workflow.analyses.wear.structures.mesh.contacts import MeshMaterial
 
 LengthName = Literal["mm", "um", "cm", "m", "in", "ft"]
 # The longest side of bodies that fret [mm], and the units that files are in, the likeliest first.
@@ -53,18 +53,22 @@ def lengths_outline(imported: ImportedMesh, names: tuple[str, ...]) -> str:
     return f"{imported.unit}; bodies within {extent(points)}"
 
 
-def size_doubts(case: MeshCase, imported: ImportedMesh) -> Iterator[str]:
-    """Doubts about sizes of the bodies, by themselves and beside loads and materials."""
-    bodies = [imported.bodies[name] for name in case.structure.names]
+def size_doubts(
+    imported: ImportedMesh, solids: Mapping[str, MeshMaterial], loads: Sequence[MeshLoad]
+) -> Iterator[str]:
+    """Doubts about sizes of bodies, which go by name, by themselves and beside loads."""
+    from fe_models.geometry.imported import GIVEN
+
+    bodies = [imported.bodies[name] for name in solids]
     side = float(np.ptp(np.concatenate([body.points for body in bodies]), axis=0).max())
     if not USUAL[0] <= side <= USUAL[1]:
         yield f"structure.length_unit: {_unusual(imported, side)}"
-    elif imported.unit.name == "m" and case.structure.length_unit is None:
+    elif imported.unit.name == "m" and imported.unit.source != GIVEN:
         yield (
             f"structure.length_unit: lengths are {imported.unit}, which makes bodies of "
             f"{plain(side, 'mm', 4)}; Salome and FreeCAD say so of every mesh: give mm or m here"
         )
-    yield from _loads(case, imported, bodies)
+    yield from _loads(loads, imported, solids)
 
 
 def _unusual(imported: ImportedMesh, side: float) -> str:
@@ -80,19 +84,22 @@ def _unusual(imported: ImportedMesh, side: float) -> str:
     return told
 
 
-def _loads(case: MeshCase, imported: ImportedMesh, bodies: list[Body]) -> Iterator[str]:
+def _loads(
+    loads: Sequence[MeshLoad], imported: ImportedMesh, solids: Mapping[str, MeshMaterial]
+) -> Iterator[str]:
     """Doubts about loads that are too large for the bodies, or all of them too small."""
+    bodies = [imported.bodies[name] for name in solids]
     stresses: dict[str, float] = {}
-    for index, load in enumerate(case.structure.loads):
+    for index, load in enumerate(loads):
         key, most = f"structure.loads.{index}", max(map(abs, load.path))
         if isinstance(load, DisplacementLoad):
             yield from _moved(key, load, most, imported, bodies)
-        stress = _stress(case, load, imported, bodies)
+        stress = _stress(load, imported, solids)
         # What is not known is neither large nor small.
         stresses[key] = WEAK if stress is None else stress * most
     strongest = max(stresses, key=lambda key: stresses[key])
-    moduli = [solid.young for solid in case.solids.values()]
-    yields = [solid.yield_stress for solid in case.solids.values()]
+    moduli = [solid.young for solid in solids.values()]
+    yields = [solid.yield_stress for solid in solids.values()]
     yield from pressed(strongest, stresses[strongest], yields, moduli)
 
 
@@ -111,16 +118,18 @@ def _moved(
 
 
 def _stress(
-    case: MeshCase, load: MeshLoad, imported: ImportedMesh, bodies: list[Body]
+    load: MeshLoad, imported: ImportedMesh, solids: Mapping[str, MeshMaterial]
 ) -> float | None:
     """About the stress that a load leaves [MPa]; None of loads that say nothing of sizes."""
+    bodies = [imported.bodies[name] for name in solids]
     if isinstance(load, RotationLoad):
-        densities = [solid.density or 0.0 for solid in case.solids.values()]
-        axis, through = np.array(load.axis), np.array(load.through)
+        axis = np.array(load.axis) / np.linalg.norm(load.axis)
         return max(
-            rho * load.speed**2 * float(np.sum(np.cross(body.points - through, axis) ** 2, 1).max())
-            for rho, body in zip(densities, bodies, strict=True)
-        ) / float(axis @ axis)
+            (solid.density or 0.0)
+            * load.speed**2
+            * float(np.sum(np.cross(body.points - load.through, axis) ** 2, axis=1).max())
+            for solid, body in zip(solids.values(), bodies, strict=True)
+        )
     if not isinstance(load, ForceLoad | MomentLoad):
         return None
     area = sum(_area(imported, body, load.group) for body in bodies)
