@@ -16,7 +16,6 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import click
 from click.shell_completion import CompletionItem
 
-from fe_models.geometry.length_unit import SIZES
 from workflow import errors
 from workflow.commands.group import OneLineGroup
 from workflow.measurements import fit, loops, scar
@@ -332,7 +331,7 @@ def surface(folder: Path, file: Path, **given: Any) -> None:
 @cli.command()
 @click.argument("file", type=click.Path(path_type=Path))
 @click.option("--size", metavar="LENGTH", help="Of the elements, for a CAD file, such as '2 mm'.")
-@click.option("--unit", type=click.Choice(list(SIZES)), help="Of lengths in the file.")
+@click.option("--unit", help="Of lengths in the file: mm, um, cm, m, in or ft.")
 @click.option("--out", type=click.Path(path_type=Path), help="Folder for a picture and a .vtu.")
 @click.option("--case", type=click.Path(path_type=Path), help="Case to write of what FILE says.")
 @click.option("--force", is_flag=True, help="Overwrite what is there.")

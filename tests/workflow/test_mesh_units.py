@@ -58,6 +58,8 @@ def test_sizes_and_their_unit_are_told(blocks, tmp_path):
     divided(tmp_path / "blocks.inp", 25.4)
     inches = _said(blocks, "--set", "structure.length_unit=in")
     assert "in in, as given, converted to mm; bodies within 2 x 2 x 3 mm" in inches
+    wrong = invoke("describe", tmp_path / "blocks.inp", "--unit", "inch")
+    assert (wrong.exit_code, "allowed: mm, um, cm, m, in, ft" in wrong.stderr) == (2, True)
     told = invoke("describe", tmp_path / "blocks.inp", "--unit", "in").output
     assert "lengths in in, as given, converted to mm" in told
     assert "body Foot-1: 27 nodes, 48 tetrahedra, 1 x 1 x 1 mm, volume 1 mm³" in told

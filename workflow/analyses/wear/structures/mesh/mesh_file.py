@@ -7,11 +7,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 
 from fe_models.geometry.endings import READ, why_not_read
+from fe_models.geometry.length_unit import SIZES
 from workflow.analyses.wear.structures.mesh.load import MeshLoad
 from workflow.analyses.wear.structures.mesh.loads import (
     DisplacementLoad,
@@ -20,7 +21,7 @@ from workflow.analyses.wear.structures.mesh.loads import (
     RotationLoad,
 )
 from workflow.case.doubts import WEAK, pressed
-from workflow.case.fields import File
+from workflow.case.fields import File, Word
 from workflow.case.plain import plain
 
 if TYPE_CHECKING:
@@ -28,7 +29,7 @@ if TYPE_CHECKING:
     from fe_models.mesh import Body
     from workflow.analyses.wear.structures.mesh.contacts import MeshMaterial
 
-LengthName = Literal["mm", "um", "cm", "m", "in", "ft"]
+LengthName = Annotated[str, Word(tuple(SIZES))]
 # The longest side of bodies that fret [mm], and the units that files are in, the likeliest first.
 USUAL, UNITS = (0.5, 1e4), ("mm", "m", "um", "in")
 # Faces are hardly moved by more than this share of their body.
@@ -73,8 +74,6 @@ def size_doubts(
 
 def _unusual(imported: ImportedMesh, side: float) -> str:
     """A side that is not usual, and a unit in which it would be."""
-    from fe_models.geometry.length_unit import SIZES
-
     least, most = (plain(usual, "mm") for usual in USUAL)
     told = f"bodies of {plain(side, 'mm', 4)}, lengths {imported.unit}; usual: {least} to {most}"
     for name in UNITS:
