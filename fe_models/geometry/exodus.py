@@ -18,7 +18,7 @@ import numpy as np
 
 from fe_models.geometry.abaqus_cards import SourceLine
 from fe_models.geometry.flattened import FlatFile
-from fe_models.geometry.grouped import CORNERS, FACE_SHAPES, GroupedMesh
+from fe_models.geometry.grouped import CORNERS, DIMENSION, FACE_SHAPES, GroupedMesh
 from fe_models.geometry.scene import Scene
 from fe_models.geometry.scope import Element, Scope, extend
 from fe_models.mesh import MeshError
@@ -85,16 +85,16 @@ class _Read:
         self._types = {name: _text(kind) for name, kind in types.items()}
         self._numbers = self._nodes()
         # What bodies do not have of the blocks that name faces and edges.
-        self._caveats: list[str] = []
+        self._caveats: list[tuple[str, str]] = []
         self._blocks()
         self._sets()
 
     def mesh(self) -> GroupedMesh:
         flat = FlatFile(self.scope, joins=True)
         mesh = flat.mesh()
-        if flat.top == 3:
-            flat.told += self._caveats
-        return replace(mesh, left=tuple(flat.told), scene=Scene(ignored=tuple(flat.told)))
+        lower = (text for shape, text in self._caveats if DIMENSION[shape] < flat.top)
+        told = (*flat.told, *lower)
+        return replace(mesh, left=told, scene=Scene(ignored=told))
 
     def _wrong(self, what: str) -> MeshError:
         return MeshError(f"{self._path}: {what}")
@@ -150,8 +150,8 @@ class _Read:
                 )
             numbers: list[int | range] = list(range(first, first + len(cells)))
             extend(self.scope.element_sets.add(name, {}), {"": numbers})
-            if shape in ("line", *SHELL_SIDES):
-                self._caveats.append(f"stiffness of {kind}, which names faces or edges {name}")
+            told = f"{self._path.name}: stiffness of {kind}, which names faces or edges {name}"
+            self._caveats.append((shape, told))
         if not self.scope.elements:
             raise self._wrong("has no elements")
 

@@ -241,6 +241,21 @@ def test_exodus(tmp_path, classic):
     assert "one body" in imported.left[0]
 
 
+def test_shells_of_exodus_name_faces(tmp_path):
+    """As blocks on the tetrahedron, and by a side set of such a shell, which has two sides."""
+    path, found = tmp_path / "a.e", variables()
+    found["connect5"], found["eb_names"] = np.array([[12, 14, 13]]), found["eb_names"][:0]
+    found |= {"elem_ss1": np.array([5, 4]), "side_ss1": np.array([2, 2])}
+    write_exodus(path, found, classic=False)
+    with h5py.File(path, "a") as file:
+        file["connect5"].attrs["elem_type"] = np.bytes_("TRI3")
+    imported = read_bodies(path)
+    upper = imported.bodies["block_40"]
+    assert patch(upper, "block_5").area == pytest.approx(18.0, rel=1e-12)
+    assert patch(upper, "base").area == pytest.approx(18.0 + 18.0 * 3**0.5, rel=1e-12)
+    assert imported.left[1] == "a.e: stiffness of TRI3, which names faces or edges block_5"
+
+
 @pytest.mark.parametrize(
     ("name", "value", "why"),
     [
