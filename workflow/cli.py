@@ -331,11 +331,17 @@ def surface(folder: Path, file: Path, **given: Any) -> None:
 @cli.command()
 @click.argument("file", type=click.Path(path_type=Path))
 @click.option("--size", metavar="LENGTH", help="Of the elements, for a CAD file, such as '2 mm'.")
+@click.option("--unit", help="Of lengths in the file: mm, um, cm, m, in or ft.")
 @click.option("--out", type=click.Path(path_type=Path), help="Folder for a picture and a .vtu.")
 @click.option("--case", type=click.Path(path_type=Path), help="Case to write of what FILE says.")
 @click.option("--force", is_flag=True, help="Overwrite what is there.")
 def describe(
-    file: Path, size: str | None, out: Path | None, case: Path | None, force: bool
+    file: Path,
+    size: str | None,
+    unit: str | None,
+    out: Path | None,
+    case: Path | None,
+    force: bool,
 ) -> None:
     """List what a case may name of a mesh or CAD FILE.
 
@@ -347,7 +353,7 @@ def describe(
     from fe_models.geometry.imported import describe_bodies
     from workflow.commands.describe import read_file, write_assembly, write_offer
 
-    imported = read_file(file, size)
+    imported = read_file(file, size, unit)
     # What is not in the case is told when that is written.
     for line in describe_bodies(imported if case is None else replace(imported, left=())):
         click.echo(line)

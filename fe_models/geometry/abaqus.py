@@ -45,9 +45,10 @@ def read_abaqus(path: Path) -> GroupedMesh:
     else:
         raise MeshError(f"{path}: has no elements")
     mesh = flattened.mesh()
-    plane, scene = _plane_stress(scopes), scene_of(model, flattened, mesh)
-    scene = replace(scene, ignored=(*plane, *scene.ignored))
-    return replace(mesh, left=(*plane, *model.left), scene=scene)
+    caveats = [*_plane_stress(scopes), *_stiff_edges(model)]
+    scene = scene_of(model, flattened, mesh)
+    scene = replace(scene, ignored=(*caveats, *scene.ignored))
+    return replace(mesh, left=(*caveats, *model.left), scene=scene)
 
 
 def _plane_stress(scopes: list[Scope]) -> list[str]:
@@ -60,6 +61,25 @@ def _plane_stress(scopes: list[Scope]) -> list[str]:
                     "the plane are in plane strain"
                 ]
     return []
+
+
+def _stiff_edges(model: Model) -> list[str]:
+    """A line for each type of beams on edges of solids, and of trusses that have a section.
+
+    Those without one are what gmsh writes for edges.
+    """
+    sets = model.flat.element_sets
+    sections = [card.parameters.get("ELSET", "") for _, card in model.said
+                if card.keyword == "SOLIDSECTION"]  # fmt: skip
+    stiff = {n for name in sections if name in sets for n in sets[name].get("", ())}
+    first = {
+        element.kind: element.place
+        for number, element in reversed(model.flat.elements.items())
+        if element.shape == "line" and (element.kind.startswith("B") or number in stiff)
+    }
+    return [
+        f"{place.short}: stiffness of {kind}, which names edges" for kind, place in first.items()
+    ]
 
 
 def _check_assembly(path: Path, model: Model) -> None:

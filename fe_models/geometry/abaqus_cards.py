@@ -8,17 +8,18 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import NamedTuple
 
+from fe_models.geometry.text_files import open_text
 from fe_models.mesh import MeshError
 
 
 class SourceLine(NamedTuple):
-    """A line of a file, for messages."""
+    """A line of a file, for messages; 0 of files without lines."""
 
     path: Path
     line: int
 
     def __str__(self) -> str:
-        return f"{self.path}:{self.line}"
+        return f"{self.path}{f':{self.line}' * (self.line > 0)}"
 
     @property
     def short(self) -> str:
@@ -95,7 +96,7 @@ def real(place: SourceLine, text: str) -> float:
 def _lines(path: Path, including: tuple[Path, ...]) -> Iterator[tuple[SourceLine, str]]:
     """Lines that are neither blank nor comments, those of included files in their place."""
     # Comments may be in any encoding.
-    with path.open(encoding="utf-8", errors="replace") as file:
+    with open_text(path) as file:
         for number, line in enumerate(file, start=1):
             text = line.strip()
             if not text or text.startswith("**"):

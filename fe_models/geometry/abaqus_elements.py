@@ -20,8 +20,9 @@ PLANES = {3: "triangle", 6: "triangle", 4: "quad", 8: "quad"}
 # Letters after the number (reduced integration, hybrid, modified, ...) do not change the mesh.
 SOLID_TYPE, PLANE_TYPE = re.compile(r"C3D(\d+)[HIMPRST]*"), re.compile(r"CP[ES](\d+)[HIMPRT]*")
 PLANE_STRESS = re.compile(r"CPS\d+.*")
-# What gmsh and meshio write for edges and facets: neither is a body.
+# What gmsh, meshio and FreeCAD write for edges and facets: neither is a body.
 FACET_TYPES = {
+    "B21": (2, "line"), "B22": (3, "line"), "B31": (2, "line"), "B32": (3, "line"),
     "T2D2": (2, "line"), "T2D3": (3, "line"), "T3D2": (2, "line"), "T3D3": (3, "line"),
     "R3D3": (3, "triangle"), "R3D4": (4, "quad"), "SFM3D3": (3, "triangle"), "SFM3D4": (4, "quad"),
 }  # fmt: skip

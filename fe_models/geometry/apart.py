@@ -12,9 +12,11 @@ import signal
 import subprocess
 import sys
 import threading
-from collections.abc import Callable
-from contextlib import suppress
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
+from typing import Any
 
 from fe_models.geometry.grouped import GroupedMesh
 from fe_models.interpreter import fresh_python
@@ -23,12 +25,39 @@ from fe_models.mesh import MeshError
 COMMAND = "from fe_models.geometry.apart import main; main()"
 # Exit code of a process that got signal 9, as the system sends it where memory runs out.
 KILLED = -9
+# Processor time of reading a shape [s], and of each megabyte of it: ten times what it takes.
+LONGEST_READ, LONGEST_READ_OF_A_MB = 20.0, 50.0
+# Letters of what a library says of a file that it cannot read.
+LONGEST = 160
 
 
-def read_apart(read: Callable[..., GroupedMesh], path: Path, *arguments: float) -> GroupedMesh:
-    """What ``read`` makes of a file and of the ``arguments`` behind it, in another process.
+@contextmanager
+def reading(path: Path) -> Iterator[None]:
+    """Turn whatever reading a file raises into a :class:`MeshError` of one line with its name.
 
-    Raises what it raises; :class:`MeshError` where the process dies of the file.
+    Damage ends in a dozen ways: numbers that are none, arrays that do not fit, names in no code.
+    """
+    try:
+        yield
+    except MeshError:
+        raise
+    except MemoryError as error:
+        raise MeshError(f"{path}: needs more memory than there is: damaged?") from error
+    except UnicodeDecodeError as error:
+        raise MeshError(
+            f"{path}: has names that are not in UTF-8: damaged? otherwise save it as UTF-8, or "
+            "export it again with names of plain letters"
+        ) from error
+    except Exception as error:
+        said = " ".join(str(error).split())[:LONGEST]
+        why = f"{type(error).__name__}{f': {said}' * bool(said)}"
+        raise MeshError(f"{path}: cannot be read ({why}): damaged? export it again") from error
+
+
+def read_apart(read: Callable[..., GroupedMesh], path: Path, *arguments: Any) -> GroupedMesh:
+    """Return what ``read`` makes of a file and of the ``arguments`` behind it, in another process.
+
+    Raises :class:`MeshError` where it raises anything, or the process dies of the file.
     """
     # Its stdin stays open as long as this process lives; what it says besides is no answer.
     with subprocess.Popen(
@@ -52,10 +81,33 @@ def read_apart(read: Callable[..., GroupedMesh], path: Path, *arguments: float) 
     if process.returncode or not answer:
         raise MeshError(f"{path}: {_ending(process.returncode)}")
     mesh = pickle.loads(answer)
-    if isinstance(mesh, Exception):
+    if isinstance(mesh, MeshError):
         raise mesh
     assert isinstance(mesh, GroupedMesh)
     return mesh
+
+
+@contextmanager
+def cpu_limited(path: Path) -> Iterator[None]:
+    """End the process where a file takes far more of its processor time than files of its size do.
+
+    Damage may send a library round in circles. Only POSIX systems have such a limit.
+    """
+    try:
+        import resource
+    except ImportError:
+        yield
+        return
+    soft, hard = resource.getrlimit(resource.RLIMIT_CPU)
+    limit = int(
+        time.process_time() + LONGEST_READ + LONGEST_READ_OF_A_MB * path.stat().st_size / 1e6
+    )
+    if soft == resource.RLIM_INFINITY or limit < soft:
+        resource.setrlimit(resource.RLIMIT_CPU, (limit, hard))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_CPU, (soft, hard))
 
 
 def _ending(code: int) -> str:
@@ -73,10 +125,11 @@ def main() -> None:
     os.dup2(2, 1)
     read, path, arguments = pickle.load(sys.stdin.buffer)
     threading.Thread(target=_end_with_parent, daemon=True).start()
-    mesh: GroupedMesh | Exception
+    mesh: GroupedMesh | MeshError
     try:
-        mesh = read(path, *arguments)
-    except Exception as error:
+        with reading(path):
+            mesh = read(path, *arguments)
+    except MeshError as error:
         mesh = error
     with answer:
         pickle.dump(mesh, answer, protocol=pickle.HIGHEST_PROTOCOL)

@@ -3,19 +3,25 @@
 from __future__ import annotations
 
 from collections import Counter
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from fe_models.geometry.apart import cpu_limited
 from fe_models.geometry.gmsh_file import EntityGroup, first_line, grouped_entities
 from fe_models.geometry.grouped import GroupedMesh
+from fe_models.geometry.length_unit import LengthUnit
+from fe_models.geometry.text_files import unmarked
 from fe_models.gmsh_session import gmsh_model
 from fe_models.mesh import MeshError
 
+# Its files state no unit.
+BREP = ".brep"
 # How files of each kind begin; without this OpenCASCADE writes its complaints to the terminal.
 BEGINNINGS = {
     ".step": (b"ISO-10303-21",),
     ".stp": (b"ISO-10303-21",),
-    ".brep": (b"DBRep_DrawableShape", b"CASCADE Topology"),
+    BREP: (b"DBRep_DrawableShape", b"CASCADE Topology"),
 }
 # The name that OpenCASCADE writes for a shape without one.
 NO_NAME = "Open CASCADE STEP translator"
@@ -23,10 +29,10 @@ NO_NAME = "Open CASCADE STEP translator"
 HEAD_BYTES = 200
 
 
-def read_cad(path: Path, size: float) -> GroupedMesh:
+def read_cad(path: Path, size: float, unit: LengthUnit | None = None) -> GroupedMesh:
     """Mesh the solids of a STEP or BREP file with tetrahedra of edge length ``size`` [mm].
 
-    A STEP file is converted to mm from the unit it states; BREP has no unit and is taken as mm. A
+    A STEP file is converted to mm from the unit it states; BREP has none and is in ``unit``. A
     solid goes by its name in the file (``solid_1``, ... without one; ``name_1``, ... if several
     have it). Its faces are ``solid_1.face_1``, ... in the order of the file, and go by their own
     names too where the file gives any. Solids that touch have their own nodes unless the file makes
@@ -34,16 +40,31 @@ def read_cad(path: Path, size: float) -> GroupedMesh:
     """
     if not size > 0.0:
         raise MeshError(f"{path}: the mesh size is {size:g} mm; allowed: more than 0")
-    with path.open("rb") as file:
+    stated = path.suffix.lower() != BREP
+    if stated and unit is not None:
+        raise MeshError(
+            f"{path}: STEP files state their unit, from which it is converted; allowed: no unit of "
+            "length, or one in the file"
+        )
+    unit = unit or LengthUnit(source="converted from the unit of the file" * stated)
+    with unmarked(path) as plain:
+        return _meshed(path, plain, size, unit)
+
+
+def _meshed(path: Path, plain: Path, size: float, unit: LengthUnit) -> GroupedMesh:
+    """The solids of a file, which is ``plain`` without a byte order mark."""
+    with plain.open("rb") as file:
         if not file.read(HEAD_BYTES).lstrip().startswith(BEGINNINGS[path.suffix.lower()]):
             raise MeshError(f"{path}: is no {path.suffix.lower()} file")
     with gmsh_model(path.stem) as gmsh:
         gmsh.option.setString("Geometry.OCCTargetUnit", "MM")
+        gmsh.option.setNumber("Geometry.OCCScaling", unit.size)
         # Both ends: by itself gmsh takes no more than a tenth of the model.
         gmsh.option.setNumber("Mesh.MeshSizeMin", size)
         gmsh.option.setNumber("Mesh.MeshSizeMax", size)
         try:
-            gmsh.model.occ.importShapes(str(path))
+            with cpu_limited(plain):
+                gmsh.model.occ.importShapes(str(plain))
             gmsh.model.occ.synchronize()
         except Exception as error:  # gmsh raises nothing more specific
             raise MeshError(f"{path}: gmsh cannot read it: {first_line(error)}") from None
@@ -58,7 +79,7 @@ def read_cad(path: Path, size: float) -> GroupedMesh:
                 f"{path}: gmsh cannot mesh it at size {size:g} mm: {first_line(error)}; take a "
                 "smaller size or repair the solids"
             ) from None
-        return grouped_entities(gmsh, groups)
+        return replace(grouped_entities(gmsh, groups), unit=unit)
 
 
 def _groups(model: Any) -> list[EntityGroup]:

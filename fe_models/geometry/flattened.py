@@ -192,11 +192,16 @@ def _loose(element: Element, where: str) -> MeshError:
 
 
 class FlatFile(Flattened):
-    """A file without parts."""
+    """A file without parts.
 
-    def __init__(self, scope: Scope) -> None:
+    Where it ``joins``, sets that divide a body between them name it together: in formats that have
+    no set of all of them. ``told`` are lines on that.
+    """
+
+    def __init__(self, scope: Scope, joins: bool = False) -> None:
         super().__init__([scope], scope)
-        self.top = dimension_of(scope)
+        self.top, self.joins = dimension_of(scope), joins
+        self.told: list[str] = []
 
     def bodies(self) -> dict[str, Blocks]:
         """Connected pieces, each by the name of its element set."""
@@ -279,6 +284,13 @@ class FlatFile(Flattened):
                 parts.setdefault(piece, {})[name] = members
         for piece, divided in parts.items():
             if piece not in names and len(set().union(*divided.values())) == size[piece]:
+                if self.joins:
+                    names[piece] = "+".join(divided)
+                    self.told.append(
+                        f"{self.common.place.path.name}: {', '.join(divided)} share nodes: one "
+                        f"body {names[piece]}, of one material"
+                    )
+                    continue
                 raise MeshError(
                     f"{self.common.place.path}: the element sets {', '.join(divided)} share nodes: "
                     "they are bonded, not in contact; name them by one set if they are one body, "

@@ -16,6 +16,7 @@ from fe_models.geometry.grouped import (
     nodes_of,
     split_blocks,
 )
+from fe_models.geometry.text_files import unmarked
 from fe_models.gmsh_session import gmsh_model
 from fe_models.mesh import MeshError
 from sa_solver.types import Array, Indices
@@ -43,13 +44,15 @@ def read_msh(path: Path) -> GroupedMesh:
     plane mesh surfaces and curves. A group without a name goes by its number, and in a file without
     physical groups every entity does. Raises :class:`MeshError`.
     """
-    with path.open("rb") as file:
-        # Anything else would be run as a script in gmsh's own language.
-        if not file.read(1) == b"$":
-            raise MeshError(f"{path}: is no gmsh mesh; allowed: .msh files of format 2.2 or 4.1")
-    with gmsh_model(path.stem) as gmsh:
+    with unmarked(path) as plain, gmsh_model(path.stem) as gmsh:
+        with plain.open("rb") as file:
+            # Anything else would be run as a script in gmsh's own language.
+            if file.read(1) != b"$":
+                raise MeshError(
+                    f"{path}: is no gmsh mesh; allowed: .msh files of format 2.2 or 4.1"
+                )
         try:
-            gmsh.merge(str(path))
+            gmsh.merge(str(plain))
         except Exception as error:  # gmsh raises nothing more specific
             raise MeshError(f"{path}: gmsh cannot read it: {first_line(error)}") from None
         try:

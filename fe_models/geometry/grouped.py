@@ -7,12 +7,13 @@ diagonals of the quadrilaterals between them, whatever they are split from.
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
 import numpy as np
 
 from fe_models.curved_face import Midsides
+from fe_models.geometry.length_unit import LengthUnit
 from fe_models.geometry.scene import Scene
 from fe_models.mesh import MeshError
 from sa_solver.types import Array, Indices
@@ -54,10 +55,11 @@ Blocks = list[tuple[str, Indices]]
 class GroupedMesh:
     """Nodes and named groups of a file; nothing of it is checked.
 
-    ``points`` ``(n, 3)`` [mm] and ``numbers`` ``(n,)``, the file's own node numbers; per name the
-    elements of a body, the facets of a surface and the rows of a node set. ``midsides`` are the
-    points in the middle of edges that elements of second order have, ``left`` lines of the file
-    that say more than a mesh and are not taken over, ``scene`` what a case could have of them.
+    ``points`` ``(n, 3)`` [mm], from a reader in ``unit``, which is the file's, and ``numbers``
+    ``(n,)``, the file's own node numbers; per name the elements of a body, the facets of a surface
+    and the rows of a node set. ``midsides`` are the points in the middle of edges that elements of
+    second order have, ``left`` lines of the file that say more than a mesh and are not taken over,
+    ``scene`` what a case could have of them.
     """
 
     points: Array
@@ -68,6 +70,17 @@ class GroupedMesh:
     midsides: Midsides | None = None
     left: tuple[str, ...] = ()
     scene: Scene = field(default_factory=Scene)
+    unit: LengthUnit = field(default_factory=LengthUnit)
+
+    def in_millimetres(self) -> GroupedMesh:
+        """Return a mesh with lengths in its ``unit`` in mm, and what it says in N, mm and t."""
+        size, midsides = self.unit.size, self.midsides
+        if size == 1.0:
+            return self
+        if midsides is not None:
+            midsides = replace(midsides, points=size * midsides.points)
+        scene = self.scene.converted(size, self.unit.force)
+        return replace(self, points=size * self.points, midsides=midsides, scene=scene)
 
 
 def midsides_of(points: Array, blocks: Iterable[tuple[str, Indices]]) -> Midsides | None:

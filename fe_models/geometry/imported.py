@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+import re
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 
@@ -10,15 +12,19 @@ import numpy as np
 
 from fe_models.curved_face import Midsides
 from fe_models.geometry.abaqus import read_abaqus
-from fe_models.geometry.apart import read_apart
-from fe_models.geometry.cad import BEGINNINGS, read_cad
+from fe_models.geometry.apart import read_apart, reading
+from fe_models.geometry.cad import read_cad
 from fe_models.geometry.checked import checked_body, vector
+from fe_models.geometry.endings import CAD, EXODUS, EXPORT, NASTRAN, why_not_read
+from fe_models.geometry.exodus import read_exodus
 from fe_models.geometry.gmsh_file import read_msh
 from fe_models.geometry.grouped import DIMENSION, Blocks, GroupedMesh, nodes_of, split_blocks
+from fe_models.geometry.length_unit import SIZES, LengthUnit
 from fe_models.geometry.meshio_file import read_meshio
 from fe_models.geometry.nastran import read_nastran
 from fe_models.geometry.scene import Scene
 from fe_models.geometry.set_faces import faces_of_sets
+from fe_models.geometry.text_files import open_text
 from fe_models.geometry.unv import read_unv
 from fe_models.mesh import Body, MeshError, in_space
 from fe_models.remesh import element_volumes
@@ -28,15 +34,10 @@ from sa_solver.types import Array, Indices
 PLANE = 1e-9
 # Closed surfaces have no mean normal: theirs is rounding, below this share of the area.
 CLOSED = 1e-9
-# Endings of Nastran's bulk data.
-NASTRAN = (".bdf", ".nas", ".fem")
-# Files of programs whose own formats nothing here reads.
-EXPORTABLE = {
-    ".cdb": "Ansys", ".db": "Ansys", ".mechdb": "Ansys", ".rst": "Ansys", ".odb": "Abaqus",
-    ".cae": "Abaqus", ".mph": "COMSOL", ".op2": "Nastran", ".hm": "HyperMesh", ".k": "LS-DYNA",
-    ".key": "LS-DYNA", ".prt": "NX", ".sldprt": "SolidWorks", ".sldasm": "SolidWorks",
-    ".catpart": "CATIA", ".catproduct": "CATIA", ".iges": "CAD", ".igs": "CAD",
-}  # fmt: skip
+# Lines by which a ``.dat`` is Nastran's.
+BULK_DATA = re.compile(r"\s*(GRID|BEGIN\s+BULK|CEND)\b", re.IGNORECASE)
+# Why lengths are in a unit that was asked for.
+GIVEN = "as given"
 
 
 @dataclass(frozen=True)
@@ -48,7 +49,8 @@ class ImportedMesh:
     in the middle of edges, of bodies for which the file has them, and ``middles`` the edges
     ``(k, 2)`` whose midside nodes are in each of these node sets; ``left`` lines of the file that
     say more than a mesh and are not taken over, ``scene`` what a case could have of them; ``axes``
-    are those of the file that the bodies have, all or the two of a plane.
+    are those of the file that the bodies have, all or the two of a plane; ``unit`` is that of
+    lengths in the file, which are in mm here.
 
     Examples
     --------
@@ -81,6 +83,7 @@ class ImportedMesh:
     left: tuple[str, ...] = ()
     scene: Scene = field(default_factory=Scene)
     axes: tuple[int, ...] = (0, 1, 2)
+    unit: LengthUnit = field(default_factory=LengthUnit)
 
     @cached_property
     def set_faces(self) -> dict[str, dict[str, Indices]]:
@@ -101,13 +104,15 @@ class Patch:
     normal: Array
 
 
-def read_bodies(path: Path, size: float | None = None) -> ImportedMesh:
+def read_bodies(path: Path, size: float | None = None, unit: str | None = None) -> ImportedMesh:
     """Read the bodies of a mesh file, or mesh those of a CAD file at ``size`` [mm].
 
     Reads gmsh's ``.msh`` (:func:`read_msh`), Abaqus ``.inp`` (:func:`read_abaqus`), Nastran's
-    ``.bdf`` and ``.nas`` (:func:`read_nastran`), ``.unv`` (:func:`read_unv`), ``.step``, ``.stp``
-    and ``.brep`` (:func:`read_cad`) and what meshio reads (:func:`read_meshio`); lengths are taken
-    as mm. Elements are straight between their corners, whatever nodes they have on
+    ``.bdf``, ``.dat`` and ``.nas`` (:func:`read_nastran`), ``.unv`` (:func:`read_unv`), Exodus
+    (:func:`read_exodus`), ``.step``, ``.stp`` and ``.brep`` (:func:`read_cad`) and what meshio
+    reads (:func:`read_meshio`). Lengths are in ``unit``, one of ``SIZES``; without it in the unit
+    that the file states, and in mm where it states none. Elements are straight between their
+    corners, whatever nodes they have on
     their edges: these tell the form of contact faces, and that of elements of second order
     (:func:`fe_models.second_order.with_midsides`). Quadrilaterals, pyramids, wedges and
     hexahedra are split into triangles or tetrahedra. A plane mesh keeps the
@@ -142,32 +147,52 @@ def read_bodies(path: Path, size: float | None = None) -> ImportedMesh:
     2 triangles, [3.] mm of side
     """
     path = Path(path)
-    grouped = _grouped(path, size)
-    try:
-        return _separated(grouped)
-    except MeshError as error:
-        raise MeshError(f"{path}: {error}") from None
+    with reading(path):
+        grouped = _grouped(path, size, unit)
+        try:
+            return _separated(grouped)
+        except MeshError as error:
+            raise MeshError(f"{path}: {error}") from None
 
 
-def _grouped(path: Path, size: float | None) -> GroupedMesh:
+def _grouped(path: Path, size: float | None, unit: str | None) -> GroupedMesh:
     suffix = path.suffix.lower()
+    given = LengthUnit() if unit is None else LengthUnit(unit, SIZES[unit], GIVEN)
     if not path.is_file():
         raise MeshError(f"{path}: {'not a file' if path.exists() else 'no such file'}")
-    if suffix in EXPORTABLE:
-        raise MeshError(
-            f"{path}: {EXPORTABLE[suffix]}'s {suffix} is not read; export it as .inp, .bdf, "
-            ".unv, .msh, .vtu or .step"
-        )
-    if suffix in BEGINNINGS:
+    if why := why_not_read(path.name):
+        raise MeshError(f"{path}: {why}")
+    if suffix in CAD:
         if size is None:
-            raise MeshError(f"{path}: a CAD file needs a mesh size [mm]")
-        return read_apart(read_cad, path, size)
+            raise MeshError(
+                f"{path}: a CAD file needs a mesh size, as it is meshed here: --size '2 mm' of "
+                "fretscale describe, mesh.size of a case"
+            )
+        return read_apart(read_cad, path, size, unit and given)
     if size is not None:
-        raise MeshError(f"{path}: is a mesh already; a mesh size is for {', '.join(BEGINNINGS)}")
+        raise MeshError(f"{path}: is a mesh already; a mesh size is for {', '.join(CAD)}")
     if suffix == ".msh":
-        return read_apart(read_msh, path)
-    reader = {".inp": read_abaqus, **dict.fromkeys(NASTRAN, read_nastran), ".unv": read_unv}
-    return reader.get(suffix, read_meshio)(path)
+        mesh = read_apart(read_msh, path)
+    else:
+        mesh = _READERS.get(suffix, read_meshio)(path)
+    return (mesh if unit is None else replace(mesh, unit=given)).in_millimetres()
+
+
+def _read_dat(path: Path) -> GroupedMesh:
+    """Read a ``.dat`` of Nastran; files of many other programs end so, too."""
+    with open_text(path) as file:
+        if any(BULK_DATA.match(line) for line in file):
+            return read_nastran(path)
+    raise MeshError(
+        f"{path}: has no bulk data of Nastran (GRID, CTETRA, ...); what Abaqus prints into a .dat, "
+        f"Ansys' input and Tecplot's files are not read: {EXPORT}"
+    )
+
+
+_READERS: dict[str, Callable[[Path], GroupedMesh]] = {
+    ".inp": read_abaqus, ".unv": read_unv, **dict.fromkeys(NASTRAN, read_nastran),
+    ".dat": _read_dat, **dict.fromkeys(EXODUS, read_exodus),
+}  # fmt: skip
 
 
 def describe_bodies(imported: ImportedMesh) -> list[str]:
@@ -193,9 +218,10 @@ def describe_bodies(imported: ImportedMesh) -> list[str]:
     ...     _ = file.write_text(text)
     ...     for line in describe_bodies(read_bodies(file)):
     ...         print(line)
-    body wedge: 4 nodes, 1 tetrahedra, volume 36 mm³
+    lengths taken as mm, the file says no unit
+    body wedge: 4 nodes, 1 tetrahedra, 6 x 6 x 6 mm, volume 36 mm³
     """
-    lines = []
+    lines = [f"lengths {imported.unit}"]
     for name, body in imported.bodies.items():
         volume = float(np.abs(element_volumes(body.mesh)).sum())
         solid = body.mesh.dim() == 3
@@ -203,6 +229,7 @@ def describe_bodies(imported: ImportedMesh) -> list[str]:
         measure, unit = ("area", "mm²") if solid else ("length", "mm")
         lines.append(
             f"body {name}: {body.mesh.nvertices} nodes, {body.mesh.nelements} {element}, "
+            f"{extent(body.mesh.p)}, "
             + (f"volume {volume:.6g} mm³" if solid else f"area {volume:.6g} mm²")
         )
         for boundary in body.mesh.boundaries or {}:
@@ -219,6 +246,11 @@ def describe_bodies(imported: ImportedMesh) -> list[str]:
                 f"  node set {points}: {len(vertices)} nodes{form}, centroid {vector(centre)} mm"
             )
     return lines + [f"not taken over: {line}" for line in imported.left]
+
+
+def extent(points: Array) -> str:
+    """Return the sides of a box round points ``(dim, n)`` [mm], as they are told."""
+    return f"{' x '.join(f'{side:.4g}' for side in np.ptp(points, axis=1))} mm"
 
 
 def patch(body: Body, boundary: str) -> Patch:
@@ -281,6 +313,7 @@ def _separated(grouped: GroupedMesh) -> ImportedMesh:
         left=grouped.left,
         scene=grouped.scene,
         axes=tuple(axes.tolist()),
+        unit=grouped.unit,
     )
 
 

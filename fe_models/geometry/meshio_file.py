@@ -19,6 +19,7 @@ from fe_models.geometry.grouped import (
     midsides_of,
     piece_blocks,
 )
+from fe_models.geometry.text_files import unmarked
 from fe_models.mesh import MeshError
 from sa_solver.types import Indices
 
@@ -80,8 +81,8 @@ def _read(path: Path) -> Any:
         meshio._mesh.topological_dimension.setdefault(kind, 3)
     output = io.StringIO()
     try:
-        with redirect_stdout(output), redirect_stderr(output):
-            mesh = meshio.read(path)
+        with redirect_stdout(output), redirect_stderr(output), unmarked(path) as plain:
+            mesh = meshio.read(plain)
     # Its readers let anything through, and its dispatch ends the process.
     except (Exception, SystemExit) as error:
         reason = output.getvalue() if isinstance(error, SystemExit) else str(error)

@@ -41,21 +41,23 @@ def read_nastran(path: Path) -> GroupedMesh:
     """Read the mesh of a Nastran bulk data file.
 
     Each connected piece of solids is a body by the name or number of the property of just its
-    elements, or else ``body_1``, ...; shells that lie on solids are boundaries by their property,
-    and have no stiffness. ``PLOAD4``, ``BSURFS`` and ``BSURF`` name boundaries ``pload4_1``,
-    ``bsurfs_1``, ...; ``SPC1``, ``SPC`` and ``FORCE`` node sets ``spc_1_xyz``, ``force_1``, ....
+    elements, of several with a plus between them, or else ``body_1``, ...; shells that lie on
+    solids are boundaries by their property, and have no stiffness. ``PLOAD4``, ``BSURFS`` and
+    ``BSURF`` name boundaries ``pload4_1``, ``bsurfs_1``, ...; ``SPC1``, ``SPC`` and ``FORCE`` node
+    sets ``spc_1_xyz``, ``force_1``, ....
 
     Raises :class:`MeshError` with file and line.
     """
     read = _Read(path, bulk_data(path))
     if not read.scope.elements:
         raise MeshError(f"{path}: has no elements that are read: {', '.join(SOLIDS)}")
-    mesh = FlatFile(read.scope).mesh()
-    scene = scene_of(read.entries, mesh, read.left)
+    flat = FlatFile(read.scope, joins=True)
+    mesh = flat.mesh()
+    scene, caveats = scene_of(read.entries, mesh, read.left), (*read.caveats, *flat.told)
     return replace(
         mesh,
-        left=(*map(told, read.left), *read.caveats),
-        scene=replace(scene, ignored=(*scene.ignored, *read.caveats)),
+        left=(*map(told, read.left), *caveats),
+        scene=replace(scene, ignored=(*scene.ignored, *caveats)),
     )
 
 

@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from fe_models.geometry.abaqus_cards import SourceLine
+from fe_models.geometry.text_files import open_text
 from fe_models.mesh import MeshError
 
 SMALL, LARGE = 8, 16
@@ -87,7 +88,7 @@ def bulk_data(path: Path) -> BulkData:
 
 def _lines(path: Path, including: tuple[Path, ...]) -> Iterator[tuple[SourceLine, str]]:
     """Lines that are not blank, with spaces for tabs; those of included files in their place."""
-    with path.open(encoding="utf-8", errors="replace") as file:
+    with open_text(path) as file:
         for number, line in enumerate(file, start=1):
             text, place = line.expandtabs(SMALL).rstrip(), SourceLine(path, number)
             if not text:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from sa_solver.errors import InputError
 
@@ -59,6 +59,34 @@ class Scene:
     loads: tuple[SaidLoad, ...] = ()
     steps: int = 0
     ignored: tuple[str, ...] = ()
+
+    def converted(self, length: float, force: float) -> Scene:
+        """Return it in N, mm and t, where it is in units of that ``length`` [mm] and ``force`` [N].
+
+        Times are in s.
+        """
+        stress = force / length**2
+        of_materials = {"young": stress, "density": force / length**4}
+        of_loads = {
+            "pressure": stress, "traction": stress, "force": force, "displacement": length,
+            "acceleration": length,
+        }  # fmt: skip
+        materials = {
+            body: {name: of_materials.get(name, 1.0) * value for name, value in known.items()}
+            for body, known in self.materials.items()
+        }
+        loads = []
+        for load in self.loads:
+            factor = of_loads.get(load.kind, 1.0)
+            value = load.value
+            scaled = factor * value if isinstance(value, float) else _times(factor, value)
+            loads.append(replace(load, value=scaled, through=_times(length, load.through)))
+        return replace(self, materials=materials, loads=tuple(loads))
+
+
+def _times(factor: float, vector: Vector) -> Vector:
+    x, y, z = vector
+    return factor * x, factor * y, factor * z
 
 
 class NotTakenError(InputError):

@@ -6,6 +6,7 @@ Datasets by their numbers: 2411 (781) nodes, 2412 elements, 2435, 2452, 2467 and
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -15,8 +16,10 @@ import numpy as np
 from fe_models.geometry.abaqus_cards import SourceLine, integer, real
 from fe_models.geometry.flattened import FlatFile
 from fe_models.geometry.grouped import CORNERS, DIMENSION, GroupedMesh
+from fe_models.geometry.length_unit import SIZES, LengthUnit
 from fe_models.geometry.scene import Scene
 from fe_models.geometry.scope import Element, Scope, extend
+from fe_models.geometry.text_files import open_text
 from fe_models.mesh import MeshError
 
 DELIMITER = "-1"
@@ -25,8 +28,13 @@ HEADER, UNITS, SYSTEMS = "151", "164", "2420"
 OLD = {"15": NODES[1], "780": ELEMENTS[0]}
 # What other datasets hold that a case says.
 SAID = {"757": "boundary conditions", "790": "loads", "791": "supports", "1710": "materials"}
-# Codes of systems of units whose length is the millimetre.
-MILLIMETRES = ("5", "8", "10")
+# Units of length of systems of units by their codes; of others the factor says it.
+LENGTHS = {
+    "1": "m", "2": "ft", "3": "m", "4": "ft", "5": "mm", "6": "cm", "7": "in", "8": "mm",
+    "10": "mm",
+}  # fmt: skip
+# Factors are rounded: a length is a unit to this share.
+ROUNDED = 1e-3
 # Shape of finite elements by their number, and where their corners are among their nodes: those of
 # second order go round their faces, midsides between corners.
 TET, WEDGE, HEX = (0, 2, 4, 9), (0, 2, 4, 9, 11, 13), (0, 2, 4, 6, 12, 14, 16, 18)
@@ -73,7 +81,7 @@ def read_unv(path: Path) -> GroupedMesh:
     and of nodes node sets. Raises :class:`MeshError` with file and line.
     """
     scope, left = Scope("", SourceLine(path, 1)), []
-    groups = []
+    groups, unit = [], LengthUnit()
     for dataset in _datasets(path):
         if dataset.number in NODES:
             _nodes(scope, dataset)
@@ -83,11 +91,8 @@ def read_unv(path: Path) -> GroupedMesh:
             groups.append(dataset)
         elif dataset.number == SYSTEMS:
             _refuse_other_systems(dataset)
-        elif dataset.number in OLD:
-            raise MeshError(
-                f"{dataset.place}: dataset {dataset.number} is of an old form; export it as "
-                f"{OLD[dataset.number]}"
-            )
+        elif dataset.number == UNITS:
+            unit = _unit(dataset)
         elif line := _left(dataset):
             left.append(line)
     if not scope.elements:
@@ -95,13 +100,13 @@ def read_unv(path: Path) -> GroupedMesh:
     for dataset in groups:
         _groups(scope, dataset)
     told = (*left, *_plane_kinds(scope))
-    return replace(FlatFile(scope).mesh(), left=told, scene=Scene(ignored=told))
+    return replace(FlatFile(scope).mesh(), left=told, scene=Scene(ignored=told), unit=unit)
 
 
 def _datasets(path: Path) -> Iterator[Dataset]:
     """Datasets between lines of -1."""
     inside: list[tuple[SourceLine, str]] | None = None
-    with path.open(encoding="utf-8", errors="replace") as file:
+    with open_text(path) as file:
         for number, line in enumerate(file, start=1):
             place, text = SourceLine(path, number), line.rstrip()
             if text.strip() == DELIMITER:
@@ -188,10 +193,14 @@ def _advice(kind: int) -> str:
 
 
 def _groups(scope: Scope, dataset: Dataset) -> None:
-    """Groups with their members, two to a line; a name may come once only."""
+    """Groups with their members, two to a line; a name may come once only.
+
+    Salome leaves a blank line for the members of a group that has none.
+    """
     rows = iter(dataset.lines)
     for place, text in rows:
-        fields = _fields(place, text)
+        if not (fields := text.split()):
+            continue
         count = integer(place, fields[-1])
         _, name = next(rows, (place, ""))
         name = name.strip() or f"group_{fields[0]}"
@@ -233,15 +242,38 @@ def _refuse_other_systems(dataset: Dataset) -> None:
             )
 
 
+def _unit(dataset: Dataset) -> LengthUnit:
+    """The unit of lengths: metres are lengths over the factor of the dataset's second line.
+
+    Where there is none, the code of the system of units says it.
+    """
+    # A code of ten columns, and its name right behind it.
+    match = re.match(r"\s*(\d+)", dataset.lines[0][1]) if dataset.lines else None
+    code, factor = match[1] if match else "", 0.0
+    if len(dataset.lines) > 1 and (factors := dataset.lines[1][1].split()):
+        factor = real(dataset.lines[1][0], factors[0])
+    source = f"as {dataset.place.short} says"
+    if not factor > 0.0:
+        name = LENGTHS.get(code, "mm")
+        return LengthUnit(name, SIZES[name], source if code in LENGTHS else "")
+    size = SIZES["m"] / factor
+    near = [name for name, known in SIZES.items() if abs(size / known - 1.0) < ROUNDED]
+    return LengthUnit(*((near[0], SIZES[near[0]]) if near else (f"{size:g} mm", size)), source)
+
+
 def _left(dataset: Dataset) -> str:
-    """What a dataset says that is not read, in a line; empty if it says nothing."""
+    """What a dataset says that is not read, in a line; empty if it says nothing.
+
+    Raises :class:`MeshError` if it is one of an old form, which would be the mesh.
+    """
     place = dataset.place.short
+    if dataset.number in OLD:
+        raise MeshError(
+            f"{dataset.place}: dataset {dataset.number} is of an old form; export it as "
+            f"{OLD[dataset.number]}"
+        )
     if dataset.number == HEADER:
         return ""
-    if dataset.number == UNITS:
-        code, *rest = (dataset.lines[0][1] if dataset.lines else "").split() or [""]
-        told = " ".join(rest[:-1]) or f"code {code}"
-        return "" if code in MILLIMETRES else f"{place}: units, {told}: lengths are taken as mm"
     return f"{place}: dataset {dataset.number}, {SAID.get(dataset.number, 'not read')}"
 
 

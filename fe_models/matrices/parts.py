@@ -98,8 +98,12 @@ def read_matrix_file(path: Path) -> MatrixFile:
 
 def found(
     sources: Mapping[str, tuple[Path, str]], file: Path | None
-) -> tuple[dict[str, Part], tuple[str, ...]]:
-    """The matrices by their parts, and the names of those that are none."""
+) -> tuple[dict[str, Part], tuple[str, ...], dict[str, tuple[str, ...]]]:
+    """The matrices by their parts, the names of those that are none, and what these could be.
+
+    The last are, for damping and loads that are missing, matrices of the right shape, each as a
+    case names it.
+    """
     files: dict[Path, MatrixFile] = {}
     parts = {}
     for part in PARTS:
@@ -119,12 +123,35 @@ def found(
             parts[part] = _checked(Part(part, files[path], chosen, values))
     used = {(id(part.file), part.name) for part in parts.values()}
     left = [
-        name
+        (each, name)
         for each in files.values()
         for name in each.matrices
         if name and name not in DESCRIBING and (id(each), name) not in used
     ]
-    return parts, tuple(left)
+    return parts, tuple(name for _, name in left), _offered(parts, left)
+
+
+def _offered(
+    parts: Mapping[str, Part], left: Sequence[tuple[MatrixFile, str]]
+) -> dict[str, tuple[str, ...]]:
+    """Of what is left, matrices that a missing damping or load could be, by their shapes."""
+    size = parts[STIFFNESS].values.shape[0]
+    offered: dict[str, tuple[str, ...]] = {}
+    for file, name in left if {DAMPING, LOADS} - set(parts) else ():
+        try:
+            values = file.matrices[name]()
+        except Exception:  # nothing depends on it
+            continue
+        shape = values.shape if min(values.shape, default=0) > 1 else (values.size, 1)
+        part = DAMPING if shape == (size, size) else LOADS
+        if (
+            values.dtype.kind in "iuf"
+            and len(shape) == 2
+            and shape[0] == size
+            and part not in parts
+        ):
+            offered[part] = (*offered.get(part, ()), f"{file.path.name}:{name}")
+    return offered
 
 
 def _chosen(file: MatrixFile, part: str, name: str, own: bool) -> str | None:

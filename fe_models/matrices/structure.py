@@ -10,7 +10,7 @@ the length times the root of the mass, so that modal masses of 1 stay 1.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -67,7 +67,8 @@ class OwnMatrices:
     ``loads`` ``(n, cases)`` are the forces of a load of 1 N; ``unknowns`` ``(n,)`` say what the
     rows are, ``places`` ``(n, 3)`` where their points are [mm], if known. ``held`` are those that a
     file holds and that are none of these, ``taken`` the matrices by the parts they are taken for,
-    ``left`` those of the files that nothing is made of.
+    ``left`` those of the files that nothing is made of, ``offered`` which of these a missing
+    damping or load could be, as ``plant.mat:D``.
 
     Examples
     --------
@@ -91,6 +92,7 @@ class OwnMatrices:
     held: tuple[Unknown, ...] = ()
     taken: Mapping[str, str] | None = None
     left: tuple[str, ...] = ()
+    offered: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
     def moved_mass(self) -> dict[str, float]:
         """Mass [t] along x, y and z of what moves as one with all points: of a free body, all."""
@@ -153,7 +155,7 @@ def own_matrices(
     [[ 2000. -1000.]
      [-1000.  1000.]] {'x': 0.003} {'stiffness': 'K', 'mass': 'M'}
     """
-    parts, left = found(sources, file)
+    parts, left, offered = found(sources, file)
     unknowns, places = _unknowns(parts, given or GivenUnknowns())
     held = {unknown for part in parts.values() for unknown in part.file.held}
     size = len(unknowns)
@@ -183,6 +185,7 @@ def own_matrices(
             tuple(sorted(held)),
             {name: part.name for name, part in parts.items()},
             left,
+            offered,
         ),
         given,
     )

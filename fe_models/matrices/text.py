@@ -18,6 +18,7 @@ import scipy.io
 import scipy.sparse as sp
 
 from fe_models.geometry.abaqus_cards import SourceLine
+from fe_models.geometry.text_files import open_text
 from fe_models.matrices.unknowns import (
     MatrixError,
     MatrixFile,
@@ -46,7 +47,7 @@ def read_mtx(path: Path) -> MatrixFile:
 
     Raises :class:`MatrixError` with file and line.
     """
-    with path.open(encoding="utf-8", errors="replace") as file:
+    with open_text(path) as file:
         first = file.readline()
         if first.startswith(MATRIX_MARKET):
             return MatrixFile(path, {"": lambda: _matrix_market(path)})

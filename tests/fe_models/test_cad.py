@@ -68,7 +68,18 @@ def test_boxes_that_touch_have_their_own_nodes(write, name):
     np.testing.assert_allclose(patch(lower, shared[0][0]).normal, [0, 0, 1], atol=1e-12)
     np.testing.assert_allclose(patch(upper, shared[0][1]).normal, [0, 0, -1], atol=1e-12)
     assert not set(imported.node_numbers["solid_1"]) & set(imported.node_numbers["solid_2"])
-    assert len(describe_bodies(imported)) == 14
+    assert len(describe_bodies(imported)) == 1 + 14
+
+
+def test_a_brep_is_in_the_unit_that_is_given(write):
+    """Boxes of 2 x 1 x 1 and 2 x 1 x 0.5 cm, by elements of 5 mm; a STEP file says its unit."""
+    path = write("boxes.brep", draw_two_boxes)
+    lower, upper = read_bodies(path, 5.0, "cm").bodies.values()
+    assert [volume(lower), volume(upper)] == pytest.approx([2000.0, 1000.0], rel=1e-12)
+    edges = np.linalg.norm(np.diff(lower.mesh.p[:, lower.mesh.edges], axis=1)[:, 0], axis=0)
+    assert np.median(edges) == pytest.approx(5.0, rel=0.4)
+    with pytest.raises(MeshError, match="STEP files state their unit, from which it is converted"):
+        read_bodies(write("boxes.step", draw_two_boxes), 5.0, "cm")
 
 
 def test_volume_of_a_cylinder_converges(write):

@@ -276,15 +276,17 @@ def salome(groups=True):
 
 
 def test_universal_file_of_salome(tmp_path):
+    """In the metres that it states."""
     mesh = read(tmp_path, "blocks.unv", salome())
     assert list(mesh.bodies) == ["lower", "upper"]
-    for body, name, height, normal in (("lower", "top", 1.0, 1.0), ("upper", "foot", 2.0, -1.0)):
+    for body, name, height, normal in (("lower", "top", 1e3, 1.0), ("upper", "foot", 2e3, -1.0)):
         surface = patch(mesh.bodies[body], name)
-        np.testing.assert_allclose(surface.centroid, [0.5, 0.5, height], atol=1e-12)
+        np.testing.assert_allclose(surface.centroid, [500, 500, height], atol=1e-9)
         np.testing.assert_allclose(surface.normal, [0, 0, normal], atol=1e-12)
     assert numbers_of(mesh, "lower", "edge") == [1, 2]
     assert numbers_of(mesh, "upper", "corners") == [13, 15, 16]
-    assert mesh.left == ("blocks.unv:2: units, SI: Meter (newton): lengths are taken as mm",)
+    assert mesh.left == ()
+    assert str(mesh.unit) == "in m, as blocks.unv:2 says, converted to mm"
 
 
 def test_universal_file_without_groups(tmp_path):
@@ -292,7 +294,7 @@ def test_universal_file_without_groups(tmp_path):
     mesh = read(tmp_path, "blocks.unv", salome(groups=False) + loads)
     assert list(mesh.bodies) == ["body_1", "body_2"]
     line = salome(groups=False).count("\n") + 2
-    assert mesh.left[1] == f"blocks.unv:{line}: dataset 790, loads"
+    assert mesh.left == (f"blocks.unv:{line}: dataset 790, loads",)
 
 
 @pytest.mark.parametrize(

@@ -4,12 +4,14 @@ import random
 
 import pytest
 
+from fe_models.geometry.apart import read_apart
 from fe_models.geometry.imported import read_bodies
 from fe_models.mesh import MeshError
 from tests.fe_models.test_abaqus import ASSEMBLY, PARTS
 from tests.fe_models.test_cae_files import DECK, salome
+from tests.fe_models.test_mesh_corpus import MSH, variables, write_exodus
 
-DAMAGED = 120
+DAMAGED, FLIPPED = 120, 40
 
 
 def damaged(text, chance):
@@ -43,3 +45,49 @@ def test_damaged_files_end_in_one_line(tmp_path, suffix, text):
             refusals.append(str(error))
     assert all(line.startswith(str(path)) and "\n" not in line for line in refusals)
     assert 0.2 * DAMAGED < len(refusals) < DAMAGED
+
+
+@pytest.mark.parametrize("classic", [True, False], ids=["netCDF-3", "netCDF-4"])
+def test_flipped_bits_of_exodus_end_in_one_line(tmp_path, classic):
+    chance = random.Random(7)
+    whole, path, refusals = tmp_path / "whole.e", tmp_path / "damaged.e", []
+    write_exodus(whole, variables(), classic)
+    for _ in range(FLIPPED):
+        letters = bytearray(whole.read_bytes())
+        letters[chance.randrange(len(letters))] ^= 1 << chance.randrange(8)
+        path.write_bytes(letters[: chance.choice([None, chance.randrange(len(letters))])])
+        try:
+            read_bodies(path)
+        except MeshError as error:
+            refusals.append(str(error))
+    assert all(line.startswith(str(path)) and "\n" not in line for line in refusals)
+    assert 0.2 * FLIPPED < len(refusals) < FLIPPED
+
+
+def test_a_name_in_no_code_is_one_line(tmp_path):
+    """Of gmsh's file, which another process reads: a bit flipped in the name of a group."""
+    path = tmp_path / "damaged.msh"
+    path.write_bytes(MSH.replace("base", "b#se").encode().replace(b"#", b"\xe1"))
+    with pytest.raises(MeshError, match="has names that are not in UTF-8: damaged") as error:
+        read_bodies(path)
+    assert str(error.value).startswith(f"{path}: ")
+    assert "\n" not in str(error.value)
+
+
+def test_whatever_a_reader_raises_is_one_line(tmp_path):
+    """Also what no process could hand on, since it cannot be made again of its own arguments."""
+    path = tmp_path / "a.msh"
+    with pytest.raises(
+        MeshError, match=r"a\.msh: cannot be read \(OddError: 7\): damaged"
+    ) as error:
+        read_apart(raise_oddly, path)
+    assert "\n" not in str(error.value)
+
+
+class OddError(Exception):
+    def __init__(self, number, _):
+        super().__init__(number)
+
+
+def raise_oddly(_):
+    raise OddError(7, "two\nlines")

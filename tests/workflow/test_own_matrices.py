@@ -5,6 +5,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
+import scipy.io
 import scipy.sparse as sp
 
 from tests.conftest import CASES
@@ -13,6 +14,7 @@ from tests.workflow.test_reduced_rig import TWO_MASSES
 from tests.workflow.time_scenes import MASS, STIFF, refused, run
 from workflow.analyses.rig import matrix_body
 from workflow.analyses.rig.building import rig_model
+from workflow.case.doubts import doubts_of
 from workflow.case.writing import dump_case
 from workflow.errors import CaseError, UserError
 from workflow.kinds import load_case, parse_case
@@ -307,6 +309,22 @@ def test_units_that_are_hardly_meant_are_doubted(two):
 )  # fmt: skip
 def test_wrong_entries_are_refused(two, override, words):
     assert words.format(folder=two) in told(two, override)
+
+
+def test_matrices_by_other_names_are_offered(two):
+    """A damping D, which would be none without a word, and loads where they are asked for."""
+    given = {"K": STIFF, "M": MASS, "D": 1e-4 * STIFF, "B": np.eye(2)[:, :1], "shapes": np.eye(3)}
+    scipy.io.savemat(two / "plant.mat", {**given, "title": "two masses"})
+    file = "structure.matrices.file=plant.mat"
+    (doubt,) = doubts_of(parse_case(OWN, str(two / "case.yaml"), [file]))
+    assert doubt.startswith("structure.matrices.damping: none by a usual name; plant.mat:D could")
+    line = told(two, file, "structure.driven={load: 1}")
+    assert "no loads by a usual name, or matrices.loads: plant.mat:B" in line
+    taken = [file, "structure.matrices.damping=plant.mat:D", "structure.matrices.loads=plant.mat:B"]
+    assert not list(doubts_of(parse_case(OWN, str(two / "case.yaml"), taken)))
+    difference = rig_of(two, *taken).model.damping - rig_of(two, file).model.damping
+    np.testing.assert_allclose(difference, 1e-4 * STIFF, rtol=1e-9)
+    np.testing.assert_array_equal(rig_of(two, *taken, "structure.driven={load: 1}").driven, [1, 0])
 
 
 @pytest.mark.parametrize(

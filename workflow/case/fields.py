@@ -24,6 +24,7 @@ from workflow.case import units
 OF_SEVERAL = r"(.*\.(?:h5|hdf5|npz|mat|op4|pch|bdf)):(.*)"
 DOTTED = r"[\w-]+(\.[\w-]+)*"
 NO_CONTEXT: Mapping[str, Any] = {}
+NOT_OF_KIND = "not a file of this kind"
 Auto = Literal["auto"]  # of an entry that is chosen before the run
 AUTO: Auto = "auto"
 LONGEST_SHOWN = 60  # of a wrong value in a message, which must stay one readable line
@@ -389,12 +390,16 @@ class File(Entry):
     def allowed(self) -> str:
         return f"a file {', '.join(self.endings)}, as seen from the folder of the case"
 
+    def wrong_name(self, name: str) -> str:
+        """Why a file of this name is not taken; empty if it is."""
+        return "" if name.endswith(self.endings) else NOT_OF_KIND
+
     def parse(self, value: object, context: Mapping[str, Any] = NO_CONTEXT) -> str:
         if not isinstance(value, str):
             raise self.refusal(value, "not a file name")
         name, dataset = split_dataset(value)
-        if not value.isprintable() or not name.endswith(self.endings):
-            raise self.refusal(value, "not a file of this kind")
+        if wrong := self.wrong_name(name) if value.isprintable() else NOT_OF_KIND:
+            raise self.refusal(value, wrong)
         folder = context.get("folder", "")
         path = os.path.abspath(os.path.join(folder, name))  # noqa: PTH100, PTH118
         if wrong := unreadable(Pathname(path)):

@@ -8,6 +8,7 @@ from pathlib import Path
 from pydantic import TypeAdapter, ValidationError
 
 from fe_models.geometry.imported import ImportedMesh, read_bodies
+from fe_models.geometry.length_unit import SIZES
 from fe_models.mesh import MeshError
 from workflow.case.sections import Length
 from workflow.errors import UserError
@@ -18,10 +19,15 @@ from workflow.shell.store import replacing
 FIGURE, PARAVIEW = "assembly.png", "assembly.vtu"
 
 
-def read_file(file: Path, size: str | None) -> ImportedMesh:
-    """The bodies of a mesh or CAD file; ``size`` with its unit. Raises UserError."""
+def read_file(file: Path, size: str | None, unit: str | None) -> ImportedMesh:
+    """Bodies of a mesh or CAD file; ``size`` with its unit, ``unit`` of lengths in the file.
+
+    Raises UserError.
+    """
+    if unit is not None and unit not in SIZES:
+        raise UserError(f"--unit: {unit!r}; allowed: {', '.join(SIZES)}")
     try:
-        return read_bodies(file, None if size is None else _length(size))
+        return read_bodies(file, None if size is None else _length(size), unit)
     except MeshError as error:
         raise UserError(str(error)) from error
 

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from fe_models.geometry.imported import ImportedMesh, Patch, patch
+from fe_models.geometry.imported import GIVEN, ImportedMesh, Patch, patch
 from fe_models.geometry.scene import SaidContact, SaidLoad, SaidSupport, Vector
 from fe_models.mesh import Body
 from sa_solver.types import Array
@@ -44,6 +44,8 @@ class _Offered:
     def __init__(self, imported: ImportedMesh, file: str, size: str | None) -> None:
         self.imported, self.file, self.size = imported, file, size
         self.scene = imported.scene
+        # A unit that the file states is not one of the case.
+        self.given = imported.unit.source == GIVEN
         self.ignored = list(self.scene.ignored)
         self.plane = len(imported.axes) == 2
         self.loads = [load for load in map(self._placed, self.scene.loads) if load is not None]
@@ -63,11 +65,13 @@ class _Offered:
         lines = [
             f"# What {Path(self.file).name} says, by `fretscale describe`: look at every entry,",
             f"# and give what says {TO_FILL!r}. `fretscale check` tells what is wrong or missing.",
+            f"# Lengths of the file are {self.imported.unit}, {self._forces}",
             f"title: {_text('Bodies of ' + Path(self.file).name)}",
             "analysis: wear",
             "structure:",
             "  kind: mesh",
             f"  file: {_text(self.file)}",
+            *([f"  length_unit: {self.imported.unit.name}"] if self.given else []),
             *self._bodies(),
             "  contacts:",
             *self._contacts(),
@@ -279,12 +283,19 @@ class _Offered:
         if known.get("young", 0.0) > STIFFEST:
             self.ignored.append(
                 f"material of {name}: Young's modulus of {known['young']:g} MPa: is the file in "
-                "other units? lengths are taken as mm, forces as N"
+                f"other units? lengths are {self.imported.unit}; describe takes another --unit"
             )
         values = {"young": TO_FILL, "poisson": TO_FILL}
         values |= {key: _number(value) for key, value in known.items()}
         told = ", ".join(f"{key}: {value}" for key, value in values.items())
         yield f"  {entry}: {{{told}}}"
+
+    @property
+    def _forces(self) -> str:
+        """What forces of the file are taken as, and all that follows from these."""
+        unit = self.imported.unit
+        force = "N" if unit.force == 1.0 else "pounds"
+        return f"forces in {force}, stresses in {force} on a square {unit.name}."
 
     @property
     def _coefficient(self) -> float | None:

@@ -260,7 +260,10 @@ class MatrixBody(JointedBody, Matrices):
         self._check_points()
         count = matrices.loads.shape[1]
         if isinstance(self.driven, LoadCase) and self.driven.load > count:
-            allowed = f"1 to {count}" if count else "points, as there are no loads"
+            none = "points, as there are no loads by a usual name"
+            for name in matrices.offered.get("loads", ()):
+                none += f", or matrices.loads: {name}"
+            allowed = f"1 to {count}" if count else none
             raise disagreement(f"{self.driven.load}: no such load; allowed: {allowed}", "driven")
         if self.small:
             with refusing(self):
@@ -441,6 +444,11 @@ class MatrixBody(JointedBody, Matrices):
             yield (
                 f"structure.retained: none, so that all {count} unknowns are kept; usual: some "
                 f"points, and modes, for more than {MANY}"
+            )
+        if names := matrices.offered.get("damping"):
+            yield (
+                f"structure.matrices.damping: none by a usual name; {' and '.join(names)} could be "
+                f"it: damping: {names[0]}"
             )
         for axis, mass in matrices.moved_mass().items():
             if mass and not LIGHTEST <= mass <= HEAVIEST:

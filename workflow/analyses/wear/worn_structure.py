@@ -300,7 +300,9 @@ def worn_structure(
     with reporter.stage("re-meshing"):
         mesh = worn()
         written = _formed({"unworn": stage.mesh, "worn": mesh}, reporter)
-        with replacing(folder.reserve("worn.msh", "the mesh with the worn faces")) as unfinished:
+        with replacing(
+            folder.reserve("worn.msh", "the mesh with the worn faces, in mm")
+        ) as unfinished:
             write_msh(unfinished, written["worn"])
     with reporter.stage("stress", "steps") as told:
         done = Tally(told, 2 * steps(len(mesh.bodies)))

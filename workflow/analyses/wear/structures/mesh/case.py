@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import model_validator
 
+from fe_models.geometry.endings import CAD
 from fe_models.mesh import MeshError, StructureMesh
 from sa_solver.types import Grid
 from workflow.analyses.wear.case.base import (
@@ -50,29 +51,27 @@ from workflow.analyses.wear.structures.mesh.loads import (
     Load,
     RotationLoad,
 )
+from workflow.analyses.wear.structures.mesh.mesh_file import (
+    LengthName,
+    MeshFile,
+    lengths_outline,
+    size_doubts,
+)
 from workflow.analyses.wear.structures.mesh.pretension import check_bolts
 from workflow.analyses.wear.structures.mesh.temperatures import check_temperatures
 from workflow.case.changing import changed
-from workflow.case.fields import AUTO, File
+from workflow.case.fields import AUTO
 from workflow.case.plain import counted, listed, told_of_body
 from workflow.case.sections import Length, Section, Title, disagreement, entry
 
 if TYPE_CHECKING:
     from fe_models.geometry.imported import ImportedMesh
 
-# Files that hold shapes and no mesh.
-CAD = (".step", ".stp", ".brep")
-# What the readers take; other endings are refused with advice.
-ENDINGS = (
-    ".msh", ".inp", ".step", ".stp", ".brep", ".vtu", ".vtk", ".xdmf", ".med", ".bdf", ".mesh",
-    ".nas", ".fem", ".unv", ".cdb", ".odb", ".cae", ".db", ".igs", ".iges",
-)  # fmt: skip
-
 Stamp = tuple[int, int]
 
 
 class ImportedStructure(Section):
-    """Two bodies from a file; lengths in mm.
+    """Two bodies from a file.
 
     Tetrahedra and hexahedra, or triangles and quadrilaterals in plane strain: coordinates of a
     plane mesh are called X and Z.
@@ -84,8 +83,13 @@ class ImportedStructure(Section):
     }
 
     kind: Literal["mesh"] = entry("what the structure is", "mesh")
-    file: Annotated[str, File(ENDINGS)] = entry(
+    file: Annotated[str, MeshFile()] = entry(
         "mesh (.msh, .inp, .vtu, ...) or CAD (.step, .brep)", "joint.msh"
+    )
+    length_unit: LengthName | None = entry(
+        "of the file: mm, um, cm, m, in or ft; without it the one that the file states, or mm",
+        "m",
+        default=None,
     )
     body_1: Name = entry("name in the file of the lower, fixed body", "disk")
     body_2: Name = entry("name in the file of the upper, moving body", "blade")
@@ -141,7 +145,7 @@ class ImportedStructure(Section):
 
     def read(self, size: float | None) -> ImportedMesh:
         """Everything in the file, read once, CAD by elements of a ``size``. Raises MeshError."""
-        return _read(self.file, size, _stamp(self.file))
+        return _read(self.file, size, self.length_unit, _stamp(self.file))
 
     def mesh(self, size: float | None, order: int = 1) -> StructureMesh:
         """Bodies with interfaces, made once, of order 2 with midside nodes. Raises MeshError."""
@@ -152,10 +156,10 @@ class ImportedStructure(Section):
 # Reading or meshing takes seconds for every 100 000 elements: a check and the run that follows it
 # share what they find.
 @lru_cache(maxsize=1)
-def _read(file: str, size: float | None, stamp: Stamp) -> ImportedMesh:
+def _read(file: str, size: float | None, unit: str | None, stamp: Stamp) -> ImportedMesh:
     from fe_models.geometry.imported import read_bodies
 
-    return read_bodies(Path(file), size)
+    return read_bodies(Path(file), size, unit)
 
 
 @lru_cache(maxsize=1)
@@ -228,6 +232,7 @@ class MeshCase(FiniteElementCase):
         bodies = [f"{b.name} of {b.mesh.nvertices} nodes" for b in mesh.bodies]
         return [
             ("structure", f"{Path(structure.file).name}: {listed(bodies)}"),
+            ("lengths", lengths_outline(imported, structure.names)),
             *(("elements", text) for text in elements_outline(mesh, imported, self.mesh.order)),
             *(
                 ("face", outline_of(mesh, interface, pair.gap))
@@ -255,6 +260,7 @@ class MeshCase(FiniteElementCase):
                 f"materials not taken over, the first {left[0]}; all of them: fretscale describe, "
                 "as a case: fretscale describe --case"
             )
+        yield from size_doubts(imported, self.solids, self.structure.loads)
         mesh = self.structure.mesh(self.mesh.size, self.mesh.order)
         yield from (f"mesh.order: {doubt}" for doubt in folded_elements(mesh, imported))
         for index, interface in enumerate(mesh.interfaces):

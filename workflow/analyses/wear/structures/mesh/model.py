@@ -162,9 +162,15 @@ class MeshModel:
         return numbers[self._mesh.bodies[place].name]
 
     def warn(self, structure: Structure, reporter: Reporter) -> None:
-        """Of contacts that planes of symmetry cut, supports that are none, and surfaces as
-        measured that are finer than the mesh.
+        """Of a mesh in another unit, contacts that planes of symmetry cut, supports that are none,
+        and surfaces as measured that are finer than the mesh.
         """
+        unit = self._case.structure.read(self._case.mesh.size).unit
+        if unit.size != 1.0:
+            reporter.say(
+                f"lengths of the mesh file are {unit}; worn.msh, worn_nodes and ParaView files are "
+                "in mm"
+            )
         for told in self._case.told_of_nodes():
             reporter.say(told)
         for interface in structure.mesh.interfaces:

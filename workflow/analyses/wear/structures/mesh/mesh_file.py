@@ -1,0 +1,151 @@
+"""The mesh or CAD file of a case, the unit of its lengths, and whether sizes and loads go together.
+
+A mesh in m that is taken as mm is a thousand times too small, and nothing in it says so.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated
+
+import numpy as np
+
+from fe_models.geometry.endings import READ, why_not_read
+from fe_models.geometry.length_unit import SIZES
+from workflow.analyses.wear.structures.mesh.load import MeshLoad
+from workflow.analyses.wear.structures.mesh.loads import (
+    DisplacementLoad,
+    ForceLoad,
+    MomentLoad,
+    RotationLoad,
+)
+from workflow.case.doubts import WEAK, pressed
+from workflow.case.fields import File, Word
+from workflow.case.plain import plain
+
+if TYPE_CHECKING:
+    from fe_models.geometry.imported import ImportedMesh
+    from fe_models.mesh import Body
+    from workflow.analyses.wear.structures.mesh.contacts import MeshMaterial
+
+LengthName = Annotated[str, Word(tuple(SIZES))]
+# The longest side of bodies that fret [mm], and the units that files are in, the likeliest first.
+USUAL, UNITS = (0.5, 1e4), ("mm", "m", "um", "in")
+# Faces are hardly moved by more than this share of their body.
+MOVED = 0.5
+
+
+@dataclass(frozen=True)
+class MeshFile(File):
+    """A file with a mesh or a shape, known by its ending, in capitals or not."""
+
+    endings: tuple[str, ...] = READ
+
+    def wrong_name(self, name: str) -> str:
+        return why_not_read(name)
+
+
+def lengths_outline(imported: ImportedMesh, names: tuple[str, ...]) -> str:
+    """The unit of lengths, and a box round all bodies of the case."""
+    from fe_models.geometry.imported import extent
+
+    points = np.concatenate([imported.bodies[name].mesh.p for name in names], axis=1)
+    return f"{imported.unit}; bodies within {extent(points)}"
+
+
+def size_doubts(
+    imported: ImportedMesh, solids: Mapping[str, MeshMaterial], loads: Sequence[MeshLoad]
+) -> Iterator[str]:
+    """Doubts about sizes of bodies, which go by name, by themselves and beside loads."""
+    from fe_models.geometry.imported import GIVEN
+
+    bodies = [imported.bodies[name] for name in solids]
+    side = float(np.ptp(np.concatenate([body.points for body in bodies]), axis=0).max())
+    if not USUAL[0] <= side <= USUAL[1]:
+        yield f"structure.length_unit: {_unusual(imported, side)}"
+    elif imported.unit.name == "m" and imported.unit.source != GIVEN:
+        yield (
+            f"structure.length_unit: lengths are {imported.unit}, which makes bodies of "
+            f"{plain(side, 'mm', 4)}; Salome and FreeCAD say so of every mesh: give mm or m here"
+        )
+    yield from _loads(loads, imported, solids)
+
+
+def _unusual(imported: ImportedMesh, side: float) -> str:
+    """A side that is not usual, and a unit in which it would be."""
+    least, most = (plain(usual, "mm") for usual in USUAL)
+    told = f"bodies of {plain(side, 'mm', 4)}, lengths {imported.unit}; usual: {least} to {most}"
+    for name in UNITS:
+        meant = side / imported.unit.size * SIZES[name]
+        if USUAL[0] <= meant <= USUAL[1]:
+            return f"{told}; {plain(meant, 'mm', 4)} if they are in {name}"
+    return told
+
+
+def _loads(
+    loads: Sequence[MeshLoad], imported: ImportedMesh, solids: Mapping[str, MeshMaterial]
+) -> Iterator[str]:
+    """Doubts about loads that are too large for the bodies, or all of them too small."""
+    bodies = [imported.bodies[name] for name in solids]
+    stresses: dict[str, float] = {}
+    for index, load in enumerate(loads):
+        key, most = f"structure.loads.{index}", max(map(abs, load.path))
+        if isinstance(load, DisplacementLoad):
+            yield from _moved(key, load, most, imported, bodies)
+        stress = _stress(load, imported, solids)
+        # What is not known is neither large nor small.
+        stresses[key] = WEAK if stress is None else stress * most
+    strongest = max(stresses, key=lambda key: stresses[key])
+    moduli = [solid.young for solid in solids.values()]
+    yields = [solid.yield_stress for solid in solids.values()]
+    yield from pressed(strongest, stresses[strongest], yields, moduli)
+
+
+def _moved(
+    key: str, load: DisplacementLoad, most: float, imported: ImportedMesh, bodies: list[Body]
+) -> Iterator[str]:
+    """A doubt about a face that is moved by much of its body."""
+    motion = most * float(np.linalg.norm(load.displacement))
+    for body in bodies:
+        side = float(np.ptp(body.points, axis=0).max())
+        if _area(imported, body, load.group) and motion > MOVED * side:
+            yield (
+                f"{key}.displacement: moves {body.name}, which is {plain(side, 'mm', 4)} long, by "
+                f"{plain(motion, 'mm', 4)}: is its unit right, and that of the mesh?"
+            )
+
+
+def _stress(
+    load: MeshLoad, imported: ImportedMesh, solids: Mapping[str, MeshMaterial]
+) -> float | None:
+    """About the stress that a load leaves [MPa]; None of loads that say nothing of sizes."""
+    bodies = [imported.bodies[name] for name in solids]
+    if isinstance(load, RotationLoad):
+        axis = np.array(load.axis) / np.linalg.norm(load.axis)
+        return max(
+            (solid.density or 0.0)
+            * load.speed**2
+            * float(np.sum(np.cross(body.points - load.through, axis) ** 2, axis=1).max())
+            for solid, body in zip(solids.values(), bodies, strict=True)
+        )
+    if not isinstance(load, ForceLoad | MomentLoad):
+        return None
+    area = sum(_area(imported, body, load.group) for body in bodies)
+    if not area:
+        return None
+    if isinstance(load, ForceLoad):
+        return float(np.linalg.norm(load.force)) / area
+    # Over a face as wide as long; in the plane over a slice of 1 mm.
+    arm = area if bodies[0].mesh.dim() == 2 else area**0.5
+    return float(np.linalg.norm(load.moment)) / (area * arm)
+
+
+def _area(imported: ImportedMesh, body: Body, group: str) -> float:
+    """Area of a boundary, or of a node set that is a face [mm²]; 0 if the body has none."""
+    facets = (body.mesh.boundaries or {}).get(group)
+    if facets is None:
+        facets = imported.set_faces[body.name].get(group)
+    if facets is None:
+        return 0.0
+    return float(np.linalg.norm(body.outward_of(facets), axis=1).sum())
