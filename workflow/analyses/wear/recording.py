@@ -21,6 +21,7 @@ from workflow.analyses.wear.heard import Heard
 from workflow.analyses.wear.load_source import LoadSource
 from workflow.analyses.wear.warnings import warn_of_growth, warn_of_instability
 from workflow.case.plain import counted
+from workflow.shell import steps
 from workflow.shell.analysis import Run
 from workflow.shell.reporter import Reporter
 from workflow.shell.store import write_arrays
@@ -69,17 +70,14 @@ class RunLog(Observer):
         )
 
 
-# Of the time of a run, what its states may take to be written: of short jumps not every one is.
-SHARE = 0.02
-
-
 @dataclass
 class Recorder(Observer):
     """Writes the fields of every jump, and now and then the state that the next one starts from.
 
     Fields are those at ``peak`` load. ``jumps`` are the digests of their files, those of the run
-    that this one goes on from to begin with. States are written as often as their :data:`SHARE` of
-    the time allows; the last one is, whatever ends the march, within :meth:`kept`.
+    that this one goes on from to begin with. States take the share of the time that
+    :mod:`workflow.shell.steps` lets them; the last one is written whatever ends the march, within
+    :meth:`kept`.
     """
 
     run: Run[WearCase]
@@ -92,7 +90,7 @@ class Recorder(Observer):
     def __post_init__(self) -> None:
         self._unsaved: CoupledState | None = None
         # When the last state was written, and how long that took [s].
-        self._saved, self._cost = time.perf_counter(), 0.0
+        self._saved, self._cost = time.perf_counter(), steps.FIRST_SAVE
 
     @contextmanager
     def kept(self) -> Iterator[None]:
@@ -130,7 +128,7 @@ class Recorder(Observer):
             arrays |= loops | kept_tensions(self.source, state)
             self.jumps.append(write_arrays(path, arrays, attributes))
         self._unsaved = state
-        if time.perf_counter() - self._saved >= self._cost / SHARE:
+        if time.perf_counter() - self._saved >= self._cost / steps.SHARE:
             self._save()
 
     def _save(self) -> None:

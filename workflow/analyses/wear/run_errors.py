@@ -24,8 +24,9 @@ FEW_INCREMENTS = 32
 
 
 # How many times shorter steps and smaller drifts to take where they leave too much: what those of
-# first order leave falls to a quarter.
-SHORTER = 4.0
+# first order leave falls to a quarter. The length of automatic steps goes with about the root of
+# their tolerance.
+SHORTER, STRICTER = 4.0, 10.0
 
 
 def warn_of_errors(
@@ -54,20 +55,22 @@ def warn_of_errors(
 def shorter_steps(wear: Duration, contact: InterfaceOutcome) -> str:
     """Return the setting that makes the steps of a finished run shorter.
 
-    Automatic ones follow their tolerance; on surfaces that move over each other they are shorter
-    than it asks for (:meth:`wear.stepping.WearingContact.comparable_cycles`), and it does nothing.
+    Automatic ones follow their tolerance. On surfaces that move over each other they are shorter
+    than it asks for (:meth:`wear.stepping.WearingContact.comparable_cycles`), so that it does
+    nothing, and those of second order leave edges less high.
     """
-    step = wear.step
+    step, moving = wear.step, len(contact.state.paths) > 0
     if step.depth is not None:
         return f"wear.step.depth: {step.depth / SHORTER:.2g} mm"
     if step.volume is not None:
         return f"wear.step.volume: {step.volume / SHORTER:.2g} mm^3"
-    if step.automatic and not len(contact.state.paths):
+    if step.automatic and not moving:
         if wear.depth_tolerance is not None:
-            return f"wear.depth_tolerance: {wear.depth_tolerance / SHORTER:.2g} mm"
-        return f"wear.tolerance: {100.0 * wear.tolerance / SHORTER:.2g} %"
+            return f"wear.depth_tolerance: {wear.depth_tolerance / STRICTER:.2g} mm"
+        return f"wear.tolerance: {100.0 * wear.tolerance / STRICTER:.2g} %"
     cycles = float(np.diff(contact.cycles).max(initial=1.0)) / SHORTER
-    return f"wear.step: {{kind: {step.kind}, cycles: {max(cycles, 1.0):.2g}}}"
+    kind = "second_order" if moving else step.kind
+    return f"wear.step: {{kind: {kind}, cycles: {max(cycles, 1.0):.2g}}}"
 
 
 def _of_link_and_coupling(case: WearCase, shorter: str) -> dict[str, str]:
