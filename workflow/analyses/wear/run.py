@@ -53,7 +53,7 @@ MANY_JUMPS = 300
 
 
 def run_wear(run: Run[WearCase]) -> None:
-    """Run a wear case to its end, from its last whole jump if it is to resume."""
+    """Run a wear case to its end, from the last state that was kept if it is to resume."""
     folder = run.folder
     report_choice(run.choice, run.reporter, again=run.resume)
     try:
