@@ -314,11 +314,21 @@ class CoupledWear:
             yield state
 
     def jumps_left(self, state: CoupledState) -> int:
-        """About how many jumps are left, if all of them are as long as the next one."""
+        """About how many jumps are left, if their length goes on as it has of late.
+
+        All are as long as the next one, or grow as they have grown over the last half of all jumps;
+        automatic ones are taken to double until two of them are known.
+        """
         if self.settings.ended(state):
             return 0
-        left = min(self._left(state), self._to_stop(state))
-        return max(1, int(np.ceil(left / self._jump_cycles(state) * (1.0 - ROUNDING))))
+        following, lengths = self._jump_cycles(state), np.diff(state.cycles)
+        count = min(self._left(state), self._to_stop(state)) / following
+        growth = 1.0 if self.settings.jump == JumpSize() else 0.0
+        if back := len(lengths) // 2:
+            growth = (following / float(lengths[-back - 1])) ** (1.0 / (back + 1.0)) - 1.0
+        if count > 1.0 and growth > 0.0:
+            count = float(np.log1p(count * growth) / np.log1p(growth))
+        return max(1, int(np.ceil(count * (1.0 - ROUNDING))))
 
     @contextmanager
     def _stage(self, name: Stage) -> Iterator[None]:

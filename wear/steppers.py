@@ -453,7 +453,19 @@ class ComparingStepper(ABC, Generic[State, Compared]):
 
         ``ends`` are the states before and after its ``cycles`` of the ``left`` ones.
         """
-        return _judged(control, *ends, max(left / cycles, 1.0))
+        return _judged(control, *ends, steps_to_come(*ends, cycles, left))
+
+
+def steps_to_come(before: WornState, after: WornState, cycles: float, left: float) -> float:
+    """Return how many steps like one of so many ``cycles`` wear as much as the ``left`` ones will.
+
+    That step is included, which has led from the state ``before`` to the one ``after``. A rate that
+    falls, as where what slips wears off, falls on as an exponential, which bounds what is to come.
+    """
+    count = max(left / cycles, 1.0)
+    if not 0.0 < after.volume_rate < before.volume_rate:
+        return count
+    return min(count, 1.0 + 1.0 / float(np.log(before.volume_rate / after.volume_rate)))
 
 
 def _judged(
@@ -461,9 +473,10 @@ def _judged(
 ) -> tuple[bool, float]:
     """Whether the error after a step will do, and the change of length that fills what it may be.
 
-    ``to_go`` are the steps of this length to the end of the run, this one included. Of the
-    tolerance the error of a body's depth may have the share :data:`EARLY` at once and the rest by
-    and by, as the depth grows; that of its volume, which no pressure presses away, grows with it.
+    ``to_go`` are the steps like this one that are to come, this one included. Of the tolerance the
+    error of a body's depth may have the share :data:`EARLY` at once and the rest by and by, as the
+    depth grows; that of its volume, which no pressure presses away, grows with it. Where a step
+    wears little of what has worn so far it may be long: the error counts at the end of the run.
     """
     fits, changes, order = True, [GROWTH], after.order
     columns = (after.surfaces.depths, before.surfaces.depths, after.errors, before.errors)
@@ -479,13 +492,16 @@ def _judged(
         share = (1.0 - EARLY) * tolerance
         room = EARLY * tolerance * ahead + share * so_far - total
         volume, volume_share = abs(float(missed.sum())), tolerance * float(worn.sum())
-        fits = fits and (room >= 0.0 or added <= share * lost) and volume <= volume_share
+        volume_room = share * float(depth.sum()) - abs(float(error.sum()))
+        fits = fits and (room >= 0.0 or added <= share * lost)
+        fits = fits and (volume_room >= 0.0 or volume <= volume_share)
         if added > 0.0:
             # A share of the step shrinks with it; what is left of the whole does not.
             filling = (SAFETY * max(room, 0.0) / added) ** (1.0 / (order + 1.0))
             changes.append(max(filling, (SAFETY * share * lost / added) ** (1.0 / order)))
         if volume > 0.0:
-            changes.append((SAFETY * volume_share / volume) ** (1.0 / order))
+            filling = (SAFETY * max(volume_room, 0.0) / volume) ** (1.0 / (order + 1.0))
+            changes.append(max(filling, (SAFETY * volume_share / volume) ** (1.0 / order)))
     return fits, min(changes)
 
 

@@ -15,6 +15,7 @@ from contextlib import contextmanager
 from dataclasses import replace
 from itertools import islice
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -325,6 +326,18 @@ def test_jumps_that_are_left_are_foreseen(
     assert foreseen[-1] == 0
     assert np.all(foreseen[2:] <= 2 * true[2:])
     assert np.all(true[2:] <= 2 * np.array(foreseen[2:]))
+
+
+def test_jumps_that_grow_are_foreseen_as_they_grow() -> None:
+    """Of 1, 2, 4 and 8 cycles sixteen more come to 2^20 - 1; of equal ones as many as are left."""
+    settings = CoupledSettings(2.0**20 - 1.0)
+    loop = CoupledWear(settings, ConstantLoads([]), in_turn([]))
+    steady = SimpleNamespace(half_way=False, depth_rate=0.0, volume_rate=0.0)
+    for lengths, following, left in (([1, 2, 4, 8], 16.0, 16), ([8, 8, 8], 8.0, 2**17 - 3)):
+        cycles = np.cumsum([0.0, *lengths])
+        steady.next_cycles = following
+        state = SimpleNamespace(cycles=cycles, interfaces=(steady,))
+        assert loop.jumps_left(state) == pytest.approx(left, abs=1)
 
 
 def test_contacts_of_unlike_steps_end_together() -> None:

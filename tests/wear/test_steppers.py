@@ -10,10 +10,11 @@ from sa_solver.half_space import HalfSpace
 from sa_solver.normal import NormalContact
 from sa_solver.types import Array, ElasticPair, Grid, LoadHistory, Material
 from tests.marks import slow
+from wear.drive import Drive
 from wear.implicit import ImplicitStepper, SecondOrderStepper
 from wear.laws import EnergyLaw
 from wear.marching import advance_cycles
-from wear.steppers import ErrorControl, ExplicitStepper, root_mean_square
+from wear.steppers import ErrorControl, ExplicitStepper, root_mean_square, steps_to_come
 from wear.stepping import SlidingCycle, WearingContact, WearState
 from wear.worn import Spent, WearStep
 
@@ -339,3 +340,50 @@ def test_the_volume_has_an_error_of_its_own(kind) -> None:
     error = float((state.surfaces.depth - reference).sum())
     assert float(np.sum(state.errors)) == pytest.approx(error, rel=0.3)
     assert abs(error) < 0.02 * reference.sum()
+
+
+# --- wear that comes to an end --------------------------------------------------------------------
+
+HELD = Drive((True, False, False, True, True, False), np.array([[1e-3, 0, 0, 0, 0, 0]]))
+"""A strip held where it was brought, until nothing presses: its rate falls by all decades."""
+
+
+def held() -> WearingContact:
+    loads = history(np.ones(1), np.zeros(1))
+    sliding = SlidingCycle(loads, np.full((1, *GRID.shape), 0.02), drive=HELD)
+    return WearingContact(CONTACT, LAWS, FRICTION, sliding, 1e-10)
+
+
+def test_steps_grow_where_wear_slows_down() -> None:
+    """As many more for each factor of the cycles, and as right as very many at any of them."""
+    contact, unworn = held(), WearState.unworn(GRID.x**2 / 2e4)
+    first = contact.cycle(unworn, contact.dissipating)
+    starts = {t: solved.start for t, solved in first.states.items()}
+    limit = contact.stable_cycles(replace(unworn, starts=starts))
+    rate = first.per_cycle(GRID.cell_area)[1]
+    begun = replace(unworn, starts=starts, volume_rate=rate, next_cycles=4.0 * limit)
+    taken = []
+    for times in (1e2, 1e4, 1e6, 1e8):
+        cycles = times * limit
+        stepper = ImplicitStepper(ErrorControl(0.01))
+        end = advance_cycles(stepper, begun, cycles, cycles, lambda _: contact)
+        taken.append(end.spent.steps)
+        fixed = begun
+        for jump in np.diff(np.r_[0.0, cycles * np.geomspace(1e-4, 1.0, 150)]):
+            fixed = contact.implicit_step(fixed, float(jump)).state
+        volumes = [state.surfaces.depth.sum() for state in (end.state, fixed)]
+        assert volumes[0] == pytest.approx(volumes[1], rel=0.01)
+    np.testing.assert_allclose(
+        fixed.surfaces.depth, np.maximum(1e-3 - unworn.surfaces.gap, 0.0), atol=1e-6
+    )
+    # From one end of the hundredfold to the other: 74, 88, 90 and 96 of them.
+    assert np.diff(taken).max() < 20
+    assert taken[0] < 100
+
+
+def test_what_is_to_come_is_bounded_by_a_rate_that_falls() -> None:
+    """Of r exp(-n d) a step: 1 + 1/d steps at least, and no more than are left."""
+    before, after = (replace(rounded(), volume_rate=rate) for rate in (1.0, np.exp(-0.25)))
+    assert steps_to_come(before, after, 10.0, 1e6) == pytest.approx(5.0)
+    assert steps_to_come(before, after, 10.0, 30.0) == 3.0
+    assert steps_to_come(after, before, 10.0, 1e6) == 1e5

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+import re
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -20,6 +22,7 @@ from workflow.analyses.wear.budget.lives import STEPS, live
 from workflow.analyses.wear.budget.parts import UNCERTAIN, ResultError, peak_left
 from workflow.analyses.wear.budget.report import datasets_of, sentences, summary_of, warning_of
 from workflow.analyses.wear.layout import PARTS
+from workflow.analyses.wear.outcome import InterfaceOutcome, peak_change
 from workflow.analyses.wear.structure import SETTINGS
 from workflow.analyses.wear.structures import structure_of
 from workflow.case.changing import changed
@@ -112,6 +115,64 @@ def test_a_result_beyond_the_accuracy_is_a_warning_that_names_the_setting() -> N
 def companions_of(case) -> Companions:
     structure = structure_of(case)
     return Companions.of(case, structure.finer(case), structure.source(case).line)
+
+
+# --- peaks that wear steps leave ------------------------------------------------------------------
+
+
+def test_a_peak_changes_by_its_height_and_not_by_where_it_ends() -> None:
+    """A rim that one contact has reached is no change; nor are two peaks that are equal by chance
+    one another's."""
+    worn = np.zeros((2, 40, 1))
+    worn[:, 10:30] = 80.0
+    wider = worn.copy()
+    wider[:, 9:31] = 78.0
+    assert peak_change(worn, wider, at_rest=True) == pytest.approx(2.0 / 80.0)
+    peaked, broad = worn.copy(), worn.copy()
+    peaked[0, 10], broad[0, 10:13] = 120.0, 120.0
+    assert peak_change(peaked, broad, at_rest=True) == pytest.approx(40.0 / 120.0)
+    elsewhere = worn.copy()
+    elsewhere[0, 20] = 120.0
+    assert peak_change(peaked, elsewhere, at_rest=False) == 0.0
+    assert peak_change(peaked, elsewhere, at_rest=True) == pytest.approx(40.0 / 120.0)
+    assert peak_change(0.0 * worn, worn, at_rest=True) == 0.0
+
+
+CYLINDER = CASES / "cylinder_wear.yaml"
+# Of the cylinder that has worn to conformity, see its case: a closed form [MPa].
+CONFORMING = 49.995
+BARE = ("error_budget=known", "output={figures: false, paraview: false, report: false}")
+
+
+@pytest.mark.parametrize("step", ["{kind: implicit}", "{kind: second_order}"])
+def test_steps_tell_what_they_leave_of_a_peak(step, tmp_path) -> None:
+    """Automatic ones of either kind on the cylinder: 1.5 and 2.8 %; told were 44 and 27 %."""
+    run = _summary_of(CYLINDER, tmp_path, *BARE, f"wear.step={step}")
+    told, peak = (run["interface"][key] for key in ("step_error", "peak_pressure"))
+    true = abs(peak["worn"] / CONFORMING - 1.0)
+    assert 0.005 < true < 0.05
+    assert true / 3.0 < told["pressure"] < 3.0 * true
+    assert run["warnings"] == []
+
+
+def _advice(warnings: list[str], about: str) -> str:
+    """The setting that a warning names, as ``--set`` takes it."""
+    (line,) = (line for line in warnings if about in line)
+    key, value = re.search(r"(wear\.[a-z.]+): (\{[^}]*\}|[\d.e+-]+ \S+)[);]*$", line).groups()
+    return f"{key}={value}"
+
+
+def test_advice_on_steps_of_given_accuracy_helps(tmp_path) -> None:
+    """What the budget names where steps leave most of a peak makes its error smaller."""
+    asked = (*BARE, "wear.step={kind: implicit}", "accuracy=0.2 %")
+    first = _summary_of(CYLINDER, tmp_path / "first", *asked)
+    advice = _advice(first["warnings"], "mostly by steps")
+    assert advice.startswith("wear.tolerance=")
+    second = _summary_of(CYLINDER, tmp_path / "second", *asked, advice)
+    errors = [
+        abs(run["interface"]["peak_pressure"]["worn"] / CONFORMING - 1.0) for run in (first, second)
+    ]
+    assert errors[1] < 0.6 * errors[0]
 
 
 # --- lives ----------------------------------------------------------------------------------------
@@ -266,6 +327,24 @@ def test_grids_are_compared_by_their_order() -> None:
     assert not companions.coupled
 
 
+# --- wear that has stopped ------------------------------------------------------------------------
+
+
+def test_wear_that_has_stopped_is_told() -> None:
+    """Both bodies' depth and volume count, and half of the cycles must be behind it."""
+    cycles = np.array([0.0, 1e3, 1e4, 1e5, 1e6])
+
+    def stopped(*depths: float) -> float | None:
+        kinetics = np.outer([0.0, *depths], [1.0, 0.5, 2.0, 1.0, 1e3])
+        found = SimpleNamespace(kinetics=kinetics, cycles=cycles)
+        return InterfaceOutcome.stopped.fget(found)
+
+    assert stopped(0.5, 0.992, 0.999, 1.0) == 1e4
+    assert stopped(0.5, 0.9, 0.999, 1.0) == 1e5
+    assert stopped(0.5, 0.7, 0.98, 1.0) is None
+    assert stopped(0.0, 0.0, 0.0, 0.0) is None
+
+
 # --- runs -----------------------------------------------------------------------------------------
 
 
@@ -288,9 +367,10 @@ def test_a_run_tells_its_errors(tmp_path) -> None:
 
 
 def _summary(folder, *overrides):
-    import json
+    return _summary_of(CASES / "dovetail_2d.yaml", folder, *QUIET, *overrides)
 
-    case = CASES / "dovetail_2d.yaml"
-    ending = invoke("run", case, "--out", folder, *settings((*QUIET, *overrides)))
+
+def _summary_of(case, folder, *overrides):
+    ending = invoke("run", case, "--out", folder, *settings(overrides))
     assert ending.exit_code == 0, ending.stderr
     return json.loads((folder / "summary.json").read_text("utf-8"))

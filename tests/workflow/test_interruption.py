@@ -6,10 +6,12 @@ import shutil
 import sys
 import time
 from concurrent.futures import CancelledError
-from contextlib import closing
+from contextlib import closing, nullcontext
 from dataclasses import replace
+from types import SimpleNamespace
 
 import h5py
+import numpy as np
 import pytest
 
 import wear.coupled
@@ -20,9 +22,10 @@ from tests.workflow.interruptions import (
     jumps_kept,
     posix_only,
 )
-from workflow.analyses.wear import contact_workers
+from workflow.analyses.wear import contact_workers, recording
 from workflow.errors import MethodFailed
 from workflow.shell import processes as workers
+from workflow.shell import steps
 from workflow.shell.store import read_arrays, write_arrays
 
 # --- in this process ----------------------------------------------------------------------------
@@ -56,6 +59,46 @@ def test_resumed_run_equals_an_uninterrupted_one(interrupted, resume, whole):
     log = (run.folder / "run.log").read_text("utf-8")
     assert log.count("run: ") == log.count("resume: ") == 1
     assert re.findall(r"jump (\d+):", log) == ["1", "2", "3"]
+
+
+def test_states_are_written_as_time_allows(monkeypatch):
+    """Of short jumps now and then, of long ones each, and the last one; no clock but this one's."""
+    now, cost = [0.0], 0.05
+    written: list[int] = []
+
+    def keep(run, state, jumps):
+        now[0] += cost
+        written.append(state.jump)
+        assert len(jumps) == state.jump
+
+    monkeypatch.setattr(recording.time, "perf_counter", lambda: now[0])
+    monkeypatch.setattr(recording.checkpoint, "keep", keep)
+    monkeypatch.setattr(recording, "write_arrays", lambda *_: "digest")
+    monkeypatch.setattr(recording, "kept_tensions", lambda *_: {})
+    monkeypatch.setattr(recording.Recorder, "_loops", lambda *_: {})
+    contacts = SimpleNamespace(stages=[], fields=lambda *_: [])
+    run = SimpleNamespace(
+        reporter=SimpleNamespace(stage=lambda name: nullcontext()),
+        folder=SimpleNamespace(jump=lambda number: number),
+    )
+
+    def march(recorder, seconds, count):
+        with recorder.kept():
+            for jump in range(1, count + 1):
+                now[0] += seconds
+                recorder.keep(SimpleNamespace(jump=jump, interfaces=(), cycles=[0.0]))
+            raise KeyboardInterrupt
+
+    for seconds, count in ((0.1, 1000), (100.0, 10)):
+        written.clear()
+        recorder = recording.Recorder(run, None, 0, contacts, [], None)
+        begun = now[0]
+        with pytest.raises(KeyboardInterrupt):
+            march(recorder, seconds, count)
+        assert written[-1] == count
+        assert cost * len(written) <= steps.SHARE * (now[0] - begun) + 2.0 * cost
+        assert seconds * (max(np.diff([0, *written])) - 1) <= cost / steps.SHARE + seconds
+    assert written == list(range(1, 11))
 
 
 def test_unfinished_run_is_not_started_again(interrupted, start):

@@ -23,6 +23,10 @@ from workflow.analyses.wear.load_source import LoadSource
 # 8 and 16 implicit ones left 5.5, 1.9 and 0.75 % of it on a dovetail's flank, 2, 4 and 8 of second
 # order 12, 4.2 and 0.8 %.
 AT_EDGES = 1.5
+# Share of the pressed cells whose pressures tell how far the largest of them is off.
+HIGHEST = 0.1
+# Wear that has come to so little of all that has worn is an end state.
+STOPPED = 0.01
 
 
 @dataclass(frozen=True)
@@ -49,6 +53,20 @@ class InterfaceOutcome:
         return {
             name: linear_regime(self.cycles, values.sum(axis=1)) for name, values in columns.items()
         }
+
+    @property
+    def stopped(self) -> float | None:
+        """Cycles after which wear had stopped; None where it goes on, or nothing has worn.
+
+        Depth and volume of both bodies are within :data:`STOPPED` of those at the end from then on,
+        for half of all cycles at least.
+        """
+        worn = self.kinetics[:, :4]
+        still = np.flatnonzero((worn < (1.0 - STOPPED) * worn[-1]).any(axis=1))
+        if not still.size:
+            return None
+        cycles = float(self.cycles[still[-1] + 1])
+        return cycles if cycles <= 0.5 * self.cycles[-1] else None
 
     @cached_property
     def carried(self) -> dict[str, LoadHistory]:
@@ -83,18 +101,16 @@ class InterfaceOutcome:
     def step_error(self) -> dict[str, float] | None:
         """What wear steps leave of depth, volume and pressure, relative; None where nobody knows.
 
-        Of the pressure it is the largest change anywhere in a cycle for steps of twice the length,
-        over the largest pressure: over 2^p - 1, p being :data:`AT_EDGES`, but for increments that
-        wear in turn. Next to worn edges of surfaces that move over each other it has no order.
+        Of the pressure it is what steps of twice the length change of its peak
+        (:func:`peak_change`): over 2^p - 1, p being :data:`AT_EDGES`, but for implicit steps over
+        increments in turn, whose error is of first order.
         """
         left, other = step_errors(self.state, self.stage.areas), self.ended.pressure_of_companion
         if left is None or other is None:
             return None
-        pressure = self.end.pressure
-        change = np.abs(pressure - other)
-        in_turn = len(self.state.paths) > 0 or self.state.order == 1.0
-        share = 1.0 if in_turn else 1.0 / (2.0**AT_EDGES - 1.0)
-        return left | {"pressure": share * float(change.max() / pressure.max())}
+        change = peak_change(self.end.pressure, other, at_rest=not len(self.state.paths))
+        share = 1.0 if self.state.order == 1.0 else 1.0 / (2.0**AT_EDGES - 1.0)
+        return left | {"pressure": share * change}
 
     @cached_property
     def increments_error(self) -> dict[str, float] | None:
@@ -115,6 +131,24 @@ class InterfaceOutcome:
     def ended(self) -> ContactEnd:
         """A cycle at the end, waited for."""
         return self.told()
+
+
+def peak_change(pressure: Array, other: Array, at_rest: bool) -> float:
+    """Return how far the peak of ``pressure`` ``(t, nx, ny)`` differs in an ``other``, relative.
+
+    It is looked for in the increment of the peak, among the :data:`HIGHEST` share of the pressed
+    cells of both, sorted by size: the two peaks alone may be equal by chance, and a rim that one
+    contact has reached and the other has not is no change of the peak. Surfaces ``at_rest`` keep
+    its place, where it counts as well.
+    """
+    peak, place = float(pressure.max()), int(pressure.argmax())
+    if peak <= 0.0:
+        return 0.0
+    increment = np.unravel_index(place, pressure.shape)[0]
+    highest, others = (np.sort(field[increment], axis=None)[::-1] for field in (pressure, other))
+    count = int(np.ceil(HIGHEST * np.count_nonzero(highest)))
+    change = float(np.abs(highest - others)[:count].max())
+    return max(change, abs(peak - float(other.flat[place])) if at_rest else 0.0) / peak
 
 
 @dataclass(frozen=True)

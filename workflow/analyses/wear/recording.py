@@ -5,6 +5,7 @@ The coupled loop (:mod:`wear.coupled`) knows nothing of them.
 
 from __future__ import annotations
 
+import time
 from collections.abc import Iterator
 from contextlib import AbstractContextManager, ExitStack, contextmanager
 from dataclasses import dataclass
@@ -20,6 +21,7 @@ from workflow.analyses.wear.heard import Heard
 from workflow.analyses.wear.load_source import LoadSource
 from workflow.analyses.wear.warnings import warn_of_growth, warn_of_instability
 from workflow.case.plain import counted
+from workflow.shell import steps
 from workflow.shell.analysis import Run
 from workflow.shell.reporter import Reporter
 from workflow.shell.store import write_arrays
@@ -68,12 +70,14 @@ class RunLog(Observer):
         )
 
 
-@dataclass(frozen=True)
+@dataclass
 class Recorder(Observer):
-    """Writes the fields of every jump, and after them the state that the next one starts from.
+    """Writes the fields of every jump, and now and then the state that the next one starts from.
 
     Fields are those at ``peak`` load. ``jumps`` are the digests of their files, those of the run
-    that this one goes on from to begin with.
+    that this one goes on from to begin with. States take the share of the time that
+    :mod:`workflow.shell.steps` lets them; the last one is written whatever ends the march, within
+    :meth:`kept`.
     """
 
     run: Run[WearCase]
@@ -83,6 +87,23 @@ class Recorder(Observer):
     jumps: list[str]
     source: LoadSource
 
+    def __post_init__(self) -> None:
+        self._unsaved: CoupledState | None = None
+        # When the last state was written, and how long that took [s].
+        self._saved, self._cost = time.perf_counter(), steps.FIRST_SAVE
+
+    @contextmanager
+    def kept(self) -> Iterator[None]:
+        """A march whose last state is written, unless the disk is what ends it."""
+        try:
+            yield
+        except OSError:
+            raise
+        except BaseException:
+            self._save()
+            raise
+        self._save()
+
     def begin(self, state: CoupledState) -> None:
         if not self.jumps:
             self.keep(state)
@@ -91,7 +112,7 @@ class Recorder(Observer):
         self.keep(after)
 
     def keep(self, state: CoupledState) -> None:
-        """Write the fields of this jump, then the state."""
+        """Write the fields of this jump, and then the state if that is due."""
         loops = self._loops(state)
         with self.run.reporter.stage("checkpoints"):
             recorded = self.contacts.fields(state.interfaces, self.peak)
@@ -106,7 +127,19 @@ class Recorder(Observer):
             path = self.run.folder.jump(state.jump)
             arrays |= loops | kept_tensions(self.source, state)
             self.jumps.append(write_arrays(path, arrays, attributes))
-            checkpoint.keep(self.run, state, self.jumps)
+        self._unsaved = state
+        if time.perf_counter() - self._saved >= self._cost / steps.SHARE:
+            self._save()
+
+    def _save(self) -> None:
+        """Write the state of the last jump recorded, if that is not written yet."""
+        if self._unsaved is None:
+            return
+        begun = time.perf_counter()
+        with self.run.reporter.stage("checkpoints"):
+            checkpoint.keep(self.run, self._unsaved, self.jumps)
+        self._unsaved, self._saved = None, time.perf_counter()
+        self._cost = self._saved - begun
 
     def _loops(self, state: CoupledState) -> dict[str, Array]:
         """Tangential loops on the present surfaces, where they are due."""

@@ -33,7 +33,7 @@ from workflow.analyses.wear.datasets import (
 )
 from workflow.analyses.wear.layout import EXTRAPOLATION, MOMENTS, Contents, energy_name
 from workflow.analyses.wear.link_report import link_summary
-from workflow.analyses.wear.outcome import InterfaceOutcome, Outcome
+from workflow.analyses.wear.outcome import STOPPED, InterfaceOutcome, Outcome
 from workflow.analyses.wear.run_errors import warn_of_errors
 from workflow.analyses.wear.structure_stage import StructureStage
 from workflow.analyses.wear.uniformity import uniformities
@@ -341,6 +341,7 @@ def _interface_summary(outcome: Outcome, contact: InterfaceOutcome) -> dict[str,
         **({"by_increment": comparison_summary(first.cycle, loads, known)} if first.cycle else {}),
         "step_error": contact.step_error,
         "increments_error": contact.increments_error,
+        "stopped": contact.stopped,
         "explicit_limit": first.stable_cycles if np.isfinite(first.stable_cycles) else None,
         "contact_residual": first.largest_residual,
         "link": link_summary(first.link),
@@ -389,4 +390,9 @@ def _lines(outcome: Outcome, summary: dict[str, Any], budget: Budget) -> Iterato
         )
         pressures = f"{peaks['unworn']:.0f} -> {peaks['worn']:.0f} MPa"
         yield f"  {name}: peak pressure {pressures}; tilt {numbers['tilt']}"
+        if contact.stopped is not None:
+            yield (
+                f"  {name}: wear has stopped to within {STOPPED:.0%} of depth and volume after "
+                f"{contact.stopped:.3g} cycles"
+            )
         yield from (f"  {name}: {told}" for told in sentences(budget[name]))

@@ -36,6 +36,7 @@ from workflow.analyses.wear.structures.resultants.writing import marched
 from workflow.analyses.wear.warnings import (
     warn_of_contact,
     warn_of_file,
+    warn_of_many_jumps,
     warn_of_structure,
     warn_of_worn_cells,
 )
@@ -47,10 +48,12 @@ from workflow.shell.reporter import Reporter
 
 # Jumps of a run whose explicit steps are too short to be recorded one by one.
 RECORDS = 10
+# Jumps, more than which are warned of.
+MANY_JUMPS = 300
 
 
 def run_wear(run: Run[WearCase]) -> None:
-    """Run a wear case to its end, from its last whole jump if it is to resume."""
+    """Run a wear case to its end, from the last state that was kept if it is to resume."""
     folder = run.folder
     report_choice(run.choice, run.reporter, again=run.resume)
     try:
@@ -162,9 +165,11 @@ def _march(
     warn_of_contact(case, source, contacts.stages, state, first, reporter)
     end = contacts.restored(kept) if kept else state
     begun = end.jump
-    with reporter.course("wear"):
+    with reporter.course("wear"), recorder.kept():
         for end in loop.march(end):  # noqa: B020 - each from the one before
             left = loop.jumps_left(end)
+            if end.jump == MANY_JUMPS:
+                warn_of_many_jumps(case.wear, end, left, reporter)
             at = f"jump {end.jump} of about {end.jump + left}, {end.cycles[-1]:.4g} cycles"
             reporter.reached((end.jump - begun) / (end.jump - begun + left), at)
     warn_of_worn_cells(case, source.peak, contacts.stages, end, reporter)

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
+
 from wear.steppers import root_mean_square
 from workflow.analyses.wear.budget.report import Budget, warning_of
 from workflow.analyses.wear.case.base import WearCase
@@ -21,6 +23,12 @@ PEAK = 0.1
 FEW_INCREMENTS = 32
 
 
+# How many times shorter steps and smaller drifts to take where they leave too much: what those of
+# first order leave falls to a quarter. The length of automatic steps goes with about the root of
+# their tolerance.
+SHORTER, STRICTER = 4.0, 10.0
+
+
 def warn_of_errors(
     case: WearCase, contacts: Sequence[InterfaceOutcome], budget: Budget, reporter: Reporter
 ) -> None:
@@ -28,10 +36,11 @@ def warn_of_errors(
 
     And few increments of surfaces that move over each other, which no estimate knows of.
     """
-    settings = {**SETTINGS, **structure_of(case).settings}
     for contact in contacts:
-        name, state = contact.stage.name, contact.state
-        _warn_of_steps(case.wear, contact, reporter)
+        name, state, shorter = contact.stage.name, contact.state, shorter_steps(case.wear, contact)
+        _warn_of_steps(case.wear, contact, shorter, reporter)
+        settings = {**SETTINGS, **structure_of(case).settings(case), "steps": shorter}
+        settings |= _of_link_and_coupling(case, shorter)
         if beyond := warning_of(name, budget[name], case.accuracy, settings):
             reporter.warn(beyond)
         fewest = min(mission.stop - mission.start for mission in state.loads.missions)
@@ -43,7 +52,44 @@ def warn_of_errors(
             )
 
 
-def _warn_of_steps(wear: Duration, contact: InterfaceOutcome, reporter: Reporter) -> None:
+def shorter_steps(wear: Duration, contact: InterfaceOutcome) -> str:
+    """Return the setting that makes the steps of a finished run shorter.
+
+    Automatic ones follow their tolerance. On surfaces that move over each other they are shorter
+    than it asks for (:meth:`wear.stepping.WearingContact.comparable_cycles`), so that it does
+    nothing, and those of second order leave edges less high.
+    """
+    step, moving = wear.step, len(contact.state.paths) > 0
+    if step.depth is not None:
+        return f"wear.step.depth: {step.depth / SHORTER:.2g} mm"
+    if step.volume is not None:
+        return f"wear.step.volume: {step.volume / SHORTER:.2g} mm^3"
+    if step.automatic and not moving:
+        if wear.depth_tolerance is not None:
+            return f"wear.depth_tolerance: {wear.depth_tolerance / STRICTER:.2g} mm"
+        return f"wear.tolerance: {100.0 * wear.tolerance / STRICTER:.2g} %"
+    cycles = float(np.diff(contact.cycles).max(initial=1.0)) / SHORTER
+    kind = "second_order" if moving else step.kind
+    return f"wear.step: {{kind: {kind}, cycles: {max(cycles, 1.0):.2g}}}"
+
+
+def _of_link_and_coupling(case: WearCase, shorter: str) -> dict[str, str]:
+    """What makes the errors of link and coupling smaller that is not set yet."""
+    coupling = case.recoupling
+    settings = {
+        "constant": "coupling.resultants: drift",
+        "drift": f"coupling.drift: {100.0 * coupling.drift / SHORTER:.2g} %",
+        "every": shorter,
+    }
+    told = {"coupling": settings[coupling.resultants]}
+    if case.contact.link == "half_space":
+        told["link"] = "contact.link: corrected"
+    return told
+
+
+def _warn_of_steps(
+    wear: Duration, contact: InterfaceOutcome, shorter: str, reporter: Reporter
+) -> None:
     left, name = contact.step_error, contact.stage.name
     if left is None:
         return
@@ -54,12 +100,11 @@ def _warn_of_steps(wear: Duration, contact: InterfaceOutcome, reporter: Reporter
     if wear.step.automatic and error > asked:
         reporter.warn(
             f"{name}: wear steps leave an estimated error of {error:.2%} of depth and volume "
-            f"where {asked:.2%} was asked for (wear.tolerance): try wear.step.kind: second_order, "
-            "or shorter steps"
+            f"where {asked:.2%} was asked for (wear.tolerance): take shorter steps ({shorter})"
         )
     if left["pressure"] > PEAK:
         reporter.warn(
             f"{name}: wear steps leave an estimated error of {left['pressure']:.0%} of the "
             "peak pressure on the worn surfaces, and of what follows from it (fretting life): "
-            "try wear.step.kind: second_order, or shorter steps"
+            f"take shorter steps ({shorter})"
         )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from math import prod
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
@@ -23,14 +23,13 @@ SPECTRA = 300
 # Dense interface matrices alive at once while a joint is condensed.
 DENSE_MATRICES = 6
 
-# What makes each part of the error of a run smaller.
+# What makes each part of the error of a run smaller; that of steps, and of loads that follow late,
+# depends on what they are (workflow.analyses.wear.run_errors).
 SETTINGS = {
-    "link": "contact.link and the mesh of the contact faces",
+    "link": "the mesh of the contact faces",
     "mesh": "the mesh of the structure",
     "increments": "load_path.increments",
     "grid": "contact.grid",
-    "steps": "wear.step (kind: second_order) and wear.tolerance",
-    "coupling": "coupling.resultants and coupling.drift",
     "solver": "contact.tolerance",
 }
 
@@ -75,7 +74,7 @@ class WearStructure(Generic[AnyWearCase]):
     the nodes of both bodies and of all interfaces (0: unknown). ``choose`` gives the case with the
     settings that it leaves open, and a record of why; ``warnings`` are about the unworn contact of
     a stage under a peak load [N]. ``finer`` gives a finer mesh, if there is one that is cheap, and
-    ``settings`` say what makes the parts of the error smaller where that is not :data:`SETTINGS`.
+    ``settings`` of a case say what makes parts of the error smaller, if not :data:`SETTINGS`.
     """
 
     name: str
@@ -86,4 +85,4 @@ class WearStructure(Generic[AnyWearCase]):
     choose: Callable[[AnyWearCase], tuple[AnyWearCase, dict[str, Any] | None]] = as_written
     warnings: Callable[[AnyWearCase, ContactStage, float], Iterable[str]] = lambda *_: ()
     finer: Callable[[AnyWearCase], Finer[AnyWearCase] | None] = lambda _: None
-    settings: Mapping[str, str] = field(default_factory=dict)
+    settings: Callable[[AnyWearCase], Mapping[str, str]] = lambda _: {}

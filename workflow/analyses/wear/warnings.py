@@ -10,6 +10,7 @@ from sa_solver.types import ElasticPair, LoadHistory, Mask
 from wear.coupled import CoupledState
 from wear.interface import FirstContact
 from workflow.analyses.wear.case.base import WearCase
+from workflow.analyses.wear.case.sections import SIZES, Duration
 from workflow.analyses.wear.contact_stage import ContactStage
 from workflow.analyses.wear.link_report import report_link
 from workflow.analyses.wear.load_source import LoadSource
@@ -225,6 +226,17 @@ def warn_of_growth(stages: list[ContactStage], state: CoupledState, reporter: Re
         worn = interface.surfaces.depth
         if worn[[0, -1], :].any() or (not stage.grid.line and worn[:, [0, -1]].any()):
             warn_of_border(stage, reporter)
+
+
+def warn_of_many_jumps(wear: Duration, state: CoupledState, left: int, reporter: Reporter) -> None:
+    """Runs of more jumps than anybody looks at, and what makes them fewer."""
+    key = next((key for key in SIZES if getattr(wear.step, key) is not None), None)
+    longer = "wear.tolerance" if key is None else f"wear.step.{key}"
+    reporter.warn(
+        f"{state.jump} wear jumps have worn {state.cycles[-1]:.3g} of {wear.cycles:g} cycles, and "
+        f"about {left} are to come: each of them takes time and a place in the results; a larger "
+        f"{longer} makes them fewer"
+    )
 
 
 def warn_of_worn_cells(

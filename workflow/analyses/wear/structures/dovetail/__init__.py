@@ -108,5 +108,7 @@ STRUCTURE = WearStructure(
     choose=_choose,
     warnings=_warnings,
     finer=_finer,
-    settings={"mesh": "mesh.order, mesh.flank_nodes and mesh.size"},
+    settings=lambda case: {
+        "mesh": "mesh.order: 2" if case.mesh.order == 1 else "mesh.flank_nodes and mesh.size"
+    },
 )

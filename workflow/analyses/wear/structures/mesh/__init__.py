@@ -75,5 +75,7 @@ STRUCTURE = WearStructure(
     memory=_memory,
     choose=_choose,
     finer=_finer,
-    settings={"mesh": "mesh.order or a finer mesh"},
+    settings=lambda case: {
+        "mesh": "mesh.order: 2, or a finer mesh" if case.mesh.order == 1 else "a finer mesh"
+    },
 )

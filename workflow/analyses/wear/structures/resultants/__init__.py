@@ -32,7 +32,7 @@ STRUCTURE = WearStructure(
     case=ResultantsCase,
     source=_source,
     extent=_extent,
-    settings={
+    settings=lambda _: {
         "link": "displacements of the nodes in structure.file",
         "mesh": "the mesh that structure.file comes from",
         "increments": "more increments in structure.file",
