@@ -367,7 +367,7 @@ def describe(
 
 def _kinds() -> dict[str, str]:
     """What ``new`` writes: each kind of case, and other files, in a line of plain words."""
-    from workflow.templates import offered
+    from workflow.commands.new import offered
 
     return offered()
 
@@ -404,7 +404,7 @@ def new(kind: str | None, file: Path | None, short: bool) -> None:
 
     Example files that the case names are written beside it, where they are not there yet.
     """
-    from workflow.templates import text_of, write_new
+    from workflow.commands.new import text_of, write_new
 
     if kind is None:
         for name, text in _kinds().items():

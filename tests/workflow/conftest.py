@@ -308,6 +308,7 @@ def template_files(tmp_path_factory: pytest.TempPathFactory) -> Path:
         (folder / f"nodes_{body}.csv").write_text(NODES, encoding="utf-8")
     for name in ("specimens_wear.yaml", "specimens_rig.yaml"):
         shutil.copy(CASES / name, folder)
+    shutil.copy(CASES / "specimens_coarse.yaml", folder / "specimens.yaml")
     save_reduced(folder / "body_2.h5", BODY)
     return folder
 
@@ -326,7 +327,6 @@ def folders(tmp_path_factory: pytest.TempPathFactory, template_files: Path) -> d
         (made[kind] / "force.csv").write_text("time,force\n0,0\n1,5\n", encoding="utf-8")
         period = "phase [deg],force\n0,0\n90,5\n270,-5\n360,0\n"
         (made[kind] / "period.csv").write_text(period, encoding="utf-8")
-        shutil.copy(CASES / "specimens_coarse.yaml", made[kind] / "specimens.yaml")
         write_matrices_of_templates(made[kind])
         rows = "".join(f"pad {number},1\n" for number in range(1, PADS + 1))
         (made[kind] / "nodes.csv").write_text(f"point,area\n{rows}", encoding="utf-8")

@@ -161,6 +161,8 @@ def stated(leaf):
             return [f"evolution={{file: {example}}}"]
         case "structure.body":
             return ["structure.file=specimens.yaml", plain]
+        case "structure.file" if example == "specimens.yaml":
+            return [plain, "structure.body=2"]
         case "load_path.file":
             return [f"load_path={{file: {example}}}"]
         case "mesh.size" if leaf.kind == "mesh":
