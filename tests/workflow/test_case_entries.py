@@ -159,10 +159,8 @@ def stated(leaf):
             return [leaf.key.replace("energy", "cycles="), plain]
         case "evolution.file":
             return [f"evolution={{file: {example}}}"]
-        case "structure.body":
-            return ["structure.file=specimens.yaml", plain]
-        case "structure.file" if example == "specimens.yaml":
-            return [plain, "structure.body=2"]
+        case "structure.body" | "structure.file" if example in (2, "specimens.yaml"):
+            return ["structure.file=specimens.yaml", "structure.body=2"]
         case "load_path.file":
             return [f"load_path={{file: {example}}}"]
         case "mesh.size" if leaf.kind == "mesh":
