@@ -7,9 +7,10 @@ the other way round, each state acts over half the slip before it and half the s
     Σ_t (p_{t-1} + p_t)/2 |Δs_t| = Σ_t p_t (|Δs_t| + |Δs_{t+1}|)/2      (cycles are closed)
 
 Taking the pressure at the end alone is of first order: 6 % too much on a dovetail of 22 increments,
-where this leaves 0.3 %. Cells that part while others stay have half of their pressure before over
-the slip of the increment, no more than that of the cells next to them that stay. Where bodies part altogether within an increment nothing says how far they
-had slid by then: it counts for none.
+where this leaves 0.3 %. Cells that part while others stay in contact work at half of their pressure
+before over the slip of the increment, which is no more than that of the cells beside them
+(:meth:`sa_solver.contact.FrictionalContact.advance`). Where bodies part altogether within an
+increment nothing says how far they had slid by then: it counts for none.
 """
 
 from __future__ import annotations
