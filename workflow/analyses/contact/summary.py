@@ -62,10 +62,12 @@ def increments_errors(
         return {}
     other = replace(history, states=history.others)
     both = history, other
-    last = [state_summaries(grid, friction, each)[-1] for each in both]
-    loops = [loop_summary(grid, friction, table, each, strain) or {} for each in both]
-    pairs = {"last": last, "loop": loops}
-    return {name: _changes(*pair, history.share) for name, pair in pairs.items()}
+    last, last_other = (state_summaries(grid, friction, each)[-1] for each in both)
+    loop, loop_other = (loop_summary(grid, friction, table, each, strain) or {} for each in both)
+    return {
+        "last": _changes(last, last_other, history.share),
+        "loop": _changes(loop, loop_other, history.share),
+    }
 
 
 def _changes(
