@@ -35,7 +35,7 @@ from sa_solver.tangential import (
     TangentialContactError,
     TangentialState,
 )
-from sa_solver.types import Array
+from sa_solver.types import Array, Mask
 
 GROSS_SHARE = 0.99
 """Share of the largest shear force from which the contact counts as sliding, where energies are at
@@ -147,7 +147,8 @@ class FrictionalContact:
         else:
             begin = ContactStart(shear=before.shear) if known.shear is None else known
             tangential = self._shear(before, limit, offset, load, begin)
-        return self._state(before, load, normal, tangential, sliding)
+        slip = self._slip(before, normal.pressure > 0.0, offset, tangential, _motion_of(tangential))
+        return self._state(before, load, normal, replace(tangential, slip=slip), sliding)
 
     def two_normal_problems(self, before: ContactState, load: ContactLoad) -> bool:
         """Whether the shear follows from two normal problems: first loading of a line contact."""
@@ -265,13 +266,19 @@ class FrictionalContact:
                 slipping=slipping,
             )
 
+        def slip_of(state: TangentialState) -> Array:
+            return self._slip(before, limit > 0.0, offset, state, _motion_of(state))
+
         near = _increment(before, known)
-        return self._by_energy(solve, lambda state: limit, before, shear, offset, load, near)
+        return self._by_energy(
+            solve, lambda state: limit, slip_of, before, shear, offset, load, near
+        )
 
     def _by_energy(
         self,
         solve: Callable[[Array, float, _State | None], _State],
         limit_of: Callable[[_State], Array],
+        slip_of: Callable[[_State], Array],
         before: ContactState,
         shear: Array,
         offset: Array,
@@ -281,8 +288,8 @@ class FrictionalContact:
         """Gross slip by the energy of ``load``, and whether it creeps.
 
         ``solve`` finds the state for a motion (Δδx, Δδy), to a tolerance, from the last one;
-        ``limit_of`` gives its µp, and ``shear`` ``(2, nx, ny)`` is about that of sliding. A motion
-        ``near`` the one sought may be known.
+        ``limit_of`` gives its µp and ``slip_of`` its slip, and ``shear`` ``(2, nx, ny)`` is about
+        that of sliding. A motion ``near`` the one sought may be known.
         """
         assert load.energy is not None
         last: deque[_State] = deque(maxlen=1)
@@ -294,7 +301,7 @@ class FrictionalContact:
             last.append(state)
             spent += state.convolutions
             force = state.shear.sum(axis=(1, 2)) * self.grid.cell_area
-            return force, self._dissipated(before, limit_of(state), state.slip)
+            return force, self._dissipated(before, limit_of(state), slip_of(state))
 
         stored = float(np.vdot(shear, self.half_space.shear(shear) + offset)) * self.grid.cell_area
         force = load.values[1:3]
@@ -339,7 +346,7 @@ class FrictionalContact:
         tangential: TangentialState,
         sliding: bool,
     ) -> ContactState:
-        shift = np.array([tangential.shift_x, tangential.shift_y, tangential.twist])
+        shift = _motion_of(tangential)
         rigid = np.array([normal.approach, 0.0, 0.0, normal.tilt_x, normal.tilt_y, 0.0])
         rigid[list(PLANAR)] = before.rigid[list(PLANAR)] + shift
         resultants = np.array([normal.P, 0.0, 0.0, normal.Mx, normal.My, 0.0])
@@ -363,6 +370,35 @@ class FrictionalContact:
             convolutions=normal.convolutions + tangential.convolutions,
             border_load=normal.border_load,
         )
+
+    def _slip(
+        self,
+        before: ContactState,
+        pressed: Mask,
+        offset: Array,
+        state: TangentialState | CoupledState,
+        motion: Array,
+    ) -> Array:
+        """Slip ``(2, nx, ny)`` [mm] of an increment, of the cells that part in it too.
+
+        ``pressed`` ``(nx, ny)`` are in contact at its end, ``motion`` (3,) is (Δδx, Δδy, Δφz).
+        Where cells part their surfaces move on apart: they slip no farther than the pressed cell
+        next to them. Where all of the bodies part, nothing says how far they slid before.
+        """
+        slip = np.where(pressed, state.slip, 0.0)
+        parting = (before.pressure > 0.0) & ~pressed
+        if not (pressed.any() and parting.any()):
+            return slip
+        from scipy.ndimage import distance_transform_edt  # where cells part
+
+        moved, modes = state.displacement[:2] + offset, self._modes
+        modes.add_motion(moved, -motion[: len(modes.free)] * modes.lengths)
+        nearest = distance_transform_edt(
+            ~pressed, sampling=self.grid.pitch, return_distances=False, return_indices=True
+        )
+        beside, size = np.hypot(*slip)[tuple(nearest)], np.hypot(*moved)
+        share = np.divide(beside, size, out=np.ones_like(size), where=size > beside)
+        return np.where(parting, share * moved, slip)
 
     def _dissipated(self, before: ContactState, limit: Array, slip: Array) -> Array:
         """Energy in x and in y [N mm], where the increment ends with µp = ``limit``."""
@@ -400,17 +436,18 @@ class FrictionalContact:
         rigid[list(PLANAR)] += before.rigid[list(PLANAR)]
         pressed = state.pressure > 0.0
         limit = self.friction * state.pressure
+        slip = self._slip(before, pressed, offset, state, state.rigid[list(PLANAR)])
         return ContactState(
             traction=state.traction,
             displacement=state.displacement,
-            slip=np.where(pressed, state.slip, 0.0),
+            slip=slip,
             gap=state.gap,
             sticking=pressed & (np.hypot(*state.shear) < limit * (1.0 - ROUNDING)),
             resultants=state.resultants,
             rigid=rigid,
             strain=load.strain,
             along=load.along,
-            energy=self._dissipated(before, limit, state.slip),
+            energy=self._dissipated(before, limit, slip),
             sliding=sliding,
             residual=state.residuals.largest,
             converged=state.converged,
@@ -445,7 +482,16 @@ class FrictionalContact:
         def limit_of(state: CoupledState) -> Array:
             return np.asarray(self.friction * state.pressure)
 
-        return self._by_energy(solve, limit_of, before, shear, offset, load, near)[0]
+        def slip_of(state: CoupledState) -> Array:
+            motion = state.rigid[list(PLANAR)]
+            return self._slip(before, state.pressure > 0.0, offset, state, motion)
+
+        return self._by_energy(solve, limit_of, slip_of, before, shear, offset, load, near)[0]
+
+
+def _motion_of(state: TangentialState) -> Array:
+    """(Δδx, Δδy, Δφz) [mm, rad] of an increment."""
+    return np.array([state.shift_x, state.shift_y, state.twist])
 
 
 def _increment(before: ContactState, known: ContactStart) -> Array | None:

@@ -66,13 +66,13 @@ class ContactState:
     """State of a frictional contact at the end of an increment.
 
     Fields: ``traction`` ``(3, nx, ny)`` ordered qx, qy, p [MPa], its ``displacement`` K t
-    ``(3, nx, ny)`` [mm], ``slip`` ``(2, nx, ny)`` of the increment [mm], ``gap`` ``(nx, ny)`` [mm],
-    ``sticking`` ``(nx, ny)``. ``resultants`` (6,) and ``rigid`` (6,) are ordered as in
-    :class:`ContactLoad`, of which ``strain`` and ``along`` are; ``rigid`` counts from the bodies
-    apart. ``energy`` (2,) is dissipated in the increment in x and y [N mm]. ``sliding`` says that
-    the whole contact slipped by its energy: then the Q in ``resultants`` follows, and need not be
-    the one given. ``residual`` is the largest of the residuals of the problems solved; ``message``
-    is empty when ``converged``.
+    ``(3, nx, ny)`` [mm], ``slip`` ``(2, nx, ny)`` [mm] of the increment in cells that are pressed
+    before or after it, ``gap`` ``(nx, ny)`` [mm], ``sticking`` ``(nx, ny)``. ``resultants`` (6,)
+    and ``rigid`` (6,) are ordered as in :class:`ContactLoad`, of which ``strain`` and ``along``
+    are; ``rigid`` counts from the bodies apart. ``energy`` (2,) is dissipated in the increment in x
+    and y [N mm]. ``sliding`` says that the whole contact slipped by its energy: then the Q in
+    ``resultants`` follows, and need not be the one given. ``residual`` is the largest of the
+    residuals of the problems solved; ``message`` is empty when ``converged``.
     """
 
     traction: Array

@@ -15,7 +15,7 @@ Source: Spinu & Frunza 2015, J. Phys. Conf. Ser. (reversals).
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from math import ceil, inf
 from typing import Literal
@@ -49,6 +49,9 @@ come."""
 
 PARTS_OF_LEGS = 4
 """Two halves of a leg differ little from the whole: they tell a sixth of its error, these half."""
+
+NO_ENERGY = 1e-3
+"""Share of the work of the shear loads below which energies are none: what sticks by all rules."""
 
 IN_PARTS = "the same path, its increments in parts:"
 
@@ -115,7 +118,10 @@ class History:
 
     ``method`` is what was taken and ``reason`` why, every increment in so many ``parts``. ``error``
     is the measured error of the shear, summed over all cells, over the largest µP of the path, by
-    what ``error_of`` says, and largest at row ``error_at``; None where increments do not matter.
+    what ``error_of`` says, and largest at row ``error_at``; ``energy_error`` that of the energy of
+    all rows, relative; both None where increments do not matter. Then ``others`` are the states at
+    the same rows, by another number of parts, and any result of ``states`` has an estimated error
+    of ``share`` times what it differs from theirs.
     """
 
     states: list[ContactState]
@@ -126,6 +132,9 @@ class History:
     error: float | None = None
     error_of: str = ""
     error_at: int = 0
+    energy_error: float | None = None
+    others: list[ContactState] = field(default_factory=list)
+    share: float = 0.0
 
 
 def march_history(
@@ -142,11 +151,11 @@ def march_history(
     """Solve a history on surfaces that do not wear.
 
     ``height`` ``(nx, ny)`` [mm] is the gap of the unloaded bodies. ``history`` ``auto`` takes the
-    cheapest method that suffices, and splits increments that matter until their error is within
-    ``accuracy``; ``full`` takes those of the path, and estimates what they leave; ``reversals``
-    raises HistoryError where legs cannot be taken in one step. An increment that has not converged
-    ends the march: it is the last state. ``progress`` is called with each row, its state and about
-    what share of the work is done; anew when increments are split.
+    cheapest method that suffices, and splits increments that matter until shear and energy are
+    within ``accuracy``; ``full`` takes those of the path, and estimates what they leave;
+    ``reversals`` raises HistoryError where legs cannot be taken in one step. An increment that has
+    not converged ends the march: it is the last state. ``progress`` is called with each row, its
+    state and about what share of the work is done; anew when increments are split.
 
     Raises what :meth:`FrictionalContact.advance` raises.
 
@@ -297,10 +306,8 @@ def _as_given(contact: FrictionalContact, march: _Marches, reason: str, parts: i
     finer = march(parts)
     if not finer[-1].converged:
         return history
-    change, row = _shear_difference(contact, finer, history.states)
     # Backward Euler is of first order: the parts leave their share of the error.
-    error = change * parts / (parts - 1)
-    return replace(history, error=error, error_of=f"{IN_PARTS} {parts}", error_at=row)
+    return _estimated(contact, history, finer, parts / (parts - 1), parts)
 
 
 def _split(
@@ -311,17 +318,37 @@ def _split(
     history, error = _history(march(1, 2 + more), reason), inf
     while history.states[-1].converged and error > accuracy and 2 * history.parts <= most:
         parts = history.parts
-        wanted = 2 if parts == 1 else ceil(parts * error / accuracy)
+        # Energy converges faster where pressure changes, after a first error that tells little.
+        wanted = 2 if parts == 1 else ceil(parts * (history.error or 0.0) / accuracy)
         finer = min(most, max(2 * parts, wanted))
         ahead = more if parts == 1 else 0
         coarse, history = history.states, _history(march(finer, ahead), reason, finer)
         if not history.states[-1].converged:
             break
-        change, row = _shear_difference(contact, history.states, coarse)
         # First order: errors are as lengths, and the change is their difference.
-        error = change * parts / (finer - parts)
-        history = replace(history, error=error, error_of=f"{IN_PARTS} {parts}", error_at=row)
+        history = _estimated(contact, history, coarse, parts / (finer - parts), parts)
+        error = max(history.error or 0.0, history.energy_error or 0.0)
     return history
+
+
+def _estimated(
+    contact: FrictionalContact,
+    history: History,
+    others: list[ContactState],
+    share: float,
+    parts: int,
+) -> History:
+    """The history with its errors, ``share`` of what it differs from ``others`` in ``parts``."""
+    change, row = _shear_difference(contact, history.states, others)
+    return replace(
+        history,
+        error=share * change,
+        error_of=f"{IN_PARTS} {parts}",
+        error_at=row,
+        energy_error=share * _energy_difference(history.states, others),
+        others=others,
+        share=share,
+    )
 
 
 def _history(states: list[ContactState], reason: str, parts: int = 1) -> History:
@@ -355,6 +382,19 @@ def _one_leg(contact: FrictionalContact, states: list[ContactState], legs: Conta
     """Whether the last leg is the first loading of a line contact."""
     begun = len(states) == len(legs) > 1
     return begun and contact.two_normal_problems(states[-2], legs.load(len(legs) - 1))
+
+
+def _energy_difference(ones: list[ContactState], others: list[ContactState]) -> float:
+    """Difference of the energies of all rows, relative, rows that cancel added by their sizes."""
+    found, known = (np.array([state.energy.sum() for state in states]) for states in (ones, others))
+    planar = list(PLANAR)
+    forces, motions = (
+        np.array([getattr(state, name)[planar] for state in ones])
+        for name in ("resultants", "rigid")
+    )
+    worked = np.abs(np.sum(forces * np.diff(motions, axis=0, prepend=0.0), axis=1)).sum()
+    scale = max(float(found.sum()), NO_ENERGY * float(worked))
+    return float(np.abs(found - known).sum()) / scale if scale > 0.0 else 0.0
 
 
 def _shear_difference(

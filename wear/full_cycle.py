@@ -15,6 +15,7 @@ import numpy as np
 from sa_solver.contact import FrictionalContact
 from sa_solver.contact_state import ContactLoad, ContactStart, ContactState
 from sa_solver.errors import ContactProblemError
+from sa_solver.increments import before
 from sa_solver.normal import NormalStart
 from sa_solver.types import Array, LoadHistory, Mask
 from wear.drive import Drive
@@ -66,6 +67,17 @@ def starts_near(
         together = None if normal is None else np.stack([*shear, normal.pressure])
         starts.append(ContactStart(normal, shear, slipping, motion, together))
     return starts
+
+
+def slip_known(cycle: Sequence[ContactState], loads: LoadHistory) -> Mask | None:
+    """Cells ``(t, nx, ny)`` whose slip a cycle of the half-space knows: pressed at either end.
+
+    None where there is no such cycle.
+    """
+    if not cycle:
+        return None
+    pressures = np.stack([state.pressure for state in cycle])
+    return np.asarray((pressures > 0.0) | (before(pressures, loads.missions) > 0.0))
 
 
 def march_cycle(

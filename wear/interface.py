@@ -22,10 +22,10 @@ from sa_solver.half_space import HalfSpace
 from sa_solver.normal import NormalContact
 from sa_solver.rigid_modes import NORMAL
 from sa_solver.ties import first_largest
-from sa_solver.types import Array, ElasticPair, Grid, LoadHistory
+from sa_solver.types import Array, ElasticPair, Grid, LoadHistory, Mask
 from wear.drive import Drive
 from wear.face_loads import FaceLoads
-from wear.full_cycle import CycleStart, march_cycle, starts_near
+from wear.full_cycle import CycleStart, march_cycle, slip_known, starts_near
 from wear.laws import EvolvingLaw, WearLaw
 from wear.link import Link, Transfer, linked
 from wear.marching import advance_cycles
@@ -227,6 +227,7 @@ class InterfaceContact:
         result = loaded.contact.cycle(state, np.flatnonzero(history.loads.P > 0.0).tolist())
         depth_rate, volume_rate = result.per_cycle(self.grid.cell_area)
         starts = {t: pressed.start for t, pressed in result.states.items()}
+        known = slip_known(loaded.cycle, history.loads)
         state = replace(
             state,
             depth_rate=depth_rate,
@@ -234,7 +235,7 @@ class InterfaceContact:
             starts=starts,
             start=loaded.contact.start,
             pressed=self._pressed(starts, history),
-            paths=self._paths(loaded.slip, starts, history.loads),
+            paths=self._paths(loaded.slip, starts, history.loads, known),
         )
         first_step = first_cycles(loaded.contact, state, cycles)
         states, pressure = result.states.values(), self._pressure(result)
@@ -430,11 +431,13 @@ class InterfaceContact:
         self._spent += Spent(len(cycle), sum(increment.convolutions for increment in cycle))
         return cycle
 
-    def _paths(self, slip: Array, starts: Starts, loads: LoadHistory) -> Array:
+    def _paths(
+        self, slip: Array, starts: Starts, loads: LoadHistory, known: Mask | None = None
+    ) -> Array:
         """The ways of body 2 over which the states act, if its motion is to be followed."""
         pressure = sum((start.pressure for start in starts.values()), np.zeros(self.grid.shape))
-        law = self.settings.laws[0]
-        paths = followed(self.grid, slip, pressure, loads.missions, self.settings.follow)
+        law, forced = self.settings.laws[0], self.settings.follow
+        paths = followed(self.grid, slip, pressure, loads.missions, forced, known)
         if len(paths) and isinstance(law, EvolvingLaw) and law.scope == "local":
             raise MotionError(
                 "the surfaces move over each other, and that of body 1 changes from place to "

@@ -154,11 +154,13 @@ def offsets(slip: Array, weight: Array) -> Array:
     """Offsets ``(t + 1, 2)`` [mm] of body 2 before the first and after each increment of a cycle.
 
     The motion is the mean of ``slip`` ``(t, 2, nx, ny)`` [mm] weighted by ``weight`` ``(nx, ny)``,
-    such as the pressure of the cycle, and counts from the middle between its extremes. A closed
-    cycle comes back to where it began; what is missing is spread evenly over its increments.
+    such as the pressure of the cycle, or ``(t, nx, ny)`` where slip is not known of all cells in
+    each increment, and counts from the middle between its extremes. A closed cycle comes back to
+    where it began; what is missing is spread evenly over its increments.
     """
-    total = float(weight.sum())
-    steps = np.einsum("tcij,ij->tc", slip, weight) / (total if total > 0.0 else 1.0)
+    weight = np.broadcast_to(weight, (len(slip), *slip.shape[2:]))
+    total = weight.sum(axis=(1, 2))[:, None]
+    steps = np.einsum("tcij,tij->tc", slip, weight) / np.where(total > 0.0, total, 1.0)
     path = np.concatenate([np.zeros((1, 2)), np.cumsum(steps, axis=0)])
     path -= np.linspace(0.0, 1.0, len(path))[:, None] * path[-1]
     middle: Array = 0.5 * (path.max(axis=0) + path.min(axis=0))
@@ -187,6 +189,7 @@ def followed(
     pressure: Array,
     missions: Sequence[slice] = (slice(None),),
     forced: bool | None = None,
+    known: Mask | None = None,
 ) -> Array:
     """Paths of body 2 over which each state of a cycle acts ``(t, 3, 2)`` [mm], if they count.
 
@@ -194,9 +197,13 @@ def followed(
     not count. ``slip`` ``(t, 2, nx, ny)`` [mm] is that of the increments and ``pressure``
     ``(nx, ny)`` that of the whole cycle, see :func:`offsets`; ``missions`` are the increments of
     each closed cycle of a mix. Motion that counts in one (:func:`moves`) is followed in all;
-    ``forced`` says instead whether to follow it.
+    ``forced`` says instead whether to follow it. ``known`` ``(t, nx, ny)`` are the cells whose slip
+    each increment knows; None: all.
     """
-    paths = [offsets(slip[mission], pressure) for mission in missions]
+    weight = np.broadcast_to(pressure, (len(slip), *pressure.shape))
+    if known is not None:
+        weight = weight * known
+    paths = [offsets(slip[mission], weight[mission]) for mission in missions]
     if forced is None:
         forced = any(moves(path, pressure > 0.0, grid) for path in paths)
     if not forced:

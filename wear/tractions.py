@@ -62,14 +62,18 @@ class CycleTractions:
         return friction_work(limit, self.slip, loads.P > 0.0, loads.missions)
 
     @property
+    def rubbed(self) -> Array:
+        """What a mean cycle rubs off the places of the grid, per area ``(nx, ny)`` [N/mm]."""
+        return np.asarray(np.sum(self.loads.share[:, None, None] * self.work, axis=0))
+
+    @property
     def increments_left(self) -> tuple[Array, Array] | None:
         """What a cycle rubs off the places of the grid, and what its increments leave of that.
 
         Per area ``(nx, ny)`` [N/mm]; None where nothing is rubbed, or nobody knows.
         """
-        loads = self.loads
+        loads, rubbed = self.loads, self.rubbed
         often = loads.share[:, None, None]
-        rubbed = np.sum(often * self.work, axis=0)
         limit = self.friction * often * self.pressure
         errors = errors_of_increments(limit, self.slip, loads.P > 0.0, loads.missions)
         return None if errors is None or not rubbed.any() else (rubbed, errors.sum(axis=0))
@@ -86,5 +90,20 @@ def increments_error(cycles: Iterable[CycleTractions]) -> dict[str, float] | Non
     if not known:
         return None
     rubbed, errors = (np.sum(fields, axis=0) for fields in zip(*known, strict=True))
+    return _relative(errors, rubbed)
+
+
+def increments_change(
+    cycles: Iterable[CycleTractions], halves: Iterable[CycleTractions]
+) -> dict[str, float] | None:
+    """The same by ``halves``, these cycles in twice as many increments: twice what those change.
+
+    Friction marched by Backward Euler is of first order in its increments.
+    """
+    rubbed, finer = (np.sum([cycle.rubbed for cycle in all_], axis=0) for all_ in (cycles, halves))
+    return _relative(2.0 * (rubbed - finer), rubbed) if rubbed.any() else None
+
+
+def _relative(errors: Array, rubbed: Array) -> dict[str, float]:
     depth, _ = depth_and_energy(errors) / depth_and_energy(rubbed)
     return {"depth": float(depth), "energy": float(errors.sum() / rubbed.sum())}

@@ -157,6 +157,45 @@ def test_increments_of_a_load_that_turns_are_split_as_accuracy_asks():
         assert marched.error / 3.0 < apart(marched, finest) < 3.0 * marched.error
 
 
+def both_rising():
+    """Pressed, pressed more and sheared at once, and back."""
+    values = np.zeros((3, 6))
+    values[:, 0], values[:, 1] = [40.0, 80.0, 40.0], [0.0, 20.0, 0.0]
+    return values
+
+
+def round_an_ellipse(steps=12):
+    angle = 2.0 * np.pi * np.arange(1, steps + 1) / steps
+    values = np.zeros((steps + 1, 6))
+    values[:, 0], values[0, 1] = 50.0, 12.0
+    values[1:, 1], values[1:, 2] = 12.0 * np.cos(angle), 6.0 * np.sin(angle)
+    return values
+
+
+@pytest.mark.parametrize(
+    ("values", "parts", "within"), [(both_rising(), 32, 0.01), slow(round_an_ellipse(), 24, 0.03)]
+)
+def test_energy_has_an_error_of_its_own(values, parts, within):
+    """Where the shear is within 2 % of µP at once, 29 and 4 % of the energy may be missing."""
+    material = Material(115e3, 0.29)
+    grid = Grid.covering((0.48, 0.48), (16, 16))
+    half_space, height = HalfSpace(grid, ElasticPair(material, material)), grid.x**2 / 20.0
+    height, given = height + grid.y**2 / 20.0, ContactLoadPath(values)
+    contact = FrictionalContact(half_space, 0.4)
+    state, exact = contact.apart(height), 0.0
+    for row in range(len(given)):
+        for part in range(1, parts + 1):
+            state = contact.advance(state, height, given.load(row, part / parts))
+            exact += state.energy.sum()
+    split = march_history(half_space, height, given, 0.4)
+    assert sum(state.energy.sum() for state in split.states) == pytest.approx(exact, rel=within)
+    whole = march_history(half_space, height, given, 0.4, history="full")
+    for marched in (split, whole):
+        true = abs(sum(state.energy.sum() for state in marched.states) / exact - 1.0)
+        assert true < 2.0 * marched.energy_error
+    assert split.energy_error <= 0.02 < whole.energy_error < 4.0 * true
+
+
 @pytest.mark.parametrize("friction", [0.5, slow(0.3)])
 def test_unlike_bodies_pressed_in_one_increment_stick_as_those_of_a_growing_load(friction):
     """Spence 1968: c/a of any profile is that of a flat strip, which has nothing to refine."""

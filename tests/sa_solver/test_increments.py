@@ -108,3 +108,13 @@ def test_slip_that_is_left_when_bodies_part_is_missed(apart: float) -> None:
 def test_increments_that_all_turn_tell_nothing() -> None:
     pressure, slip, _ = cycle(2)
     assert errors_of_increments(pressure, slip, np.ones(2, dtype=bool)) is None
+
+
+def test_a_few_cells_that_go_one_way_tell_nothing_of_the_others() -> None:
+    """Two increments that turn wherever much is worn; one cell creeps along one way in both."""
+    pressure = np.array([[2.0, 3.0, 1.0], [1.0, 2.0, 1.0]])
+    slip = np.zeros((2, 2, 3))
+    slip[:, 0] = [[1.0, 1.0, 1e-3], [-1.0, -1.0, 1e-3]]
+    loaded = np.ones(2, dtype=bool)
+    assert errors_of_increments(pressure, slip, loaded) is None
+    assert errors_of_increments(pressure[:, 2:], slip[:, :, 2:], loaded) is not None

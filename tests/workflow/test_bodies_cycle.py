@@ -8,7 +8,10 @@ import h5py
 import numpy as np
 import pytest
 
+from tests.marks import slow
 from tests.workflow.commands import command
+from workflow.analyses.wear import ANALYSIS
+from workflow.analyses.wear.contact_stage import ContactStage
 from workflow.analyses.wear.structures.bodies.case import BodiesWearCase, LineBodiesWearCase
 from workflow.analyses.wear.structures.bodies.source import BodiesSource
 from workflow.case.writing import dump_case
@@ -155,3 +158,73 @@ def test_what_forces_dissipate_only_the_half_space_knows(tmp_path: Path) -> None
         assert not {"Edx", "Edy"} & structure["load_history"].keys()
     page = (tmp_path / "out" / "report.html").read_text("utf-8")
     assert "energy dissipated in a cycle, unworn" in page
+
+
+# --- increments -----------------------------------------------------------------------------------
+
+COARSE = "contact.grid=[16, 16]", "contact.size=[0.6 mm, 0.6 mm]"
+RISING = "{legs: [{P: 80 N, Qx: 20 N}, {P: 40 N, Qx: 0 N}]}"
+TURNING = "{legs: [{P: 60 N, Qx: 12 N}, {P: 40 N, Qx: -12 N}]}"
+
+
+def cycle_energy(case: BodiesWearCase, parts: int = 1) -> float:
+    """What an unworn cycle dissipates, its increments in so many parts [N mm]."""
+    source = BodiesSource(case, parts)
+    _, first = ContactStage(case, source.faces[0]).begin(source.unworn()[0], 1.0)
+    return float(first.energy.sum())
+
+
+@pytest.mark.parametrize(
+    ("legs", "whole", "accuracy"), [(TURNING, 0.06, 0.05), slow(RISING, 0.5, 0.02)]
+)
+def test_increments_are_split_until_they_leave_the_accuracy(
+    legs: str, whole: float, accuracy: float
+) -> None:
+    """As the template writes them, one to a leg, they leave far more."""
+    case = area(legs, *COARSE, f"contact.accuracy={accuracy}")
+    many = cycle_energy(case, 16)
+    chosen, record = ANALYSIS.choose(case)
+    assert isinstance(chosen, BodiesWearCase)
+    assert record is not None
+    assert record["met"]
+    assert cycle_energy(case) > (1.0 + whole) * many
+    assert cycle_energy(chosen) == pytest.approx(many, rel=accuracy)
+    increments = [leg.increments for leg in chosen.load_path.legs]
+    assert list(record["chosen"].values()) == increments
+
+
+def test_what_should_stick_hardly_slips() -> None:
+    """Q rises with P by less than µ: no slip at all (Mindlin and Deresiewicz 1953)."""
+    case = area("{legs: [{P: 80 N, Qx: 4 N}, {P: 40 N, Qx: 0 N}]}", *COARSE)
+    chosen, _ = ANALYSIS.choose(case)
+    assert isinstance(chosen, BodiesWearCase)
+    assert cycle_energy(chosen) < 0.02 * cycle_energy(case)
+
+
+def test_accuracy_and_strokes_that_slide_take_the_increments_as_they_are() -> None:
+    """Shear that slides at a constant pressure has no error by its increments."""
+    for case in (
+        area("{P: 50, stroke: 50 um, increments: 2}"),
+        area(TURNING, "contact.accuracy=1"),
+    ):
+        assert ANALYSIS.choose(case) == (case, None)
+
+
+@pytest.mark.slow
+def test_a_run_tells_what_the_rows_of_a_file_leave(tmp_path: Path) -> None:
+    """Rows are not split: volume is too large by what is told, which is no 0."""
+    (tmp_path / "cycle.csv").write_text("P,Qx\n60,12\n40,-12\n")
+    settings = [
+        *SMALL,
+        *COARSE,
+        "load_path={file: cycle.csv}",
+        "wear.cycles=20",
+        "wear.step.cycles=20",
+    ]
+    case = parse_case(AREA, str(tmp_path / "case.yaml"), [*settings, *PLAIN])
+    assert isinstance(case, BodiesWearCase)
+    found = run(case, tmp_path / "out")["interface"]
+    many = cycle_energy(case, 24)
+    true = found["energy"] / 20.0 / many - 1.0
+    assert found["increments_error"]["energy"] == pytest.approx(true, rel=1.0)
+    assert found["increments_error"]["energy"] > 0.05

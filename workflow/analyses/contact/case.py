@@ -235,7 +235,8 @@ class HalfSpaceGrid(Section):
         default="auto",
     )
     accuracy: Annotated[float, Quantity("1", at_least=1e-6, at_most=1.0)] = entry(
-        "of shear over µP that increments may leave: auto splits them, full warns [1]",
+        "of shear over µP and of energy that increments may leave: auto splits them, full warns "
+        "[1]",
         "2 %",
         default=0.02,
     )

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from functools import partial
-
 from workflow.analyses.contact.case import BodiesCase
 from workflow.analyses.contact.datasets import LOADS, RIGID_MOTIONS
 from workflow.shell.analysis import Summary
@@ -35,6 +33,7 @@ NUMBERS = {
 # Forces and motions below this share of the largest are rounding.
 ROUNDING = 1e-9
 FORCES = "P", "Qx", "Qy"
+BY_INCREMENTS = "of the increments of the load"
 # What runs are compared by, beside the numbers.
 CURVES = (
     CurvesOf(
@@ -55,11 +54,15 @@ CURVES = (
 
 
 def main_results(case: BodiesCase, summary: Summary) -> list[Quantity]:
-    """Of the last state and the last cycle; errors are those that increments leave of shear."""
+    """Of the last state and the last cycle; errors are those that increments leave of each."""
     last, loop = summary["states"][-1], summary["loop"] or {}
     line = "contact_half_width" in last
-    of_shear = estimate(summary, "history.error", "shear over µP, by the increments")
-    of = partial(Quantity, LAST)
+
+    def of(text: str, path: str, unit: str, where: str = LAST) -> Quantity:
+        place = "loop" if where == LOOP else "last"
+        error = f"increments_error.{place}.{path.rpartition('.')[2]}"
+        return Quantity(where, text, path, unit, **estimate(summary, error, BY_INCREMENTS))
+
     quantities = [
         of(f"{LOADS[name][1]}, {name}", f"states.-1.{name}", unit_in(line, LOADS[name][0]))
         for name in _large(last, FORCES)
@@ -69,16 +72,18 @@ def main_results(case: BodiesCase, summary: Summary) -> list[Quantity]:
         for name in _large(last, ("approach", "shift_x", "shift_y"))
     ]
     for name, (unit, text) in NUMBERS.items():
-        known = of_shear if name == "peak_shear" else {}
-        quantities.append(of(text, f"states.-1.{name}", unit_in(line, unit), **known))
+        quantities.append(of(text, f"states.-1.{name}", unit_in(line, unit)))
     if loop:
         (force_unit, force), motion = LOADS[loop["force"]], loop["motion"]
         energy, amplitude = unit_in(line, "N mm"), RIGID_MOTIONS[motion][0]
         quantities += [
-            Quantity(LOOP, "energy dissipated", "loop.energy", energy),
-            Quantity(LOOP, f"amplitude of the {MOTIONS[motion]}", "loop.amplitude", amplitude),
-            Quantity(
-                LOOP, f"amplitude of the {force}", "loop.force_amplitude", unit_in(line, force_unit)
+            of("energy dissipated", "loop.energy", energy, LOOP),
+            of(f"amplitude of the {MOTIONS[motion]}", "loop.amplitude", amplitude, LOOP),
+            of(
+                f"amplitude of the {force}",
+                "loop.force_amplitude",
+                unit_in(line, force_unit),
+                LOOP,
             ),
         ]
     return told(summary, quantities)

@@ -20,7 +20,13 @@ from workflow.analyses.contact.datasets import (
     traction_fields,
 )
 from workflow.analyses.contact.load_table import LoadTable
-from workflow.analyses.contact.summary import loop_summary, slides, state_summaries, stick_zone
+from workflow.analyses.contact.summary import (
+    increments_errors,
+    loop_summary,
+    slides,
+    state_summaries,
+    stick_zone,
+)
 from workflow.case.plain import counted
 from workflow.shell.analysis import Run
 from workflow.shell.dataset import Dataset, described
@@ -29,6 +35,8 @@ from workflow.shell.summary import finish
 
 ContactRun = Run[BodiesCase]
 
+# What the summary says of a history.
+HISTORY = "method", "reason", "parts", "error", "error_of", "energy_error"
 BULK_STRESSES = {
     "bulk_stress_1": ("MPa", "stress along x in body 1 far below the contact"),
     "bulk_stress_2": ("MPa", "stress along x in body 2 far above the contact"),
@@ -117,14 +125,14 @@ def _fields(state: ContactState, friction: float) -> dict[str, Dataset]:
 def _summary(outcome: ContactOutcome) -> dict[str, Any]:
     case, grid, history = outcome.case, outcome.grid, outcome.history
     friction, surfaces = case.friction.coefficient, case.structure.surfaces
+    told = grid, friction, outcome.table, history, outcome.strain
     return {
         **({} if surfaces is None else {"surfaces": surfaces.summary(grid)}),
         "increments": len(outcome.table),
-        "history": {
-            key: getattr(history, key) for key in ("method", "reason", "parts", "error", "error_of")
-        },
+        "history": {key: getattr(history, key) for key in HISTORY},
         "states": state_summaries(grid, friction, history),
-        "loop": loop_summary(grid, friction, outcome.table, history, outcome.strain),
+        "loop": loop_summary(*told),
+        "increments_error": increments_errors(*told),
         "convolutions": outcome.convolutions,
     }
 
@@ -135,7 +143,12 @@ def _lines(summary: dict[str, Any], grid: Grid) -> Iterator[str]:
     some = len(summary["states"]) < summary["increments"]
     computed = f", {len(summary['states'])} of them computed" if some else ""
     split = f" in {history['parts']} parts each" if history["parts"] > 1 else ""
-    left = "" if history["error"] is None else f", shear within {history['error']:.1%}"
+    left = ""
+    if history["error"] is not None:
+        left = (
+            f", shear within {history['error']:.1%} of µP, energy within "
+            f"{history['energy_error']:.1%}"
+        )
     yield (
         f"{counted(summary['increments'], 'increment')}{computed} ({history['method']})"
         f"{split}{left}, {counted(summary['convolutions'], 'convolution')}"

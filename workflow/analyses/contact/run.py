@@ -99,19 +99,8 @@ def _check_grid(outcome: ContactOutcome, reporter: Reporter) -> None:
 
 def _warn(outcome: ContactOutcome, reporter: Reporter) -> None:
     """Long increments, contacts cut off by the border of the grid, pressures above yield."""
-    states, history, case = outcome.history.states, outcome.history, outcome.case
-    if history.error is not None and history.error > case.contact.accuracy:
-        place = case.load_path.place(history.error_at)
-        shorter = f"take more increments ({place}) or raise contact.accuracy"
-        if history.method != "full":
-            shorter = "take all increments (contact.history: full)"
-        elif case.contact.history == "full":
-            shorter = f"take contact.history: auto, which splits them, or more of them ({place})"
-        reporter.warn(
-            f"the increments of the load leave about {history.error:.1%} of friction as an error "
-            f"of the shear, largest at increment {history.error_at + 1}, above contact.accuracy of "
-            f"{case.contact.accuracy:.1%}: {shorter}"
-        )
+    states = outcome.history.states
+    _warn_of_increments(outcome, reporter)
     if any(state.border_load > 0.0 for state in states):
         reporter.warn(
             "the contact touches the border of its grid, where it is cut off: raise contact.size"
@@ -123,3 +112,31 @@ def _warn(outcome: ContactOutcome, reporter: Reporter) -> None:
             f"the pressure reaches {highest:.0f} MPa, above the yield stress of "
             f"{yield_stress:.0f} MPa: the elastic solution is no longer valid there"
         )
+
+
+def _warn_of_increments(outcome: ContactOutcome, reporter: Reporter) -> None:
+    """Long increments, by what they leave of shear and energy."""
+    history, case = outcome.history, outcome.case
+    accuracy = case.contact.accuracy
+    if history.error is None or history.energy_error is None:
+        return
+    place = case.load_path.place(history.error_at)
+    left = []
+    if history.energy_error > accuracy:
+        left.append(f"{history.energy_error:.1%} of the energy dissipated")
+    if history.error > accuracy:
+        left.append(
+            f"{history.error:.1%} of friction as an error of the shear, largest at increment "
+            f"{history.error_at + 1}"
+        )
+    if not left:
+        return
+    shorter = f"take more increments ({place}) or raise contact.accuracy"
+    if history.method != "full":
+        shorter = "take all increments (contact.history: full)"
+    elif case.contact.history == "full":
+        shorter = f"take contact.history: auto, which splits them, or more of them ({place})"
+    reporter.warn(
+        f"the increments of the load leave about {' and '.join(left)}, above contact.accuracy of "
+        f"{accuracy:.1%}: {shorter}"
+    )

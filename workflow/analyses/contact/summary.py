@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import replace
 from itertools import pairwise
 from typing import Any
 
@@ -17,6 +19,10 @@ from workflow.analyses.contact.load_table import FORCES, MOTIONS, LoadTable
 STICK_MARGIN = 1e-6
 # A cycle is closed where shear comes back to within this share of µ times the peak pressure.
 CLOSED = 0.05
+# Changes below this share, and forces and motions below it of the largest, are what solvers leave.
+ROUNDING = 1e-6
+# Numbers that are no results, but of the solution.
+NO_RESULTS = {"residual", "border_load", "closure"}
 
 
 def state_summaries(grid: Grid, friction: float, history: History) -> list[dict[str, Any]]:
@@ -43,6 +49,44 @@ def state_summaries(grid: Grid, friction: float, history: History) -> list[dict[
         }
         for index, state, energy in zip(history.indices, history.states, energies, strict=True)
     ]
+
+
+def increments_errors(
+    grid: Grid, friction: float, table: LoadTable, history: History, strain: Array
+) -> dict[str, dict[str, float]]:
+    """What increments are estimated to leave of the numbers of the ``last`` state and the ``loop``.
+
+    Relative, of those that they change; empty where increments do not matter or nobody knows.
+    """
+    if not history.others:
+        return {}
+    other = replace(history, states=history.others)
+    both = history, other
+    last, last_other = (state_summaries(grid, friction, each)[-1] for each in both)
+    loop, loop_other = (loop_summary(grid, friction, table, each, strain) or {} for each in both)
+    return {
+        "last": _changes(last, last_other, history.share),
+        "loop": _changes(loop, loop_other, history.share),
+    }
+
+
+def _changes(
+    numbers: Mapping[str, Any], others: Mapping[str, Any], share: float
+) -> dict[str, float]:
+    """So much of the changes of all numbers, relative to these."""
+    largest = {
+        name: max(abs(numbers.get(other, 0.0)) for other in group)
+        for group in (FORCES, MOTIONS)
+        for name in group
+    }
+    found = {
+        name: share * abs(value - others[name]) / abs(value)
+        for name, value in numbers.items()
+        if isinstance(value, float)
+        and name in others.keys() - NO_RESULTS
+        and abs(value) > ROUNDING * largest.get(name, 0.0)
+    }
+    return {name: error for name, error in found.items() if error > ROUNDING}
 
 
 def stick_zone(state: ContactState, friction: float) -> Mask:

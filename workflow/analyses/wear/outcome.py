@@ -14,7 +14,8 @@ from wear.face_loads import FaceLoads
 from wear.interface import FirstContact, InterfaceState
 from wear.kinetics import LinearRegime, linear_regime
 from wear.steppers import step_errors
-from wear.tractions import CycleTractions, increments_error
+from wear.stepping import ContactFailure
+from wear.tractions import CycleTractions, increments_change, increments_error
 from workflow.analyses.wear.case.base import WearCase
 from workflow.analyses.wear.contact_stage import ContactEnd, ContactStage
 from workflow.analyses.wear.load_source import LoadSource
@@ -35,7 +36,8 @@ class InterfaceOutcome:
 
     ``unworn`` are its loads before wear and ``first`` the contact of that cycle; ``state`` has its
     surfaces at the end, and ``told`` tells a cycle on them. ``kinetics`` ``(j, 5)`` are those at
-    ``cycles`` ``(j,)``.
+    ``cycles`` ``(j,)``. ``finer`` gives both cycles in twice as many increments, None where nobody
+    knows the loads in between.
     """
 
     stage: ContactStage
@@ -45,6 +47,7 @@ class InterfaceOutcome:
     told: Callable[[], ContactEnd]
     cycles: Array
     kinetics: Array
+    finer: Callable[[InterfaceState], list[CycleTractions] | None] = lambda _: None
 
     @cached_property
     def regimes(self) -> dict[str, LinearRegime | None]:
@@ -114,8 +117,16 @@ class InterfaceOutcome:
 
     @cached_property
     def increments_error(self) -> dict[str, float] | None:
-        """What increments leave of depth and energy of the first and the last cycle together."""
-        return increments_error([self.begin, self.end])
+        """What increments leave of depth and energy of the first and the last cycle together.
+
+        By as many again where loads in between are known, of friction too; None where nobody knows.
+        """
+        cycles = [self.begin, self.end]
+        try:
+            finer = self.finer(self.state)
+        except ContactFailure:
+            return None
+        return increments_error(cycles) if finer is None else increments_change(cycles, finer)
 
     @cached_property
     def begin(self) -> CycleTractions:

@@ -105,8 +105,9 @@ def _compute(run: Run[WearCase], working: ExitStack) -> tuple[Outcome, Begun]:
         state, first = _march(run, source, contacts, unworn, kept)
         ends = _told_once(contacts.ends(state.interfaces), working, len(faces))
     columns = contacts.stages, unworn, first, state.interfaces, ends
+    finer = partial(structure_of(case).finer_cycles, case)
     interfaces = [
-        InterfaceOutcome(*column, state.cycles, state.kinetics[:, number])
+        InterfaceOutcome(*column, state.cycles, state.kinetics[:, number], finer)
         for number, column in enumerate(zip(*columns, strict=True))
     ]
     return Outcome(case, source, state, interfaces), lives

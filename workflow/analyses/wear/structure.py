@@ -13,6 +13,8 @@ from workflow.shell.analysis import as_written
 from workflow.shell.memory import Memory, factor_bytes
 
 if TYPE_CHECKING:
+    from wear.interface import InterfaceState
+    from wear.tractions import CycleTractions
     from workflow.analyses.wear.contact_stage import ContactStage
     from workflow.analyses.wear.load_source import LoadSource
 
@@ -65,6 +67,10 @@ class Finer(Generic[AnyWearCase]):
     section: AnyWearCase | None = None
 
 
+def no_cycles(case: WearCase, state: InterfaceState) -> None:
+    """Nobody knows the loads between two increments, or slips that friction would find."""
+
+
 @dataclass(frozen=True)
 class WearStructure(Generic[AnyWearCase]):
     """What a wear run needs to know of a kind of structure.
@@ -73,7 +79,9 @@ class WearStructure(Generic[AnyWearCase]):
     how many they are, by which the time of a run is told, and ``memory`` what a run needs, given
     the nodes of both bodies and of all interfaces (0: unknown). ``choose`` gives the case with the
     settings that it leaves open, and a record of why; ``warnings`` are about the unworn contact of
-    a stage under a peak load [N]. ``finer`` gives a finer mesh, if there is one that is cheap, and
+    a stage under a peak load [N]. ``finer`` gives a finer mesh, if there is one that is cheap.
+    ``finer_cycles`` gives the unworn cycle and that on the surfaces of a state in twice as many
+    increments, where it is known what loads are in between and the half-space finds the slips.
     ``settings`` of a case say what makes parts of the error smaller, if not :data:`SETTINGS`.
     """
 
@@ -85,4 +93,5 @@ class WearStructure(Generic[AnyWearCase]):
     choose: Callable[[AnyWearCase], tuple[AnyWearCase, dict[str, Any] | None]] = as_written
     warnings: Callable[[AnyWearCase, ContactStage, float], Iterable[str]] = lambda *_: ()
     finer: Callable[[AnyWearCase], Finer[AnyWearCase] | None] = lambda _: None
+    finer_cycles: Callable[[AnyWearCase, InterfaceState], list[CycleTractions] | None] = no_cycles
     settings: Callable[[AnyWearCase], Mapping[str, str]] = lambda _: {}

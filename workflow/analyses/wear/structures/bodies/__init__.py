@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -12,30 +12,64 @@ from workflow.analyses.wear.structures.bodies.case import (
     SHIFTS,
     BodiesWearCase,
     LineBodiesWearCase,
+    TwoBodiesWearCase,
 )
 
 if TYPE_CHECKING:
+    from wear.interface import InterfaceState
+    from wear.tractions import CycleTractions
     from workflow.analyses.wear.load_source import LoadSource
 
 # Path of slip in a cycle of a contact that forces shear, to tell about how long it takes [mm].
 PARTIAL_SLIP = 5e-3
+# Increments of such a cycle once they are split, about: two legs of one to 2 % took 8 to 64.
+SPLIT_INTO = 32
 
 
-def _source(case: BodiesWearCase | LineBodiesWearCase) -> LoadSource:
+def _source(case: TwoBodiesWearCase) -> LoadSource:
     from workflow.analyses.wear.structures.bodies.source import BodiesSource
 
     return BodiesSource(case)
 
 
-def _extent(case: BodiesWearCase | LineBodiesWearCase) -> Extent:
-    """Every increment of the cycle may dissipate."""
+def _extent(case: TwoBodiesWearCase) -> Extent:
+    """Every increment of the cycle may dissipate; under forces they are split."""
     table = case.load_path.table()
     steps = [table[name] - np.roll(table[name], 1) for name in SHIFTS]
     path = float(np.hypot(*steps).sum())
-    return Extent(len(table), path=path or PARTIAL_SLIP)
+    increments = len(table)
+    if case.splits and not path:
+        increments = max(increments, SPLIT_INTO)
+    return Extent(increments, path=path or PARTIAL_SLIP)
 
 
-STRUCTURE = WearStructure(name="bodies_wear", case=BodiesWearCase, source=_source, extent=_extent)
-LINE_STRUCTURE = WearStructure(
-    name="line_wear", case=LineBodiesWearCase, source=_source, extent=_extent
+def _choose(
+    case: TwoBodiesWearCase,
+) -> tuple[TwoBodiesWearCase, dict[str, Any] | None]:
+    if not case.splits:
+        return case, None
+    from workflow.analyses.wear.structures.bodies.increments import choose_parts
+
+    return choose_parts(case)
+
+
+def _finer_cycles(case: TwoBodiesWearCase, state: InterfaceState) -> list[CycleTractions] | None:
+    if case.contact.method != "full":
+        return None
+    from workflow.analyses.wear.structures.bodies.increments import finer_cycles
+
+    return finer_cycles(case, state)
+
+
+STRUCTURE, LINE_STRUCTURE = (
+    WearStructure(
+        name=name,
+        case=case,
+        source=_source,
+        extent=_extent,
+        choose=_choose,
+        finer_cycles=_finer_cycles,
+        settings=lambda _: {"increments": "contact.accuracy, or the increments of load_path"},
+    )
+    for name, case in (("bodies_wear", BodiesWearCase), ("line_wear", LineBodiesWearCase))
 )

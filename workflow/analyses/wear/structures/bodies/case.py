@@ -44,7 +44,7 @@ from workflow.analyses.wear.case.sections import Contact, Cycles, PressingForce,
 from workflow.case.doubts import heights, long_stroke
 from workflow.case.fields import Quantity, Whole
 from workflow.case.input_files import read_heights
-from workflow.case.plain import plain
+from workflow.case.plain import plain, shares
 from workflow.case.sections import GridCells, Length, LineCells, Section, Title, disagreement, entry
 from workflow.case.source import Source
 
@@ -55,6 +55,7 @@ Direction = Annotated[
     float, Quantity("rad", at_least=-6.4, at_most=6.4, range_text="-360 to 360 deg")
 ]
 Increments = Annotated[int, Whole(1, 1000)]
+Accuracy = Annotated[float, Quantity("1", at_least=1e-6, at_most=1.0)]
 
 # Of the only contact.
 NAME = "interface"
@@ -208,6 +209,11 @@ LineLoadPath = Annotated[
 METHODS = (
     "normal: every cell slides by all of the stroke; full: slips of the half-space, over the stroke"
 )
+ACCURACY = (
+    "of depth and energy of a cycle that increments may leave with method full, which splits them "
+    "[1]"
+)
+SPLIT = "in parts until they leave {} of depth and energy (contact.accuracy)"
 LINK = "there is no structure to link the contact to: both bodies are half-spaces"
 
 
@@ -229,6 +235,7 @@ class WearGrid(Contact):
         "of the grid along x, along y, room for the stroke included [mm]", ["1 mm", "1 mm"]
     )
     method: Literal["normal", "full"] = entry(METHODS, "normal", default="normal")
+    accuracy: Accuracy = entry(ACCURACY, "2 %", default=0.02)
     link: Literal["half_space"] = entry(LINK, "half_space", default="half_space")
 
 
@@ -240,6 +247,7 @@ class LineWearGrid(Contact):
     )
     size: Length = entry("of the grid along x, room for the stroke included [mm]", "2 mm")
     method: Literal["normal", "full"] = entry(METHODS, "normal", default="normal")
+    accuracy: Accuracy = entry(ACCURACY, "2 %", default=0.02)
     link: Literal["half_space"] = entry(LINK, "half_space", default="half_space")
 
 
@@ -295,7 +303,14 @@ class TwoBodiesWearCase(WearCase):
             ("structure", f"{self.structure.text}, {kind}"),
             *surfaces_in_words(self.structure, self.grid),
             ("load path", _in_words(self.load_path, force)),
+            *([("increments", SPLIT.format(shares(self.contact.accuracy)))] if self.splits else []),
         ]
+
+    @property
+    def splits(self) -> bool:
+        """Whether increments are split as ``contact.accuracy`` asks; rows of a file are not."""
+        path = self.load_path
+        return self.contact.method == "full" and getattr(path, "file", None) is None
 
     def face_sides(self) -> tuple[float, float]:
         along, across = self.size

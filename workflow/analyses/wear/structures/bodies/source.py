@@ -15,6 +15,7 @@ from wear.drive import Drive
 from wear.face_loads import CycleLoads
 from workflow.analyses.contact.bodies import bulk_strain
 from workflow.analyses.contact.case import Heights, Shape
+from workflow.analyses.contact.load_table import LoadTable
 from workflow.analyses.wear.gaps import GapFunction, GridHeights, with_measured
 from workflow.analyses.wear.load_source import (
     COARSER,
@@ -27,10 +28,9 @@ from workflow.analyses.wear.load_source import (
 from workflow.analyses.wear.structures.bodies.case import (
     NAME,
     SHIFTS,
-    BodiesWearCase,
-    LineBodiesWearCase,
     LineReciprocation,
     Reciprocation,
+    TwoBodiesWearCase,
     with_held,
 )
 from workflow.case.input_files import read_heights
@@ -42,12 +42,13 @@ class BodiesSource(UncoupledSource):
     """Two bodies as load source of a wear run: a cycle of forces and motions.
 
     Loads that nobody imposes are those of bodies that slide as a whole, along the face, and of the
-    unworn contact across it. What forces alone dissipate is for the half-space to find.
+    unworn contact across it. What forces alone dissipate is for the half-space to find. Every
+    increment of the case is passed in so many ``parts``.
     """
 
-    def __init__(self, case: BodiesWearCase | LineBodiesWearCase) -> None:
-        self._case, self.line = case, isinstance(case, LineBodiesWearCase)
-        self._table = with_held(case.load_path)
+    def __init__(self, case: TwoBodiesWearCase, parts: int = 1) -> None:
+        self._case, self.line, self._parts = case, case.line, parts
+        self._table = in_parts(with_held(case.load_path), parts)
         bodies = case.material(1), case.material(2)
         strain = bulk_strain(self._table, bodies)
         self.drive = Drive(
@@ -60,7 +61,7 @@ class BodiesSource(UncoupledSource):
         """The increment of the largest normal force, and there of the largest shear force."""
         path = self._case.load_path
         if isinstance(path, Reciprocation | LineReciprocation):
-            return path.increments // 2  # that passes the middle on the way there
+            return self._parts * path.increments // 2  # that passes the middle on the way there
         heaviest, shear = self._normal_force, np.hypot(self._table["Qx"], self._table["Qy"])
         loaded = heaviest >= (1.0 - SAME) * heaviest.max()
         return first_largest(np.where(loaded, shear, -1.0))
@@ -141,6 +142,19 @@ class BodiesSource(UncoupledSource):
     @property
     def _grid(self) -> Grid:
         return self._case.grid
+
+
+def in_parts(table: LoadTable, parts: int) -> LoadTable:
+    """Each increment of a closed cycle in so many equal parts."""
+    if parts == 1:
+        return table
+    shares = np.arange(1, parts + 1) / parts
+
+    def split(column: Array) -> Array:
+        before = np.roll(column, 1)[:, None]
+        return np.asarray(before + shares * (column[:, None] - before)).ravel()
+
+    return LoadTable({name: split(column) for name, column in table.columns.items()})
 
 
 def gap_of(bodies: Shape | Heights, grid: Grid) -> GapFunction:

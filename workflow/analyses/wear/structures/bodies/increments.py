@@ -1,0 +1,137 @@
+"""Increments of a cycle of two bodies with friction of their own, and what they leave.
+
+The loads of such a cycle go straight from increment to increment, so that it is known what they are
+in between. Solved in twice as many increments it tells what those leave, of the friction and of the
+sums over increments together: Backward Euler is of first order, and the change by half as long ones
+is half of the error.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any, TypeVar
+
+import numpy as np
+
+from sa_solver.history import MOST_INCREMENTS, NO_ENERGY
+from sa_solver.increments import depth_and_energy
+from sa_solver.rigid_modes import PLANAR
+from sa_solver.types import Array
+from wear.interface import InterfaceState
+from wear.stepping import ContactFailure
+from wear.tractions import CycleTractions
+from workflow.analyses.contact.load_path import Leg, LineLeg
+from workflow.analyses.wear.choice import Decision, record_of, since
+from workflow.analyses.wear.contact_stage import ContactStage
+from workflow.analyses.wear.structures.bodies.case import Stroke, TwoBodiesWearCase
+from workflow.analyses.wear.structures.bodies.source import BodiesSource
+from workflow.case.changing import changed
+
+AnyCase = TypeVar("AnyCase", bound=TwoBodiesWearCase)
+
+
+def choose_parts(case: AnyCase) -> tuple[AnyCase, dict[str, Any] | None]:
+    """The case with increments that leave ``contact.accuracy`` of its unworn cycle, and why.
+
+    Each is split into as many parts. No record where the case's own will do, or where no cycle can
+    be solved.
+    """
+    begin, accuracy = time.perf_counter(), case.contact.accuracy
+    rows, parts, tried = len(case.load_path.table()), 1, {}
+    coarse, error = _cycle(case, 1), np.inf
+    while True:
+        fine = _cycle(case, 2 * parts)
+        change = _change(coarse, fine)
+        tried[parts] = 2.0 * change
+        if 2.0 * change <= accuracy:
+            error = 2.0 * change
+            break
+        coarse, parts, error = fine, 2 * parts, change
+        if error <= accuracy or 2 * parts * rows > MOST_INCREMENTS:
+            break
+    if not np.isfinite(error) or (parts == 1 and error <= accuracy):
+        return case, None
+    why = (
+        f"{parts * rows} in a cycle leave {error:.2%} of the depth and energy of the unworn "
+        f"cycle, of {accuracy:.2%} allowed (contact.accuracy); the case's own {rows} leave "
+        f"{tried[1]:.2%}"
+    )
+    (entry, value), *also = _divided(case, parts).items()
+    probe = {
+        "parts": list(tried),
+        "errors": [e if np.isfinite(e) else None for e in tried.values()],
+    }
+    seconds = since(begin)
+    decision = Decision(
+        *(entry, value, why, probe, dict(also), accuracy, error, error <= accuracy, seconds)
+    )
+    record = record_of([decision], accuracy, seconds)
+    return _with_parts(case, parts), record
+
+
+def finer_cycles(case: TwoBodiesWearCase, state: InterfaceState) -> list[CycleTractions]:
+    """Unworn cycle and that on the surfaces of ``state``, in twice as many increments.
+
+    Raises ContactFailure.
+    """
+    stage, loads = _staged(case, 2)
+    unworn, first = stage.begin(loads, case.wear.cycles)
+    worn = replace(unworn, surfaces=state.surfaces, energy=state.energy, starts={}, start=None)
+    return [stage.unworn_tractions(loads, first), stage.tractions(worn)]
+
+
+def _staged(case: TwoBodiesWearCase, parts: int) -> tuple[ContactStage, Any]:
+    source = BodiesSource(case, parts)
+    (face,), (loads,) = source.faces, source.unworn()
+    return ContactStage(case, face), loads
+
+
+def _cycle(case: TwoBodiesWearCase, parts: int) -> tuple[Array, float] | None:
+    """Friction work per area of an unworn cycle, and what its shear loads move; None: no solution.
+
+    The latter in all increments by its size [N mm].
+    """
+    stage, loads = _staged(case, parts)
+    try:
+        _, first = stage.begin(loads, case.wear.cycles)
+    except ContactFailure:
+        return None
+    work = stage.unworn_tractions(loads, first).work.sum(axis=0)
+    planar = list(PLANAR)
+    forces, motions = (
+        np.array([getattr(state, name)[planar] for state in first.cycle])
+        for name in ("resultants", "rigid")
+    )
+    moved = np.abs(np.sum(forces * (motions - np.roll(motions, 1, axis=0)), axis=1)).sum()
+    return work, float(moved) / stage.grid.cell_area
+
+
+def _change(coarse: tuple[Array, float] | None, fine: tuple[Array, float] | None) -> float:
+    """Relative change of depth or energy, the larger; inf where one of them is not known."""
+    if coarse is None or fine is None:
+        return np.inf
+    (before, _), (work, moved) = coarse, fine
+    energy = float(work.sum())
+    if energy <= 0.0:
+        return 0.0 if before.sum() <= 0.0 else np.inf
+    scale = max(1.0, NO_ENERGY * moved / energy)
+    return float(np.max(depth_and_energy(work - before) / depth_and_energy(work)) / scale)
+
+
+def _divided(case: TwoBodiesWearCase, parts: int) -> dict[str, Any]:
+    """Entries for so many parts of each increment."""
+    path = case.load_path
+    if isinstance(path, Stroke):
+        return {"load_path.increments": parts * path.model_dump()["increments"]}
+    legs: Sequence[Leg | LineLeg] = path.legs
+    return {f"load_path.legs.{n}.increments": parts * leg.increments for n, leg in enumerate(legs)}
+
+
+def _with_parts(case: AnyCase, parts: int) -> AnyCase:
+    path = case.load_path
+    if isinstance(path, Stroke):
+        return changed(case, _divided(case, parts))
+    legs = tuple(changed(leg, {"increments": parts * leg.increments}) for leg in path.legs)
+    return changed(case, {"load_path.legs": legs})
