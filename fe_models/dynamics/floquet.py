@@ -183,15 +183,9 @@ class Floquet:
 
     def _times(self, motion: HarmonicSolution, samples: int, deepest: int) -> PeriodTimes:
         """Those of a period, in short steps where joints change what they do."""
-        times = PeriodTimes.even(samples, deepest)
-        while True:
-            regimes = self._deviations(motion, times).regimes
-            changes = (regimes != np.roll(regimes, -1, axis=0)).any(axis=1)
-            # It changes in this step or, where the motion turns, in the next.
-            marked = changes | np.roll(changes, 1)
-            if not (marked & (times.levels < deepest)).any():
-                return times
-            times = times.divided(marked)
+        return PeriodTimes.following(
+            lambda times: self._deviations(motion, times).regimes, samples, deepest
+        )
 
     def _alike(self, *of: tuple[HarmonicSolution, PeriodTimes]) -> list[Deviations]:
         """What joints make of deviations from motions, as many numbers of memory in each."""

@@ -224,6 +224,10 @@ class HarmonicBalance:
             return self.wave
         return np.asarray(self.wave + np.square(angular)[:, None] * self.inertial)
 
+    def load_at(self, angular: Array, force: float) -> ComplexArray:
+        """All of the load on the modes ``(k, n)`` at these frequencies, under a force."""
+        return np.asarray(self._constant + force * self.wave_at(angular))
+
     def first_wave(self, angular: Array) -> ComplexArray:
         """Harmonic 1 of the force on the modes ``(f, n)`` at angular frequencies ``(f,)``."""
         first = self.resolution.harmonics.index(1)
@@ -439,7 +443,7 @@ class HarmonicBalance:
             coefficients, resolution.basis, resolution.weights, resolution.lead
         )
         steady = steady or self.transfer.steady(frequency * self.turning)
-        on_modes = self._constant + force * self.wave_at(steady.angular)
+        on_modes = self.load_at(steady.angular, force)
         on_modes -= self.transfer.on_modes(cycle.force, unknowns)
         vibration = steady.vibrate(on_modes)
         response = self.transfer.at_joints(vibration)

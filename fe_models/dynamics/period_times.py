@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -28,13 +29,33 @@ class PeriodTimes:
         starts = SPLIT**deepest * np.arange(samples)
         return cls(starts, np.zeros(samples, np.int64), samples, deepest)
 
+    @classmethod
+    def following(
+        cls, regimes: Callable[[PeriodTimes], np.ndarray], samples: int, deepest: int
+    ) -> PeriodTimes:
+        """Steps that are divided to the ``deepest`` level where ``regimes`` ``(t, j)`` change."""
+        times = cls.even(samples, deepest)
+        while True:
+            known = regimes(times)
+            changes = (known != np.roll(known, -1, axis=0)).any(axis=1)
+            # It changes in this step or, where the motion turns, in the next.
+            marked = changes | np.roll(changes, 1)
+            if not (marked & (times.levels < deepest)).any():
+                return times
+            times = times.divided(marked)
+
     @property
     def parts(self) -> int:
         """In which times are counted."""
         return int(self.samples * SPLIT**self.deepest)
 
     def divided(self, marked: np.ndarray) -> PeriodTimes:
-        """With the ``marked`` ``(t,)`` steps in four, if they are not of the deepest level."""
+        """With the ``marked`` ``(t,)`` steps in four, if they are not of the deepest level.
+
+        The first two steps, the next two, ... are divided together, so that :meth:`halved` is of
+        the same times.
+        """
+        marked = np.repeat(marked.reshape(-1, 2).any(axis=1), 2)
         pieces = np.where(marked & (self.levels < self.deepest), SPLIT, 1)
         levels = np.repeat(self.levels + (pieces > 1), pieces)
         within = np.arange(len(levels)) - np.repeat(np.cumsum(pieces) - pieces, pieces)
