@@ -201,9 +201,20 @@ def deviating(
     deviations: Deviations,
     joints: ActiveJoints,
     driven: Driven | None = None,
+    late: bool = False,
 ) -> Deviating:
-    """What a period of a frequency [Hz] makes of deviations, and of a motion that is ``driven``."""
-    columns, course = _columns(structure, frequency, times, deviations, joints, driven)
+    """What a period of a frequency [Hz] makes of deviations, and of a motion that is ``driven``.
+
+    Joints that become stiffer in the shortest steps do so one of these steps ``late``, if so: as
+    they are found to a step, they are as stiff as that for a step too long or too short.
+    """
+    maps = joints.steps(deviations, structure)
+    if late:
+        before = np.roll(maps.tangent, 1, axis=0)
+        stiffer = (maps.tangent - before).sum(axis=(1, 2, 3)) > 0.0
+        changed = stiffer & (times.levels == times.deepest)
+        maps.tangent[changed] = before[changed]
+    columns, course = _columns(structure, frequency, times, (deviations, joints, maps), driven)
     count = 2 * len(structure.squares)
     # What a joint never changes is 1 by itself: a row and a column of it.
     changed = np.flatnonzero(np.concatenate([np.ones(count, bool), joints.changed]))
@@ -218,11 +229,11 @@ def _columns(
     structure: ModalStructure,
     frequency: float,
     times: PeriodTimes,
-    deviations: Deviations,
-    joints: ActiveJoints,
+    of_joints: tuple[Deviations, ActiveJoints, JointSteps],
     driven: Driven | None,
 ) -> tuple[Array, Array]:
     """What :func:`monodromy` makes of a period, and the course of it."""
+    deviations, joints, maps = of_joints
     stiffness = np.diag(structure.squares)[None]
     scale = np.sqrt(np.maximum(structure.squares, (2.0 * np.pi * frequency) ** 2))
     if structure.residual is None and joints.springs[_others(joints)].any():
@@ -236,7 +247,6 @@ def _columns(
     directions, levels = deviations.tangent.shape[2], times.deepest + 1
     places = (joints.active[:, None] * directions + np.arange(directions)).ravel()
     at_joints = structure.at_joints[places]
-    maps = joints.steps(deviations, structure)
     if structure.residual is None:
         residual = np.zeros((len(places), len(places)))
         kinds, alike = _alike(maps)

@@ -11,6 +11,7 @@ is the derivative of the very same steps.
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -38,18 +39,25 @@ FOUND, MOST_STEPS = 1e-8, 15
 # away may be another.
 NEAR = 0.1
 
+# Shares of the steps with which the motion is found twice more, in steps that begin elsewhere, and
+# levels left out there: steps in which joints change are then some twenty times as long.
+COARSER, LEVELS_LESS = (0.75, 0.625), 2
+
 Path = Callable[[Array], Array]
 """Displacements of joints ``(t, j d)`` [mm] at shares ``(t,)`` of a period."""
 
 
 class RefinedMotion(NamedTuple):
     """A motion in time: its ``path``, the ``times`` at which it was found, what a period makes of
-    deviations from it, and how many of these are ``neutral``."""
+    deviations from it, how many of these are ``neutral``, and the same with joints that become
+    stiffer one shortest step ``late``.
+    """
 
     path: Path
     times: PeriodTimes
     deviating: Deviating
     neutral: int
+    late: Callable[[], Deviating]
 
 
 class MotionInTime:
@@ -77,11 +85,14 @@ class MotionInTime:
     def _values(path: Path) -> Array:
         return path(np.arange(128) / 128)
 
-    def found(self, samples: int, deepest: int, path: Path) -> RefinedMotion | None:
-        """The motion near to a path, with so many steps and levels; None where there is none."""
+    def found(self, samples: int, deepest: int, path: Path | None = None) -> RefinedMotion | None:
+        """The motion near to a path, that in harmonics at first, with so many steps and levels.
+
+        None where there is none.
+        """
+        path = path or self.in_harmonics
         for _ in range(MOST_STEPS):
-            times = self._times(path, samples, deepest)
-            refined, change = self._stepped(path, times)
+            refined, change = self._stepped(path, self._times(path, samples, deepest))
             if refined is None:
                 return None
             path = refined.path
@@ -89,15 +100,30 @@ class MotionInTime:
                 return refined if self._distance(path) <= NEAR else None
         return None
 
-    def coarser(self, refined: RefinedMotion) -> RefinedMotion | None:
-        """The same motion in steps that are twice as long."""
-        times, path = refined.times.halved(), refined.path
-        for _ in range(MOST_STEPS):
-            coarse, change = self._stepped(path, times)
-            if coarse is None or change <= FOUND:
-                return coarse
-            path = coarse.path
-        return None
+    def others(self, refined: RefinedMotion) -> list[Deviating]:
+        """What a period makes of deviations in longer steps, that begin at other times, and where
+        joints become stiffer a step later; nothing where the motion is not found so."""
+        samples, deepest = refined.times.samples, refined.times.deepest
+        others = [refined.late()]
+        for share in COARSER:
+            steps = 2 * int(0.5 * share * samples), max(deepest - LEVELS_LESS, 0)
+            coarser = self.found(*steps, refined.path)
+            if coarser is None:
+                return []
+            others.append(coarser.deviating)
+        return others
+
+    def volume_error(self, refined: RefinedMotion) -> float:
+        """Relative error of the product of all multipliers, by Liouville's formula exp(-T tr M⁻¹C).
+
+        It holds where joints remember nothing; 0 where they do.
+        """
+        matrix, damping = refined.deviating.matrix, self._structure.damping
+        if len(matrix) != 2 * len(damping):
+            return 0.0
+        sign, size = np.linalg.slogdet(matrix)
+        error = sign * np.exp(size + np.trace(damping) / self._frequency) - 1.0
+        return abs(float(error))
 
     def _distance(self, path: Path) -> float:
         """Of a motion from that in harmonics, as a share of the vibration."""
@@ -111,7 +137,8 @@ class MotionInTime:
         deviations = self._deviations(moved, times)
         joints = ActiveJoints.of(deviations, self._structure, every=True)
         driven = Driven(self._angular, self._amplitudes, moved)
-        linear = deviating(self._structure, self._frequency, times, deviations, joints, driven)
+        at = self._structure, self._frequency, times, deviations, joints
+        linear = deviating(*at, driven)
         try:
             change = linear.corrections()
         except np.linalg.LinAlgError:
@@ -123,7 +150,8 @@ class MotionInTime:
         ends = np.append(shares, 1.0), np.vstack([after, after[:1]])
         spline = CubicSpline(*ends, bc_type="periodic")
         neutral = joints.neutral + linear.shifts.shape[1]
-        return RefinedMotion(spline, times, linear, neutral), size
+        late = partial(deviating, *at, late=True)
+        return RefinedMotion(spline, times, linear, neutral, late), size
 
     def _times(self, path: Path, samples: int, deepest: int) -> PeriodTimes:
         """Steps of a period, short where joints change what they do."""
