@@ -31,16 +31,19 @@ RESISTING = 1e-10
 class ModalStructure:
     """Modes ``(n,)`` of the natural frequencies' ``squares`` with their ``damping`` ``(n, n)``.
 
-    ``at_joints`` ``(j d, n)`` are their displacements there, with springs ``reference``
-    ``(j, d, d)`` for joints. Modes left out answer forces of joints at once, by ``residual``
-    ``(j d, j d)``; without any it is None.
+    ``at_joints`` ``(j d, n)`` are their displacements there, and ``at_points`` ``(p, n)`` those of
+    the structure, with springs ``reference`` ``(j, d, d)`` for joints. Modes left out answer forces
+    of joints at once, by ``residual`` ``(j d, j d)``, and the load by ``to_load`` ``(j d, p)``;
+    without any these are None.
     """
 
     squares: Array
     damping: Array
     at_joints: Array
+    at_points: Array
     reference: Array
     residual: Array | None
+    to_load: Array | None = None
 
     @classmethod
     def whole(cls, problem: HarmonicBalance) -> ModalStructure:
@@ -54,20 +57,24 @@ class ModalStructure:
         damping = damping if damping.ndim == 2 else np.diag(damping)
         joints = len(receptance.at_joints) // directions
         nothing = np.zeros((joints, directions, directions))
-        return cls(receptance.squares, damping, receptance.at_joints, nothing, None)
+        shapes = receptance.at_joints, receptance.at_points
+        return cls(receptance.squares, damping, *shapes, nothing, None)
 
     @classmethod
     def reduced(cls, problem: HarmonicBalance, count: int) -> ModalStructure:
         """So many low modes, with joints as stiff as at rest."""
         stuck = problem.rest.stuck
         stiffened, shapes = stuck.stiffened, stuck.stiffened.at_points[:, :count]
+        others = stiffened.at_joints[:, count:] / stiffened.squares[count:]
         return cls(
             stiffened.squares[:count],
             # Not only that of each mode: damping is that of the structure without joints.
             shapes.T @ problem.model.damping @ shapes,
             stiffened.at_joints[:, :count],
+            shapes,
             stuck.tangents,
             stiffened.residual_flexibility(count),
+            others @ stiffened.at_points[:, count:].T,
         )
 
     def rates(self, stiffness: Array, scale: Array) -> Array:
@@ -154,11 +161,11 @@ class ActiveJoints:
 
 
 class Driven(NamedTuple):
-    """A motion under its load: ``amplitudes`` ``(k, n)`` on the modes at the ``angular``
-    frequencies ``(k,)`` [rad/s], and displacements ``moved`` ``(t, j d)`` of joints [mm]."""
+    """A motion under its ``load`` ``(k, p)`` of the ``harmonics`` ``(k,)`` on the structure [N],
+    with displacements ``moved`` ``(t, j d)`` of joints [mm]."""
 
-    angular: Array
-    amplitudes: ComplexArray
+    harmonics: Array
+    load: ComplexArray
     moved: Array
 
 
@@ -244,7 +251,7 @@ def _columns(
         rates = structure.rates(stiffness, scale)
         forward = linear_steps(rates, nothing, 1.0 / frequency, 1).forward[0, 0]
         return np.pad(forward, ((0, 0), (0, 1))), np.empty((0, 0, 0))
-    directions, levels = deviations.tangent.shape[2], times.deepest + 1
+    directions, levels = deviations.tangent.shape[2], int(times.levels.max()) + 1
     places = (joints.active[:, None] * directions + np.arange(directions)).ravel()
     at_joints = structure.at_joints[places]
     if structure.residual is None:
@@ -254,7 +261,7 @@ def _columns(
     else:
         residual = structure.residual[np.ix_(places, places)]
         kinds, alike = maps.kinds, np.zeros((1, *maps.tangent.shape[1:]))
-    rates, phases = _loaded(structure.rates(stiffness, scale), driven)
+    rates, phases = _loaded(structure, structure.rates(stiffness, scale), driven, frequency)
     beside = ((0, len(phases)), (0, 0))
     inputs = np.pad(np.vstack([np.zeros_like(at_joints.T), -at_joints.T]), beside)
     steps = linear_steps(rates, inputs, 1.0 / (frequency * times.samples), levels)
@@ -271,7 +278,7 @@ def _columns(
     begin = np.eye(len(rates[0]), count + memory + 1)
     begin[count:] = 0.0
     begin[count:, -1] = phases
-    given = _given(deviations, joints, places, driven)
+    given = _given(structure, times, deviations, driven, places)
     course = np.zeros((0 if driven is None else len(maps.kept) + 1, len(places), begin.shape[1]))
     in_order = maps._replace(kinds=levels * kinds + times.levels)
     return np.asarray(monodromy(in_steps, in_order, given, begin, course)), course
@@ -284,7 +291,9 @@ def _others(joints: ActiveJoints) -> np.ndarray:
     return others
 
 
-def _loaded(rates: Array, driven: Driven | None) -> tuple[Array, Array]:
+def _loaded(
+    structure: ModalStructure, rates: Array, driven: Driven | None, frequency: float
+) -> tuple[Array, Array]:
     """Rates ``(s, k, k)`` with the harmonics of a load as further numbers, and these at first.
 
     Each is the state of a free oscillator, so that a step is exact under the load too.
@@ -292,8 +301,10 @@ def _loaded(rates: Array, driven: Driven | None) -> tuple[Array, Array]:
     count = rates.shape[1]
     if driven is None:
         return rates, np.empty(0)
-    loading = np.abs(driven.amplitudes).any(axis=1)
-    angular, amplitudes = driven.angular[loading], driven.amplitudes[loading]
+    on_modes = driven.load @ structure.at_points
+    loading = on_modes.any(axis=1)
+    angular = 2.0 * np.pi * frequency * driven.harmonics[loading]
+    amplitudes = on_modes[loading]
     # A number for each in units that leave all rates of about one size.
     unit = np.abs(amplitudes).max(initial=0.0) / np.abs(rates).max()
     whole = np.zeros((len(rates), count + 2 * len(angular), count + 2 * len(angular)))
@@ -308,15 +319,26 @@ def _loaded(rates: Array, driven: Driven | None) -> tuple[Array, Array]:
 
 
 def _given(
-    deviations: Deviations, joints: ActiveJoints, places: np.ndarray, driven: Driven | None
+    structure: ModalStructure,
+    times: PeriodTimes,
+    deviations: Deviations,
+    driven: Driven | None,
+    places: np.ndarray,
 ) -> GivenMotion:
-    """What active joints do in the motion, from its beginning to its end."""
-    times = np.arange(len(deviations.kept) + 1) % len(deviations.kept)
+    """What joints do in the motion at these places, from its beginning to its end."""
+    steps = len(deviations.kept)
     if driven is None:
-        nothing = np.zeros((len(times), len(places)))
+        nothing = np.zeros((steps + 1, len(places)))
         return GivenMotion(nothing, nothing)
-    force = deviations.force[:, joints.active].reshape(len(deviations.kept), -1)
-    return GivenMotion(driven.moved[times][:, places], force[times])
+    moved, force = driven.moved, deviations.force.reshape(steps, -1)
+    if structure.to_load is not None:
+        by_joint = moved.reshape(*deviations.force.shape, 1)
+        force = force - (structure.reference @ by_joint).reshape(force.shape)
+        # What modes left out do under the load is no motion of those that are followed.
+        turns = np.exp(2j * np.pi * np.outer(times.starts / times.parts, driven.harmonics))
+        moved = moved - (turns @ driven.load @ structure.to_load.T).real
+    after = np.arange(steps + 1) % steps
+    return GivenMotion(moved[after][:, places], force[after][:, places])
 
 
 def _shifts(

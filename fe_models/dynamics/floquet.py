@@ -49,6 +49,8 @@ Verdict = Literal["stable", "unstable", "unknown"]
 SAMPLES, DEEPEST = 128, 3
 # The same of a motion that is refined in time.
 DEEPEST_IN_TIME = 8
+# Error of the largest multiplier, as a share of it or of 1, above which more times are taken.
+WANTED = 3e-4
 # Where multipliers are nearer to the circle than their error, so often four times as many times.
 FINER = 2
 # Multipliers that are told, and those below which one is of no account.
@@ -178,7 +180,8 @@ class Floquet:
         samples = SAMPLES if self.cheap else LARGE_SAMPLES
         while samples < PER_HARMONIC * motion.resolution.harmonics[-1]:
             samples *= 2
-        if self.cheap and self._sector is None:
+        few = len(structure.squares) <= MOST_MODES
+        if few and len(structure.at_joints) <= MOST_DIRECTIONS:
             return self._in_time(motion, structure, samples)
         return self._in_harmonics(motion, structure, samples)
 
@@ -198,15 +201,17 @@ class Floquet:
         self, motion: HarmonicSolution, structure: ModalStructure, samples: int
     ) -> Stability:
         """By the motion in time that is near to this one, if there is one."""
-        in_time, told = MotionInTime(self._problem, structure, motion), None
+        ring = None if self._sector is None else self._sector.ring
+        in_time, told = MotionInTime(self._problem, structure, motion, ring), None
+        path = None
         for finer in range(FINER + 1 if motion.residual <= SOLVED else 0):
-            found = in_time.found(SPLIT**finer * samples, DEEPEST_IN_TIME + finer)
+            found = in_time.found(SPLIT**finer * samples, DEEPEST_IN_TIME + finer, path)
             if found is not None and (others := in_time.others(found)):
-                fine = found.deviating.multipliers
+                fine, path = found.deviating.multipliers, found.path
                 errors = np.max([_apart(fine, other.multipliers) for other in others], axis=0)
                 errors += in_time.volume_error(found) * np.abs(fine)
                 told = _judged(fine, errors, found.neutral)
-                if told.verdict != "unknown":
+                if told.verdict != "unknown" and told.error <= WANTED * max(told.largest, 1.0):
                     return told
         if told is not None:
             return told

@@ -90,6 +90,14 @@ class PeriodicLoad:
         """Those of the force."""
         return {*self.waves, *self.inertial}
 
+    def amplitude(self, harmonic: int, angular: float, force: float) -> ComplexArray:
+        """What the structure carries ``(n,)`` in a harmonic of so many rad/s, under a force."""
+        nothing = np.zeros(1)
+        growing = self.waves.get(harmonic, nothing)
+        growing = growing + angular**2 * self.inertial.get(harmonic, nothing)
+        constant = nothing if harmonic or self.static is None else self.static
+        return np.asarray(force * growing + constant, dtype=complex)
+
 
 @dataclass(frozen=True)
 class Balance:
@@ -223,10 +231,6 @@ class HarmonicBalance:
         if not self.load.inertial:
             return self.wave
         return np.asarray(self.wave + np.square(angular)[:, None] * self.inertial)
-
-    def load_at(self, angular: Array, force: float) -> ComplexArray:
-        """All of the load on the modes ``(k, n)`` at these frequencies, under a force."""
-        return np.asarray(self._constant + force * self.wave_at(angular))
 
     def first_wave(self, angular: Array) -> ComplexArray:
         """Harmonic 1 of the force on the modes ``(f, n)`` at angular frequencies ``(f,)``."""
@@ -443,7 +447,7 @@ class HarmonicBalance:
             coefficients, resolution.basis, resolution.weights, resolution.lead
         )
         steady = steady or self.transfer.steady(frequency * self.turning)
-        on_modes = self.load_at(steady.angular, force)
+        on_modes = self._constant + force * self.wave_at(steady.angular)
         on_modes -= self.transfer.on_modes(cycle.force, unknowns)
         vibration = steady.vibrate(on_modes)
         response = self.transfer.at_joints(vibration)

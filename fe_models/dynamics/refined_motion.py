@@ -26,10 +26,12 @@ from fe_models.dynamics.deviating_structure import (
 )
 from fe_models.dynamics.harmonic_balance import HarmonicBalance
 from fe_models.dynamics.harmonic_solution import HarmonicSolution
-from fe_models.dynamics.harmonics import by_function
+from fe_models.dynamics.harmonics import ComplexArray, by_function
 from fe_models.dynamics.period_times import PeriodTimes
 from fe_models.dynamics.periodic_joints import DeviatingJoints, Deviations
+from fe_models.dynamics.sector import Ring
 from fe_models.dynamics.sizes import norm
+from fe_models.dynamics.whole_ring import JoinedDeviations, motion_of
 from sa_solver.types import Array
 
 # A motion is found where a step changes it by no more than this share of its vibration, in at most
@@ -61,23 +63,29 @@ class RefinedMotion(NamedTuple):
 
 
 class MotionInTime:
-    """A ``motion`` of a problem with few joints and modes, at times of a period."""
+    """A ``motion`` of a problem with few joints and modes, at times of a period.
+
+    Of a sector in a wave ``ring`` tells how all sectors of its ring follow it.
+    """
 
     def __init__(
-        self, problem: HarmonicBalance, structure: ModalStructure, motion: HarmonicSolution
+        self,
+        problem: HarmonicBalance,
+        structure: ModalStructure,
+        motion: HarmonicSolution,
+        ring: Ring | None,
     ) -> None:
         assert isinstance(problem.joints, DeviatingJoints)
         self._joints, self._structure = problem.joints, structure
-        self._frequency = motion.frequency
-        self._angular = motion.frequency * 2.0 * np.pi * np.array(motion.resolution.harmonics)
-        of_motion = problem.refined(motion.resolution)
-        self._amplitudes = of_motion.load_at(self._angular, motion.force)
-        self._mean = motion.resolution.harmonics[0] == 0
+        self._frequency, self._mean = motion.frequency, motion.resolution.harmonics[0] == 0
+        self._harmonics = np.array(motion.resolution.harmonics)
+        self._load = _load(problem, motion, ring, len(structure.at_points))
+        sectors = [motion] if ring is None else _every(ring, motion)
         count, _, directions = motion.coefficients.shape
         # Functions of time are the displacements themselves.
         each = np.eye(count * directions).reshape(-1, count, directions)
         self._each = np.ascontiguousarray(each.transpose(1, 0, 2))
-        rows = by_function(motion.coefficients)
+        rows = np.hstack([by_function(of.coefficients) for of in sectors])
         self.in_harmonics: Path = lambda shares: motion.resolution.functions_during(shares) @ rows
         self._vibration = float(np.linalg.norm(np.ptp(self._values(self.in_harmonics), axis=0)))
 
@@ -136,7 +144,7 @@ class MotionInTime:
         moved = path(shares)
         deviations = self._deviations(moved, times)
         joints = ActiveJoints.of(deviations, self._structure, every=True)
-        driven = Driven(self._angular, self._amplitudes, moved)
+        driven = Driven(self._harmonics, self._load, moved)
         at = self._structure, self._frequency, times, deviations, joints
         linear = deviating(*at, driven)
         try:
@@ -165,4 +173,37 @@ class MotionInTime:
         steps = np.diff(np.append(times.starts, times.parts)) / times.parts
         mean = steps @ (0.5 * (moved + np.roll(moved, -1, axis=0)))
         lead = np.vstack([mean, moved[0]]) if self._mean else moved[:1]
-        return self._joints.linearise(self._each, moved, lead)
+        count = len(self._each[0])
+        parts = [slice(first, first + count) for first in range(0, moved.shape[1], count)]
+
+        def of(part: slice, memory: int) -> Deviations:
+            return self._joints.linearise(self._each, moved[:, part], lead[:, part], memory)
+
+        if len(parts) == 1:
+            return of(parts[0], 0)
+        memory = max(of(part, 0).kept.shape[2] for part in parts)
+        return JoinedDeviations.of(of(part, memory) for part in parts)
+
+
+def _every(ring: Ring, motion: HarmonicSolution) -> list[HarmonicSolution]:
+    """The motions of all sectors of a ring."""
+    return [motion_of(ring, motion, sector) for sector in range(ring.sectors)]
+
+
+def _load(
+    problem: HarmonicBalance, motion: HarmonicSolution, ring: Ring | None, points: int
+) -> ComplexArray:
+    """The load ``(k, p)`` on a structure of so many ``points`` in the harmonics of a motion."""
+    harmonics = motion.resolution.harmonics
+    load = np.zeros((len(harmonics), points), dtype=complex)
+    for row, harmonic in enumerate(harmonics):
+        angular = 2.0 * np.pi * motion.frequency * harmonic
+        amplitude = problem.load.amplitude(harmonic, angular, motion.force)
+        if ring is None:
+            load[row] = amplitude
+        else:
+            shift = ring.shift(harmonic)
+            later = [ring.phase(sector * shift) for sector in range(ring.sectors)]
+            whole = np.broadcast_to(amplitude, points // ring.sectors)
+            load[row] = np.outer(later, whole).ravel()
+    return load
