@@ -38,7 +38,7 @@ from fe_models.dynamics.harmonics import ComplexArray
 from fe_models.dynamics.linear_steps import SPLIT
 from fe_models.dynamics.period_times import PeriodTimes
 from fe_models.dynamics.periodic_joints import DeviatingJoints, Deviations
-from fe_models.dynamics.refined_motion import MotionInTime
+from fe_models.dynamics.refined_motion import EVENTS_LONGER, MotionInTime
 from fe_models.dynamics.travelling_wave import WaveReceptance
 from fe_models.dynamics.whole_ring import JoinedDeviations, motion_of, ring_structure
 from sa_solver.types import Array
@@ -47,9 +47,11 @@ Verdict = Literal["stable", "unstable", "unknown"]
 # Times of a period at first, at least: so many steps of equal length, which then are divided in
 # four, so often, where a joint changes what it does.
 SAMPLES, DEEPEST = 128, 3
-# The same of a motion that is refined in time.
-DEEPEST_IN_TIME = 8
-# Error of the largest multiplier, as a share of it or of 1, above which more times are taken.
+# The same of a motion that is refined in time; how many more levels there are where it shows when
+# joints change what they do, and attempts, the others with four times as many times.
+DEEPEST_IN_TIME, DEEPER, ATTEMPTS = 4, 4, 4
+# Error of the sum of all multipliers, as a share of the largest or of 1, above which more times are
+# taken: of a pair off the real axis it shows what their sizes do not.
 WANTED = 3e-4
 # Where multipliers are nearer to the circle than their error, so often four times as many times.
 FINER = 2
@@ -203,16 +205,25 @@ class Floquet:
         """By the motion in time that is near to this one, if there is one."""
         ring = None if self._sector is None else self._sector.ring
         in_time, told = MotionInTime(self._problem, structure, motion, ring), None
-        path = None
-        for finer in range(FINER + 1 if motion.residual <= SOLVED else 0):
-            found = in_time.found(SPLIT**finer * samples, DEEPEST_IN_TIME + finer, path)
-            if found is not None and (others := in_time.others(found)):
+        path, deepest = None, DEEPEST_IN_TIME
+        for _ in range(ATTEMPTS if motion.residual <= SOLVED else 0):
+            found = in_time.found(samples, deepest, path)
+            others = [] if found is None else in_time.others(found)
+            apart = np.zeros(0)
+            if found is not None and others:
                 fine, path = found.deviating.multipliers, found.path
                 errors = np.max([_apart(fine, other.multipliers) for other in others], axis=0)
                 errors += in_time.volume_error(found) * np.abs(fine)
                 told = _judged(fine, errors, found.neutral)
-                if told.verdict != "unknown" and told.error <= WANTED * max(told.largest, 1.0):
+                apart = np.array([abs(np.sum(fine) - np.sum(of.multipliers)) for of in others])
+                enough = apart.max() <= WANTED * max(told.largest, 1.0)
+                if told.verdict != "unknown" and enough:
                     return told
+            # In longer steps it shows that many times as much when joints become stiffer.
+            if len(apart) and 2.0 * EVENTS_LONGER * apart[0] > apart.max():
+                deepest += DEEPER
+            else:
+                samples *= SPLIT
         if told is not None:
             return told
         lost = "no periodic motion in time is found near to these harmonics: give more of them"

@@ -27,6 +27,7 @@ from fe_models.dynamics.deviating_structure import (
 from fe_models.dynamics.harmonic_balance import HarmonicBalance
 from fe_models.dynamics.harmonic_solution import HarmonicSolution
 from fe_models.dynamics.harmonics import ComplexArray, by_function
+from fe_models.dynamics.linear_steps import SPLIT
 from fe_models.dynamics.period_times import PeriodTimes
 from fe_models.dynamics.periodic_joints import DeviatingJoints, Deviations
 from fe_models.dynamics.sector import Ring
@@ -36,14 +37,15 @@ from sa_solver.types import Array
 
 # A motion is found where a step changes it by no more than this share of its vibration, in at most
 # so many steps.
-FOUND, MOST_STEPS = 1e-8, 15
+FOUND, MOST_STEPS = 1e-7, 15
 # Share of its vibration by which the motion in time may differ from that in harmonics: one further
 # away may be another.
 NEAR = 0.1
 
 # Shares of the steps with which the motion is found twice more, in steps that begin elsewhere, and
-# levels left out there: steps in which joints change are then some twenty times as long.
+# levels left out there: steps in which joints change are then so many times as long, and more.
 COARSER, LEVELS_LESS = (0.75, 0.625), 2
+EVENTS_LONGER = SPLIT**LEVELS_LESS
 
 Path = Callable[[Array], Array]
 """Displacements of joints ``(t, j d)`` [mm] at shares ``(t,)`` of a period."""
@@ -109,8 +111,8 @@ class MotionInTime:
         return None
 
     def others(self, refined: RefinedMotion) -> list[Deviating]:
-        """What a period makes of deviations in longer steps, that begin at other times, and where
-        joints become stiffer a step later; nothing where the motion is not found so."""
+        """What a period makes of deviations where joints become stiffer a step later, and in longer
+        steps, that begin at other times; nothing where the motion is not found so."""
         samples, deepest = refined.times.samples, refined.times.deepest
         others = [refined.late()]
         for share in COARSER:
