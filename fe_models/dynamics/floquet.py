@@ -208,19 +208,21 @@ class Floquet:
         path, deepest = None, DEEPEST_IN_TIME
         for _ in range(ATTEMPTS if motion.residual <= SOLVED else 0):
             found = in_time.found(samples, deepest, path)
-            others = [] if found is None else in_time.others(found)
-            apart = np.zeros(0)
-            if found is not None and others:
-                fine, path = found.deviating.multipliers, found.path
-                errors = np.max([_apart(fine, other.multipliers) for other in others], axis=0)
-                errors += in_time.volume_error(found) * np.abs(fine)
-                told = _judged(fine, errors, found.neutral)
-                apart = np.array([abs(np.sum(fine) - np.sum(of.multipliers)) for of in others])
-                enough = apart.max() <= WANTED * max(told.largest, 1.0)
-                if told.verdict != "unknown" and enough:
-                    return told
+            others = None if found is None else in_time.others(found)
+            if found is None or others is None:
+                samples *= SPLIT
+                continue
+            fine, path = found.deviating.multipliers, found.path
+            late, coarse = (other.multipliers for other in others)
+            errors = np.maximum(_apart(fine, late), _apart(fine, coarse))
+            errors += in_time.volume_error(found) * np.abs(fine)
+            told = _judged(fine, errors, found.neutral)
+            by_events, by_steps = (abs(np.sum(fine) - np.sum(each)) for each in (late, coarse))
+            enough = max(by_events, by_steps) <= WANTED * max(told.largest, 1.0)
+            if told.verdict != "unknown" and enough:
+                return told
             # In longer steps it shows that many times as much when joints become stiffer.
-            if len(apart) and 2.0 * EVENTS_LONGER * apart[0] > apart.max():
+            if 2.0 * EVENTS_LONGER * by_events > by_steps:
                 deepest += DEEPER
             else:
                 samples *= SPLIT

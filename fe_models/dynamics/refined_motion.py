@@ -36,15 +36,15 @@ from fe_models.dynamics.whole_ring import JoinedDeviations, motion_of
 from sa_solver.types import Array
 
 # A motion is found where a step changes it by no more than this share of its vibration, in at most
-# so many steps.
-FOUND, MOST_STEPS = 1e-7, 15
+# so many steps; one that only tells the error of another by a larger share.
+FOUND, ROUGHLY, MOST_STEPS = 1e-6, 1e-4, 15
 # Share of its vibration by which the motion in time may differ from that in harmonics: one further
 # away may be another.
 NEAR = 0.1
 
-# Shares of the steps with which the motion is found twice more, in steps that begin elsewhere, and
+# Share of the steps with which the motion is found once more, in steps that begin elsewhere, and
 # levels left out there: steps in which joints change are then so many times as long, and more.
-COARSER, LEVELS_LESS = (0.75, 0.625), 2
+COARSER, LEVELS_LESS = 0.625, 2
 EVENTS_LONGER = SPLIT**LEVELS_LESS
 
 Path = Callable[[Array], Array]
@@ -95,10 +95,12 @@ class MotionInTime:
     def _values(path: Path) -> Array:
         return path(np.arange(128) / 128)
 
-    def found(self, samples: int, deepest: int, path: Path | None = None) -> RefinedMotion | None:
+    def found(
+        self, samples: int, deepest: int, path: Path | None = None, enough: float = FOUND
+    ) -> RefinedMotion | None:
         """The motion near to a path, that in harmonics at first, with so many steps and levels.
 
-        None where there is none.
+        None where a step that changes no more than ``enough`` is not found.
         """
         path = path or self.in_harmonics
         for _ in range(MOST_STEPS):
@@ -106,22 +108,17 @@ class MotionInTime:
             if refined is None:
                 return None
             path = refined.path
-            if change <= FOUND:
+            if change <= enough:
                 return refined if self._distance(path) <= NEAR else None
         return None
 
-    def others(self, refined: RefinedMotion) -> list[Deviating]:
+    def others(self, refined: RefinedMotion) -> tuple[Deviating, Deviating] | None:
         """What a period makes of deviations where joints become stiffer a step later, and in longer
-        steps, that begin at other times; nothing where the motion is not found so."""
-        samples, deepest = refined.times.samples, refined.times.deepest
-        others = [refined.late()]
-        for share in COARSER:
-            steps = 2 * int(0.5 * share * samples), max(deepest - LEVELS_LESS, 0)
-            coarser = self.found(*steps, refined.path)
-            if coarser is None:
-                return []
-            others.append(coarser.deviating)
-        return others
+        steps, that begin at other times; None where the motion is not found in these."""
+        times = refined.times
+        steps = 2 * int(0.5 * COARSER * times.samples), max(times.deepest - LEVELS_LESS, 0)
+        coarser = self.found(*steps, refined.path, ROUGHLY)
+        return None if coarser is None else (refined.late(), coarser.deviating)
 
     def volume_error(self, refined: RefinedMotion) -> float:
         """Relative error of the product of all multipliers, by Liouville's formula exp(-T tr M⁻¹C).
