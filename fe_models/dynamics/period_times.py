@@ -9,6 +9,9 @@ import numpy as np
 
 from fe_models.dynamics.linear_steps import SPLIT
 
+# Times in a step at which it is looked what joints do, and levels to which it is divided for that.
+PROBE, PROBED = 8, 2
+
 
 @dataclass(frozen=True)
 class PeriodTimes:
@@ -33,8 +36,18 @@ class PeriodTimes:
     def following(
         cls, regimes: Callable[[PeriodTimes], np.ndarray], samples: int, deepest: int
     ) -> PeriodTimes:
-        """Steps that are divided to the ``deepest`` level where ``regimes`` ``(t, j)`` change."""
-        times = cls.even(samples, deepest)
+        """Steps that are divided to the ``deepest`` level where ``regimes`` ``(t, j)`` change.
+
+        What joints do for less than a step is looked for at more times, and not passed over.
+        """
+        times, probe = cls.even(samples, deepest), cls.even(PROBE * samples, deepest)
+        known = regimes(probe)
+        changes = (known != np.roll(known, -1, axis=0)).any(axis=1)
+        for level in range(min(PROBED, deepest)):
+            marked = np.zeros(len(times.starts), bool)
+            within = np.searchsorted(times.starts, probe.starts[changes] // PROBE, side="right")
+            marked[within - 1] = True
+            times = times.divided(marked & (times.levels == level))
         while True:
             known = regimes(times)
             changes = (known != np.roll(known, -1, axis=0)).any(axis=1)
