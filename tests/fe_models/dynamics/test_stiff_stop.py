@@ -5,10 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fe_models.dynamics.bifurcations import find_bifurcations
 from fe_models.dynamics.continuation import ContinuationControl
 from fe_models.dynamics.floquet import Floquet
-from fe_models.dynamics.followed_curve import curve_by_frequency
 from fe_models.dynamics.forced_response import along_frequency
 from fe_models.dynamics.harmonic_balance import HarmonicBalance, PeriodicLoad
 from fe_models.dynamics.harmonics import Resolution
@@ -96,22 +94,6 @@ def test_nothing_is_said_of_what_is_no_motion(touching):
     told = Floquet(branch.problem).stability(replace(motion, residual=1e-2))
     assert told.verdict == "unknown"
     assert not told.resolved
-
-
-@pytest.mark.slow
-def test_folds_between_motions_of_no_verdict_are_not_denied(touching):
-    """What is not known of the motions beside a fold is not told of it."""
-    branch, known = touching
-    curve = curve_by_frequency(branch.problem, FORCE)
-    steps = np.diff(branch.frequencies)
-    place = int(np.flatnonzero(steps[1:] * steps[:-1] < 0.0)[0])
-    some = slice(place, place + 3)
-    unknown = [
-        replace(told, verdict="unknown", error=np.inf, multipliers=np.empty(0)) for told in known
-    ]
-    found = find_bifurcations(curve, branch.solutions[some], unknown[some])
-    assert [each.kind for each in found] == ["fold"]
-    assert found[0].unstable == (None, None)
 
 
 def test_steps_that_are_joined_are_of_the_same_times():
