@@ -7,7 +7,8 @@ symmetry; at -1 the period doubles; a pair elsewhere is a Neimark-Sacker bifurca
 *Practical Bifurcation and Stability Analysis*, 3rd ed., section 7.4).
 
 Folds are found by the curve itself, where it turns: the multiplier of a motion of few harmonics is
-1 nearby. Joints that begin to touch or to slip may take multipliers past the circle in a jump.
+1 nearby. Everything else is looked for only between motions whose multipliers are known. Joints
+that begin to touch or to slip may take multipliers past the circle in a jump.
 """
 
 from __future__ import annotations
@@ -43,14 +44,15 @@ class Bifurcation:
     many others.
 
     ``multiplier`` is the one that passes the circle there; of a fold, the nearest to 1.
-    ``unstable`` is how many are beyond the circle at the points before and after.
+    ``unstable`` is how many are beyond the circle at the points before and after, None where that
+    is not known.
     """
 
     kind: Kind
     motion: HarmonicSolution
     multiplier: complex
     after: int
-    unstable: tuple[int, int]
+    unstable: tuple[int | None, int | None]
 
 
 def find_bifurcations(
@@ -65,31 +67,35 @@ def find_bifurcations(
     control = ContinuationControl()
     ways = [_Way(Chord(curve, *ends, control), floquet) for ends in pairwise(places)]
     folds = {place: fold for place in _turns(curve, motions, ways) if (fold := ways[place].fold())}
-    counts: dict[int, tuple[int, int]] = {}
+    counts: dict[int, tuple[int | None, int | None]] = {}
     found = []
     for place in _changes(stability):
-        before, after = stability[place].beyond, stability[place + 1].beyond
-        for motion, multiplier in ways[place].passages(before, after):
+        changed = stability[place].beyond, stability[place + 1].beyond
+        for motion, multiplier in ways[place].passages(*changed):
             kind = _kind_of(multiplier)
-            beside = [at for at in (place, place - 1, place + 1) if at in folds]
-            if beside and kind in ("branching", "jump"):
-                counts[beside[0]] = before, after
+            near = [at for at in (place, place - 1, place + 1) if at in folds]
+            if near and kind in ("branching", "jump"):
+                counts[near[0]] = changed
             else:
-                found.append(Bifurcation(kind, motion, multiplier, place, (before, after)))
+                found.append(Bifurcation(kind, motion, multiplier, place, changed))
     for place, (motion, multiplier) in folds.items():
-        same = stability[place].beyond, stability[place + 1].beyond
-        found.append(Bifurcation("fold", motion, multiplier, place, counts.get(place, same)))
+        beside = stability[place], stability[place + 1]
+        before, after = (at.beyond if at.resolved else None for at in beside)
+        unstable = counts.get(place, (before, after))
+        found.append(Bifurcation("fold", motion, multiplier, place, unstable))
     return tuple(sorted(found, key=lambda bifurcation: bifurcation.after))
 
 
 def _changes(stability: Sequence[Stability]) -> Iterator[int]:
     """Points between which and the next the number of multipliers beyond the circle changes.
 
-    Where several that are not known lie between two that are, only if it does between these.
+    Where several of no verdict lie between two that have one, only if it does between these, and
+    if the multipliers of all of them are known.
     """
     known = [place for place, at in enumerate(stability) if at.verdict != "unknown"]
     for first, last in pairwise(known):
-        if stability[first].beyond != stability[last].beyond:
+        resolved = all(at.resolved for at in stability[first:last])
+        if resolved and stability[first].beyond != stability[last].beyond:
             for place in range(first, last):
                 if stability[place].beyond != stability[place + 1].beyond:
                     yield place
@@ -141,7 +147,8 @@ class _Way(Generic[L]):
         share = self._root(lambda share: self._require(share).turning)
         if share is None:
             return None
-        multipliers = self._stability(share).multipliers
+        # Of the curve as its harmonics have it: its fold is one of them.
+        multipliers = self._floquet.multipliers(self._motion(share))
         nearest = min(multipliers, key=lambda value: float(abs(value - 1.0)), default=0.0)
         return self._motion(share), complex(nearest)
 
@@ -166,7 +173,9 @@ class _Way(Generic[L]):
         try:
             if function(0.0) * function(1.0) > 0.0:
                 return None
-            return float(brentq(function, 0.0, 1.0, xtol=LOCATED))
+            share = float(brentq(function, 0.0, 1.0, xtol=LOCATED))
+            function(share)  # known there too
+            return share
         except _Lost:
             return None
 
@@ -178,6 +187,8 @@ class _Way(Generic[L]):
     def _stability(self, share: float) -> Stability:
         if share not in self._known:
             self._known[share] = self._floquet.stability(self._motion(share))
+        if not self._known[share].resolved:
+            raise _Lost
         return self._known[share]
 
     def _require(self, share: float) -> Place[L]:

@@ -10,9 +10,13 @@ Neutral deviations, which neither grow nor die, are told by what joints are, not
 slider that sticks all period long may stand where it likes (its multiplier is 1), and it is a
 spring to all else; a structure that only sliders hold may be displaced as a whole.
 
-The error of the multipliers is told by half as many times of the period, and by a motion that is as
-far off as the given one may be. Where one is no farther from the circle than that, more times are
-taken, and in the end nothing is said.
+Of structures with few modes and joints the motion is first refined in time
+(:mod:`fe_models.dynamics.refined_motion`): multipliers are those of the motion that the harmonics
+are near to. Their error is told by longer steps that begin at other times, and by Liouville's
+product of all multipliers; where no motion is found nearby nothing is said. Of larger structures,
+and of rings, it is told by half as many times of the period, and by a motion that is as far off as
+the given one may be. Where a multiplier is no farther from the circle than its error, more times
+are taken, and in the end nothing is said.
 """
 
 from __future__ import annotations
@@ -25,8 +29,8 @@ import numpy as np
 from fe_models.dynamics.deviating_structure import (
     ActiveJoints,
     ModalStructure,
+    deviating,
     modes_below,
-    multipliers_of,
 )
 from fe_models.dynamics.harmonic_balance import HarmonicBalance
 from fe_models.dynamics.harmonic_solution import HarmonicSolution
@@ -34,13 +38,21 @@ from fe_models.dynamics.harmonics import ComplexArray
 from fe_models.dynamics.linear_steps import SPLIT
 from fe_models.dynamics.period_times import PeriodTimes
 from fe_models.dynamics.periodic_joints import DeviatingJoints, Deviations
+from fe_models.dynamics.refined_motion import EVENTS_LONGER, MotionInTime
 from fe_models.dynamics.travelling_wave import WaveReceptance
 from fe_models.dynamics.whole_ring import JoinedDeviations, motion_of, ring_structure
+from sa_solver.types import Array
 
 Verdict = Literal["stable", "unstable", "unknown"]
 # Times of a period at first, at least: so many steps of equal length, which then are divided in
 # four, so often, where a joint changes what it does.
 SAMPLES, DEEPEST = 128, 3
+# The same of a motion that is refined in time; how many more levels there are where it shows when
+# joints change what they do, and attempts, the others with four times as many times.
+DEEPEST_IN_TIME, DEEPER, ATTEMPTS = 4, 4, 4
+# Error of the sum of all multipliers, as a share of the largest or of 1, above which more times are
+# taken: of a pair off the real axis it shows what their sizes do not.
+WANTED = 3e-4
 # Where multipliers are nearer to the circle than their error, so often four times as many times.
 FINER = 2
 # Multipliers that are told, and those below which one is of no account.
@@ -53,6 +65,8 @@ ROUNDING = 1e-9
 # highest harmonic of the motion. Times of a period of these, or with more directions of joints than
 # so many, and times per highest harmonic.
 MOST_MODES, HIGHEST, MOST_DIRECTIONS, LARGE_SAMPLES, PER_HARMONIC = 64, 3.0, 12, 128, 4
+# What is left of the equations of a motion, relative to their terms, beyond which it is none.
+SOLVED = 1e-4
 # Modes of all sectors of a ring, of which none is left out: more take minutes.
 MOST_OF_RING = 256
 
@@ -63,7 +77,8 @@ class Stability:
 
     ``multipliers`` ``(k,)`` are the largest, by size, without the ``neutral`` ones, so many, which
     are 1 whatever the motion is; ``unstable`` of them are beyond the circle. ``error`` is that of
-    the largest. ``message`` says why nothing can be said, where it is unknown.
+    the largest, infinite where it is not known. ``message`` says why nothing can be said, where it
+    is unknown.
     """
 
     verdict: Verdict
@@ -72,6 +87,11 @@ class Stability:
     neutral: int
     error: float
     message: str
+
+    @property
+    def resolved(self) -> bool:
+        """Whether the error of the multipliers is known."""
+        return bool(np.isfinite(self.error))
 
     @property
     def beyond(self) -> int:
@@ -159,13 +179,64 @@ class Floquet:
                 f"{MOST_OF_RING}"
             )
         structure = self._structure(motion)
-        samples, deepest, finest = SAMPLES, DEEPEST, FINER
-        if not self.cheap:
-            # Of many joints one changes in every step: none of them is divided.
-            samples, deepest, finest = LARGE_SAMPLES, 0, 0
+        samples = SAMPLES if self.cheap else LARGE_SAMPLES
         while samples < PER_HARMONIC * motion.resolution.harmonics[-1]:
             samples *= 2
-        at = structure, motion.frequency
+        few = len(structure.squares) <= MOST_MODES
+        if few and len(structure.at_joints) <= MOST_DIRECTIONS:
+            return self._in_time(motion, structure, samples)
+        return self._in_harmonics(motion, structure, samples)
+
+    def multipliers(self, motion: HarmonicSolution) -> ComplexArray:
+        """Multipliers along a motion as its harmonics have it, whether or not they are enough.
+
+        Where a curve of such motions folds, one of them is 1.
+        """
+        samples = SPLIT**FINER * SAMPLES if self.cheap else LARGE_SAMPLES
+        times = self._times(motion, samples, DEEPEST if self.cheap else 0)
+        deviations, structure = self._deviations(motion, times), self._structure(motion)
+        joints = ActiveJoints.of(deviations, structure)
+        period = deviating(structure, motion.frequency, times, deviations, joints)
+        return _largest(period.multipliers)
+
+    def _in_time(
+        self, motion: HarmonicSolution, structure: ModalStructure, samples: int
+    ) -> Stability:
+        """By the motion in time that is near to this one, if there is one."""
+        ring = None if self._sector is None else self._sector.ring
+        in_time, told = MotionInTime(self._problem, structure, motion, ring), None
+        path, deepest = None, DEEPEST_IN_TIME
+        for _ in range(ATTEMPTS if motion.residual <= SOLVED else 0):
+            found = in_time.found(samples, deepest, path)
+            others = None if found is None else in_time.others(found)
+            if found is None or others is None:
+                samples *= SPLIT
+                continue
+            fine, path = found.deviating.multipliers, found.path
+            late, coarse = (other.multipliers for other in others)
+            errors = np.maximum(_apart(fine, late), _apart(fine, coarse))
+            errors += in_time.volume_error(found) * np.abs(fine)
+            told = _judged(fine, errors, found.neutral)
+            by_events, by_steps = (abs(np.sum(fine) - np.sum(each)) for each in (late, coarse))
+            enough = max(by_events, by_steps) <= WANTED * max(told.largest, 1.0)
+            if told.verdict != "unknown" and enough:
+                return told
+            # In longer steps it shows that many times as much when joints become stiffer.
+            if 2.0 * EVENTS_LONGER * by_events > by_steps:
+                deepest += DEEPER
+            else:
+                samples *= SPLIT
+        if told is not None:
+            return told
+        lost = "no periodic motion in time is found near to these harmonics: give more of them"
+        return replace(_unknown(lost), multipliers=self.multipliers(motion))
+
+    def _in_harmonics(
+        self, motion: HarmonicSolution, structure: ModalStructure, samples: int
+    ) -> Stability:
+        """By the motion as its harmonics have it."""
+        # Of many joints one changes in every step: none of them is divided.
+        finest, deepest = (FINER, DEEPEST) if self.cheap else (0, 0)
         for finer in range(finest + 1):
             times = self._times(motion, SPLIT**finer * samples, deepest + finer)
             half = times.halved()
@@ -174,24 +245,21 @@ class Floquet:
                 (motion, times), (motion, half), (_displaced(motion), half)
             )
             joints = ActiveJoints.of(first, structure)
-            fine, shifts = multipliers_of(*at, times, first, joints)
-            coarse, moved = (multipliers_of(*at, half, of, joints)[0] for of in others)
-            told = _judged(fine, coarse, moved, joints.neutral + shifts)
+            at = structure, motion.frequency
+            period = deviating(*at, times, first, joints)
+            coarse, moved = (deviating(*at, half, of, joints).multipliers for of in others)
+            fine = period.multipliers
+            errors = _apart(fine, coarse) + _apart(moved, coarse)
+            told = _judged(fine, errors, joints.neutral + period.shifts.shape[1])
             if told.verdict != "unknown":
                 break
         return told
 
     def _times(self, motion: HarmonicSolution, samples: int, deepest: int) -> PeriodTimes:
         """Those of a period, in short steps where joints change what they do."""
-        times = PeriodTimes.even(samples, deepest)
-        while True:
-            regimes = self._deviations(motion, times).regimes
-            changes = (regimes != np.roll(regimes, -1, axis=0)).any(axis=1)
-            # It changes in this step or, where the motion turns, in the next.
-            marked = changes | np.roll(changes, 1)
-            if not (marked & (times.levels < deepest)).any():
-                return times
-            times = times.divided(marked)
+        return PeriodTimes.following(
+            lambda times: self._deviations(motion, times).regimes, samples, deepest
+        )
 
     def _alike(self, *of: tuple[HarmonicSolution, PeriodTimes]) -> list[Deviations]:
         """What joints make of deviations from motions, as many numbers of memory in each."""
@@ -235,15 +303,25 @@ def _displaced(motion: HarmonicSolution) -> HarmonicSolution:
     return replace(motion, coefficients=coefficients)
 
 
-def _judged(
-    fine: ComplexArray, coarse: ComplexArray, moved: ComplexArray, neutral: int
-) -> Stability:
-    """What multipliers say, with those of half as many times, and of another motion at these.
+def _apart(some: ComplexArray, others: ComplexArray) -> Array:
+    """By how much the largest differs in size, the second largest, and so on; of the first."""
+    sizes = np.zeros(max(len(some), len(others)))
+    sizes[: len(some)] += np.abs(some)
+    sizes[: len(others)] -= np.abs(others)
+    return np.abs(sizes[: len(some)])
+
+
+def _largest(multipliers: ComplexArray) -> ComplexArray:
+    """Those that are told."""
+    return multipliers[np.abs(multipliers) > SMALL][:TOLD]
+
+
+def _judged(fine: ComplexArray, errors: Array, neutral: int) -> Stability:
+    """What multipliers say with errors ``(k,)`` of their sizes.
 
     What counts is how large the largest is, the second largest, and so on.
     """
-    sizes, halved, other = (np.abs(multipliers) for multipliers in (fine, coarse, moved))
-    errors = np.abs(sizes - halved) + np.abs(other - halved) + ROUNDING
+    sizes, errors = np.abs(fine), errors + ROUNDING
     beyond = sizes - 1.0
     unstable, undecided = beyond > SURE * errors, np.abs(beyond) <= SURE * errors
     verdict: Verdict = "unstable" if unstable.any() else "stable"
@@ -255,6 +333,5 @@ def _judged(
             f"a multiplier of size {sizes[place]:.6g} is as near to 1 as its error, "
             f"{errors[place]:.1g}"
         )
-    told = fine[sizes > SMALL][:TOLD]
     error = float(errors[:1].sum())
-    return Stability(verdict, told, int(unstable.sum()), neutral, error, message)
+    return Stability(verdict, _largest(fine), int(unstable.sum()), neutral, error, message)

@@ -90,6 +90,14 @@ class PeriodicLoad:
         """Those of the force."""
         return {*self.waves, *self.inertial}
 
+    def amplitude(self, harmonic: int, angular: float, force: float) -> ComplexArray:
+        """What the structure carries ``(n,)`` in a harmonic of so many rad/s, under a force."""
+        nothing = np.zeros(1)
+        growing = self.waves.get(harmonic, nothing)
+        growing = growing + angular**2 * self.inertial.get(harmonic, nothing)
+        constant = nothing if harmonic or self.static is None else self.static
+        return np.asarray(force * growing + constant, dtype=complex)
+
 
 @dataclass(frozen=True)
 class Balance:
@@ -270,7 +278,8 @@ class HarmonicBalance:
     ) -> NewtonSolution[Balance]:
         """Newton's method from given unknowns; if it fails, from rest, by raising the force.
 
-        A branch is followed for the latter, with the steps of ``control``. The equations of the
+        A branch is followed for the latter, with the steps of ``control``; its ``watch``, who looks
+        at another curve, is told nothing of it. The equations of the
         solution are those with the frequency as parameter. Raises :class:`HarmonicBalanceError` for
         a frequency that is not above zero, and for numbers that are not finite.
         """
@@ -279,7 +288,7 @@ class HarmonicBalance:
                 f"frequency {frequency:g} Hz, force {force:g}: give a frequency above 0, and both "
                 "finite"
             )
-        control = control or ContinuationControl()
+        control = replace(control or ContinuationControl(), watch=lambda parameter: None)
         newton = NewtonControl(control.tolerance)
         direct = solve(self.by_frequency(force), unknowns, frequency, newton)
         if direct.converged or force == 0.0:

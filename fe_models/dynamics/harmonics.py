@@ -103,6 +103,15 @@ class Resolution:
         values[:, sine[sine >= 0]] = sines[at[:, sine >= 0]]
         return values
 
+    def functions_during(self, shares: Array) -> Array:
+        """The same at any ``shares`` ``(t,)`` of the period."""
+        values = np.empty((len(shares), self.size))
+        angles = 2.0 * np.pi * np.outer(shares, self.harmonics)
+        cosine, sine = self.places
+        values[:, cosine] = np.cos(angles)
+        values[:, sine[sine >= 0]] = np.sin(angles[:, sine >= 0])
+        return values
+
     @cached_property
     def basis(self) -> Array:
         return self.functions(self.samples)

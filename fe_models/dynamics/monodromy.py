@@ -6,6 +6,10 @@ within a step the displacements u of the joints are those under which both agree
 
     u = (what the structure does without the forces at the end) - G F,   F = (T + S D) u + ...
 
+A last column is no deviation but what the given motion lacks: the structure's whole state under
+the load and the forces that joints have in the motion, less the displacements of the motion. With
+it a period says which motion is periodic, by Newton's method for the whole period at once.
+
 Springs near to what the joints are in a step are taken as parts of the structure in it, and off the
 joints' forces: where joints are these springs nothing is left of the error, which is of second
 order in the steps, and of first order in those in which a joint changes what it does.
@@ -56,17 +60,34 @@ class JointSteps(NamedTuple):
     tangent: Array
 
 
+class GivenMotion(NamedTuple):
+    """What joints do in the motion at ``t + 1`` times: displacements ``moved`` and ``force``
+    ``(t + 1, a d)``; all 0 where nothing is asked of it."""
+
+    moved: Array
+    force: Array
+
+
 @njit(cache=True, nogil=True)
-def monodromy(structure: StructureSteps, joints: JointSteps) -> Array:
-    """The matrix ``(k + a p, k + a p)``: numbers of the structure first, then memory by joint."""
-    own = structure.forward.shape[1]
+def monodromy(
+    structure: StructureSteps,
+    joints: JointSteps,
+    motion: GivenMotion,
+    begin: Array,
+    course: Array,
+) -> Array:
+    """Columns ``(k + a p, n + a p + 1)``: numbers of the structure first, then memory by joint.
+
+    ``begin`` ``(k, n + a p + 1)`` is the structure at first: unit deviations in ``n`` columns, the
+    last as the load begins. Displacements of joints are written into the ``course``
+    ``(t + 1, a d, n + a p + 1)``, or none where that is empty.
+    """
+    own, size = begin.shape
     count, remembered, directions = joints.by_end.shape[1:]
-    forces, size = count * directions, own + count * remembered
-    state, memory = np.zeros((own, size)), np.zeros((count * remembered, size))
-    for row in range(own):
-        state[row, row] = 1.0
+    forces = count * directions
+    state, memory = begin.copy(), np.zeros((count * remembered, size))
     for number in range(count * remembered):
-        memory[number, own + number] = 1.0
+        memory[number, size - 1 - count * remembered + number] = 1.0
     compliance = np.empty((len(structure.forward), forces, forces))
     for kind in range(len(compliance)):
         _copy(structure.residual, compliance[kind])
@@ -74,18 +95,26 @@ def monodromy(structure: StructureSteps, joints: JointSteps) -> Array:
     new_state, new_memory = np.empty_like(state), np.empty_like(memory)
     force, moved = np.empty((forces, size)), np.zeros((forces, size))
     slopes, matrix = np.empty((count, directions, directions)), np.empty((forces, forces))
+    given = np.empty(forces)
     # Displacements at the beginning: those of the structure, less what forces do at once.
     _memory_forces(joints, memory, force)
+    _add_last(1.0, motion.force[0], force)
     _add_product(1.0, structure.at_joints, state, moved)
     _add_product(-1.0, structure.residual, force, moved)
+    _add_last(-1.0, motion.moved[0], moved)
+    _add_last(-1.0, motion.force[0], force)
     for joint in range(count):
         _copy(joints.tangent[-1, joint], slopes[joint])
     _solve(_coupled(structure.residual, slopes, matrix), moved)
     _add_springs(1.0, joints.tangent[-1], moved, force)
+    if len(course):
+        _copy(moved, course[0])
     for step in range(len(joints.kinds)):
         kind = joints.kinds[step]
         springs = structure.springs[kind]
         _add_springs(-1.0, springs, moved, force)
+        _beside_springs(motion, step, springs, given)
+        _add_last(1.0, given, force)
         new_state[:] = 0.0
         _add_product(1.0, structure.forward[kind], state, new_state)
         _add_product(1.0, structure.by_start[kind], force, new_state)
@@ -93,20 +122,26 @@ def monodromy(structure: StructureSteps, joints: JointSteps) -> Array:
         _add_kept(joints.kept[step], memory, new_memory)
         _add_moved(joints.by_start[step], moved, new_memory)
         _memory_forces(joints, new_memory, force)
+        _beside_springs(motion, step + 1, springs, given)
+        _add_last(1.0, given, force)
         moved[:] = 0.0
         _add_product(1.0, structure.at_joints, new_state, moved)
         _add_product(-1.0, compliance[kind], force, moved)
+        _add_last(-1.0, motion.moved[step + 1], moved)
         _slopes(joints, step, springs, slopes)
         _solve(_coupled(compliance[kind], slopes, matrix), moved)
         _add_springs(1.0, slopes, moved, force)
         _add_product(1.0, structure.by_end[kind], force, new_state)
         _add_moved(joints.by_end[step], moved, new_memory)
         # Whole forces again: those of springs in the structure are the joints'.
+        _add_last(-1.0, given, force)
         _add_springs(1.0, springs, moved, force)
+        if len(course):
+            _copy(moved, course[step + 1])
         _forget(new_memory)
         state, new_state = new_state, state
         memory, new_memory = new_memory, memory
-    whole = np.empty((size, size))
+    whole = np.empty((own + count * remembered, size))
     _copy(state, whole)
     _copy(memory, whole[own:])
     return whole
@@ -118,6 +153,26 @@ def _copy(rows: np.ndarray, to: Array) -> None:
     for row in range(rows.shape[0]):
         for c in range(rows.shape[1]):
             to[row, c] = rows[row, c]
+
+
+@njit(cache=True, nogil=True)
+def _add_last(factor: float, values: Array, rows: Array) -> None:
+    """Add to the last column."""
+    last = rows.shape[1] - 1
+    for row in range(len(values)):
+        rows[row, last] += factor * values[row]
+
+
+@njit(cache=True, nogil=True)
+def _beside_springs(motion: GivenMotion, at: int, springs: Array, given: Array) -> None:
+    """Write forces ``(a d,)`` of the motion at a time, less those of springs ``(a, d, d)``."""
+    count, directions, _ = springs.shape
+    for joint in range(count):
+        first = joint * directions
+        for i in range(directions):
+            given[first + i] = motion.force[at, first + i]
+            for k in range(directions):
+                given[first + i] -= springs[joint, i, k] * motion.moved[at, first + k]
 
 
 @njit(cache=True, nogil=True)

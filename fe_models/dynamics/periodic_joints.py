@@ -33,9 +33,9 @@ class Deviations(Protocol):
     From each of ``t`` times of a period to the next, deviations of what ``j`` joints remember
     ``(p,)`` and of their displacements ``(d,)`` go on as δs_end = A δs + E δu + D δu_end, and their
     forces are S δs_end + T δu_end: ``kept`` A, ``by_start`` E, ``by_end`` D ``(t, j, ...)``,
-    ``pull`` S ``(j, d, p)`` and ``tangent`` T. ``regimes`` ``(t, j)`` tell what joints do. Of the
-    numbers each joint has ``remembered`` ``(j,)``: further ones, of which others have more, stay as
-    they are.
+    ``pull`` S ``(j, d, p)`` and ``tangent`` T. ``regimes`` ``(t, j)`` tell what joints do, and
+    ``force`` ``(t, j, d)`` [N] is that of the motion itself at the times. Of the numbers each joint
+    has ``remembered`` ``(j,)``: further ones, of which others have more, stay as they are.
     """
 
     @property
@@ -50,6 +50,8 @@ class Deviations(Protocol):
     def tangent(self) -> Array: ...
     @property
     def regimes(self) -> np.ndarray: ...
+    @property
+    def force(self) -> Array: ...
     @property
     def remembered(self) -> Indices: ...
 

@@ -28,6 +28,7 @@ class JoinedDeviations:
     pull: Array
     tangent: Array
     regimes: np.ndarray
+    force: Array
     remembered: Indices
 
     @classmethod
@@ -45,6 +46,7 @@ class JoinedDeviations:
             joined("pull", 0),
             joined("tangent", 1),
             joined("regimes", 1),
+            joined("force", 1),
             np.concatenate([part.remembered for part in every]),
         )
 

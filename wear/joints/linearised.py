@@ -54,6 +54,7 @@ class LinearisedMarch:
     ``kept`` A ``(t, j, p, p)``, ``by_start`` E and ``by_end`` D ``(t, j, p, d)``, ``pull`` S
     ``(j, d, p)`` and ``tangent`` T ``(t, j, d, d)`` as in the module; ``regimes`` ``(t, j)`` are
     whole numbers that change from an increment to the next where the joint does something else.
+    ``force`` ``(t, j, d)`` [N] is that of the motion itself, at each sample.
     A joint that remembers less than others has ``remembered`` ``(j,)`` numbers: the further ones
     have no part in it, and stay as they are.
     """
@@ -64,6 +65,7 @@ class LinearisedMarch:
     pull: Array
     tangent: Array
     regimes: np.ndarray
+    force: Array
     remembered: Indices
 
     @classmethod
@@ -82,6 +84,7 @@ class Maps(NamedTuple):
     pull: Array
     tangent: Array
     regimes: np.ndarray
+    force: Array
 
     @classmethod
     def room(cls, samples: int, joints: int, memory: int, directions: int) -> Maps:
@@ -94,6 +97,7 @@ class Maps(NamedTuple):
             np.zeros((joints, directions, memory)),
             np.zeros((samples, joints, directions, directions)),
             np.zeros((samples, joints), np.int32),
+            np.zeros((samples, joints, directions)),
         )
 
 
@@ -105,8 +109,10 @@ def linearise_sliders(joints: DrivenJoints, maps: Maps) -> None:
         slider, stretch = slider_of(joint), joints.settled[j, 0]
         maps.pull[j, 0, 0] = slider.spring
         for step in range(len(path)):
-            increment = path[(step + 1) % len(path)] - path[step]
+            at = (step + 1) % len(path)
+            increment = path[at] - path[step]
             stretch, kept, follows, _ = move_slider(slider, stretch, increment)
+            maps.force[at, j, 0] = slider.spring * stretch + joint[2] * path[at]
             maps.kept[step, j, 0, 0] = kept
             maps.by_start[step, j, 0, 0], maps.by_end[step, j, 0, 0] = -follows, follows
             maps.tangent[step, j, 0, 0] = joint[2]
@@ -121,9 +127,10 @@ def linearise_elastic(joints: DrivenJoints, maps: Maps) -> None:
     for j in range(len(joints.parameters)):
         joint, path = joints.parameters[j], joints.path[j]
         for step in range(len(path)):
-            at = path[(step + 1) % len(path)]
-            _, slope, state = elastic_force(joint, at)
-            maps.tangent[step, j, 0, 0] = slope
+            after = (step + 1) % len(path)
+            at = path[after]
+            force, slope, state = elastic_force(joint, at)
+            maps.force[after, j, 0], maps.tangent[step, j, 0, 0] = force, slope
             # Of a stop, which of two sides is pressed counts too.
             if joint[0] == STOP:
                 maps.regimes[step, j] = IS_APART if state else int(copysign(1.0, at))
@@ -144,6 +151,8 @@ def linearise_contacts(joints: DrivenJoints, maps: Maps) -> None:
             way = increment_of(contact, stretch, path, step, at)
             x, y, of_x, of_y = advance_slopes(way)
             stretch = Stretch(x / contact.stiffness, y / contact.stiffness)
+            maps.force[at, j, 0], maps.force[at, j, 1] = x, y
+            maps.force[at, j, 2] = max(pressing(contact, path[at, 2]), 0.0)
             for row, of in enumerate((of_x, of_y)):
                 maps.kept[step, j, row, 0] = of.force_x
                 maps.kept[step, j, row, 1] = of.force_y
@@ -183,7 +192,7 @@ def linearise_curves(lead: int, joints: DrivenJoints, maps: Maps) -> int:
                 increment = end - memory[DISPLACEMENT]
                 depth = int(memory[DEPTH])
                 turned = increment != 0.0 and turns(memory, depth, end)
-                _, slope, _ = advance_masing(curve, 0.0, memory, increment)
+                force, slope, _ = advance_masing(curve, 0.0, memory, increment)
                 memory[DISPLACEMENT] = end
                 left = int(memory[DEPTH])
                 if period < CURVE_PERIODS:
@@ -192,6 +201,7 @@ def linearise_curves(lead: int, joints: DrivenJoints, maps: Maps) -> int:
                 if 2 * most >= maps.kept.shape[2]:
                     continue
                 maps.tangent[step, j, 0, 0], maps.pull[j, 0, 0] = joint[1], 1.0
+                maps.force[(step + 1) % samples, j, 0] = force + joint[1] * end
                 maps.regimes[step, j] = 2 * left + (increment > 0.0)
                 _write_curve(maps, step, j, (depth if turned else -1, left, slope))
     return most

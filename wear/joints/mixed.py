@@ -178,6 +178,7 @@ class MixedMarch:
             maps.pull[at, along, known] = march.pull
             maps.tangent[:, at, along, along] = march.tangent
             maps.regimes[:, at] = march.regimes
+            maps.force[:, at, along] = march.force
         remembered = np.concatenate([march.remembered for march in marches])
         return LinearisedMarch(*maps, remembered)
 

@@ -26,7 +26,8 @@ from sa_solver.types import Progress, Tally, unseen
 from workflow.case.sections import Output
 from workflow.shell.analysis import Pictures, Share
 from workflow.shell.folder import OutputFolder
-from workflow.shell.processes import Beside, Task, share_out
+from workflow.shell.isolation import Isolation
+from workflow.shell.processes import Beside, Task, attempt, share_out
 
 
 def write_pictures(
@@ -34,13 +35,15 @@ def write_pictures(
     folder: OutputFolder,
     pictures: Callable[[], Pictures],
     contents: Any,
+    isolated: Isolation,
     beside: Beside | None = None,
     share: Share = "pictures",
     progress: Progress = unseen,
 ) -> dict[str, str]:
     """Write the pictures of the results in a folder that a case asks for in its ``output``.
 
-    ``contents`` is what the results hold, as ``pictures`` are told it. A process ``beside`` this
+    ``contents`` is what the results hold, as ``pictures`` are told it. Each picture is ``isolated``
+    from the others and from the run: one that fails is left out. A process ``beside`` this
     one has a ``share`` of the work, and ``progress`` is told what is done. Returns the figures as
     SVG texts by their names, in the order in which they are to be looked at, if they are to go into
     a report.
@@ -57,8 +60,15 @@ def write_pictures(
             tasks.append((write_paraview, (*told, paraview)))
         there = beside if share != "nothing" else None
         own = len(names) if share == "files" else 0
-        written = share_out(tasks, there, Tally(progress, len(tasks)), own)
-    return dict(zip(names, written, strict=False)) if output.report else {}
+        attempts: list[Task] = [(attempt, task) for task in tasks]
+        written = share_out(attempts, there, Tally(progress, len(tasks)), own)
+    drawn: dict[str, str] = {}
+    for name, answer in zip((*names, "paraview"), written, strict=False):
+        with isolated(name if name == "paraview" else f"figures/{name}"):
+            if isinstance(answer, Exception):
+                raise answer
+            drawn[name] = answer
+    return {name: drawn[name] for name in names if name in drawn} if output.report else {}
 
 
 def load_what_draws(

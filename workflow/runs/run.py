@@ -22,12 +22,12 @@ from workflow.runs.provenance import case_values, provenance_of
 from workflow.shell import checkpoint
 from workflow.shell.analysis import Analysis, Pictures, Run, Share, Summary
 from workflow.shell.checkpoint import Checkpoint
-from workflow.shell.folder import ASIDE, MANIFEST, OutputFolder
+from workflow.shell.folder import ASIDE, MANIFEST, REPORT, OutputFolder
 from workflow.shell.forecast import in_words
 from workflow.shell.lock import locked
 from workflow.shell.measured import check_measured, tell_measured
 from workflow.shell.processes import Beside
-from workflow.shell.reporter import SHORT_RUN, Reporter, telling
+from workflow.shell.reporter import FORECAST, SHORT_RUN, TERMINAL, Reporter, telling
 from workflow.shell.run_time import RunTime
 from workflow.shell.screen import Loudness, Screen
 from workflow.shell.store import read_bytes
@@ -217,25 +217,27 @@ def _run(
         return bring_to_end(load_case(file), root)
 
     def draw(contents: Any) -> None:
-        with reporter.stage("paraview and figures", "pictures") as told:
+        isolated, output = reporter.isolated, case.output
+        with reporter.stage("paraview and figures", "pictures") as told, isolated("figures"):
             if pictures is not None:
                 drawn.extend(_names(pictures, case, contents))
-                figures.update(
-                    write_pictures(case.output, folder, pictures, contents, beside, share, told)
-                )
+                told_of = folder, pictures, contents, isolated
+                figures.update(write_pictures(output, *told_of, beside, share, told))
 
     def report(summary: Summary) -> None:
-        if case.output.report:
-            _report(run, summary, figures)
+        with reporter.isolated(REPORT):
+            if case.output.report:
+                _report(run, summary, figures)
 
     pictures, share = pictures_of(analysis, case), _share(analysis, case)
     figures: dict[str, str] = {}
     drawn: list[str] = []
-    expected = analysis.run_time(case)
     with (
-        closing(Reporter(folder.reserve_log(), resume, expected, loudness)) as reporter,
+        closing(Reporter(folder.reserve_log(), resume, loudness=loudness)) as reporter,
         closing(Beside()) as beside,
     ):
+        with reporter.isolated(FORECAST):
+            reporter.expected = analysis.run_time(case)
         for line in filter(None, told):
             reporter.say(line)
         if stays:
@@ -243,7 +245,7 @@ def _run(
                 f"{', '.join(stays)}: in the folder before this run, and not of it; what has a "
                 f"name that the run needs gets {ASIDE} at its end"
             )
-        _announce(case, expected, resume, reporter)
+        _announce(case, reporter.expected, resume, reporter)
         run = Run(
             kind=kind_of(case),
             case=case,
@@ -260,11 +262,13 @@ def _run(
             beside=beside,
         )
         if share != "nothing":
-            beside.begin(load_what_draws, pictures, case.output, share)
+            with reporter.isolated("figures"):
+                beside.begin(load_what_draws, pictures, case.output, share)
         with telling(reporter):
             analysis.run(run)
-        for line in first_look(folder.root, drawn):
-            reporter.say(line)
+        with reporter.isolated(TERMINAL):
+            for line in first_look(folder.root, drawn):
+                reporter.say(line)
 
 
 def _names(pictures: Callable[[], Pictures], case: Case, contents: Any) -> list[str]:
@@ -301,7 +305,7 @@ def _stopped(analysis: Analysis, folder: OutputFolder) -> str:
 
 
 def _report(run: Run[Any], summary: Summary, figures: Mapping[str, str]) -> None:
-    """Write the page of a run. It is no reason to lose the run, but for a disk that is full."""
+    """Write the page of a run."""
     told = ToldRun(
         case=run.case,
         case_text=read_bytes(run.folder.case).decode("utf-8"),
@@ -310,15 +314,7 @@ def _report(run: Run[Any], summary: Summary, figures: Mapping[str, str]) -> None
         input_files=run.provenance["input_files"],
         figures=figures,
     )
-    path = run.folder.reserve_report()
-    try:
-        write_page(told, path)
-    except OSError:
-        raise
-    except Exception as error:  # whatever of the results it could not put in words
-        run.reporter.warn(
-            f"{path.name}: not written ({type(error).__name__}: {error}); the results are whole"
-        )
+    write_page(told, run.folder.reserve_report())
 
 
 def _is_case(path: Path, case: Case) -> bool:

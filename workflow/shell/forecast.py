@@ -28,7 +28,12 @@ class Forecast:
         self.steps = 0
 
     def reach(self, share: float) -> None:
-        """So large a share of all work is done; a smaller one than before where more has shown."""
+        """So large a share of all work is done; a smaller one than before where more has shown.
+
+        Whoever reckons it may be wrong: below 0, or where it is no number, nothing is done yet, and
+        above 1 all is.
+        """
+        share = min(share, 1.0) if share > 0.0 else 0.0
         self._now, self.share = self._clock(), share
         self.steps += 1
         if self.steps == 1:

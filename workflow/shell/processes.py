@@ -320,13 +320,13 @@ def _serve(
     settings: Any,
 ) -> None:
     """Answer calls, one after the other, and tell what of them is done."""
-    answering = _attempt(make, (settings, lambda: _write(answers, _Done())))
+    answering = attempt(make, (settings, lambda: _write(answers, _Done())))
     while True:
         method, arguments = pickle.loads(messages.get())
         if isinstance(answering, Exception):
             _write(answers, answering)
         else:
-            _write(answers, _attempt(answering, (method, *arguments)))
+            _write(answers, attempt(answering, (method, *arguments)))
 
 
 def _do_each(messages: SimpleQueue[bytes], answers: IO[bytes]) -> None:
@@ -337,11 +337,11 @@ def _do_each(messages: SimpleQueue[bytes], answers: IO[bytes]) -> None:
         return function(*arguments)
 
     while True:
-        _write(answers, _attempt(run, (messages.get(),)))
+        _write(answers, attempt(run, (messages.get(),)))
 
 
-def _attempt(function: Callable[..., Any], arguments: tuple[Any, ...]) -> Any:
-    """What the function returned or, as a value, what it raised."""
+def attempt(function: Callable[..., Any], arguments: tuple[Any, ...]) -> Any:
+    """Return what the function returned or, as a value, what it raised."""
     try:
         return function(*arguments)
     except Exception as error:

@@ -12,6 +12,7 @@ from typing import TypeVar
 
 from sa_solver.types import Progress
 from workflow.shell.forecast import Forecast, about
+from workflow.shell.isolation import Isolation
 from workflow.shell.run_time import RunTime
 from workflow.shell.screen import Loudness, Row, Screen, console
 from workflow.shell.store import check_regular
@@ -29,6 +30,8 @@ CHANGED = 1.5
 # Seconds between two looks of a stage at how far it is, and between two lines about that where
 # there is no screen.
 LOOK, LINE = 0.1, 60.0
+# What is isolated from the run, as a warning names it.
+FORECAST, LOG, TERMINAL = "progress", "run.log", "terminal"
 
 
 @dataclass
@@ -44,13 +47,24 @@ class _Course:
 class _Stage:
     """Tells how far a stage is: a ``fe_models`` or ``wear`` callback, called as often as it may."""
 
-    def __init__(self, name: str, of: str, row: Row, say: Callable[[str], None] | None) -> None:
+    def __init__(
+        self,
+        name: str,
+        of: str,
+        row: Row,
+        say: Callable[[str], None] | None,
+        isolated: Isolation,
+    ) -> None:
         self._name, self._of, self._row, self._say = name, of, row, say
         self._forecast, self._looked = Forecast(), time.perf_counter()
-        self._said = self._looked
+        self._said, self._isolated = self._looked, isolated
 
     def __call__(self, done: int, total: int) -> None:
         """So many of ``total`` are done."""
+        with self._isolated(FORECAST):
+            self._look(done, total)
+
+    def _look(self, done: int, total: int) -> None:
         now = time.perf_counter()
         if now - self._looked < LOOK:
             return
@@ -68,7 +82,8 @@ class Reporter:
     """Times stages, logs lines, collects warnings, and forecasts how long the run will take.
 
     What comes after its long part takes as much longer than ``expected`` as what came before it.
-    Raises UserError where a pipe, say, is in the place of its ``log``.
+    Nothing that it does ends a run: see ``isolated``, which keeps whatever else only shows a run
+    apart from it too. Raises UserError where a pipe, say, is in the place of its ``log``.
     """
 
     def __init__(
@@ -80,16 +95,18 @@ class Reporter:
     ) -> None:
         check_regular(log)
         self._log = log.open("a" if append else "w", encoding="utf-8")
-        self._loudness, self._screen = loudness, Screen(loudness > Loudness.QUIET)
-        self._begin, self._expected, self._after = time.perf_counter(), expected, 0.0
+        self.warnings: list[str] = []
+        self.isolated = Isolation(self.warn)
+        self._loudness, self._screen = loudness, Screen(loudness > Loudness.QUIET, self.isolated)
+        self._begin, self.expected, self._after = time.perf_counter(), expected, 0.0
         self._course: _Course | None = None
         self._span, self._names = (0.0, 1.0), ""
         self.seconds: dict[str, float] = {}
-        self.warnings: list[str] = []
 
     def close(self) -> None:
         self._screen.close()
-        self._log.close()
+        with self.isolated(LOG, needed=False):
+            self._log.close()
 
     @property
     def spent(self) -> float:
@@ -100,17 +117,22 @@ class Reporter:
         """A line on the terminal and in the log; ``always`` if it is asked to be quiet too."""
         self._write(line)
         if always or self._loudness > Loudness.QUIET:
-            console().print(line, markup=False, soft_wrap=True)
+            self._print(line)
 
     def log(self, line: str) -> None:
         """A line in the log only, unless it is asked to be verbose."""
         self._write(line)
         if self._loudness is Loudness.VERBOSE:
-            console().print(line, markup=False, soft_wrap=True)
+            self._print(line)
 
     def _write(self, line: str) -> None:
-        self._log.write(f"{time.strftime('%H:%M:%S')} {line}\n")
-        self._log.flush()
+        with self.isolated(LOG, needed=False):
+            self._log.write(f"{time.strftime('%H:%M:%S')} {line}\n")
+            self._log.flush()
+
+    def _print(self, line: str) -> None:
+        with self.isolated(TERMINAL):
+            console().print(line, markup=False, soft_wrap=True)
 
     def warn(self, line: str) -> None:
         """A warning: said once, and kept for the summary."""
@@ -127,7 +149,7 @@ class Reporter:
         begin = time.perf_counter()
         try:
             with self._screen.row(name) as row:
-                yield _Stage(name, of, row, None if self._screen.on else self.say)
+                yield _Stage(name, of, row, None if self._screen.on else self.say, self.isolated)
         finally:
             spent = time.perf_counter() - begin
             self.seconds[name] = self.seconds.get(name, 0.0) + spent
@@ -139,10 +161,11 @@ class Reporter:
     def course(self, name: str) -> Iterator[None]:
         """The long part of a run: :meth:`part` and :meth:`reached` tell how far it has got."""
         with self._screen.row(name) as row:
-            self._after = self._expected.after * max(1.0, self.spent / self._expected.begun)
             self._course = _Course(name, row, Forecast())
-            if (expected := self._expected.course) > 0.0:
-                row.show(0.0, "", f"{about(expected + self._after)} to go")
+            with self.isolated(FORECAST):
+                self._after = self.expected.after * max(1.0, self.spent / self.expected.begun)
+                if (expected := self.expected.course) > 0.0:
+                    row.show(0.0, "", f"{about(expected + self._after)} to go")
             try:
                 yield
             finally:
@@ -167,7 +190,7 @@ class Reporter:
         The less is done, the less is known of what the rest will take: harmonics and contacts grow
         on the way.
         """
-        expected = self._expected.course * (1.0 - share)
+        expected = self.expected.course * (1.0 - share)
         if not measured * expected > 0.0:
             return measured
         trust = share / (share + LITTLE)
@@ -191,9 +214,12 @@ class Reporter:
 
     def reached(self, share: float, text: str = "") -> None:
         """About so large a ``share`` of the present part is done; ``text`` says how far that is."""
-        course, (begin, end) = self._course, self._span
-        if course is None:
-            return
+        if self._course is not None:
+            with self.isolated(FORECAST):
+                self._tell(self._course, share, text)
+
+    def _tell(self, course: _Course, share: float, text: str) -> None:
+        begin, end = self._span
         course.forecast.reach(begin + (end - begin) * share)
         at = f"{self._names}{text}".rstrip(": ")
         if course.forecast.left is None:
@@ -220,7 +246,8 @@ class _Telling(logging.Handler):
         self._reporter = reporter
 
     def emit(self, record: logging.LogRecord) -> None:
-        self._reporter.say(record.getMessage(), always=record.levelno >= logging.WARNING)
+        with self._reporter.isolated(LOG):
+            self._reporter.say(record.getMessage(), always=record.levelno >= logging.WARNING)
 
 
 @contextmanager

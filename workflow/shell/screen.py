@@ -14,11 +14,15 @@ from rich.console import Console, RenderableType
 from rich.progress import BarColumn, Progress, ProgressColumn, TaskID, TextColumn, TimeElapsedColumn
 from rich.table import Column
 
+from workflow.shell.isolation import Isolation
+
 # Seconds before a row is worth being looked at.
 BRIEF = 0.3
 BAR_WIDTH = 20
 # Columns of a terminal below which words have no room beside a bar.
 NARROW = 60
+# What is isolated from the run, as a warning names it.
+ROWS = "progress on the terminal"
 
 
 class Loudness(IntEnum):
@@ -38,16 +42,18 @@ def console() -> Console:
 class Row:
     """One thing that is being done: how far that is, as a bar and in words."""
 
-    def __init__(self, rows: Progress, task: TaskID) -> None:
-        self._rows, self._task = rows, task
+    def __init__(self, rows: Progress, task: TaskID, isolated: Isolation) -> None:
+        self._rows, self._task, self._isolated = rows, task, isolated
 
     def show(self, share: float, at: str, left: str) -> None:
         """``share`` of it is done: how far ``at`` that is, and how long what is ``left`` takes."""
-        self._rows.update(self._task, total=1.0, completed=share, at=at, left=left)
+        with self._isolated(ROWS):
+            self._rows.update(self._task, total=1.0, completed=share, at=at, left=left)
 
     def doing(self, at: str) -> None:
         """No more of it is done than before."""
-        self._rows.update(self._task, at=at)
+        with self._isolated(ROWS):
+            self._rows.update(self._task, at=at)
 
 
 class _Rows(Progress):
@@ -62,15 +68,17 @@ class _Rows(Progress):
 
 
 class Screen:
-    """The rows of a run; nothing is shown if it is not ``on``."""
+    """The rows of a run; nothing is shown if it is not ``on``, and nothing ends a run."""
 
-    def __init__(self, on: bool) -> None:
+    def __init__(self, on: bool, isolated: Isolation | None = None) -> None:
+        self._isolated = isolated or Isolation(lambda warning: None)
         columns = _columns(console().width)
         self._rows = _Rows(*columns, console=console(), transient=True, expand=True)
         self._between = self._rows.add_task("working", total=None, at="", left="")
         self._on = on and console().is_terminal and not console().is_dumb_terminal
         if self._on:
-            self._rows.start()
+            with self._isolated(ROWS):
+                self._rows.start()
 
     @property
     def on(self) -> bool:
@@ -80,17 +88,22 @@ class Screen:
     @contextmanager
     def row(self, name: str) -> Iterator[Row]:
         """A row as long as something of this ``name`` is being done."""
-        task = self._rows.add_task(name, total=None, at="", left="")
+        # The number of none: where a row cannot be added, there is none to be shown.
+        task = TaskID(-1)
+        with self._isolated(ROWS):
+            task = self._rows.add_task(name, total=None, at="", left="")
         try:
-            yield Row(self._rows, task)
+            yield Row(self._rows, task, self._isolated)
         finally:
-            self._rows.remove_task(task)
-            self._rows.reset(self._between)
+            with self._isolated(ROWS):
+                self._rows.remove_task(task)
+                self._rows.reset(self._between)
 
     def close(self) -> None:
         """Nothing is left on the terminal."""
         if self._on:
-            self._rows.stop()
+            with self._isolated(ROWS):
+                self._rows.stop()
 
 
 def _columns(width: int) -> tuple[ProgressColumn, ...]:

@@ -9,6 +9,7 @@ from typing import Any
 from workflow.shell.analysis import Run
 from workflow.shell.measured import doubts_of_measured, lines_of_measured
 from workflow.shell.quantities import Quantity
+from workflow.shell.reporter import TERMINAL
 from workflow.shell.versions import versions
 
 # Stages whose seconds are told at the end; all of them are in the summary.
@@ -39,8 +40,9 @@ def finish(run: Run[Any], numbers: Mapping[str, Any], lines: Iterable[str]) -> N
     run.report(summary)
     run.folder.finish(summary, run.provenance)
     run.folder.discard_state()
-    for line in chain(lines, lines_of_measured(measured)):
-        reporter.say(line)
+    with reporter.isolated(TERMINAL):
+        for line in chain(lines, lines_of_measured(measured)):
+            reporter.say(line)
     reporter.log(
         f"  seconds: {', '.join(f'{name} {value:.1f}' for name, value in seconds.items())}"
     )

@@ -147,6 +147,17 @@ def test_folds_of_duffing_are_where_the_curve_turns_and_a_multiplier_is_1(folded
     assert all(each.multiplier == pytest.approx(1.0, abs=1e-4) for each in turned)
 
 
+def test_what_is_not_known_beside_a_fold_is_not_told_of_it(folded):
+    """Motions of no verdict neither hide a fold of the curve nor deny it."""
+    branch, known = folded
+    unknown = [
+        replace(told, verdict="unknown", error=np.inf, multipliers=np.empty(0)) for told in known
+    ]
+    found = find_bifurcations(curve_by_frequency(branch.problem, 0.3), branch.solutions, unknown)
+    assert [each.kind for each in found] == ["fold", "fold"]
+    assert [each.unstable for each in found] == [(None, None)] * 2
+
+
 def test_time_integration_on_both_sides_of_a_fold(folded):
     """Started 1 % off, it stays by stable motions and leaves unstable ones."""
     branch, known = folded

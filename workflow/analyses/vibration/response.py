@@ -37,7 +37,7 @@ from workflow.analyses.vibration.outcome import DIAMETERS, RESONANCE, Curves, Re
 from workflow.analyses.vibration.stability import stability_along
 from workflow.errors import MethodFailed
 from workflow.shell.dataset import Dataset, Datasets
-from workflow.shell.reporter import Reporter
+from workflow.shell.reporter import FORECAST, Reporter
 
 # Times of a period from which amplitudes are taken: between them harmonic 1 is 5e-6 larger.
 TIMES = 1024
@@ -82,6 +82,7 @@ def progress_along(
     length = abs(float(np.log(end / begin)))
     points, farthest = 0, 0.0
 
+    @reporter.isolated(FORECAST)
     def watch(parameter: float) -> None:
         nonlocal points, farthest
         points += 1

@@ -26,7 +26,7 @@ LIMITS, DIRECTIONS, CUBE = 25.0, 363.0, 3
 MIXED = 40.0
 # Stability of a point with one joint, and of so many directions of joints of which most slip [s];
 # directions up to which it is found unless the case says otherwise.
-STABILITY, MANY_STABILITY, FEW_DIRECTIONS = 3e-3, 1.2, 12
+STABILITY, MANY_STABILITY, FEW_DIRECTIONS = 4e-2, 1.2, 12
 # Joints of a reduced body whose points are not counted.
 JOINTS = 100
 

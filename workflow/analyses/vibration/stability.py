@@ -14,6 +14,7 @@ from fe_models.dynamics.floquet import Floquet, Stability
 from fe_models.dynamics.followed_curve import FollowedCurve
 from fe_models.dynamics.harmonic_solution import HarmonicSolution
 from sa_solver.steps import Steps
+from sa_solver.types import Array
 from workflow.analyses.vibration.case import VibrationCase
 from workflow.analyses.vibration.excitation import Amount
 from workflow.analyses.vibration.model import VibrationModel
@@ -83,20 +84,25 @@ def stability_along(
     unknown = [at for at in known if at.verdict == "unknown"]
     if len(unknown) == len(known) and known:
         reporter.warn(f"{name}: nothing is said of stability: {unknown[0].message}")
-    numbers = {
+    numbers: dict[str, Any] = {
         "unstable_points": sum(at.verdict == "unstable" for at in known),
         "unknown_points": len(unknown),
-        "largest_multiplier": max((at.largest for at in known), default=0.0),
     }
+    if sizes := [at.largest for at in known if at.resolved]:
+        numbers["largest_multiplier"] = max(sizes)
     return CurveStability(_columns(known), numbers, bifurcations)
 
 
 def _warn_of_folds(
     name: str, bifurcations: Sequence[Mapping[str, Any]], reporter: Reporter
 ) -> None:
-    """Warn of folds that more harmonics would not have."""
+    """Warn of folds that more harmonics would not have.
+
+    Only where the motions on both sides are known: others deny no fold.
+    """
     for each in bifurcations:
-        if each["kind"] != "fold" or each["unstable_before"] != each["unstable_after"]:
+        before, after = each["unstable_before"], each["unstable_after"]
+        if each["kind"] != "fold" or before is None or before != after:
             continue
         multiplier = each["multiplier"] * np.exp(1j * each["multiplier_angle"])
         if abs(multiplier - 1.0) > AWAY:
@@ -112,20 +118,28 @@ def _stability_of(floquet: Floquet, motions: tuple[HarmonicSolution, ...]) -> tu
 
 
 def _columns(known: Sequence[Stability]) -> dict[str, Dataset]:
+    """Columns of motions; those of multipliers only where something is known of any."""
     of = "of a small deviation in a period"
-    return {
-        "stability": Dataset(
-            np.array([CODES[at.verdict] for at in known]), "1", "1 stable, -1 unstable, 0 unknown"
-        ),
+    verdicts = np.array([CODES[at.verdict] for at in known])
+    columns = {"stability": Dataset(verdicts, "1", "1 stable, -1 unstable, 0 unknown")}
+    resolved = np.array([at.resolved for at in known], bool)
+    if not resolved.any():
+        return columns
+    largest, error = np.array([(at.largest, at.error) for at in known]).T
+    unstable = np.array([at.unstable for at in known])
+    unknown = "NaN where it is not known"
+    return columns | {
         "multiplier": Dataset(
-            np.array([at.largest for at in known]), "1", f"size of the largest multiplier {of}"
+            np.where(resolved, largest, np.nan),
+            "1",
+            f"size of the largest multiplier {of}, {unknown}",
         ),
         "multiplier_error": Dataset(
-            np.array([at.error for at in known]), "1", "estimated, of the largest multiplier"
+            np.where(resolved, error, np.nan),
+            "1",
+            f"estimated, of the largest multiplier, {unknown}",
         ),
-        "unstable_multipliers": Dataset(
-            np.array([at.unstable for at in known]), "1", f"multipliers {of} beyond 1, surely"
-        ),
+        "unstable_multipliers": Dataset(unstable, "1", f"multipliers {of} beyond 1, surely"),
     }
 
 
@@ -152,7 +166,7 @@ def columns_for(amount: Amount) -> dict[str, tuple[str, str]]:
         "amplitude": ("mm", "half of the way to and fro of what is looked at"),
         "multiplier": ("1", "size of the one that passes the circle there"),
         "multiplier_angle": ("rad", "its angle: 0 of a fold, pi where the period doubles"),
-        "unstable_before": ("1", "multipliers beyond the circle at the point before"),
+        "unstable_before": ("1", "multipliers beyond the circle before, NaN where not known"),
         "unstable_after": ("1", "and at the point after"),
     }
 
@@ -162,6 +176,13 @@ def bifurcation_datasets(
 ) -> dict[str, Dataset]:
     """Columns ``(n,)`` of bifurcations, without their kinds."""
     return {
-        name: Dataset(np.array([found[name] for found in bifurcations]), unit, what)
+        name: Dataset(_numbers([found[name] for found in bifurcations]), unit, what)
         for name, (unit, what) in columns_for(amount).items()
     }
+
+
+def _numbers(values: Sequence[float | None]) -> Array:
+    """Numbers ``(n,)``, NaN for what is not known."""
+    if None not in values:
+        return np.array(values)
+    return np.array([np.nan if value is None else value for value in values])

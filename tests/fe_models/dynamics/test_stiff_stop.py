@@ -1,0 +1,117 @@
+"""Stability of motions on a stiff stop, against exact shooting from contact to contact."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from fe_models.dynamics.continuation import ContinuationControl
+from fe_models.dynamics.floquet import Floquet
+from fe_models.dynamics.forced_response import along_frequency
+from fe_models.dynamics.harmonic_balance import HarmonicBalance, PeriodicLoad
+from fe_models.dynamics.harmonics import Resolution
+from fe_models.dynamics.period_times import PeriodTimes
+from fe_models.dynamics.rig import Link, lumped_rig, unit_force
+from tests.oracles.stop_shooting import shoot
+from wear.joints.elastic import ElasticStop
+from wear.joints.periodic import PeriodicMarch
+
+# Masses of 1 on springs of 1; the last meets a stop that is a hundred times as stiff.
+DAMPING, GAP, STIFFNESS, FORCE = 0.03, 1.0, 100.0, 0.1
+
+
+def two_masses(highest: int = 21) -> HarmonicBalance:
+    """Two masses in a row, damped in proportion to their stiffness."""
+    model = lumped_rig(
+        {"a": 1.0, "b": 1.0}, {Link("a"): 1.0, Link("b", "a"): 1.0}, [[Link("b")]], 0.0
+    )
+    model = replace(model, damping=DAMPING * model.stiffness)
+    law = PeriodicMarch(ElasticStop(stiffness=STIFFNESS, gap=GAP))
+    load = PeriodicLoad({1: -1j * unit_force(model, "b")})
+    return HarmonicBalance(model, law, load, Resolution(tuple(range(highest + 1)), 1024))
+
+
+@pytest.fixture(scope="module")
+def touching():
+    """A curve that folds where the stop is met, and the stability of all its motions."""
+    control = ContinuationControl(max_points=75)
+    branch = along_frequency(two_masses(), FORCE, (0.0796, 0.1273), control=control)
+    of = Floquet(branch.problem).stability
+    return branch, [of(motion) for motion in branch.solutions]
+
+
+@pytest.mark.slow
+def test_multipliers_are_those_of_shooting_within_their_error(touching):
+    """Of 21 harmonics alone some are off by as much as 1, and more than ten verdicts are wrong."""
+    branch, known = touching
+    problem, compared, away = branch.problem, 0, 0.0
+    for motion, told in list(zip(branch.solutions, known, strict=True))[18::6]:
+        exact = shoot(problem, motion)
+        if told.verdict == "unknown" or exact is None:
+            continue
+        largest = abs(exact.multipliers[0])
+        assert told.verdict == ("stable" if largest < 1.0 else "unstable")
+        assert abs(told.largest - largest) <= 2.0 * told.error
+        assert told.error < 5e-3 * max(largest, 1.0)
+        compared, away = compared + 1, max(away, exact.distance)
+    assert compared >= 8
+    # The motions themselves are off by more than that.
+    assert away > 1e-3
+
+
+def test_a_motion_that_seven_harmonics_cut_short_is_judged_by_the_motion_in_time():
+    """The multiplier is that of shooting, though harmonics have the motion off by a hundredth."""
+    problem = two_masses(highest=7)
+    motion = problem.solve(0.105, FORCE)
+    told, exact = Floquet(problem).stability(motion), shoot(problem, motion)
+    assert exact.distance > 1e-2
+    assert told.verdict == ("stable" if abs(exact.multipliers[0]) < 1.0 else "unstable")
+    assert told.largest == pytest.approx(abs(exact.multipliers[0]), abs=2.0 * told.error)
+    assert told.error < 1e-3
+
+
+@pytest.mark.slow
+def test_liouville_holds_through_contact(touching):
+    """The product of all multipliers is what damping leaves in a period, exp(-T tr M⁻¹C)."""
+    branch, known = touching
+    for motion, told in list(zip(branch.solutions, known, strict=True))[20::15]:
+        if told.resolved:
+            lost = np.exp(-DAMPING * np.trace(branch.problem.model.stiffness) / motion.frequency)
+            assert abs(np.prod(told.multipliers)) == pytest.approx(lost, rel=1e-4)
+
+
+@pytest.mark.slow
+def test_few_verdicts_are_unknown(touching):
+    _, known = touching
+    assert sum(told.verdict == "unknown" for told in known) <= 0.05 * len(known)
+
+
+@pytest.mark.slow
+def test_nothing_is_said_of_what_is_no_motion(touching):
+    """A motion that does not balance is near to none, and has no error that anybody knows."""
+    branch, _ = touching
+    motion = branch.solutions[40]
+    told = Floquet(branch.problem).stability(replace(motion, residual=1e-2))
+    assert told.verdict == "unknown"
+    assert not told.resolved
+
+
+def test_steps_that_are_joined_are_of_the_same_times():
+    """Half as many steps begin at every second time, wherever steps were divided."""
+    times = PeriodTimes.even(8, 2)
+    for place in (3, 6):
+        marked = np.zeros(len(times.starts), bool)
+        marked[place] = True
+        times = times.divided(marked)
+    half = times.halved()
+    ends = np.append(half.starts, half.parts)
+    np.testing.assert_array_equal(np.diff(ends), 4 ** (half.deepest - half.levels))
+
+
+def test_what_a_joint_does_for_less_than_a_step_is_seen():
+    def regimes(times):
+        share = times.starts / times.parts
+        return ((share > 0.4301) & (share < 0.4341))[:, None]
+
+    times = PeriodTimes.following(regimes, 32, 5)
+    assert regimes(times).sum() > 10
