@@ -14,6 +14,8 @@ from wear.face_loads import FaceLoads
 from wear.interface import FirstContact, InterfaceState
 from wear.kinetics import LinearRegime, linear_regime
 from wear.steppers import step_errors
+from wear.stepping import ContactFailure
+from wear.stick_border import border_errors
 from wear.tractions import CycleTractions, increments_error
 from workflow.analyses.wear.case.base import WearCase
 from workflow.analyses.wear.contact_stage import ContactEnd, ContactStage
@@ -100,6 +102,18 @@ class InterfaceOutcome:
     def increments_error(self) -> dict[str, float] | None:
         """What increments leave of depth and energy of the first and the last cycle together."""
         return increments_error([self.begin, self.end])
+
+    @cached_property
+    def border_error(self) -> dict[str, float] | None:
+        """What the border of the zone that sticks leaves of depth and volume, relative.
+
+        Of a half-space with its own friction; None where nobody knows.
+        """
+        contact, cycles = self.stage.wearing(self.state), float(self.cycles[-1])
+        try:
+            return border_errors(contact, self.state, (self.begin, self.end), cycles)
+        except ContactFailure:
+            return None
 
     @cached_property
     def begin(self) -> CycleTractions:
