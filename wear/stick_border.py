@@ -1,4 +1,4 @@
-r"""What whole cells leave of wear in partial slip: the place of the border of the stick zone.
+"""What whole cells leave of wear in partial slip: the place of the border of the stick zone.
 
 Where a contact slips it wears until nothing presses there any more; where it sticks it never wears
 (Popov 2014, doi:10.1038/srep03749; Dimaki et al. 2014, Int. J. Solids Struct. 51, 4215). In the end
@@ -7,9 +7,11 @@ and its width decides on the wear around it. Slip close to the border is small, 
 only once the cells there have lost their pressure. On a grid the zone consists of whole cells, and
 presses as one with another border, for two reasons:
 
-- Cells stick or slip as a whole. Where the border would be is told by the reserve µp - \|q\| of the
-  cells that stick: its square falls to zero linearly there, unworn (Cattaneo and Mindlin) and worn.
-- A punch of whole cells presses as a narrower one (:data:`EDGE`).
+- Cells stick or slip as a whole. Where the border is that they stand for is told by the reserve
+  µp - |q| of the unworn contact, whose square falls to zero linearly there (Cattaneo and Mindlin).
+  Where wear moves the border it does so cell by cell, until those left stick.
+- A punch of whole cells presses as a narrower one (:data:`EDGE`). That only matters where the
+  border is still the unworn one: one that has moved is where such a punch sticks.
 
 How much wear depends on the border is found by two short lives at the last slips: one in which the
 zone sticks, and one in which the cells next to it stick as well.
@@ -21,6 +23,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from sa_solver.types import Array, Mask
 from wear.stepping import WearingContact, WearState
@@ -35,6 +38,11 @@ holds for a circle too (0.11 of a cell by them, 0.12 found)."""
 PLACED = 0.04
 """How well the border is known, in cells: root mean square over 18 spheres and cylinders of 5 to 27
 cells from the middle of the zone to its border."""
+
+ROUNDED, ALIKE = 12.0**-0.5, 8
+"""How well that is known of a border that wear has moved, by one cell after the other until those
+left stick: root mean square of a place somewhere in a cell. So many of the zone's borders are at
+the same place by symmetry."""
 
 STICKING = 1e-6
 """A cell that slips has no reserve but for rounding, in shares of the largest µp."""
@@ -72,19 +80,24 @@ def border_errors(
     ContactFailure
         If one of the short lives does not converge.
     """
-    stuck, reserve = _always_stuck(cycles[1])
+    none = {"depth": 0.0, "volume": 0.0}
+    if not state.surfaces.depth.any():
+        return none
+    (before, reserve), (stuck, _) = map(_always_stuck, cycles)
     wears = ~stuck & (state.surfaces.depth > 0.0)
     ring = _next_to(stuck) & wears
     if not ring.any():
-        return {"depth": 0.0, "volume": 0.0}
+        return none
     slip = _slip_everywhere(cycles)
     few, _ = _lived(contact, state, np.where(stuck, 0.0, slip), worn)
     more, held = _lived(contact, state, np.where(stuck | ring, 0.0, slip), worn)
     now, most = (sum(float(p[t][ring].sum()) for t in held) for p in (cycles[1].pressure, held))
     gone = float(np.clip(1.0 - now / most, 0.0, 1.0)) if most > 0.0 else 1.0
-    lines = [(reserve, stuck, wears), (reserve.T, stuck.T, wears.T)][: 1 if contact.grid.line else 2]
-    borders, wide = np.mean([_too_wide(*fields) for fields in lines], axis=0)
-    size = gone * float(np.hypot(wide, PLACED * borders))
+    axes = [_too_wide(reserve, before, stuck, wears)]
+    if not contact.grid.line:
+        axes.append(_too_wide(reserve.T, before.T, stuck.T, wears.T))
+    wide, uncertain = np.mean(axes, axis=0)
+    size = gone * float(np.hypot(wide, uncertain))
     share = float(np.copysign(size, wide)) / np.count_nonzero(ring)
     return {
         name: share * _relative(float(of(more)), float(of(few)))
@@ -109,20 +122,26 @@ def _next_to(zone: Mask) -> Mask:
     return beside
 
 
-def _too_wide(reserve: Array, stuck: Mask, wears: Mask) -> tuple[int, float]:
-    """Borders that cross the first axis, and how many cells too wide the zone presses as by them.
+def _too_wide(reserve: Array, before: Mask, stuck: Mask, wears: Mask) -> tuple[float, float]:
+    """By how many cells the zone that ``stuck`` presses as one too wide, and how uncertain that is.
 
-    Only those beside cells that wear count.
+    By its borders across the first axis, beside cells that wear. ``reserve`` is that of the unworn
+    cycle, and tells where borders are that are still where they were ``before``.
     """
-    wide = [
-        -EDGE - _beyond(reserve[cells[1 : 1 + FITTED], beyond[1]] ** 2)
-        for cells, beyond in _ends(stuck)
-        if wears[beyond]
-    ]
-    return len(wide), sum(wide)
+    wide, still, moved = 0.0, 0, 0
+    for cells, beyond in _ends(stuck):
+        if not wears[beyond]:
+            continue
+        if before[beyond] or not before[cells[0], beyond[1]]:
+            moved += 1
+            continue
+        wide -= EDGE + _beyond(reserve[cells[1 : 1 + FITTED], beyond[1]] ** 2)
+        still += 1
+    rounded = ROUNDED * float(np.sqrt(moved * min(moved, ALIKE)))
+    return wide, float(np.hypot(PLACED * still, rounded))
 
 
-def _ends(stuck: Mask) -> Iterator[tuple[Array, tuple[int, int]]]:
+def _ends(stuck: Mask) -> Iterator[tuple[NDArray[np.intp], tuple[int, int]]]:
     """Cells of every run along the first axis from either end of it, and the cell beyond that."""
     count = len(stuck)
     for line in np.flatnonzero(stuck.any(axis=0)):
