@@ -33,8 +33,8 @@ load_path:
 contact: {{grid: {grid}, size: {size}, method: full}}
 wear:
   law: archard
-  cycles: 3e7
-  step: {{kind: implicit{cycles}}}
+  cycles: {life}
+  step: {{kind: implicit{step}}}
   tolerance: 5 %
   body_1: {{specific_wear_rate: "1e-6 mm^3/(N*m)"}}
   body_2: {{specific_wear_rate: "1e-6 mm^3/(N*m)"}}
@@ -44,11 +44,11 @@ output: {{paraview: false, figures: false, report: false}}
 FIXED = ", cycles: 1.5e7"
 
 
-def errors(folder, legs: tuple[str, str, str], cells: int, cycles: str = FIXED) -> dict:
+def errors(folder, legs: tuple[str, str, str], cells: int, step: str = FIXED, life: str = "3e7"):
     """The interface of a run under ``legs`` that press, and shear one way and the other."""
     pressing, along, value = legs
     line = "/mm" in pressing
-    shape = {"shape": "cylinder" if line else "sphere", "cycles": cycles}
+    shape = {"shape": "cylinder" if line else "sphere", "step": step, "life": life}
     shape |= {"grid": cells if line else [cells] * 2, "size": "0.84 mm" if line else [0.84, 0.84]}
     path = folder / "case.yaml"
     text = CASE.format(**shape, pressing=pressing, along=along, value=value)
@@ -91,9 +91,8 @@ def limit_of_sphere(d: float, c: float) -> dict[str, float]:
 def assert_told(found: dict, exact: dict[str, float], most: float = 3.0) -> None:
     for name, true in exact.items():
         error = sum(found[f"{name}_{body}"] for body in (1, 2)) / true - 1.0
-        told = found["error"][name]["total"]
-        assert abs(error) / most < told < most * abs(error), (name, error, told)
-        assert error * found["error"][name]["grid"] > 0.0
+        told = found["error"][name]["grid"]
+        assert 1.0 / most < told / error < most, (name, error, told)
 
 
 def test_a_punch_of_cells_is_narrower_than_these() -> None:
@@ -118,7 +117,7 @@ def test_a_cylinder_tells_where_its_cells_put_the_border(tmp_path, strips) -> No
 
 
 def test_a_cylinder_that_slides_has_no_such_border(tmp_path) -> None:
-    found = errors(tmp_path, ("P: 700 N/mm", "shift_x", "8 um"), 32, ", cycles: 3e4")
+    found = errors(tmp_path, ("P: 700 N/mm", "shift_x", "8 um"), 32, ", cycles: 5e3", "1e4")
     assert found["depth_1"] > 0.0
     assert found["error"]["volume"]["grid"] is None  # no lives are lived here
 
@@ -134,8 +133,8 @@ SPHERES = {
 
 @pytest.mark.slow
 @pytest.mark.parametrize("load", SPHERES)
-@pytest.mark.parametrize("cycles", ["", FIXED], ids=["chosen", "fixed"])
-def test_a_sphere_tells_where_its_cells_put_the_border(tmp_path, load, cycles) -> None:
+@pytest.mark.parametrize("step", ["", FIXED], ids=["chosen", "fixed"])
+def test_a_sphere_tells_where_its_cells_put_the_border(tmp_path, load, step) -> None:
     """4 and 7 % too much is worn on 48 cells; c = 0.18 mm, µE*(d - c²/R) = G* shift."""
     legs, exact = SPHERES[load]
-    assert_told(errors(tmp_path, legs, 48, cycles), exact)
+    assert_told(errors(tmp_path, legs, 48, step), exact)
