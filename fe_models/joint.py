@@ -286,15 +286,17 @@ def _shifted_inverse(stiffness: Matrix, rho: float) -> Array:
 def _spectrum(stiffness: Array, free: int) -> tuple[int, float, float]:
     """Number of zero eigenvalues, smallest other one and largest one, by Lanczos iterations.
 
-    So many bodies may be ``free``.
+    So many bodies may be ``free``. Lanczos iterations owe it to rounding how many copies they find
+    of an eigenvalue that there is several times. What they have found is therefore taken out, and
+    looked for again, until no zero is left.
     """
     start = np.random.default_rng(0).standard_normal(len(stiffness))
-    extreme = partial(eigsh, v0=start, tol=RITZ_RESIDUAL, return_eigenvectors=False)
+    extreme = partial(eigsh, v0=start, tol=RITZ_RESIDUAL)
     product = LinearOperator(
         stiffness.shape, matvec=lambda v: symmetric_product(stiffness, v), dtype=np.float64
     )
     with one_thread(len(stiffness)):
-        (largest,) = extreme(product, 1)
+        (largest,) = extreme(product, 1, return_eigenvectors=False)
     shift = SPECTRUM_SHIFT * largest
     factors = sl.cho_factor(_shifted(stiffness, shift), lower=True, overwrite_a=True)
     inverse = LinearOperator(
@@ -304,7 +306,25 @@ def _spectrum(stiffness: Array, free: int) -> tuple[int, float, float]:
     )
     # A free body has at most six rigid motions: the next eigenvalue is elastic.
     count = min(6 * free + 1, len(stiffness) - 1)
+    rigid, elastic = np.empty((len(stiffness), 0)), np.empty(0)
     with one_thread(len(stiffness)):
-        lowest = 1.0 / extreme(inverse, count) - shift
-    elastic = lowest[lowest > RIGID_LIMIT * largest]
-    return len(lowest) - len(elastic), float(elastic.min()), float(largest)
+        while not rigid.shape[1] or count < len(stiffness) - rigid.shape[1]:
+            inverted, modes = extreme(_without(inverse, rigid), count)
+            values = 1.0 / inverted - shift
+            zero = values <= RIGID_LIMIT * largest
+            elastic, count = np.append(elastic, values[~zero]), 1
+            if not zero.any():
+                break
+            rigid = np.linalg.qr(np.hstack([rigid, modes[:, zero]]))[0]
+    return rigid.shape[1], float(elastic.min()), float(largest)
+
+
+def _without(operator: LinearOperator, vectors: Array) -> LinearOperator:
+    """Return a symmetric operator that takes orthonormal ``vectors`` ``(n, k)`` to zero."""
+
+    def outside(vector: Array) -> Array:
+        return vector - vectors @ (vectors.T @ vector)
+
+    return LinearOperator(
+        operator.shape, matvec=lambda v: outside(operator.matvec(outside(v))), dtype=np.float64
+    )

@@ -276,7 +276,7 @@ class InterfaceContact:
         self, state: InterfaceState, cycles: float, left: float
     ) -> tuple[InterfaceState, Spent]:
         """Wear ``cycles`` of the ``left`` cycles of the run; also what it took."""
-        result = advance_cycles(self.settings.stepper, state, cycles, left, self._contact_at)
+        result = advance_cycles(self.settings.stepper, state, cycles, left, self.wearing)
         assert isinstance(result.state, InterfaceState)
         return result.state, result.spent + self._newly_spent()
 
@@ -378,7 +378,8 @@ class InterfaceContact:
         self._spent += Spent(0, half_space.count - before)
         return link.level() if settings.drive.tilt == "free" else link
 
-    def _contact_at(self, state: WearState) -> WearingContact:
+    def wearing(self, state: WearState) -> WearingContact:
+        """Return what wears under the loads and slips of a state."""
         assert isinstance(state, InterfaceState)
         return self._loaded(state).contact
 

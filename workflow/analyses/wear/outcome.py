@@ -15,6 +15,7 @@ from wear.interface import FirstContact, InterfaceState
 from wear.kinetics import LinearRegime, linear_regime
 from wear.steppers import step_errors
 from wear.stepping import ContactFailure
+from wear.stick_border import border_errors
 from wear.tractions import CycleTractions, increments_change, increments_error
 from workflow.analyses.wear.case.base import WearCase
 from workflow.analyses.wear.contact_stage import ContactEnd, ContactStage
@@ -127,6 +128,18 @@ class InterfaceOutcome:
         except ContactFailure:
             return None
         return increments_error(cycles) if finer is None else increments_change(cycles, finer)
+
+    @cached_property
+    def border_error(self) -> dict[str, float] | None:
+        """What the border of the zone that sticks leaves of depth and volume, relative.
+
+        Of a half-space with its own friction; None where nobody knows.
+        """
+        contact, cycles = self.stage.wearing(self.state), float(self.cycles[-1])
+        try:
+            return border_errors(contact, self.state, (self.begin, self.end), cycles)
+        except ContactFailure:
+            return None
 
     @cached_property
     def begin(self) -> CycleTractions:

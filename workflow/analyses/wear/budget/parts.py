@@ -77,7 +77,7 @@ def errors_of(case: WearCase, contact: InterfaceOutcome, peak: int, probed: Prob
         "link": _link(contact, probed),
         "mesh": _told(probed, "mesh", WORN | PRESSURES),
         "increments": _by_result(contact.increments_error, "depth", "energy", "depth"),
-        "grid": _grid(contact, peak, probed),
+        "grid": _grid(case, contact, peak, probed),
         "steps": _by_result(contact.step_error, "depth", "volume", "pressure"),
         "solver": dict.fromkeys(WORN | PRESSURES, solver),
     }
@@ -119,12 +119,24 @@ def _link(contact: InterfaceOutcome, probed: Probed) -> ByResult:
     return {**dict.fromkeys(WORN, apart), **dict.fromkeys(PRESSURES, float(link.quality[1]))}
 
 
-def _grid(contact: InterfaceOutcome, peak: int, probed: Probed) -> ByResult:
-    """Where no lives tell, cells show so much too little of a peak."""
+def _grid(case: WearCase, contact: InterfaceOutcome, peak: int, probed: Probed) -> ByResult:
+    """What cells leave: of a peak by their neighbours where no lives tell.
+
+    Lives slide wherever their loads have them slide. In partial slip the border of the zone that
+    sticks comes to what they tell, and is what is known where they tell nothing.
+    """
     told = _told(probed, "grid", (*WORN, "peak_pressure"))
+    if case.contact.method == "full":
+        border = contact.border_error
+        told |= {name: None if border is None else _with(told[name], border[name]) for name in WORN}
     if told["peak_pressure"] is None:
         told["peak_pressure"] = -peak_left(contact.first.pressure[peak])
     return told | {"worn_peak_pressure": peak_left(contact.end.pressure[peak])}
+
+
+def _with(told: float | None, border: float) -> float | None:
+    """The error that lives have told and that of a border, 0 where there is none."""
+    return told if border == 0.0 else border + (told or 0.0)
 
 
 def _told(probed: Probed, part: str, results: Iterable[str]) -> dict[str, float | None]:
