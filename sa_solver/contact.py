@@ -15,10 +15,11 @@ from collections import deque
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cached_property
-from typing import TypeVar
+from typing import TypeVar, get_args
 
 import numpy as np
 
+from sa_solver import checks
 from sa_solver.ciavarella_jaeger import first_loading
 from sa_solver.contact_state import ContactLoad, ContactStart, ContactState
 from sa_solver.coupled import CoupledContact, CoupledState
@@ -27,7 +28,8 @@ from sa_solver.friction_limit import largest_share
 from sa_solver.gross_slip import SlidingRule, gross_slip, sliding_direction
 from sa_solver.half_space import HalfSpace
 from sa_solver.increments import dissipated
-from sa_solver.normal import NormalContact, NormalStart, NormalState
+from sa_solver.normal import NormalContact, NormalStart, NormalState, checked_surfaces
+from sa_solver.normal_control import NormalContactError
 from sa_solver.rigid_modes import NORMAL, PLANAR, PlanarModes
 from sa_solver.tangential import (
     FrictionLimitError,
@@ -35,15 +37,12 @@ from sa_solver.tangential import (
     TangentialContactError,
     TangentialState,
 )
-from sa_solver.types import Array, Mask
+from sa_solver.types import Array, Grid, Mask
 
 GROSS_SHARE = 0.99
 """Share of the largest shear force from which the contact counts as sliding, where energies are at
 hand: from there on the force hardly says how far, the energy does. A structure whose last nodes
 stick at the ends of a flank holds 0.2 % less than friction could while it slides by tens of µm."""
-
-ROUNDING = 1e-12
-"""How far below its limit shear on the limit may be."""
 
 SHARE_CHECKED = 0.5
 """Share of µP or of its moment from which the largest force is computed."""
@@ -91,8 +90,10 @@ class FrictionalContact:
 
         Raises FrictionError unless µ is finite and 0 or more.
         """
-        if not (np.isfinite(friction) and friction >= 0.0):
-            raise FrictionError(f"friction coefficient {friction}: must be a number of 0 or more")
+        name = "friction coefficient"
+        friction = checks.number(name, friction, least=0.0, error=FrictionError)
+        tolerance = checks.number("tolerance", tolerance, above=0.0)
+        checks.choice("sliding", sliding, get_args(SlidingRule))
         self.half_space, self.grid = half_space, half_space.grid
         self.friction, self.tolerance, self._sliding = friction, tolerance, sliding
         self._modes = PlanarModes.on(self.grid)
@@ -102,6 +103,7 @@ class FrictionalContact:
 
         Their surfaces may have moved ``along`` each other: see :class:`ContactLoad`.
         """
+        height, along = self._checked(height), _moved(along, self.grid)
         field = np.zeros((3, *self.grid.shape))
         return ContactState(
             traction=field,
@@ -113,6 +115,7 @@ class FrictionalContact:
             rigid=np.zeros(6),
             energy=np.zeros(2),
             converged=True,
+            cell_area=self.grid.cell_area,
             along=along,
         )
 
@@ -125,10 +128,11 @@ class FrictionalContact:
     ) -> ContactState:
         """The state under ``load``, from the state ``before`` it.
 
-        ``height`` ``(nx, ny)`` [mm] is the gap of the unloaded bodies. The search begins from
-        ``start``, or from the state before. Raises what the solvers raise for impossible data:
-        NormalContactError, TangentialContactError.
+        ``height`` ``(nx, ny)`` [mm] is the gap of the unloaded bodies, infinite or masked where a
+        body has no surface. The search begins from ``start``, or from the state before. Raises what
+        the solvers raise for impossible data: NormalContactError, TangentialContactError.
         """
+        height = self._checked(height)
         known = start or ContactStart()
         if not self.half_space.pair.similar:
             return self._together(before, height, load, known)
@@ -149,6 +153,10 @@ class FrictionalContact:
             tangential = self._shear(before, limit, offset, load, begin)
         slip = self._slip(before, normal.pressure > 0.0, offset, tangential, _motion_of(tangential))
         return self._state(before, load, normal, replace(tangential, slip=slip), sliding)
+
+    def _checked(self, height: Array) -> Array:
+        """Heights as both solvers take them."""
+        return checked_surfaces(height, None, self.grid.shape, NormalContactError)[0]
 
     def two_normal_problems(self, before: ContactState, load: ContactLoad) -> bool:
         """Whether the shear follows from two normal problems: first loading of a line contact."""
@@ -309,8 +317,14 @@ class FrictionalContact:
         slip = gross_slip(
             *(slide, carried, load.energy, force, self.tolerance, self._sliding, stored, near)
         )
-        message = last[0].message or slip.message
-        state = replace(last[0], convolutions=spent, converged=not message, message=message)
+        found = last[0]
+        failure = slip.message if found.converged else ""
+        state = replace(
+            found,
+            convolutions=spent,
+            converged=found.converged and not failure,
+            message="; ".join(text for text in (failure, found.message) if text),
+        )
         return state, slip.creeps
 
     def _slides(self, limit: Array, load: ContactLoad) -> bool:
@@ -369,6 +383,7 @@ class FrictionalContact:
             message="; ".join(messages),
             convolutions=normal.convolutions + tangential.convolutions,
             border_load=normal.border_load,
+            cell_area=self.grid.cell_area,
         )
 
     def _slip(
@@ -442,7 +457,7 @@ class FrictionalContact:
             displacement=state.displacement,
             slip=slip,
             gap=state.gap,
-            sticking=pressed & (np.hypot(*state.shear) < limit * (1.0 - ROUNDING)),
+            sticking=state.sticking,
             resultants=state.resultants,
             rigid=rigid,
             strain=load.strain,
@@ -454,6 +469,7 @@ class FrictionalContact:
             message=state.message,
             convolutions=state.convolutions,
             border_load=state.border_load,
+            cell_area=self.grid.cell_area,
         )
 
     def _slide_together(
@@ -492,6 +508,11 @@ class FrictionalContact:
 def _motion_of(state: TangentialState) -> Array:
     """(Δδx, Δδy, Δφz) [mm, rad] of an increment."""
     return np.array([state.shift_x, state.shift_y, state.twist])
+
+
+def _moved(along: Array | None, grid: Grid) -> Array | None:
+    """What surfaces have moved along each other, as the solvers take it."""
+    return None if along is None else checks.array("motions along", along, (2, *grid.shape))
 
 
 def _increment(before: ContactState, known: ContactStart) -> Array | None:
