@@ -15,16 +15,29 @@ import numpy as np
 from scipy.optimize import brentq
 from scipy.special import elliprd, elliprf
 
+from sa_solver import checks
 from sa_solver.types import Array, ElasticPair, Material
+
+
+def _above_zero(form: object) -> None:
+    """Refuse a load, radius or modulus that is not above 0."""
+    for name, value in vars(form).items():
+        checks.number(name.replace("_", " "), value, above=0.0)
 
 
 @dataclass(frozen=True)
 class HertzSphere:
-    """Sphere of relative ``radius`` [mm] pressed with ``load`` [N] at E* ``contact_modulus``."""
+    """Sphere of relative ``radius`` [mm] pressed with ``load`` [N] at E* ``contact_modulus`` [MPa].
+
+    Raises InputError for one of them that is not above 0, as do all forms here.
+    """
 
     load: float
     radius: float
     contact_modulus: float
+
+    def __post_init__(self) -> None:
+        _above_zero(self)
 
     @property
     def contact_radius(self) -> float:
@@ -61,6 +74,9 @@ class FrictionalSphere:
     body_2: Material
     friction: float
 
+    def __post_init__(self) -> None:
+        checks.number("friction", self.friction, least=0.0)
+
     @cached_property
     def pair(self) -> ElasticPair:
         """Both bodies."""
@@ -90,6 +106,9 @@ class HertzEllipse:
     radius_x: float
     radius_y: float
     contact_modulus: float
+
+    def __post_init__(self) -> None:
+        _above_zero(self)
 
     @cached_property
     def axis_ratio(self) -> float:
@@ -142,6 +161,9 @@ class HertzCylinder:
     load: float
     radius: float
     contact_modulus: float
+
+    def __post_init__(self) -> None:
+        _above_zero(self)
 
     @property
     def half_width(self) -> float:
