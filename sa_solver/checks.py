@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from operator import index
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,6 +31,7 @@ def array(
     masked: float | None = None,
     infinite: bool = False,
     finite: bool = True,
+    order: Literal["C", "K"] = "C",
 ) -> NDArray[np.float64]:
     """Return ``values`` as an array of 64-bit floats of ``shape``, itself where it is one.
 
@@ -50,11 +51,13 @@ def array(
         Whether +infinity is a value.
     finite
         Whether values are looked at; False where whatever takes them does that.
+    order
+        C: rows lie one after the other in memory; K: as they are, for large matrices.
     """
     plain = values if type(values) is np.ndarray else _without_mask(name, values, masked, error)
     if plain.dtype.kind not in REAL:
         raise error(f"{name} are of the type {plain.dtype}: give real numbers")
-    found: NDArray[np.float64] = np.asarray(plain, dtype=np.float64, order="C")
+    found: NDArray[np.float64] = np.asarray(plain, dtype=np.float64, order=order)
     pairs = zip(shape, found.shape, strict=False)
     same = found.ndim == len(shape) and all(wanted in (None, n) for wanted, n in pairs)
     if not same:
@@ -76,7 +79,7 @@ def number(
     error: type[FretscaleError] = InputError,
 ) -> float:
     """Return ``value`` as a float within bounds; finite, but for +infinity where it is allowed."""
-    plain = np.ma.asanyarray(value)
+    plain: Any = np.ma.asanyarray(value)
     if plain.ndim or np.ma.getmaskarray(plain).any() or plain.dtype.kind not in REAL:
         raise error(f"{name} is {value!r}: give one real number")
     found = float(plain)
@@ -88,6 +91,14 @@ def number(
         kind = "number" if infinite else "finite number"
         raise error(f"{name} = {found:g}: give a {kind} {' and '.join(bounds)}".rstrip())
     return found
+
+
+def numbers(holder: object, *names: str, **bounds: Any) -> None:
+    """Refuse what :func:`number` does in fields of these names, None excepted."""
+    for name in names:
+        value = getattr(holder, name)
+        if value is not None:
+            number(name.replace("_", " "), value, **bounds)
 
 
 def whole(name: str, value: Any, error: type[FretscaleError] = InputError) -> int:
@@ -118,7 +129,7 @@ def _without_mask(
     """An array of ``values`` without its mask."""
     try:
         # Lists may hold masked arrays, whose masks numpy alone would lose.
-        found = np.ma.asanyarray(values)
+        found: Any = np.ma.asanyarray(values)
     except ValueError as problem:
         raise error(f"{name} are no array: {problem}") from problem
     missing = np.ma.getmaskarray(found)

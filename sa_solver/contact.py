@@ -28,8 +28,7 @@ from sa_solver.friction_limit import largest_share
 from sa_solver.gross_slip import SlidingRule, gross_slip, sliding_direction
 from sa_solver.half_space import HalfSpace
 from sa_solver.increments import dissipated
-from sa_solver.normal import NormalContact, NormalStart, NormalState, checked_surfaces
-from sa_solver.normal_control import NormalContactError
+from sa_solver.normal import NormalContact, NormalStart, NormalState, checked_heights
 from sa_solver.rigid_modes import NORMAL, PLANAR, PlanarModes
 from sa_solver.tangential import (
     FrictionLimitError,
@@ -103,7 +102,7 @@ class FrictionalContact:
 
         Their surfaces may have moved ``along`` each other: see :class:`ContactLoad`.
         """
-        height, along = self._checked(height), _moved(along, self.grid)
+        height, along = checked_heights(height, self.grid), _moved(along, self.grid)
         field = np.zeros((3, *self.grid.shape))
         return ContactState(
             traction=field,
@@ -132,7 +131,7 @@ class FrictionalContact:
         body has no surface. The search begins from ``start``, or from the state before. Raises what
         the solvers raise for impossible data: NormalContactError, TangentialContactError.
         """
-        height = self._checked(height)
+        height = checked_heights(height, self.grid)
         known = start or ContactStart()
         if not self.half_space.pair.similar:
             return self._together(before, height, load, known)
@@ -153,10 +152,6 @@ class FrictionalContact:
             tangential = self._shear(before, limit, offset, load, begin)
         slip = self._slip(before, normal.pressure > 0.0, offset, tangential, _motion_of(tangential))
         return self._state(before, load, normal, replace(tangential, slip=slip), sliding)
-
-    def _checked(self, height: Array) -> Array:
-        """Heights as both solvers take them."""
-        return checked_surfaces(height, None, self.grid.shape, NormalContactError)[0]
 
     def two_normal_problems(self, before: ContactState, load: ContactLoad) -> bool:
         """Whether the shear follows from two normal problems: first loading of a line contact."""

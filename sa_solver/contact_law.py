@@ -37,8 +37,8 @@ def project_on_disk(shear: Array, limit: Array) -> Array:
 def sticking(traction: Array, friction: float) -> Mask:
     """Cells ``(nx, ny)`` in contact whose shear is below µp; ``traction`` ``(3, nx, ny)``."""
     limit = friction * traction[2]
-    below: Mask = np.hypot(*traction[:2]) < limit * (1.0 - ROUNDING)
-    return (traction[2] > 0.0) & below
+    below = np.hypot(*traction[:2]) < limit * (1.0 - ROUNDING)
+    return np.asarray((traction[2] > 0.0) & below)
 
 
 def coulomb(traction: Array, friction: float | Array) -> Array:

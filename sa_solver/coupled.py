@@ -29,7 +29,7 @@ from sa_solver.errors import ContactProblemError
 from sa_solver.friction_limit import largest_share
 from sa_solver.half_space import HalfSpace
 from sa_solver.influence import Z
-from sa_solver.normal import NormalContact, checked_surfaces
+from sa_solver.normal import NormalContact, checked_compliance, checked_heights
 from sa_solver.normal_problem import border_share, messages
 from sa_solver.rigid_modes import NORMAL, PLANAR, RESULTANTS, RigidModes
 from sa_solver.splitting import douglas_rachford
@@ -211,7 +211,9 @@ class CoupledContact:
         force above µP.
         """
         error, shape = CoupledContactError, self.grid.shape
-        height, compliance = checked_surfaces(height, compliance, shape, error)
+        height = checked_heights(height, self.grid, error)
+        if compliance is not None:
+            compliance = checked_compliance(compliance, self.grid, error)
         if offset is not None:
             offset = checks.array("offsets", offset, (2, *shape), error=error)
         tolerance = checks.number("tolerance", tolerance, above=0.0, error=error)

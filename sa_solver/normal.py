@@ -14,6 +14,7 @@ Source: Gallego, Nélias & Jacq 2006, J. Tribol. 128, 476, doi:10.1115/1.2194914
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -35,7 +36,7 @@ from sa_solver.normal_problem import (
 )
 from sa_solver.rigid_modes import APPROACH, NormalModes, mode_lengths
 from sa_solver.separation import separating_tilt
-from sa_solver.types import Array
+from sa_solver.types import Array, Grid
 
 TOLERANCE = 1e-8
 """Default bound on every residual of :class:`NormalResiduals`."""
@@ -188,7 +189,9 @@ class NormalContact:
         >>> print(f"My {held.My:.2f} N mm, tilt {held.tilt_y:.3f}; tilt {free.tilt_y:.3f} rad")
         My -1.00 N mm, tilt 0.000; tilt 0.010 rad
         """
-        height, compliance = self._checked(height, start, compliance)
+        height = checked_heights(height, self.grid)
+        compliance = None if compliance is None else checked_compliance(compliance, self.grid)
+        self._check_start(start)
         tolerance = checks.number("tolerance", tolerance, above=0.0, error=NormalContactError)
         control = NormalControl(P, Mx, My, approach, tilt_x, tilt_y)
         control.check_moments(self.grid)
@@ -288,19 +291,13 @@ class NormalContact:
             cell_area=self.grid.cell_area,
         )
 
-    def _checked(
-        self, height: Array, start: NormalStart | None, compliance: Array | None
-    ) -> tuple[Array, Array | None]:
-        """Heights and compliances as the solver takes them."""
-        shape = self.grid.shape
-        height, compliance = checked_surfaces(height, compliance, shape, NormalContactError)
-        pressure = None if start is None else getattr(start, "pressure", start)
-        if pressure is not None and np.shape(pressure) != shape:
+    def _check_start(self, start: NormalStart | None) -> None:
+        pressure: Any = getattr(start, "pressure", None)
+        given, shape = np.shape(pressure), self.grid.shape
+        if start is not None and given != shape:
             raise NormalContactError(
-                f"start has shape {np.shape(pressure)}, the grid {shape}: "
-                "start from a state on the same grid"
+                f"start has shape {given}, the grid {shape}: start from a state on the same grid"
             )
-        return height, compliance
 
 
 def _separated(problem: NormalProblem) -> Array | None:
@@ -314,19 +311,21 @@ def _separated(problem: NormalProblem) -> Array | None:
     return touching
 
 
-def checked_surfaces(
-    height: Array,
-    compliance: Array | None,
-    shape: tuple[int, int],
-    error: type[ContactProblemError],
-) -> tuple[Array, Array | None]:
-    """Heights, infinite where no surface is, and compliances >= 0 of ``shape``; or ``error``."""
-    height = checks.array("heights", height, shape, error=error, masked=np.inf, infinite=True)
-    if compliance is not None:
-        compliance = checks.array("compliances", compliance, shape, error=error)
-        if compliance.min() < 0.0:
-            raise error("compliances must be 0 or more: check the wear rate's sign")
-    return height, compliance
+def checked_heights(
+    height: Array, grid: Grid, error: type[ContactProblemError] = NormalContactError
+) -> Array:
+    """Heights on ``grid``, infinite where there is no surface."""
+    return checks.array("heights", height, grid.shape, error=error, masked=np.inf, infinite=True)
+
+
+def checked_compliance(
+    compliance: Array, grid: Grid, error: type[ContactProblemError] = NormalContactError
+) -> Array:
+    """Compliances on ``grid``."""
+    compliance = checks.array("compliances", compliance, grid.shape, error=error)
+    if compliance.min() < 0.0:
+        raise error("compliances must be 0 or more: check the wear rate's sign")
+    return compliance
 
 
 def _failure(

@@ -35,8 +35,7 @@ import numpy as np
 from sa_solver import checks
 from sa_solver.errors import InputError
 from sa_solver.half_space import HalfSpace
-from sa_solver.normal import NormalContact, NormalStart, NormalState, checked_surfaces
-from sa_solver.normal_control import NormalContactError
+from sa_solver.normal import NormalContact, NormalStart, NormalState, checked_heights
 from sa_solver.tangential_loop import LoopFailure, LoopPath, stuck_stiffness, tractions_of_motion
 from sa_solver.ties import SAME
 from sa_solver.types import Array, Tilt
@@ -162,7 +161,7 @@ def partial_slip_curve(
     if checks.whole("stages", stages) < FEWEST_STAGES:
         raise PartialSlipError(f"{stages} stages: give {FEWEST_STAGES} or more")
     checks.choice("tilt", tilt, get_args(Tilt), PartialSlipError)
-    height, _ = checked_surfaces(height, None, contact.grid.shape, NormalContactError)
+    height = checked_heights(height, contact.grid)
     moment = 0.0 if tilt == "free" else None
     pressed = contact.solve(height, P, moment, moment, tolerance=tolerance, start=start)
     normal = _converged(pressed)

@@ -22,7 +22,7 @@ def von_mises(stress: Array) -> Array:
     """
     xx, yy, zz, xy, yz, zx = stress
     squares = (xx - yy) ** 2 + (yy - zz) ** 2 + (zz - xx) ** 2
-    return np.sqrt(0.5 * squares + 3.0 * (xy**2 + yz**2 + zx**2))
+    return np.asarray(np.sqrt(0.5 * squares + 3.0 * (xy**2 + yz**2 + zx**2)))
 
 
 def principal_stresses(stress: Array) -> Array:

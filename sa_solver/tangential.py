@@ -401,7 +401,7 @@ def _begun(
     if slipping is None:
         return shear, np.zeros_like(problem.pressed)
     magnitude = np.sqrt(squared(shear))
-    on_circle = slipping[window] & (magnitude > 0.0)
+    on_circle = np.asarray(slipping, dtype=bool)[window] & (magnitude > 0.0)
     shear *= np.divide(problem.limit, magnitude, out=np.ones_like(magnitude), where=on_circle)
     return shear, on_circle
 

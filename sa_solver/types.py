@@ -28,7 +28,7 @@ from dataclasses import dataclass, field, fields
 from functools import cached_property
 from itertools import pairwise
 from threading import Lock
-from typing import Literal, TypeVar
+from typing import Any, Literal, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -280,7 +280,8 @@ class Grid:
 
 def _pair(name: str, values: Sequence[T]) -> Sequence[T]:
     """``values`` where they are two, along x and along y."""
-    if np.shape(values) != (2,):
+    given: Any = values
+    if np.shape(given) != (2,):
         raise InputError(f"the {name} of a grid is {values!r}: give two, along x and along y")
     return values
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Protocol
 
+from sa_solver import checks
 from sa_solver.types import Array, LoadHistory
 
 
@@ -52,3 +53,13 @@ class CycleLoads:
     slip: Array
     force: Array | None = None
     displacement: Array | None = None
+
+    def __post_init__(self) -> None:
+        increments = len(self.loads)
+        slip = checks.array("slips", self.slip, (increments, 2, None))
+        checks.settle(self, slip=slip)
+        for name in ("force", "displacement"):
+            field = getattr(self, name)
+            if field is not None:
+                field = checks.array(f"{name}s", field, (increments, 3, slip.shape[2]))
+                checks.settle(self, **{name: field})

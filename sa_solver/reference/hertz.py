@@ -19,12 +19,6 @@ from sa_solver import checks
 from sa_solver.types import Array, ElasticPair, Material
 
 
-def _above_zero(form: object) -> None:
-    """Refuse a load, radius or modulus that is not above 0."""
-    for name, value in vars(form).items():
-        checks.number(name.replace("_", " "), value, above=0.0)
-
-
 @dataclass(frozen=True)
 class HertzSphere:
     """Sphere of relative ``radius`` [mm] pressed with ``load`` [N] at E* ``contact_modulus`` [MPa].
@@ -37,7 +31,7 @@ class HertzSphere:
     contact_modulus: float
 
     def __post_init__(self) -> None:
-        _above_zero(self)
+        checks.numbers(self, "load", "radius", "contact_modulus", above=0.0)
 
     @property
     def contact_radius(self) -> float:
@@ -75,7 +69,7 @@ class FrictionalSphere:
     friction: float
 
     def __post_init__(self) -> None:
-        checks.number("friction", self.friction, least=0.0)
+        checks.numbers(self, "friction", least=0.0)
 
     @cached_property
     def pair(self) -> ElasticPair:
@@ -108,7 +102,8 @@ class HertzEllipse:
     contact_modulus: float
 
     def __post_init__(self) -> None:
-        _above_zero(self)
+        names = "load", "radius_x", "radius_y", "contact_modulus"
+        checks.numbers(self, *names, above=0.0)
 
     @cached_property
     def axis_ratio(self) -> float:
@@ -163,7 +158,7 @@ class HertzCylinder:
     contact_modulus: float
 
     def __post_init__(self) -> None:
-        _above_zero(self)
+        checks.numbers(self, "load", "radius", "contact_modulus", above=0.0)
 
     @property
     def half_width(self) -> float:
