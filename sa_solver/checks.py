@@ -64,7 +64,7 @@ def array(
         raise error(f"{name} have shape {found.shape}: give {_shown(shape, found.shape)}")
     if finite and not np.all(np.isfinite(found) | (infinite & (found == np.inf))):
         bad = "NaN or -infinity" if infinite else "NaN or infinity"
-        raise error(f"{name} hold {bad}: fill or crop the missing points")
+        raise error(f"{name} hold {bad}: give finite numbers, or fill or crop what is missing")
     return found
 
 

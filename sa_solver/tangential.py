@@ -376,10 +376,11 @@ class TangentialContact:
         forces: tuple[float, float, float],
         motions: tuple[float | None, float | None, float | None],
     ) -> None:
-        names = *NAMES, "shift_x", "shift_y", "twist"
-        for name, value in zip(names, forces + motions, strict=True):
-            if value is not None:
-                checks.number(name, value, error=TangentialContactError)
+        given = dict(zip(NAMES, forces, strict=True))
+        named = zip(("shift_x", "shift_y", "twist"), motions, strict=True)
+        given |= {name: motion for name, motion in named if motion is not None}
+        for name, value in given.items():
+            checks.number(name, value, error=TangentialContactError)
         if self.grid.line and (forces[2] != 0.0 or motions[2]):
             raise TangentialContactError("a line contact carries no Mz: give Qx and Qy only")
 
