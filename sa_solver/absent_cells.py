@@ -26,35 +26,31 @@ if TYPE_CHECKING:
 LIFTS = (1.0, 1e2, 1e4)
 """Heights that are tried, over the first: digits of a displacement are lost beyond."""
 
+Control = tuple[float, float, float, float]
 State = TypeVar("State", "NormalState", "CoupledState")
-
-
-def reach(half_space: HalfSpace, P: float, motions: Array) -> float:
-    """How far [mm] a load ``P`` [N] and imposed ``motions`` δz, φx, φy [mm, rad] can get."""
-    grid, compliance = half_space.grid, half_space.self_compliance(Z)
-    delta, tilt_x, tilt_y = np.abs(motions)
-    moved = delta + 0.5 * (tilt_x * grid.size[1] + tilt_y * grid.size[0])
-    return float(abs(P) / grid.cell_area * compliance + moved)
 
 
 def without_absent(
     height: Array,
-    far: float,
+    half_space: HalfSpace,
+    control: Control,
     solve: Callable[[Array], State],
     error: type[ContactProblemError],
 ) -> State:
     """The state that ``solve`` finds for ``height`` ``(nx, ny)`` with infinite ones in it [mm].
 
-    ``far`` is about how far bodies come towards each other [mm]. Raises ``error`` where no cell has
-    a surface, or where the load can be carried by none that has.
+    ``control`` is P [N] and the imposed δz [mm], φx and φy [rad], 0 where they are not imposed.
+    Raises ``error`` where no cell has a surface, or where the load can be carried by none that has.
     """
     absent = np.isinf(height)
     if not absent.any():
         return solve(height)
     if absent.all():
         raise error("heights are infinite or masked in all cells: nothing can touch")
-    there = height[~absent]
-    far += float(np.ptp(there))
+    there, grid = height[~absent], half_space.grid
+    P, delta, tilt_x, tilt_y = map(abs, control)
+    far = P / grid.cell_area * half_space.self_compliance(Z) + delta + float(np.ptp(there))
+    far += 0.5 * (tilt_x * grid.size[1] + tilt_y * grid.size[0])
     for times in LIFTS:
         state = solve(np.where(absent, there.max() + times * far, height))
         if not state.pressure[absent].any():

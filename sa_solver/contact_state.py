@@ -95,7 +95,9 @@ class ContactLoad:
             motion=tuple(map(bool, motion)),
             strain=strain,
             energy=None if energy is None else checks.array("energies", energy, (2,), finite=False),
-            along=along,
+            along=along
+            if along is None
+            else checks.array("motions along", along, (2, None, None), finite=False),
         )
 
 

@@ -20,7 +20,7 @@ from functools import cached_property
 import numpy as np
 
 from sa_solver import checks
-from sa_solver.absent_cells import reach, without_absent
+from sa_solver.absent_cells import without_absent
 from sa_solver.contact_law import sticking
 from sa_solver.coupled_levels import CoupledLevel, pressed_without_friction
 from sa_solver.coupled_problem import CoupledProblem, CoupledResiduals, coupled_residuals
@@ -228,9 +228,9 @@ class CoupledContact:
             state = self._unloaded(problem) if apart else self._search(problem, tolerance, start)
             return replace(state, message=messages(state.message, state.border_load))
 
-        imposed = np.where(motion, values, 0.0)[list(NORMAL)]
-        far = reach(self.half_space, 0.0 if motion[0] else values[0], imposed)
-        return without_absent(height, far, pressed, error)
+        delta, *tilts = (float(values[k]) if motion[k] else 0.0 for k in NORMAL)
+        imposed = 0.0 if motion[0] else float(values[0]), delta, tilts[0], tilts[1]
+        return without_absent(height, self.half_space, imposed, pressed, error)
 
     # -- steps of solve -----------------------------------------------------------------------
     def _search(

@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 
 from sa_solver import checks
-from sa_solver.absent_cells import reach, without_absent
+from sa_solver.absent_cells import without_absent
 from sa_solver.errors import ContactProblemError
 from sa_solver.half_space import HalfSpace
 from sa_solver.nested_solver import NestedSolver
@@ -199,8 +199,8 @@ class NormalContact:
         def pressed(height: Array) -> NormalState:
             return self._pressed(height, control, tolerance, start, compliance)
 
-        far = reach(self.half_space, control.resultants[0], control.motions)
-        return without_absent(height, far, pressed, NormalContactError)
+        imposed = float(control.resultants[0]), *map(float, control.motions)
+        return without_absent(height, self.half_space, imposed, pressed, NormalContactError)
 
     # -- steps of solve -----------------------------------------------------------------------
     def _pressed(
