@@ -199,7 +199,8 @@ class NormalContact:
         def pressed(height: Array) -> NormalState:
             return self._pressed(height, control, tolerance, start, compliance)
 
-        imposed = float(control.resultants[0]), *map(float, control.motions)
+        delta, tilt_x, tilt_y = map(float, control.motions)
+        imposed = float(control.resultants[0]), delta, tilt_x, tilt_y
         return without_absent(height, self.half_space, imposed, pressed, NormalContactError)
 
     # -- steps of solve -----------------------------------------------------------------------
