@@ -146,7 +146,11 @@ def reduce_body(
     """
     size = np.shape(stiffness)[0]
     stiffness, mass, damping = (_sparse(matrix, size) for matrix in (stiffness, mass, damping))
-    kept = _numbers(size, kept)
+    kept = checks.places("kept displacements", kept, size)
+    if kept.ndim != 1 or len(np.unique(kept)) < len(kept):
+        raise InputError(
+            "kept displacements that are no list, or not all different: give each once"
+        )
     inner = _others(size, kept)
     if (modes > 0 or damping is not None) and mass is None:
         raise InputError("fixed-interface modes, and damping, need a mass matrix")
@@ -275,17 +279,6 @@ def _sparse(matrix: sp.csr_matrix | None, size: int) -> sp.csr_matrix | None:
         found = sp.csr_matrix(checks.array("numbers of a matrix", matrix, (size, size)))
     if found is not None and found.shape != (size, size):
         raise InputError(f"a matrix of shape {found.shape}: give {(size, size)}")
-    return found
-
-
-def _numbers(size: int, kept: Indices) -> Indices:
-    """Numbers of different displacements, of which there are ``size``."""
-    found = np.asarray(kept)
-    proper = found.ndim == 1 and found.dtype.kind in "iu"
-    if not proper or len(np.unique(found)) < len(found) or np.any((found < 0) | (found >= size)):
-        raise InputError(
-            f"kept displacements {found}: give numbers from 0 to {size - 1}, each once"
-        )
     return found
 
 

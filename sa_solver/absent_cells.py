@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import TYPE_CHECKING, TypeVar
+from typing import Any, ClassVar, Protocol, TypeVar
 
 import numpy as np
 
@@ -19,15 +19,24 @@ from sa_solver.half_space import HalfSpace
 from sa_solver.influence import Z
 from sa_solver.types import Array
 
-if TYPE_CHECKING:
-    from sa_solver.coupled import CoupledState
-    from sa_solver.normal import NormalState
-
 LIFTS = (1.0, 1e2, 1e4)
 """Heights that are tried, over the first: digits of a displacement are lost beyond."""
 
 Control = tuple[float, float, float, float]
-State = TypeVar("State", "NormalState", "CoupledState")
+
+
+class Pressed(Protocol):
+    """A state, frozen, with ``pressure`` and ``gap`` ``(nx, ny)``."""
+
+    __dataclass_fields__: ClassVar[dict[str, Any]]
+
+    @property
+    def pressure(self) -> Array: ...
+    @property
+    def gap(self) -> Array: ...
+
+
+State = TypeVar("State", bound=Pressed)
 
 
 def without_absent(

@@ -109,6 +109,16 @@ def whole(name: str, value: Any, error: type[FretscaleError] = InputError) -> in
         raise error(f"{name} is {value!r}: give a whole number") from problem
 
 
+def places(
+    name: str, values: object, count: int, error: type[FretscaleError] = InputError
+) -> NDArray[np.int64]:
+    """Return ``values`` as whole numbers from 0 to below ``count``, of any shape."""
+    found = values if type(values) is np.ndarray else _without_mask(name, values, None, error)
+    if found.size and (found.dtype.kind not in "iu" or found.min() < 0 or found.max() >= count):
+        raise error(f"{name} {np.unique(found)}: give whole numbers from 0 to {count - 1}")
+    return np.asarray(found, dtype=np.int64)
+
+
 def choice(
     name: str, value: object, allowed: Sequence[str], error: type[FretscaleError] = InputError
 ) -> None:

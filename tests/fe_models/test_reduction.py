@@ -195,7 +195,7 @@ class TestReduction:
 
     @pytest.mark.parametrize("kept", [[0, 0], [-1], [10**6], [0.5], [True, False], 3])
     def test_displacements_that_there_are_not(self, matrices, kept):
-        with pytest.raises(InputError, match="each once"):
+        with pytest.raises(InputError, match="kept displacements"):
             reduce_body(*matrices[:2], np.array(kept))
 
     def test_loads_that_are_masked(self, matrices):
