@@ -197,9 +197,9 @@ class ContactState:
     def elastic_energy(self) -> float:
         """Energy ½ Σ t·u S that all tractions store in both bodies [N mm], with u = K t.
 
-        The work of forces and moments over the increments is what this grows by, and the
-        ``energy`` that slip dissipates. (Bulk strain does work as well, which is in neither.) In a
-        line contact, per mm, it counts up to the datum of the half-space.
+        In an increment forces and moments do as much work as this grows by and slip dissipates
+        (``energy``). Bulk strain does work as well, which neither counts. In a line contact, per
+        mm, it counts up to the datum of the half-space.
         """
         return 0.5 * float(np.vdot(self.traction, self.displacement)) * self.cell_area
 

@@ -45,7 +45,7 @@ ALIKE = 1e-12
 """|β| up to which bodies are alike: what rounding leaves of moduli in different units."""
 
 SQUARE = 1e-6
-"""How far products of a frame's axes may be from 0 and 1: what files with 7 digits leave."""
+"""How far products of a frame's axes may be from 0 and 1: six printed digits."""
 
 Progress = Callable[[int, int], None]
 """Told how many of how many things are done, as often as it may be."""
