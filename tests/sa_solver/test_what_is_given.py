@@ -79,6 +79,11 @@ HEIGHTS = {"normal", "coupled", "frictional", "history", "partial slip"}
 EVERY = pytest.mark.parametrize("entry", ENTRIES)
 
 
+def assert_same(found, expected):
+    """But for what solvers leave: sums of arrays that begin elsewhere in memory are rounded so."""
+    np.testing.assert_allclose(found, expected, rtol=0.0, atol=1e-6 * np.abs(expected).max())
+
+
 @EVERY
 def test_numbers_count_and_not_how_they_are_held(entry):
     """Lists, single precision, columns first, every second of an array twice as long."""
@@ -90,10 +95,10 @@ def test_numbers_count_and_not_how_they_are_held(entry):
     for given in (field.tolist(), field.astype(np.float32), np.asfortranarray(field), longer):
         found = made(given)
         assert type(found) is np.ndarray
-        np.testing.assert_array_equal(found, expected)
-    np.testing.assert_array_equal(made(unmasked), expected)
+        assert_same(found, expected)
+    assert_same(made(unmasked), expected)
     whole = np.round(field / np.abs(field).max() * 3.0)
-    np.testing.assert_array_equal(made(whole.astype(int)), made(whole))
+    assert_same(made(whole.astype(int)), made(whole))
 
 
 @EVERY
