@@ -89,8 +89,7 @@ class FrictionalContact:
 
         Raises FrictionError unless µ is finite and 0 or more.
         """
-        name = "friction coefficient"
-        friction = checks.number(name, friction, least=0.0, error=FrictionError)
+        friction = checks.number("friction", friction, least=0.0, error=FrictionError)
         tolerance = checks.number("tolerance", tolerance, above=0.0)
         checks.choice("sliding", sliding, get_args(SlidingRule))
         self.half_space, self.grid = half_space, half_space.grid
@@ -102,8 +101,9 @@ class FrictionalContact:
 
         Their surfaces may have moved ``along`` each other: see :class:`ContactLoad`.
         """
-        height, along = checked_heights(height, self.grid), _moved(along, self.grid)
-        field = np.zeros((3, *self.grid.shape))
+        height, field = checked_heights(height, self.grid), np.zeros((3, *self.grid.shape))
+        if along is not None:
+            along = checks.array("motions along", along, field[:2].shape)
         return ContactState(
             traction=field,
             displacement=field,
@@ -314,12 +314,8 @@ class FrictionalContact:
         )
         found = last[0]
         failure = slip.message if found.converged else ""
-        state = replace(
-            found,
-            convolutions=spent,
-            converged=found.converged and not failure,
-            message="; ".join(text for text in (failure, found.message) if text),
-        )
+        converged, message = found.converged and not failure, failure or found.message
+        state = replace(found, convolutions=spent, converged=converged, message=message)
         return state, slip.creeps
 
     def _slides(self, limit: Array, load: ContactLoad) -> bool:
@@ -503,11 +499,6 @@ class FrictionalContact:
 def _motion_of(state: TangentialState) -> Array:
     """(Δδx, Δδy, Δφz) [mm, rad] of an increment."""
     return np.array([state.shift_x, state.shift_y, state.twist])
-
-
-def _moved(along: Array | None, grid: Grid) -> Array | None:
-    """What surfaces have moved along each other, as the solvers take it."""
-    return None if along is None else checks.array("motions along", along, (2, *grid.shape))
 
 
 def _increment(before: ContactState, known: ContactStart) -> Array | None:
