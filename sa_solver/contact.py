@@ -36,7 +36,7 @@ from sa_solver.tangential import (
     TangentialContactError,
     TangentialState,
 )
-from sa_solver.types import Array, Grid, Mask
+from sa_solver.types import Array, Mask
 
 GROSS_SHARE = 0.99
 """Share of the largest shear force from which the contact counts as sliding, where energies are at
