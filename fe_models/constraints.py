@@ -7,6 +7,7 @@ import scipy.sparse as sp
 from scipy.linalg import null_space, orth
 
 from fe_models.averages import leaving_means
+from sa_solver import checks
 from sa_solver.ties import first_largest
 from sa_solver.types import Array, Indices
 
@@ -177,7 +178,9 @@ class Constraints:
 
     def _dofs(self, nodes: Indices) -> Indices:
         """Displacements of nodes, one node after the other."""
-        return (self._dimension * np.reshape(nodes, (-1, 1)) + np.arange(self._dimension)).ravel()
+        nodes = checks.places("nodes", nodes, self._size // self._dimension).reshape(-1, 1)
+        dofs: Indices = (self._dimension * nodes + np.arange(self._dimension)).ravel()
+        return dofs
 
     def _equation(self, dofs: Indices, coefficients: Array) -> None:
         """Impose Σ c u = 0 by the free displacement that counts most in it, if there is one."""

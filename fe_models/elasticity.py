@@ -22,6 +22,7 @@ from skfem.helpers import grad
 
 from fe_models.isoparametric import INTEGRATED, facet_normals, mapping_of
 from fe_models.mesh import Body, in_space
+from sa_solver.stress import principal_stresses
 from sa_solver.subsurface_influence import INDICES
 from sa_solver.types import Array, Indices, Material
 
@@ -344,17 +345,9 @@ def _spatial(points: Array) -> Array:
     return np.moveaxis(in_space(np.moveaxis(points, 0, -1)), -1, 0)
 
 
-def von_mises(stress: Array) -> Array:
-    """Von Mises stress of ``(6, ...)`` components."""
-    xx, yy, zz, xy, yz, zx = stress
-    squares = (xx - yy) ** 2 + (yy - zz) ** 2 + (zz - xx) ** 2
-    return np.sqrt(0.5 * squares + 3.0 * (xy**2 + yz**2 + zx**2))
-
-
 def maximum_principal(stress: Array) -> Array:
-    """Largest principal stress of ``(6, n)`` components."""
-    largest = np.linalg.eigvalsh(tensors(stress).transpose(2, 0, 1))[:, -1]
-    return np.asarray(largest, dtype=np.float64)
+    """Largest principal stress of ``(6, ...)`` components."""
+    return principal_stresses(stress)[0]
 
 
 def tensors(stress: Array) -> Array:

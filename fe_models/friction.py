@@ -18,7 +18,9 @@ import numpy as np
 from fe_models.blas_threads import one_thread
 from fe_models.joint import JointResolvent
 from fe_models.mesh import AXES, in_space
+from sa_solver import checks
 from sa_solver.contact_law import coulomb
+from sa_solver.errors import InputError
 from sa_solver.splitting import SplittingResult, douglas_rachford
 from sa_solver.types import Array
 
@@ -73,6 +75,12 @@ class FrictionalJoint:
     """
 
     def __init__(self, joint: JointResolvent, friction: float | Array) -> None:
+        """Take the joint and its friction. Raises InputError for a µ below 0 or not finite."""
+        if np.ndim(friction) == 0:
+            friction = checks.number("friction", friction, least=0.0)
+        else:
+            friction = checks.array("friction coefficients", friction, (None,))
+            checks.number("the smallest friction coefficient", friction.min(), least=0.0)
         self._joint, self._friction = joint, friction
 
     def march(
@@ -87,8 +95,15 @@ class FrictionalJoint:
         ``gap`` ``(n,)`` is the distance of the unloaded faces [mm]; ``previous`` the displacement
         ``(3, n)`` that the path starts from, unslipped unless it is given. ``guess`` are the
         ``state`` of every increment of a similar path: they save iterations and change nothing
-        else.
+        else. Raises InputError for loads and gaps of another number, or not finite.
         """
+        size, cases = self._joint.loads.shape
+        amplitudes = checks.array("amplitudes", amplitudes, (None, cases))
+        gap = checks.array("gaps", gap, (None,))
+        if size not in (2 * len(gap), 3 * len(gap)):
+            raise InputError(
+                f"{len(gap)} gaps: give one at each node of a joint of {size} displacements"
+            )
         loads = np.tensordot(amplitudes, self._with_images(self._joint.loads.T), 1)
         guesses = self._with_images(np.array(guess).reshape(-1, loads.shape[-1]))
         sizes = np.linalg.norm(loads[:, 0], axis=1)

@@ -33,6 +33,7 @@ from scipy.sparse.linalg import LinearOperator, eigsh
 from fe_models.blas_threads import one_thread
 from fe_models.condensation import Condensed
 from fe_models.symmetry import Matrix, Mirror, SplitMatrix, symmetric_product
+from sa_solver import checks
 from sa_solver.threads import at_once
 from sa_solver.types import Array, Indices
 
@@ -75,6 +76,14 @@ class JointStiffness:
     smallest: float
     largest: float
     held: NDArray[np.bool_] | None = None
+
+    def __post_init__(self) -> None:
+        loads = checks.array("loads", self.loads, (None, None), finite=False, order="K")
+        checks.settle(self, loads=loads)
+        if not isinstance(self.stiffness, SplitMatrix):
+            shape = len(loads), len(loads)
+            stiffness = checks.array("stiffnesses", self.stiffness, shape, finite=False, order="K")
+            checks.settle(self, stiffness=stiffness)
 
     def resolvent(self) -> JointResolvent:
         """(H + ρ)⁻¹ with ρ the geometric mean of the extreme elastic eigenvalues.

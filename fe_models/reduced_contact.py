@@ -29,6 +29,7 @@ from fe_models.complementarity import ROUNDING, Flags, complementary
 from fe_models.friction import FrictionalJoint, FrictionState
 from fe_models.joint import JointStiffness
 from fe_models.mesh import Face
+from sa_solver import checks
 from sa_solver.reference.masing import superpose
 from sa_solver.types import Array
 
@@ -130,6 +131,10 @@ class FrettingConditions:
     stroke: float
     friction: float
 
+    def __post_init__(self) -> None:
+        checks.numbers(self, "force", above=0.0)
+        checks.numbers(self, "stroke", "friction", least=0.0)
+
 
 @dataclass(frozen=True)
 class FrettingCycle:
@@ -217,8 +222,8 @@ class ReducedPair:
 
         ``guess`` ``(n,)`` says which nodes are likely to touch.
         """
-        if not force > 0.0:
-            raise ValueError(f"a normal force of {force:g} N: give one above 0")
+        force = checks.number("normal force [N]", force, above=0.0)
+        gap = checks.array("gaps", gap, (len(self.face),))
         contact = complementary(self.block(Z), gap, force, guess)
         return NormalSolution(
             force=contact.force,
@@ -233,10 +238,8 @@ class ReducedPair:
         self, normal: NormalSolution, displacement: float, friction: float
     ) -> TangentialSolution:
         """Move body 2's ring from rest by ``displacement`` >= 0 [mm] along x."""
-        if displacement < 0.0:
-            raise ValueError(
-                f"first loading to {displacement:g} mm: give a displacement of 0 or more"
-            )
+        checks.number("displacement of first loading [mm]", displacement, least=0.0)
+        checks.number("friction", friction, least=0.0)
         touching = np.flatnonzero(normal.touching)
         A = self.block(X)
         limit = friction * normal.force[touching]

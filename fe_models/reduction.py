@@ -28,6 +28,8 @@ import scipy.sparse as sp
 from scipy.sparse.linalg import LinearOperator, eigsh
 
 from fe_models.linear_solver import COLUMNS_AT_ONCE, Factorisation, condense, factorise
+from sa_solver import checks
+from sa_solver.errors import InputError
 from sa_solver.types import Array, Indices
 
 # The shift of a free body's search over the median of K_jj/M_jj, which no choice of coordinates
@@ -123,9 +125,9 @@ def reduce_body(
     ``stiffness``, ``mass`` and ``damping`` ``(n, n)`` are symmetric; the mass may be left out where
     there are no modes, damping always. ``loads`` ``(n, cases)``. The order of ``kept`` is that of
     the result. With mass and modes ``done`` is called after each of ``STEPS`` steps. Raises
-    ``ValueError`` if modes are asked for that the body does not have, or modes or damping without
-    mass, and :class:`~fe_models.linear_solver.SolverError` if the body can move while they are
-    held.
+    InputError if modes are asked for that the body does not have, modes or damping without mass, or
+    for ``kept`` that are not numbers of different displacements, and
+    :class:`~fe_models.linear_solver.SolverError` if the body can move while they are held.
 
     Examples
     --------
@@ -142,13 +144,21 @@ def reduce_body(
     [[ 10. -10.]
      [-10.  10.]]
     """
-    size = stiffness.shape[0]
+    size = np.shape(stiffness)[0]
+    stiffness, mass, damping = (_sparse(matrix, size) for matrix in (stiffness, mass, damping))
+    kept = checks.places("kept displacements", kept, size)
+    if kept.ndim != 1 or len(np.unique(kept)) < len(kept):
+        raise InputError(
+            "kept displacements that are no list, or not all different: give each once"
+        )
     inner = _others(size, kept)
     if (modes > 0 or damping is not None) and mass is None:
-        raise ValueError("fixed-interface modes, and damping, need a mass matrix")
+        raise InputError("fixed-interface modes, and damping, need a mass matrix")
     if modes >= len(inner) > 0 or modes < 0:
-        raise ValueError(f"{modes} modes of {len(inner)} inner displacements: take 0 to fewer")
-    full_loads = np.zeros((size, 0)) if loads is None else loads
+        raise InputError(f"{modes} modes of {len(inner)} inner displacements: take 0 to fewer")
+    full_loads = np.zeros((size, 0))
+    if loads is not None:
+        full_loads = checks.array("loads", loads, (size, None), order="K")
     static, static_loads = condense(stiffness, full_loads, kept)
     done()
     values, shapes, reduced_mass = np.empty(0), np.zeros((size, modes)), None
@@ -259,6 +269,17 @@ def _check_shapes(path: Path, datasets: Mapping[str, Any]) -> None:
             raise ValueError(f"{path}: {name}: not all finite numbers")
     if not all(isinstance(name, bytes) for name in names):
         raise ValueError(f"{path}: names: not texts")
+
+
+def _sparse(matrix: sp.csr_matrix | None, size: int) -> sp.csr_matrix | None:
+    """A matrix ``(size, size)`` in rows, however it is given."""
+    if matrix is None or sp.issparse(matrix):
+        found = matrix
+    else:
+        found = sp.csr_matrix(checks.array("numbers of a matrix", matrix, (size, size)))
+    if found is not None and found.shape != (size, size):
+        raise InputError(f"a matrix of shape {found.shape}: give {(size, size)}")
+    return found
 
 
 def _others(size: int, kept: Indices) -> Indices:

@@ -13,13 +13,13 @@ from fe_models.elasticity import (
     components,
     maximum_principal,
     tensors,
-    von_mises,
 )
 from fe_models.mesh import Body, in_space
 from fe_models.motion import structure_motion
 from fe_models.recovery import StressRecovery
 from fe_models.structure import Structure
 from fe_models.thermal import thermal_gradient
+from sa_solver.stress import von_mises
 from sa_solver.ties import first_largest
 from sa_solver.types import Array, Frame, Indices
 

@@ -20,6 +20,7 @@ What is solved
     - ``march_loop``: the hysteresis loop that it leads to, with stiffness and friction.
     - ``partial_slip_curve``: force against motion up to sliding, from normal problems alone.
     - ``SubsurfaceStress``: stress inside either body under the tractions.
+    - ``von_mises``, ``principal_stresses``: what its components amount to.
 
 What is raised
     - ``FretscaleError``: the base of all.
@@ -55,6 +56,7 @@ if TYPE_CHECKING:
     from sa_solver.history import ContactLoadPath, march_history
     from sa_solver.normal import NormalContact
     from sa_solver.partial_slip import partial_slip_curve
+    from sa_solver.stress import principal_stresses, von_mises
     from sa_solver.subsurface import SubsurfaceStress
     from sa_solver.tangential import TangentialContact
     from sa_solver.tangential_loop import LoopPath, march_loop
@@ -81,6 +83,8 @@ __all__ = [
     "march_history",
     "march_loop",
     "partial_slip_curve",
+    "principal_stresses",
+    "von_mises",
 ]
 
 __getattr__, __dir__ = lazy_names(
@@ -94,6 +98,7 @@ __getattr__, __dir__ = lazy_names(
         "history": ("ContactLoadPath", "march_history"),
         "normal": ("NormalContact",),
         "partial_slip": ("partial_slip_curve",),
+        "stress": ("principal_stresses", "von_mises"),
         "subsurface": ("SubsurfaceStress",),
         "tangential": ("TangentialContact",),
         "tangential_loop": ("LoopPath", "march_loop"),

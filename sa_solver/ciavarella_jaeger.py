@@ -66,6 +66,7 @@ def first_loading(
             abs(carried - Qx) / (friction * normal.P), 0.0, stuck.residuals.largest
         ),
         converged=stuck.converged,
-        message=stuck.message,
+        message="" if stuck.converged else stuck.message,
         convolutions=stuck.convolutions,
+        cell_area=stuck.cell_area,
     )

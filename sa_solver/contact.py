@@ -15,10 +15,11 @@ from collections import deque
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cached_property
-from typing import TypeVar
+from typing import TypeVar, get_args
 
 import numpy as np
 
+from sa_solver import checks
 from sa_solver.ciavarella_jaeger import first_loading
 from sa_solver.contact_state import ContactLoad, ContactStart, ContactState
 from sa_solver.coupled import CoupledContact, CoupledState
@@ -27,7 +28,7 @@ from sa_solver.friction_limit import largest_share
 from sa_solver.gross_slip import SlidingRule, gross_slip, sliding_direction
 from sa_solver.half_space import HalfSpace
 from sa_solver.increments import dissipated
-from sa_solver.normal import NormalContact, NormalStart, NormalState
+from sa_solver.normal import NormalContact, NormalStart, NormalState, checked_heights
 from sa_solver.rigid_modes import NORMAL, PLANAR, PlanarModes
 from sa_solver.tangential import (
     FrictionLimitError,
@@ -41,9 +42,6 @@ GROSS_SHARE = 0.99
 """Share of the largest shear force from which the contact counts as sliding, where energies are at
 hand: from there on the force hardly says how far, the energy does. A structure whose last nodes
 stick at the ends of a flank holds 0.2 % less than friction could while it slides by tens of µm."""
-
-ROUNDING = 1e-12
-"""How far below its limit shear on the limit may be."""
 
 SHARE_CHECKED = 0.5
 """Share of µP or of its moment from which the largest force is computed."""
@@ -91,8 +89,9 @@ class FrictionalContact:
 
         Raises FrictionError unless µ is finite and 0 or more.
         """
-        if not (np.isfinite(friction) and friction >= 0.0):
-            raise FrictionError(f"friction coefficient {friction}: must be a number of 0 or more")
+        friction = checks.number("friction", friction, least=0.0, error=FrictionError)
+        tolerance = checks.number("tolerance", tolerance, above=0.0)
+        checks.choice("sliding", sliding, get_args(SlidingRule))
         self.half_space, self.grid = half_space, half_space.grid
         self.friction, self.tolerance, self._sliding = friction, tolerance, sliding
         self._modes = PlanarModes.on(self.grid)
@@ -102,7 +101,9 @@ class FrictionalContact:
 
         Their surfaces may have moved ``along`` each other: see :class:`ContactLoad`.
         """
-        field = np.zeros((3, *self.grid.shape))
+        height, field = checked_heights(height, self.grid), np.zeros((3, *self.grid.shape))
+        if along is not None:
+            along = checks.array("motions along", along, field[:2].shape)
         return ContactState(
             traction=field,
             displacement=field,
@@ -113,6 +114,7 @@ class FrictionalContact:
             rigid=np.zeros(6),
             energy=np.zeros(2),
             converged=True,
+            cell_area=self.grid.cell_area,
             along=along,
         )
 
@@ -125,10 +127,11 @@ class FrictionalContact:
     ) -> ContactState:
         """The state under ``load``, from the state ``before`` it.
 
-        ``height`` ``(nx, ny)`` [mm] is the gap of the unloaded bodies. The search begins from
-        ``start``, or from the state before. Raises what the solvers raise for impossible data:
-        NormalContactError, TangentialContactError.
+        ``height`` ``(nx, ny)`` [mm] is the gap of the unloaded bodies, infinite or masked where a
+        body has no surface. The search begins from ``start``, or from the state before. Raises what
+        the solvers raise for impossible data: NormalContactError, TangentialContactError.
         """
+        height = checked_heights(height, self.grid)
         known = start or ContactStart()
         if not self.half_space.pair.similar:
             return self._together(before, height, load, known)
@@ -309,8 +312,10 @@ class FrictionalContact:
         slip = gross_slip(
             *(slide, carried, load.energy, force, self.tolerance, self._sliding, stored, near)
         )
-        message = last[0].message or slip.message
-        state = replace(last[0], convolutions=spent, converged=not message, message=message)
+        found = last[0]
+        failure = slip.message if found.converged else ""
+        converged, message = found.converged and not failure, failure or found.message
+        state = replace(found, convolutions=spent, converged=converged, message=message)
         return state, slip.creeps
 
     def _slides(self, limit: Array, load: ContactLoad) -> bool:
@@ -369,6 +374,7 @@ class FrictionalContact:
             message="; ".join(messages),
             convolutions=normal.convolutions + tangential.convolutions,
             border_load=normal.border_load,
+            cell_area=self.grid.cell_area,
         )
 
     def _slip(
@@ -442,7 +448,7 @@ class FrictionalContact:
             displacement=state.displacement,
             slip=slip,
             gap=state.gap,
-            sticking=pressed & (np.hypot(*state.shear) < limit * (1.0 - ROUNDING)),
+            sticking=state.sticking,
             resultants=state.resultants,
             rigid=rigid,
             strain=load.strain,
@@ -454,6 +460,7 @@ class FrictionalContact:
             message=state.message,
             convolutions=state.convolutions,
             border_load=state.border_load,
+            cell_area=self.grid.cell_area,
         )
 
     def _slide_together(

@@ -8,7 +8,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from sa_solver.types import Array
+from sa_solver.types import Array, Mask
+
+ROUNDING = 1e-12
+"""How far below its limit shear on the limit may be."""
 
 
 def unilateral(pressure: Array) -> Array:
@@ -29,6 +32,13 @@ def project_on_disk(shear: Array, limit: Array) -> Array:
         radius, magnitude, out=np.ones_like(magnitude), where=magnitude > radius
     )
     return shear * factor
+
+
+def sticking(traction: Array, friction: float) -> Mask:
+    """Cells ``(nx, ny)`` in contact whose shear is below µp; ``traction`` ``(3, nx, ny)``."""
+    limit = friction * traction[2]
+    below = np.hypot(*traction[:2]) < limit * (1.0 - ROUNDING)
+    return np.asarray((traction[2] > 0.0) & below)
 
 
 def coulomb(traction: Array, friction: float | Array) -> Array:

@@ -19,6 +19,9 @@ from functools import cached_property
 
 import numpy as np
 
+from sa_solver import checks
+from sa_solver.absent_cells import without_absent
+from sa_solver.contact_law import sticking
 from sa_solver.coupled_levels import CoupledLevel, pressed_without_friction
 from sa_solver.coupled_problem import CoupledProblem, CoupledResiduals, coupled_residuals
 from sa_solver.coupled_splitting import CoupledSplitting
@@ -26,9 +29,9 @@ from sa_solver.errors import ContactProblemError
 from sa_solver.friction_limit import largest_share
 from sa_solver.half_space import HalfSpace
 from sa_solver.influence import Z
-from sa_solver.normal import NormalContact
-from sa_solver.normal_problem import border_share
-from sa_solver.rigid_modes import PLANAR, RESULTANTS, RigidModes
+from sa_solver.normal import NormalContact, checked_compliance, checked_heights
+from sa_solver.normal_problem import border_share, messages
+from sa_solver.rigid_modes import NORMAL, PLANAR, RESULTANTS, RigidModes
 from sa_solver.splitting import douglas_rachford
 from sa_solver.tangential import UNCARRIED, FrictionLimitError, listed
 from sa_solver.types import Array, Mask
@@ -88,9 +91,11 @@ class CoupledState:
     ``traction`` ``(qx, qy, p)`` [MPa] and ``displacement`` K t [mm] are ``(3, nx, ny)``, ``slip``
     Δs of the increment [mm] (0 off the contact) is ``(2, nx, ny)``, ``gap`` [mm] ``(nx, ny)``.
     ``resultants`` are (P, Qx, Qy, Mx, My, Mz) [N, N mm] and ``rigid`` the motions (δz, δx, δy, φx,
-    φy, φz) [mm, rad], those in the plane being of the increment. ``border_load`` is the share of P
-    on the outermost cells: above 0, the grid is too small. ``message`` is empty when
-    ``converged``, else says what is wrong and what to try. ``convolutions`` of three components
+    φy, φz) [mm, rad], those in the plane being of the increment. ``sticking`` ``(nx, ny)`` are the
+    cells in contact that do not slip, ``cell_area`` [mm²] is that of the grid. ``border_load`` is
+    the share of P on the outermost cells: above 0, the grid is too small. ``message`` says what is
+    wrong and what to try, of a state that has not ``converged`` and of a contact that reaches the
+    grid's border; else it is empty. ``convolutions`` of three components
     are in units of one on the whole grid, by the size of their transforms, rounded up. (Each
     iteration also transforms unpadded fields, a quarter of a convolution.)
     """
@@ -103,10 +108,27 @@ class CoupledState:
     resultants: Array
     residuals: CoupledResiduals
     border_load: float
+    sticking: Mask
+    cell_area: float
     converged: bool = False
     message: str = ""
     iterations: int = 0
     convolutions: int = 0
+
+    @property
+    def contact_area(self) -> float:
+        """As :attr:`sa_solver.normal.NormalState.contact_area`."""
+        return float(np.count_nonzero(self.pressure)) * self.cell_area
+
+    @property
+    def stick_area(self) -> float:
+        """Area of the cells that stick [mm²; in a line contact, per mm, their width in mm]."""
+        return float(np.count_nonzero(self.sticking)) * self.cell_area
+
+    @property
+    def elastic_energy(self) -> float:
+        """Energy ½ Σ t·u S that all tractions store in both bodies [N mm], with u = K t."""
+        return 0.5 * float(np.vdot(self.traction, self.displacement)) * self.cell_area
 
     @property
     def pressure(self) -> Array:
@@ -157,8 +179,7 @@ class CoupledContact:
 
         Raises CoupledContactError for a µ below 0 or not finite.
         """
-        if not (np.isfinite(friction) and friction >= 0.0):
-            raise CoupledContactError(f"friction {friction} must be finite and 0 or more")
+        friction = checks.number("friction", friction, least=0.0, error=CoupledContactError)
         self.half_space, self.friction = half_space, friction
         self.grid = half_space.grid
         self._modes = RigidModes(half_space.grid)
@@ -177,22 +198,39 @@ class CoupledContact:
     ) -> CoupledState:
         """Tractions and motions at the end of one increment.
 
-        ``height`` is the gap before all loading ``(nx, ny)`` and ``offset`` ``(2, nx, ny)`` (0 if
-        None) less the displacement u_τ of the previous state plus any imposed mismatch [mm].
+        ``height`` is the gap before all loading ``(nx, ny)``, infinite or masked where a body has
+        no surface, and ``offset`` ``(2, nx, ny)`` (0 if None) less the displacement u_τ of the
+        previous state plus any imposed mismatch [mm].
         ``values`` ``(6,)`` are P, Qx, Qy [N], Mx, My, Mz [N mm] or, where ``motion`` is true, the
         motion conjugate to each: δz, δx, δy [mm], φx, φy, φz [rad]. ``compliance`` ``(nx, ny)``
         [mm/MPa] adds D p to the gap. Converged means that every residual is within ``tolerance``.
+        Moments of 0 let the bodies turn: to hold them give a φx and φy of 0.
 
         Raises CoupledContactError for fields that are not finite or have another shape, a load
         that pulls, a moment that the cells cannot carry or feel; FrictionLimitError for a shear
         force above µP.
         """
-        values = np.array(values, dtype=np.float64)
-        self._check(height, offset, compliance, values, motion)
-        problem = self._problem(height, offset, values, motion, compliance)
-        if self._apart(problem):
-            return self._unloaded(problem)
-        return self._search(problem, tolerance, start)
+        error, shape = CoupledContactError, self.grid.shape
+        height = checked_heights(height, self.grid, error)
+        if compliance is not None:
+            compliance = checked_compliance(compliance, self.grid, error)
+        if offset is not None:
+            offset = checks.array("offsets", offset, (2, *shape), error=error)
+        tolerance = checks.number("tolerance", tolerance, above=0.0, error=error)
+        if np.shape(values) != (6,) or np.shape(motion) != (6,):
+            raise error("give six values and six switches: P, Qx, Qy, Mx, My, Mz")
+        values = checks.array("values", values, (6,), error=error)
+        self._check(values, motion)
+
+        def pressed(height: Array) -> CoupledState:
+            problem = self._problem(height, offset, values, motion, compliance)
+            apart = self._apart(problem)
+            state = self._unloaded(problem) if apart else self._search(problem, tolerance, start)
+            return replace(state, message=messages(state.message, state.border_load))
+
+        delta, *tilts = (float(values[k]) if motion[k] else 0.0 for k in NORMAL)
+        imposed = 0.0 if motion[0] else float(values[0]), delta, tilts[0], tilts[1]
+        return without_absent(height, self.half_space, imposed, pressed, error)
 
     # -- steps of solve -----------------------------------------------------------------------
     def _search(
@@ -336,6 +374,8 @@ class CoupledContact:
             resultants=self._modes.resultants(traction),
             residuals=coupled_residuals(problem, traction, displacement, relative),
             border_load=border_share(traction[Z]),
+            sticking=sticking(traction, self.friction),
+            cell_area=self.grid.cell_area,
         )
 
     def _pressed(self, problem: CoupledProblem) -> Array:
@@ -415,27 +455,7 @@ class CoupledContact:
         )
 
     # -- what is refused ----------------------------------------------------------------------
-    def _check(
-        self,
-        height: Array,
-        offset: Array | None,
-        compliance: Array | None,
-        values: Array,
-        motion: tuple[bool, ...],
-    ) -> None:
-        _check_field("heights", height, self.grid.shape)
-        if offset is not None:
-            _check_field("offsets", offset, (2, *self.grid.shape))
-        if compliance is not None:
-            _check_field("compliances", compliance, self.grid.shape)
-            if compliance.min() < 0.0:
-                raise CoupledContactError(
-                    "compliances must be 0 or more: check the wear rate's sign"
-                )
-        if values.shape != (6,) or len(motion) != 6:
-            raise CoupledContactError("give six values and six switches: P, Qx, Qy, Mx, My, Mz")
-        if not np.all(np.isfinite(values)):
-            raise CoupledContactError(f"values {values} must be finite: check the load history")
+    def _check(self, values: Array, motion: tuple[bool, ...]) -> None:
         for k, name in enumerate(RESULTANTS):
             if k not in self._modes.present and values[k] != 0.0:
                 raise CoupledContactError(
@@ -467,10 +487,3 @@ class CoupledContact:
                 f"friction cannot carry a shear force of {shear:.6g} N; the largest is µP = "
                 f"{largest:.6g} N: lower the force, or impose the sliding motion instead",
             )
-
-
-def _check_field(name: str, field: Array, shape: tuple[int, ...]) -> None:
-    if field.shape != shape:
-        raise CoupledContactError(f"{name} have shape {field.shape}: give {shape}")
-    if not np.all(np.isfinite(field)):
-        raise CoupledContactError(f"{name} hold NaN or infinity: fill or crop the missing points")

@@ -11,6 +11,7 @@ from functools import cache
 
 import numpy as np
 
+from sa_solver import checks
 from sa_solver.errors import InputError
 from sa_solver.influence import X, Y, Z
 from sa_solver.pruned import LARGE
@@ -76,7 +77,7 @@ class HalfSpace:
         Raises InputError for a datum shorter than the grid.
         """
         self.grid, self.pair = grid, pair
-        self.datum = DATUM * grid.size[0] if datum is None else datum
+        self.datum = DATUM * grid.size[0] if datum is None else checks.number("datum", datum)
         if grid.line and not grid.size[0] <= self.datum < np.inf:
             raise InputError(
                 f"datum {self.datum:g} mm is not between the width of the grid, "
@@ -100,23 +101,28 @@ class HalfSpace:
 
     def normal(self, pressure: Array) -> Array:
         """``u_z`` under ``pressure`` alone, both ``(nx, ny)`` [MPa] → [mm]."""
+        pressure = checks.array("pressures", pressure, self.grid.shape, finite=False)
         displacement: Array = self._convolve(pressure[None], NORMAL, NORMAL)[0]
         return displacement
 
     def shear(self, shear: Array) -> Array:
         """``u_x, u_y`` under ``shear`` alone, both ``(2, nx, ny)`` [MPa] → [mm]."""
-        return self._convolve(shear, SHEAR, SHEAR)
+        return self._convolve(self._checked(shear, 2), SHEAR, SHEAR)
 
     def displacement(self, traction: Array) -> Array:
         """``u`` under ``traction``, both ``(3, nx, ny)`` ordered x, y, z [MPa] → [mm]."""
-        return self._convolve(traction, ALL, ALL)
+        return self._convolve(self._checked(traction, 3), ALL, ALL)
 
     def normal_under_shear(self, shear: Array) -> Array:
         """``u_z`` ``(nx, ny)`` under ``shear`` ``(2, nx, ny)``; 0 for similar bodies."""
         if self.pair.similar:
             return np.zeros(shear.shape[1:])
-        displacement: Array = self._convolve(shear, NORMAL, SHEAR)[0]
+        displacement: Array = self._convolve(self._checked(shear, 2), NORMAL, SHEAR)[0]
         return displacement
+
+    def _checked(self, traction: Array, components: int) -> Array:
+        """Tractions ``(components, nx, ny)`` as the transforms take them."""
+        return checks.array("tractions", traction, (components, *self.grid.shape), finite=False)
 
     def symbol(self, row: int, column: int, period: GridShape | None = None) -> Array:
         """Eigenvalues of the influence coefficients made periodic, ``(mx, my//2 + 1)`` [mm/MPa].

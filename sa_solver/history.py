@@ -22,6 +22,7 @@ from typing import Literal
 
 import numpy as np
 
+from sa_solver import checks
 from sa_solver.contact import FrictionalContact
 from sa_solver.contact_state import ContactLoad, ContactState
 from sa_solver.errors import InputError
@@ -65,7 +66,9 @@ class ContactLoadPath:
     """Loads at the ends of n increments, from bodies apart.
 
     ``values`` ``(n, 6)``, ``motion`` (6,) and ``strain`` ``(n,)`` as in
-    :class:`~sa_solver.contact.ContactLoad`; ``energy`` ``(n, 2)`` or None.
+    :class:`~sa_solver.contact_state.ContactLoad`; ``energy`` ``(n, 2)`` or None. Moments of 0 let
+    the bodies turn: to hold their tilt, take (False, False, False, True, True, False) for
+    ``motion``.
 
     Examples
     --------
@@ -84,6 +87,17 @@ class ContactLoadPath:
     motion: tuple[bool, ...] = (False,) * 6
     strain: Array | None = None
     energy: Array | None = None
+
+    def __post_init__(self) -> None:
+        values = checks.array("values of a load path", self.values, (None, 6), finite=False)
+        checks.settle(self, values=values)
+        if not len(values) or np.shape(self.motion) != (6,):
+            raise InputError("a load path needs one increment or more, and six switches")
+        for name, shape in (("strain", (len(values),)), ("energy", (len(values), 2))):
+            column = getattr(self, name)
+            if column is not None:
+                column = checks.array(f"values of {name}", column, shape, finite=False)
+                checks.settle(self, **{name: column})
 
     def __len__(self) -> int:
         return len(self.values)
@@ -184,6 +198,8 @@ def march_history(
     2.8 of 146.2 MPa
     """
     contact = FrictionalContact(half_space, friction, tolerance)
+    checks.choice("history", history, ("auto", "full", "reversals"), HistoryError)
+    accuracy = checks.number("accuracy", accuracy, above=0.0, error=HistoryError)
     obstacle = _obstacle_to_legs(half_space, path)
     if history == "reversals" and obstacle:
         raise HistoryError(f"legs cannot be taken in one step, {obstacle}: use full or auto")

@@ -14,9 +14,13 @@ Source: Gallego, Nélias & Jacq 2006, J. Tribol. 128, 476, doi:10.1115/1.2194914
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
+from sa_solver import checks
+from sa_solver.absent_cells import without_absent
+from sa_solver.errors import ContactProblemError
 from sa_solver.half_space import HalfSpace
 from sa_solver.nested_solver import NestedSolver
 from sa_solver.normal_control import NormalContactError as NormalContactError
@@ -27,11 +31,12 @@ from sa_solver.normal_problem import (
     NormalResiduals,
     Work,
     border_share,
+    messages,
     normal_residuals,
 )
 from sa_solver.rigid_modes import APPROACH, NormalModes, mode_lengths
 from sa_solver.separation import separating_tilt
-from sa_solver.types import Array
+from sa_solver.types import Array, Grid
 
 TOLERANCE = 1e-8
 """Default bound on every residual of :class:`NormalResiduals`."""
@@ -61,8 +66,9 @@ class NormalState:
     ``convolutions`` are in units of one on the whole grid, by the size of their transforms, rounded
     up. (Each iteration also transforms an unpadded field, a quarter of a convolution.)
     ``border_load`` is the share of P carried by the
-    outermost cells: above 0, the grid is too small. ``message`` is empty when ``converged``, else
-    says what is wrong and what to try.
+    outermost cells: above 0, the grid is too small. ``message`` says what is wrong and what to try,
+    of a state that has not ``converged`` and of a contact that reaches the grid's border; else it
+    is empty. ``cell_area`` [mm²] is that of the grid.
     """
 
     pressure: Array
@@ -79,7 +85,22 @@ class NormalState:
     message: str
     convolutions: int
     border_load: float
+    cell_area: float
     method: str = ""
+
+    @property
+    def contact_area(self) -> float:
+        """Area of the cells in contact [mm²; in a line contact, per mm, its width in mm]."""
+        return float(np.count_nonzero(self.pressure)) * self.cell_area
+
+    @property
+    def elastic_energy(self) -> float:
+        """Energy ½ Σ p u S stored in both bodies [N mm], with their displacement u = K p.
+
+        Between bodies that do not wear it is the work of P and moments since the bodies were apart.
+        In a line contact, per mm, it counts up to the datum of the half-space.
+        """
+        return 0.5 * float(np.vdot(self.pressure, self.displacement)) * self.cell_area
 
     @property
     def start(self) -> NormalStart:
@@ -140,19 +161,58 @@ class NormalContact:
     ) -> NormalState:
         """Pressure, gap and the unknown motions and resultants of a contact.
 
-        Imposed are the load ``P`` [N] or the ``approach`` δz [mm]; the moment ``Mx`` [N mm], 0
-        unless given, or ``tilt_x`` φx [rad]; ``My`` or ``tilt_y``. ``height`` h is the gap before
-        loading ``(nx, ny)`` [mm], whatever else moves the surfaces apart included; ``compliance``
-        D >= 0 ``(nx, ny)`` [mm/MPa]; ``start`` that of any state on the same grid. Converged means
-        that every residual is within ``tolerance``; a state that is not says so in its ``message``.
+        Imposed are the load ``P`` [N] or the ``approach`` δz [mm]; about x the moment ``Mx`` [N mm]
+        or the tilt ``tilt_x`` φx [rad], about y ``My`` or ``tilt_y``. The bodies do not turn unless
+        one of these is given: ``Mx=0.0, My=0.0`` lets them turn freely, until the load passes
+        through the middle of the grid.
 
-        Raises NormalContactError for heights or compliances that are not finite or have another
-        shape, both or neither of a force and its motion, a negative load, or a moment that no
-        pressure on the grid can carry.
+        ``height`` h is the gap before loading ``(nx, ny)`` [mm], large where the surfaces are far
+        from each other, whatever else moves them apart included. It is +infinity, or masked, where
+        there is no surface: such cells never touch, and stay at an infinite gap. (Where points were
+        only not measured, :func:`sa_solver.scans.filled` puts a surface in.) ``compliance`` D >= 0
+        ``(nx, ny)`` [mm/MPa]; ``start`` that of any state on the same grid. Converged means that
+        every residual is within ``tolerance``; a state that is not says so in its ``message``.
+
+        Raises NormalContactError for heights or compliances that are NaN, no numbers or of another
+        shape, both of a force and its motion, neither ``P`` nor ``approach``, a negative load, or a
+        moment that no pressure on the grid can carry.
+
+        Examples
+        --------
+        A ball 0.1 mm off the middle of its grid, held and free to turn:
+
+        >>> from sa_solver import ElasticPair, Grid, HalfSpace, NormalContact
+        >>> grid = Grid.covering((1.0, 1.0), (32, 32))
+        >>> contact = NormalContact(HalfSpace(grid, ElasticPair.from_contact_modulus(115e3)))
+        >>> height = ((grid.x - 0.1) ** 2 + grid.y**2) / 20.0
+        >>> held, free = contact.solve(height, P=10.0), contact.solve(height, P=10.0, Mx=0, My=0)
+        >>> print(f"My {held.My:.2f} N mm, tilt {held.tilt_y:.3f}; tilt {free.tilt_y:.3f} rad")
+        My -1.00 N mm, tilt 0.000; tilt 0.010 rad
         """
-        self._check_fields(height, start, compliance)
+        height = checked_heights(height, self.grid)
+        compliance = None if compliance is None else checked_compliance(compliance, self.grid)
+        self._check_start(start)
+        tolerance = checks.number("tolerance", tolerance, above=0.0, error=NormalContactError)
         control = NormalControl(P, Mx, My, approach, tilt_x, tilt_y)
         control.check_moments(self.grid)
+
+        def pressed(height: Array) -> NormalState:
+            return self._pressed(height, control, tolerance, start, compliance)
+
+        delta, tilt_x, tilt_y = map(float, control.motions)
+        imposed = float(control.resultants[0]), delta, tilt_x, tilt_y
+        return without_absent(height, self.half_space, imposed, pressed, NormalContactError)
+
+    # -- steps of solve -----------------------------------------------------------------------
+    def _pressed(
+        self,
+        height: Array,
+        control: NormalControl,
+        tolerance: float,
+        start: NormalStart | None,
+        compliance: Array | None,
+    ) -> NormalState:
+        """The state on finite heights."""
         # Counted from the lowest point, heights keep the digits of a small displacement.
         lowest = float(height.min()) if APPROACH in control.free else 0.0
         problem = self._problem(height - lowest, control, compliance)
@@ -168,7 +228,6 @@ class NormalContact:
         state = self._state(problem, control, iterate, residuals, tolerance)
         return replace(state, approach=state.approach + lowest, method=method)
 
-    # -- steps of solve -----------------------------------------------------------------------
     def _problem(
         self, height: Array, control: NormalControl, compliance: Array | None
     ) -> NormalProblem:
@@ -212,6 +271,8 @@ class NormalContact:
         motions[free] = iterate.rigid / mode_lengths(self.grid)[free]
         force = iterate.pressure * self.grid.cell_area
         along_x, along_y = force.sum(axis=1), force.sum(axis=0)
+        border_load = border_share(iterate.pressure)
+        failure = "" if converged else _failure(problem, iterate, residuals, tolerance)
         transformed = sum(count * nx * ny for (nx, ny), count in problem.work.items())
         return NormalState(
             pressure=iterate.pressure,
@@ -225,25 +286,18 @@ class NormalContact:
             My=float(along_x @ -self.grid.x[:, 0]),
             residuals=residuals,
             converged=converged,
-            message="" if converged else _failure(problem, iterate, residuals, tolerance),
+            message=messages(failure, border_load),
             convolutions=int(np.ceil(transformed / np.prod(self.half_space.padded))),
-            border_load=border_share(iterate.pressure),
+            border_load=border_load,
+            cell_area=self.grid.cell_area,
         )
 
-    def _check_fields(
-        self, height: Array, start: NormalStart | None, compliance: Array | None
-    ) -> None:
-        _check_field("heights", height, self.grid.shape)
-        if compliance is not None:
-            _check_field("compliances", compliance, self.grid.shape)
-            if compliance.min() < 0.0:
-                raise NormalContactError(
-                    "compliances must be 0 or more: check the wear rate's sign"
-                )
-        if start is not None and start.pressure.shape != self.grid.shape:
+    def _check_start(self, start: NormalStart | None) -> None:
+        pressure: Any = getattr(start, "pressure", None)
+        given, shape = np.shape(pressure), self.grid.shape
+        if start is not None and given != shape:
             raise NormalContactError(
-                f"start has shape {start.pressure.shape}, the grid {self.grid.shape}: "
-                "start from a state on the same grid"
+                f"start has shape {given}, the grid {shape}: start from a state on the same grid"
             )
 
 
@@ -258,11 +312,21 @@ def _separated(problem: NormalProblem) -> Array | None:
     return touching
 
 
-def _check_field(name: str, field: Array, shape: tuple[int, int]) -> None:
-    if field.shape != shape:
-        raise NormalContactError(f"{name} have shape {field.shape}: give {shape}, the grid's")
-    if not np.all(np.isfinite(field)):
-        raise NormalContactError(f"{name} hold NaN or infinity: fill or crop the missing points")
+def checked_heights(
+    height: Array, grid: Grid, error: type[ContactProblemError] = NormalContactError
+) -> Array:
+    """Heights on ``grid``, infinite where there is no surface."""
+    return checks.array("heights", height, grid.shape, error=error, masked=np.inf, infinite=True)
+
+
+def checked_compliance(
+    compliance: Array, grid: Grid, error: type[ContactProblemError] = NormalContactError
+) -> Array:
+    """Compliances on ``grid``."""
+    compliance = checks.array("compliances", compliance, grid.shape, error=error)
+    if compliance.min() < 0.0:
+        raise error("compliances must be 0 or more: check the wear rate's sign")
+    return compliance
 
 
 def _failure(

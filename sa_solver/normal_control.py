@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from sa_solver import checks
 from sa_solver.errors import ContactProblemError
 from sa_solver.rigid_modes import APPROACH, mode_lengths
 from sa_solver.types import Array, Grid
@@ -20,8 +21,8 @@ class NormalControl:
     """One of each pair: ``P`` [N] or ``approach`` [mm], ``Mx`` [N mm] or ``tilt_x`` [rad], ``My``
     or ``tilt_y``.
 
-    A moment is 0 where neither it nor its tilt is given. Raises NormalContactError for both or
-    neither of a pair, values that are not finite, and a load that pulls.
+    A tilt is held at 0 where neither it nor its moment is given. Raises NormalContactError for both
+    of a pair, neither P nor approach, values that are not finite, and a load that pulls.
     """
 
     P: float | None = None
@@ -39,11 +40,12 @@ class NormalControl:
                 )
         if self.P is None and self.approach is None:
             raise NormalContactError("neither P nor approach is given: impose one of them")
-        given = [value for value in vars(self).values() if value is not None]
-        if not np.all(np.isfinite(given)):
-            raise NormalContactError(
-                f"resultants and motions {given} must be finite: check the load history"
-            )
+        for moment, tilt in (("Mx", "tilt_x"), ("My", "tilt_y")):
+            if getattr(self, moment) is None and getattr(self, tilt) is None:
+                checks.settle(self, **{tilt: 0.0})
+        for name, value in vars(self).items():
+            if value is not None:
+                checks.settle(self, **{name: checks.number(name, value, error=NormalContactError)})
         if self.P is not None and self.P < 0.0:
             raise NormalContactError(f"load {self.P:g} N pulls: give P >= 0")
 

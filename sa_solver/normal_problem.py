@@ -126,3 +126,12 @@ def border_share(pressure: Array) -> float:
         border[:, [0, -1]] = True
     total = float(pressure.sum())
     return float(pressure[border].sum()) / total if total > 0.0 else 0.0
+
+
+def messages(failure: str, border_load: float) -> str:
+    """What a state says of itself: its ``failure``, and whether its grid cuts the contact off."""
+    border = (
+        f"the contact reaches the border of its grid, where cells carry {border_load:.2g} of the "
+        "load, and is cut off there: take a larger grid, unless the bodies end with it"
+    )
+    return "; ".join(text for text in (failure, border if border_load > 0.0 else "") if text)

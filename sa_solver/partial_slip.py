@@ -28,12 +28,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import get_args
 
 import numpy as np
 
+from sa_solver import checks
 from sa_solver.errors import InputError
 from sa_solver.half_space import HalfSpace
-from sa_solver.normal import NormalContact, NormalStart, NormalState
+from sa_solver.normal import NormalContact, NormalStart, NormalState, checked_heights
 from sa_solver.tangential_loop import LoopFailure, LoopPath, stuck_stiffness, tractions_of_motion
 from sa_solver.ties import SAME
 from sa_solver.types import Array, Tilt
@@ -45,6 +47,9 @@ tangential problem by less than 2 %, from a quarter of the amplitude at which al
 DENSER = 1.5
 """Stages go with this power of their number: closer to each other where little has slipped yet,
 since the energy of small loops goes with the cube of their amplitude."""
+
+FEWEST_STAGES = 2
+"""Between rest and sliding: the first of them bends the curve."""
 
 ROUNDING = 1e-9
 """Share of the stuck stiffness below which a slope has not changed."""
@@ -121,13 +126,14 @@ def partial_slip_curve(
     stages: int = STAGES,
     tolerance: float,
     start: NormalStart | None = None,
-    tilt: Tilt = "free",
+    tilt: Tilt = "held",
 ) -> PartialSlip:
     """What a contact of alike bodies does when it is moved along x under a load ``P`` [N].
 
-    ``height`` ``(nx, ny)`` [mm] is the gap of the unloaded bodies, whose ``tilt`` under P is free
-    of moments or held. Raises PartialSlipError for bodies that are not alike or a load that is not
-    above 0, LoopFailure where a normal problem does not converge.
+    ``height`` ``(nx, ny)`` [mm] is the gap of the unloaded bodies, infinite or masked where a body
+    has no surface. Their ``tilt`` under P is held, or free of moments. Raises PartialSlipError for
+    bodies that are not alike or a load that is not above 0, LoopFailure where a normal problem does
+    not converge.
 
     Examples
     --------
@@ -151,10 +157,13 @@ def partial_slip_curve(
     """
     if not contact.half_space.pair.similar:
         raise PartialSlipError("bodies that are not alike: their pressure follows the shear")
-    if not P > 0.0:
-        raise PartialSlipError(f"a load of {P:g} N: nothing is pressed")
-    held = 0.0 if tilt == "held" else None
-    pressed = contact.solve(height, P, tilt_x=held, tilt_y=held, tolerance=tolerance, start=start)
+    P = checks.number("load P [N]", P, above=0.0, error=PartialSlipError)
+    if checks.whole("stages", stages) < FEWEST_STAGES:
+        raise PartialSlipError(f"{stages} stages: give {FEWEST_STAGES} or more")
+    checks.choice("tilt", tilt, get_args(Tilt), PartialSlipError)
+    height = checked_heights(height, contact.grid)
+    moment = 0.0 if tilt == "free" else None
+    pressed = contact.solve(height, P, moment, moment, tolerance=tolerance, start=start)
     normal = _converged(pressed)
     tangential, ratio = _stiffness(contact.half_space, normal)
     tilted = height - normal.tilt_x * contact.grid.y + normal.tilt_y * contact.grid.x
@@ -179,7 +188,7 @@ def partial_slip_curve(
     # Without any load they just touch.
     force.append(normal.P)
     gaps.append(tilted - tilted.min())
-    slip = ratio * np.maximum(gaps, 0.0) * (normal.pressure > 0.0)
+    slip = ratio * np.where(normal.pressure > 0.0, np.maximum(gaps, 0.0), 0.0)
     curve = PartialSlip(normal, tangential, ratio * depth * shares, np.array(force), slip)
     return _bent_at_once(_bending(curve))
 

@@ -15,6 +15,7 @@ from typing import Literal
 
 import numpy as np
 
+from sa_solver import checks
 from sa_solver.errors import InputError
 from sa_solver.types import Array, Grid, Mask
 
@@ -49,7 +50,7 @@ class Scan:
     """Heights as measured: ``heights`` ``(nx, ny)`` and ``pitch`` ``(dx, dy)``, all in mm.
 
     Rows are along x, columns along y; one column is a profile. Heights count out of the body; NaN
-    is a missing point. The origin is in the middle.
+    is a missing point, and so is a masked one. The origin is in the middle.
 
     Examples
     --------
@@ -69,11 +70,16 @@ class Scan:
     pitch: tuple[float, float]
 
     def __post_init__(self) -> None:
-        if self.heights.ndim != 2 or not all(0.0 < pitch < np.inf for pitch in self.pitch):
+        dimensions = np.ndim(self.heights)
+        if dimensions != 2 or not all(0.0 < pitch < np.inf for pitch in self.pitch):
             raise InputError(
-                f"a scan of {self.heights.ndim} dimensions, points {self.pitch} mm apart: give "
+                f"a scan of {dimensions} dimensions, points {self.pitch} mm apart: give "
                 "rows along x and columns along y, and a pitch above 0"
             )
+        heights = checks.array(
+            "heights of a scan", self.heights, (None, None), masked=np.nan, finite=False, order="K"
+        )
+        checks.settle(self, heights=heights)
         if not self.measured.any():
             raise InputError("a scan without a point: give one with heights")
 

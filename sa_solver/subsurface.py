@@ -6,9 +6,9 @@ under (-qx, -qy, p), whose yz and zx change sign on the way back. Stress has six
 zz, xy, yz, zx in the interface frame, tension positive [MPa]. It is that of the tractions alone: a
 bulk stress is to be added.
 
-Tractions are uniform on each cell and stress is taken below the cells' centres, where it is exact
-for such tractions (:mod:`sa_solver.subsurface_influence`). At the surface zz, yz and zx are
--p, -qy and -qx in both bodies.
+Tractions are uniform on each cell and stress is taken below the cells' centres, or at any points,
+where it is exact for such tractions (:mod:`sa_solver.subsurface_influence`). At the surface zz, yz
+and zx are -p, -qy and -qx in both bodies.
 
 Inside, stress is of second order in the pitch where a cell's traction is the mean over it (3/2 for
 Hertz's pressure sampled at the centres). At the surface it is of order 1/2 where shear starts as a
@@ -28,6 +28,7 @@ from typing import Literal
 import numpy as np
 import scipy.fft
 
+from sa_solver import checks
 from sa_solver.errors import InputError
 from sa_solver.half_space import padded_shape
 from sa_solver.subsurface_influence import (
@@ -43,10 +44,13 @@ from sa_solver.subsurface_influence import (
 )
 from sa_solver.symbols import continued, quarter_edges, symbol_of
 from sa_solver.transform import SpectralFilter, Transform
-from sa_solver.types import Array, Grid, Material
+from sa_solver.types import Array, Grid, Indices, Material
 
 COMPONENTS = ("xx", "yy", "zz", "xy", "yz", "zx")
 """Names of the components of stress, in order."""
+
+BORDER = 1e-9
+"""Share of a pitch up to which a point of the surface lies on the border of a cell."""
 
 SHEAR = (0, 1)
 """The tractions along the surface."""
@@ -90,12 +94,10 @@ class SubsurfaceStress:
     def __init__(self, grid: Grid, material: Material, body: Literal[1, 2]) -> None:
         """Plan for ``body``, of which only Poisson's ratio counts.
 
-        Raises SubsurfaceError unless the body is 1 or 2 and the ratio from 0 to 0.5.
+        Raises SubsurfaceError unless the body is 1 or 2.
         """
         if body not in MIRROR:
             raise SubsurfaceError(f"body {body}: there are bodies 1 and 2")
-        if not 0.0 <= material.poisson <= 0.5:
-            raise SubsurfaceError(f"Poisson's ratio {material.poisson:g}: must be from 0 to 0.5")
         self.grid, self.poisson = grid, material.poisson
         self.count = 0
         self._mirror = MIRROR[body]
@@ -108,7 +110,7 @@ class SubsurfaceStress:
         ``traction`` ``(3, nx, ny)`` is ordered qx, qy, p, on body 2 whichever the body [MPa].
         Raises SubsurfaceError for another shape or a depth below 0.
         """
-        self._check(traction, depth)
+        traction, (depth,) = self._checked(traction, depth)
         self.count += 1
         rows = ALONG_SURFACE if depth == 0.0 else INSIDE
         stress = np.empty((6, *self.grid.shape))
@@ -122,7 +124,7 @@ class SubsurfaceStress:
 
     def along_surface(self, traction: Array, depth: float) -> Array:
         """Its components xx, yy and xy alone, ``(3, nx, ny)``, with half as many transforms."""
-        self._check(traction, depth)
+        traction, (depth,) = self._checked(traction, depth)
         self.count += 1
         return self._filter(depth, ALONG_SURFACE).apply(self._felt(traction))
 
@@ -132,6 +134,68 @@ class SubsurfaceStress:
         As of :func:`sections`.
         """
         return sections([(self, traction, depths)], axis, at)[0]
+
+    def at_points(self, traction: Array, points: Array) -> Array:
+        """Stress ``(6, n)`` at ``points`` ``(n, 3)``: x, y and the depth below the surface [mm].
+
+        ``traction`` is that of :meth:`at_depth`. Points may lie beside the grid too. It is the sum
+        over all loaded cells, point by point: where many points lie at one depth under the cells'
+        centres, the other methods are faster. Less than a pitch deep it shows the single cells.
+
+        Raises SubsurfaceError for another shape, a depth below 0, and points of the surface on the
+        border between two cells, where tractions jump.
+
+        Examples
+        --------
+        The largest von Mises stress under a ball is 0.62 of the peak pressure (1000 MPa), 0.48
+        radii of the contact (0.5 mm) deep:
+
+        >>> import numpy as np
+        >>> from sa_solver import Grid, Material, SubsurfaceStress, von_mises
+        >>> grid = Grid.covering((1.1, 1.1), (44, 44))
+        >>> traction = np.zeros((3, 44, 44))
+        >>> inside = np.maximum(0.0, 1.0 - (grid.x**2 + grid.y**2) / 0.5**2)
+        >>> traction[2] = 1000.0 * np.sqrt(inside)
+        >>> body = SubsurfaceStress(grid, Material(young=210e3, poisson=0.3), body=1)
+        >>> depths = np.linspace(0.1, 0.4, 31)
+        >>> points = np.stack([0.0 * depths, 0.0 * depths, depths], axis=1)
+        >>> equivalent = von_mises(body.at_points(traction, points))
+        >>> print(f"{equivalent.max():.0f} MPa at {depths[equivalent.argmax()]:.2f} mm")
+        620 MPa at 0.24 mm
+        """
+        points = checks.array("points", points, (None, 3), error=SubsurfaceError)
+        traction, depths = self._checked(traction, *points[:, 2])
+        stress = np.zeros((6, len(points)))
+        felt = self._felt(traction)
+        loaded = [np.flatnonzero(felt.any(axis=axes)) for axes in ((0, 2), (0, 1))]
+        if not all(map(len, loaded)):
+            return stress
+        # From the last cell back, so that point less source ascends.
+        (x, y), (rows, columns) = zip(*map(self._edges, (0, 1), loaded), strict=True)
+        felt = felt[:, rows, columns][:, ::-1, ::-1]
+        for column, (at, depth) in enumerate(zip(points[:, :2], depths, strict=True)):
+            away = [at[0] - x, at[1] - y]
+            self._check_border(away, depth)
+            stress[:, column] = np.einsum("ijxy,jxy->i", self._influence(away, depth), felt)
+        stress[[YZ, ZX]] *= self._mirror[0]
+        return stress
+
+    def _edges(self, axis: int, loaded: Indices) -> tuple[Array, slice]:
+        """Edges [mm] of the cells from the first to the last ``loaded`` one, the last one first."""
+        rows = slice(int(loaded[0]), int(loaded[-1]) + 1)
+        count, pitch = self.grid.shape[axis], self.grid.pitch[axis]
+        edges = (np.arange(count + 1.0) - 0.5 * count) * pitch
+        return edges[rows.start : rows.stop + 1][::-1], rows
+
+    def _check_border(self, away: list[Array], depth: float) -> None:
+        """Refuse a point of the surface that lies on edges ``away`` by 0 along x or y."""
+        axes = 1 if self.grid.line else 2
+        pairs = zip(away[:axes], self.grid.pitch, strict=False)
+        if depth == 0.0 and any(np.abs(edges).min() < BORDER * pitch for edges, pitch in pairs):
+            raise SubsurfaceError(
+                "a point of the surface lies on the border between two cells, where tractions "
+                "jump: take one within a cell, or a depth above 0"
+            )
 
     def _sources(self, traction: Array, axis: Literal["x", "y"], at: float) -> Array | None:
         """Spectra along a section of the rows of cells: see :func:`_folded`; None without load."""
@@ -167,14 +231,12 @@ class SubsurfaceStress:
             )
         return int(np.argmin(np.abs(centres - at)))
 
-    def _check(self, traction: Array, *depths: float) -> None:
-        if traction.shape != (3, *self.grid.shape):
-            raise SubsurfaceError(
-                f"tractions of shape {traction.shape}: must be {(3, *self.grid.shape)}"
-            )
-        for depth in depths:
-            if not 0.0 <= depth < np.inf:
-                raise SubsurfaceError(f"depth {depth:g} mm: must be 0 or more")
+    def _checked(self, traction: Array, *depths: float) -> tuple[Array, list[float]]:
+        """Tractions and depths as all methods take them."""
+        shape = 3, *self.grid.shape
+        traction = checks.array("tractions", traction, shape, error=SubsurfaceError)
+        error = SubsurfaceError
+        return traction, [checks.number("depth", at, least=0.0, error=error) for at in depths]
 
     def _felt(self, traction: Array) -> Array:
         """Tractions on the half-space z > 0 that the body is or mirrors."""
@@ -239,8 +301,10 @@ def sections(
     """
     stresses: list[Array] = []
     shared: dict[tuple[Grid, float, float], list[tuple[SubsurfaceStress, Array, Array]]] = {}
+    at = checks.number("place of a section", at, error=SubsurfaceError)
     for body, traction, depths in wanted:
-        body._check(traction, *depths.tolist())
+        depths = checks.array("depths", depths, (None,), error=SubsurfaceError)
+        traction, _ = body._checked(traction, *depths)
         spectra = body._sources(traction, axis, at)
         stress = np.zeros((6, body.grid.shape["xy".index(axis)], len(depths)))
         stresses.append(stress)

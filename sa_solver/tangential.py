@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from sa_solver import checks
 from sa_solver.errors import ContactProblemError
 from sa_solver.friction_limit import largest_share
 from sa_solver.half_space import HalfSpace
@@ -100,7 +101,8 @@ class TangentialState:
     ``(2, nx, ny)``, ``sticking`` ``(nx, ny)``. ``shift_x``, ``shift_y`` Δδ [mm] and ``twist`` Δφz
     [rad] are the rigid motions of the increment, ``Qx``, ``Qy`` [N], ``Mz`` [N mm] the resultants.
     ``message`` is empty when ``converged``, else says what is wrong and what to try.
-    ``convolutions`` have two components, on a box around the pressed cells.
+    ``convolutions`` have two components, on a box around the pressed cells. ``cell_area`` [mm²] is
+    that of the grid.
     """
 
     shear: Array
@@ -115,8 +117,19 @@ class TangentialState:
     Mz: float
     residuals: TangentialResiduals
     converged: bool
+    cell_area: float
     message: str = ""
     convolutions: int = 0
+
+    @property
+    def stick_area(self) -> float:
+        """Area of the cells that stick [mm²; in a line contact, per mm, their width in mm]."""
+        return float(np.count_nonzero(self.sticking)) * self.cell_area
+
+    @property
+    def elastic_energy(self) -> float:
+        """Energy ½ Σ q·u S that shear stores in both bodies [N mm], with u = K q."""
+        return 0.5 * float(np.vdot(self.shear, self.displacement)) * self.cell_area
 
 
 class TangentialContact:
@@ -176,8 +189,9 @@ class TangentialContact:
         negative limit, and FrictionLimitError for a force beyond the largest that friction can
         carry, or so close to it that the contact slides.
         """
-        offset = np.zeros((2, *self.grid.shape)) if offset is None else offset
-        self._check(limit, offset, (Qx, Qy, Mz), (shift_x, shift_y, twist))
+        limit, offset = self._checked(limit, offset)
+        tolerance = checks.number("tolerance", tolerance, above=0.0, error=TangentialContactError)
+        self._check_loads((Qx, Qy, Mz), (shift_x, shift_y, twist))
         motions = [shift_x, shift_y, twist]
         modes = self._modes
         free = tuple(k for k in modes.free if motions[k] is None)
@@ -194,6 +208,10 @@ class TangentialContact:
         window, level = self._box(limit)
         problem = self._problem(window, level, limit, offset, forces, imposed, free)
         before = level.half_space.count
+        if start is not None:
+            start = checks.array(
+                "shears to start from", start, offset.shape, error=TangentialContactError
+            )
         begin, on_circle = _begun(problem, window, start, slipping)
         shear = problem.balanced(begin, on_circle) if on_circle.any() else None
         if shear is None:
@@ -290,6 +308,7 @@ class TangentialContact:
             Mz=float(loads[2]),
             residuals=residuals,
             converged=converged,
+            cell_area=self.grid.cell_area,
             message="" if converged else _failure(residuals, tolerance),
             convolutions=convolutions,
         )
@@ -325,6 +344,7 @@ class TangentialContact:
             Mz=0.0,
             residuals=TangentialResiduals(0.0, 0.0, 0.0),
             converged=True,
+            cell_area=self.grid.cell_area,
         )
 
     def _beyond_friction(self, problem: TangentialProblem, forces: Array) -> FrictionLimitError:
@@ -339,30 +359,28 @@ class TangentialContact:
             "energy instead",
         )
 
-    def _check(
-        self,
-        limit: Array,
-        offset: Array,
-        forces: tuple[float, float, float],
-        motions: tuple[float | None, float | None, float | None],
-    ) -> None:
-        for name, field, shape in (
-            ("limits", limit, self.grid.shape),
-            ("offsets", offset, (2, *self.grid.shape)),
-        ):
-            if field.shape != shape:
-                raise TangentialContactError(f"{name} have shape {field.shape}: give {shape}")
-            if not np.all(np.isfinite(field)):
-                raise TangentialContactError(
-                    f"{name} hold NaN or infinity: check pressure, friction and history"
-                )
+    def _checked(self, limit: Array, offset: Array | None) -> tuple[Array, Array]:
+        """Limits and offsets as the solver takes them."""
+        shape, error = self.grid.shape, TangentialContactError
+        limit = checks.array("limits", limit, shape, error=error)
         if limit.min() < 0.0:
             raise TangentialContactError(
                 "limits µp must be 0 or more: check the sign of friction and pressure"
             )
-        given = [*forces, *(motion for motion in motions if motion is not None)]
-        if not all(np.isfinite(given)):
-            raise TangentialContactError(f"loads {given} must be finite: check the load history")
+        if offset is None:
+            return limit, np.zeros((2, *shape))
+        return limit, checks.array("offsets", offset, (2, *shape), error=error)
+
+    def _check_loads(
+        self,
+        forces: tuple[float, float, float],
+        motions: tuple[float | None, float | None, float | None],
+    ) -> None:
+        given = dict(zip(NAMES, forces, strict=True))
+        named = zip(("shift_x", "shift_y", "twist"), motions, strict=True)
+        given |= {name: motion for name, motion in named if motion is not None}
+        for name, value in given.items():
+            checks.number(name, value, error=TangentialContactError)
         if self.grid.line and (forces[2] != 0.0 or motions[2]):
             raise TangentialContactError("a line contact carries no Mz: give Qx and Qy only")
 
@@ -384,7 +402,7 @@ def _begun(
     if slipping is None:
         return shear, np.zeros_like(problem.pressed)
     magnitude = np.sqrt(squared(shear))
-    on_circle = slipping[window] & (magnitude > 0.0)
+    on_circle = np.asarray(slipping, dtype=bool)[window] & (magnitude > 0.0)
     shear *= np.divide(problem.limit, magnitude, out=np.ones_like(magnitude), where=on_circle)
     return shear, on_circle
 

@@ -20,12 +20,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 from scipy.ndimage import binary_erosion
 from scipy.sparse.linalg import LinearOperator, cg
 
+from sa_solver import checks
 from sa_solver.contact import FrictionalContact
 from sa_solver.contact_state import ContactLoad, ContactState
 from sa_solver.errors import ConvergenceError, InputError
@@ -63,8 +64,8 @@ class LoopPath:
     """What is imposed: normal load ``P`` [N], then a motion or a force to and fro.
 
     ``amplitude`` is a motion [mm] or, with ``by`` ``force``, a force [N], along ``axis``. Each
-    branch has ``increments`` of equal size. ``moments`` (Mx, My) [N mm] are imposed with P; None
-    keeps the bodies from tilting. Per mm on line grids, whose Mx is not asked for. Raises
+    branch has ``increments`` of equal size. The bodies do not tilt unless ``moments`` (Mx, My)
+    [N mm] are imposed with P. Per mm on line grids, whose Mx is not asked for. Raises
     LoopError for a P or amplitude not above 0 or less than 2 increments.
 
     Examples
@@ -86,9 +87,15 @@ class LoopPath:
     by: Literal["motion", "force"] = "motion"
     increments: int = 12
     axis: LoopAxis = "x"
-    moments: tuple[float, float] | None = (0.0, 0.0)
+    moments: tuple[float, float] | None = None
 
     def __post_init__(self) -> None:
+        checks.choice("by", self.by, ("motion", "force"), LoopError)
+        checks.choice("axis", self.axis, get_args(LoopAxis), LoopError)
+        for name in ("P", "amplitude"):
+            value = checks.number(name, getattr(self, name), infinite=True, error=LoopError)
+            checks.settle(self, **{name: value})
+        checks.whole("increments of a branch", self.increments, LoopError)
         for name in ("P", "amplitude"):
             if not 0.0 < getattr(self, name) < np.inf:
                 raise LoopError(f"{name} = {getattr(self, name):g}: a loop needs one above 0")

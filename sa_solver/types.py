@@ -28,19 +28,24 @@ from dataclasses import dataclass, field, fields
 from functools import cached_property
 from itertools import pairwise
 from threading import Lock
-from typing import Literal
+from typing import Any, Literal, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from sa_solver import checks
 from sa_solver.errors import InputError
 
+T = TypeVar("T")
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 Mask = NDArray[np.bool_]
 
 ALIKE = 1e-12
 """|β| up to which bodies are alike: what rounding leaves of moduli in different units."""
+
+SQUARE = 1e-6
+"""How far products of a frame's axes may be from 0 and 1: six printed digits."""
 
 Progress = Callable[[int, int], None]
 """Told how many of how many things are done, as often as it may be."""
@@ -77,8 +82,10 @@ unloaded and unworn, whatever moments that takes."""
 class Material:
     """Isotropic linear elastic material.
 
-    ``young`` and ``yield_stress`` in MPa, ``density`` in t/mm³, ``poisson`` is Poisson's ratio and
-    ``expansion`` the coefficient of linear thermal expansion [1/K].
+    ``young`` and ``yield_stress`` in MPa (210e3 for steel, not 210 or 210e9), ``density`` in t/mm³,
+    ``poisson`` is Poisson's ratio and ``expansion`` the coefficient of linear thermal expansion
+    [1/K]. An infinite ``young`` is a rigid body. Raises InputError for a modulus or yield stress
+    not above 0, a ratio not from 0 to 0.5, or a density below 0.
 
     Examples
     --------
@@ -95,6 +102,13 @@ class Material:
     density: float = 0.0
     yield_stress: float = np.inf
     expansion: float = 0.0
+
+    def __post_init__(self) -> None:
+        checks.number("Young's modulus [MPa]", self.young, above=0.0, infinite=True)
+        checks.number("Poisson's ratio", self.poisson, least=0.0, most=0.5)
+        checks.number("density [t/mm³]", self.density, least=0.0)
+        checks.number("yield stress [MPa]", self.yield_stress, above=0.0, infinite=True)
+        checks.number("thermal expansion [1/K]", self.expansion)
 
     @property
     def shear_modulus(self) -> float:
@@ -134,14 +148,20 @@ class ElasticPair:
     body_2: Material
 
     def __post_init__(self) -> None:
-        for material in (self.body_1, self.body_2):
-            if not (material.young > 0.0 and 0.0 <= material.poisson <= 0.5):
-                raise InputError(
-                    f"Young's modulus {material.young:g} MPa, Poisson's ratio "
-                    f"{material.poisson:g}: give a modulus above 0 and a ratio of 0 to 0.5"
-                )
         if not self.normal > 0.0:
             raise InputError("two rigid bodies: give one of them a finite Young's modulus")
+
+    @classmethod
+    def from_contact_modulus(cls, contact_modulus: float, poisson: float = 0.3) -> ElasticPair:
+        """Return two alike bodies of the contact modulus E* [MPa], both of ``poisson`` ν.
+
+        Young's modulus of each is 2 (1 - ν²) E*. Pressure depends on E* alone; ν counts for shear
+        and for stress inside the bodies. Raises InputError for an E* not above 0 or infinite.
+        """
+        checks.number("contact modulus [MPa]", contact_modulus, above=0.0)
+        checks.number("Poisson's ratio", poisson, least=0.0, most=0.5)
+        body = Material(2.0 * (1.0 - poisson**2) * contact_modulus, poisson)
+        return cls(body, body)
 
     @property
     def normal(self) -> float:
@@ -186,9 +206,9 @@ class ElasticPair:
 class Grid:
     """Uniform grid of rectangular cells, centred on the frame's origin.
 
-    ``shape`` is ``(nx, ny)``, ``pitch`` is ``(dx, dy)`` in mm. Fields on it have that shape. A
-    ``line`` grid has cells along x only, slices 1 mm long of strips that go on along y for ever
-    (plane strain): resultants on it are per mm.
+    ``shape`` is ``(nx, ny)``, ``pitch`` is ``(dx, dy)`` in mm. Fields on it have that shape: the
+    first index counts along x, the second along y. A ``line`` grid has cells along x only, slices
+    1 mm long of strips that go on along y for ever (plane strain): resultants on it are per mm.
 
     Examples
     --------
@@ -207,20 +227,25 @@ class Grid:
     line: bool = False
 
     def __post_init__(self) -> None:
-        if min(self.shape) < 1 or not all(0.0 < pitch < np.inf for pitch in self.pitch):
-            raise InputError(f"a grid of {self.shape} cells of {self.pitch} mm has no area")
+        shape = tuple(checks.whole("a number of cells", n) for n in _pair("shape", self.shape))
+        pitch = tuple(checks.array("pitches of a grid", self.pitch, (2,), finite=False).tolist())
+        if min(shape) < 1 or not all(0.0 < length < np.inf for length in pitch):
+            raise InputError(f"a grid of {shape} cells of {pitch} mm has no area")
+        checks.settle(self, shape=shape, pitch=pitch)
         if self.line and (self.shape[1] != 1 or self.pitch[1] != 1.0):
             raise InputError("a line grid has one row of cells 1 mm long: use Grid.strips")
 
     @classmethod
     def strips(cls, width: float, count: int) -> Grid:
         """Line contact: ``count`` strips that together cover ``width`` (mm)."""
+        width = checks.number("the width of a grid [mm]", width)
         return cls((count, 1), (width / max(count, 1), 1.0), line=True)
 
     @classmethod
     def covering(cls, size: tuple[float, float], shape: tuple[int, int]) -> Grid:
         """The grid of ``shape`` cells that exactly covers a rectangle of ``size`` (mm, mm)."""
-        return cls(shape, (size[0] / max(shape[0], 1), size[1] / max(shape[1], 1)))
+        (along_x, along_y), (nx, ny) = _pair("size", size), _pair("shape", shape)
+        return cls((nx, ny), (along_x / max(nx, 1), along_y / max(ny, 1)))
 
     @classmethod
     def over(cls, size: tuple[float, float], shape: tuple[int, int], line: bool) -> Grid:
@@ -253,6 +278,14 @@ class Grid:
         return np.stack(np.broadcast_arrays(self.x, self.y))
 
 
+def _pair(name: str, values: Sequence[T]) -> Sequence[T]:
+    """``values`` where they are two, along x and along y."""
+    given: Any = values
+    if np.shape(given) != (2,):
+        raise InputError(f"the {name} of a grid is {values!r}: give two, along x and along y")
+    return values
+
+
 def _centres(count: int, pitch: float) -> Array:
     """Centres of ``count`` cells about zero."""
     return (np.arange(count, dtype=np.float64) - 0.5 * (count - 1)) * pitch
@@ -261,6 +294,8 @@ def _centres(count: int, pitch: float) -> Array:
 @dataclass(frozen=True)
 class Frame:
     """Interface frame: ``origin`` (3,) in mm and ``axes`` (3, 3), whose rows are x, y and z.
+
+    Raises InputError for axes that are not of length 1, at right angles and right-handed.
 
     Examples
     --------
@@ -279,6 +314,15 @@ class Frame:
 
     origin: Array
     axes: Array
+
+    def __post_init__(self) -> None:
+        axes = checks.array("axes of a frame", self.axes, (3, 3))
+        checks.settle(self, origin=checks.array("origins of a frame", self.origin, (3,)), axes=axes)
+        if np.abs(axes @ axes.T - np.eye(3)).max() > SQUARE or np.linalg.det(axes) < 0.0:
+            raise InputError(
+                f"axes of a frame {axes.tolist()}: give rows of length 1, at right angles, with z "
+                "that follows from x and y by the right hand"
+            )
 
     def coordinates(self, points: Array) -> Array:
         """Local coordinates of global ``points`` ``(..., 3)``."""
@@ -363,6 +407,11 @@ class LoadHistory:
         if not self.block.size and not self.share.size:
             object.__setattr__(self, "share", np.ones(len(self.P)))
             object.__setattr__(self, "block", np.zeros(len(self.P), dtype=np.int64))
+        forces = [f.name for f in fields(self) if f.name not in ("sliding", "share", "block")]
+        for name in (*forces, "share"):
+            column = checks.array(f"values of {name}", getattr(self, name), (None,), finite=False)
+            checks.settle(self, **{name: column})
+        checks.settle(self, sliding=np.asarray(self.sliding, dtype=bool))
         lengths = {len(getattr(self, f.name)) for f in fields(self)}
         if len(lengths) != 1:
             raise InputError(f"columns of a load history differ in length: {sorted(lengths)}")

@@ -9,7 +9,8 @@ import numpy as np
 
 from sa_solver.types import Array
 from wear.face_loads import FaceLoads
-from wear.interface import FirstContact, InterfaceContact, InterfaceState, failures_of
+from wear.interface import FirstContact, InterfaceContact, InterfaceState
+from wear.stepping import failures_of
 from wear.worn import Spent
 
 KINETICS = ("depth_1", "depth_2", "volume_1", "volume_2", "energy")

@@ -16,6 +16,7 @@ from typing import Literal, Protocol
 
 import numpy as np
 
+from sa_solver import checks
 from sa_solver.errors import InputError
 from sa_solver.ties import first_largest
 from sa_solver.types import Array, resultant_change
@@ -65,6 +66,7 @@ class JumpSize:
     def __post_init__(self) -> None:
         if sum(size is not None for size in vars(self).values()) > 1:
             raise InputError("a jump of more than one size: give cycles, depth or volume")
+        checks.numbers(self, "cycles", "depth", "volume", above=0.0)
 
 
 @dataclass(frozen=True)
@@ -85,6 +87,9 @@ class Stop:
 
     depth: float | None = None
     volume: float | None = None
+
+    def __post_init__(self) -> None:
+        checks.numbers(self, "depth", "volume", above=0.0)
 
 
 @dataclass(frozen=True)
@@ -113,6 +118,11 @@ class CoupledSettings:
     resultants: Literal["constant", "drift", "every"] = "drift"
     drift: float = 0.02
     friction: Literal["constant", "evolving"] = "constant"
+
+    def __post_init__(self) -> None:
+        checks.numbers(self, "cycles", "drift", least=0.0)
+        checks.choice("resultants", self.resultants, ("constant", "drift", "every"))
+        checks.choice("friction", self.friction, ("constant", "evolving"))
 
     def ended(self, state: CoupledState) -> bool:
         """Whether a run that has got to ``state`` is over."""

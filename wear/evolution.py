@@ -7,6 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from sa_solver import checks
 from sa_solver.errors import InputError
 from sa_solver.types import Array
 
@@ -34,6 +35,10 @@ class EnergyTable:
     threshold: float = 0.0
 
     def __post_init__(self) -> None:
+        for name in ("energy", "factor"):
+            column = checks.array(f"values of {name}", getattr(self, name), (None,))
+            checks.settle(self, **{name: tuple(column.tolist())})
+        checks.numbers(self, "threshold")
         if not self.energy or len(self.energy) != len(self.factor):
             raise InputError(
                 f"{len(self.energy)} energies and {len(self.factor)} factors: give one or more, "

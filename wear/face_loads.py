@@ -5,6 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Protocol
 
+import numpy as np
+
+from sa_solver import checks
 from sa_solver.types import Array, LoadHistory
 
 
@@ -52,3 +55,12 @@ class CycleLoads:
     slip: Array
     force: Array | None = None
     displacement: Array | None = None
+
+    def __post_init__(self) -> None:
+        increments, places = len(self.loads), np.shape(self.slip)[2:] or (None,)
+        checks.settle(self, slip=checks.array("slips", self.slip, (increments, 2, *places)))
+        for name in ("force", "displacement"):
+            field = getattr(self, name)
+            if field is not None:
+                field = checks.array(f"{name}s", field, (increments, 3, *places))
+                checks.settle(self, **{name: field})

@@ -8,18 +8,18 @@ the structure's nodes, or the half-space's own under the same loads (wear method
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
 
+from sa_solver import checks
 from sa_solver.contact import FrictionalContact
 from sa_solver.contact_state import ContactState
 from sa_solver.errors import InputError
 from sa_solver.half_space import HalfSpace
-from sa_solver.normal import NormalContact
+from sa_solver.normal import NormalContact, checked_heights
 from sa_solver.rigid_modes import NORMAL
 from sa_solver.ties import first_largest
 from sa_solver.types import Array, ElasticPair, Grid, LoadHistory, Mask
@@ -32,7 +32,6 @@ from wear.marching import advance_cycles
 from wear.moving import followed, passages
 from wear.steppers import Stepper, first_cycles
 from wear.stepping import (
-    ContactFailure,
     CycleResult,
     SlidingCycle,
     Starts,
@@ -59,7 +58,8 @@ class InterfaceSettings:
     leads from the nodes of the loads there (:class:`wear.CellNodes` where these are the cells), and
     ``stepper`` says in which steps it wears.
 
-    ``gap`` ``(nx, ny)`` [mm] is that of the unloaded, unworn bodies, ``laws`` those of body 1 and
+    ``gap`` ``(nx, ny)`` [mm] is that of the unloaded, unworn bodies, infinite or masked where one
+    of them has no surface, ``laws`` those of body 1 and
     body 2, and ``friction`` gives Coulomb's coefficient after so much dissipated energy [N mm].
     Slips are those of the loads, or with ``method`` full the half-space's own; there ``gross_slip``
     says in which direction it slides as a whole. A ``drive`` may impose motions of the bodies in
@@ -99,6 +99,11 @@ class InterfaceSettings:
     follow: bool | None = None
     link: Literal["corrected", "half_space"] = "corrected"
     tolerance: float = 1e-8
+
+    def __post_init__(self) -> None:
+        checks.settle(self, gap=checked_heights(self.gap, self.grid))
+        checks.choice("method", self.method, ("normal", "full"))
+        checks.choice("link", self.link, ("corrected", "half_space"))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -140,15 +145,6 @@ class FirstContact:
     stable_cycles: float
     link: Link
     cycle: tuple[ContactState, ...]
-
-
-@contextmanager
-def failures_of(name: str) -> Iterator[None]:
-    """Let a :class:`~wear.stepping.ContactFailure` say of which interface it is."""
-    try:
-        yield
-    except ContactFailure as error:
-        raise ContactFailure(f"{name}: {error}") from error
 
 
 # --- the contact ----------------------------------------------------------------------------------

@@ -12,6 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from sa_solver import checks
+from sa_solver.errors import InputError
 from sa_solver.types import Array
 
 # Slopes within this share of the mean slope of the regime count as equal.
@@ -68,6 +70,7 @@ def linear_regime(cycles: Array, values: Array) -> LinearRegime | None:
     """The longest stretch up to the end in which all slopes agree, or None while there is none.
 
     ``cycles`` and ``values`` ``(n,)``, both ascending. Running-in ends where the regime starts.
+    Raises InputError for cycles that do not ascend, or another number of values.
 
     Examples
     --------
@@ -83,6 +86,10 @@ def linear_regime(cycles: Array, values: Array) -> LinearRegime | None:
     >>> print(f"{regime.extrapolate(2e5):.4f} +- {regime.uncertainty(2e5):.4f} mm^3 of 0.0410")
     0.0410 +- 0.0003 mm^3 of 0.0410
     """
+    cycles = checks.array("cycles", cycles, (None,))
+    values = checks.array("values", values, cycles.shape)
+    if np.any(np.diff(cycles) <= 0.0):
+        raise InputError("cycles that do not ascend: give each once, the smallest first")
     for first in range(len(cycles) - FEWEST_INTERVALS):
         if cycles[first] > LATEST_START * cycles[-1]:
             return None

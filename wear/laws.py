@@ -10,6 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal, Protocol
 
+from sa_solver import checks
 from sa_solver.types import Array
 from wear.evolution import EnergyTable
 
@@ -64,6 +65,10 @@ class ArchardLaw:
     coefficient: float
     hardness: float
 
+    def __post_init__(self) -> None:
+        checks.numbers(self, "coefficient", least=0.0)
+        checks.numbers(self, "hardness", above=0.0)
+
     def depth_per_pressure(self, sliding: SlidingConditions) -> Array:
         return self.coefficient / self.hardness * sliding.slip
 
@@ -88,6 +93,9 @@ class EnergyLaw:
     """
 
     coefficient: float
+
+    def __post_init__(self) -> None:
+        checks.numbers(self, "coefficient", least=0.0)
 
     def depth_per_pressure(self, sliding: SlidingConditions) -> Array:
         return self.coefficient * sliding.friction * sliding.slip
@@ -120,6 +128,10 @@ class EnergyAmplitudeLaw:
     coefficient: float
     reference_amplitude: float
 
+    def __post_init__(self) -> None:
+        checks.numbers(self, "coefficient", least=0.0)
+        checks.numbers(self, "reference_amplitude", above=0.0)
+
     def depth_per_pressure(self, sliding: SlidingConditions) -> Array:
         amplitude = sliding.slip.sum(axis=0) / 4.0 / self.reference_amplitude
         depth: Array = self.coefficient * sliding.friction * sliding.slip * amplitude
@@ -151,6 +163,9 @@ class EvolvingLaw:
     law: WearLaw
     factor: EnergyTable
     scope: Literal["local", "global"]
+
+    def __post_init__(self) -> None:
+        checks.choice("scope", self.scope, ("local", "global"))
 
     def depth_per_pressure(self, sliding: SlidingConditions) -> Array:
         before, after = sliding.work if self.scope == "local" else sliding.energy

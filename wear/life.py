@@ -28,6 +28,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from sa_solver import checks
 from sa_solver.errors import InputError
 from sa_solver.subsurface_influence import XX, XY, YY
 from sa_solver.types import Array, Material
@@ -94,7 +95,8 @@ def ruiz(stress: Array, work: Array) -> Ruiz:
     >>> print(parameters.friction_parameter[0, 0], parameters.cracking_parameter[0, 0])
     0.1 20.0
     """
-    _check(stress)
+    stress = _checked(stress)
+    work = checks.array("work", work, stress.shape[2:])
     principal = tension_along(*(stress[:, component] for component in (XX, YY, XY)))
     return Ruiz(work, np.maximum(0.0, principal.max(axis=0)))
 
@@ -239,16 +241,17 @@ def smith_watson_topper(
     return _search(stress, parameter, search)
 
 
-def _check(stress: Array) -> None:
-    if stress.ndim < 2 or stress.shape[1] != 6 or len(stress) == 0:
-        raise StressHistoryError(f"stress of shape {stress.shape}: must be (t, 6, ...)")
-    if not np.isfinite(stress).all():
-        raise StressHistoryError("stress that is infinite or not a number: must be finite")
+def _checked(stress: Array) -> Array:
+    """Stress as all parameters take it."""
+    shape = np.shape(stress)
+    if len(shape) < 2 or shape[1] != 6 or shape[0] == 0:
+        raise StressHistoryError(f"stress of shape {shape}: must be (t, 6, ...)")
+    return checks.array("stresses", stress, shape, error=StressHistoryError, order="K")
 
 
 def _search(stress: Array, parameter: PlaneParameter, search: PlaneSearch) -> CriticalPlane:
     """The plane with the largest value of ``parameter``, at every point."""
-    _check(stress)
+    stress = _checked(stress)
     shape = stress.shape[2:]
     points = np.moveaxis(stress.reshape(len(stress), 6, -1), 0, 1)
     best = np.empty((6, points.shape[2]))

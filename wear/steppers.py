@@ -27,6 +27,7 @@ from typing import Any, Generic, Protocol, Self, TypeVar
 
 import numpy as np
 
+from sa_solver import checks
 from sa_solver.errors import InputError
 from sa_solver.types import Array
 from wear.worn import Spent, State, WearStep, WornState
@@ -312,6 +313,9 @@ class ErrorControl:
 
     relative: float | None = None
     absolute: float | None = None
+
+    def __post_init__(self) -> None:
+        checks.numbers(self, "relative", "absolute", above=0.0)
 
     def tolerance(self, depth: Array, expected: Array) -> float:
         """The bound for a body worn to ``depth``, as a share of the one ``expected`` to come."""

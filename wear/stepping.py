@@ -22,6 +22,8 @@ stands for that: then no step is better than first order.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -48,6 +50,15 @@ Starts = dict[int, NormalStart]
 
 class ContactFailure(ConvergenceError):
     """The half-space solver did not converge; the message is its own."""
+
+
+@contextmanager
+def failures_of(name: str) -> Iterator[None]:
+    """Let a :class:`ContactFailure` say of which interface it is."""
+    try:
+        yield
+    except ContactFailure as error:
+        raise ContactFailure(f"{name}: {error}") from error
 
 
 @dataclass(frozen=True)

@@ -19,6 +19,7 @@ from functools import cached_property
 import numpy as np
 from scipy.optimize import brentq, minimize_scalar
 
+from sa_solver import checks
 from sa_solver.types import Array
 
 SMALLEST_ANGLE = 1e-6
@@ -42,6 +43,9 @@ class FlatRoundedPunch:
     radius: float
     load: float
     contact_modulus: float
+
+    def __post_init__(self) -> None:
+        checks.numbers(self, "half_width", "radius", "load", "contact_modulus", above=0.0)
 
     def gap(self, x: Array) -> Array:
         """Gap before loading [mm]."""

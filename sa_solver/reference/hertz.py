@@ -15,16 +15,23 @@ import numpy as np
 from scipy.optimize import brentq
 from scipy.special import elliprd, elliprf
 
+from sa_solver import checks
 from sa_solver.types import Array, ElasticPair, Material
 
 
 @dataclass(frozen=True)
 class HertzSphere:
-    """Sphere of relative ``radius`` [mm] pressed with ``load`` [N] at E* ``contact_modulus``."""
+    """Sphere of relative ``radius`` [mm] pressed with ``load`` [N] at E* ``contact_modulus`` [MPa].
+
+    Raises InputError for one of them that is not above 0, as do all forms here.
+    """
 
     load: float
     radius: float
     contact_modulus: float
+
+    def __post_init__(self) -> None:
+        checks.numbers(self, "load", "radius", "contact_modulus", above=0.0)
 
     @property
     def contact_radius(self) -> float:
@@ -61,6 +68,9 @@ class FrictionalSphere:
     body_2: Material
     friction: float
 
+    def __post_init__(self) -> None:
+        checks.numbers(self, "friction", least=0.0)
+
     @cached_property
     def pair(self) -> ElasticPair:
         """Both bodies."""
@@ -90,6 +100,10 @@ class HertzEllipse:
     radius_x: float
     radius_y: float
     contact_modulus: float
+
+    def __post_init__(self) -> None:
+        names = "load", "radius_x", "radius_y", "contact_modulus"
+        checks.numbers(self, *names, above=0.0)
 
     @cached_property
     def axis_ratio(self) -> float:
@@ -142,6 +156,9 @@ class HertzCylinder:
     load: float
     radius: float
     contact_modulus: float
+
+    def __post_init__(self) -> None:
+        checks.numbers(self, "load", "radius", "contact_modulus", above=0.0)
 
     @property
     def half_width(self) -> float:

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from fe_models.constraints import Constraints
+from sa_solver.errors import InputError
 
 NODES = 6
 
@@ -38,6 +39,13 @@ def test_hold():
     constraints = Constraints(NODES)
     constraints.hold(np.array([1, 4]))
     spans_null_space(constraints, np.eye(3 * NODES)[[3, 4, 5, 12, 13, 14]])
+
+
+@pytest.mark.parametrize("nodes", [[-1], [NODES], [0.5], [True, False], "all"])
+def test_nodes_that_there_are_not(nodes):
+    """Counted from the end, they were held nowhere."""
+    with pytest.raises(InputError, match="nodes"):
+        Constraints(NODES).hold(nodes)
 
 
 def test_slide(rng):

@@ -10,12 +10,13 @@ from scipy.spatial import cKDTree
 from fe_models.applied_loads import BoundaryForce
 from fe_models.constraints import Constraints
 from fe_models.cyclic import Cuts, hold_normal
-from fe_models.elasticity import ElasticBody, von_mises
+from fe_models.elasticity import ElasticBody
 from fe_models.imposed import tie_rigid
 from fe_models.mesh import Body, MeshError
 from fe_models.recovery import StressRecovery
 from fe_models.sector_recovery import SectorRecovery
 from fe_models.supported_body import SupportedBody
+from sa_solver import von_mises
 from sa_solver.types import Material
 from tests.marks import slow
 from tests.wheels import INNER, OBLIQUE, OUTER, THROUGH, Y, about, curved, sector, wheel

@@ -9,6 +9,7 @@ import pytest
 from fe_models import friction
 from fe_models.friction import FrictionalJoint
 from fe_models.joint import JointStiffness
+from sa_solver.errors import InputError
 from tests.marks import slow
 
 NODES = 4
@@ -318,3 +319,40 @@ def test_worn_faces_meet_under_a_light_load(structure, joint, mission):
         assert state.converged
         assert state.iterations < 100
     np.testing.assert_allclose(first.force, state.force, atol=1e-4 * np.abs(first.force).max())
+
+
+SPRINGS = JointStiffness(100.0 * np.eye(3), np.eye(3)[:, [2, 0]], 0, 100.0, 100.0)
+PATH = np.array([[10.0, 3.0], [10.0, 6.0]])
+
+
+def marched(path=PATH, gap=(0.0,), mu=0.4):
+    return [
+        state.force[0, 0] for state in FrictionalJoint(SPRINGS.resolvent(), mu).march(path, gap)
+    ]
+
+
+@pytest.mark.parametrize("path", [PATH.tolist(), PATH.astype(int), np.asfortranarray(PATH)])
+def test_a_path_is_any_array(path):
+    assert marched(path) == pytest.approx([3.0, 4.0])
+
+
+@pytest.mark.parametrize(
+    "given",
+    [
+        {"path": np.ma.array(PATH, mask=PATH > 5.0)},
+        {"path": np.where(PATH > 5.0, np.nan, PATH)},
+        {"path": PATH[0]},
+        {"path": PATH[:, :1]},
+        {"gap": np.ma.array([0.0], mask=[True])},
+        {"gap": [np.inf]},
+        {"gap": np.zeros(3)},
+        {"gap": 0.0},
+        {"mu": -0.4},
+        {"mu": np.nan},
+        {"mu": [-0.4]},
+        {"mu": "0.4"},
+    ],
+)
+def test_what_has_no_meaning_is_refused(given):
+    with pytest.raises(InputError):
+        marched(**given)

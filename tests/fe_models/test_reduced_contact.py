@@ -13,6 +13,7 @@ from fe_models.constraints import Constraints
 from fe_models.geometry.specimens import Specimen
 from fe_models.mesh import Face
 from fe_models.reduced_contact import FrettingConditions, ReducedPair, masing_loop
+from sa_solver.errors import InputError
 from sa_solver.influence import rectangle_influence
 from sa_solver.reference.mindlin import ShearedSphere
 from sa_solver.types import ElasticPair, Frame, Material
@@ -354,3 +355,20 @@ class TestRig:
         for tied, low, high in ((True, 95e3, 100e3), (False, 84e3, 88e3)):
             pressed = rigs[tied].normal(np.zeros(121), 17.0)
             assert low < rigs[tied].stick_stiffness(pressed) < high
+
+
+def test_what_has_no_meaning_is_refused(pair, flat):
+    normal = pair.normal(flat, 17.0)
+    for attempt in (
+        lambda: pair.normal(np.ma.array(flat, mask=flat == 0.0), 17.0),
+        lambda: pair.normal(np.where(flat == 0.0, np.inf, flat), 17.0),
+        lambda: pair.normal(flat[1:], 17.0),
+        lambda: pair.normal(flat, 0.0),
+        lambda: pair.tangential(normal, -0.01, FRICTION),
+        lambda: pair.tangential(normal, 0.01, -FRICTION),
+        lambda: FrettingConditions(np.nan, STROKE, FRICTION),
+        lambda: FrettingConditions(17.0, STROKE, -FRICTION),
+    ):
+        with pytest.raises(InputError):
+            attempt()
+    assert pair.normal(flat.tolist(), 17.0).approach == normal.approach

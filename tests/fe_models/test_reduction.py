@@ -10,6 +10,7 @@ from fe_models.constraints import Constraints
 from fe_models.linear_solver import SolverError
 from fe_models.reduction import free_frequencies, load_reduced, reduce_body, save_reduced
 from fe_models.supported_body import SupportedBody
+from sa_solver.errors import InputError
 from sa_solver.types import Material
 
 STEEL = Material(200e3, 0.3, 7.8e-9)
@@ -186,6 +187,23 @@ class TestReduction:
         model = reduce_body((t.T @ elastic.stiffness @ t).tocsr(), None, kept, 0, t.T @ loads)
         np.testing.assert_allclose(model.stiffness, condensed[0], rtol=1e-9, atol=1e-6)
         np.testing.assert_allclose(model.loads, condensed[1], rtol=1e-9, atol=1e-9)
+
+    def test_lists_and_full_matrices_do_as_well(self, matrices):
+        stiffness, mass, kept = matrices
+        full = reduce_body(stiffness.toarray(), mass.toarray(), list(kept), 1)
+        np.testing.assert_allclose(full.mass, reduce_body(stiffness, mass, kept, 1).mass)
+
+    @pytest.mark.parametrize("kept", [[0, 0], [-1], [10**6], [0.5], [True, False], 3])
+    def test_displacements_that_there_are_not(self, matrices, kept):
+        with pytest.raises(InputError, match="kept displacements"):
+            reduce_body(*matrices[:2], np.array(kept))
+
+    def test_loads_that_are_masked(self, matrices):
+        stiffness, mass, kept = matrices
+        loads = np.ma.array(np.ones((stiffness.shape[0], 1)), mask=False)
+        loads[2] = np.ma.masked
+        with pytest.raises(InputError, match="masked"):
+            reduce_body(stiffness, mass, kept, 0, loads)
 
     def test_modes_without_mass(self, matrices):
         stiffness, _, kept = matrices

@@ -235,7 +235,7 @@ def test_any_roughness_is_solved(rms, seed):
     The displacement is 2 µm where all presses and up to 70 µm where three cells do.
     """
     grid, height = rough(24, rms, seed)
-    state = NormalContact(HalfSpace(grid, PAIR)).solve(height, 100.0)
+    state = NormalContact(HalfSpace(grid, PAIR)).solve(height, 100.0, 0.0, 0.0)
     assert state.converged, state.message
     # Rounding of heights of 10 mm is 1e-15 mm, 1e-10 of that displacement.
     assert normal_error(grid, MODULUS, height, state) < 3.0 * SOLVED

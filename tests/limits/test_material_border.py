@@ -127,7 +127,7 @@ def test_bodies_that_are_almost_alike_are_solved_as_if_they_were():
     [(0.0, 0.3), (-1.0, 0.3), (np.nan, 0.3), (1e5, -0.1), (1e5, 0.51), (1e5, np.nan)],
 )
 def test_what_is_no_material_is_refused(young, poisson):
-    with pytest.raises(ValueError, match="give a modulus above 0 and a ratio of 0 to"):
+    with pytest.raises(ValueError, match=r"(modulus|ratio).*: give a"):
         ElasticPair(Material(young, poisson), Material(70e3, 0.3))
 
 

@@ -451,7 +451,7 @@ def test_friction_must_make_sense(friction):
         ({"height": np.zeros((8, 9))}, "heights have shape"),
         ({"offset": np.full((2, 8, 8), np.inf)}, "offsets hold NaN"),
         ({"compliance": np.full((8, 8), -1.0)}, "wear rate's sign"),
-        ({"values": loads(np.nan)}, "must be finite"),
+        ({"values": loads(np.nan)}, "values hold NaN"),
         ({"values": loads(-1.0)}, "pulls"),
         ({"values": loads(My=1e3)}, "outside the cells"),
         ({"values": np.zeros(5)}, "six values"),

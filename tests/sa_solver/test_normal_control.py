@@ -63,8 +63,8 @@ def test_a_free_tilt_turns_a_body_out_of_contact():
     grid = Grid.covering((2.0, 5.0), (20, 22))
     height = 0.1 + 0.1 * grid.y + np.zeros(grid.shape)
     contact = NormalContact(HalfSpace(grid, PAIR))
-    apart = contact.solve(height, approach=0.05)
-    pressed = contact.solve(height, approach=0.05, tilt_x=0.0)
+    apart = contact.solve(height, approach=0.05, Mx=0.0, My=0.0)
+    pressed = contact.solve(height, approach=0.05)
     assert apart.P == 0.0
     assert apart.gap.min() >= -1e-12
     assert pressed.converged

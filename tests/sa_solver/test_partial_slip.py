@@ -176,5 +176,5 @@ def test_unlike_bodies_and_no_load_are_refused():
     with pytest.raises(PartialSlipError, match="not alike"):
         partial_slip_curve(unlike, gap, LOAD, tolerance=1e-8)
     alike = NormalContact(HalfSpace(grid, ElasticPair(STEEL, STEEL)))
-    with pytest.raises(PartialSlipError, match="a load of 0 N"):
+    with pytest.raises(PartialSlipError, match=r"load P .* = 0"):
         partial_slip_curve(alike, gap, 0.0, tolerance=1e-8)

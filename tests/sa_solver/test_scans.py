@@ -176,3 +176,16 @@ def test_pressures_converge_with_the_pitch_of_the_scan():
     # Points of 0.5 um and the middles of the cells, of 12.5 um, are means apart.
     points = contact.solve(ball(grid.x, grid.y), P=50.0).pressure
     assert np.linalg.norm(points - finest) < 2e-3 * np.linalg.norm(finest)
+
+
+def test_a_masked_point_of_a_scan_is_a_missing_one():
+    """It is filled, here by the plane around it, and does not count as it stands in the array."""
+    plane = over((1.0, 1.0), (12, 12), lambda x, y: 0.1 * x - 0.2 * y)
+    spoiled = np.ma.array(plane.heights.copy(), mask=False)
+    spoiled.data[3:5, 6] = 1e3
+    spoiled[3:5, 6] = np.ma.masked
+    scan = Scan(spoiled, plane.pitch)
+    assert scan.missing == pytest.approx(2 / 144)
+    np.testing.assert_allclose(filled(scan).heights, plane.heights, atol=1e-12)
+    with pytest.raises(InputError):
+        Scan(plane.heights.astype(str), plane.pitch)

@@ -406,10 +406,10 @@ def test_shear_without_pressure():
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"limit": np.nan}, "check pressure, friction and history"),
+        ({"limit": np.nan}, "hold NaN or infinity"),
         ({"limit": -1.0}, "check the sign of friction"),
-        ({"offset": np.inf}, "check pressure, friction and history"),
-        ({"Qx": np.nan}, "check the load history"),
+        ({"offset": np.inf}, "hold NaN or infinity"),
+        ({"Qx": np.nan}, "Qx = nan"),
     ],
 )
 def test_data_without_meaning(change, message):

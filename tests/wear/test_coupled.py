@@ -265,7 +265,7 @@ def test_a_source_is_told_of_friction_that_changes() -> None:
     contacts = [patch(friction=friction)] * 2
     source = Listening((LOAD, 0.5 * LOAD), FALL, contacts[0].grid)
     settings = CoupledSettings(
-        0.2 * SCALE, JumpSize(0.1 * SCALE), resultants="every", friction=friction
+        0.2 * SCALE, JumpSize(0.1 * SCALE), resultants="every", friction="evolving"
     )
     states = run(settings, source, contacts)
     energies = states[-1].kinetics[1:, :, 4]

@@ -5,9 +5,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sa_solver.types import Array
+from sa_solver.errors import InputError
+from sa_solver.types import Array, ElasticPair, Grid, LoadHistory, Material
+from wear.coupled import CoupledSettings, JumpSize, Stop
 from wear.evolution import EnergyTable
+from wear.face_loads import CycleLoads
+from wear.implicit import ImplicitStepper
+from wear.interface import InterfaceContact, InterfaceSettings
+from wear.kinetics import linear_regime
 from wear.laws import ArchardLaw, EnergyAmplitudeLaw, EnergyLaw, EvolvingLaw, SlidingConditions
+from wear.life import findley, ruiz
+from wear.link import CellNodes
+from wear.steppers import ErrorControl
 
 UM3_PER_J = 1e-12  # [1/MPa]: 1e-9 mm³ per 1e3 N mm
 FRICTION = 0.4
@@ -181,3 +190,65 @@ def test_nothing_wears_below_the_threshold() -> None:
     depth = (law.depth_per_pressure(step) * pressure).sum(axis=0)
     beyond = np.maximum(step.work[1], 30.0) - np.maximum(step.work[0], 30.0)
     np.testing.assert_allclose(depth, 1e-8 * beyond, rtol=1e-12, atol=1e-22)
+
+
+STILL, ONE = np.zeros(1), np.full(1, 50.0)
+CYCLE = LoadHistory(ONE, *[STILL] * 7, sliding=[True])
+HOLES = np.ma.array(np.ones((1, 2, 4)), mask=False)
+HOLES[0, 0, 1] = np.ma.masked
+
+
+@pytest.mark.parametrize(
+    "attempt",
+    [
+        lambda: ArchardLaw(1e-4, 0.0),
+        lambda: ArchardLaw(-1e-4, 3000.0),
+        lambda: EnergyLaw(np.nan),
+        lambda: EnergyAmplitudeLaw(1e-8, 0.0),
+        lambda: EvolvingLaw(EnergyLaw(1e-8), EnergyTable(), scope="here"),
+        lambda: EnergyTable((0.0, np.nan), (1.0, 1.0)),
+        lambda: EnergyTable(np.ma.array([0.0, 1.0], mask=[0, 1]), (1.0, 1.0)),
+        lambda: ErrorControl(relative=-0.1),
+        lambda: JumpSize(cycles=0.0),
+        lambda: Stop(depth=np.nan),
+        lambda: CoupledSettings(cycles=-1.0),
+        lambda: CycleLoads(CYCLE, HOLES),
+        lambda: CycleLoads(CYCLE, np.ones((2, 1, 4))),
+        lambda: CycleLoads(CYCLE, np.ones((1, 2, 4)), force=np.ones((1, 3, 5))),
+        lambda: linear_regime(np.arange(9.0), np.arange(8.0)),
+        lambda: linear_regime(np.arange(9.0), np.ma.array(np.arange(9.0), mask=np.arange(9) > 5)),
+        lambda: linear_regime(np.arange(9.0)[::-1], np.arange(9.0)),
+        lambda: findley(np.ma.array(np.ones((3, 6)), mask=np.eye(3, 6)), 0.3),
+        lambda: ruiz(np.ones((2, 6, 3)), np.ones(4)),
+    ],
+)
+def test_what_has_no_meaning_is_refused(attempt) -> None:
+    with pytest.raises(InputError):
+        attempt()
+
+
+def test_a_gap_may_be_a_list_and_have_holes() -> None:
+    """A cylinder with a slot in its middle loses α µ P s a cycle, and nothing in the slot."""
+    grid, steel = Grid.strips(1.4, 70), Material(210e3, 0.3)
+    gap, slot = grid.x**2 / 20.0, np.abs(grid.x) < 0.05
+    slip = np.zeros((1, 2, 70))
+    slip[:, 0] = 0.04
+    volumes = []
+    for height in (np.ma.array(gap, mask=slot), gap.tolist()):
+        contact = InterfaceContact(
+            InterfaceSettings(
+                name="cylinder",
+                grid=grid,
+                gap=height,
+                transfer=CellNodes(grid),
+                pair=ElasticPair(steel, steel),
+                laws=(EnergyLaw(5e-9), EnergyLaw(5e-9)),
+                friction=lambda energy: 0.5,
+                stepper=ImplicitStepper(),
+            )
+        )
+        state, _ = contact.begin(CycleLoads(CYCLE, slip.tolist()), cycles=1e5)
+        state, _ = contact.jump(state, 2e4, 1e5)
+        assert state.surfaces.depth[slot].any() == isinstance(height, list)
+        volumes.append(contact.volume(state.surfaces.depth))
+    assert volumes == pytest.approx([1e-8 * 0.5 * 50.0 * 0.04 * 2e4] * 2, rel=1e-9)

@@ -8,7 +8,7 @@ import h5py
 import numpy as np
 import pytest
 
-from fe_models.elasticity import von_mises
+from sa_solver import von_mises
 from sa_solver.subsurface import SubsurfaceStress
 from sa_solver.types import Array, Grid, LoadHistory, Material
 from tests.marks import slow

@@ -15,7 +15,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from fe_models.elasticity import von_mises
+from sa_solver.stress import von_mises
 from sa_solver.subsurface import COMPONENTS
 from sa_solver.threads import at_once
 from sa_solver.ties import first_largest

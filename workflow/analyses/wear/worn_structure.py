@@ -10,13 +10,14 @@ from typing import Any
 import numpy as np
 
 from fe_models.cut_face import WholeStress, whole_components, whole_values
-from fe_models.elasticity import maximum_principal, von_mises
+from fe_models.elasticity import maximum_principal
 from fe_models.mesh import Body, Interface, MeshError, StructureMesh, write_msh
 from fe_models.mesh_quality import element_sizes, elements_across, radius_ratios
 from fe_models.nonlinear import NonlinearCheck
 from fe_models.remesh import form_of, formed_mesh, worn_volume
 from fe_models.stress import CycleStress, PeakStress, StressField, SurfaceHistory, steps
 from fe_models.structure import CycleSolution, InterfaceHistory
+from sa_solver.stress import von_mises
 from sa_solver.threads import begun
 from sa_solver.types import Array, LoadHistory, Tally
 from wear.coupled import CoupledState
@@ -256,7 +257,7 @@ def _body(body: Body, field: StressField) -> dict[str, Dataset]:
 def _mission(body: Body, surface: SurfaceHistory, shown: Sequence[int]) -> dict[str, Dataset]:
     """The surface of a body over the increments, of which there may be many: single precision."""
     seen = "surface of the body, or of all of it in the plane"
-    largest = np.array([maximum_principal(stress) for stress in surface.stress])
+    largest = maximum_principal(surface.stress.swapaxes(0, 1))
     equivalent = von_mises(surface.stress.swapaxes(0, 1))
     fields = {
         "displacement": (surface.displacement, "mm", "displacement in each increment"),

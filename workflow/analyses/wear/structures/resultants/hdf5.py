@@ -9,6 +9,7 @@ from typing import Any
 import h5py
 import numpy as np
 
+from sa_solver.errors import InputError
 from sa_solver.types import Array, Frame, Indices, LoadHistory
 from workflow.analyses.wear.structures.resultants.consistency import (
     MIX,
@@ -36,8 +37,6 @@ NODAL = ("coordinates", *ON_NODES, "height")
 IGNORED = ("pressure", "shear")
 # How far nodal forces may be from adding up to those of the loads, in shares of the largest P.
 ADD_UP = 0.01
-# How far the axes of a frame may be from perpendicular and from length 1: six printed digits.
-ORTHONORMAL = 1e-6
 
 
 @dataclass(frozen=True)
@@ -227,14 +226,11 @@ def _frame(group: Group) -> Frame | None:
         return None
     if len(attributes) == 1:
         raise group.error("", f"attribute {attributes[0]} alone", "origin (3,) and axes (3, 3)")
-    frame = frame_of(group.group)
-    if frame.origin.shape != (3,) or frame.axes.shape != (3, 3):
-        raise group.error("", "frame of another shape", "origin (3,) and axes (3, 3)")
-    axes = frame.axes.astype(np.float64)
-    right_handed = np.linalg.det(axes) > 0.0
-    if not right_handed or np.abs(axes @ axes.T - np.eye(3)).max() > ORTHONORMAL:
-        raise group.error("", "axes of no frame", "rows x, y, z of length 1, z = x × y")
-    return Frame(frame.origin.astype(np.float64), axes)
+    try:
+        return frame_of(group.group)
+    except InputError as error:
+        allowed = "origin (3,), and axes (3, 3) with rows x, y, z of length 1, z = x × y"
+        raise group.error("", str(error), allowed) from error
 
 
 def _coordinates(group: Group, line: bool) -> Array | None:

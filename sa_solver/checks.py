@@ -1,0 +1,161 @@
+"""What public functions and classes accept as an array, a number or a choice.
+
+The rest is refused with an :class:`~sa_solver.errors.InputError` that says what to give. Without
+that numpy would pass over the mask of a masked array, read texts and truth values as numbers, and
+fail far from the cause where a list or a single number stands for a field.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from operator import index
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sa_solver.errors import FretscaleError, InputError
+
+REAL = "fiu"
+"""Kinds of numpy's numbers that are real: floats, and whole numbers with and without a sign."""
+
+Shape = Sequence[int | None]
+
+
+def array(
+    name: str,
+    values: object,
+    shape: Shape,
+    *,
+    error: type[FretscaleError] = InputError,
+    masked: float | None = None,
+    infinite: bool = False,
+    finite: bool = True,
+    order: Literal["C", "K"] = "C",
+) -> NDArray[np.float64]:
+    """Return ``values`` as an array of 64-bit floats of ``shape``, itself where it is one.
+
+    Parameters
+    ----------
+    name
+        What the values are, in the plural, as it begins a message.
+    values
+        An array or nested lists of real numbers.
+    shape
+        The shape that they must have, None where any length will do.
+    error
+        What is raised.
+    masked
+        What a masked value counts as; None: masked values are refused.
+    infinite
+        Whether +infinity is a value.
+    finite
+        Whether values are looked at; False where whatever takes them does that.
+    order
+        C: rows lie one after the other in memory; K: as they are, for large matrices.
+    """
+    plain = values if type(values) is np.ndarray else _without_mask(name, values, masked, error)
+    if plain.dtype.kind not in REAL:
+        raise error(f"{name} are of the type {plain.dtype}: give real numbers")
+    found: NDArray[np.float64] = np.asarray(plain, dtype=np.float64, order=order)
+    pairs = zip(shape, found.shape, strict=False)
+    same = found.ndim == len(shape) and all(wanted in (None, n) for wanted, n in pairs)
+    if not same:
+        raise error(f"{name} have shape {found.shape}: give {_shown(shape, found.shape)}")
+    if finite and not np.all(np.isfinite(found) | (infinite & (found == np.inf))):
+        bad = "NaN or -infinity" if infinite else "NaN or infinity"
+        raise error(f"{name} hold {bad}: give finite numbers, or fill or crop what is missing")
+    return found
+
+
+def number(
+    name: str,
+    value: object,
+    *,
+    above: float = -np.inf,
+    least: float = -np.inf,
+    most: float = np.inf,
+    infinite: bool = False,
+    error: type[FretscaleError] = InputError,
+) -> float:
+    """Return ``value`` as a float within bounds; finite, but for +infinity where it is allowed."""
+    plain: Any = np.ma.asanyarray(value)
+    if plain.ndim or np.ma.getmaskarray(plain).any() or plain.dtype.kind not in REAL:
+        raise error(f"{name} is {value!r}: give one real number")
+    found = float(plain)
+    inside = found > above and least <= found <= most
+    if not (inside and (np.isfinite(found) or (infinite and found == np.inf))):
+        bounds = [f"above {above:g}"] if above > -np.inf else []
+        bounds += [f"of {least:g} or more"] if least > -np.inf else []
+        bounds += [f"of {most:g} or less"] if most < np.inf else []
+        kind = "number" if infinite else "finite number"
+        raise error(f"{name} = {found:g}: give a {kind} {' and '.join(bounds)}".rstrip())
+    return found
+
+
+def numbers(holder: object, *names: str, **bounds: Any) -> None:
+    """Refuse what :func:`number` does in fields of these names, None excepted."""
+    for name in names:
+        value = getattr(holder, name)
+        if value is not None:
+            number(name.replace("_", " "), value, **bounds)
+
+
+def whole(name: str, value: Any, error: type[FretscaleError] = InputError) -> int:
+    """Return ``value`` as a whole number."""
+    try:
+        return index(value)
+    except TypeError as problem:
+        raise error(f"{name} is {value!r}: give a whole number") from problem
+
+
+def places(
+    name: str, values: object, count: int, error: type[FretscaleError] = InputError
+) -> NDArray[np.int64]:
+    """Return ``values`` as whole numbers from 0 to below ``count``, of any shape."""
+    found = values if type(values) is np.ndarray else _without_mask(name, values, None, error)
+    if found.size and (found.dtype.kind not in "iu" or found.min() < 0 or found.max() >= count):
+        raise error(f"{name} {np.unique(found)}: give whole numbers from 0 to {count - 1}")
+    return np.asarray(found, dtype=np.int64)
+
+
+def choice(
+    name: str, value: object, allowed: Sequence[str], error: type[FretscaleError] = InputError
+) -> None:
+    """Refuse a ``value`` that is none of those ``allowed``."""
+    if value not in allowed:
+        raise error(f"{name} is {value!r}: give {' or '.join(allowed)}")
+
+
+def settle(frozen: object, **fields: object) -> None:
+    """Set checked ``fields`` of a frozen dataclass while it is made."""
+    for name, value in fields.items():
+        object.__setattr__(frozen, name, value)
+
+
+def _without_mask(
+    name: str, values: object, masked: float | None, error: type[FretscaleError]
+) -> NDArray[Any]:
+    """An array of ``values`` without its mask."""
+    try:
+        # Lists may hold masked arrays, whose masks numpy alone would lose.
+        found: Any = np.ma.asanyarray(values)
+    except ValueError as problem:
+        raise error(f"{name} are no array: {problem}") from problem
+    missing = np.ma.getmaskarray(found)
+    if not missing.any():
+        return np.asarray(found.data)
+    if masked is None:
+        raise error(
+            f"{name} are masked in {np.count_nonzero(missing)} places: give numbers there, or "
+            "leave these places out"
+        )
+    return np.asarray(found.astype(np.float64).filled(masked))
+
+
+def _shown(shape: Shape, given: tuple[int, ...]) -> str:
+    """A shape for a message, and what was likely meant."""
+    sizes = ", ".join("any" if wanted is None else str(wanted) for wanted in shape)
+    text = f"({sizes},)" if len(shape) == 1 else f"({sizes})"
+    turned = None not in shape and tuple(shape) == given[::-1] and len(given) > 1
+    return text + (", with x along the first axis: transpose them" if turned else "")
