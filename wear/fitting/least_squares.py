@@ -28,7 +28,7 @@ from sa_solver.types import Array, Mask
 from wear.fitting.estimates import RANK, Estimate, estimate_at, inverse_of, led_astray
 from wear.fitting.problem import FitError, FitProblem
 from wear.fitting.profiles import profiled
-from wear.fitting.solving import solve
+from wear.fitting.solving import pinned, solve
 
 LEVEL = 0.95
 """Of all bounds."""
@@ -58,7 +58,7 @@ class Fit:
     """The best fit of a ``problem``.
 
     ``values`` ``(p,)`` are those of all its parameters, also of what is not determined; which are,
-    ``estimates`` say. ``covariance`` ``(p, p)`` is that of the fitted ones (logarithms where these
+    ``estimates`` say of all but nuisances, which come last. ``covariance`` ``(p, p)`` is that of the fitted ones (logarithms where these
     are fitted), without directions that nothing decides, and ``parts`` ``(k, p, p)`` what each
     series brings to it. ``fitted`` and ``residuals`` ``(n,)``, ``deviations`` ``(n,)`` of the data,
     and their ``leverages`` ``(n,)``. ``freedoms`` ``(k,)`` are the data of each series less the
@@ -99,10 +99,11 @@ class Fit:
 
     @property
     def correlation(self) -> Array:
-        """Of the fitted parameters ``(p, p)``; NaN where one is not determined."""
+        """Of the parameters that have estimates ``(q, q)``; NaN where one is not determined."""
         found = np.array([estimate.determined for estimate in self.estimates])
-        scale = np.sqrt(np.where(found, np.diag(self.covariance), np.nan))
-        return np.asarray(self.covariance / np.outer(scale, scale))
+        covariance = self.covariance[: len(found), : len(found)]
+        scale = np.sqrt(np.where(found, np.diag(covariance), np.nan))
+        return np.asarray(covariance / np.outer(scale, scale))
 
     @property
     def standardised(self) -> Array:
@@ -230,7 +231,8 @@ def fit(problem: FitProblem) -> Fit:
     ]
     if not is_exact(problem, residuals):
         alone = profiled(problem, inner, deviations, alone)
-    estimates = tuple(led_astray(alone, place, parts.sum(axis=0)) for place in range(len(values)))
+    asked = sum(not unknown.nuisance for unknown in problem.unknowns)
+    estimates = tuple(led_astray(alone, place, parts.sum(axis=0)) for place in range(asked))
     return Fit(
         problem=problem,
         values=values,
@@ -291,14 +293,14 @@ def _best(problem: FitProblem) -> tuple[Array, int]:
     least = min(found, key=lambda end: end[1])
     floor = 0.5 * len(problem.data) * EXACT**2
     same = [cost - least[1] <= SAME_MINIMUM * least[1] + floor for _, cost, _ in found]
-    return least[0], sum(same)
+    return pinned(problem, least[0], least[1], deviations), sum(same)
 
 
 def _first_deviations(problem: FitProblem) -> Array:
     """Of data whose deviations are not known the size of their series."""
     return np.concatenate(
         [
-            np.full(len(one.values), max(np.abs(one.values).max(), np.finfo(float).tiny))
+            one.scattered(max(np.abs(one.values).max(), np.finfo(float).tiny))
             if one.deviations is None
             else one.deviations
             for one in problem.series
@@ -345,7 +347,8 @@ def _scatter(problem: FitProblem, inner: Array, jacobian: Array, deviations: Arr
                 "do not tell their own scatter; allowed: more values, or their standard deviations"
             )
         least = max(EXACT * np.abs(series.values).max(), np.finfo(float).tiny)
-        found[here] = max(float(np.sqrt(np.sum(residuals[here] ** 2) / left)), least)
+        squares = np.sum((residuals[here] / series.scattered(1.0)) ** 2)
+        found[here] = series.scattered(max(float(np.sqrt(squares / left)), least))
     return found
 
 

@@ -47,7 +47,7 @@ def profiled(
     found, clouds = [], []
     for place, estimate in enumerate(estimates):
         checked, cloud = estimate, [inner]
-        if estimate.determined:
+        if estimate.determined and not problem.unknowns[place].nuisance:
             checked, cloud = _profiled(problem, place, inner, deviations, estimate)
         found.append(checked)
         clouds.append(np.array([problem.outer(values) for values in cloud]))

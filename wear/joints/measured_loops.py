@@ -1,6 +1,6 @@
 """Friction, stiffness and energy of hysteresis loops, measured or computed.
 
-Each cycle of a record gives
+Each loop that closes in a record gives
 
 - the stick slope, that of the force right after a reversal. From the reversal until the force has
   risen through half of the loop's height a parabola is laid through force over displacement, and
@@ -12,6 +12,11 @@ Each cycle of a record gives
 - the sliding branches, the straight last part of each branch: their slope is the residual
   stiffness kr, their distance ΔT, at one displacement so that kr drops out, is 2 µ N;
 - the energy, ∮ T dδ by trapezoids (the shoelace formula), and the stroke.
+
+Loops are averaged only with loops that are like them: a step is made of loops that close one after
+the other and have the same stroke, range of force, energy and normal load, within :data:`ALIKE` and
+the noise. Whether and how far loops slide, and how their stick branches bend, is found step by
+step. A mean position that drifts makes no other step: nothing here depends on it.
 
 The stick slope is what the loop shows, residual stiffness included, as measured stiffnesses are
 printed; laws with the residual spring in parallel (Jenkins, Iwan) need it without, which is
@@ -30,18 +35,34 @@ Source of ΔT / 2N: Li et al. 2020, Wear, doi:10.1016/j.wear.2020.203411, sectio
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from sa_solver.types import Array, Indices
+from sa_solver.types import Array, Indices, Mask
 from wear.joints.loop_record import (
     LoopBranch,
+    LoopPair,
     LoopRecord,
     MeasuredLoopError,
-    complete_branches,
+    closed_loops,
     loop_record,
+    noise_of,
+    resolution,
+    smoothed,
 )
+
+ALIKE = 0.02
+"""Loops of one step differ by less than this share of stroke, force and load, ..."""
+
+ALIKE_NOISE = 4.0
+"""... or by less than this many standard deviations that noise makes of it."""
+
+GIVING = 0.01
+"""Loops give energy, by a wrong sign, if they give more than this share of force times stroke."""
+
+NOUGHT = 1e-12
+"""Share of force times stroke that is an energy of rounding."""
 
 WINDOW = 0.5
 """The stick slope is taken until the force has risen through this share of the loop's height:
@@ -91,42 +112,83 @@ def mean_estimate(values: Array) -> MeanEstimate:
 
 @dataclass(frozen=True)
 class MeasuredLoops:
-    """What the ``c`` cycles of a record say.
+    """What the ``c`` loops of a record say, in the order in which they close.
 
     Each ``(c,)``: ``stroke`` [mm] peak to peak, ``energy`` [N mm] of a loop, ``stick_stiffness``
-    [N/mm] the slope after a reversal (``bend_spread`` is the relative standard error common to all,
-    that of the branches' bend), ``residual_stiffness`` [N/mm] and ``friction_force`` [N],
-    half the height between the sliding branches, both NaN if they do not slide; ``force`` [N] half
-    the range of the force; ``normal_load`` [N] its mean, NaN if not given. ``sliding`` is the share
-    of the stroke taken to slide, 0 if none does. ``reversals`` ``(c, 3)`` are the samples of
-    ``record`` at which a cycle begins, turns and ends.
+    [N/mm] the slope after a reversal, NaN where there are too few samples (``bend_spread`` is the
+    relative standard error that a step has in common, that of the branches' bend),
+    ``residual_stiffness`` [N/mm] and ``friction_force`` [N], half the height between the sliding
+    branches, both NaN where they do not slide; ``force`` [N] half the range of the force;
+    ``normal_load`` [N] its mean, NaN if not given. ``sliding`` is the share of the stroke taken to
+    slide, 0 where none does. ``step`` counts the steps of like loops from 0 on. ``branches`` are
+    the two branches of each loop in the ``record``. Reversals closer to each other than
+    ``resolution`` [mm] were taken for noise.
     """
 
     stroke: Array
     energy: Array
     stick_stiffness: Array
-    bend_spread: float
+    bend_spread: Array
     residual_stiffness: Array
     friction_force: Array
     force: Array
     normal_load: Array
-    sliding: float
-    reversals: Indices
+    sliding: Array
+    step: Indices
+    branches: tuple[LoopPair, ...]
     record: LoopRecord
+    resolution: float
+
+    @property
+    def steps(self) -> tuple[MeasuredLoops, ...]:
+        """The loops step by step: those of one are alike, and may be averaged."""
+        return tuple(self._of(self.step == number) for number in np.unique(self.step))
+
+    def _of(self, chosen: Mask) -> MeasuredLoops:
+        """Some of the loops."""
+        values = {
+            name: value[chosen]
+            for name, value in vars(self).items()
+            if isinstance(value, np.ndarray)
+        }
+        branches = tuple(self.branches[place] for place in np.flatnonzero(chosen))
+        return replace(self, **values, branches=branches)
+
+    @property
+    def widest(self) -> MeasuredLoops:
+        """The step of the largest stroke."""
+        return self._of(self.step == self.step[np.argmax(self.stroke)])
+
+    @property
+    def reversals(self) -> Indices:
+        """Samples of ``record`` at which loops begin, turn and end, ``(c, 3)``."""
+        return np.array([(out.begin, out.end, back.end) for out, back in self.branches])
 
     @property
     def slides(self) -> bool:
-        """Whether the branches of the loops end in sliding."""
-        return self.sliding > 0.0
+        """Whether the branches of all loops end in sliding."""
+        return bool((self.sliding > 0.0).all())
 
     @property
     def stick_estimate(self) -> MeanEstimate:
-        """Stick stiffness of all cycles [N/mm]: that of their mean compliance."""
+        """Stick stiffness of loops that are alike [N/mm]: that of their mean compliance.
+
+        Raises MeasuredLoopError for loops of several steps.
+        """
+        self.require_alike()
         compliance = mean_estimate(1.0 / self.stick_stiffness)
         value = 1.0 / compliance.value
-        return MeanEstimate(
-            value, float(np.hypot(compliance.error * value, self.bend_spread)) * value
-        )
+        spread = float(self.bend_spread[0])
+        return MeanEstimate(value, float(np.hypot(compliance.error * value, spread)) * value)
+
+    def require_alike(self) -> None:
+        """Raise MeasuredLoopError unless the loops are all of one step."""
+        if (self.step != self.step[0]).any():
+            raise MeasuredLoopError(
+                f"the loops are of {len(np.unique(self.step))} steps, strokes of "
+                f"{self.stroke.min():.4g} to {self.stroke.max():.4g} mm, and have no mean; "
+                "allowed: one of their steps"
+            )
 
     @property
     def contact_stiffness(self) -> Array:
@@ -135,13 +197,13 @@ class MeasuredLoops:
 
     @property
     def friction(self) -> Array:
-        """Friction coefficient ΔT / 2N, ``(c,)``.
+        """Friction coefficient ΔT / 2N, ``(c,)``, NaN of loops that do not slide.
 
-        Raises MeasuredLoopError for loops that do not slide (:attr:`mobilised` is a lower bound
-        then) and without a normal load.
+        Raises MeasuredLoopError where none slides (:attr:`mobilised` is a lower bound then) and
+        without a normal load.
         """
-        if not self.slides:
-            bound = "" if np.isnan(self.normal_load).any() else f" of {np.mean(self.mobilised):.4g}"
+        if not self.sliding.any():
+            bound = "" if np.isnan(self.normal_load).any() else f" of {np.max(self.mobilised):.4g}"
             raise MeasuredLoopError(
                 "the loops have no sliding branch, so that their force over the normal load is "
                 f"only a lower bound{bound} of the friction coefficient; allowed: a larger stroke"
@@ -162,6 +224,13 @@ class MeasuredLoops:
             raise MeasuredLoopError("a friction coefficient needs the normal load of the record")
         return self.normal_load
 
+    @property
+    def work(self) -> Array:
+        """Work of the force since the record began, at each of its samples ``(t,)`` [N mm]."""
+        motion, force = self.record.displacement, self.record.force
+        steps = 0.5 * (force[1:] + force[:-1]) * np.diff(motion)
+        return np.append(0.0, np.cumsum(steps))
+
 
 def measure_loops(
     displacement: Array,
@@ -169,14 +238,13 @@ def measure_loops(
     normal_load: float | Array | None = None,
     time: Array | None = None,
 ) -> MeasuredLoops:
-    """Measure the loops of a record of ``t`` samples.
+    """Measure the closed loops of a record of ``t`` samples.
 
     ``displacement`` [mm] and the resisting ``force`` [N] are ``(t,)``, in the order of time;
     ``normal_load`` [N] is a number or ``(t,)``; ``time`` ``(t,)``, in any unit, is needed where the
-    samples are not evenly spaced. The loops of a record are taken to be alike: whether and how far
-    they slide, and how their stick branches bend, is found for all together. Raises
-    MeasuredLoopError for a record without a complete cycle, with too few samples after a reversal,
-    or whose loops give energy instead of taking it.
+    samples are not evenly spaced. Strokes may change: :attr:`MeasuredLoops.steps` has like loops
+    together. Raises MeasuredLoopError for a record without a closed loop, with too few samples to
+    tell anything but energies, or whose loops give energy instead of taking it.
 
     Examples
     --------
@@ -193,36 +261,124 @@ def measure_loops(
     >>> print(f"{loops.energy.mean():.3f} N mm of {law.loop_energy(0.03):.3f}")
     4.998 N mm of 5.000
     """
-    record, branches = complete_branches(loop_record(displacement, force, normal_load, time))
+    record, pairs = closed_loops(loop_record(displacement, force, normal_load, time))
+    energy = np.array([_energy(record, pair) for pair in pairs])
+    sizes = np.array([_of_pair(record, pair) for pair in pairs])
+    box = 2.0 * sizes[:, 0] * sizes[:, 1]
+    if (box <= 0.0).all() or energy.sum() < -GIVING * np.abs(box).sum():
+        raise MeasuredLoopError(
+            "the loops give energy; allowed: the force that resists the displacement "
+            "(change the sign of one of them)"
+        )
+    energy = np.where(np.abs(energy) > NOUGHT * np.abs(box), energy, 0.0)
+    loads = np.array([record.normal_load[_samples(pair)].mean() for pair in pairs])
+    step = _steps(record, pairs, sizes, energy, loads)
+    measured = [
+        _measured(record, [pairs[k] for k in np.flatnonzero(step == number)])
+        for number in range(step[-1] + 1)
+    ]
+    stick, spread, residual, friction, sliding, stroke = map(
+        np.concatenate, zip(*measured, strict=True)
+    )
+    if not sliding.any() and np.isnan(stick).all():
+        raise MeasuredLoopError(
+            f"sample {pairs[0][0].begin}: fewer than {FEWEST_STUCK} samples from this reversal, as "
+            "from all others, until half of the loop's height; allowed: a record sampled faster"
+        )
+    return MeasuredLoops(
+        stroke=stroke,
+        energy=energy,
+        stick_stiffness=stick,
+        bend_spread=spread,
+        residual_stiffness=residual,
+        friction_force=friction,
+        force=sizes[:, 1],
+        normal_load=loads,
+        sliding=sliding,
+        step=step,
+        branches=pairs,
+        record=record,
+        resolution=resolution(record.displacement),
+    )
+
+
+def _samples(pair: LoopPair) -> Indices:
+    """All samples of a loop."""
+    return np.concatenate([pair[0].samples, pair[1].samples[1:]])
+
+
+def _of_pair(record: LoopRecord, pair: LoopPair) -> tuple[float, float]:
+    """Means of the two branches: displacement that they cover, and half of what the force gains."""
+    travel = float(np.mean([record.travel(branch) for branch in pair]))
+    return travel, 0.5 * float(np.mean([record.rise(branch) for branch in pair]))
+
+
+def _steps(
+    record: LoopRecord, pairs: Sequence[LoopPair], sizes: Array, energy: Array, loads: Array
+) -> Indices:
+    """The step ``(c,)`` that each loop is of: a new one where it is unlike the mean of the last."""
+    motion, force = noise_of(record.displacement), noise_of(record.force)
+    stroke, half = np.maximum(np.abs(sizes), np.finfo(float).tiny).T
+    counts = np.array([len(_samples(pair)) for pair in pairs])
+    # Noise of the energy: that of the force on the increments of the motion, and the reverse.
+    uncertain = np.pi * np.hypot(force * stroke, 2.0 * motion * half) / np.sqrt(counts)
+    features = [
+        # Values, what they are measured by, and their noise.
+        (sizes[:, 0], stroke, np.full_like(stroke, 2.0 * motion)),
+        (sizes[:, 1], half, np.full_like(half, force)),
+        (energy, 2.0 * stroke * half, uncertain),
+        (loads, loads, np.zeros_like(loads)),
+    ]
+    step = np.zeros(len(pairs), dtype=np.int64)
+    first = 0
+    for place in range(1, len(pairs)):
+        alike = all(
+            not abs(values[place] - values[first:place].mean())
+            > ALIKE * scale[place] + ALIKE_NOISE * noise[place]
+            for values, scale, noise in features
+        )
+        step[place] = step[place - 1] + (not alike)
+        first = first if alike else place
+    return step
+
+
+def _measured(record: LoopRecord, pairs: Sequence[LoopPair]) -> tuple[Array, ...]:
+    """What the loops of one step say, each ``(c,)``.
+
+    Stick stiffness and the standard error common to all, residual stiffness, friction force, share
+    that slides, and stroke.
+    """
+    branches = [branch for pair in pairs for branch in pair]
+    record = record._replace(displacement=smoothed(record.displacement, branches))
     rises = [WINDOW * record.rise(branch) for branch in branches]
     slopes, spread = _stick_slopes(record, branches, rises)
-    sliding = _sliding_share(record, branches, float(np.mean(slopes)))
-    pairs = list(zip(branches[0::2], branches[1::2], strict=True))
+    rough = slopes if np.isfinite(slopes).all() else _chords(record, branches, rises)
+    sliding = _sliding_share(record, branches, float(np.mean(rough)))
     lines = np.full((len(pairs), 2), np.nan)
     if sliding > 0.0:
         lines = np.array([_sliding_lines(record, pair, sliding) for pair in pairs])
         heights = np.repeat(2.0 * lines[:, 1], 2)
         slopes, spread = _stick_slopes(record, branches, (WINDOW * heights).tolist())
-    energy = np.array([_energy(record, pair) for pair in pairs])
-    if not energy.mean() > 0.0:
-        raise MeasuredLoopError(
-            "the loops give energy; allowed: the force that resists the displacement "
-            "(change the sign of one of them)"
+    alike = np.ones(len(pairs))
+    stroke = _of_cycles([record.travel(branch) for branch in branches])
+    stick = 1.0 / _of_cycles(1.0 / slopes)
+    return stick, spread * alike, lines[:, 0], lines[:, 1], sliding * alike, stroke
+
+
+def _chords(record: LoopRecord, branches: Sequence[LoopBranch], rises: Sequence[float]) -> Array:
+    """Slopes ``(b,)`` from the reversals to the first samples above the ``rises`` [N/mm].
+
+    They are less than the stick slopes.
+    """
+    chords = []
+    for branch, rise in zip(branches, rises, strict=True):
+        force = branch.sense * (record.force[branch.samples] - record.force[branch.begin])
+        moved = branch.sense * (
+            record.displacement[branch.samples] - record.displacement[branch.begin]
         )
-    cycles = np.array([(go.begin, go.end, back.end) for go, back in pairs])
-    return MeasuredLoops(
-        stroke=_of_cycles([record.travel(branch) for branch in branches]),
-        energy=energy,
-        stick_stiffness=1.0 / _of_cycles(1.0 / slopes),
-        bend_spread=spread,
-        residual_stiffness=lines[:, 0],
-        friction_force=lines[:, 1],
-        force=0.5 * _of_cycles([record.rise(branch) for branch in branches]),
-        normal_load=np.array([record.normal_load[i : k + 1].mean() for i, _, k in cycles]),
-        sliding=sliding,
-        reversals=cycles,
-        record=record,
-    )
+        above = max(int(np.argmax(force >= rise)), 1)
+        chords.append(force[above] / max(moved[above], np.finfo(float).tiny))
+    return np.array(chords)
 
 
 def _of_cycles(values: Sequence[float] | Array) -> Array:
@@ -230,9 +386,9 @@ def _of_cycles(values: Sequence[float] | Array) -> Array:
     return np.asarray(np.reshape(values, (-1, 2)).mean(axis=1))
 
 
-def _energy(record: LoopRecord, pair: tuple[LoopBranch, LoopBranch]) -> float:
+def _energy(record: LoopRecord, pair: LoopPair) -> float:
     """∮ T dδ of the closed polygon [N mm]."""
-    here = slice(pair[0].begin, pair[1].end + 1)
+    here = _samples(pair)
     motion, force = record.displacement[here], record.force[here]
     return float(0.5 * np.sum((force + np.roll(force, -1)) * (np.roll(motion, -1) - motion)))
 
@@ -262,9 +418,12 @@ def _stick_slopes(
 ) -> tuple[Array, float]:
     """Slopes of the force at the reversals that begin the branches, ``(b,)`` [N/mm].
 
-    And the relative standard error that they share, of the bend.
+    And the relative standard error that they share, of the bend. NaN where there are fewer than
+    :data:`FEWEST_STUCK` samples to tell it.
     """
     sticks = [_stick(record, *one) for one in zip(branches, rises, strict=True)]
+    if min(len(stick.moved) for stick in sticks) < FEWEST_STUCK:
+        return np.full(len(sticks), np.nan), 0.0
     bend, error = _common_bend(sticks)
     compliances, leverages = [], []
     for stick in sticks:
@@ -279,15 +438,10 @@ def _stick(record: LoopRecord, branch: LoopBranch, rise: float) -> _Stick:
     """The part of a branch until the force has risen by ``rise``."""
     force = branch.sense * (record.force[branch.samples] - record.force[branch.begin])
     count = _passage(force, rise)
-    if count < FEWEST_STUCK:
-        raise MeasuredLoopError(
-            f"sample {branch.begin}: {count} samples from this reversal until half of the loop's "
-            f"height; allowed: at least {FEWEST_STUCK}, of a record sampled faster"
-        )
-    phase = np.arange(count) / (branch.end - branch.begin)
+    phase = np.arange(count) / (len(branch.samples) - 1)
     motion = branch.sense * record.displacement[branch.samples][:count]
     # Where the reversal is, one-sided: a corner must not be rounded.
-    start = np.polyfit(phase, motion, 2)[-1]
+    start = np.polyfit(phase, motion, 2)[-1] if count >= FEWEST_STUCK else 0.0
     return _Stick(1.0 - np.cos(np.pi * phase), motion - start, force[:count])
 
 
@@ -324,11 +478,11 @@ def _centred_powers(values: Array) -> Array:
 # --- sliding ------------------------------------------------------------------------------------
 
 
-def _tail(record: LoopRecord, branch: LoopBranch, share: float) -> slice:
+def _tail(record: LoopRecord, branch: LoopBranch, share: float) -> Indices:
     """The samples of the last ``share`` of a branch's stroke."""
     motion = branch.sense * record.displacement[branch.samples]
     level = motion[-1] - share * record.travel(branch)
-    return slice(branch.begin + _passage(motion, level), branch.end + 1)
+    return branch.samples[_passage(motion, level) :]
 
 
 def _sliding_share(record: LoopRecord, branches: Sequence[LoopBranch], stick_slope: float) -> float:
@@ -336,7 +490,7 @@ def _sliding_share(record: LoopRecord, branches: Sequence[LoopBranch], stick_slo
     span = float(np.mean([record.rise(branch) for branch in branches]))
     for share in SHARES:
         tails = [_tail(record, branch, share) for branch in branches]
-        if min(tail.stop - tail.start for tail in tails) < FEWEST_SLIDING:
+        if min(map(len, tails)) < FEWEST_SLIDING:
             break
         lines = np.array([_shape(record, *one) for one in zip(tails, branches, strict=True)])
         slope, turn, bend = lines[:, :3].mean(axis=0)
@@ -349,7 +503,7 @@ def _sliding_share(record: LoopRecord, branches: Sequence[LoopBranch], stick_slo
     return 0.0
 
 
-def _shape(record: LoopRecord, tail: slice, branch: LoopBranch) -> tuple[float, ...]:
+def _shape(record: LoopRecord, tail: Indices, branch: LoopBranch) -> tuple[float, ...]:
     """Slope of a tail, its change from end to end, its bend [N], standard errors of the latter."""
     motion = branch.sense * record.displacement[tail]
     middle, half = 0.5 * (motion[-1] + motion[0]), 0.5 * (motion[-1] - motion[0])
@@ -364,9 +518,7 @@ def _shape(record: LoopRecord, tail: slice, branch: LoopBranch) -> tuple[float, 
     return float(coefficients[1]) / half, 4.0 * bend / half, bend, 4.0 * error / half, error
 
 
-def _sliding_lines(
-    record: LoopRecord, pair: tuple[LoopBranch, LoopBranch], share: float
-) -> tuple[float, float]:
+def _sliding_lines(record: LoopRecord, pair: LoopPair, share: float) -> tuple[float, float]:
     """Common slope of the two sliding branches [N/mm], and half the height between them [N]."""
     tails = [_tail(record, branch, share) for branch in pair]
     motion = [record.displacement[tail] for tail in tails]

@@ -125,7 +125,8 @@ def test_energy_is_that_dissipated(name):
     law = LAWS[name]
     marched = march_joints(law, law.rest(1), np.zeros((1, 1)), displacement[:, None, None])
     measured = measure_loops(displacement, marched.force[:, 0, 0])
-    for energy, (begin, _, end) in zip(measured.energy, measured.reversals, strict=True):
+    # The first loop of Bouc-Wen's law is not settled: it closes in displacement, not in force.
+    for energy, (begin, _, end) in zip(measured.energy[1:], measured.reversals[1:], strict=True):
         # Trapezoids of the step: second order, 4e-7 of a loop here, and more at Jenkins's corners.
         dissipated = marched.dissipated[begin + 1 : end + 1].sum()
         assert energy == pytest.approx(dissipated, rel=1e-5)
@@ -201,9 +202,9 @@ def test_reversals_are_found_in_noise(motion, noise):
     generator = np.random.default_rng(5)
     displacement = noisy(motion(1.0, 500, 20), noise, generator)
     turns = reversals(displacement)[1:-1]
-    # 2.5 % of a cycle is 1 % of the stroke, at its turn. The first of 42 may be no reversal.
-    assert len(turns) in (40, 41)
-    away = turns - 250 * np.arange(41 - len(turns), 41) - 125
+    # 2.5 % of a cycle is 1 % of the stroke, at its turn.
+    assert len(turns) == 42
+    away = turns - 250 * np.arange(42) - 125
     assert np.abs(away).max() <= (12 if noise else 0)
 
 
