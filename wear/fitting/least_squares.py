@@ -58,12 +58,12 @@ class Fit:
     """The best fit of a ``problem``.
 
     ``values`` ``(p,)`` are those of all its parameters, also of what is not determined; which are,
-    ``estimates`` say of all but nuisances, which come last. ``covariance`` ``(p, p)`` is that of the fitted ones (logarithms where these
-    are fitted), without directions that nothing decides, and ``parts`` ``(k, p, p)`` what each
-    series brings to it. ``fitted`` and ``residuals`` ``(n,)``, ``deviations`` ``(n,)`` of the data,
-    and their ``leverages`` ``(n,)``. ``freedoms`` ``(k,)`` are the data of each series less the
-    parameters that they decide. ``reached`` of the ``tried`` starts ended here. ``known`` says
-    whether all deviations were given.
+    ``estimates`` say of all but nuisances, which come last. ``covariance`` ``(p, p)`` is that of
+    the fitted ones (logarithms where these are fitted), without directions that nothing decides,
+    and ``parts`` ``(k, p, p)`` what each series brings to it. ``fitted`` and ``residuals``
+    ``(n,)``, ``deviations`` ``(n,)`` of the data, and their ``leverages`` ``(n,)``. ``freedoms``
+    ``(k,)`` are the data of each series less the parameters that they decide. ``reached`` of the
+    ``tried`` starts ended here. ``known`` says whether all deviations were given.
 
     Examples
     --------

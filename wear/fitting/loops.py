@@ -1,19 +1,18 @@
 """Joint laws from measured hysteresis loops: the law's own loop beside those of a record.
 
-Loops are averaged with loops of their own step alone, those that are alike
-(:class:`wear.joints.measured_loops.MeasuredLoops`), and only where there is noise: forces and
-displacements at equal times between reversals. The law goes through its settled loop from one
-turning point to the other. Where these are is fitted too, since the samples only pass them by, and
-so is a constant force of each step: of a loop within others, Masing's laws leave just that. Every
-point counts by the noise of its force and, where the loop is steep, that of its displacement.
-Bounds count what scatters about the law: a displacement that is wrong in every cycle alike is not
-seen.
+Nothing is averaged: samples of single loops are taken as they are, of those that are alike
+(:class:`wear.joints.measured_loops.MeasuredLoops`) some. The law goes through its settled loop from
+one turning point to the other. Where these are is fitted too, since the samples only pass them by,
+and so is a constant force of each step of like loops: of loops within others, Masing's laws leave
+just that. Every sample counts by the noise of its force and, where the loop is steep, that of its
+displacement. Bounds count what scatters about the law: a displacement that is wrong in every cycle
+alike is not seen.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from itertools import product
 from typing import Any
 
@@ -27,7 +26,6 @@ from wear.joints.jenkins import Jenkins
 from wear.joints.law import march_joints
 from wear.joints.loop_record import (
     LoopBranch,
-    LoopPair,
     LoopRecord,
     MeasuredLoopError,
     noise_of,
@@ -51,8 +49,8 @@ distance of that to its neighbours, ..."""
 TURN_NOISE = 5.0
 """... or than this many standard deviations of the noise."""
 
-SAME_COURSE = 0.02
-"""Loops go the same way in time if the spreads of their displacements differ by less than this."""
+MOST_LOOPS = 12
+"""Loops of like ones that are fitted: each has two turning points of its own to be found."""
 
 STIFFER = 1.0 - 1e-9
 """Largest residual stiffness of a Bouc-Wen joint, in its stiffness."""
@@ -60,8 +58,8 @@ STIFFER = 1.0 - 1e-9
 MOBILISED = 1.2
 """Friction to begin with where nothing slides, over what the record has mobilised."""
 
-OFFSET, TURNS = "offset", ("lower", "upper")
-"""Mean force and turning points of a loop, beside the parameters of the law."""
+OFFSET = "offset"
+"""Mean force of loops, beside the parameters of the law."""
 
 COMMON = ("stiffness", "friction", "normal_load", "residual_stiffness")
 """Parameters that all laws have, none below 0."""
@@ -99,26 +97,27 @@ LAWS: Mapping[str, LoopLaw] = {
 
 @dataclass(frozen=True)
 class LoopData:
-    """Loops of one step of the record ``name``, or their mean.
+    """Samples of ``l`` loops of one step of the record ``name``.
 
-    ``displacement`` ``(n,)`` [mm] about its mean and ``force`` ``(n,)`` [N], on branches of
-    ``sense`` ``(n,)`` ±1; ``turns`` ``(2,)`` [mm] the outermost samples, and ``spacing`` [mm] the
-    distance to their neighbours; ``noise`` the standard deviations of displacement [mm] and force
-    [N]. ``amplitude`` [mm] is half the stroke, ``normal_load`` [N] NaN if it is not known.
-    ``stiffness``, ``residual_stiffness`` [N/mm] and ``limit`` [N], the friction force, are what the
-    record says of itself, to begin with.
+    ``displacement`` ``(n,)`` [mm] about its mean and ``force`` ``(n,)`` [N], each of the ``loop``
+    ``(n,)``, 0 to l - 1, and on its branch of ``sense`` ``(n,)`` ±1; ``turns`` ``(l, 2)`` [mm] the
+    lowest and the highest sample of each loop, which are not among them, and ``spacing`` ``(l,)``
+    [mm] the distance to their neighbours; ``noise`` the standard deviations of displacement [mm]
+    and force [N]. ``amplitude`` [mm] is half the stroke, ``normal_load`` [N] NaN if it is not
+    known. ``stiffness``, ``residual_stiffness`` [N/mm] and ``limit`` [N], the friction force, are
+    what the record says of itself, to begin with.
 
     Examples
     --------
     The loop of a Jenkins joint, which is what its record says:
 
     >>> import numpy as np
-    >>> from wear.fitting import mean_loop
+    >>> from wear.fitting import loop_data
     >>> from wear.joints import Jenkins, march_joints, measure_loops
     >>> law = Jenkins(stiffness=1e4, friction=0.5, normal_load=100.0)
     >>> motion = 0.03 * np.sin(2.0 * np.pi * np.arange(801) / 160)
     >>> record = march_joints(law, law.rest(1), np.zeros((1, 1)), motion[:, None, None])
-    >>> loop = mean_loop("first", measure_loops(motion, record.force.ravel(), 100.0))
+    >>> loop = loop_data("first", measure_loops(motion, record.force.ravel(), 100.0))
     >>> print(f"{loop.limit:.2f} N, {loop.amplitude:.4f} mm")
     50.00 N, 0.0300 mm
     """
@@ -127,8 +126,9 @@ class LoopData:
     displacement: Array
     force: Array
     sense: Array
+    loop: Indices
     turns: Array
-    spacing: float
+    spacing: Array
     noise: tuple[float, float]
     amplitude: float
     normal_load: float
@@ -137,96 +137,69 @@ class LoopData:
     limit: float
 
 
-def mean_loop(name: str, measured: MeasuredLoops) -> LoopData:
-    """Return the mean of loops that are alike, at up to :data:`POINTS` places of each branch.
+def loop_data(name: str, measured: MeasuredLoops, most: int = MOST_LOOPS) -> LoopData:
+    """Return ``most`` loops of those that are alike, or all, as data of :func:`loop_problem`.
 
-    Without noise, and of a single loop, there is nothing to average: samples are taken as they are.
-    Raises MeasuredLoopError for loops of several steps.
+    Of each branch up to :data:`POINTS` samples. Raises MeasuredLoopError for loops of several steps
+    and branches without samples between their reversals.
 
     Examples
     --------
     See :class:`LoopData`.
 
-    >>> from wear.fitting import mean_loop
+    >>> from wear.fitting import loop_data
     """
     measured.require_alike()
-    record = measured.record
+    record, count = measured.record, len(measured.branches)
+    places = np.linspace(0, count - 1, min(count, most)).round().astype(int)
+    pairs = [sorted(measured.branches[place], key=lambda one: one.sense) for place in places]
     noise = noise_of(record.displacement), noise_of(record.force)
-    pairs = [tuple(sorted(pair, key=lambda branch: -branch.sense)) for pair in measured.branches]
-    pairs = [pairs[len(pairs) // 2]] if not any(noise) else _of_one_course(record, pairs)
-    counts = [min(POINTS, *(len(pair[side].samples) - 2 for pair in pairs)) for side in (0, 1)]
-    if min(counts) < 1:
+    branches = [branch for pair in pairs for branch in pair]
+    chosen = [_chosen(record, branch, noise[0] == 0.0) for branch in branches]
+    counts = [len(one) for one in chosen]
+    if min(counts) == 0:
         raise MeasuredLoopError(
-            f"a branch of {2 - max(0, -min(counts))} samples; allowed: some between its reversals"
+            f"sample {branches[int(np.argmin(counts))].begin}: no samples between two reversals; "
+            "allowed: some"
         )
-    # Displacements and forces (2, m) of all loops, each about its own middle.
-    points = np.array(
-        [
-            np.concatenate(
-                [
-                    _points(record, branch, count, len(pairs) > 1, noise[0] == 0.0)
-                    for branch, count in zip(pair, counts, strict=True)
-                ],
-                axis=1,
-            )
-            for pair in pairs
-        ]
-    )
-    middles = points[:, 0].mean(axis=1)
-    motion, force = points.mean(axis=0)
-    ends = np.array([[record.displacement[pair[k].begin] for k in (0, 1)] for pair in pairs])
-    beside = [
-        record.displacement[branch.samples[[0, 1, -2, -1]]] for pair in pairs for branch in pair
-    ]
-    limit = float(
-        (measured.friction_force if measured.slides else MOBILISED * measured.force).mean()
-    )
-    amplitude = 0.5 * float(measured.stroke.mean())
+    motion = record.displacement[np.concatenate(chosen)]
+    # A branch of sense -1 ends at the lowest sample, the other at the highest.
+    turns = np.array([[record.displacement[branch.end] for branch in pair] for pair in pairs])
+    ends = [branch.samples[[0, 1, -2, -1]] for branch in branches]
+    gaps = np.abs(np.diff(record.displacement[ends], axis=1))[:, [0, 2]]
+    limit = measured.friction_force if measured.slides else MOBILISED * measured.force
+    middle = float(motion.mean())
     return LoopData(
         name=name,
-        displacement=motion - middles.mean(),
-        force=force,
-        sense=np.repeat([1.0, -1.0], counts),
-        turns=(ends - middles[:, None]).mean(axis=0),
-        spacing=float(np.abs(np.diff(beside, axis=1)[:, [0, 2]]).max()),
+        displacement=motion - middle,
+        force=record.force[np.concatenate(chosen)],
+        sense=np.repeat([float(branch.sense) for branch in branches], counts),
+        loop=np.repeat(np.arange(len(branches)) // 2, counts),
+        turns=turns - middle,
+        spacing=gaps.reshape(-1, 4).max(axis=1),
         noise=noise,
-        amplitude=amplitude,
+        amplitude=0.5 * float(measured.stroke.mean()),
         normal_load=float(measured.normal_load.mean()),
-        stiffness=_stiffness(measured, amplitude, limit),
+        stiffness=_stiffness(measured, float(limit.mean())),
         residual_stiffness=float(np.nan_to_num(measured.residual_stiffness).mean()),
-        limit=limit,
+        limit=float(limit.mean()),
     )
 
 
-def _of_one_course(record: LoopRecord, pairs: Sequence[LoopPair]) -> list[LoopPair]:
-    """The loops that go the same way in time, as most do: those of a transition are faster."""
-    courses = [[record.displacement[branch.samples].std() for branch in pair] for pair in pairs]
-    away = np.abs(courses / np.median(courses, axis=0) - 1.0).max(axis=1)
-    return [
-        pair for pair, one in zip(pairs, away, strict=True) if one <= max(SAME_COURSE, away.min())
-    ]
+def _chosen(record: LoopRecord, branch: LoopBranch, exact: bool) -> Indices:
+    """Samples of a branch, its ends left out: up to :data:`POINTS` at equal times.
 
-
-def _points(
-    record: LoopRecord, branch: LoopBranch, count: int, between: bool, exact: bool
-) -> Array:
-    """Displacement and force ``(2, count)`` of a branch, its ends left out.
-
-    At equal times, and of an ``exact`` displacement, in which a rest is no time, as much by its
-    way; at samples, or ``between`` them too.
+    Of an ``exact`` displacement, in which a rest is no time, as much by its way.
     """
-    motion, force = record.displacement[branch.samples], record.force[branch.samples]
+    motion = record.displacement[branch.samples]
     last = len(motion) - 1
     phase = np.arange(last + 1) / last
     if exact:
         way = np.maximum.accumulate(branch.sense * (motion - motion[0]))
         phase = 0.5 * (phase + way / way[-1])
-    places = np.interp((np.arange(count) + 0.5) / count, phase, np.arange(last + 1.0))
-    if between:
-        return np.stack([np.interp(places, np.arange(last + 1), one) for one in (motion, force)])
-    # Each sample once, and none of the ends, which are of both branches.
-    taken = np.arange(1, last) if count == last - 1 else _spread(places, last)
-    return np.stack([motion[taken], force[taken]])
+    count = min(POINTS, last - 1)
+    places = np.interp((np.arange(count) + 0.5) / max(count, 1), phase, np.arange(last + 1.0))
+    return branch.samples[_spread(places, last)]
 
 
 def _spread(places: Array, last: int) -> Indices:
@@ -237,10 +210,11 @@ def _spread(places: Array, last: int) -> Indices:
     return np.minimum(taken, last - count) + order
 
 
-def _stiffness(measured: MeasuredLoops, amplitude: float, limit: float) -> float:
+def _stiffness(measured: MeasuredLoops, limit: float) -> float:
     """Stick stiffness: where no slope tells it, by the energy of a slider, 4 µN (A - µN/kt)."""
     if np.isfinite(measured.stick_stiffness).all():
         return measured.stick_estimate.value
+    amplitude = 0.5 * float(measured.stroke.mean())
     stuck = amplitude - float(measured.energy.mean()) / (4.0 * limit)
     return limit / max(stuck, 0.01 * amplitude)
 
@@ -249,15 +223,17 @@ def _stiffness(measured: MeasuredLoops, amplitude: float, limit: float) -> float
 class LoopFit:
     """The problem of some :class:`LoopData` under a law of parameters that are ``held`` or free.
 
-    ``names`` has the place among the unknowns by parameter; each of the data has an offset and two
-    turning points of its own, by its number.
+    ``names`` has the place among the unknowns by parameter of the law; ``offsets`` ``(k,)`` those
+    of the data, and ``turns``, for each of them, ``(l, 2)`` those of its loops.
     """
 
     problem: FitProblem
     data: tuple[LoopData, ...]
     law: LoopLaw
     held: Mapping[str, float]
-    names: Mapping[str, int] = field(default_factory=dict)
+    names: Mapping[str, int]
+    offsets: Indices
+    turns: tuple[Indices, ...]
 
     def record(self, name: str, values: Array) -> Array:
         """Force ``(n,)`` of the law at the displacements of all data of a record [N]."""
@@ -278,12 +254,12 @@ def loop_problem(data: Sequence[LoopData], law: str, held: Mapping[str, float]) 
     The joint that a record was made with comes back:
 
     >>> import numpy as np
-    >>> from wear.fitting import fit, loop_problem, mean_loop
+    >>> from wear.fitting import fit, loop_data, loop_problem
     >>> from wear.joints import UniformIwan, march_joints, measure_loops
     >>> law = UniformIwan(stiffness=1e4, friction=0.5, normal_load=100.0)
     >>> motion = 0.03 * np.sin(2.0 * np.pi * np.arange(4001) / 800)
     >>> record = march_joints(law, law.rest(1), np.zeros((1, 1)), motion[:, None, None])
-    >>> loop = mean_loop("first", measure_loops(motion, record.force.ravel(), 100.0))
+    >>> loop = loop_data("first", measure_loops(motion, record.force.ravel(), 100.0))
     >>> problem = loop_problem([loop], "uniform_iwan", {"normal_load": 100.0})
     >>> stiffness, friction, *_ = fit(problem.problem).estimates
     >>> print(f"{friction.value:.3f}, {stiffness.value:.0f} N/mm")
@@ -299,11 +275,16 @@ def loop_problem(data: Sequence[LoopData], law: str, held: Mapping[str, float]) 
     free = [name for name in (*COMMON, *known.shape) if name not in held]
     stiffest = max(one.stiffness for one in data)
     unknowns = [_unknown(name, known, stiffest) for name in free]
-    unknowns += _of_data(data)
-    names = {unknown.name: place for place, unknown in enumerate(unknowns)}
-    made = LoopFit(
-        FitProblem((), (), lambda values: values, ()), tuple(data), known, dict(held), names
-    )
+    names = {name: place for place, name in enumerate(free)}
+    unknowns += _offsets(data)
+    offsets = np.arange(len(free), len(unknowns))
+    turns = []
+    for number, one in enumerate(data):
+        begin = len(unknowns)
+        unknowns += _turns(one, number)
+        turns.append(np.arange(begin, len(unknowns)).reshape(-1, 2))
+    nothing = FitProblem(tuple(unknowns), (), lambda values: values, ())
+    made = LoopFit(nothing, tuple(data), known, dict(held), names, offsets, tuple(turns))
     starts = _starts(made)
     slopes = _slopes(made, starts[0])
     problem = FitProblem(
@@ -312,35 +293,31 @@ def loop_problem(data: Sequence[LoopData], law: str, held: Mapping[str, float]) 
         lambda values: _forces(made, range(len(data)), values),
         starts,
     )
-    return LoopFit(problem, made.data, known, made.held, names)
+    return replace(made, problem=problem)
 
 
-def _of_data(data: Sequence[LoopData]) -> list[Unknown]:
-    """The unknowns that each of the data has of its own: offsets first, then turning points."""
+def _offsets(data: Sequence[LoopData]) -> list[Unknown]:
+    """The mean forces of the data; of a record with several steps nobody asks for them."""
     size = max(float(np.abs(one.force).max()) for one in data)
-    offsets = [Unknown(_own(data, number, OFFSET), size=size) for number in range(len(data))]
-    turns = []
-    for number, one in enumerate(data):
-        noise = TURN_NOISE * one.noise[0]
-        near = WITHIN * one.spacing + noise, BEYOND * one.spacing + noise
-        for turn, name, (down, up) in zip(one.turns, TURNS, (near[::-1], near), strict=True):
-            turns.append(
-                Unknown(
-                    _own(data, number, name),
-                    turn - down,
-                    turn + up,
-                    size=one.amplitude,
-                    nuisance=True,
-                )
-            )
-    return offsets + turns
+    names = [one.name for one in data]
+    several = len(set(names)) < len(names)
+    return [
+        Unknown(f"{name}.{OFFSET}" + (f"_{number}" if several else ""), size=size, nuisance=several)
+        for number, name in enumerate(names, 1)
+    ]
 
 
-def _own(data: Sequence[LoopData], number: int, what: str) -> str:
-    """Name of an unknown of one of the data: of a record with several by its number there."""
-    name = data[number].name
-    places = [place for place, one in enumerate(data) if one.name == name]
-    return f"{name}.{what}" + (f"_{places.index(number) + 1}" if len(places) > 1 else "")
+def _turns(data: LoopData, number: int) -> list[Unknown]:
+    """The turning points of all loops of the data with a ``number``, lower and upper in turn."""
+    unknowns = []
+    noise = TURN_NOISE * data.noise[0]
+    for loop, (pair, spacing) in enumerate(zip(data.turns, data.spacing, strict=True)):
+        within, beyond = WITHIN * spacing + noise, BEYOND * spacing + noise
+        for at, sense in zip(pair, (-1.0, 1.0), strict=True):
+            ends = sorted((at - sense * within, at + sense * beyond))
+            name = f"{data.name}.turn_{number}_{loop}_{'lower' if sense < 0.0 else 'upper'}"
+            unknowns.append(Unknown(name, *ends, size=data.amplitude, nuisance=True))
+    return unknowns
 
 
 def _series(name: str, data: Sequence[LoopData], slopes: Sequence[Array]) -> Series:
@@ -362,15 +339,22 @@ def _unknown(name: str, law: LoopLaw, stiffness: float) -> Unknown:
 
 
 def _forces(made: LoopFit, chosen: Iterable[int], values: Array) -> Array:
-    """Force of the law on its settled loops, ``(n,)``: each point from the reversal before it."""
+    """Force of the law on its settled loops, ``(n,)``: each point from the reversal before it.
+
+    A displacement that noise has put before that reversal lies on the branch continued backwards:
+    cut off there, noise would be of one sign.
+    """
     given = dict(made.held) | {name: float(values[place]) for name, place in made.names.items()}
+    chosen = list(chosen)
     data = [made.data[number] for number in chosen]
-    own = [[given[_own(made.data, number, what)] for what in (OFFSET, *TURNS)] for number in chosen]
     counts = [len(one.force) for one in data]
-    offset, lower, upper = np.repeat(np.array(own), counts, axis=0).T
+    offset = np.repeat(values[made.offsets[chosen]], counts)
+    turns = [made.turns[number][one.loop] for number, one in zip(chosen, data, strict=True)]
+    lower, upper = values[np.concatenate(turns)].T
     sense = np.concatenate([one.sense for one in data])
-    place = np.clip(np.concatenate([one.displacement for one in data]), lower, upper)
+    place = np.concatenate([one.displacement for one in data])
     there, back = np.where(sense > 0.0, (upper, lower), (lower, upper))
+    before = sense * (place - back) < 0.0
     parameters: dict[str, Any] = {name: given[name] for name in (*COMMON, *made.law.shape)}
     if np.isnan(parameters["normal_load"]):
         parameters["normal_load"] = np.repeat([one.normal_load for one in data], counts)
@@ -380,9 +364,10 @@ def _forces(made: LoopFit, chosen: Iterable[int], values: Array) -> Array:
         most = STIFFER * parameters["stiffness"]
         parameters["residual_stiffness"] = min(parameters["residual_stiffness"], most)
     law = made.law.law(**parameters)
-    way = np.stack([*[there, back] * SETTLING, place])
+    way = np.stack([*[there, back] * SETTLING, np.where(before, 2.0 * back - place, place)])
     history = march_joints(law, law.rest(len(place)), np.zeros((len(place), 1)), way[..., None])
-    return np.asarray(history.force[-1, :, 0] + offset)
+    start, force = history.force[-2:, :, 0]
+    return np.asarray(np.where(before, 2.0 * start - force, force) + offset)
 
 
 def _slopes(made: LoopFit, values: Array) -> list[Array]:
@@ -418,13 +403,14 @@ def _starts(made: LoopFit) -> list[Array]:
         "friction": first.limit / load,
         "normal_load": first.limit / made.held.get("friction", first.limit),
     }
-    for number, one in enumerate(made.data):
-        own = (float(one.force.mean()), *one.turns.tolist())
-        for what, value in zip((OFFSET, *TURNS), own, strict=True):
-            begin[_own(made.data, number, what)] = value
     free = [name for name in made.law.tried if name in made.names]
     starts = []
     for shape in product(*(made.law.tried[name] for name in free)):
         values = {**begin, **dict(zip(free, shape, strict=True))}
-        starts.append(np.array([values[name] for name in made.names]))
+        begun = np.empty(len(made.problem.unknowns))
+        begun[list(made.names.values())] = [values[name] for name in made.names]
+        begun[made.offsets] = [one.force.mean() for one in made.data]
+        for places, one in zip(made.turns, made.data, strict=True):
+            begun[places] = one.turns
+        starts.append(begun)
     return starts

@@ -231,6 +231,14 @@ class MeasuredLoops:
         steps = 0.5 * (force[1:] + force[:-1]) * np.diff(motion)
         return np.append(0.0, np.cumsum(steps))
 
+    @property
+    def left_out(self) -> tuple[float, float, float]:
+        """Work of a record that is in none of its loops, before, between and after them [N mm]."""
+        work, reversals = self.work, self.reversals
+        begin, end = work[reversals.min()], work[reversals.max()]
+        between = float(end - begin - self.energy.sum())
+        return float(begin), between, float(work[-1] - end)
+
 
 def measure_loops(
     displacement: Array,
