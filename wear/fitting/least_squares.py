@@ -216,6 +216,8 @@ def fit(problem: FitProblem) -> Fit:
     free = ~held
     inverse, kernel = inverse_of(jacobian * free)
     leverages = np.einsum("ij,ji->i", jacobian * free, inverse)
+    wider = _wider(problem, inverse, residuals / deviations, leverages)
+    inverse = inverse * wider[:, None]
     masks = [problem.places == k for k in range(len(problem.series))]
     parts = np.stack([inverse[:, here] @ inverse[:, here].T for here in masks])
     # The sum of leverages is the number of parameters that the data of a series decide.
@@ -230,7 +232,7 @@ def fit(problem: FitProblem) -> Fit:
         for place in range(len(values))
     ]
     if not is_exact(problem, residuals):
-        alone = profiled(problem, inner, deviations, alone)
+        alone = profiled(problem, inner, deviations, alone, wider)
     asked = sum(not unknown.nuisance for unknown in problem.unknowns)
     estimates = tuple(led_astray(alone, place, parts.sum(axis=0)) for place in range(asked))
     return Fit(
@@ -247,6 +249,20 @@ def fit(problem: FitProblem) -> Fit:
         tried=len(problem.starts),
         known=known,
     )
+
+
+def _wider(problem: FitProblem, inverse: Array, scaled: Array, leverages: Array) -> Array:
+    """By how much deviations ``(p,)`` grow where shares of a scatter are not those of the data.
+
+    Shares are themselves estimated; what the residuals of the data that decide a parameter say is
+    taken where it is more (White 1980, Econometrica 48, 817; residuals over 1 - h as MacKinnon and
+    White 1985, J. Econometrics 29, 305).
+    """
+    shared = np.array([series.shares is not None for series in problem.series])[problem.places]
+    squares = np.where(shared, (scaled / np.maximum(1.0 - leverages, RANK)) ** 2, 1.0)
+    total = np.sum(inverse**2, axis=1)
+    found = np.sum(inverse**2 * squares, axis=1)
+    return np.asarray(np.sqrt(np.maximum(found / np.where(total > 0.0, total, 1.0), 1.0)))
 
 
 def is_exact(problem: FitProblem, residuals: Array) -> bool:

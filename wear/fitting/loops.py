@@ -49,6 +49,12 @@ distance of that to its neighbours, ..."""
 TURN_NOISE = 5.0
 """... or than this many standard deviations of the noise."""
 
+ROUNDED = 1e-6
+"""Noise of displacements and forces that show none, in their largest values."""
+
+LEAST_SHARE = 0.01
+"""Of the scatter of a sample in that of the noisiest one."""
+
 MOST_LOOPS = 12
 """Loops of like ones that are fitted: each has two turning points of its own to be found."""
 
@@ -321,11 +327,17 @@ def _turns(data: LoopData, number: int) -> list[Unknown]:
 
 
 def _series(name: str, data: Sequence[LoopData], slopes: Sequence[Array]) -> Series:
-    """The forces of a record, which scatter by their own noise and that of the displacement."""
+    """The forces of a record, which scatter by their own noise and that of the displacement.
+
+    Where none shows both are rounded: as much, in their ranges.
+    """
     chosen = [(one, slope) for one, slope in zip(data, slopes, strict=True) if one.name == name]
     forces = np.concatenate([one.force for one, _ in chosen])
-    shares = np.concatenate([np.hypot(one.noise[1], slope * one.noise[0]) for one, slope in chosen])
-    return Series(name, forces, shares=shares / shares.max() if shares.all() else None)
+    steepness = np.concatenate([slope for _, slope in chosen])
+    motion = max(chosen[0][0].noise[0], ROUNDED * max(one.amplitude for one, _ in chosen))
+    force = max(chosen[0][0].noise[1], ROUNDED * float(np.abs(forces).max()))
+    shares = np.hypot(force, steepness * motion)
+    return Series(name, forces, shares=np.maximum(shares / shares.max(), LEAST_SHARE))
 
 
 def _unknown(name: str, law: LoopLaw, stiffness: float) -> Unknown:
