@@ -320,9 +320,9 @@ def _turns(data: LoopData, number: int) -> list[Unknown]:
     for loop, (pair, spacing) in enumerate(zip(data.turns, data.spacing, strict=True)):
         within, beyond = WITHIN * spacing + noise, BEYOND * spacing + noise
         for at, sense in zip(pair, (-1.0, 1.0), strict=True):
-            ends = sorted((at - sense * within, at + sense * beyond))
+            low, high = sorted((at - sense * within, at + sense * beyond))
             name = f"{data.name}.turn_{number}_{loop}_{'lower' if sense < 0.0 else 'upper'}"
-            unknowns.append(Unknown(name, *ends, size=data.amplitude, nuisance=True))
+            unknowns.append(Unknown(name, low, high, data.amplitude, nuisance=True))
     return unknowns
 
 

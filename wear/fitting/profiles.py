@@ -45,7 +45,8 @@ def profiled(
     """The estimates with bounds that their profiles bear out.
 
     ``inner`` ``(p,)`` are the best values as they are fitted, ``deviations`` ``(n,)`` those of the
-    data, and ``wider`` ``(p,)`` by how much those of the estimates are more than these make them. What a profile passes within the quantile the data allow for the others too: where that is
+    data, and ``wider`` ``(p,)`` by how much those of the estimates are more than these make them.
+    What a profile passes within the quantile the data allow for the others too: where that is
     beyond their bounds these are widened, or left if the profile has no end.
     """
     found, clouds = [], []

@@ -36,6 +36,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -146,13 +147,13 @@ class MeasuredLoops:
 
     def _of(self, chosen: Mask) -> MeasuredLoops:
         """Some of the loops."""
-        values = {
+        values: dict[str, Any] = {
             name: value[chosen]
             for name, value in vars(self).items()
             if isinstance(value, np.ndarray)
         }
-        branches = tuple(self.branches[place] for place in np.flatnonzero(chosen))
-        return replace(self, **values, branches=branches)
+        values["branches"] = tuple(self.branches[place] for place in np.flatnonzero(chosen))
+        return replace(self, **values)
 
     @property
     def widest(self) -> MeasuredLoops:

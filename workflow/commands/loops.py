@@ -12,7 +12,7 @@ from sa_solver.types import Array, Mask
 from wear.joints.loop_record import MeasuredLoopError
 from wear.joints.measured_loops import MeanEstimate, MeasuredLoops, mean_estimate, measure_loops
 from workflow.analyses.wear.loop_table import write_loop_table
-from workflow.case.loop_file import BASE_UNITS, read_loop_file
+from workflow.case.loop_file import BASE_UNITS, account, read_loop_file
 from workflow.case.units import UnitError, to_base
 from workflow.errors import UserError
 from workflow.shell.folder import OutputFolder
@@ -203,18 +203,6 @@ def _strokes(loops: MeasuredLoops) -> str:
     stuck = 1e3 * loops.stroke[loops.sliding == 0.0]
     least, most = f"{stuck.min():.4g}", f"{stuck.max():.4g}"
     return f"strokes of {least if least == most else f'{least} to {most}'} um"
-
-
-def account(loops: MeasuredLoops) -> str:
-    """What is in the loops of a record, and what is left out of them."""
-    before, between, after = loops.left_out
-    count = len(loops.energy)
-    return (
-        f"{count} closed loop{'s' if count > 1 else ''} of {loops.energy.sum():.4g} mJ; left out, "
-        f"of {loops.work[-1]:.4g} mJ of work on the record: {before:.3g} mJ before the first loop, "
-        f"{between:.3g} between loops, {after:.3g} after the last; reversals closer than "
-        f"{1e3 * loops.resolution:.2g} um are taken for noise"
-    )
 
 
 # --- what is written ----------------------------------------------------------------------------

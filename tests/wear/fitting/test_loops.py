@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tests.marks import slow
-from wear.fitting import fit, loop_problem, mean_loop
+from wear.fitting import fit, loop_data, loop_problem
 from wear.fitting.loops import LAWS
 from wear.joints import march_joints, measure_loops
 
@@ -29,7 +29,7 @@ def record(law, stroke, rng=None):
     if rng is not None:
         motion = motion + 5e-4 * stroke * rng.standard_normal(len(motion))
         force = force + 0.3 * rng.standard_normal(len(force))
-    return mean_loop("force", measure_loops(motion, force, 60.0))
+    return loop_data("force", measure_loops(motion, force, 60.0))
 
 
 @pytest.mark.parametrize(
