@@ -28,7 +28,7 @@ from wear.joints.loop_record import (
     LoopBranch,
     LoopRecord,
     MeasuredLoopError,
-    noise_of,
+    noise_along,
 )
 from wear.joints.measured_loops import MeasuredLoops
 from wear.joints.parameters import UniaxialLaw
@@ -159,8 +159,8 @@ def loop_data(name: str, measured: MeasuredLoops, most: int = MOST_LOOPS) -> Loo
     record, count = measured.record, len(measured.branches)
     places = np.linspace(0, count - 1, min(count, most)).round().astype(int)
     pairs = [sorted(measured.branches[place], key=lambda one: one.sense) for place in places]
-    noise = noise_of(record.displacement), noise_of(record.force)
     branches = [branch for pair in pairs for branch in pair]
+    noise = noise_along(record, branches)
     chosen = [_chosen(record, branch, noise[0] == 0.0) for branch in branches]
     counts = [len(one) for one in chosen]
     if min(counts) == 0:
@@ -173,12 +173,15 @@ def loop_data(name: str, measured: MeasuredLoops, most: int = MOST_LOOPS) -> Loo
     turns = np.array([[record.displacement[branch.end] for branch in pair] for pair in pairs])
     ends = [branch.samples[[0, 1, -2, -1]] for branch in branches]
     gaps = np.abs(np.diff(record.displacement[ends], axis=1))[:, [0, 2]]
-    limit = measured.friction_force if measured.slides else MOBILISED * measured.force
+    force = record.force[np.concatenate(chosen)]
+    limit = MOBILISED * 0.5 * float(np.ptp(force))
+    if measured.slides:
+        limit = float(measured.friction_force.mean())
     middle = float(motion.mean())
     return LoopData(
         name=name,
         displacement=motion - middle,
-        force=record.force[np.concatenate(chosen)],
+        force=force,
         sense=np.repeat([float(branch.sense) for branch in branches], counts),
         loop=np.repeat(np.arange(len(branches)) // 2, counts),
         turns=turns - middle,
@@ -186,9 +189,9 @@ def loop_data(name: str, measured: MeasuredLoops, most: int = MOST_LOOPS) -> Loo
         noise=noise,
         amplitude=0.5 * float(measured.stroke.mean()),
         normal_load=float(measured.normal_load.mean()),
-        stiffness=_stiffness(measured, float(limit.mean())),
+        stiffness=_stiffness(measured, limit),
         residual_stiffness=float(np.nan_to_num(measured.residual_stiffness).mean()),
-        limit=float(limit.mean()),
+        limit=limit,
     )
 
 

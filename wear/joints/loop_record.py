@@ -23,6 +23,10 @@ the second it is one whatever the noise."""
 SHORT = 2
 """Steps up to which a way from one sample that turns to the next is a sign of noise."""
 
+BACKWARDS = 3.0
+"""Steps back of white noise exceed its standard deviation half of the time: three times as much is
+an upper bound."""
+
 CLOSING = 0.02
 """A loop is closed if it ends this close to where it began, in its stroke, ..."""
 
@@ -340,6 +344,19 @@ def _begun_at(record: LoopRecord, start: int) -> LoopRecord:
         count -= 1
     order = np.append(np.roll(np.arange(count), -start), start)
     return LoopRecord(*(column[order] for column in record))
+
+
+def noise_along(record: LoopRecord, branches: Sequence[LoopBranch]) -> tuple[float, float]:
+    """Return the standard deviations of the noise of displacement [mm] and force [N].
+
+    Where a branch has few points its force jumps as noise does, but not backwards: its noise is no
+    more than :data:`BACKWARDS` times what half of the steps back exceed, and 0 without any.
+    """
+    steps = [branch.sense * np.diff(record.force[branch.samples]) for branch in branches]
+    back = -np.concatenate(steps)
+    back = back[back > 0.0]
+    most = BACKWARDS * float(np.median(back)) if back.size else 0.0
+    return noise_of(record.displacement), min(noise_of(record.force), most)
 
 
 def smoothed(motion: Array, branches: Sequence[LoopBranch]) -> Array:

@@ -37,6 +37,9 @@ there a Bouc-Wen branch begins to bend, and a uniform Iwan branch is a parabola 
 FEWEST_STUCK = 4
 """Samples in that window: one more than a parabola has coefficients."""
 
+NEAREST = 1e-6
+"""Of a branch: a sample that noise has put nearer to the reversal tells no slope."""
+
 BENT = 3.0
 """Standard errors by which the bend of the stick branches must stand out, not to be noise."""
 
@@ -155,7 +158,7 @@ def chords_of(record: LoopRecord, branches: Sequence[LoopBranch], rises: Sequenc
             record.displacement[branch.samples] - record.displacement[branch.begin]
         )
         above = max(int(np.argmax(force >= rise)), 1)
-        chords.append(force[above] / max(moved[above], np.finfo(float).tiny))
+        chords.append(force[above] / max(moved[above], NEAREST * record.travel(branch)))
     return np.array(chords)
 
 

@@ -29,7 +29,7 @@ from wear.joints.loop_record import (
     MeasuredLoopError,
     closed_loops,
     loop_record,
-    noise_of,
+    noise_along,
     resolution,
     smoothed,
 )
@@ -41,6 +41,9 @@ from wear.joints.loop_shape import (
     sliding_share,
     stick_slopes,
 )
+
+FEWEST_SAMPLES = 8
+"""Of a branch: with fewer neither sticking nor sliding shows."""
 
 ALIKE = 0.02
 """Loops of one step differ by less than this share of stroke, force and load, ..."""
@@ -248,7 +251,8 @@ def measure_loops(
     stick, spread, residual, friction, sliding, stroke = map(
         np.concatenate, zip(*measured, strict=True)
     )
-    if not sliding.any() and np.isnan(stick).all():
+    longest = max(len(branch.samples) for pair in pairs for branch in pair)
+    if not sliding.any() and np.isnan(stick).all() and longest < FEWEST_SAMPLES:
         raise MeasuredLoopError(
             f"sample {pairs[0][0].begin}: fewer than {FEWEST_STUCK} samples from this reversal, as "
             "from all others, until half of the loop's height; allowed: a record sampled faster"
@@ -285,16 +289,18 @@ def _steps(
     record: LoopRecord, pairs: Sequence[LoopPair], sizes: Array, energy: Array, loads: Array
 ) -> Indices:
     """The step ``(c,)`` that each loop is of: a new one where it is unlike the mean of the last."""
-    motion, force = noise_of(record.displacement), noise_of(record.force)
+    motion, force = noise_along(record, [branch for pair in pairs for branch in pair])
     stroke, half = np.maximum(np.abs(sizes), np.finfo(float).tiny).T
     counts = np.array([len(_samples(pair)) for pair in pairs])
+    # Reversals lie between samples: what these are apart there.
+    gaps = np.array([_gaps(record, pair) for pair in pairs])
     # Noise of the energy: that of the force on the increments of the motion, and the reverse.
     uncertain = np.pi * np.hypot(force * stroke, 2.0 * motion * half) / np.sqrt(counts)
     features = [
-        # Values, what they are measured by, and their noise.
-        (sizes[:, 0], stroke, np.full_like(stroke, 2.0 * motion)),
-        (sizes[:, 1], half, np.full_like(half, force)),
-        (energy, 2.0 * stroke * half, uncertain),
+        # Values, what they are measured by, and what may be wrong with them.
+        (sizes[:, 0], stroke, ALIKE_NOISE * 2.0 * motion + gaps[:, 0]),
+        (sizes[:, 1], half, ALIKE_NOISE * force + gaps[:, 1]),
+        (energy, 2.0 * stroke * half, ALIKE_NOISE * uncertain + 4.0 * half * gaps[:, 0]),
         (loads, loads, np.zeros_like(loads)),
     ]
     step = np.zeros(len(pairs), dtype=np.int64)
@@ -302,12 +308,19 @@ def _steps(
     for place in range(1, len(pairs)):
         alike = all(
             not abs(values[place] - values[first:place].mean())
-            > ALIKE * scale[place] + ALIKE_NOISE * noise[place]
-            for values, scale, noise in features
+            > ALIKE * scale[place] + max(wrong[place], wrong[first:place].mean())
+            for values, scale, wrong in features
         )
         step[place] = step[place - 1] + (not alike)
         first = first if alike else place
     return step
+
+
+def _gaps(record: LoopRecord, pair: LoopPair) -> tuple[float, float]:
+    """Largest distances of samples beside the reversals of a loop, in displacement and force."""
+    beside = np.concatenate([branch.samples[[0, 1, -2, -1]] for branch in pair]).reshape(-1, 2)
+    motion, force = (np.abs(np.diff(record[k][beside], axis=1)).max() for k in (0, 1))
+    return float(motion), float(force)
 
 
 def _measured(record: LoopRecord, pairs: Sequence[LoopPair]) -> tuple[Array, ...]:
@@ -325,6 +338,10 @@ def _measured(record: LoopRecord, pairs: Sequence[LoopPair]) -> tuple[Array, ...
     lines = np.full((len(pairs), 2), np.nan)
     if sliding > 0.0:
         lines = np.array([sliding_lines(record, pair, sliding) for pair in pairs])
+    if (lines[:, 1] <= 0.0).any():
+        # Of a few points: the branches lie the wrong way about each other.
+        lines, sliding = np.full((len(pairs), 2), np.nan), 0.0
+    if sliding > 0.0:
         heights = np.repeat(2.0 * lines[:, 1], 2)
         slopes, spread = stick_slopes(record, branches, (WINDOW * heights).tolist())
     alike = np.ones(len(pairs))
