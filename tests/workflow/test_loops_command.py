@@ -100,7 +100,7 @@ def test_strokes_that_rise_are_told_step_by_step(tmp_path):
     done = invoke(path, "--normal-load", "60 N", "--out", tmp_path / "out")
     assert done.exit_code == 0, done.output
     rows = [line.split() for line in done.stdout.splitlines()]
-    loops = [row for row in rows if row[0] in "12345"]
+    loops = [row for row in rows if row[0] in "12345" and row[1] in "123"]
     assert [row[1:3] for row in loops] == [
         ["1", "6"],
         ["1", "6"],
@@ -113,8 +113,8 @@ def test_strokes_that_rise_are_told_step_by_step(tmp_path):
     assert "5 closed loops of 2.7 mJ" in done.stdout
     table = read_table_file(tmp_path / "out" / "loops.csv")
     energy = table.column("energy", Quantity("N*mm"))
-    # 6 and 12 µm of slip from one stroke to the next are dissipated too.
-    assert energy[-1] == pytest.approx(2.7 + 30.0 * (6e-3 + 12e-3), rel=2e-3)
+    # 3 and 6 µm of slip from one stroke to the next are dissipated too.
+    assert energy[-1] == pytest.approx(2.7 + 30.0 * (3e-3 + 6e-3), rel=2e-3)
 
 
 def test_a_single_cycle_has_no_standard_error(tmp_path):

@@ -51,6 +51,9 @@ ALIKE = 0.02
 ALIKE_NOISE = 4.0
 """... or by less than this many standard deviations that noise makes of it."""
 
+RANGE_NOISE = 4.0
+"""Standard deviations by which noise makes half of a range larger, at most."""
+
 GIVING = 0.01
 """Loops give energy, by a wrong sign, if they give more than this share of force times stroke."""
 
@@ -242,8 +245,12 @@ def measure_loops(
             "(change the sign of one of them)"
         )
     energy = np.where(np.abs(energy) > NOUGHT * np.abs(box), energy, 0.0)
+    # Of a few points the outermost may lie on either branch, at any force: then the range counts.
+    noise = noise_along(record, [branch for pair in pairs for branch in pair])
+    ranges = np.array([0.5 * np.ptp(record.force[_samples(pair)]) for pair in pairs])
+    sizes[:, 1] = np.maximum(sizes[:, 1], ranges - RANGE_NOISE * noise[1])
     loads = np.array([record.normal_load[_samples(pair)].mean() for pair in pairs])
-    step = _steps(record, pairs, sizes, energy, loads)
+    step = _steps(record, pairs, sizes, energy, loads, noise)
     measured = [
         _measured(record, [pairs[k] for k in np.flatnonzero(step == number)])
         for number in range(step[-1] + 1)
@@ -286,10 +293,15 @@ def _of_pair(record: LoopRecord, pair: LoopPair) -> tuple[float, float]:
 
 
 def _steps(
-    record: LoopRecord, pairs: Sequence[LoopPair], sizes: Array, energy: Array, loads: Array
+    record: LoopRecord,
+    pairs: Sequence[LoopPair],
+    sizes: Array,
+    energy: Array,
+    loads: Array,
+    noise: tuple[float, float],
 ) -> Indices:
     """The step ``(c,)`` that each loop is of: a new one where it is unlike the mean of the last."""
-    motion, force = noise_along(record, [branch for pair in pairs for branch in pair])
+    motion, force = noise
     stroke, half = np.maximum(np.abs(sizes), np.finfo(float).tiny).T
     counts = np.array([len(_samples(pair)) for pair in pairs])
     # Reversals lie between samples: what these are apart there.
