@@ -265,8 +265,8 @@ def closed_loops(record: LoopRecord) -> tuple[LoopRecord, tuple[LoopPair, ...]]:
         loops = _closed_ways(record.displacement, reversals(record.displacement))
     if not loops:
         raise MeasuredLoopError(
-            "no complete cycle; allowed: a record that has one from reversal to reversal, or one "
-            "closed period"
+            "no complete cycle; allowed: a record that has one from reversal to reversal, of falling "
+            "strokes two cycles of each, or one closed period"
         )
     ends = [end for loop in loops for way in loop for piece in way.pieces for end in piece]
     samples = np.arange(len(record.force))
@@ -362,8 +362,11 @@ def noise_along(record: LoopRecord, branches: Sequence[LoopBranch]) -> tuple[flo
 def smoothed(motion: Array, branches: Sequence[LoopBranch]) -> Array:
     """Return the displacement ``(t,)`` without some of the noise, right on ``branches`` alone.
 
-    It is the displacement as it is if smoothing would bend the motion.
+    It is the displacement as it is if it shows no noise, or if smoothing would bend the motion.
+    Branches follow each other in pairs, the first of which ends at a reversal.
     """
+    if noise_of(motion) == 0.0:
+        return motion
     period = 2.0 * float(np.median([len(branch.samples) - 1 for branch in branches]))
     half = int(0.5 * SMOOTHING * period)
     if 2 * half + 1 < FEWEST_SMOOTHED or len(motion) < 2 * half + 1:
@@ -376,7 +379,7 @@ def smoothed(motion: Array, branches: Sequence[LoopBranch]) -> Array:
     taken = (motion - smooth)[used]
     if taken[1:] @ taken[:-1] > SIGNAL * (taken @ taken):
         return motion
-    turns = np.array([[branch.end, branch.sense] for branch in branches])
+    turns = np.array([[branch.end, branch.sense] for branch in branches[::2]])
     inside = (turns[:, 0] >= half) & (turns[:, 0] < len(motion) - half)
     if not inside.any():
         return motion

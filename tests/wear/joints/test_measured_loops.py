@@ -280,6 +280,16 @@ def test_rising_strokes_are_steps_and_the_account_is_whole():
     assert whole == pytest.approx(measured.work[-1], rel=1e-12)
 
 
+def test_one_cycle_of_each_rising_stroke_closes_on_the_way_to_the_next():
+    """Triangles, whose corners smoothing would round: slopes and strokes are exact."""
+    turns = 1e-3 * np.array([0.0, 2.0, -2.0, 4.0, -4.0, 6.0, -6.0, 8.0, -8.0, 0.0])
+    motion = np.interp(np.arange(361) / 40.0, np.arange(10), turns)
+    measured = measure_loops(motion, forces(Jenkins(KT, 0.5, 60.0), motion), 60.0)
+    assert measured.stroke == pytest.approx([4e-3, 8e-3, 12e-3], rel=1e-9)
+    assert measured.stick_stiffness == pytest.approx(KT, rel=1e-6)
+    assert measured.energy == pytest.approx([slid(2.0), slid(4.0), slid(6.0)], rel=2e-3)
+
+
 def test_small_strokes_are_found_in_noise():
     motion, force = strokes(RISING)
     generator = np.random.default_rng(1)
