@@ -265,8 +265,8 @@ def closed_loops(record: LoopRecord) -> tuple[LoopRecord, tuple[LoopPair, ...]]:
         loops = _closed_ways(record.displacement, reversals(record.displacement))
     if not loops:
         raise MeasuredLoopError(
-            "no complete cycle; allowed: a record that has one from reversal to reversal, of strokes "
-            "that fall two cycles of each, or one closed period"
+            "no complete cycle; allowed: a record that has one from reversal to reversal, or of "
+            "strokes that fall two cycles of each, or one closed period"
         )
     ends = [end for loop in loops for way in loop for piece in way.pieces for end in piece]
     samples = np.arange(len(record.force))
