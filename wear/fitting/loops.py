@@ -370,19 +370,29 @@ def _forces(made: LoopFit, chosen: Iterable[int], values: Array) -> Array:
     place = np.concatenate([one.displacement for one in data])
     there, back = np.where(sense > 0.0, (upper, lower), (lower, upper))
     before = sense * (place - back) < 0.0
+    loads = np.repeat([one.normal_load for one in data], counts)
+    # Branches alternate: each is settled once, and every sample goes on from there.
+    first = np.flatnonzero(np.append(True, np.diff(sense) != 0.0))
+    branch = np.repeat(np.arange(len(first)), np.diff(np.append(first, len(sense))))
+    way = np.stack([there, back] * SETTLING)[:, first, None]
+    law = _law(made, given, loads[first])
+    settled = march_joints(law, law.rest(len(first)), np.zeros((len(first), 1)), way)
+    moved = np.where(before, back - place, place - back)[:, None]
+    gone = _law(made, given, loads).respond(settled.state[branch], moved)
+    start, force = settled.force[-1, branch, 0], gone.force[:, 0]
+    return np.asarray(np.where(before, 2.0 * start - force, force) + offset)
+
+
+def _law(made: LoopFit, given: Mapping[str, float], loads: Array) -> UniaxialLaw:
+    """The law of as many joints as there are normal ``loads``, which count if none is given."""
     parameters: dict[str, Any] = {name: given[name] for name in (*COMMON, *made.law.shape)}
     if np.isnan(parameters["normal_load"]):
-        parameters["normal_load"] = np.repeat([one.normal_load for one in data], counts)
-    tiny = np.finfo(float).tiny
-    parameters["stiffness"] = max(parameters["stiffness"], tiny)
+        parameters["normal_load"] = loads
+    parameters["stiffness"] = max(parameters["stiffness"], np.finfo(float).tiny)
     if made.law.law is BoucWen:
         most = STIFFER * parameters["stiffness"]
         parameters["residual_stiffness"] = min(parameters["residual_stiffness"], most)
-    law = made.law.law(**parameters)
-    way = np.stack([*[there, back] * SETTLING, np.where(before, 2.0 * back - place, place)])
-    history = march_joints(law, law.rest(len(place)), np.zeros((len(place), 1)), way[..., None])
-    start, force = history.force[-2:, :, 0]
-    return np.asarray(np.where(before, 2.0 * start - force, force) + offset)
+    return made.law.law(**parameters)
 
 
 def _slopes(made: LoopFit, values: Array) -> list[Array]:
