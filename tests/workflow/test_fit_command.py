@@ -174,6 +174,25 @@ def test_a_law_comes_back_from_a_record_of_loops(folder):
         fretscale.fit(asked)
 
 
+def test_a_joint_that_wears_within_a_record_is_told(folder):
+    law = UniformIwan(60e3, 0.9, 60.0, 1.4e3)
+    motion = 7e-3 * np.sin(2.0 * np.pi * np.arange(161) / 40)
+    force = march_joints(law, law.rest(1), np.zeros((1, 1)), motion[:, None, None]).force.ravel()
+    force *= np.linspace(1.0, 1.3, len(force))
+    rows = [f"{1e3 * x:.9g}, {f:.9g}" for x, f in zip(motion, force, strict=True)]
+    (folder / "loop.csv").write_text("\n".join(["displacement, force", "um, N", *rows]))
+    found = fretscale.fit(
+        {
+            "title": "Wears",
+            "fit": "joint_law",
+            "measurements": [{"file": str(folder / "loop.csv")}],
+            "joint": {"law": "uniform_iwan", "normal_load": "60 N"},
+        }
+    )
+    assert any("loops of one stroke change" in doubt for doubt in found.doubts)
+    assert "closed loops of" in str(found)
+
+
 def test_residual_stiffness_is_taken_off_for_laws_beside_a_spring(folder):
     text = JOINT.replace("law: bouc_wen", "law: jenkins")
     (folder / "joint.yaml").write_text(text, encoding="utf-8")

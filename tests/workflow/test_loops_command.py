@@ -89,6 +89,34 @@ def test_columns_may_have_other_names_units_and_company(measured, tmp_path):
     assert done.stdout == plain.stdout
 
 
+def test_strokes_that_rise_are_told_step_by_step(tmp_path):
+    """Two cycles each of 3, 6 and 12 µm; the account says where all the work of the record is."""
+    wave = np.sin(2.0 * np.pi * np.arange(400) / 200)
+    motion = np.concatenate([3e-3 * wave, 6e-3 * wave, 12e-3 * wave, [0.0]])
+    law = Jenkins(20e3, 0.5, 60.0)
+    force = march_joints(law, law.rest(1), np.zeros((1, 1)), motion[:, None, None]).force.ravel()
+    path = tmp_path / "rising.csv"
+    written(path, ["displacement [um]", "force [N]"], 1e3 * motion, force)
+    done = invoke(path, "--normal-load", "60 N", "--out", tmp_path / "out")
+    assert done.exit_code == 0, done.output
+    rows = [line.split() for line in done.stdout.splitlines()]
+    loops = [row for row in rows if row[0] in "12345" and row[1] in "123"]
+    assert [row[1:3] for row in loops] == [
+        ["1", "6"],
+        ["1", "6"],
+        ["2", "12"],
+        ["2", "12"],
+        ["3", "24"],
+    ]
+    means = [[float(row[1]), float(row[3])] for row in rows if row[0] == "mean"]
+    assert means == pytest.approx(np.array([[1, 0.18], [2, 0.54], [3, 1.26]]), rel=1e-3)
+    assert "5 closed loops of 2.7 mJ" in done.stdout
+    table = read_table_file(tmp_path / "out" / "loops.csv")
+    energy = table.column("energy", Quantity("N*mm"))
+    # 3 and 6 µm of slip from one stroke to the next are dissipated too.
+    assert energy[-1] == pytest.approx(2.7 + 30.0 * (3e-3 + 6e-3), rel=2e-3)
+
+
 def test_a_single_cycle_has_no_standard_error(tmp_path):
     _, displacement, force = record()
     # From one upper reversal to the next, and a little on both sides.

@@ -127,3 +127,18 @@ def test_a_ratio_may_be_in_percent(tmp_path):
     path = tmp_path / "table.csv"
     path.write_text("mu [%]\n50\n", encoding="utf-8")
     assert read_table_file(path).column("mu", Quantity("1")).tolist() == [0.5]
+
+
+@pytest.mark.parametrize("units", ["um,kN,-", "[um],[kN],", "(um), (kN), -"])
+def test_units_may_be_in_a_second_row(tmp_path, units):
+    path = tmp_path / "record.csv"
+    path.write_text(f"displacement,force,note\n{units}\n0.5,2,a\n1,3,b\n", encoding="utf-8")
+    record = read_loop_file(path, {})
+    np.testing.assert_allclose(record["displacement"], [5e-4, 1e-3], rtol=1e-15)
+    np.testing.assert_allclose(record["force"], [2e3, 3e3], rtol=1e-15)
+
+
+def test_a_row_of_texts_and_numbers_is_no_row_of_units(tmp_path):
+    path = tmp_path / "record.csv"
+    path.write_text("force,note\n2,m\n3,s\n", encoding="utf-8")
+    assert forces(path).tolist() == [2.0, 3.0]

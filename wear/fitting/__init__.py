@@ -16,7 +16,7 @@ What is fitted
     - ``evolution_problem``: how joint parameters follow the dissipated energy.
     - ``EvolutionData``: what was measured of one of them.
     - ``loop_problem``: a joint law from measured loops.
-    - ``mean_loop``, ``LoopData``: the mean of all loops of a record.
+    - ``loop_data``, ``LoopData``: loops of a record that are alike, as data.
     - ``volume_problem``: wear coefficients from worn volumes.
     - ``VolumeData``, ``VolumeLaw``: the volumes, and what of the law is asked for.
     - ``scar_problem``: wear coefficients from depths and profiles, through a model's runs.
@@ -45,7 +45,7 @@ if TYPE_CHECKING:
     from wear.fitting.estimates import Estimate
     from wear.fitting.evolutions import EvolutionData, evolution_problem
     from wear.fitting.least_squares import Fit, fit
-    from wear.fitting.loops import LoopData, loop_problem, mean_loop
+    from wear.fitting.loops import LoopData, loop_data, loop_problem
     from wear.fitting.problem import FitError, FitProblem, Series, Unknown
     from wear.fitting.scars import ComputedScars, ScarData, scar_problem
     from wear.fitting.volumes import VolumeData, VolumeLaw, volume_problem
@@ -68,8 +68,8 @@ __all__ = [
     "diagnose",
     "evolution_problem",
     "fit",
+    "loop_data",
     "loop_problem",
-    "mean_loop",
     "scar_problem",
     "volume_problem",
 ]
@@ -82,7 +82,7 @@ __getattr__, __dir__ = lazy_names(
         "estimates": ("Estimate",),
         "evolutions": ("EvolutionData", "evolution_problem"),
         "least_squares": ("Fit", "fit"),
-        "loops": ("LoopData", "loop_problem", "mean_loop"),
+        "loops": ("LoopData", "loop_data", "loop_problem"),
         "problem": ("FitError", "FitProblem", "Series", "Unknown"),
         "scars": ("ComputedScars", "ScarData", "scar_problem"),
         "volumes": ("VolumeData", "VolumeLaw", "volume_problem"),

@@ -28,7 +28,7 @@ from sa_solver.types import Array, Mask
 from wear.fitting.estimates import RANK, Estimate, estimate_at, inverse_of, led_astray
 from wear.fitting.problem import FitError, FitProblem
 from wear.fitting.profiles import profiled
-from wear.fitting.solving import solve
+from wear.fitting.solving import pinned, solve
 
 LEVEL = 0.95
 """Of all bounds."""
@@ -58,12 +58,12 @@ class Fit:
     """The best fit of a ``problem``.
 
     ``values`` ``(p,)`` are those of all its parameters, also of what is not determined; which are,
-    ``estimates`` say. ``covariance`` ``(p, p)`` is that of the fitted ones (logarithms where these
-    are fitted), without directions that nothing decides, and ``parts`` ``(k, p, p)`` what each
-    series brings to it. ``fitted`` and ``residuals`` ``(n,)``, ``deviations`` ``(n,)`` of the data,
-    and their ``leverages`` ``(n,)``. ``freedoms`` ``(k,)`` are the data of each series less the
-    parameters that they decide. ``reached`` of the ``tried`` starts ended here. ``known`` says
-    whether all deviations were given.
+    ``estimates`` say of all but nuisances, which come last. ``covariance`` ``(p, p)`` is that of
+    the fitted ones (logarithms where these are fitted), without directions that nothing decides,
+    and ``parts`` ``(k, p, p)`` what each series brings to it. ``fitted`` and ``residuals``
+    ``(n,)``, ``deviations`` ``(n,)`` of the data, and their ``leverages`` ``(n,)``. ``freedoms``
+    ``(k,)`` are the data of each series less the parameters that they decide. ``reached`` of the
+    ``tried`` starts ended here. ``known`` says whether all deviations were given.
 
     Examples
     --------
@@ -99,10 +99,11 @@ class Fit:
 
     @property
     def correlation(self) -> Array:
-        """Of the fitted parameters ``(p, p)``; NaN where one is not determined."""
+        """Of the parameters that have estimates ``(q, q)``; NaN where one is not determined."""
         found = np.array([estimate.determined for estimate in self.estimates])
-        scale = np.sqrt(np.where(found, np.diag(self.covariance), np.nan))
-        return np.asarray(self.covariance / np.outer(scale, scale))
+        covariance = self.covariance[: len(found), : len(found)]
+        scale = np.sqrt(np.where(found, np.diag(covariance), np.nan))
+        return np.asarray(covariance / np.outer(scale, scale))
 
     @property
     def standardised(self) -> Array:
@@ -215,6 +216,8 @@ def fit(problem: FitProblem) -> Fit:
     free = ~held
     inverse, kernel = inverse_of(jacobian * free)
     leverages = np.einsum("ij,ji->i", jacobian * free, inverse)
+    wider = _wider(problem, inverse, residuals / deviations, leverages)
+    inverse = inverse * wider[:, None]
     masks = [problem.places == k for k in range(len(problem.series))]
     parts = np.stack([inverse[:, here] @ inverse[:, here].T for here in masks])
     # The sum of leverages is the number of parameters that the data of a series decide.
@@ -229,8 +232,9 @@ def fit(problem: FitProblem) -> Fit:
         for place in range(len(values))
     ]
     if not is_exact(problem, residuals):
-        alone = profiled(problem, inner, deviations, alone)
-    estimates = tuple(led_astray(alone, place, parts.sum(axis=0)) for place in range(len(values)))
+        alone = profiled(problem, inner, deviations, alone, wider)
+    asked = sum(not unknown.nuisance for unknown in problem.unknowns)
+    estimates = tuple(led_astray(alone, place, parts.sum(axis=0)) for place in range(asked))
     return Fit(
         problem=problem,
         values=values,
@@ -245,6 +249,20 @@ def fit(problem: FitProblem) -> Fit:
         tried=len(problem.starts),
         known=known,
     )
+
+
+def _wider(problem: FitProblem, inverse: Array, scaled: Array, leverages: Array) -> Array:
+    """By how much deviations ``(p,)`` grow where shares of a scatter are not those of the data.
+
+    Shares are themselves estimated; what the residuals of the data that decide a parameter say is
+    taken where it is more (White 1980, Econometrica 48, 817; residuals over 1 - h as MacKinnon and
+    White 1985, J. Econometrics 29, 305).
+    """
+    shared = np.array([series.shares is not None for series in problem.series])[problem.places]
+    squares = np.where(shared, (scaled / np.maximum(1.0 - leverages, RANK)) ** 2, 1.0)
+    total = np.sum(inverse**2, axis=1)
+    found = np.sum(inverse**2 * squares, axis=1)
+    return np.asarray(np.sqrt(np.maximum(found / np.where(total > 0.0, total, 1.0), 1.0)))
 
 
 def is_exact(problem: FitProblem, residuals: Array) -> bool:
@@ -291,14 +309,14 @@ def _best(problem: FitProblem) -> tuple[Array, int]:
     least = min(found, key=lambda end: end[1])
     floor = 0.5 * len(problem.data) * EXACT**2
     same = [cost - least[1] <= SAME_MINIMUM * least[1] + floor for _, cost, _ in found]
-    return least[0], sum(same)
+    return pinned(problem, least[0], least[1], deviations), sum(same)
 
 
 def _first_deviations(problem: FitProblem) -> Array:
     """Of data whose deviations are not known the size of their series."""
     return np.concatenate(
         [
-            np.full(len(one.values), max(np.abs(one.values).max(), np.finfo(float).tiny))
+            one.scattered(max(np.abs(one.values).max(), np.finfo(float).tiny))
             if one.deviations is None
             else one.deviations
             for one in problem.series
@@ -345,7 +363,8 @@ def _scatter(problem: FitProblem, inner: Array, jacobian: Array, deviations: Arr
                 "do not tell their own scatter; allowed: more values, or their standard deviations"
             )
         least = max(EXACT * np.abs(series.values).max(), np.finfo(float).tiny)
-        found[here] = max(float(np.sqrt(np.sum(residuals[here] ** 2) / left)), least)
+        squares = np.sum((residuals[here] / series.scattered(1.0)) ** 2)
+        found[here] = series.scattered(max(float(np.sqrt(squares / left)), least))
     return found
 
 

@@ -1,33 +1,62 @@
-"""Joint laws from measured hysteresis loops: the law's own loop beside the mean one of a record.
+"""Joint laws from measured hysteresis loops: the law's own loop beside those of a record.
 
-The loops of a record are taken to be alike, as :func:`wear.joints.measure_loops` takes them: their
-forces and displacements are averaged over the cycles at equal times between reversals. The law goes
-through its settled loop of that motion; a constant force of the record is fitted beside it. Bounds
-count what scatters about the law: a displacement that is wrong in every cycle alike is not seen.
+Nothing is averaged: samples of single loops are taken as they are, of those that are alike
+(:class:`wear.joints.measured_loops.MeasuredLoops`) some. The law goes through its settled loop from
+one turning point to the other. Where these are is fitted too, since the samples only pass them by,
+and so is a constant force of each step of like loops: of loops within others, Masing's laws leave
+just that. Every sample counts by the noise of its force and, where the loop is steep, that of its
+displacement. Bounds count what scatters about the law: a displacement that is wrong in every cycle
+alike is not seen.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from itertools import product
+from typing import Any
 
 import numpy as np
 
-from sa_solver.types import Array
+from sa_solver.types import Array, Indices
 from wear.fitting.problem import FitError, FitProblem, Series, Unknown
 from wear.joints.bouc_wen import BoucWen
 from wear.joints.iwan import FourParameterIwan, UniformIwan
 from wear.joints.jenkins import Jenkins
 from wear.joints.law import march_joints
+from wear.joints.loop_record import (
+    LoopBranch,
+    LoopRecord,
+    MeasuredLoopError,
+    noise_along,
+)
 from wear.joints.measured_loops import MeasuredLoops
 from wear.joints.parameters import UniaxialLaw
 
 POINTS = 40
-"""Of each branch of a loop."""
+"""Most of each branch of a loop."""
+
+SLOPE_STEP = 1e-3
+"""Of the amplitude: slopes that tell the noise of a displacement in that of the force."""
 
 SETTLING = 2
 """Cycles before the loop that counts: a law that forgets is settled after one."""
+
+BEYOND, WITHIN = 3.0, 0.5
+"""A turning point is no farther beyond the outermost sample, nor within it, than so many times the
+distance of that to its neighbours, ..."""
+
+TURN_NOISE = 5.0
+"""... or than this many standard deviations of the noise."""
+
+ROUNDED = 1e-6
+"""Noise of displacements and forces that show none, in their largest values."""
+
+LEAST_SHARE = 0.01
+"""Of the scatter of a sample in that of the noisiest one."""
+
+MOST_LOOPS = 12
+"""Loops of like ones that are fitted: each has two turning points of its own to be found."""
 
 STIFFER = 1.0 - 1e-9
 """Largest residual stiffness of a Bouc-Wen joint, in its stiffness."""
@@ -36,7 +65,7 @@ MOBILISED = 1.2
 """Friction to begin with where nothing slides, over what the record has mobilised."""
 
 OFFSET = "offset"
-"""Mean force of a record, beside the parameters of the law."""
+"""Mean force of loops, beside the parameters of the law."""
 
 COMMON = ("stiffness", "friction", "normal_load", "residual_stiffness")
 """Parameters that all laws have, none below 0."""
@@ -74,24 +103,27 @@ LAWS: Mapping[str, LoopLaw] = {
 
 @dataclass(frozen=True)
 class LoopData:
-    """The mean loop of a record, its ``name``.
+    """Samples of ``l`` loops of one step of the record ``name``.
 
-    ``displacement`` ``(2 m,)`` [mm] about the middle of the stroke, there and back, ``force``
-    ``(2 m,)`` [N], ``amplitude`` [mm] half the stroke, ``normal_load`` [N] NaN if it is not known.
-    ``stiffness``, ``residual_stiffness`` [N/mm] and ``limit`` [N], the friction force, are what the
-    record says of itself, to begin with.
+    ``displacement`` ``(n,)`` [mm] about its mean and ``force`` ``(n,)`` [N], each of the ``loop``
+    ``(n,)``, 0 to l - 1, and on its branch of ``sense`` ``(n,)`` ±1; ``turns`` ``(l, 2)`` [mm] the
+    lowest and the highest sample of each loop, which are not among them, and ``spacing`` ``(l,)``
+    [mm] the distance to their neighbours; ``noise`` the standard deviations of displacement [mm]
+    and force [N]. ``amplitude`` [mm] is half the stroke, ``normal_load`` [N] NaN if it is not
+    known. ``stiffness``, ``residual_stiffness`` [N/mm] and ``limit`` [N], the friction force, are
+    what the record says of itself, to begin with.
 
     Examples
     --------
     The loop of a Jenkins joint, which is what its record says:
 
     >>> import numpy as np
-    >>> from wear.fitting import mean_loop
+    >>> from wear.fitting import loop_data
     >>> from wear.joints import Jenkins, march_joints, measure_loops
     >>> law = Jenkins(stiffness=1e4, friction=0.5, normal_load=100.0)
     >>> motion = 0.03 * np.sin(2.0 * np.pi * np.arange(801) / 160)
     >>> record = march_joints(law, law.rest(1), np.zeros((1, 1)), motion[:, None, None])
-    >>> loop = mean_loop("first", measure_loops(motion, record.force.ravel(), 100.0))
+    >>> loop = loop_data("first", measure_loops(motion, record.force.ravel(), 100.0))
     >>> print(f"{loop.limit:.2f} N, {loop.amplitude:.4f} mm")
     50.00 N, 0.0300 mm
     """
@@ -99,6 +131,11 @@ class LoopData:
     name: str
     displacement: Array
     force: Array
+    sense: Array
+    loop: Indices
+    turns: Array
+    spacing: Array
+    noise: tuple[float, float]
     amplitude: float
     normal_load: float
     stiffness: float
@@ -106,77 +143,118 @@ class LoopData:
     limit: float
 
 
-def mean_loop(name: str, measured: MeasuredLoops) -> LoopData:
-    """The mean of all loops of a record, at :data:`POINTS` places of each branch.
+def loop_data(name: str, measured: MeasuredLoops, most: int = MOST_LOOPS) -> LoopData:
+    """Return ``most`` loops of those that are alike, or all, as data of :func:`loop_problem`.
+
+    Of each branch up to :data:`POINTS` samples. Raises MeasuredLoopError for loops of several steps
+    and branches without samples between their reversals.
 
     Examples
     --------
     See :class:`LoopData`.
 
-    >>> from wear.fitting import mean_loop
+    >>> from wear.fitting import loop_data
     """
-    record, branches = measured.record, []
-    for begin, turn, end in measured.reversals.tolist():
-        for first, last in ((begin, turn), (turn, end)):
-            branches.append(_at_phases(record.displacement, record.force, first, last))
-    # Shares of the way (m,) and forces (m,) of each branch, averaged over the cycles.
-    out, back = (np.mean(branches[k::2], axis=0) for k in (0, 1))
-    if out[0, 0] > out[0, -1]:
-        out, back = back, out
-    amplitude = 0.5 * float(measured.stroke.mean())
-    slides = measured.slides
-    stick = measured.stick_estimate.value
+    measured.require_alike()
+    record, count = measured.record, len(measured.branches)
+    places = np.linspace(0, count - 1, min(count, most)).round().astype(int)
+    pairs = [sorted(measured.branches[place], key=lambda one: one.sense) for place in places]
+    branches = [branch for pair in pairs for branch in pair]
+    noise = noise_along(record, branches)
+    chosen = [_chosen(record, branch, noise[0] == 0.0) for branch in branches]
+    counts = [len(one) for one in chosen]
+    if min(counts) == 0:
+        raise MeasuredLoopError(
+            f"sample {branches[int(np.argmin(counts))].begin}: no samples between two reversals; "
+            "allowed: some"
+        )
+    motion = record.displacement[np.concatenate(chosen)]
+    # A branch of sense -1 ends at the lowest sample, the other at the highest.
+    turns = np.array([[record.displacement[branch.end] for branch in pair] for pair in pairs])
+    ends = [branch.samples[[0, 1, -2, -1]] for branch in branches]
+    gaps = np.abs(np.diff(record.displacement[ends], axis=1))[:, [0, 2]]
+    force = record.force[np.concatenate(chosen)]
+    limit = MOBILISED * 0.5 * float(np.ptp(force))
+    if measured.slides:
+        limit = float(measured.friction_force.mean())
+    middle = float(motion.mean())
     return LoopData(
         name=name,
-        displacement=amplitude * np.concatenate([_one_way(out[0]), -_one_way(-back[0])]),
-        force=np.concatenate([out[1], back[1]]),
-        amplitude=amplitude,
+        displacement=motion - middle,
+        force=force,
+        sense=np.repeat([float(branch.sense) for branch in branches], counts),
+        loop=np.repeat(np.arange(len(branches)) // 2, counts),
+        turns=turns - middle,
+        spacing=gaps.reshape(-1, 4).max(axis=1),
+        noise=noise,
+        amplitude=0.5 * float(measured.stroke.mean()),
         normal_load=float(measured.normal_load.mean()),
-        stiffness=stick,
-        residual_stiffness=float(measured.residual_stiffness.mean()) if slides else 0.0,
-        limit=float((measured.friction_force if slides else MOBILISED * measured.force).mean()),
+        stiffness=_stiffness(measured, limit),
+        residual_stiffness=float(np.nan_to_num(measured.residual_stiffness).mean()),
+        limit=limit,
     )
 
 
-def _at_phases(motion: Array, force: Array, first: int, last: int) -> Array:
-    """Share of the way, -1 to 1, and force ``(2, m)`` of a branch at equal times of it.
+def _chosen(record: LoopRecord, branch: LoopBranch, exact: bool) -> Indices:
+    """Samples of a branch, its ends left out: up to :data:`POINTS` at equal times.
 
-    Displacements are averaged as forces are: both have noise, time has none.
+    Of an ``exact`` displacement, in which a rest is no time, as much by its way.
     """
-    places = first + (last - first) * (np.arange(POINTS) + 0.5) / POINTS
-    samples = np.arange(len(motion))
-    middle, half = 0.5 * (motion[first] + motion[last]), 0.5 * abs(motion[last] - motion[first])
-    moved = np.interp(places, samples, motion)
-    return np.stack([(moved - middle) / half, np.interp(places, samples, force)])
+    motion = record.displacement[branch.samples]
+    last = len(motion) - 1
+    phase = np.arange(last + 1) / last
+    if exact:
+        way = np.maximum.accumulate(branch.sense * (motion - motion[0]))
+        phase = 0.5 * (phase + way / way[-1])
+    count = min(POINTS, last - 1)
+    places = np.interp((np.arange(count) + 0.5) / max(count, 1), phase, np.arange(last + 1.0))
+    return branch.samples[_spread(places, last)]
 
 
-def _one_way(shares: Array) -> Array:
-    """Shares of a way that goes nowhere back, nor beyond its ends."""
-    return np.clip(np.maximum.accumulate(shares), -1.0, 1.0)
+def _spread(places: Array, last: int) -> Indices:
+    """Different whole numbers from 1 to ``last`` - 1, each near one of the growing ``places``."""
+    count = len(places)
+    order = np.arange(count)
+    taken = np.maximum.accumulate(np.clip(np.rint(places).astype(int), 1, last - 1) - order)
+    return np.minimum(taken, last - count) + order
+
+
+def _stiffness(measured: MeasuredLoops, limit: float) -> float:
+    """Stick stiffness: where no slope tells it, by the energy of a slider, 4 µN (A - µN/kt)."""
+    if np.isfinite(measured.stick_stiffness).all():
+        return measured.stick_estimate.value
+    amplitude = 0.5 * float(measured.stroke.mean())
+    stuck = amplitude - float(measured.energy.mean()) / (4.0 * limit)
+    return limit / max(stuck, 0.01 * amplitude)
 
 
 @dataclass(frozen=True)
 class LoopFit:
     """The problem of some :class:`LoopData` under a law of parameters that are ``held`` or free.
 
-    ``names`` has the place among the unknowns by parameter; each loop has an offset of its own.
+    ``names`` has the place among the unknowns by parameter of the law; ``offsets`` ``(k,)`` those
+    of the data, and ``turns``, for each of them, ``(l, 2)`` those of its loops.
     """
 
     problem: FitProblem
     data: tuple[LoopData, ...]
     law: LoopLaw
     held: Mapping[str, float]
-    names: Mapping[str, int] = field(default_factory=dict)
+    names: Mapping[str, int]
+    offsets: Indices
+    turns: tuple[Indices, ...]
 
-    def loop(self, data: LoopData, values: Array) -> Array:
-        """Force ``(2 m,)`` of the law at the displacements of one of the data [N]."""
-        return _loop(data, self.law, {**self.held, **_named(self.names, values)})
+    def record(self, name: str, values: Array) -> Array:
+        """Force ``(n,)`` of the law at the displacements of all data of a record [N]."""
+        chosen = [number for number, one in enumerate(self.data) if one.name == name]
+        return _forces(self, chosen, values)
 
 
 def loop_problem(data: Sequence[LoopData], law: str, held: Mapping[str, float]) -> LoopFit:
-    """A joint law from mean loops, as a problem of :func:`fit`.
+    """A joint law from loops, as a problem of :func:`fit`.
 
-    ``law`` is a key of ``LAWS``; ``held`` are parameters that are not free, by name. A normal load
+    The data of a record, which have one name and follow each other, are one series. ``law`` is a
+    key of ``LAWS``; ``held`` are parameters that are not free, by name. A normal load
     that is neither held nor free (``nan``) is that of each record. Raises FitError for a record
     without one.
 
@@ -185,12 +263,12 @@ def loop_problem(data: Sequence[LoopData], law: str, held: Mapping[str, float]) 
     The joint that a record was made with comes back:
 
     >>> import numpy as np
-    >>> from wear.fitting import fit, loop_problem, mean_loop
+    >>> from wear.fitting import fit, loop_data, loop_problem
     >>> from wear.joints import UniformIwan, march_joints, measure_loops
     >>> law = UniformIwan(stiffness=1e4, friction=0.5, normal_load=100.0)
     >>> motion = 0.03 * np.sin(2.0 * np.pi * np.arange(4001) / 800)
     >>> record = march_joints(law, law.rest(1), np.zeros((1, 1)), motion[:, None, None])
-    >>> loop = mean_loop("first", measure_loops(motion, record.force.ravel(), 100.0))
+    >>> loop = loop_data("first", measure_loops(motion, record.force.ravel(), 100.0))
     >>> problem = loop_problem([loop], "uniform_iwan", {"normal_load": 100.0})
     >>> stiffness, friction, *_ = fit(problem.problem).estimates
     >>> print(f"{friction.value:.3f}, {stiffness.value:.0f} N/mm")
@@ -206,19 +284,63 @@ def loop_problem(data: Sequence[LoopData], law: str, held: Mapping[str, float]) 
     free = [name for name in (*COMMON, *known.shape) if name not in held]
     stiffest = max(one.stiffness for one in data)
     unknowns = [_unknown(name, known, stiffest) for name in free]
-    size = max(float(np.abs(one.force).max()) for one in data)
-    unknowns += [Unknown(f"{one.name}.{OFFSET}", size=size) for one in data]
-    names = {unknown.name: place for place, unknown in enumerate(unknowns)}
-    made = LoopFit(
-        FitProblem((), (), lambda values: values, ()), tuple(data), known, dict(held), names
-    )
+    names = {name: place for place, name in enumerate(free)}
+    unknowns += _offsets(data)
+    offsets = np.arange(len(free), len(unknowns))
+    turns = []
+    for number, one in enumerate(data):
+        begin = len(unknowns)
+        unknowns += _turns(one, number)
+        turns.append(np.arange(begin, len(unknowns)).reshape(-1, 2))
+    nothing = FitProblem(tuple(unknowns), (), lambda values: values, ())
+    made = LoopFit(nothing, tuple(data), known, dict(held), names, offsets, tuple(turns))
+    starts = _starts(made)
+    slopes = _slopes(made, starts[0])
     problem = FitProblem(
         tuple(unknowns),
-        tuple(Series(one.name, one.force) for one in data),
-        lambda values: np.concatenate([made.loop(one, values) for one in data]),
-        _starts(made),
+        tuple(_series(name, made.data, slopes) for name in dict.fromkeys(one.name for one in data)),
+        lambda values: _forces(made, range(len(data)), values),
+        starts,
     )
-    return LoopFit(problem, made.data, known, made.held, names)
+    return replace(made, problem=problem)
+
+
+def _offsets(data: Sequence[LoopData]) -> list[Unknown]:
+    """The mean forces of the data; of a record with several steps nobody asks for them."""
+    size = max(float(np.abs(one.force).max()) for one in data)
+    names = [one.name for one in data]
+    several = len(set(names)) < len(names)
+    return [
+        Unknown(f"{name}.{OFFSET}" + (f"_{number}" if several else ""), size=size, nuisance=several)
+        for number, name in enumerate(names, 1)
+    ]
+
+
+def _turns(data: LoopData, number: int) -> list[Unknown]:
+    """The turning points of all loops of the data with a ``number``, lower and upper in turn."""
+    unknowns = []
+    noise = TURN_NOISE * data.noise[0]
+    for loop, (pair, spacing) in enumerate(zip(data.turns, data.spacing, strict=True)):
+        within, beyond = WITHIN * spacing + noise, BEYOND * spacing + noise
+        for at, sense in zip(pair, (-1.0, 1.0), strict=True):
+            low, high = sorted((at - sense * within, at + sense * beyond))
+            name = f"{data.name}.turn_{number}_{loop}_{'lower' if sense < 0.0 else 'upper'}"
+            unknowns.append(Unknown(name, low, high, data.amplitude, nuisance=True))
+    return unknowns
+
+
+def _series(name: str, data: Sequence[LoopData], slopes: Sequence[Array]) -> Series:
+    """The forces of a record, which scatter by their own noise and that of the displacement.
+
+    Where none shows both are rounded: as much, in their ranges.
+    """
+    chosen = [(one, slope) for one, slope in zip(data, slopes, strict=True) if one.name == name]
+    forces = np.concatenate([one.force for one, _ in chosen])
+    steepness = np.concatenate([slope for _, slope in chosen])
+    motion = max(chosen[0][0].noise[0], ROUNDED * max(one.amplitude for one, _ in chosen))
+    force = max(chosen[0][0].noise[1], ROUNDED * float(np.abs(forces).max()))
+    shares = np.hypot(force, steepness * motion)
+    return Series(name, forces, shares=np.maximum(shares / shares.max(), LEAST_SHARE))
 
 
 def _unknown(name: str, law: LoopLaw, stiffness: float) -> Unknown:
@@ -231,32 +353,72 @@ def _unknown(name: str, law: LoopLaw, stiffness: float) -> Unknown:
     return Unknown(name, 0.0)
 
 
-def _named(names: Mapping[str, int], values: Array) -> dict[str, float]:
-    return {name: float(values[place]) for name, place in names.items()}
+def _forces(made: LoopFit, chosen: Iterable[int], values: Array) -> Array:
+    """Force of the law on its settled loops, ``(n,)``: each point from the reversal before it.
+
+    A displacement that noise has put before that reversal lies on the branch continued backwards:
+    cut off there, noise would be of one sign.
+    """
+    given = dict(made.held) | {name: float(values[place]) for name, place in made.names.items()}
+    chosen = list(chosen)
+    data = [made.data[number] for number in chosen]
+    counts = [len(one.force) for one in data]
+    offset = np.repeat(values[made.offsets[chosen]], counts)
+    turns = [made.turns[number][one.loop] for number, one in zip(chosen, data, strict=True)]
+    lower, upper = values[np.concatenate(turns)].T
+    sense = np.concatenate([one.sense for one in data])
+    place = np.concatenate([one.displacement for one in data])
+    there, back = np.where(sense > 0.0, (upper, lower), (lower, upper))
+    before = sense * (place - back) < 0.0
+    loads = np.repeat([one.normal_load for one in data], counts)
+    # Branches alternate: each is settled once, and every sample goes on from there.
+    first = np.flatnonzero(np.append(True, np.diff(sense) != 0.0))
+    branch = np.repeat(np.arange(len(first)), np.diff(np.append(first, len(sense))))
+    way = np.stack([there, back] * SETTLING)[:, first, None]
+    law = _law(made, given, loads[first])
+    settled = march_joints(law, law.rest(len(first)), np.zeros((len(first), 1)), way)
+    moved = np.where(before, back - place, place - back)[:, None]
+    gone = _law(made, given, loads).respond(settled.state[branch], moved)
+    start, force = settled.force[-1, branch, 0], gone.force[:, 0]
+    return np.asarray(np.where(before, 2.0 * start - force, force) + offset)
 
 
-def _loop(data: LoopData, law: LoopLaw, values: Mapping[str, float]) -> Array:
-    """Force of the settled loop at the displacements of the data."""
-    given = {name: values[name] for name in (*COMMON, *law.shape)}
-    if np.isnan(given["normal_load"]):
-        given["normal_load"] = data.normal_load
-    tiny = np.finfo(float).tiny
-    given["stiffness"] = max(given["stiffness"], tiny)
-    if law.law is BoucWen:
-        given["residual_stiffness"] = min(given["residual_stiffness"], STIFFER * given["stiffness"])
-    made = law.law(**given)
-    half = len(data.displacement) // 2
-    ends = data.amplitude * np.array([1.0, -1.0] * SETTLING)
-    out, back = data.displacement[:half], data.displacement[half:]
-    way = np.concatenate([ends, out, ends[:1], back])
-    history = march_joints(made, made.rest(1), np.zeros((1, 1)), way[:, None, None])
-    force = np.delete(history.force[len(ends) :, 0, 0], half)
-    return np.asarray(force + values[f"{data.name}.{OFFSET}"])
+def _law(made: LoopFit, given: Mapping[str, float], loads: Array) -> UniaxialLaw:
+    """The law of as many joints as there are normal ``loads``, which count if none is given."""
+    parameters: dict[str, Any] = {name: given[name] for name in (*COMMON, *made.law.shape)}
+    if np.isnan(parameters["normal_load"]):
+        parameters["normal_load"] = loads
+    parameters["stiffness"] = max(parameters["stiffness"], np.finfo(float).tiny)
+    if made.law.law is BoucWen:
+        most = STIFFER * parameters["stiffness"]
+        parameters["residual_stiffness"] = min(parameters["residual_stiffness"], most)
+    return made.law.law(**parameters)
+
+
+def _slopes(made: LoopFit, values: Array) -> list[Array]:
+    """Slopes ``(n,)`` [N/mm] of the law's loops at the displacements of each of the data."""
+    found = []
+    for number, one in enumerate(made.data):
+        step = SLOPE_STEP * one.amplitude
+        ends = [
+            _forces(replace(made, data=_moved(made.data, number, way * step)), [number], values)
+            for way in (1.0, -1.0)
+        ]
+        found.append((ends[0] - ends[1]) / (2.0 * step))
+    return found
+
+
+def _moved(data: Sequence[LoopData], number: int, step: float) -> tuple[LoopData, ...]:
+    """The data with all displacements of one of them moved."""
+    one = data[number]
+    moved = replace(one, displacement=one.displacement + step)
+    return (*data[:number], moved, *data[number + 1 :])
 
 
 def _starts(made: LoopFit) -> list[Array]:
     """What the records say of themselves, with some shapes of the law."""
-    first = made.data[0]
+    # The loop that slides most says most.
+    first = max(made.data, key=lambda one: one.amplitude)
     load = made.held.get("normal_load", 1.0)
     load = first.normal_load if np.isnan(load) else load
     parallel = 0.0 if made.law.law is BoucWen else first.residual_stiffness
@@ -266,11 +428,14 @@ def _starts(made: LoopFit) -> list[Array]:
         "friction": first.limit / load,
         "normal_load": first.limit / made.held.get("friction", first.limit),
     }
-    for one in made.data:
-        begin[f"{one.name}.{OFFSET}"] = float(one.force.mean())
     free = [name for name in made.law.tried if name in made.names]
     starts = []
     for shape in product(*(made.law.tried[name] for name in free)):
         values = {**begin, **dict(zip(free, shape, strict=True))}
-        starts.append(np.array([values[name] for name in made.names]))
+        begun = np.empty(len(made.problem.unknowns))
+        begun[list(made.names.values())] = [values[name] for name in made.names]
+        begun[made.offsets] = [one.force.mean() for one in made.data]
+        for places, one in zip(made.turns, made.data, strict=True):
+            begun[places] = one.turns
+        starts.append(begun)
     return starts

@@ -21,7 +21,8 @@ class Unknown:
     """A free parameter, its ``name``, which lies from ``lower`` to ``upper``.
 
     Known no better than to ``size`` or to its own value, whichever is larger, it is not determined.
-    A ``logarithmic`` one, above 0, is known by a factor instead.
+    A ``logarithmic`` one, above 0, is known by a factor instead. Of a ``nuisance`` nobody asks: it
+    is fitted with all others, which come before it, and told nowhere.
 
     Examples
     --------
@@ -36,6 +37,7 @@ class Unknown:
     upper: float = np.inf
     size: float = 0.0
     logarithmic: bool = False
+    nuisance: bool = False
 
 
 @dataclass(frozen=True)
@@ -43,7 +45,7 @@ class Series:
     """Data of one kind, its ``name``.
 
     ``values`` ``(n,)``, and their standard ``deviations`` ``(n,)`` if they are known; without them
-    all have one, which the residuals tell.
+    all have one, which the residuals tell, or ``shares`` ``(n,)`` of one.
 
     Examples
     --------
@@ -55,6 +57,12 @@ class Series:
     name: str
     values: Array
     deviations: Array | None = None
+    shares: Array | None = None
+
+    def scattered(self, deviation: float) -> Array:
+        """Deviations ``(n,)`` that are shares of one."""
+        ones = np.ones(len(self.values))
+        return deviation * (ones if self.shares is None else self.shares)
 
 
 @dataclass(frozen=True)

@@ -36,31 +36,42 @@ PRECISE = 1e-8
 
 
 def profiled(
-    problem: FitProblem, inner: Array, deviations: Array, estimates: Sequence[Estimate]
+    problem: FitProblem,
+    inner: Array,
+    deviations: Array,
+    estimates: Sequence[Estimate],
+    wider: Array,
 ) -> list[Estimate]:
     """The estimates with bounds that their profiles bear out.
 
     ``inner`` ``(p,)`` are the best values as they are fitted, ``deviations`` ``(n,)`` those of the
-    data. What a profile passes within the quantile the data allow for the others too: where that is
+    data, and ``wider`` ``(p,)`` by how much those of the estimates are more than these make them.
+    What a profile passes within the quantile the data allow for the others too: where that is
     beyond their bounds these are widened, or left if the profile has no end.
     """
     found, clouds = [], []
     for place, estimate in enumerate(estimates):
         checked, cloud = estimate, [inner]
-        if estimate.determined:
-            checked, cloud = _profiled(problem, place, inner, deviations, estimate)
+        if estimate.determined and not problem.unknowns[place].nuisance:
+            quantile = float(estimate.quantile * wider[place])
+            checked, cloud = _profiled(problem, place, inner, deviations, estimate, quantile)
         found.append(checked)
         clouds.append(np.array([problem.outer(values) for values in cloud]))
     return [_widened(problem, place, found, clouds) for place in range(len(found))]
 
 
 def _profiled(
-    problem: FitProblem, place: int, inner: Array, deviations: Array, estimate: Estimate
+    problem: FitProblem,
+    place: int,
+    inner: Array,
+    deviations: Array,
+    estimate: Estimate,
+    quantile: float,
 ) -> tuple[Estimate, list[Array]]:
-    """The estimate at a ``place``, and all values ``(p,)`` met within the quantile."""
+    """The estimate at a ``place``, and all values ``(p,)`` met within the ``quantile``."""
     cloud: list[Array] = [inner]
     lower, upper = (
-        _bound(problem, place, inner, deviations, bound, estimate.quantile, cloud)
+        _bound(problem, place, inner, deviations, bound, quantile, cloud)
         for bound in estimate.bounds
     )
     return _with_bounds(problem, place, estimate, (lower, upper)), cloud

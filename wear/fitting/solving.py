@@ -11,6 +11,9 @@ from wear.fitting.problem import FitProblem
 TOLERANCE = 1e-12
 """Of the solver, relative: the solution is then exact beside any bound of it."""
 
+AT_BOUND = 1e-3
+"""Of its size, or of its range: a parameter so near to a bound may well be at it."""
+
 ROUGH = 1e-10
 """Tolerance from which on one-sided differences are good enough."""
 
@@ -46,6 +49,33 @@ def solve(
     except (ValueError, np.linalg.LinAlgError):  # a Jacobian that is not finite
         return None
     return solved.x, float(solved.cost), solved.jac
+
+
+def pinned(problem: FitProblem, inner: Array, cost: float, deviations: Array) -> Array:
+    """Return fitted values ``(p,)`` with those nearly at a bound put there, if it costs no more.
+
+    The solver comes to a bound from within, ever more slowly: of data that a model meets exactly,
+    with a parameter at its bound, it leaves more than rounding does.
+    """
+    lower, upper = problem.bounds
+    near = AT_BOUND * np.minimum(_sizes(problem, inner), upper - lower)
+    moved = np.where(inner - lower < near, lower, np.where(upper - inner < near, upper, inner))
+    free = moved == inner
+    if free.all() or not free.any():
+        return inner
+    whole = problem.outer(moved)
+
+    def predict(values: Array) -> Array:
+        given = whole.copy()
+        given[free] = values
+        return problem.predict(given)
+
+    unknowns = tuple(one for one, let in zip(problem.unknowns, free, strict=True) if let)
+    solved = solve(FitProblem(unknowns, problem.series, predict, ()), inner[free], deviations)
+    if solved is None or solved[1] > cost:
+        return inner
+    moved[free] = solved[0]
+    return moved
 
 
 def _sizes(problem: FitProblem, inner: Array) -> Array:

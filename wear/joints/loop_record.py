@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -12,20 +12,36 @@ import numpy as np
 from sa_solver.errors import InputError
 from sa_solver.types import Array, Indices
 
-REVERSAL = 0.5
-"""A reversal turns back by more than this share of the range: inner loops are no cycles."""
+NOISE_REACH = 10.0
+"""A reversal turns back by more than this many standard deviations of the noise, the most that the
+extremes of a million samples of it are apart, ..."""
+
+SMALLEST, LARGEST = 0.01, 0.5
+"""... and by more than the first share of the range, as less are ripples of the drive; by more than
+the second it is one whatever the noise."""
+
+SHORT = 2
+"""Steps up to which a way from one sample that turns to the next is a sign of noise."""
+
+BACKWARDS = 3.0
+"""Steps back of white noise exceed its standard deviation half of the time: three times as much is
+an upper bound."""
+
+CLOSING = 0.02
+"""A loop is closed if it ends this close to where it began, in its stroke, ..."""
 
 NOISE_BAND = 4.0
-"""The reversal is among the samples this many standard deviations of noise from the extreme one,"""
+"""The reversal is among the samples this many standard deviations of noise from the extreme one
+(no loop is closed better than that either), ..."""
 
 SHOULDER = 0.05
-"""and there where lines over this share of the two branches meet, be it a corner or not."""
+"""... and there where lines over this share of the two branches meet, be it a corner or not."""
 
 ENOUGH = 5
-"""Reversals, ends included, that make a cycle without the ends."""
+"""Reversals, ends included, that make a loop without the beginning of a record."""
 
 COMPLETE = 0.98
-"""In shorter records a branch from or to an end counts if it covers this share of the stroke."""
+"""In shorter records the first branch counts if it covers this share of the stroke."""
 
 CLOSED = 0.05
 """One period that begins anywhere is a loop if it ends this close to its beginning, in ranges."""
@@ -51,15 +67,21 @@ class MeasuredLoopError(InputError):
 
 @dataclass(frozen=True)
 class LoopBranch:
-    """From a reversal to the next: their samples ``begin`` and ``end``, and ``sense`` ±1."""
+    """Way from a reversal to the next: its ``samples`` ``(k,)`` of a record, and ``sense`` ±1.
 
-    begin: int
-    end: int
+    Samples of smaller loops that close on the way are left out.
+    """
+
+    samples: Indices
     sense: int
 
     @property
-    def samples(self) -> slice:
-        return slice(self.begin, self.end + 1)
+    def begin(self) -> int:
+        return int(self.samples[0])
+
+    @property
+    def end(self) -> int:
+        return int(self.samples[-1])
 
 
 class LoopRecord(NamedTuple):
@@ -126,24 +148,49 @@ def _evenly(record: LoopRecord, time: Array) -> LoopRecord:
 
 
 def reversals(displacement: Array) -> Indices:
-    """Samples at which ``displacement`` ``(t,)`` turns back, and its extremes at both ends.
+    """Return the samples at which ``displacement`` ``(t,)`` turns back, and both ends.
 
     Noise does not turn it: a reversal is one if the displacement then goes back by more than
-    ``REVERSAL`` of its range. The first and the last sample given may be where the record begins
-    or ends. Raises MeasuredLoopError for a record that never moves.
+    :func:`resolution`. The first and the last sample given may be where the record begins or ends.
+    Raises MeasuredLoopError for a record that never moves.
     """
     motion = np.asarray(displacement, dtype=float)
-    reach = REVERSAL * float(np.ptp(motion)) if motion.size else 0.0
-    if not reach > 0.0:
-        raise MeasuredLoopError("the displacement never changes; allowed: a record of loops")
-    turns = _turning_points(motion.tolist(), reach)
+    turns = _turning_points(motion.tolist(), resolution(motion))
     if len(turns) < 3:
         return np.array(turns, dtype=np.int64)
     first, *inner, last = turns
-    band = min(NOISE_BAND * _noise(motion), 0.25 * reach)
+    band = NOISE_BAND * noise_of(motion)
     neighbours = zip([first, *inner[:-1]], inner, [*inner[1:], last], strict=True)
     middle = [_amid(motion, place, band) for place in neighbours]
     return np.array([first, *middle, last], dtype=np.int64)
+
+
+def resolution(displacement: Array) -> float:
+    """Return the smallest way back of ``displacement`` ``(t,)`` that counts as a reversal [mm].
+
+    Raises MeasuredLoopError for a record that never moves.
+    """
+    extent = float(np.ptp(displacement)) if displacement.size else 0.0
+    if not extent > 0.0:
+        raise MeasuredLoopError("the displacement never changes; allowed: a record of loops")
+    return float(np.clip(NOISE_REACH * noise_of(displacement), SMALLEST * extent, LARGEST * extent))
+
+
+def noise_of(values: Array) -> float:
+    """Return the standard deviation of the noise of ``values`` ``(t,)``, 0 where none shows.
+
+    It is that of the third differences, in which a motion drops out that is sampled finely. In one
+    of a few points a branch it does not; so the noise is no larger than the ways that turn back
+    within :data:`SHORT` steps, of which a motion without noise has none.
+    """
+    moving = values[np.append(True, np.diff(values) != 0.0)]
+    turns = 1 + np.flatnonzero(np.diff(np.sign(np.diff(moving))))
+    short = np.abs(np.diff(moving[turns]))[np.diff(turns) <= SHORT]
+    if short.size == 0 or moving.size < 4:
+        return 0.0
+    # Of white noise they have the variance 1 + 9 + 9 + 1; the median of |N(0, 1)| is 0.6745.
+    spread = float(np.median(np.abs(np.diff(moving, 3)))) / float(0.6745 * np.sqrt(20.0))
+    return min(spread, float(short.max()))
 
 
 def _turning_points(motion: Sequence[float], reach: float) -> list[int]:
@@ -164,14 +211,6 @@ def _turning_points(motion: Sequence[float], reach: float) -> list[int]:
     return [*turns, high if sense > 0 else low]
 
 
-def _noise(motion: Array) -> float:
-    """Standard deviation of the noise, from third differences, in which the motion drops out."""
-    if motion.size < 4:
-        return 0.0
-    # Of white noise they have the variance 1 + 9 + 9 + 1; the median of |N(0, 1)| is 0.6745.
-    return float(np.median(np.abs(np.diff(motion, 3)))) / float(0.6745 * np.sqrt(20.0))
-
-
 def _amid(motion: Array, places: tuple[int, int, int], band: float) -> int:
     """Where the lines before and after ``places[1]`` meet, among the samples as extreme as it."""
     before, turn, after = places
@@ -188,41 +227,107 @@ def _amid(motion: Array, places: tuple[int, int, int], band: float) -> int:
     return int(np.clip(meet, near[0], near[-1]))
 
 
-# --- branches -----------------------------------------------------------------------------------
+# --- loops --------------------------------------------------------------------------------------
+
+LoopPair = tuple[LoopBranch, LoopBranch]
 
 
-def complete_branches(record: LoopRecord) -> tuple[LoopRecord, tuple[LoopBranch, ...]]:
-    """The two branches of every complete cycle, one after the other, and the record they are of.
+@dataclass(frozen=True)
+class _Way:
+    """A way of one ``sense`` ±1, in ``pieces`` from one place of a record to another.
 
-    In that record the displacement is smoothed; one closed period that begins anywhere is turned
-    to begin at a reversal. Raises MeasuredLoopError for a record without a complete cycle.
+    Places between samples are meant as well; ``whole`` says whether it begins at a reversal.
+    """
+
+    pieces: tuple[tuple[float, float], ...]
+    sense: int
+    whole: bool = True
+
+    def travel(self, motion: Array) -> float:
+        """Displacement that it covers [mm]."""
+        ends = self.pieces[0][0], self.pieces[-1][1]
+        return self.sense * float(np.diff(np.interp(ends, np.arange(len(motion)), motion))[0])
+
+
+def closed_loops(record: LoopRecord) -> tuple[LoopRecord, tuple[LoopPair, ...]]:
+    """Return the two branches of every closed loop, in the order in which they close.
+
+    A loop closes where the displacement comes back to the reversal at which it began; it is taken
+    out, and what was before goes on behind it (Masing's memory, which counts loops as rainflow
+    does). Where that is between two samples of a branch that goes on, the record that is returned
+    has one more sample there. One closed period that begins anywhere is turned to begin at a
+    reversal. Raises MeasuredLoopError for a record without a loop.
     """
     turns = reversals(record.displacement)
-    branches = _complete(record, turns)
-    if len(branches) < 2 <= len(turns) and _closed(record):
+    loops = _closed_ways(record.displacement, turns)
+    if not loops and len(turns) >= 2 and _closed(record):
         record = _begun_at(record, int(turns[1]))
-        branches = _complete(record, reversals(record.displacement))
-    if len(branches) < 2:
+        loops = _closed_ways(record.displacement, reversals(record.displacement))
+    if not loops:
         raise MeasuredLoopError(
-            "no complete cycle; allowed: a record that has one from reversal to reversal, or one "
-            "closed period"
+            "no complete cycle; allowed: a record that has one from reversal to reversal, or of "
+            "strokes that fall two cycles of each, or one closed period"
         )
-    branches = branches[: len(branches) // 2 * 2]
-    smooth = _smoothed(record.displacement, branches)
-    return record._replace(displacement=smooth), tuple(branches)
+    ends = [end for loop in loops for way in loop for piece in way.pieces for end in piece]
+    samples = np.arange(len(record.force))
+    places = np.union1d(samples, ends)
+    record = LoopRecord(*(np.interp(places, samples, column) for column in record))
+    return record, tuple((_branch(out, places), _branch(back, places)) for out, back in loops)
 
 
-def _complete(record: LoopRecord, places: Indices) -> list[LoopBranch]:
-    """Branches from reversal to reversal; those at the ends of a record only if there are few."""
-    if len(places) < 3:
-        return []
-    moved = np.diff(record.displacement[places])
-    whole = np.abs(moved) >= COMPLETE * np.abs(moved).max()
-    whole[1:-1] = True
-    if len(places) >= ENOUGH:
-        whole[[0, -1]] = False
-    pairs = zip(pairwise(places.tolist()), np.sign(moved).astype(int).tolist(), whole, strict=True)
-    return [LoopBranch(begin, end, sense) for (begin, end), sense, taken in pairs if taken]
+def _branch(way: _Way, places: Array) -> LoopBranch:
+    """The samples of a way, once the record has all ``places``."""
+    parts = [
+        np.arange(*(np.searchsorted(places, piece) + np.array([0, 1]))) for piece in way.pieces
+    ]
+    # Pieces that follow each other share a sample.
+    return LoopBranch(np.unique(np.concatenate(parts)), way.sense)
+
+
+def _closed_ways(motion: Array, turns: Indices) -> list[tuple[_Way, _Way]]:
+    """The ways of all loops that close between ``turns``."""
+    ways = [
+        _Way(((float(begin), float(end)),), 1 if motion[end] > motion[begin] else -1)
+        for begin, end in pairwise(turns.tolist())
+    ]
+    longest = max((way.travel(motion) for way in ways), default=0.0)
+    if ways and (len(turns) >= ENOUGH or ways[0].travel(motion) < COMPLETE * longest):
+        ways[0] = replace(ways[0], whole=False)
+    slack = NOISE_BAND * noise_of(motion)
+    loops: list[tuple[_Way, _Way]] = []
+    opened: list[_Way] = []
+    for way in ways:
+        while opened and opened[-1].whole:
+            stroke = opened[-1].travel(motion)
+            short = max(CLOSING * stroke, slack)
+            if way.travel(motion) < stroke - short:
+                break
+            before = opened.pop()
+            back, rest = _parted(motion, way, before, way.travel(motion) > stroke + short)
+            loops.append((before, back))
+            if not opened:
+                way = replace(rest, whole=False)
+                break
+            outer = opened.pop()
+            way = replace(outer, pieces=(*outer.pieces, *rest.pieces))
+        opened.append(way)
+    return loops
+
+
+def _parted(motion: Array, way: _Way, before: _Way, beyond: bool) -> tuple[_Way, _Way]:
+    """A way up to where ``before`` began, or to its end unless it goes ``beyond``, and the rest."""
+    *pieces, (begin, end) = way.pieces
+    place = end
+    if beyond:
+        level = motion[int(before.pieces[0][0])]
+        inside = np.arange(int(np.ceil(begin)), int(end))
+        below = inside[way.sense * (motion[inside] - level) < 0.0]
+        last = int(below[-1]) if below.size else int(np.floor(begin))
+        step = motion[last + 1] - motion[last]
+        share = (level - motion[last]) / step if step != 0.0 else 0.0
+        place = float(np.clip(last + share, begin, end))
+    back = replace(way, pieces=(*pieces, (begin, place)))
+    return back, replace(way, pieces=((place, end),))
 
 
 def _closed(record: LoopRecord) -> bool:
@@ -241,21 +346,44 @@ def _begun_at(record: LoopRecord, start: int) -> LoopRecord:
     return LoopRecord(*(column[order] for column in record))
 
 
-def _smoothed(motion: Array, branches: Sequence[LoopBranch]) -> Array:
-    """The displacement without some of its noise, or as it is if that would bend the motion."""
-    period = 2.0 * float(np.median([branch.end - branch.begin for branch in branches]))
+def noise_along(record: LoopRecord, branches: Sequence[LoopBranch]) -> tuple[float, float]:
+    """Return the standard deviations of the noise of displacement [mm] and force [N].
+
+    Where a branch has few points its force jumps as noise does, but not backwards: its noise is no
+    more than :data:`BACKWARDS` times what half of the steps back exceed, and 0 without any.
+    """
+    steps = [branch.sense * np.diff(record.force[branch.samples]) for branch in branches]
+    back = -np.concatenate(steps)
+    back = back[back > 0.0]
+    most = BACKWARDS * float(np.median(back)) if back.size else 0.0
+    return noise_of(record.displacement), min(noise_of(record.force), most)
+
+
+def smoothed(motion: Array, branches: Sequence[LoopBranch]) -> Array:
+    """Return the displacement ``(t,)`` without some of the noise, right on ``branches`` alone.
+
+    It is the displacement as it is if it shows no noise, or if smoothing would bend the motion.
+    Branches follow each other in pairs, the first of which ends at a reversal.
+    """
+    if noise_of(motion) == 0.0:
+        return motion
+    period = 2.0 * float(np.median([len(branch.samples) - 1 for branch in branches]))
     half = int(0.5 * SMOOTHING * period)
-    if 2 * half + 1 < FEWEST_SMOOTHED:
+    if 2 * half + 1 < FEWEST_SMOOTHED or len(motion) < 2 * half + 1:
         return motion
     # Half a second to import: where it is used.
     from scipy.signal import savgol_filter
 
     smooth: Array = savgol_filter(motion, 2 * half + 1, 3)
-    taken = motion - smooth
+    used = np.unique(np.concatenate([branch.samples for branch in branches]))
+    taken = (motion - smooth)[used]
     if taken[1:] @ taken[:-1] > SIGNAL * (taken @ taken):
         return motion
-    turns = np.array([[branch.end, branch.sense] for branch in branches[:-1]])
-    near = turns[:, :1] + np.arange(-half // 4, half // 4 + 1)
-    rounding = turns[:, 1] * taken[near].mean(axis=1)
+    turns = np.array([[branch.end, branch.sense] for branch in branches[::2]])
+    inside = (turns[:, 0] >= half) & (turns[:, 0] < len(motion) - half)
+    if not inside.any():
+        return motion
+    near = turns[inside, :1] + np.arange(-half // 4, half // 4 + 1)
+    rounding = turns[inside, 1] * (motion - smooth)[near].mean(axis=1)
     error = float(np.std(taken)) / np.sqrt(near.size)
     return motion if abs(float(rounding.mean())) > ROUNDED * error else smooth

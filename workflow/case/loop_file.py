@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from sa_solver.types import Array
+from wear.joints.measured_loops import MeasuredLoops
 from workflow.case.fields import Quantity
 from workflow.case.input_files import InputFileError
 from workflow.case.table_file import read_table_file
@@ -33,3 +34,17 @@ def read_loop_file(path: Path, names: Mapping[str, str]) -> dict[str, Array]:
         }
     except InputFileError as error:
         raise UserError(str(error)) from error
+
+
+def account(loops: MeasuredLoops) -> str:
+    """What is in the loops of a record, and what is left out of them."""
+    # Without the rounding of a difference of sums.
+    work = float(loops.work[-1])
+    before, between, after = (one if abs(one) > 1e-9 * work else 0.0 for one in loops.left_out)
+    count = len(loops.energy)
+    return (
+        f"{count} closed loop{'s' if count > 1 else ''} of {loops.energy.sum():.4g} mJ; left out, "
+        f"of {work:.4g} mJ of work on the record: {before:.3g} mJ before the first loop, "
+        f"{between:.3g} between loops, {after:.3g} after the last; reversals closer than "
+        f"{1e3 * loops.resolution:.2g} um are taken for noise"
+    )

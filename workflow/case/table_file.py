@@ -1,8 +1,9 @@
 """Tables of numbers in CSV files that come with a case or a command: one dialect for all of them.
 
 The first row has the headings, each a name with a unit in brackets, or without one in the base
-unit. Lines that begin with ``#`` are comments, empty ones and a byte-order mark are passed over.
-Encodings and separators are those of :func:`workflow.case.input_files.csv_rows`.
+unit; the second row may have the units instead, as measuring programs write them. Lines that begin
+with ``#`` are comments, empty ones and a byte-order mark are passed over. Encodings and separators
+are those of :func:`workflow.case.input_files.csv_rows`.
 """
 
 from __future__ import annotations
@@ -25,6 +26,9 @@ from workflow.case.units import UnitError, to_base
 HEADING = re.compile(r"(?P<name>[^\[\]]*?)\s*(?:\[\s*(?P<unit>[^\[\]]*?)\s*\])?")
 # Other ways to write a unit, taken for one where it is: "force (left)" is a name.
 ELSEWHERE = re.compile(r"(?P<name>.+?)\s*(?:\((?P<in_brackets>.+)\)|\s(?:in|/)\s+(?P<after>\S+))")
+
+# A row of units below the names: each as it is or in any brackets, and what stands for none.
+BRACKETS, NO_UNIT = re.compile(r"^[\[(]\s*(.*?)\s*[\])]$"), "-"
 
 
 @dataclass(frozen=True)
@@ -138,6 +142,11 @@ def read_table_file(file: str | Path) -> TableFile:
         raise InputFileError(f"{file}:{line}: no rows; allowed: a header and at least one row")
     check_widths(file, rows, "header")
     (line, headings), *rest = rows
+    if len(rest) > 1 and (units := _units_below(headings, rest[0][1])):
+        headings = tuple(
+            f"{name} [{unit}]" if unit else name for name, unit in zip(headings, units, strict=True)
+        )
+        rest = rest[1:]
     return TableFile(str(file), line, headings, tuple(rest))
 
 
@@ -158,6 +167,21 @@ def check_unit(place: str, unit: str, base: str) -> None:
     except UnitError as error:
         allowed = "a bare number" if base == "1" else f"{base}, or a unit of the same dimension"
         raise InputFileError(f"{place}: {error}; allowed: {allowed}") from error
+
+
+def _units_below(headings: tuple[str, ...], cells: tuple[str, ...]) -> tuple[str, ...]:
+    """Units in a second row of headings, empty for a column without; none if it has no units."""
+    units = tuple(BRACKETS.sub(r"\1", cell) for cell in cells)
+    units = tuple("" if unit == NO_UNIT else unit for unit in units)
+    if not any(units) or any(_name_and_unit(heading)[1] for heading in headings):
+        return ()
+    for unit in filter(None, units):
+        try:
+            to_base(f"1 {unit}", None)
+        except UnitError:
+            return ()
+    # A number among them makes them the first row of the table.
+    return () if any(unit[0] in "0123456789.+" for unit in filter(None, units)) else units
 
 
 @cache

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
-from sa_solver.types import Array
+from sa_solver.types import Array, Mask
 from wear.joints.loop_record import MeasuredLoopError
 from wear.joints.measured_loops import MeanEstimate, MeasuredLoops, mean_estimate, measure_loops
 from workflow.analyses.wear.loop_table import write_loop_table
-from workflow.case.loop_file import BASE_UNITS, read_loop_file
+from workflow.case.loop_file import BASE_UNITS, account, read_loop_file
 from workflow.case.units import UnitError, to_base
 from workflow.errors import UserError
 from workflow.shell.folder import OutputFolder
@@ -78,45 +79,84 @@ def _number(text: str) -> float | None:
 
 
 def report(loops: MeasuredLoops) -> list[str]:
-    """The table of cycles, their means with standard errors, and what to know of them."""
+    """The table of loops, the means of each step with standard errors, and what to know of them."""
+    steps = loops.steps
+    many = len(steps) > 1
     columns = _shown(loops)
-    rows = [["cycle", *columns]]
-    count = len(loops.energy)
-    for cycle in _few(count):
-        values = [values[cycle] for values, _ in columns.values()]
-        rows.append([str(cycle + 1), *(f"{value:.4g}" for value in values)])
-    rows.append(["mean", *(f"{estimate.value:.4g}" for _, estimate in columns.values())])
-    if count > 1:
-        rows.append(["+-", *(f"{estimate.error:.1g}" for _, estimate in columns.values())])
+    rows = [["cycle", *(["step"] if many else []), *columns]]
+    for cycle in _few(len(loops.energy)):
+        step = [str(loops.step[cycle] + 1)] if many else []
+        rows.append([str(cycle + 1), *step, *(column.cell(cycle) for column in columns.values())])
+    for number in _few(len(steps)):
+        rows += _means(steps[number], list(columns), str(number + 1) if many else "")
     lines = ["".join(f"{cell:>{WIDTH}}" for cell in row) for row in rows]
+    if max(len(loops.energy), len(steps)) > MOST_ROWS:
+        lines.append(
+            f"{MOST_ROWS} rows at most are shown; the table that --out writes has all loops"
+        )
     return [*lines, *_notes(loops)]
 
 
-def _shown(loops: MeasuredLoops) -> dict[str, tuple[Array, MeanEstimate]]:
-    """Values ``(c,)`` and their mean, by heading."""
+def _means(step: MeasuredLoops, names: Sequence[str], number: str) -> list[list[str]]:
+    """Rows of a step: its means and, of several loops, their standard errors."""
+    columns = _shown(step)
+    beside = [number] if number else []
+    given = [columns.get(name) for name in names]
+    rows = [["mean", *beside, *("-" if one is None else one.mean_cell() for one in given)]]
+    if len(step.energy) > 1:
+        rows.append(["+-", *beside, *("-" if one is None else one.error_cell() for one in given)])
+    return rows
+
+
+class _Column(NamedTuple):
+    """Values ``(c,)`` of the loops, their mean, and which of them are only a lower bound."""
+
+    values: Array
+    mean: MeanEstimate
+    bounds: Mask
+
+    def cell(self, cycle: int) -> str:
+        return _cell(self.values[cycle], self.bounds[cycle])
+
+    def mean_cell(self) -> str:
+        return _cell(self.mean.value, self.bounds[0])
+
+    def error_cell(self) -> str:
+        return f"{self.mean.error:.1g}" if np.isfinite(self.mean.error) else "-"
+
+
+def _cell(value: float, bound: bool) -> str:
+    """A number, of a lower bound with its sign; nothing for what is not known."""
+    return f"{'>' if bound else ''}{value:.4g}" if np.isfinite(value) else "-"
+
+
+def _shown(loops: MeasuredLoops) -> dict[str, _Column]:
+    """Columns by heading; means are those of loops that are alike."""
     per_micron = 1e-3
-    stick = loops.stick_estimate
+    some = bool(loops.sliding.any())
+    kt = loops.stick_stiffness * per_micron
     columns = {
-        "stroke [um]": _with_mean(loops.stroke / per_micron),
-        "energy [mJ]": _with_mean(loops.energy),
-        "kt [N/um]": (
-            loops.stick_stiffness * per_micron,
-            MeanEstimate(stick.value * per_micron, stick.error * per_micron),
-        ),
+        "stroke [um]": _column(loops.stroke / per_micron),
+        "energy [mJ]": _column(loops.energy),
+        "kt [N/um]": _column(kt),
     }
-    if loops.slides:
-        columns["kr [N/um]"] = _with_mean(loops.residual_stiffness * per_micron)
-    if not np.isnan(loops.normal_load).any():
-        mu = loops.friction if loops.slides else loops.mobilised
-        columns["mu" if loops.slides else "mu at least"] = _with_mean(mu)
-    else:
-        force = loops.friction_force if loops.slides else loops.force
-        columns["mu N [N]" if loops.slides else "force [N]"] = _with_mean(force)
+    if (loops.step == loops.step[0]).all():
+        stick = loops.stick_estimate
+        mean = MeanEstimate(stick.value * per_micron, stick.error * per_micron)
+        columns["kt [N/um]"] = columns["kt [N/um]"]._replace(mean=mean)
+    if some:
+        columns["kr [N/um]"] = _column(loops.residual_stiffness * per_micron)
+    known = not np.isnan(loops.normal_load).any()
+    sliding, stuck = ("mu", "mu at least") if known else ("mu N [N]", "force [N]")
+    values = np.where(loops.sliding > 0.0, loops.friction_force, loops.force)
+    values = values / loops.normal_load if known else values
+    columns[sliding if some else stuck] = _column(values, some & (loops.sliding == 0.0))
     return columns
 
 
-def _with_mean(values: Array) -> tuple[Array, MeanEstimate]:
-    return values, mean_estimate(values)
+def _column(values: Array, bounds: Mask | None = None) -> _Column:
+    none = np.zeros(len(values), dtype=np.bool_)
+    return _Column(values, mean_estimate(values), none if bounds is None else bounds)
 
 
 def _few(count: int) -> list[int]:
@@ -128,20 +168,41 @@ def _few(count: int) -> list[int]:
 
 def _notes(loops: MeasuredLoops) -> list[str]:
     """What the numbers mean."""
-    notes = ["kt is the slope right after a reversal, residual stiffness included"]
-    if loops.slides:
+    count = int(loops.step[-1]) + 1
+    notes = [account(loops), "kt is the slope right after a reversal, residual stiffness included"]
+    if count > 1:
         notes.append(
-            f"the last {loops.sliding:.0%} of the branches slide: kr is their slope, mu half "
-            "their distance over the normal load"
+            f"{count} steps of loops that are alike in stroke, force and load; there is no mean of "
+            "all"
         )
-    else:
+    if np.isnan(loops.stick_stiffness).any():
         notes.append(
-            "no sliding branch: half the force range over the normal load is a lower bound of mu, "
-            "and kr is not known; a larger stroke would show both"
+            "kt: not known where fewer than 4 samples lie between a reversal and half of the "
+            "loop's height; a fit of joint_law finds it from whole loops"
+        )
+    if loops.sliding.any():
+        shares = np.unique(loops.sliding[loops.sliding > 0.0])
+        least, most = f"{shares[0]:.0%}", f"{shares[-1]:.0%}"
+        notes.append(
+            f"the last {least if least == most else f'{least} to {most}'} of the branches slide: "
+            "kr is their slope, mu half their distance over the normal load"
+        )
+    if not loops.slides:
+        notes.append(
+            f"no sliding branch{f' at {_strokes(loops)}' if loops.sliding.any() else ''}: half the "
+            "force range over the normal load is a lower bound of mu, and kr is not known; a "
+            "larger stroke would show both"
         )
     if np.isnan(loops.normal_load).any():
         notes.append("no normal load, so no mu: give --normal-load or a column normal_load")
     return notes
+
+
+def _strokes(loops: MeasuredLoops) -> str:
+    """Strokes of the loops that do not slide."""
+    stuck = 1e3 * loops.stroke[loops.sliding == 0.0]
+    least, most = f"{stuck.min():.4g}", f"{stuck.max():.4g}"
+    return f"strokes of {least if least == most else f'{least} to {most}'} um"
 
 
 # --- what is written ----------------------------------------------------------------------------
@@ -163,11 +224,16 @@ def write_loops(loops: MeasuredLoops, out: Path, title: str, force: bool) -> lis
 
 
 def _rows(loops: MeasuredLoops) -> Iterator[dict[str, float]]:
-    """A row per cycle, in base units; columns that the record does not have are left out."""
+    """A row per loop whose stiffness is known, in base units.
+
+    Columns that the record does not have are left out; of loops that do not slide, among some that
+    do, friction is what is mobilised, as in the table of a wear run.
+    """
+    reversals, work = loops.reversals, loops.work
     values: dict[str, Array] = {
         "cycles": np.arange(1.0, len(loops.energy) + 1.0),
-        # Since the first cycle of the record began.
-        "energy": np.cumsum(loops.energy),
+        # Since the first loop of the record began.
+        "energy": work[reversals[:, 2]] - work[reversals.min()],
         "kt": loops.stick_stiffness,
         "energy_per_loop": loops.energy,
         "amplitude": 0.5 * loops.stroke,
@@ -177,7 +243,13 @@ def _rows(loops: MeasuredLoops) -> Iterator[dict[str, float]]:
         values["residual_stiffness"] = loops.residual_stiffness
     if not np.isnan(loops.normal_load).any():
         values["P"] = loops.normal_load
-        if loops.slides:
-            values["mu"] = loops.friction
+        if loops.sliding.any():
+            values["mu"] = np.where(loops.sliding > 0.0, loops.friction, loops.mobilised)
+            if not loops.slides:
+                values["sliding"] = (loops.sliding > 0.0).astype(float)
+    if np.isnan(loops.stick_stiffness).all():
+        del values["kt"]
     for cycle in zip(*values.values(), strict=True):
-        yield dict(zip(values, map(float, cycle), strict=True))
+        row = dict(zip(values, map(float, cycle), strict=True))
+        if np.isfinite(row.get("kt", 0.0)):
+            yield row

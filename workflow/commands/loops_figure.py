@@ -9,7 +9,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from sa_solver.types import Array
+from sa_solver.types import Array, Indices
+from wear.joints.loop_record import LoopBranch
 from wear.joints.measured_loops import MeasuredLoops
 from workflow.pictures.panels import legend_below, new_figure
 from workflow.pictures.scales import PER_MICRON, TO_MICRONS
@@ -17,6 +18,8 @@ from workflow.pictures.style import BLACK, BLUE, GREEN, ORANGE, write_figures
 
 # More loops than this are drawn as every so many.
 MOST_LOOPS = 40
+# Steps of like loops too.
+MOST_STEPS = 12
 HEADROOM = 1.15
 
 
@@ -26,7 +29,7 @@ def write_figure(loops: MeasuredLoops, name: str, path: Path) -> None:
 
 
 def figure(loops: MeasuredLoops, name: str) -> Figure:
-    """Loops with the lines that were laid through the middle one; stiffness, friction, energy."""
+    """Loops, with lines laid through the middle one of each step; stiffness, friction, energy."""
     drawn = new_figure(_title(loops, name), 7.0)
     left, right = drawn.subfigures(1, 2, squeeze=False, width_ratios=(1.4, 1.0))[0]
     axis = left.subplots()
@@ -41,73 +44,89 @@ def figure(loops: MeasuredLoops, name: str) -> Figure:
 
 
 def _draw_loops(axis: Axes, loops: MeasuredLoops) -> None:
-    record, count = loops.record, len(loops.energy)
-    for begin, _, end in loops.reversals[:: -(-count // MOST_LOOPS)]:
-        here = slice(begin, end + 1)
-        axis.plot(TO_MICRONS * record.displacement[here], record.force[here], color="0.7", lw=0.8)
-    middle = count // 2
-    begin, turn, end = loops.reversals[middle]
-    here = slice(begin, end + 1)
-    axis.plot(
-        TO_MICRONS * record.displacement[here],
-        record.force[here],
-        color=BLACK,
-        lw=1.2,
-        label=f"cycle {middle + 1}",
-    )
-    for number, place in enumerate((begin, turn)):
-        _draw_stick(axis, loops, middle, place, None if number else "stick slope kt")
-    if loops.slides:
-        _draw_sliding(axis, loops, middle)
+    count = len(loops.energy)
+    for pair in loops.branches[:: -(-count // MOST_LOOPS)]:
+        axis.plot(*_curve(loops, *pair), color="0.7", lw=0.8)
+    last = int(loops.step[-1])
+    for number in range(0, last + 1, -(-(last + 1) // MOST_STEPS)):
+        _draw_step(axis, loops, np.flatnonzero(loops.step == number), number == 0)
     axis.set_xlabel("displacement [µm]")
     axis.set_ylabel("force [N]")
 
 
+def _draw_step(axis: Axes, loops: MeasuredLoops, members: Indices, labelled: bool) -> None:
+    """The middle one of the loops of a step, with the lines laid through it."""
+    middle = int(members[len(members) // 2])
+    pair = loops.branches[middle]
+    several = loops.step[-1] > 0
+    label = "middle loop of a step" if several else f"cycle {middle + 1}"
+    axis.plot(*_curve(loops, *pair), color=BLACK, lw=1.2, label=label if labelled else None)
+    for number, branch in enumerate(pair):
+        told = labelled and number == 0
+        _draw_stick(axis, loops, middle, branch, "stick slope kt" if told else None)
+        if loops.sliding[middle] > 0.0:
+            # Of small strokes that stick there is no such line: whichever is first has the name.
+            named = "sliding, slope kr"
+            new = named not in axis.get_legend_handles_labels()[1]
+            _draw_sliding(axis, loops, middle, branch, named if new else None)
+
+
+def _curve(loops: MeasuredLoops, *branches: LoopBranch) -> tuple[Array, Array]:
+    """Displacement [µm] and force [N] along branches."""
+    samples = np.concatenate([branch.samples for branch in branches])
+    return TO_MICRONS * loops.record.displacement[samples], loops.record.force[samples]
+
+
 def _draw_stick(
-    axis: Axes, loops: MeasuredLoops, cycle: int, place: int, label: str | None
+    axis: Axes, loops: MeasuredLoops, cycle: int, branch: LoopBranch, label: str | None
 ) -> None:
-    """The slope at the reversal ``place``, over half of the height of the loop."""
-    record = loops.record
-    forces = record.force[loops.reversals[cycle, :2]]
-    start, opposite = record.force[place], forces.sum() - record.force[place]
-    height = np.sign(opposite - start) * np.array([0.0, loops.force[cycle]])
-    motion = record.displacement[place] + height / loops.stick_stiffness[cycle]
-    axis.plot(TO_MICRONS * motion, start + height, color=BLUE, lw=2.5, label=label)
+    """The slope at the beginning of a branch, over half of the height of the loop."""
+    if np.isnan(loops.stick_stiffness[cycle]):
+        return
+    moved, force = _curve(loops, branch)
+    height = branch.sense * np.array([0.0, loops.force[cycle]])
+    motion = moved[0] + TO_MICRONS * height / loops.stick_stiffness[cycle]
+    axis.plot(motion, force[0] + height, color=BLUE, lw=2.5, label=label)
 
 
-def _draw_sliding(axis: Axes, loops: MeasuredLoops, cycle: int) -> None:
-    """The sliding lines over the part of the branches that they are laid through."""
-    record, (begin, turn, end) = loops.record, loops.reversals[cycle]
-    stroke, slope = loops.stroke[cycle], loops.residual_stiffness[cycle]
-    for number, (start, stop) in enumerate(((begin, turn), (turn, end))):
-        sense = np.sign(record.displacement[stop] - record.displacement[start])
-        reach = record.displacement[stop] - sense * loops.sliding * stroke
-        branch = slice(start, stop + 1)
-        motion, force = record.displacement[branch], record.force[branch]
-        there = sense * (motion - reach) >= 0.0
-        ends = np.array([reach, record.displacement[stop]])
-        line = force[there].mean() + slope * (ends - motion[there].mean())
-        label = None if number else "sliding, slope kr"
-        axis.plot(TO_MICRONS * ends, line, color=ORANGE, lw=2.5, label=label)
+def _draw_sliding(
+    axis: Axes, loops: MeasuredLoops, cycle: int, branch: LoopBranch, label: str | None
+) -> None:
+    """The sliding line over the part of a branch that it is laid through."""
+    moved, force = _curve(loops, branch)
+    reach = moved[-1] - branch.sense * TO_MICRONS * loops.sliding[cycle] * loops.stroke[cycle]
+    there = branch.sense * (moved - reach) >= 0.0
+    ends = np.array([reach, moved[-1]])
+    slope = loops.residual_stiffness[cycle] / TO_MICRONS
+    line = force[there].mean() + slope * (ends - moved[there].mean())
+    axis.plot(ends, line, color=ORANGE, lw=2.5, label=label)
 
 
 def _friction(loops: MeasuredLoops) -> tuple[Array, str]:
     """What the record says of friction, and what to call it."""
-    if np.isnan(loops.normal_load).any():
-        return (loops.friction_force, "µN [N]") if loops.slides else (loops.force, "force [N]")
-    return (loops.friction, "µ") if loops.slides else (loops.mobilised, "µ at least")
+    values = np.where(loops.sliding > 0.0, loops.friction_force, loops.force)
+    known = not np.isnan(loops.normal_load).any()
+    values = values / loops.normal_load if known else values
+    if loops.slides:
+        return values, "µ" if known else "µN [N]"
+    least = " at least" if not loops.sliding.any() else " (stuck: at least)"
+    return values, f"µ{least}" if known else "force [N]"
 
 
 def _draw_values(axis: Axes, values: Array, label: str, colour: str) -> None:
     axis.plot(np.arange(1, len(values) + 1), values, color=colour, marker="o", ms=4.0, lw=1.2)
-    axis.set_ylim(0.0, HEADROOM * values.max())
+    most = np.max(values, initial=0.0, where=np.isfinite(values))
+    axis.set_ylim(0.0, HEADROOM * most if most > 0.0 else 1.0)
     axis.set_ylabel(label)
 
 
 def _title(loops: MeasuredLoops, name: str) -> str:
+    if (steps := int(loops.step[-1]) + 1) > 1:
+        return f"{name}: {len(loops.energy)} loops in {steps} steps of like ones"
     values, label = _friction(loops)
     stick = PER_MICRON * loops.stick_estimate.value
     called, _, unit = label.partition(" [")
     unit = f" {unit.rstrip(']')}" if unit else ""
     equals = " " if called.endswith("least") else " = "
-    return f"{name}: kt = {stick:.4g} N/µm, {called}{equals}{values.mean():.4g}{unit}"
+    known = f"kt = {stick:.4g} N/µm, " if np.isfinite(stick) else ""
+    return f"{name}: {known}{called}{equals}{values.mean():.4g}{unit}"

@@ -17,26 +17,20 @@ from wear.fitting import (
     EvolutionData,
     Fit,
     FitError,
-    LoopData,
     VolumeData,
     VolumeLaw,
     common_over,
     diagnose,
     evolution_problem,
     fit,
-    loop_problem,
-    mean_loop,
     volume_problem,
 )
 from wear.fitting.diagnosis import ALARM
-from wear.joints.loop_record import MeasuredLoopError
-from wear.joints.measured_loops import measure_loops
-from workflow.case.loop_file import read_loop_file
 from workflow.case.sections import Section
 from workflow.case.units import to_base
 from workflow.errors import CaseError, UserError
 from workflow.fit.measured import Column, read_columns
-from workflow.fit.schema import FREE, FitInput, JointFit, LoopFit, WearFit
+from workflow.fit.schema import FREE, FitInput, JointFit, WearFit
 from workflow.pictures.scales import TO_JOULES, TO_MICRONS
 
 # Columns of the parameters of a joint.
@@ -170,6 +164,7 @@ def solved(
     paths: Sequence[tuple[str, str]],
     series: Sequence[FittedSeries],
     notes: Sequence[str],
+    told: Sequence[str] = (),
 ) -> Fitted:
     """The result of a fit whose parameters have these ``paths`` and units."""
     called = {one.name: path for one, (path, _) in zip(fitted.estimates, paths, strict=True)}
@@ -197,7 +192,7 @@ def solved(
             "best of all is told"
         )
     tests = _tests(fitted, parameters, series, files)
-    found = Fitted(given, fitted, parameters, tuple(series), tuple(doubts), tests)
+    found = Fitted(given, fitted, parameters, tuple(series), tuple(doubts), tests, tuple(told))
     return replace(found, doubts=(*doubts, *_contradictions(found)))
 
 
@@ -344,63 +339,6 @@ def _without_residual(
         return columns, [note]
     alone = Column(kt.against, kt.values - residual, kt.deviations, kt.others, kt.places, kt.files)
     return {**columns, "kt": alone}, []
-
-
-# --- loops --------------------------------------------------------------------------------------
-
-
-def fit_loops(given: FitInput, file: LoopFit) -> Fitted:
-    """A law of loops. Raises as :func:`workflow.fit.running.run_fit`."""
-    entries = file.joint.model_dump(exclude={"law"})
-    # A normal load that is not given is that of each record.
-    entries["normal_load"] = np.nan if file.joint.normal_load is None else entries["normal_load"]
-    held = {key: float(value) for key, value in entries.items() if value != FREE}
-    loops = []
-    for number, one in enumerate(file.measurements, 1):
-        names = {k: v for k, v in one.columns.model_dump().items() if v is not None}
-        record = read_loop_file(Path(one.file), names)
-        columns = (record.get("normal_load"), record.get("time"))
-        try:
-            measured = measure_loops(record["displacement"], record["force"], *columns)
-        except MeasuredLoopError as error:
-            raise UserError(f"{one.file}: {error}") from error
-        loops.append(mean_loop(_loop_name(file, number), measured))
-    try:
-        problem = loop_problem(loops, file.joint.law, held)
-        fitted = fit(problem.problem)
-    except FitError as error:
-        raise UserError(f"{given.name}: {error}") from error
-    series = [
-        FittedSeries(
-            one.name,
-            "N",
-            _loop_column(one, measurement.file, number),
-            DISPLACEMENT,
-            lambda _, one=one: lambda values: problem.loop(one, values),  # type: ignore[misc]
-        )
-        for number, (one, measurement) in enumerate(zip(loops, file.measurements, strict=True))
-    ]
-    paths = [_loop_path(unknown.name) for unknown in problem.problem.unknowns]
-    return solved(given, fitted, paths, series, [])
-
-
-def _loop_name(file: LoopFit, number: int) -> str:
-    return "force" if len(file.measurements) == 1 else f"force_{number}"
-
-
-def _loop_column(loop: LoopData, file: str, number: int) -> Column:
-    """The mean loop as a column; its places are named by their displacement."""
-    name = Path(file).name
-    places = tuple(f"{name} at {TO_MICRONS * x:.3g} um" for x in loop.displacement)
-    files = np.full(len(loop.force), number)
-    others = {"normal_load": np.full(len(loop.force), loop.normal_load)}
-    return Column(loop.displacement, loop.force, None, others, places, files)
-
-
-def _loop_path(name: str) -> tuple[str, str]:
-    """Path and unit of a parameter of :func:`loop_problem`."""
-    of, _, parameter = name.rpartition(".")
-    return (f"{of}.{parameter}", "N") if of else (f"joint.{name}", JOINT_UNITS.get(name, "1"))
 
 
 # --- wear ---------------------------------------------------------------------------------------

@@ -5,7 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 from workflow.errors import UserError
-from workflow.fit.fitting import Fitted, fit_joint, fit_loops, fit_wear
+from workflow.fit.fitting import Fitted, fit_joint, fit_wear
+from workflow.fit.loops import fit_loops
 from workflow.fit.profile_schema import ProfileFit
 from workflow.fit.report import data_columns, parameter_columns, summary
 from workflow.fit.schema import FitInput, JointFit, LoopFit

@@ -309,7 +309,7 @@ class LoopHeadings(Section):
 
 
 class LoopMeasurement(Measurement):
-    """A record of loops that are alike."""
+    """A record of loops, of one stroke or of several."""
 
     columns: LoopHeadings = entry("other headings", default=LoopHeadings())
 

@@ -129,7 +129,8 @@ def _slopes(
     """Stick slope and friction of a loop; no friction where it does not slide."""
     slope, friction = _stick_slope(model, motion, displacement, force, rows), None
     with suppress(MeasuredLoopError):
-        loop = measure_loops(np.tile(displacement, REPEATED), np.tile(force, REPEATED))
+        # Loops within the largest, of higher harmonics, are not those that are asked for.
+        loop = measure_loops(np.tile(displacement, REPEATED), np.tile(force, REPEATED)).widest
         if loop.energy.mean() > STUCK_LOOP * np.ptp(displacement) * np.ptp(force):
             slope = float(loop.stick_stiffness.mean()) if slope is None else slope
             if loop.slides and load > 0.0:
