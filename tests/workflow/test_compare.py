@@ -52,11 +52,12 @@ def test_what_differs_is_told_and_what_exceeds_the_errors_marked(runs):
     rows = {row.first.path.removeprefix("states.-1."): row for row in compared.rows}
     assert rows["peak_pressure"].difference(1) == pytest.approx(0.0, abs=1e-9)
     assert rows["peak_pressure"].beyond(1) is None
-    first, other, _ = rows["peak_shear"].values
-    assert rows["peak_shear"].difference(1) == pytest.approx(other / first - 1.0)
-    assert rows["peak_shear"].difference(1) > 0.02
-    assert rows["peak_shear"].beyond(1) is True
-    assert rows["peak_shear"].beyond(2) is False
+    first, other, _ = rows["cumulative_energy"].values
+    assert rows["cumulative_energy"].difference(1) == pytest.approx(other / first - 1.0)
+    # Less of the contact slips where friction is larger.
+    assert rows["cumulative_energy"].difference(1) < -0.02
+    assert rows["cumulative_energy"].beyond(1) is True
+    assert rows["cumulative_energy"].beyond(2) is False
     assert rows["stick_radius"].difference(0) is None
     assert rows["stick_radius"].difference(2) == 0.0
 
@@ -69,19 +70,19 @@ def test_command_writes_text_table_page_and_curves(runs, tmp_path):
     (line,) = [line for line in ended.stdout.splitlines() if "friction.coefficient" in line]
     assert line.split() == ["friction.coefficient", "0.7", "0.9"]
     assert any(
-        "largest shear" in text and text.endswith("!")
+        "energy dissipated so far" in text and text.endswith("!")
         for text in map(str.rstrip, ended.stdout.splitlines())
     )
     assert OutputFolder(out, "comparison").manifest.keys() > {"compare.csv", "compare.html"}
     assert len(list((out / "curves").glob("*.png"))) == 4
     with (out / "compare.csv").open(encoding="utf-8", newline="") as file:
         rows = {row["path"]: row for row in csv.DictReader(file)}
-    shear = rows["states.-1.peak_shear"]
-    assert shear["unit"] == "MPa"
-    assert float(shear["rough, difference"]) == pytest.approx(
-        float(shear["rough"]) / float(shear["ball"]) - 1.0
+    energy = rows["states.-1.cumulative_energy"]
+    assert energy["unit"] == "N mm"
+    assert float(energy["rough, difference"]) == pytest.approx(
+        float(energy["rough"]) / float(energy["ball"]) - 1.0
     )
-    assert shear["rough, beyond errors"] == "True"
+    assert energy["rough, beyond errors"] == "True"
     page = Page((out / "compare.html").read_text("utf-8"))
     assert "script" not in page.tags
     assert len(page.images) == 4
@@ -94,18 +95,18 @@ def test_a_program_compares_as_the_command_does(runs, tmp_path):
     balls = fretscale.compare(runs / "ball", fretscale.open(runs / "rough"), str(runs / "again"))
     assert balls.names == ("ball", "rough", "again")
     assert balls.entries == {"friction.coefficient": ("0.7", "0.9", "0.7")}
-    shear = balls["largest shear"]
-    first, other, same = shear.values
-    assert (shear.unit, same) == ("MPa", first)
-    assert shear.differences == (None, pytest.approx(other / first - 1.0), 0.0)
-    assert shear.beyond == (None, True, False)
-    assert shear == balls["after the last increment, largest shear"]
-    with pytest.raises(KeyError, match=r"nothing: not there; allowed: .*largest shear"):
+    energy = balls["energy dissipated so far"]
+    first, other, same = energy.values
+    assert (energy.unit, same) == ("N mm", first)
+    assert energy.differences == (None, pytest.approx(other / first - 1.0), 0.0)
+    assert energy.beyond == (None, True, False)
+    assert energy == balls["after the last increment, energy dissipated so far"]
+    with pytest.raises(KeyError, match=r"nothing: not there; allowed: .*energy dissipated so far"):
         balls["nothing"]
     ended = invoke("compare", runs / "ball", runs / "rough", runs / "again")
     assert [line.rstrip() for line in ended.stdout.splitlines()] == repr(balls).splitlines()
     table = balls.pandas()
-    assert table.loc[(shear.of, shear.name), "rough, difference"] == shear.differences[1]
+    assert table.loc[(energy.of, energy.name), "rough, difference"] == energy.differences[1]
     page = balls.report(tmp_path / "compared")
     assert Page(page.read_text("utf-8")).images
     assert page.with_name("compare.csv").exists()
