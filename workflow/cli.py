@@ -402,7 +402,7 @@ class _KindsInHelp(click.Command):
 def new(kind: str | None, file: Path | None, short: bool) -> None:
     """Write a commented case to FILE; without KIND list the kinds.
 
-    Example files that the case names are written beside it, where they are not there yet.
+    An example of a file that the case names is written beside it, where there is none yet.
     """
     from workflow.commands.new import text_of, write_new
 
@@ -412,8 +412,9 @@ def new(kind: str | None, file: Path | None, short: bool) -> None:
     elif file is None:
         click.echo(text_of(kind, short), nl=False)
     else:
-        for companion in write_new(kind, file, short)[1:]:
-            click.echo(f"{companion}: an example, which {file} names; replace it by yours")
+        example = write_new(kind, file, short)
+        if example is not None:
+            click.echo(f"{example}: an example, which {file} names; replace it by yours")
 
 
 @cli.command()

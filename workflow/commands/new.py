@@ -18,13 +18,15 @@ flank,4000,0,0,0,0,0,0,0
 flank,8000,-3200,0,0,0,0,60,0
 flank,4000,1600,0,0,0,0,60,0
 """
-# Files that a template names beside it, each by the kind whose template it is, or as text.
-COMPANIONS: Mapping[str, Mapping[str, str]] = {
-    "resultants": {"loads.csv": LOADS},
-    "vibration_wear": {"specimens_wear.yaml": "bodies_wear"},
-    "friction_rig_wear": {"specimens_rig.yaml": "specimens"},
-    "reduced_wear": {"specimens.yaml": "specimens"},
-    SWEEP: {"my.yaml": "bodies"},
+# Of specimens: few nodes, for a first run of minutes.
+COARSE = "\nmesh: {pad_elements: 4, size: 2 mm}  # coarse; by default 10 and 1 mm\n"
+# Files that a template names beside it: the kind of a short case, empty for none, and more text.
+COMPANIONS: Mapping[str, tuple[str, str, str]] = {
+    "resultants": ("loads.csv", "", LOADS),
+    "vibration_wear": ("specimens_wear.yaml", "bodies_wear", ""),
+    "friction_rig_wear": ("specimens_rig.yaml", "specimens", COARSE),
+    "reduced_wear": ("specimens.yaml", "specimens", COARSE),
+    SWEEP: ("my.yaml", "bodies", ""),
 }
 
 
@@ -47,11 +49,11 @@ def text_of(kind: str, short: bool = False) -> str:
     return sweep_template() if kind == SWEEP else template(kind, short)
 
 
-def write_new(kind: str, file: Path, short: bool = False) -> list[Path]:
-    """Write the template of a kind to ``file`` and what it names beside it; return the paths.
+def write_new(kind: str, file: Path, short: bool = False) -> Path | None:
+    """Write the template of a kind to ``file``, and beside it an example of what it names.
 
-    Files beside it that exist are left as they are, and not returned. Raises UserError where
-    ``file`` itself exists.
+    Returns the path of the example, None where there is none, or where such a file is there: that
+    is left as it is. Raises UserError where ``file`` itself exists.
     """
     text = text_of(kind, short)
     try:
@@ -59,12 +61,11 @@ def write_new(kind: str, file: Path, short: bool = False) -> list[Path]:
             stream.write(text)
     except FileExistsError:
         raise UserError(f"{file}: exists; give another name or remove it") from None
-    written = [file]
-    for name, content in COMPANIONS.get(kind, {}).items():
-        companion = file.parent / name
-        if not companion.exists():
-            companion.write_text(
-                content if "\n" in content else text_of(content, short=True), encoding="utf-8"
-            )
-            written.append(companion)
-    return written
+    if kind not in COMPANIONS:
+        return None
+    name, of_kind, more = COMPANIONS[kind]
+    example = file.parent / name
+    if example.exists():
+        return None
+    example.write_text((text_of(of_kind, short=True) if of_kind else "") + more, encoding="utf-8")
+    return example
