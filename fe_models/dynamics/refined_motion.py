@@ -163,10 +163,13 @@ class MotionInTime:
     def _times(self, path: Path, samples: int, deepest: int) -> PeriodTimes:
         """Steps of a period, short where joints change what they do."""
 
-        def regimes(times: PeriodTimes) -> np.ndarray:
-            return self._deviations(path(times.starts / times.parts), times).regimes
+        def moved(times: PeriodTimes) -> Array:
+            return path(times.starts / times.parts)
 
-        return PeriodTimes.following(regimes, samples, deepest)
+        def regimes(times: PeriodTimes) -> np.ndarray:
+            return self._deviations(moved(times), times).regimes
+
+        return PeriodTimes.following(regimes, samples, deepest, moved)
 
     def _deviations(self, moved: Array, times: PeriodTimes) -> Deviations:
         steps = np.diff(np.append(times.starts, times.parts)) / times.parts
