@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -34,18 +34,29 @@ class PeriodTimes:
 
     @classmethod
     def following(
-        cls, regimes: Callable[[PeriodTimes], np.ndarray], samples: int, deepest: int
+        cls,
+        regimes: Callable[[PeriodTimes], np.ndarray],
+        samples: int,
+        deepest: int,
+        path: Callable[[PeriodTimes], np.ndarray] | None = None,
     ) -> PeriodTimes:
         """Steps that are divided to the ``deepest`` level where ``regimes`` ``(t, j)`` change.
 
-        What joints do for less than a step is looked for at more times, and not passed over.
+        What joints do for less than a step is looked for at more times, and not passed over: also
+        at those at which a ``path`` ``(t, d)`` turns, as a stop may be met there for a moment only.
         """
         times, probe = cls.even(samples, deepest), cls.even(PROBE * samples, deepest)
+        if path is not None:
+            starts = np.union1d(probe.starts, probe.turns(path(probe)))
+            probe = replace(probe, starts=starts, levels=np.zeros(len(starts), np.int64))
         known = regimes(probe)
-        changes = (known != np.roll(known, -1, axis=0)).any(axis=1)
-        for level in range(min(PROBED, deepest)):
+        differs = known != np.roll(known, -1, axis=0)
+        changes = differs.any(axis=1)
+        moments = (differs & np.roll(differs, 1, axis=0)).any(axis=1)
+        for level in range(deepest):
             marked = np.zeros(len(times.starts), bool)
-            within = np.searchsorted(times.starts, probe.starts[changes] // PROBE, side="right")
+            sought = probe.starts[changes if level < PROBED else moments]
+            within = np.searchsorted(times.starts, sought // PROBE, side="right")
             marked[within - 1] = True
             times = times.divided(marked & (times.levels == level))
         while True:
@@ -61,6 +72,18 @@ class PeriodTimes:
     def parts(self) -> int:
         """In which times are counted."""
         return int(self.samples * SPLIT**self.deepest)
+
+    def turns(self, values: np.ndarray) -> np.ndarray:
+        """Times, in parts, at which ``values`` ``(t, d)`` at steps of equal length turn.
+
+        They are those of parabolas through three values.
+        """
+        before, after = values - np.roll(values, 1, axis=0), np.roll(values, -1, axis=0) - values
+        steps, numbers = np.nonzero((before * after <= 0.0) & (before != after))
+        first, second = before[steps, numbers], after[steps, numbers]
+        offset = 0.5 * (first + second) / (first - second)
+        length = self.parts // self.samples
+        return np.rint(self.starts[steps] + offset * length).astype(np.int64) % self.parts
 
     def divided(self, marked: np.ndarray) -> PeriodTimes:
         """With the ``marked`` ``(t,)`` steps in four, if they are not of the deepest level.

@@ -35,9 +35,10 @@ from fe_models.dynamics.sizes import norm
 from fe_models.dynamics.whole_ring import JoinedDeviations, motion_of
 from sa_solver.types import Array
 
-# A motion is found where a step changes it by no more than this share of its vibration, in at most
-# so many steps; one that only tells the error of another by a larger share.
-FOUND, ROUGHLY, MOST_STEPS = 1e-6, 1e-4, 15
+# A motion is found where two steps in succession change it by no more than this share of its
+# vibration, in at most so many steps: a single step says what becomes of deviations from the motion
+# before it, and where a stop is barely met that is another matter.
+FOUND, MOST_STEPS = 1e-6, 15
 # Share of its vibration by which the motion in time may differ from that in harmonics: one further
 # away may be another.
 NEAR = 0.1
@@ -95,21 +96,20 @@ class MotionInTime:
     def _values(path: Path) -> Array:
         return path(np.arange(128) / 128)
 
-    def found(
-        self, samples: int, deepest: int, path: Path | None = None, enough: float = FOUND
-    ) -> RefinedMotion | None:
+    def found(self, samples: int, deepest: int, path: Path | None = None) -> RefinedMotion | None:
         """The motion near to a path, that in harmonics at first, with so many steps and levels.
 
-        None where a step that changes no more than ``enough`` is not found.
+        None where steps go on to change it.
         """
-        path = path or self.in_harmonics
+        path, before = path or self.in_harmonics, np.inf
         for _ in range(MOST_STEPS):
             refined, change = self._stepped(path, self._times(path, samples, deepest))
             if refined is None:
                 return None
             path = refined.path
-            if change <= enough:
+            if max(before, change) <= FOUND:
                 return refined if self._distance(path) <= NEAR else None
+            before = change
         return None
 
     def others(self, refined: RefinedMotion) -> tuple[Deviating, Deviating] | None:
@@ -117,7 +117,7 @@ class MotionInTime:
         steps, that begin at other times; None where the motion is not found in these."""
         times = refined.times
         steps = 2 * int(0.5 * COARSER * times.samples), max(times.deepest - LEVELS_LESS, 0)
-        coarser = self.found(*steps, refined.path, ROUGHLY)
+        coarser = self.found(*steps, refined.path)
         return None if coarser is None else (refined.late(), coarser.deviating)
 
     def volume_error(self, refined: RefinedMotion) -> float:
@@ -163,10 +163,13 @@ class MotionInTime:
     def _times(self, path: Path, samples: int, deepest: int) -> PeriodTimes:
         """Steps of a period, short where joints change what they do."""
 
-        def regimes(times: PeriodTimes) -> np.ndarray:
-            return self._deviations(path(times.starts / times.parts), times).regimes
+        def moved(times: PeriodTimes) -> Array:
+            return path(times.starts / times.parts)
 
-        return PeriodTimes.following(regimes, samples, deepest)
+        def regimes(times: PeriodTimes) -> np.ndarray:
+            return self._deviations(moved(times), times).regimes
+
+        return PeriodTimes.following(regimes, samples, deepest, moved)
 
     def _deviations(self, moved: Array, times: PeriodTimes) -> Deviations:
         steps = np.diff(np.append(times.starts, times.parts)) / times.parts

@@ -27,8 +27,11 @@ class Shot(NamedTuple):
     distance: float
 
 
-def shoot(problem: HarmonicBalance, motion: HarmonicSolution) -> Shot | None:
-    """The motion near to one that has one joint and one harmonic of a load, or None."""
+def shoot(problem: HarmonicBalance, motion: HarmonicSolution, steps: int = STEPS) -> Shot | None:
+    """The motion near to one that has one joint and one harmonic of a load, or None.
+
+    A contact is seen at the end of one of so many ``steps``.
+    """
     model, law = problem.model, problem.joints.law
     size, omega = len(model.mass), 2.0 * np.pi * motion.frequency
     row = model.connection[0]
@@ -50,13 +53,13 @@ def shoot(problem: HarmonicBalance, motion: HarmonicSolution) -> Shot | None:
         )
         a[2 * size, 2 * size + 1], a[2 * size + 1, 2 * size] = -order * omega, order * omega
         rates.append(a)
-    step = 1.0 / (motion.frequency * STEPS)
+    step = 1.0 / (motion.frequency * steps)
     whole = [sl.expm(step * a) for a in rates]
     seen = np.append(row, np.zeros(size + 3))
 
     def period(start: Array) -> tuple[Array, Array]:
         y, forward = np.concatenate([start, [1.0, 0.0, 1.0]]), np.eye(2 * size + 3)
-        for _ in range(STEPS):
+        for _ in range(steps):
             left = step
             while left > 0.0:
                 side = int(seen @ y > gap or (seen @ y == gap and seen @ rates[0] @ y > 0.0))

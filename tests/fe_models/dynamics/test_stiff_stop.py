@@ -70,6 +70,33 @@ def test_a_motion_that_seven_harmonics_cut_short_is_judged_by_the_motion_in_time
     assert told.error < 1e-3
 
 
+def barely_touching(stiffness, deep, frequency=0.2):
+    """A motion that reaches so ``deep`` into the stop, in the middle between two of 1024 times of a
+    period, the least deep for less than a 2048th of it. Without the stop it would be stable."""
+    free, highest = two_masses().model, 601 / 2048
+    point, angular = unit_force(free, "b"), 2.0 * np.pi * frequency
+    dynamic = free.stiffness - angular**2 * free.mass + 1j * angular * free.damping
+    wave = np.exp(-2j * np.pi * highest) / (point @ np.linalg.solve(dynamic, point))
+    law = PeriodicMarch(ElasticStop(stiffness=stiffness, gap=GAP - deep))
+    load, resolution = PeriodicLoad({1: wave * point}), Resolution(tuple(range(22)), 4096)
+    problem = HarmonicBalance(free, law, load, resolution)
+    return problem, problem.solve(frequency, GAP)
+
+
+@pytest.mark.parametrize(
+    ("stiffness", "deep"), [(100.0, 1e-6), (300.0, 1e-6), (300.0, 1e-5), (1000.0, 1e-5)]
+)
+def test_a_stop_that_is_met_for_a_moment_only_is_not_passed_over(stiffness, deep):
+    problem, motion = barely_touching(stiffness, deep)
+    told, exact = Floquet(problem).stability(motion), shoot(problem, motion, steps=2048)
+    assert exact.distance < 1e-6
+    largest = abs(exact.multipliers[0])
+    assert largest > 1.05
+    assert told.verdict == "unstable"
+    assert told.largest == pytest.approx(largest, abs=2.0 * told.error)
+    assert told.error < 0.01
+
+
 @pytest.mark.slow
 def test_liouville_holds_through_contact(touching):
     """The product of all multipliers is what damping leaves in a period, exp(-T tr M⁻¹C)."""
