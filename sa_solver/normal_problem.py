@@ -129,7 +129,7 @@ def border_share(pressure: Array) -> float:
 
 
 def messages(failure: str, border_load: float) -> str:
-    """What a state says of itself: its ``failure``, and whether its grid cuts the contact off."""
+    """Return the message of a state: its ``failure``, and whether its grid cuts the contact off."""
     border = (
         f"the contact reaches the border of its grid, where cells carry {border_load:.2g} of the "
         "load, and is cut off there: take a larger grid, unless the bodies end with it"

@@ -115,7 +115,7 @@ class ActiveJoints:
     def of(
         cls, deviations: Deviations, structure: ModalStructure, every: bool = False
     ) -> ActiveJoints:
-        """Those of a period; ``every`` joint is followed, or those that need be."""
+        """Classify what joints do over one period: ``every`` one, or those that need it."""
         kept, starts, ends = deviations.kept, deviations.by_start, deviations.by_end
         same = _all(deviations.tangent == deviations.tangent[0]) & _all(ends == ends[0])
         holds = same & _all(kept == np.eye(kept.shape[2])) & _all(starts == -ends)
@@ -210,7 +210,7 @@ def deviating(
     driven: Driven | None = None,
     late: bool = False,
 ) -> Deviating:
-    """What a period of a frequency [Hz] makes of deviations, and of a motion that is ``driven``.
+    """Return how one period of a frequency [Hz] maps deviations, and a motion that is ``driven``.
 
     Joints that become stiffer in the shortest steps do so one of these steps ``late``, if so: as
     they are found to a step, they are as stiff as that for a step too long or too short.
@@ -239,7 +239,7 @@ def _columns(
     of_joints: tuple[Deviations, ActiveJoints, JointSteps],
     driven: Driven | None,
 ) -> tuple[Array, Array]:
-    """What :func:`monodromy` makes of a period, and the course of it."""
+    """The result of :func:`monodromy`: the map of one period, and its course."""
     deviations, joints, maps = of_joints
     stiffness = np.diag(structure.squares)[None]
     scale = np.sqrt(np.maximum(structure.squares, (2.0 * np.pi * frequency) ** 2))
@@ -325,7 +325,7 @@ def _given(
     driven: Driven | None,
     places: np.ndarray,
 ) -> GivenMotion:
-    """What joints do in the motion at these places, from its beginning to its end."""
+    """Return what the joints do in the motion at these places, from its beginning to its end."""
     steps = len(deviations.kept)
     if driven is None:
         nothing = np.zeros((steps + 1, len(places)))

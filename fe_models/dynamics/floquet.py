@@ -90,7 +90,7 @@ class Stability:
 
     @property
     def resolved(self) -> bool:
-        """Whether the error of the multipliers is known."""
+        """True where the error of the multipliers is known."""
         return bool(np.isfinite(self.error))
 
     @property
@@ -312,12 +312,12 @@ def _apart(some: ComplexArray, others: ComplexArray) -> Array:
 
 
 def _largest(multipliers: ComplexArray) -> ComplexArray:
-    """Those that are told."""
+    """Return the multipliers that are reported."""
     return multipliers[np.abs(multipliers) > SMALL][:TOLD]
 
 
 def _judged(fine: ComplexArray, errors: Array, neutral: int) -> Stability:
-    """What multipliers say with errors ``(k,)`` of their sizes.
+    """Return the verdict that multipliers allow, given the errors ``(k,)`` of their sizes.
 
     What counts is how large the largest is, the second largest, and so on.
     """

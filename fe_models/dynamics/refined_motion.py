@@ -113,8 +113,10 @@ class MotionInTime:
         return None
 
     def others(self, refined: RefinedMotion) -> tuple[Deviating, Deviating] | None:
-        """What a period makes of deviations where joints become stiffer a step later, and in longer
-        steps, that begin at other times; None where the motion is not found in these."""
+        """Return the map of one period with joints that stiffen a step later, and in longer steps.
+
+        The longer steps begin at other times; None where the motion is not found in these.
+        """
         times = refined.times
         steps = 2 * int(0.5 * COARSER * times.samples), max(times.deepest - LEVELS_LESS, 0)
         coarser = self.found(*steps, refined.path)
@@ -133,7 +135,7 @@ class MotionInTime:
         return abs(float(error))
 
     def _distance(self, path: Path) -> float:
-        """Of a motion from that in harmonics, as a share of the vibration."""
+        """Return how far a motion is from the one in harmonics, as a share of the vibration."""
         away = self._values(path) - self._values(self.in_harmonics)
         return float(np.linalg.norm(np.abs(away).max(axis=0))) / self._vibration
 

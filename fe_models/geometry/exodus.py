@@ -77,7 +77,7 @@ def read_exodus(path: Path) -> GroupedMesh:
 
 
 class _Read:
-    """What the variables of a file define; they count nodes and elements from one."""
+    """A mesh as the variables of a file define it; they count nodes and elements from one."""
 
     def __init__(self, path: Path, variables: Mapping[str, Any], types: dict[str, Any]) -> None:
         self.scope = Scope("", SourceLine(path, 0))

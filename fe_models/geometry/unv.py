@@ -262,7 +262,7 @@ def _unit(dataset: Dataset) -> LengthUnit:
 
 
 def _left(dataset: Dataset) -> str:
-    """What a dataset says that is not read, in a line; empty if it says nothing.
+    """Describe in a line what a dataset says that is not read; empty if it says nothing.
 
     Raises :class:`MeshError` if it is one of an old form, which would be the mesh.
     """

@@ -134,7 +134,7 @@ def found(
 def _offered(
     parts: Mapping[str, Part], left: Sequence[tuple[MatrixFile, str]]
 ) -> dict[str, tuple[str, ...]]:
-    """Of what is left, matrices that a missing damping or load could be, by their shapes."""
+    """Return the matrices not used so far whose shapes fit a missing damping or load."""
     size = parts[STIFFNESS].values.shape[0]
     offered: dict[str, tuple[str, ...]] = {}
     for file, name in left if {DAMPING, LOADS} - set(parts) else ():

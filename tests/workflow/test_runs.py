@@ -424,7 +424,8 @@ def test_a_worker_killed_at_work_changes_nothing(contact, wear, tmp_path):
         killed = beside.submit(kill_at_work, workers, out / "run0")
         results = run_jobs(jobs, out, dask=cluster.scheduler_address, report=told.append)
         assert killed.result() in workers
-    assert (out / "run0/run.log").read_text("utf-8").count("resume: ") == 1
+    # Whether there was a state to go on from, the clock decides; it was taken over once.
+    assert (out / "run0/run.log").read_text("utf-8").count("has gone and left its lock") == 1
     assert len(told) == len(jobs)
     for one, other in zip(results, run_jobs(jobs, tmp_path / "here"), strict=True):
         if one.job.name == "slides":

@@ -37,7 +37,7 @@ def read_loop_file(path: Path, names: Mapping[str, str]) -> dict[str, Array]:
 
 
 def account(loops: MeasuredLoops) -> str:
-    """What is in the loops of a record, and what is left out of them."""
+    """Return lines on what the loops of a record contain, and what is left out of them."""
     # Without the rounding of a difference of sums.
     work = float(loops.work[-1])
     before, between, after = (one if abs(one) > 1e-9 * work else 0.0 for one in loops.left_out)

@@ -136,7 +136,7 @@ def _checked(file: str, read: Callable[[], Scan]) -> Scan:
 
 
 def _implausible(scan: Scan) -> str:
-    """What no measured surface has, empty where there is nothing of the kind."""
+    """Describe what no measured surface has; empty where there is nothing of the kind."""
     heights = np.abs(scan.heights[scan.measured])
     range_, size = float(np.ptp(scan.heights[scan.measured])), max(scan.size)
     tiny = heights[(heights > 0.0) & (heights < LEAST_HEIGHT)]

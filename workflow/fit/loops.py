@@ -76,7 +76,7 @@ def _fitted_steps(measured: MeasuredLoops) -> list[MeasuredLoops]:
 
 
 def _doubts(measured: MeasuredLoops, fitted: int) -> list[str]:
-    """What the steps of a record say against one law for all of them."""
+    """Yield what in the steps of a record contradicts one law for all of them."""
     steps, doubts = measured.steps, []
     if fitted < len(steps):
         doubts.append(

@@ -54,7 +54,7 @@ CURVES = (
 
 
 def main_results(case: BodiesCase, summary: Summary) -> list[Quantity]:
-    """Of the last state and the last cycle; errors are those that increments leave of each."""
+    """Return the main results of the last state and cycle, with the error of each by increments."""
     last, loop = summary["states"][-1], summary["loop"] or {}
     line = "contact_half_width" in last
 

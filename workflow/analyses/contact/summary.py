@@ -54,7 +54,7 @@ def state_summaries(grid: Grid, friction: float, history: History) -> list[dict[
 def increments_errors(
     grid: Grid, friction: float, table: LoadTable, history: History, strain: Array
 ) -> dict[str, dict[str, float]]:
-    """What increments are estimated to leave of the numbers of the ``last`` state and the ``loop``.
+    """Estimate the error due to increments of the numbers of the ``last`` state and the ``loop``.
 
     Relative, of those that they change; empty where increments do not matter or nobody knows.
     """

@@ -118,7 +118,7 @@ class InterfaceOutcome:
 
     @cached_property
     def increments_error(self) -> dict[str, float] | None:
-        """What increments leave of depth and energy of the first and the last cycle together.
+        """Error due to increments of depth and energy, over the first and the last cycle together.
 
         By as many again where loads in between are known, of friction too; None where nobody knows.
         """
@@ -131,7 +131,7 @@ class InterfaceOutcome:
 
     @cached_property
     def border_error(self) -> dict[str, float] | None:
-        """What the border of the zone that sticks leaves of depth and volume, relative.
+        """Relative error of depth and volume due to the border of the stick zone.
 
         Of a half-space with its own friction; None where nobody knows.
         """

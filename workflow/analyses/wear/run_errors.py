@@ -74,7 +74,7 @@ def shorter_steps(wear: Duration, contact: InterfaceOutcome) -> str:
 
 
 def _of_link_and_coupling(case: WearCase, shorter: str) -> dict[str, str]:
-    """What makes the errors of link and coupling smaller that is not set yet."""
+    """Yield the settings, not in use yet, that make the errors of link and coupling smaller."""
     coupling = case.recoupling
     settings = {
         "constant": "coupling.resultants: drift",

@@ -120,7 +120,7 @@ def _link(contact: InterfaceOutcome, probed: Probed) -> ByResult:
 
 
 def _grid(case: WearCase, contact: InterfaceOutcome, peak: int, probed: Probed) -> ByResult:
-    """What cells leave: of a peak by their neighbours where no lives tell.
+    """Return the error due to the grid: of a peak from its neighbours where no probe run tells.
 
     Lives slide wherever their loads have them slide. In partial slip the border of the zone that
     sticks comes to what they tell, and is what is known where they tell nothing.
