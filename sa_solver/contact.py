@@ -27,7 +27,7 @@ from sa_solver.errors import InputError
 from sa_solver.friction_limit import largest_share
 from sa_solver.gross_slip import SlidingRule, gross_slip, sliding_direction
 from sa_solver.half_space import HalfSpace
-from sa_solver.increments import dissipated
+from sa_solver.increments import dissipated, of_nearest
 from sa_solver.normal import NormalContact, NormalStart, NormalState, checked_heights
 from sa_solver.rigid_modes import NORMAL, PLANAR, PlanarModes
 from sa_solver.tangential import (
@@ -395,14 +395,9 @@ class FrictionalContact:
         parting = (before.pressure > 0.0) & ~pressed
         if not (pressed.any() and parting.any()):
             return slip
-        from scipy.ndimage import distance_transform_edt  # where cells part
-
         moved, modes = state.displacement[:2] + offset, self._modes
         modes.add_motion(moved, -motion[: len(modes.free)] * modes.lengths)
-        nearest = distance_transform_edt(
-            ~pressed, sampling=self.grid.pitch, return_distances=False, return_indices=True
-        )
-        beside, size = np.hypot(*slip)[tuple(nearest)], np.hypot(*moved)
+        beside, size = of_nearest(np.hypot(*slip), pressed, self.grid.pitch), np.hypot(*moved)
         share = np.divide(beside, size, out=np.ones_like(size), where=size > beside)
         return np.where(parting, share * moved, slip)
 

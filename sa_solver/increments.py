@@ -16,6 +16,7 @@ increment nothing says how far they had slid by then: it counts for none.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import product
 
 import numpy as np
 
@@ -126,3 +127,21 @@ def _errors(pressure: Array, slip: Array, loaded: Mask) -> tuple[Array, Mask]:
     closing = np.linalg.norm(in_rows(slip, ~meets).sum(axis=0), axis=0)
     parted = in_rows(-0.5 * p_last * closing, ~loaded & np.roll(loaded, 1))
     return np.asarray(bent + begun + parted), (count > 0.0) | begins
+
+
+def of_nearest(values: Array, where: Mask, pitch: tuple[float, float]) -> Array:
+    """Return for each cell ``(nx, ny)`` the value of the nearest cell of ``where``.
+
+    Of cells that are equally near it is the mean of those that a search from each of the four
+    corners finds first: a field that is its own mirror image stays one.
+    """
+    from scipy.ndimage import distance_transform_edt  # takes a while to load, and is rarely wanted
+
+    found = np.zeros_like(values)
+    for ways in product((1, -1), repeat=2):
+        view = tuple(slice(None, None, way) for way in ways)
+        nearest = distance_transform_edt(
+            ~where[view], sampling=pitch, return_distances=False, return_indices=True
+        )
+        found += 0.25 * values[view][tuple(nearest)][view]
+    return found

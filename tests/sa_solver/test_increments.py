@@ -8,6 +8,7 @@ from sa_solver.increments import (
     dissipated,
     errors_of_increments,
     mean_of_ends,
+    of_nearest,
     slip_of_states,
 )
 from sa_solver.types import Array
@@ -118,3 +119,19 @@ def test_a_few_cells_that_go_one_way_tell_nothing_of_the_others() -> None:
     loaded = np.ones(2, dtype=bool)
     assert errors_of_increments(pressure, slip, loaded) is None
     assert errors_of_increments(pressure[:, 2:], slip[:, :, 2:], loaded) is not None
+
+
+def test_values_of_the_nearest_cells_keep_symmetry():
+    """Around a square of cells many are equally near: no side is preferred."""
+    values = np.zeros((8, 8))
+    values[2:6, 2:6] = np.array([4.0, 1.0, 1.0, 4.0])[:, None] + [3.0, 2.0, 2.0, 3.0]
+    found = of_nearest(values, values > 0.0, (0.1, 0.1))
+    np.testing.assert_array_equal(found[2:6, 2:6], values[2:6, 2:6])
+    assert found[0, 3] == values[2, 3]
+    for mirrored in (found[::-1], found[:, ::-1]):
+        np.testing.assert_allclose(mirrored, found, rtol=1e-15)
+    plus = np.zeros((5, 5), dtype=bool)
+    plus[2, :] = plus[:, 2] = True
+    along = np.where(plus, np.arange(5.0)[:, None] - 2.0, 0.0) ** 2
+    found = of_nearest(along, plus, (1.0, 1.0))
+    np.testing.assert_allclose(found, found[::-1, ::-1], rtol=1e-15)

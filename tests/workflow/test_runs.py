@@ -206,7 +206,10 @@ run_jobs([Job("one", Path(case), tuple(overrides))], Path(out), processes=1)
 
 
 def start(*arguments):
-    command = [sys.executable, "-c", RUN, *map(str, arguments)]
+    # Its job keeps every step as it ends.
+    every = f"from workflow.shell import steps; steps.SHARE = float('inf'); {runs_job.COMMAND}"
+    code = f"from workflow.runs import job\njob.COMMAND = {every!r}\n{RUN}"
+    command = [sys.executable, "-c", code, *map(str, arguments)]
     return subprocess.Popen(command, stderr=subprocess.PIPE, start_new_session=True)
 
 
