@@ -20,14 +20,14 @@ run: $(INSTALLED)
 	$(BIN)/fretscale run cases/dovetail.yaml --out out/dovetail --force
 
 test: $(TESTABLE)
-	@echo 'fretscale: style, types and layers, then the tests: 4 to 5 minutes on two cores.'
+	@echo 'fretscale: style, types and layers, then the tests: about 6 minutes on two cores.'
 	@$(MAKE) --no-print-directory lint
 	$(TESTING) $(BIN)/python -m pytest -q -n 2 --dist worksteal
 
 test-full: test test-slow
 
 test-slow: $(TESTABLE)
-	@echo 'fretscale: the tests of more than a few seconds: about 18 minutes on two cores.'
+	@echo 'fretscale: the tests of more than a few seconds: about 20 minutes on two cores.'
 	$(TESTING) $(BIN)/python -m pytest -q -n 2 --dist worksteal -m slow
 
 lint: $(TESTABLE)
