@@ -83,7 +83,7 @@ class WearByVibration(Section):
 
     also_filled_in: ClassVar[tuple[str, ...]] = ("force",)
 
-    force: DrivingForce | None = entry("amplitude [N]", "75 N", default=None)
+    force: DrivingForce | None = entry("amplitude [N]", "40 N", default=None)
     level: Level | None = entry(
         "instead of force: by which the excitation is multiplied [1]", 1, default=None
     )
