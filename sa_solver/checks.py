@@ -1,7 +1,7 @@
-"""What public functions and classes accept as an array, a number or a choice.
+"""Checks of the arrays, numbers and choices that public functions and classes are given.
 
-The rest is refused with an :class:`~sa_solver.errors.InputError` that says what to give. Without
-that numpy would pass over the mask of a masked array, read texts and truth values as numbers, and
+Anything else is refused with an :class:`~sa_solver.errors.InputError` that says what to give.
+Without that numpy would pass over the mask of a masked array, read texts and truth values as numbers, and
 fail far from the cause where a list or a single number stands for a field.
 """
 

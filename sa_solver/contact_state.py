@@ -18,7 +18,7 @@ MOTIONS = ("approach", "shift_x", "shift_y", "tilt_x", "tilt_y", "twist")
 
 @dataclass(frozen=True, init=False)
 class ContactLoad:
-    """What is imposed at the end of an increment, by names or as an array.
+    """Load or motion imposed at the end of an increment, by names or as an array.
 
     By names it is ``P`` [N; per mm on line grids] or the ``approach`` δz [mm] since the bodies were
     apart; of ``Qx`` and ``shift_x`` δx, ``Qy`` and ``shift_y`` δy, ``Mz`` [N mm] and ``twist`` φz

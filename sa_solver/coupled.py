@@ -117,7 +117,7 @@ class CoupledState:
 
     @property
     def contact_area(self) -> float:
-        """As :attr:`sa_solver.normal.NormalState.contact_area`."""
+        """Area of the cells in contact [mm²; in a line contact, per mm, its width in mm]."""
         return float(np.count_nonzero(self.pressure)) * self.cell_area
 
     @property

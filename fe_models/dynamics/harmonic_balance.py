@@ -91,7 +91,7 @@ class PeriodicLoad:
         return {*self.waves, *self.inertial}
 
     def amplitude(self, harmonic: int, angular: float, force: float) -> ComplexArray:
-        """What the structure carries ``(n,)`` in a harmonic of so many rad/s, under a force."""
+        """Return the load ``(n,)`` of a harmonic at a frequency [rad/s], under a force."""
         nothing = np.zeros(1)
         growing = self.waves.get(harmonic, nothing)
         growing = growing + angular**2 * self.inertial.get(harmonic, nothing)

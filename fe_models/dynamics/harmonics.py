@@ -104,7 +104,7 @@ class Resolution:
         return values
 
     def functions_during(self, shares: Array) -> Array:
-        """The same at any ``shares`` ``(t,)`` of the period."""
+        """Return the motion at any ``shares`` ``(t,)`` of the period."""
         values = np.empty((len(shares), self.size))
         angles = 2.0 * np.pi * np.outer(shares, self.harmonics)
         cosine, sine = self.places
