@@ -1,8 +1,8 @@
 """Checks of the arrays, numbers and choices that public functions and classes are given.
 
 Anything else is refused with an :class:`~sa_solver.errors.InputError` that says what to give.
-Without that numpy would pass over the mask of a masked array, read texts and truth values as numbers, and
-fail far from the cause where a list or a single number stands for a field.
+Without that numpy would pass over the mask of a masked array, read texts and truth values as
+numbers, and fail far from the cause where a list or a single number stands for a field.
 """
 
 from __future__ import annotations
