@@ -24,15 +24,15 @@ from typing import Any, NamedTuple
 import numpy as np
 from skfem import MeshTet
 
-from fe_models.applied_loads import BoundaryForce, Pressure
-from fe_models.dynamics.continuation import ContinuationControl
-from fe_models.dynamics.forced_response import along_frequency
-from fe_models.dynamics.harmonic_balance import HarmonicBalance
-from fe_models.dynamics.harmonics import Resolution
-from fe_models.friction import FrictionalJoint
+from fe_models.dynamics.curves.continuation import ContinuationControl
+from fe_models.dynamics.curves.forced_response import along_frequency
+from fe_models.dynamics.periodic.harmonic_balance import HarmonicBalance
+from fe_models.dynamics.periodic.harmonics import Resolution
 from fe_models.geometry.imported import ImportedMesh
 from fe_models.imported_structure import ContactPair, Support, imported_mesh, imported_structure
-from fe_models.mesh import Body
+from fe_models.joints.friction import FrictionalJoint
+from fe_models.loads.applied_loads import BoundaryForce, Pressure
+from fe_models.meshes.structure_mesh import Body
 from fe_models.structure import Structure
 from sa_solver import (
     ContactLoad,
@@ -42,9 +42,9 @@ from sa_solver import (
     HalfSpace,
     Material,
     NormalContact,
-    loops,
 )
 from sa_solver.reference.hertz import HertzSphere
+from sa_solver.transforms import passes as loops
 from workflow.analyses.vibration.case import VibrationCase
 from workflow.analyses.vibration.model import VibrationModel
 from workflow.analyses.wear.structure_stage import StructureStage

@@ -35,10 +35,10 @@ from sa_solver import (
     Material,
     march_history,
 )
-from sa_solver.history import ACCURACY
+from sa_solver.cycles.history import ACCURACY
 from sa_solver.types import Array
 from wear import findley
-from wear.life import PlaneSearch
+from wear.cracking.life import PlaneSearch
 from workflow.analyses.specimens.model import SpecimensModel
 from workflow.analyses.wear.structure_stage import StructureStage
 from workflow.analyses.wear.structures.dovetail.model import DovetailModel

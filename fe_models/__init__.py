@@ -33,14 +33,14 @@ from typing import TYPE_CHECKING
 from sa_solver.lazy import lazy_names
 
 if TYPE_CHECKING:
-    from fe_models.constraints import Constraints
-    from fe_models.elasticity import ElasticBody
-    from fe_models.friction import FrictionalJoint
-    from fe_models.joint import JointStiffness
-    from fe_models.linear_solver import SolverError
-    from fe_models.mesh import Body, Interface, MeshError, StructureMesh
-    from fe_models.reduced_contact import FrettingConditions, ReducedPair
-    from fe_models.reduction import ReducedModel, reduce_body
+    from fe_models.elasticity.body import ElasticBody
+    from fe_models.joints.friction import FrictionalJoint
+    from fe_models.joints.joint import JointStiffness
+    from fe_models.joints.reduced_contact import FrettingConditions, ReducedPair
+    from fe_models.joints.reduction import ReducedModel, reduce_body
+    from fe_models.loads.constraints import Constraints
+    from fe_models.meshes.structure_mesh import Body, Interface, MeshError, StructureMesh
+    from fe_models.solvers.linear_solver import SolverError
     from fe_models.structure import Structure
     from fe_models.supported_body import SupportedBody
 
@@ -65,22 +65,22 @@ __all__ = [
 __getattr__, __dir__ = lazy_names(
     __name__,
     {
-        "constraints": ("Constraints",),
-        "elasticity": ("ElasticBody",),
-        "friction": ("FrictionalJoint",),
-        "joint": ("JointStiffness",),
-        "linear_solver": ("SolverError",),
-        "mesh": (
+        "loads.constraints": ("Constraints",),
+        "elasticity.body": ("ElasticBody",),
+        "joints.friction": ("FrictionalJoint",),
+        "joints.joint": ("JointStiffness",),
+        "solvers.linear_solver": ("SolverError",),
+        "meshes.structure_mesh": (
             "Body",
             "Interface",
             "MeshError",
             "StructureMesh",
         ),
-        "reduced_contact": (
+        "joints.reduced_contact": (
             "FrettingConditions",
             "ReducedPair",
         ),
-        "reduction": (
+        "joints.reduction": (
             "ReducedModel",
             "reduce_body",
         ),

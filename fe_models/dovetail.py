@@ -7,15 +7,15 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 
-from fe_models.constraints import Constraints
-from fe_models.cyclic import Cuts, Cyclic
-from fe_models.elasticity import ORIGIN, ROTOR, ElasticBody
+from fe_models.cyclic.cuts import Cuts, Cyclic
+from fe_models.elasticity.body import ORIGIN, ROTOR, ElasticBody
+from fe_models.elasticity.spin_softening import CarriedMass, spin_softening
 from fe_models.geometry.dovetail import Dovetail
-from fe_models.mesh import Body, MeshError, StructureMesh
-from fe_models.spin_softening import CarriedMass, spin_softening
+from fe_models.loads.constraints import Constraints
+from fe_models.meshes.structure_mesh import Body, MeshError, StructureMesh
+from fe_models.meshes.trace import LinearTrace
 from fe_models.structure import Structure
 from fe_models.supported_body import SupportedBody, interface_nodes
-from fe_models.trace import LinearTrace
 from sa_solver.types import Array, Material
 
 # The boundary of the blade that the airfoil pulls at.

@@ -10,7 +10,20 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.spatial import cKDTree
 
-from fe_models.applied_loads import (
+from fe_models.cyclic.cuts import Cuts, Cyclic, hold_normal
+from fe_models.cyclic.sector import (
+    check_alike,
+    check_jumps,
+    check_off_cuts,
+    check_temperatures,
+    sector_cuts,
+)
+from fe_models.elasticity.body import ElasticBody
+from fe_models.elasticity.spin_softening import spin_softening
+from fe_models.elasticity.thermal import Temperature, check_temperature, thermal_strains
+from fe_models.geometry.imported import ImportedMesh
+from fe_models.joints.mortar import frame_of_faces, mortar_interface
+from fe_models.loads.applied_loads import (
     AppliedLoad,
     BoundaryForce,
     RemoteDisplacement,
@@ -19,36 +32,29 @@ from fe_models.applied_loads import (
     turning_of,
     vector_of,
 )
-from fe_models.constraints import Constraints
-from fe_models.curved_face import Surface, edges_of
-from fe_models.cut_face import cut_interface
-from fe_models.cyclic import Cuts, Cyclic, hold_normal
-from fe_models.elasticity import ElasticBody
-from fe_models.geometry.imported import ImportedMesh
-from fe_models.geometry.set_faces import facets_within
-from fe_models.imposed import (
+from fe_models.loads.constraints import Constraints
+from fe_models.loads.imposed import (
     check_against_each_other,
     check_against_supports,
 )
-from fe_models.load_cases import LoadCases
-from fe_models.mesh import Body, MatchError, MeshError, StructureMesh, matched_interface
-from fe_models.mortar import frame_of_faces, mortar_interface
-from fe_models.nodal_force import shared
-from fe_models.pretension import Pretension, check_pretension
-from fe_models.rest import rigid_assemblies
-from fe_models.second_order import set_nodes
-from fe_models.sector import (
-    check_alike,
-    check_jumps,
-    check_off_cuts,
-    check_temperatures,
-    sector_cuts,
+from fe_models.loads.load_cases import LoadCases
+from fe_models.loads.nodal_force import shared
+from fe_models.loads.pretension import Pretension, check_pretension
+from fe_models.loads.rest import rigid_assemblies
+from fe_models.meshes.curved_face import Surface, edges_of
+from fe_models.meshes.cut_face import cut_interface
+from fe_models.meshes.second_order import set_nodes
+from fe_models.meshes.structure_mesh import (
+    Body,
+    MatchError,
+    MeshError,
+    StructureMesh,
+    matched_interface,
 )
-from fe_models.spin_softening import spin_softening
+from fe_models.meshes.trace import LinearTrace
+from fe_models.readers.set_faces import facets_within
 from fe_models.structure import Structure
 from fe_models.supported_body import FREE_MOTION, SupportedBody, interface_nodes
-from fe_models.thermal import Temperature, check_temperature, thermal_strains
-from fe_models.trace import LinearTrace
 from sa_solver.ties import first_largest
 from sa_solver.types import Array, Frame, Indices, Material
 
@@ -101,7 +107,7 @@ def imported_mesh(
     """The bodies of those names and the interfaces between them.
 
     The contact faces become boundaries named as their interface, whose nodes need not match;
-    ``supports`` on them may be planes of symmetry (:mod:`fe_models.cut_face`).
+    ``supports`` on them may be planes of symmetry (:mod:`fe_models.meshes.cut_face`).
     Raises :class:`MeshError` for names that are not in the file or faces that do not meet.
     """
     bodies = {name: _with_interfaces(imported, named_body(imported, name), pairs) for name in names}
@@ -140,7 +146,7 @@ def imported_structure(
     """All bodies with their supports and a load case for each of the ``loads``.
 
     They may be a sector of a wheel with ``cyclic`` cuts. Elements of ``order`` 2 are curved where
-    bodies have midsides, which :func:`fe_models.second_order.with_midsides` gives them.
+    bodies have midsides, which :func:`fe_models.meshes.second_order.with_midsides` gives them.
 
     Raises :class:`MeshError` for groups that no body has, supports that let bodies move as rigid
     ones though all faces stick, and ones on a contact face that no plane of symmetry explains.

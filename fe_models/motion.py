@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fe_models.mesh import in_space
+from fe_models.meshes.structure_mesh import in_space
 from fe_models.structure import Structure
 from sa_solver.types import Array
 

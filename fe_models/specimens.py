@@ -9,13 +9,13 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.spatial import cKDTree
 
-from fe_models import reduction
-from fe_models.constraints import Constraints
-from fe_models.elasticity import ElasticBody
+from fe_models.elasticity.body import ElasticBody
 from fe_models.geometry.specimens import CONTACT, Specimen
-from fe_models.mesh import Body, StructureMesh
-from fe_models.reduction import ReducedModel, reduce_body
-from fe_models.trace import LinearTrace
+from fe_models.joints import reduction
+from fe_models.joints.reduction import ReducedModel, reduce_body
+from fe_models.loads.constraints import Constraints
+from fe_models.meshes.structure_mesh import Body, StructureMesh
+from fe_models.meshes.trace import LinearTrace
 from sa_solver.types import Array, Indices, Material
 
 # Fixed-interface modes of each specimen ("Dynamics simulations of fretting wear for aero-engine
@@ -36,7 +36,8 @@ class SpecimenMatrices:
     ``stiffness`` and ``mass`` ``(n, n)`` on the displacements that are left, ``transformation``
     ``(all, n)`` to those of all nodes; ``kept`` are the three displacements of each pad node, in
     the interface's order, then of each ring node, and of further points. Those of the pad are the
-    last and massless, of its trace (:mod:`fe_models.trace`), where elements are of second order.
+    last and massless, of its trace (:mod:`fe_models.meshes.trace`), where elements are of second
+    order.
     """
 
     stiffness: sp.csr_matrix

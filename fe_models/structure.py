@@ -11,14 +11,14 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from fe_models.condensation import Keep, made_anew
-from fe_models.friction import LOAD_FLOOR, FrictionalJoint, FrictionState
-from fe_models.joint import JointResolvent, JointStiffness, join, join_halves
-from fe_models.mesh import Face, Interface, StructureMesh, in_space
-from fe_models.pardiso import sharing
+from fe_models.joints.condensation import Keep, made_anew
+from fe_models.joints.friction import LOAD_FLOOR, FrictionalJoint, FrictionState
+from fe_models.joints.joint import JointResolvent, JointStiffness, join, join_halves
+from fe_models.meshes.structure_mesh import Face, Interface, StructureMesh, in_space
+from fe_models.solvers.pardiso import sharing
 from fe_models.supported_body import SupportedBody
-from sa_solver.increments import dissipated, in_rows, mean_of_ends
-from sa_solver.threads import at_once
+from sa_solver.cycles.increments import dissipated, in_rows, mean_of_ends
+from sa_solver.transforms.threads import at_once
 from sa_solver.types import Array, Indices, LoadHistory, Progress, Tally, resultants, unseen
 
 T = TypeVar("T")
@@ -106,7 +106,7 @@ class Structure:
     >>> import numpy as np
     >>> from skfem import MeshTri
     >>> from fe_models import *
-    >>> from fe_models.mesh import matched_interface
+    >>> from fe_models.meshes.structure_mesh import matched_interface
     >>> from fe_models.supported_body import interface_nodes
     >>> from sa_solver import Frame, Material
     >>> steel, side = Material(210e3, 0.3), np.linspace(0.0, 1.0, 4)
@@ -440,7 +440,7 @@ def load_history(
 ) -> LoadHistory:
     """Resultants and energies of nodal ``force`` ``(t, 3, n)`` and ``slip`` ``(t, 2, n)``.
 
-    Those of one closed cycle; energies are of second order (:mod:`sa_solver.increments`).
+    Those of one closed cycle; energies are of second order (:mod:`sa_solver.cycles.increments`).
     ``friction`` is µ, one or by node ``(n,)``.
     """
     x, y = interface.coordinates.T

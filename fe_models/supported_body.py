@@ -11,17 +11,17 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.sparse.linalg import spsolve
 
-from fe_models.condensation import Condensed, Keep, condense_body, made_anew, renamed
-from fe_models.constraints import Constraints
-from fe_models.cyclic import Cuts
-from fe_models.elasticity import ElasticBody
-from fe_models.linear_solver import prepare
-from fe_models.mesh import Body, Interface
-from fe_models.recovery import StressRecovery
-from fe_models.rigid_motions import rigid_body_modes, rigid_motions
-from fe_models.sector_recovery import SectorRecovery
-from fe_models.symmetry import Mirror, halves, mirror_of_nodes
-from fe_models.trace import LinearTrace
+from fe_models.cyclic.cuts import Cuts
+from fe_models.cyclic.recovery import SectorRecovery
+from fe_models.elasticity.body import ElasticBody
+from fe_models.elasticity.recovery import StressRecovery
+from fe_models.joints.condensation import Condensed, Keep, condense_body, made_anew, renamed
+from fe_models.loads.constraints import Constraints
+from fe_models.loads.rigid_motions import rigid_body_modes, rigid_motions
+from fe_models.meshes.structure_mesh import Body, Interface
+from fe_models.meshes.trace import LinearTrace
+from fe_models.solvers.linear_solver import prepare
+from fe_models.solvers.symmetry import Mirror, halves, mirror_of_nodes
 from sa_solver.types import Array, Indices
 
 # A rigid motion that supports change by less than this share of itself is free.
@@ -43,7 +43,7 @@ class SupportedBody:
     displacements that each imposes on nodes that ``constraints`` hold; ``loaded`` are boundaries
     with tractions on them; ``thermal`` ``(vertices, cases)`` expansions of the vertices and
     ``jumps`` ``(d all, cases)`` shifts of a part of the body, which strain nothing
-    (:mod:`fe_models.pretension`). The forces of both are among the loads; ``own`` ``(d all,
+    (:mod:`fe_models.loads.pretension`). The forces of both are among the loads; ``own`` ``(d all,
     cases)`` are those of the loads that do not act from outside. ``held`` ``(d n,)`` marks the
     interface displacements that are held at zero, as on a plane of symmetry. Raises ValueError if
     those of an interface node are constrained in any other way.

@@ -28,7 +28,7 @@ What is raised
     - ``ConvergenceError``: a method that did not come to its end.
 
 Closed forms to compare with are in :mod:`sa_solver.reference`, measured surfaces in
-:mod:`sa_solver.scans`. Units are N, mm and MPa; signs are
+:mod:`sa_solver.surfaces.scans`. Units are N, mm and MPa; signs are
 those of :mod:`sa_solver.types`. A sphere on a flat, against Hertz:
 
 >>> from sa_solver import ElasticPair, Grid, HalfSpace, Material, NormalContact
@@ -50,16 +50,16 @@ from sa_solver.lazy import lazy_names
 if TYPE_CHECKING:
     from sa_solver.contact import FrictionalContact
     from sa_solver.contact_state import ContactLoad
-    from sa_solver.coupled import CoupledContact
+    from sa_solver.cycles.history import ContactLoadPath, march_history
+    from sa_solver.cycles.partial_slip import partial_slip_curve
+    from sa_solver.cycles.tangential_loop import LoopPath, march_loop
+    from sa_solver.dissimilar.contact import CoupledContact
     from sa_solver.errors import ConvergenceError, FretscaleError, InputError
-    from sa_solver.half_space import HalfSpace
-    from sa_solver.history import ContactLoadPath, march_history
-    from sa_solver.normal import NormalContact
-    from sa_solver.partial_slip import partial_slip_curve
-    from sa_solver.stress import principal_stresses, von_mises
-    from sa_solver.subsurface import SubsurfaceStress
-    from sa_solver.tangential import TangentialContact
-    from sa_solver.tangential_loop import LoopPath, march_loop
+    from sa_solver.half_space.operator import HalfSpace
+    from sa_solver.half_space.stress import principal_stresses, von_mises
+    from sa_solver.half_space.subsurface import SubsurfaceStress
+    from sa_solver.normal.contact import NormalContact
+    from sa_solver.tangential.contact import TangentialContact
     from sa_solver.types import ElasticPair, Frame, Grid, LoadHistory, Material
 
 __all__ = [
@@ -92,16 +92,16 @@ __getattr__, __dir__ = lazy_names(
     {
         "contact": ("FrictionalContact",),
         "contact_state": ("ContactLoad",),
-        "coupled": ("CoupledContact",),
+        "dissimilar.contact": ("CoupledContact",),
         "errors": ("ConvergenceError", "FretscaleError", "InputError"),
-        "half_space": ("HalfSpace",),
-        "history": ("ContactLoadPath", "march_history"),
-        "normal": ("NormalContact",),
-        "partial_slip": ("partial_slip_curve",),
-        "stress": ("principal_stresses", "von_mises"),
-        "subsurface": ("SubsurfaceStress",),
-        "tangential": ("TangentialContact",),
-        "tangential_loop": ("LoopPath", "march_loop"),
+        "half_space.operator": ("HalfSpace",),
+        "cycles.history": ("ContactLoadPath", "march_history"),
+        "normal.contact": ("NormalContact",),
+        "cycles.partial_slip": ("partial_slip_curve",),
+        "half_space.stress": ("principal_stresses", "von_mises"),
+        "half_space.subsurface": ("SubsurfaceStress",),
+        "tangential.contact": ("TangentialContact",),
+        "cycles.tangential_loop": ("LoopPath", "march_loop"),
         "types": ("ElasticPair", "Frame", "Grid", "LoadHistory", "Material"),
     },
 )

@@ -3,7 +3,7 @@
 For similar bodies the normal problem does not feel shear and is solved first; its µp is the limit
 of the tangential one. Dissimilar bodies have both solved together. Where the load asks for more
 shear than friction carries, the contact slides as a whole, by the energies that the load history
-gives (:mod:`sa_solver.gross_slip`).
+gives (:mod:`sa_solver.tangential.gross_slip`).
 
 Source: Gallego, Nélias & Jacq 2006, J. Tribol. 128, 476, doi:10.1115/1.2194914; Gallego 2007,
 eqs 6-8.
@@ -20,22 +20,22 @@ from typing import TypeVar, get_args
 import numpy as np
 
 from sa_solver import checks
-from sa_solver.ciavarella_jaeger import first_loading
 from sa_solver.contact_state import ContactLoad, ContactStart, ContactState
-from sa_solver.coupled import CoupledContact, CoupledState
+from sa_solver.cycles.increments import dissipated, of_nearest
+from sa_solver.dissimilar.contact import CoupledContact, CoupledState
 from sa_solver.errors import InputError
-from sa_solver.friction_limit import largest_share
-from sa_solver.gross_slip import SlidingRule, gross_slip, sliding_direction
-from sa_solver.half_space import HalfSpace
-from sa_solver.increments import dissipated, of_nearest
-from sa_solver.normal import NormalContact, NormalStart, NormalState, checked_heights
+from sa_solver.half_space.operator import HalfSpace
+from sa_solver.normal.contact import NormalContact, NormalStart, NormalState, checked_heights
 from sa_solver.rigid_modes import NORMAL, PLANAR, PlanarModes
-from sa_solver.tangential import (
+from sa_solver.tangential.ciavarella_jaeger import first_loading
+from sa_solver.tangential.contact import (
     FrictionLimitError,
     TangentialContact,
     TangentialContactError,
     TangentialState,
 )
+from sa_solver.tangential.friction_limit import largest_share
+from sa_solver.tangential.gross_slip import SlidingRule, gross_slip, sliding_direction
 from sa_solver.types import Array, Mask
 
 GROSS_SHARE = 0.99
@@ -85,7 +85,8 @@ class FrictionalContact:
     ) -> None:
         """Plan for ``half_space`` and Coulomb's coefficient ``friction`` µ.
 
-        ``sliding`` is how gross slip finds its direction: see :mod:`sa_solver.gross_slip`.
+        ``sliding`` is how gross slip finds its direction: see
+        :mod:`sa_solver.tangential.gross_slip`.
 
         Raises FrictionError unless µ is finite and 0 or more.
         """

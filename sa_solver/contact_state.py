@@ -8,7 +8,7 @@ import numpy as np
 
 from sa_solver import checks
 from sa_solver.errors import InputError
-from sa_solver.normal import NormalStart
+from sa_solver.normal.contact import NormalStart
 from sa_solver.rigid_modes import NORMAL, RESULTANTS
 from sa_solver.types import Array, Mask
 

@@ -3,7 +3,8 @@
 The elastic relation ``v = K t + offset - R c`` is met exactly there, since the padded K is
 circulant and the law off the grid is t = 0. The rigid motions c are such that t has the given
 resultants. The caller says which components the tractions have and which law they obey on the grid:
-pressure alone (:mod:`sa_solver.normal_splitting`) or pressure and shear (:mod:`sa_solver.coupled`).
+pressure alone (:mod:`sa_solver.normal.splitting`) or pressure and shear
+(:mod:`sa_solver.dissimilar.contact`).
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sa_solver.half_space import HalfSpaceResolvent
+from sa_solver.half_space.operator import HalfSpaceResolvent
 from sa_solver.types import Array
 
 Sums = Callable[[Array], Array]

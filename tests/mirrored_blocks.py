@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from skfem import MeshTet, MeshTri
 
-from fe_models.mesh import Body
+from fe_models.meshes.structure_mesh import Body
 
 Mesh = MeshTet | MeshTri
 

@@ -15,9 +15,9 @@ import numpy as np
 import scipy.linalg
 import scipy.sparse as sp
 
-from fe_models.elasticity import ElasticBody
-from fe_models.linear_solver import _Checked
-from sa_solver.symbols import Coefficients
+from fe_models.elasticity.body import ElasticBody
+from fe_models.solvers.linear_solver import _Checked
+from sa_solver.half_space.symbols import Coefficients
 
 SIZE = 1e-13
 SEED = int(os.environ.get("SEED", "1"))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import cache
 
 from fe_models.geometry.specimens import Specimen
-from fe_models.mesh import Interface, StructureMesh
+from fe_models.meshes.structure_mesh import Interface, StructureMesh
 from fe_models.specimens import pad_stiffness, reduced_specimens
 from sa_solver.types import Array, Material
 

@@ -5,11 +5,11 @@ import pytest
 
 from fe_models.dynamics.excitation import HammerBlow, HarmonicForce
 from fe_models.dynamics.motion import Start, quadratic
-from fe_models.dynamics.newmark import TimeStepControl, integrate
 from fe_models.dynamics.rig import Link, lumped_rig
-from fe_models.reduced_contact import FrettingConditions, ReducedPair
-from sa_solver.half_space import HalfSpace
-from sa_solver.normal import NormalContact
+from fe_models.dynamics.transient.newmark import TimeStepControl, integrate
+from fe_models.joints.reduced_contact import FrettingConditions, ReducedPair
+from sa_solver.half_space.operator import HalfSpace
+from sa_solver.normal.contact import NormalContact
 from sa_solver.reference.hertz import HertzSphere
 from sa_solver.types import ElasticPair, Grid, Material
 from tests.oracles.event_driven import SliderJoints, integrate_exactly

@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 from scipy.spatial import cKDTree
 
-from fe_models.cyclic import Cyclic
-from fe_models.mesh import Body, named_mesh
+from fe_models.cyclic.cuts import Cyclic
+from fe_models.meshes.structure_mesh import Body, named_mesh
 
 INNER, OUTER, WIDTH = 20.0, 30.0, 6.0
 Y = np.array([0.0, 1.0, 0.0])

@@ -31,9 +31,9 @@ What follows
     - ``linear_regime``: the rate after running-in, and how far it can be extrapolated.
     - ``ruiz``, ``findley``, ``smith_watson_topper``: where cracks start.
 
-Contacts at nodes are in :mod:`wear.nodes`, joints of vibrating structures in :mod:`wear.joints`,
-wear between two scans in :mod:`wear.scar`. A cylinder of 10 mm that is pressed by 50 N/mm and
-slides 40 µm a cycle:
+Contacts at nodes are in :mod:`wear.contact.nodes`, joints of vibrating structures in
+:mod:`wear.joints`, wear between two scans in :mod:`wear.scar`. A cylinder of 10 mm that is pressed
+by 50 N/mm and slides 40 µm a cycle:
 
 >>> import numpy as np
 >>> from sa_solver import ElasticPair, Grid, LoadHistory, Material
@@ -62,7 +62,10 @@ from typing import TYPE_CHECKING
 from sa_solver.lazy import lazy_names
 
 if TYPE_CHECKING:
-    from wear.contacts import Contacts
+    from wear.contact.contacts import Contacts
+    from wear.contact.face_loads import CycleLoads
+    from wear.contact.interface import InterfaceContact, InterfaceSettings
+    from wear.contact.link import CellNodes
     from wear.coupled import (
         ConstantLoads,
         CoupledSettings,
@@ -72,16 +75,13 @@ if TYPE_CHECKING:
         Observer,
         Stop,
     )
+    from wear.cracking.life import findley, ruiz, smith_watson_topper
     from wear.evolution import EnergyTable
-    from wear.face_loads import CycleLoads
-    from wear.implicit import ImplicitStepper, SecondOrderStepper
-    from wear.interface import InterfaceContact, InterfaceSettings
     from wear.kinetics import linear_regime
     from wear.laws import ArchardLaw, EnergyAmplitudeLaw, EnergyLaw, EvolvingLaw, WearLaw
-    from wear.life import findley, ruiz, smith_watson_topper
-    from wear.link import CellNodes
-    from wear.steppers import ErrorControl, ExplicitStepper, HeunStepper
-    from wear.stepping import ContactFailure
+    from wear.steps.implicit import ImplicitStepper, SecondOrderStepper
+    from wear.steps.steppers import ErrorControl, ExplicitStepper, HeunStepper
+    from wear.steps.stepping import ContactFailure
 
 __all__ = [
     "ArchardLaw",
@@ -117,20 +117,20 @@ __all__ = [
 __getattr__, __dir__ = lazy_names(
     __name__,
     {
-        "contacts": ("Contacts",),
+        "contact.contacts": ("Contacts",),
         "coupled": (
             *("ConstantLoads", "CoupledSettings", "CoupledState"),
             *("CoupledWear", "JumpSize", "Observer", "Stop"),
         ),
         "evolution": ("EnergyTable",),
-        "face_loads": ("CycleLoads",),
-        "implicit": ("ImplicitStepper", "SecondOrderStepper"),
-        "interface": ("InterfaceContact", "InterfaceSettings"),
+        "contact.face_loads": ("CycleLoads",),
+        "steps.implicit": ("ImplicitStepper", "SecondOrderStepper"),
+        "contact.interface": ("InterfaceContact", "InterfaceSettings"),
         "kinetics": ("linear_regime",),
         "laws": ("ArchardLaw", "EnergyAmplitudeLaw", "EnergyLaw", "EvolvingLaw", "WearLaw"),
-        "life": ("findley", "ruiz", "smith_watson_topper"),
-        "link": ("CellNodes",),
-        "steppers": ("ErrorControl", "ExplicitStepper", "HeunStepper"),
-        "stepping": ("ContactFailure",),
+        "cracking.life": ("findley", "ruiz", "smith_watson_topper"),
+        "contact.link": ("CellNodes",),
+        "steps.steppers": ("ErrorControl", "ExplicitStepper", "HeunStepper"),
+        "steps.stepping": ("ContactFailure",),
     },
 )

@@ -20,10 +20,10 @@ from sa_solver import checks
 from sa_solver.errors import InputError
 from sa_solver.ties import first_largest
 from sa_solver.types import Array, resultant_change
-from wear.contacts import KINETICS, Contacts
-from wear.face_loads import FaceLoads
-from wear.interface import FirstContact, InterfaceState
-from wear.steppers import ROUNDING
+from wear.contact.contacts import KINETICS, Contacts
+from wear.contact.face_loads import FaceLoads
+from wear.contact.interface import FirstContact, InterfaceState
+from wear.steps.steppers import ROUNDING
 from wear.worn import Spent
 
 AT_STOP = 1e-3
@@ -194,9 +194,9 @@ class CoupledState:
 
     ``interfaces`` are the states of the contacts; ``cycles`` ``(j,)`` those at the end of every
     jump so far, the unworn state included; ``kinetics`` ``(j, interfaces, 5)`` has the columns
-    :data:`wear.contacts.KINETICS`; ``solved_resultants`` ``(interfaces, 6)`` is the probe at the
-    last solution of the source; ``drift`` ``(j,)`` the drift found after each jump; ``solutions``
-    counts the solutions, ``spent`` what the contacts have taken.
+    :data:`wear.contact.contacts.KINETICS`; ``solved_resultants`` ``(interfaces, 6)`` is the probe
+    at the last solution of the source; ``drift`` ``(j,)`` the drift found after each jump;
+    ``solutions`` counts the solutions, ``spent`` what the contacts have taken.
     """
 
     interfaces: tuple[InterfaceState, ...]

@@ -20,7 +20,7 @@ from functools import cached_property
 import numpy as np
 
 from sa_solver.errors import InputError
-from sa_solver.scans import Scan, filled, levelled, resampled, rms
+from sa_solver.surfaces.scans import Scan, filled, levelled, resampled, rms
 from sa_solver.types import Array, Grid, Mask
 
 RECOGNISED = 0.5
@@ -135,7 +135,7 @@ def measure_scar(before: Scan, after: Scan, worn: Mask | None = None) -> Scar:
 
     >>> import numpy as np
     >>> from sa_solver import Grid
-    >>> from sa_solver.scans import Scan
+    >>> from sa_solver.surfaces.scans import Scan
     >>> from wear.scar import measure_scar
     >>> rng, grid = np.random.default_rng(1), Grid.covering((1.0, 1.0), (100, 100))
     >>> cap = np.maximum(4e-3 - (grid.x**2 + grid.y**2) / 20.0, 0.0)

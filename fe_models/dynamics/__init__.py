@@ -14,8 +14,8 @@ M x'' + C x' + K x = f(t) - Bᵀ F(B x), with joint laws F that are handed over,
 - ``motions_at``: all motions of a branch at a frequency
 - ``along_phase_resonance``: the backbone of a resonance
 - ``along_nonlinear_mode``, ``LinearMode``: frequency and damping of a mode against its amplitude
-- ``HarmonicBalance.of_sector``, with :mod:`fe_models.dynamics.sector`: one sector of a ring in a
-  wave that travels round
+- ``HarmonicBalance.of_sector``, with :mod:`fe_models.dynamics.rings.sector`: one sector of a ring
+  in a wave that travels round
 - ``Floquet``: whether motions are stable
 - ``ContinuationControl``, ``Accuracy``: the steps along a branch, how fine its motions are
 - ``frequency_response``, ``ring_down``: what a hammer's blow shows
@@ -39,8 +39,11 @@ from typing import TYPE_CHECKING
 from sa_solver.lazy import lazy_names
 
 if TYPE_CHECKING:
-    from fe_models.dynamics.continuation import ContinuationControl
-    from fe_models.dynamics.crossings import motions_at
+    from fe_models.dynamics.curves.continuation import ContinuationControl
+    from fe_models.dynamics.curves.crossings import motions_at
+    from fe_models.dynamics.curves.forced_response import Accuracy, along_force, along_frequency
+    from fe_models.dynamics.curves.nonlinear_mode import LinearMode, along_nonlinear_mode
+    from fe_models.dynamics.curves.phase_resonance import along_phase_resonance
     from fe_models.dynamics.damping import damped
     from fe_models.dynamics.excitation import (
         CombinedForces,
@@ -49,16 +52,9 @@ if TYPE_CHECKING:
         HarmonicForce,
         RecordedForce,
     )
-    from fe_models.dynamics.floquet import Floquet
-    from fe_models.dynamics.forced_response import Accuracy, along_force, along_frequency
-    from fe_models.dynamics.free_decay import ring_down
-    from fe_models.dynamics.harmonic_balance import HarmonicBalance, PeriodicLoad
-    from fe_models.dynamics.harmonics import Resolution
-    from fe_models.dynamics.impact_hammer import frequency_response
     from fe_models.dynamics.model import DynamicModel
-    from fe_models.dynamics.newmark import TimeStepControl, integrate
-    from fe_models.dynamics.nonlinear_mode import LinearMode, along_nonlinear_mode
-    from fe_models.dynamics.phase_resonance import along_phase_resonance
+    from fe_models.dynamics.periodic.harmonic_balance import HarmonicBalance, PeriodicLoad
+    from fe_models.dynamics.periodic.harmonics import Resolution
     from fe_models.dynamics.rig import (
         Link,
         lumped_rig,
@@ -66,6 +62,10 @@ if TYPE_CHECKING:
         reduced_rig,
         unit_force,
     )
+    from fe_models.dynamics.stability.floquet import Floquet
+    from fe_models.dynamics.transient.free_decay import ring_down
+    from fe_models.dynamics.transient.impact_hammer import frequency_response
+    from fe_models.dynamics.transient.newmark import TimeStepControl, integrate
 
 __all__ = [
     "Accuracy",
@@ -101,8 +101,8 @@ __all__ = [
 __getattr__, __dir__ = lazy_names(
     __name__,
     {
-        "continuation": ("ContinuationControl",),
-        "crossings": ("motions_at",),
+        "curves.continuation": ("ContinuationControl",),
+        "curves.crossings": ("motions_at",),
         "damping": ("damped",),
         "excitation": (
             "CombinedForces",
@@ -111,29 +111,29 @@ __getattr__, __dir__ = lazy_names(
             "HarmonicForce",
             "RecordedForce",
         ),
-        "floquet": ("Floquet",),
-        "forced_response": (
+        "stability.floquet": ("Floquet",),
+        "curves.forced_response": (
             "Accuracy",
             "along_force",
             "along_frequency",
         ),
-        "free_decay": ("ring_down",),
-        "harmonic_balance": (
+        "transient.free_decay": ("ring_down",),
+        "periodic.harmonic_balance": (
             "HarmonicBalance",
             "PeriodicLoad",
         ),
-        "harmonics": ("Resolution",),
-        "impact_hammer": ("frequency_response",),
+        "periodic.harmonics": ("Resolution",),
+        "transient.impact_hammer": ("frequency_response",),
         "model": ("DynamicModel",),
-        "newmark": (
+        "transient.newmark": (
             "TimeStepControl",
             "integrate",
         ),
-        "nonlinear_mode": (
+        "curves.nonlinear_mode": (
             "LinearMode",
             "along_nonlinear_mode",
         ),
-        "phase_resonance": ("along_phase_resonance",),
+        "curves.phase_resonance": ("along_phase_resonance",),
         "rig": (
             "Link",
             "lumped_rig",

@@ -17,7 +17,7 @@ import scipy.linalg as sl
 from fe_models.dynamics.ground_motion import translation_of
 from fe_models.dynamics.model import DynamicModel
 from fe_models.dynamics.rig import Link, RigError, connected_rig
-from fe_models.reduction import ReducedModel
+from fe_models.joints.reduction import ReducedModel
 from fe_models.specimens import PAD, RING
 from sa_solver.types import Array
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fe_models.dynamics.rig import RigError
-from fe_models.reduction import ReducedModel
+from fe_models.joints.reduction import ReducedModel
 from sa_solver.types import Array
 
 # Of the largest force that a unit of each displacement makes: what a translation of a free body may

@@ -7,10 +7,10 @@ from functools import cached_property
 
 import numpy as np
 
-from fe_models.dynamics.harmonics import Resolution
 from fe_models.dynamics.model import DynamicModel
-from fe_models.dynamics.periodic_joints import Cycle, PeriodicJoints
-from fe_models.dynamics.receptance import Receptance
+from fe_models.dynamics.periodic.harmonics import Resolution
+from fe_models.dynamics.periodic.joints import Cycle, PeriodicJoints
+from fe_models.dynamics.periodic.receptance import Receptance
 from sa_solver.types import Array
 
 # Of rest under a constant load, as shares of what loads and joints do to the joints: a guess that

@@ -13,8 +13,8 @@ import numpy as np
 import scipy.linalg as sl
 
 from fe_models.dynamics.model import DynamicModel
-from fe_models.dynamics.receptance import RIGID
-from fe_models.reduction import ReducedModel
+from fe_models.dynamics.periodic.receptance import RIGID
+from fe_models.joints.reduction import ReducedModel
 from sa_solver.errors import InputError
 from sa_solver.types import Array
 

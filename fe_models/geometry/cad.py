@@ -7,13 +7,13 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from fe_models.geometry.apart import cpu_limited
-from fe_models.geometry.gmsh_file import EntityGroup, first_line, grouped_entities
-from fe_models.geometry.grouped import GroupedMesh
-from fe_models.geometry.length_unit import LengthUnit
-from fe_models.geometry.text_files import unmarked
-from fe_models.gmsh_session import gmsh_model
-from fe_models.mesh import MeshError
+from fe_models.meshes.gmsh_session import gmsh_model
+from fe_models.meshes.structure_mesh import MeshError
+from fe_models.readers.gmsh_file import EntityGroup, first_line, grouped_entities
+from fe_models.readers.grouped import GroupedMesh
+from fe_models.readers.length_unit import LengthUnit
+from fe_models.readers.reader_process import cpu_limited
+from fe_models.readers.text_files import unmarked
 
 # Its files state no unit.
 BREP = ".brep"

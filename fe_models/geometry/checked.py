@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from fe_models.geometry.grouped import pieces
-from fe_models.mesh import Body, MeshError, named_mesh
-from fe_models.remesh import element_volumes
+from fe_models.meshes.remesh import element_volumes
+from fe_models.meshes.structure_mesh import Body, MeshError, named_mesh
+from fe_models.readers.grouped import pieces
 from sa_solver.types import Array, Indices
 
 # An element is flat when its volume is below this share of the cube of its extent (the square in

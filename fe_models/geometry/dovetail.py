@@ -13,9 +13,8 @@ from typing import Any, Literal
 
 import numpy as np
 
-from fe_models.geometry.gmsh_file import EntityGroup, generated_body
-from fe_models.gmsh_session import gmsh_model, grow_from
-from fe_models.mesh import (
+from fe_models.meshes.gmsh_session import gmsh_model, grow_from
+from fe_models.meshes.structure_mesh import (
     AXES,
     Body,
     MeshError,
@@ -23,7 +22,8 @@ from fe_models.mesh import (
     matched_interface,
     named_mesh,
 )
-from sa_solver.shapes import rounded_edge
+from fe_models.readers.gmsh_file import EntityGroup, generated_body
+from sa_solver.surfaces.shapes import rounded_edge
 from sa_solver.types import Array, Frame
 
 # How fast the mesh size grows with the distance from the flanks, and from the fillets: pressure

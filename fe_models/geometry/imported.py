@@ -10,24 +10,24 @@ from pathlib import Path
 
 import numpy as np
 
-from fe_models.curved_face import Midsides
-from fe_models.geometry.abaqus import read_abaqus
-from fe_models.geometry.apart import read_apart, reading
 from fe_models.geometry.cad import read_cad
 from fe_models.geometry.checked import checked_body, vector
-from fe_models.geometry.endings import CAD, EXODUS, EXPORT, NASTRAN, why_not_read
-from fe_models.geometry.exodus import read_exodus
-from fe_models.geometry.gmsh_file import read_msh
-from fe_models.geometry.grouped import DIMENSION, Blocks, GroupedMesh, nodes_of, split_blocks
-from fe_models.geometry.length_unit import SIZES, LengthUnit
-from fe_models.geometry.meshio_file import read_meshio
-from fe_models.geometry.nastran import read_nastran
-from fe_models.geometry.scene import Scene
-from fe_models.geometry.set_faces import faces_of_sets
-from fe_models.geometry.text_files import open_text
-from fe_models.geometry.unv import read_unv
-from fe_models.mesh import Body, MeshError, in_space
-from fe_models.remesh import element_volumes
+from fe_models.meshes.curved_face import Midsides
+from fe_models.meshes.remesh import element_volumes
+from fe_models.meshes.structure_mesh import Body, MeshError, in_space
+from fe_models.readers.abaqus.mesh import read_abaqus
+from fe_models.readers.endings import CAD, EXODUS, EXPORT, NASTRAN, why_not_read
+from fe_models.readers.exodus import read_exodus
+from fe_models.readers.gmsh_file import read_msh
+from fe_models.readers.grouped import DIMENSION, Blocks, GroupedMesh, nodes_of, split_blocks
+from fe_models.readers.length_unit import SIZES, LengthUnit
+from fe_models.readers.meshio_file import read_meshio
+from fe_models.readers.nastran.mesh import read_nastran
+from fe_models.readers.reader_process import read_apart, reading
+from fe_models.readers.scene import Scene
+from fe_models.readers.set_faces import faces_of_sets
+from fe_models.readers.text_files import open_text
+from fe_models.readers.unv import read_unv
 from sa_solver.types import Array, Indices
 
 # A mesh is plane when it is thinner than this share of its size.
@@ -114,7 +114,7 @@ def read_bodies(path: Path, size: float | None = None, unit: str | None = None) 
     that the file states, and in mm where it states none. Elements are straight between their
     corners, whatever nodes they have on
     their edges: these tell the form of contact faces, and that of elements of second order
-    (:func:`fe_models.second_order.with_midsides`). Quadrilaterals, pyramids, wedges and
+    (:func:`fe_models.meshes.second_order.with_midsides`). Quadrilaterals, pyramids, wedges and
     hexahedra are split into triangles or tetrahedra. A plane mesh keeps the
     two coordinates that vary, in their order, as X and Z; whether its elements are of plane strain
     or stress is not read.

@@ -23,9 +23,15 @@ from typing import Any
 
 import numpy as np
 
-from fe_models.geometry.gmsh_file import EntityGroup, generated_body
-from fe_models.gmsh_session import gmsh_model, grow_from
-from fe_models.mesh import Body, MeshError, StructureMesh, matched_interface, named_mesh
+from fe_models.meshes.gmsh_session import gmsh_model, grow_from
+from fe_models.meshes.structure_mesh import (
+    Body,
+    MeshError,
+    StructureMesh,
+    matched_interface,
+    named_mesh,
+)
+from fe_models.readers.gmsh_file import EntityGroup, generated_body
 from sa_solver.types import Array, Frame, Indices
 
 # Name of the interface, and of the boundary of both bodies that it joins.

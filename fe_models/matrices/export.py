@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import scipy.io
 
+from fe_models.joints.reduction import ReducedModel
 from fe_models.matrices.unknowns import MODAL, Unknown, unknown_of
-from fe_models.reduction import ReducedModel
 from sa_solver.types import Array
 
 # Digits that leave nothing of a number out.

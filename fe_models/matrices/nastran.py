@@ -15,7 +15,6 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
-from fe_models.geometry.nastran_cards import Entry, bulk_data
 from fe_models.matrices.unknowns import (
     MatrixError,
     MatrixFile,
@@ -24,7 +23,8 @@ from fe_models.matrices.unknowns import (
     by_number,
     mirrored,
 )
-from fe_models.mesh import MeshError
+from fe_models.meshes.structure_mesh import MeshError
+from fe_models.readers.nastran.cards import Entry, bulk_data
 
 DMIG = "DMIG"
 # Forms of a matrix: whole, rectangular with numbered columns, and symmetric with one triangle.

@@ -8,10 +8,10 @@ from dataclasses import replace
 import numpy as np
 import scipy.linalg as sl
 
-from fe_models.linear_solver import FactorMemoryError, SolverError
+from fe_models.joints.reduction import ReducedModel, free_frequencies, reduce_body
 from fe_models.matrices.structure import OwnMatrices
 from fe_models.matrices.unknowns import MODAL, ROTATIONS, MatrixError, Unknown
-from fe_models.reduction import ReducedModel, free_frequencies, reduce_body
+from fe_models.solvers.linear_solver import FactorMemoryError, SolverError
 from sa_solver.types import Array, Indices
 
 # Masses that are nothing, over the largest of their kind (displacements, rotations, modes).
@@ -76,8 +76,8 @@ def on_retained(
     """The matrices on the unknowns of ``points`` and so many modes, by Craig and Bampton.
 
     Damping and loads are projected onto the same shapes. ``done`` is called as by
-    :func:`~fe_models.reduction.reduce_body`. Raises :class:`MatrixError` for modes that there are
-    not, and where what is not retained can move while the points are held.
+    :func:`~fe_models.joints.reduction.reduce_body`. Raises :class:`MatrixError` for modes that
+    there are not, and where what is not retained can move while the points are held.
 
     Examples
     --------
@@ -319,7 +319,8 @@ def lowest_frequencies(matrices: OwnMatrices, count: int) -> Array:
     """The lowest natural frequencies [Hz]: 0 of rigid motions, and up to ``count`` above them.
 
     Raises :class:`MatrixError` for what has no mass or no stiffness, and
-    :class:`~fe_models.linear_solver.SolverError` where large matrices have no such frequencies.
+    :class:`~fe_models.solvers.linear_solver.SolverError` where large matrices have no such
+    frequencies.
 
     Examples
     --------

@@ -17,8 +17,6 @@ import numpy as np
 import scipy.io
 import scipy.sparse as sp
 
-from fe_models.geometry.abaqus_cards import SourceLine
-from fe_models.geometry.text_files import open_text
 from fe_models.matrices.unknowns import (
     MatrixError,
     MatrixFile,
@@ -30,6 +28,8 @@ from fe_models.matrices.unknowns import (
     once,
     whole,
 )
+from fe_models.readers.abaqus.cards import SourceLine
+from fe_models.readers.text_files import open_text
 from sa_solver.types import Array, Indices
 
 MATRIX_MARKET, USER_ELEMENT = "%%MatrixMarket", "*USERELEMENT"

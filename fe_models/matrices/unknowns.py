@@ -10,7 +10,7 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 import scipy.sparse as sp
 
-from fe_models.geometry.nastran_cards import fortran_real
+from fe_models.readers.nastran.cards import fortran_real
 from sa_solver.errors import InputError
 from sa_solver.types import Array
 

@@ -12,8 +12,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from sa_solver.half_space.subsurface_influence import EXCHANGED
 from sa_solver.reference.hertz import HertzCylinder, HertzSphere
-from sa_solver.subsurface_influence import EXCHANGED
 from sa_solver.types import Array
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from sa_solver import loops
+from sa_solver.transforms import passes as loops
 
 RECORD = Path(__file__).with_name("record.csv")
 

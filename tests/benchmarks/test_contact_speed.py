@@ -17,8 +17,8 @@ import pytest
 
 from sa_solver.contact import FrictionalContact
 from sa_solver.contact_state import ContactLoad, ContactState
-from sa_solver.half_space import HalfSpace
-from sa_solver.normal import NormalContact
+from sa_solver.half_space.operator import HalfSpace
+from sa_solver.normal.contact import NormalContact
 from sa_solver.reference.hertz import HertzSphere
 from sa_solver.types import Array, ElasticPair, Grid, Material
 
@@ -120,7 +120,7 @@ def in_a_process(function: str) -> dict[str, float]:
 def first_solve() -> dict[str, float]:
     """Seconds of the first solve of this process at 256², and of the next; modules are loaded.
 
-    Not those that it does without, as the compiler (:mod:`sa_solver.loops`).
+    Not those that it does without, as the compiler (:mod:`sa_solver.transforms.passes`).
     """
     small, gap, load = sphere(16, ALIKE)
     NormalContact(small).solve(gap, load)

@@ -15,9 +15,9 @@ from pathlib import Path
 import numpy as np
 
 from fe_models.dovetail import Mission, dovetail_structure
-from fe_models.friction import FrictionalJoint
-from sa_solver.half_space import HalfSpace
-from sa_solver.normal import NormalContact
+from fe_models.joints.friction import FrictionalJoint
+from sa_solver.half_space.operator import HalfSpace
+from sa_solver.normal.contact import NormalContact
 from sa_solver.types import ElasticPair, Grid, Material
 from workflow.kinds import load_case
 

@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 from skfem import MeshTet
 
-from fe_models.elasticity import ElasticBody
-from fe_models.linear_solver import factorise, prepare
-from fe_models.mesh import Body
-from fe_models.multigrid import MultigridSolver
-from fe_models.rigid_motions import rigid_body_modes
+from fe_models.elasticity.body import ElasticBody
+from fe_models.loads.rigid_motions import rigid_body_modes
+from fe_models.meshes.structure_mesh import Body
+from fe_models.solvers.linear_solver import factorise, prepare
+from fe_models.solvers.multigrid import MultigridSolver
 from sa_solver.types import Array, Material
 from workflow.analyses.wear.structure_stage import StructureStage
 from workflow.analyses.wear.structures.dovetail.case import DovetailCase

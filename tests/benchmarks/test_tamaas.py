@@ -19,11 +19,11 @@ from statistics import median
 import numpy as np
 import pytest
 
-from sa_solver import loops
-from sa_solver.half_space import HalfSpace
-from sa_solver.normal import NormalContact
-from sa_solver.normal_problem import contact_residuals
+from sa_solver.half_space.operator import HalfSpace
+from sa_solver.normal.contact import NormalContact
+from sa_solver.normal.problem import contact_residuals
 from sa_solver.reference.hertz import HertzSphere
+from sa_solver.transforms import passes as loops
 from sa_solver.types import Array, ElasticPair, Grid, Material
 
 RESIDUAL = 1e-6

@@ -11,10 +11,10 @@ import pytest
 
 from sa_solver.contact import FrictionalContact
 from sa_solver.contact_state import ContactLoad, ContactStart, ContactState
-from sa_solver.half_space import HalfSpace
+from sa_solver.half_space.operator import HalfSpace
 from sa_solver.reference.hertz import HertzSphere
-from sa_solver.tangential import TangentialContact
-from sa_solver.transform import Transform
+from sa_solver.tangential.contact import TangentialContact
+from sa_solver.transforms.padded import Transform
 from sa_solver.types import Array, ElasticPair, Grid, Material
 
 TITANIUM = Material(115e3, 0.29)

@@ -18,16 +18,16 @@ from typing import Any
 import numpy as np
 import pytest
 
-from fe_models.dynamics.continuation import ContinuationControl
-from fe_models.dynamics.forced_response import ResponseBranch, along_frequency
-from fe_models.dynamics.harmonic_balance import HarmonicBalance, PeriodicLoad
-from fe_models.dynamics.harmonics import Resolution
+from fe_models.dynamics.curves.continuation import ContinuationControl
+from fe_models.dynamics.curves.forced_response import ResponseBranch, along_frequency
+from fe_models.dynamics.periodic.harmonic_balance import HarmonicBalance, PeriodicLoad
+from fe_models.dynamics.periodic.harmonics import Resolution
 from fe_models.dynamics.rig import unit_force
 from sa_solver.types import Array
 from tests.oracles.two_mass_rig import two_mass_rig
 from wear.joints.friction_contact import FrictionContact
 from wear.joints.jenkins import Jenkins
-from wear.joints.periodic import PeriodicMarch
+from wear.joints.periodic.march import PeriodicMarch
 from workflow.analyses.vibration.case import VibrationCase
 from workflow.analyses.vibration.model import VibrationModel
 from workflow.kinds import load_case

@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 import scipy.linalg as sl
 
-from fe_models.elasticity import ElasticBody
+from fe_models.elasticity.body import ElasticBody
 from sa_solver.types import Array, Indices
 
 needs_ccx = pytest.mark.skipif(shutil.which("ccx") is None, reason="needs CalculiX's ccx")

@@ -9,12 +9,12 @@ import pytest
 from skfem import MeshTet
 
 from fe_models.dovetail import Mission, dovetail_structure
-from fe_models.elasticity import ElasticBody
-from fe_models.friction import FrictionalJoint
+from fe_models.elasticity.body import ElasticBody
+from fe_models.elasticity.stress import StressField, cycle_stress
 from fe_models.geometry.dovetail import Dovetail
-from fe_models.joint import JointStiffness
-from fe_models.mesh import Body, StructureMesh
-from fe_models.stress import StressField, cycle_stress
+from fe_models.joints.friction import FrictionalJoint
+from fe_models.joints.joint import JointStiffness
+from fe_models.meshes.structure_mesh import Body, StructureMesh
 from fe_models.structure import CycleSolution, Structure
 from sa_solver.types import Array, Material
 

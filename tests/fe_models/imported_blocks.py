@@ -4,7 +4,7 @@ import numpy as np
 from skfem import MeshTet
 
 from fe_models.geometry.imported import ImportedMesh
-from fe_models.mesh import Body
+from fe_models.meshes.structure_mesh import Body
 from tests.mirrored_blocks import along, mirrored, with_faces
 
 BODIES = "lower", "upper"

@@ -4,14 +4,14 @@ import numpy as np
 import scipy.sparse as sp
 from skfem import MeshTet, MeshTri
 
-from fe_models.constraints import Constraints
-from fe_models.elasticity import ElasticBody
-from fe_models.friction import FrictionalJoint
-from fe_models.joint import join
-from fe_models.mesh import AXES, Body
-from fe_models.mortar import mortar_interface
+from fe_models.elasticity.body import ElasticBody
+from fe_models.joints.friction import FrictionalJoint
+from fe_models.joints.joint import join
+from fe_models.joints.mortar import mortar_interface
+from fe_models.loads.constraints import Constraints
+from fe_models.meshes.structure_mesh import AXES, Body
+from fe_models.meshes.trace import LinearTrace
 from fe_models.supported_body import SupportedBody, interface_nodes
-from fe_models.trace import LinearTrace
 from sa_solver.types import Frame, Material
 
 LINE, SURFACE = 2, 3

@@ -6,9 +6,9 @@ import pytest
 from skfem import MeshTet
 
 from fe_models.geometry.imported import patch, read_bodies
-from fe_models.gmsh_session import gmsh_model
-from fe_models.mesh import MeshError
-from fe_models.remesh import element_volumes
+from fe_models.meshes.gmsh_session import gmsh_model
+from fe_models.meshes.remesh import element_volumes
+from fe_models.meshes.structure_mesh import MeshError
 from tests.fe_models.abaqus_files import ASSEMBLY, CUBES, PARTS, read
 
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from fe_models.mesh import MeshError
+from fe_models.meshes.structure_mesh import MeshError
 from tests.fe_models.abaqus_files import ASSEMBLY, CUBES, PARTS, read
 
 

@@ -9,10 +9,10 @@ from pathlib import Path
 
 import pytest
 
-from fe_models.geometry.apart import read_apart
 from fe_models.geometry.imported import read_bodies
-from fe_models.gmsh_session import gmsh_model
-from fe_models.mesh import MeshError
+from fe_models.meshes.gmsh_session import gmsh_model
+from fe_models.meshes.structure_mesh import MeshError
+from fe_models.readers.reader_process import read_apart
 
 posix_only = pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
 PATIENCE = 120.0
@@ -64,7 +64,7 @@ def test_the_end_of_the_process_is_told(ending, number, words):
 @pytest.mark.skipif(not Path("/proc").exists(), reason="looks for processes in /proc")
 def test_the_process_ends_with_whoever_reads():
     """However that one ends."""
-    reading = "from fe_models.geometry.apart import read_apart; read_apart(time.sleep, 99)"
+    reading = "from fe_models.readers.reader_process import read_apart; read_apart(time.sleep, 99)"
     with subprocess.Popen([sys.executable, "-c", f"import time; {reading}"]) as process:
         below = Path(f"/proc/{process.pid}/task/{process.pid}/children")
         end = time.monotonic() + PATIENCE

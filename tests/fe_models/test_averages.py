@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from fe_models.averages import GROUP, leaving_means
-from fe_models.constraints import Constraints
-from fe_models.rigid_motions import rigid_motions
+from fe_models.loads.averages import GROUP, leaving_means
+from fe_models.loads.constraints import Constraints
+from fe_models.loads.rigid_motions import rigid_motions
 
 
 @pytest.mark.parametrize("nodes", [2, 7, 60, 250])

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from fe_models import blas_threads
-from fe_models.blas_threads import SMALL, one_thread
+from fe_models.solvers import blas_threads
+from fe_models.solvers.blas_threads import SMALL, one_thread
 
 
 def _numbers() -> list[int]:

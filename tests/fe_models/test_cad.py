@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from fe_models.geometry.imported import describe_bodies, patch, read_bodies
-from fe_models.gmsh_session import gmsh_model
-from fe_models.mesh import MeshError
-from fe_models.remesh import element_volumes
+from fe_models.meshes.gmsh_session import gmsh_model
+from fe_models.meshes.remesh import element_volumes
+from fe_models.meshes.structure_mesh import MeshError
 
 pytestmark = pytest.mark.usefixtures("reads_here")
 

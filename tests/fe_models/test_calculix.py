@@ -9,15 +9,15 @@ from scipy.sparse.linalg import spsolve
 from scipy.spatial import cKDTree
 from skfem import MeshTet
 
-import fe_models.elasticity
-from fe_models.constraints import Constraints
-from fe_models.elasticity import ElasticBody
-from fe_models.mesh import Body, StructureMesh, matched_interface
-from fe_models.mortar import mortar_interface
+import fe_models.elasticity.body
+from fe_models.elasticity.body import ElasticBody
+from fe_models.joints.mortar import mortar_interface
+from fe_models.loads.constraints import Constraints
+from fe_models.meshes.structure_mesh import Body, StructureMesh, matched_interface
+from fe_models.meshes.trace import LinearTrace
 from fe_models.motion import deformation
 from fe_models.structure import Structure
 from fe_models.supported_body import SupportedBody, interface_nodes
-from fe_models.trace import LinearTrace
 from sa_solver.types import Frame, Material
 from tests.fe_models.calculix import Job, needs_ccx, stresses_of
 
@@ -153,7 +153,7 @@ def compare(bodies, displacements, answer):
 @pytest.fixture
 def as_calculix(monkeypatch):
     """Four integration points in curved tetrahedra too, as C3D10 has."""
-    monkeypatch.setattr(fe_models.elasticity, "INTEGRATED", 2)
+    monkeypatch.setattr(fe_models.elasticity.body, "INTEGRATED", 2)
 
 
 # Displacements in a .dat file have seven digits, the largest of them here a 2 before the point.
@@ -240,7 +240,7 @@ def test_what_differs_by_choice(monkeypatch):
     whole, tied = (
         np.concatenate(u) for u in (one_body(bodies), bonded(structure_of(bodies, True)))
     )
-    monkeypatch.setattr(fe_models.elasticity, "INTEGRATED", 2)
+    monkeypatch.setattr(fe_models.elasticity.body, "INTEGRATED", 2)
     few = np.concatenate(one_body(blocks(2, curved=True)))
     assert 1e-3 < np.abs(few - whole).max() / np.abs(whole).max() < 3e-3
     assert 1e-3 < np.abs(tied - whole).max() / np.abs(whole).max() < 1e-2

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from fe_models.constraints import Constraints
-from fe_models.friction import FrictionalJoint
-from fe_models.mesh import StructureMesh, matched_interface
+from fe_models.joints.friction import FrictionalJoint
+from fe_models.loads.constraints import Constraints
+from fe_models.meshes.structure_mesh import StructureMesh, matched_interface
 from fe_models.motion import deformation
 from fe_models.structure import Structure
 from fe_models.supported_body import SupportedBody, interface_nodes

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from fe_models.constraints import Constraints
+from fe_models.loads.constraints import Constraints
 from sa_solver.errors import InputError
 
 NODES = 6

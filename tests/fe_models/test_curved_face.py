@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 from skfem import MeshTri
 
-from fe_models.curved_face import Midsides, Surface
-from fe_models.geometry.grouped import CORNERS, midsides_of
 from fe_models.geometry.imported import read_bodies
-from fe_models.gmsh_session import gmsh_model
-from fe_models.mesh import MeshError
-from fe_models.mortar import mortar_projection
+from fe_models.joints.mortar import mortar_projection
+from fe_models.meshes.curved_face import Midsides, Surface
+from fe_models.meshes.gmsh_session import gmsh_model
+from fe_models.meshes.structure_mesh import MeshError
+from fe_models.readers.grouped import CORNERS, midsides_of
 
 RADIUS = 5.0
 ROW = np.zeros((1, 1))

@@ -5,11 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fe_models import friction, structure
-from fe_models.applied_loads import BoundaryForce, Pressure
-from fe_models.cut_face import WholeStress, whole_face, whole_history, whole_resultants
-from fe_models.elasticity import ElasticBody
-from fe_models.friction import FrictionalJoint
+from fe_models import structure
+from fe_models.elasticity.body import ElasticBody
+from fe_models.elasticity.stress import stress_field
 from fe_models.geometry.imported import ImportedMesh
 from fe_models.imported_structure import (
     ContactPair,
@@ -17,8 +15,11 @@ from fe_models.imported_structure import (
     imported_mesh,
     imported_structure,
 )
-from fe_models.mesh import Body
-from fe_models.stress import stress_field
+from fe_models.joints import friction
+from fe_models.joints.friction import FrictionalJoint
+from fe_models.loads.applied_loads import BoundaryForce, Pressure
+from fe_models.meshes.cut_face import WholeStress, whole_face, whole_history, whole_resultants
+from fe_models.meshes.structure_mesh import Body
 from sa_solver.types import Frame, Material
 from tests.marks import slow
 from tests.mirrored_blocks import pad_on_block

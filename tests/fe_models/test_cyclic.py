@@ -7,14 +7,14 @@ import pytest
 from scipy.sparse.linalg import spsolve
 from scipy.spatial import cKDTree
 
-from fe_models.applied_loads import BoundaryForce
-from fe_models.constraints import Constraints
-from fe_models.cyclic import Cuts, hold_normal
-from fe_models.elasticity import ElasticBody
-from fe_models.imposed import tie_rigid
-from fe_models.mesh import Body, MeshError
-from fe_models.recovery import StressRecovery
-from fe_models.sector_recovery import SectorRecovery
+from fe_models.cyclic.cuts import Cuts, hold_normal
+from fe_models.cyclic.recovery import SectorRecovery
+from fe_models.elasticity.body import ElasticBody
+from fe_models.elasticity.recovery import StressRecovery
+from fe_models.loads.applied_loads import BoundaryForce
+from fe_models.loads.constraints import Constraints
+from fe_models.loads.imposed import tie_rigid
+from fe_models.meshes.structure_mesh import Body, MeshError
 from fe_models.supported_body import SupportedBody
 from sa_solver import von_mises
 from sa_solver.types import Material

@@ -4,9 +4,9 @@ import random
 
 import pytest
 
-from fe_models.geometry.apart import read_apart
 from fe_models.geometry.imported import read_bodies
-from fe_models.mesh import MeshError
+from fe_models.meshes.structure_mesh import MeshError
+from fe_models.readers.reader_process import read_apart
 from tests.fe_models.test_abaqus import ASSEMBLY, PARTS
 from tests.fe_models.test_cae_files import DECK, salome
 from tests.fe_models.test_mesh_corpus import MSH, variables, write_exodus

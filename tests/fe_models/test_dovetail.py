@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fe_models import friction
-from fe_models.friction import FrictionalJoint
-from fe_models.remesh import element_volumes
+from fe_models.joints import friction
+from fe_models.joints.friction import FrictionalJoint
+from fe_models.meshes.remesh import element_volumes
 from fe_models.structure import load_history
 from sa_solver.types import LoadHistory
 from tests.marks import slow

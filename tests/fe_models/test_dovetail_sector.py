@@ -5,15 +5,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fe_models import friction, structure
-from fe_models.constraints import Constraints
+from fe_models import structure
 from fe_models.dovetail import dovetail_cuts, dovetail_structure
-from fe_models.elasticity import ElasticBody
-from fe_models.friction import FrictionalJoint
-from fe_models.mesh import MeshError, StructureMesh, matched_interface
+from fe_models.elasticity.body import ElasticBody
+from fe_models.joints import friction
+from fe_models.joints.friction import FrictionalJoint
+from fe_models.loads.constraints import Constraints
+from fe_models.meshes.structure_mesh import MeshError, StructureMesh, matched_interface
+from fe_models.meshes.trace import LinearTrace
 from fe_models.structure import Structure
 from fe_models.supported_body import SupportedBody, interface_nodes
-from fe_models.trace import LinearTrace
 from sa_solver.types import Frame
 from tests.fe_models.conftest import FLANK_NODES, NOTCH, SIZE
 from tests.wheels import about, turned, wheel

@@ -5,11 +5,11 @@ import pytest
 import scipy.sparse.linalg as spla
 from skfem import Basis, ElementTetP1, ElementTetP2, LinearForm, MeshTet
 
-from fe_models.constraints import Constraints
-from fe_models.elasticity import ElasticBody, maximum_principal
-from fe_models.linear_solver import factorise
-from fe_models.mesh import Body
-from fe_models.remesh import element_volumes
+from fe_models.elasticity.body import ElasticBody, maximum_principal
+from fe_models.loads.constraints import Constraints
+from fe_models.meshes.remesh import element_volumes
+from fe_models.meshes.structure_mesh import Body
+from fe_models.solvers.linear_solver import factorise
 from fe_models.supported_body import _rotation
 from sa_solver import von_mises
 from sa_solver.types import Material

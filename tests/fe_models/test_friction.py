@@ -6,9 +6,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fe_models import friction
-from fe_models.friction import FrictionalJoint
-from fe_models.joint import JointStiffness
+from fe_models.joints import friction
+from fe_models.joints.friction import FrictionalJoint
+from fe_models.joints.joint import JointStiffness
 from sa_solver.errors import InputError
 from tests.marks import slow
 

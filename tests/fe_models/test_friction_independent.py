@@ -12,13 +12,13 @@ import pytest
 import scipy.sparse as sp
 from skfem import MeshTet
 
-from fe_models import friction
-from fe_models.constraints import Constraints
 from fe_models.dovetail import dovetail_structure
-from fe_models.elasticity import ElasticBody
-from fe_models.friction import FrictionalJoint
-from fe_models.joint import join
-from fe_models.mesh import Body
+from fe_models.elasticity.body import ElasticBody
+from fe_models.joints import friction
+from fe_models.joints.friction import FrictionalJoint
+from fe_models.joints.joint import join
+from fe_models.loads.constraints import Constraints
+from fe_models.meshes.structure_mesh import Body
 from fe_models.supported_body import SupportedBody
 from sa_solver.types import Material, resultants
 from tests.fe_models.monolithic import (

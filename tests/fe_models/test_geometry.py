@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from fe_models.mesh import MeshError
-from fe_models.remesh import element_volumes
+from fe_models.meshes.remesh import element_volumes
+from fe_models.meshes.structure_mesh import MeshError
 
 SKEWS = [0.0, np.deg2rad(15.0)]
 DISK = {"intrados", "extrados", "inner", "sides"}

@@ -5,7 +5,7 @@ import signal
 
 import pytest
 
-from fe_models.gmsh_session import GIVEN_BACK, gmsh_model
+from fe_models.meshes.gmsh_session import GIVEN_BACK, gmsh_model
 
 NUMBERS = [getattr(signal, name) for name in GIVEN_BACK if hasattr(signal, name)]
 

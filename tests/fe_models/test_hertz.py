@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from fe_models.elasticity import ElasticBody
-from fe_models.friction import FrictionalJoint
-from fe_models.joint import join
-from fe_models.mesh import Body
+from fe_models.elasticity.body import ElasticBody
+from fe_models.joints.friction import FrictionalJoint
+from fe_models.joints.joint import join
+from fe_models.meshes.structure_mesh import Body
+from fe_models.meshes.trace import LinearTrace
 from fe_models.supported_body import SupportedBody
-from fe_models.trace import LinearTrace
 from sa_solver.reference import hertz
 from sa_solver.reference.subsurface import cylinder_stress, point_force_stress, sphere_axis_stress
 from tests.fe_models.test_verification import (

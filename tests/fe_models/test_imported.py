@@ -5,11 +5,11 @@ import numpy as np
 import pytest
 from skfem import MeshHex, MeshQuad, MeshTet, MeshTri
 
-from fe_models.geometry.grouped import CORNERS, pieces, simplices
 from fe_models.geometry.imported import describe_bodies, patch, read_bodies
-from fe_models.gmsh_session import gmsh_model
-from fe_models.mesh import MeshError, write_msh
-from fe_models.remesh import element_volumes
+from fe_models.meshes.gmsh_session import gmsh_model
+from fe_models.meshes.remesh import element_volumes
+from fe_models.meshes.structure_mesh import MeshError, write_msh
+from fe_models.readers.grouped import CORNERS, pieces, simplices
 
 pytestmark = pytest.mark.usefixtures("reads_here")
 

@@ -4,24 +4,25 @@ import numpy as np
 import pytest
 from skfem import MeshTet, MeshTri
 
-from fe_models import friction, structure
-from fe_models.applied_loads import (
-    Acceleration,
-    BoundaryForce,
-    Displacement,
-    Pressure,
-    Rotation,
-)
-from fe_models.elasticity import ElasticBody
-from fe_models.friction import FrictionalJoint
+from fe_models import structure
+from fe_models.elasticity.body import ElasticBody
 from fe_models.imported_structure import (
     ContactPair,
     Support,
     imported_mesh,
     imported_structure,
 )
-from fe_models.mesh import Body, MeshError
-from fe_models.remesh import element_volumes
+from fe_models.joints import friction
+from fe_models.joints.friction import FrictionalJoint
+from fe_models.loads.applied_loads import (
+    Acceleration,
+    BoundaryForce,
+    Displacement,
+    Pressure,
+    Rotation,
+)
+from fe_models.meshes.remesh import element_volumes
+from fe_models.meshes.structure_mesh import Body, MeshError
 from fe_models.structure import CLOSED, MOST_CYCLES
 from sa_solver.types import Material
 from tests.fe_models.conftest import stress_state

@@ -8,15 +8,15 @@ import pytest
 from scipy.sparse.linalg import spsolve
 from skfem import MeshTet, MeshTri
 
-from fe_models.constraints import Constraints
-from fe_models.cyclic import Cuts, Cyclic
-from fe_models.elasticity import ElasticBody, tensors
-from fe_models.isoparametric import facet_normals, folded
-from fe_models.mesh import Body, MeshError
-from fe_models.recovery import StressRecovery
-from fe_models.rigid_motions import rigid_motions
-from fe_models.spin_softening import spin_softening
-from fe_models.total_lagrangian import TotalLagrangian
+from fe_models.cyclic.cuts import Cuts, Cyclic
+from fe_models.elasticity.body import ElasticBody, tensors
+from fe_models.elasticity.recovery import StressRecovery
+from fe_models.elasticity.spin_softening import spin_softening
+from fe_models.elasticity.total_lagrangian import TotalLagrangian
+from fe_models.loads.constraints import Constraints
+from fe_models.loads.rigid_motions import rigid_motions
+from fe_models.meshes.isoparametric import facet_normals, folded
+from fe_models.meshes.structure_mesh import Body, MeshError
 from sa_solver.types import Material
 
 STEEL = Material(210e3, 0.3, 7.8e-9)

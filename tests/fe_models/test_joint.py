@@ -6,11 +6,11 @@ import scipy.sparse as sp
 from skfem.quadrature import get_quadrature
 from skfem.refdom import RefTri
 
-from fe_models.constraints import Constraints
 from fe_models.dovetail import dovetail_structure
-from fe_models.joint import join
+from fe_models.joints.joint import join
+from fe_models.loads.constraints import Constraints
+from fe_models.meshes.trace import LinearTrace
 from fe_models.supported_body import SupportedBody, interface_nodes
-from fe_models.trace import LinearTrace
 from sa_solver.types import Material
 
 ORDERS = [1, 2]

@@ -9,18 +9,18 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
-from fe_models import linear_solver, memory, pardiso, superlu
-from fe_models.constraints import Constraints
-from fe_models.linear_solver import (
+from fe_models.loads.constraints import Constraints
+from fe_models.loads.rigid_motions import rigid_body_modes
+from fe_models.solvers import linear_solver, memory, pardiso, superlu
+from fe_models.solvers.linear_solver import (
     FactorMemoryError,
     SolverError,
     condense,
     factorise,
     prepare,
 )
-from fe_models.multigrid import MultigridSolver, softness
-from fe_models.pardiso import Pardiso
-from fe_models.rigid_motions import rigid_body_modes
+from fe_models.solvers.multigrid import MultigridSolver, softness
+from fe_models.solvers.pardiso import Pardiso
 
 SIZE = 120
 # What may be taken for factors, where the system is to be iterated.
@@ -286,7 +286,7 @@ def test_factors_on_two_threads_are_the_same_bit_for_bit(box, titanium):
 GROWTH = """
 import gc, os
 import scipy.sparse as sp
-from fe_models.pardiso import Pardiso
+from fe_models.solvers.pardiso import Pardiso
 
 def resident_bytes():
     gc.collect()

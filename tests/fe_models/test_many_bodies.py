@@ -6,17 +6,17 @@ import numpy as np
 import pytest
 from skfem import MeshTet, MeshTri
 
-from fe_models import friction
-from fe_models.applied_loads import BoundaryForce, Pressure
-from fe_models.constraints import Constraints
-from fe_models.elasticity import ElasticBody
-from fe_models.friction import FrictionalJoint
+from fe_models.elasticity.body import ElasticBody
+from fe_models.elasticity.stress import cycle_stress
 from fe_models.geometry.imported import ImportedMesh
 from fe_models.imported_structure import ContactPair, Support, imported_mesh, imported_structure
-from fe_models.linear_solver import prepare
-from fe_models.mesh import Body, MeshError
+from fe_models.joints import friction
+from fe_models.joints.friction import FrictionalJoint
+from fe_models.loads.applied_loads import BoundaryForce, Pressure
+from fe_models.loads.constraints import Constraints
+from fe_models.meshes.structure_mesh import Body, MeshError
 from fe_models.motion import deformation, structure_motion
-from fe_models.stress import cycle_stress
+from fe_models.solvers.linear_solver import prepare
 from sa_solver.types import Material
 from tests.mirrored_blocks import along, with_faces
 

@@ -11,6 +11,7 @@ import scipy.io
 import scipy.linalg as sl
 import scipy.sparse as sp
 
+from fe_models.joints.reduction import save_reduced
 from fe_models.matrices import (
     FileUnits,
     GivenUnknowns,
@@ -23,7 +24,6 @@ from fe_models.matrices import (
     read_matrix_file,
     write_matrices,
 )
-from fe_models.reduction import save_reduced
 from tests.fe_models.test_damaged_files import damaged
 from tests.marks import slow
 

@@ -7,6 +7,7 @@ import pytest
 import scipy.linalg as sl
 import scipy.sparse as sp
 
+from fe_models.joints.reduction import free_frequencies
 from fe_models.matrices import (
     MatrixError,
     OwnMatrices,
@@ -18,7 +19,6 @@ from fe_models.matrices import (
     with_light_motions,
     without_massless,
 )
-from fe_models.reduction import free_frequencies
 from tests.fe_models.test_matrices import LOAD, MASS, STIFFNESS, changed, own_of
 
 

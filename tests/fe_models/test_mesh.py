@@ -7,7 +7,13 @@ import numpy as np
 import pytest
 from skfem import MeshTet, MeshTri
 
-from fe_models.mesh import Body, MeshError, matched_interface, named_mesh, write_msh
+from fe_models.meshes.structure_mesh import (
+    Body,
+    MeshError,
+    matched_interface,
+    named_mesh,
+    write_msh,
+)
 
 TETRAHEDRON = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
 

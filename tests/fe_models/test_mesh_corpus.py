@@ -6,8 +6,8 @@ import pytest
 from scipy.io import netcdf_file
 
 from fe_models.geometry.imported import patch, read_bodies
-from fe_models.mesh import MeshError
-from fe_models.remesh import element_volumes
+from fe_models.meshes.remesh import element_volumes
+from fe_models.meshes.structure_mesh import MeshError
 
 pytestmark = pytest.mark.usefixtures("reads_here")
 

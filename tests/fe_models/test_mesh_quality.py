@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from skfem import MeshTet, MeshTri
 
-from fe_models.gmsh_session import gmsh_model
-from fe_models.mesh_quality import element_sizes, radius_ratios
+from fe_models.meshes.gmsh_session import gmsh_model
+from fe_models.meshes.quality import element_sizes, radius_ratios
 
 # gmsh's numbers of first-order elements.
 CELLS = {2: 2, 3: 4}

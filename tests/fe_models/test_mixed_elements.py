@@ -5,10 +5,10 @@ import numpy as np
 import pytest
 import pyvista as pv
 
-from fe_models.curved_face import edges_of
-from fe_models.elasticity import ElasticBody
+from fe_models.elasticity.body import ElasticBody
 from fe_models.geometry.imported import read_bodies
-from fe_models.remesh import element_volumes
+from fe_models.meshes.curved_face import edges_of
+from fe_models.meshes.remesh import element_volumes
 from sa_solver.types import Material
 from tests.fe_models import cae_files
 

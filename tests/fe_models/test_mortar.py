@@ -5,8 +5,8 @@ import pytest
 from scipy.spatial import Delaunay
 from skfem import MeshTri
 
-from fe_models.mesh import MeshError
-from fe_models.mortar import mortar_projection
+from fe_models.joints.mortar import mortar_projection
+from fe_models.meshes.structure_mesh import MeshError
 
 LINE, SURFACE = 2, 3
 DIMENSIONS = [LINE, SURFACE]

@@ -8,13 +8,13 @@ import pytest
 import scipy.sparse as sp
 from skfem import MeshTri
 
-from fe_models.constraints import Constraints
 from fe_models.dovetail import dovetail_structure
-from fe_models.elasticity import ElasticBody
-from fe_models.friction import FrictionalJoint
-from fe_models.joint import join
-from fe_models.mesh import AXES, Body
-from fe_models.mortar import frame_of_faces, mortar_interface
+from fe_models.elasticity.body import ElasticBody
+from fe_models.joints.friction import FrictionalJoint
+from fe_models.joints.joint import join
+from fe_models.joints.mortar import frame_of_faces, mortar_interface
+from fe_models.loads.constraints import Constraints
+from fe_models.meshes.structure_mesh import AXES, Body
 from fe_models.supported_body import SupportedBody, interface_nodes
 from sa_solver.types import Frame
 from tests.fe_models.pressed_blocks import (

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fe_models.mesh import AXES, Body, MeshError
-from fe_models.mortar import frame_of_faces, mortar_interface
+from fe_models.joints.mortar import frame_of_faces, mortar_interface
+from fe_models.meshes.structure_mesh import AXES, Body, MeshError
 from sa_solver.types import Frame
 from tests.fe_models.pressed_blocks import DIMENSIONS, STEEL, SURFACE, block
 

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from fe_models.applied_loads import BoundaryForce
-from fe_models.mesh import MeshError
-from fe_models.nodal_force import shared
+from fe_models.loads.applied_loads import BoundaryForce
+from fe_models.loads.nodal_force import shared
+from fe_models.meshes.structure_mesh import MeshError
 
 FORCE, MOMENT, AT = (
     np.array([3.0, -1.0, 2.0]),

@@ -7,19 +7,20 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from fe_models import friction, nonlinear
 from fe_models.dovetail import dovetail_softening, dovetail_structure
-from fe_models.friction import FrictionalJoint
-from fe_models.motion import deformation
-from fe_models.nonlinear import check_nonlinearity, face_sizes, slip_change
-from fe_models.relinearised import (
+from fe_models.elasticity import nonlinear
+from fe_models.elasticity.nonlinear import check_nonlinearity, face_sizes, slip_change
+from fe_models.elasticity.relinearised import (
     mean_rotation,
     relinearised,
     stress_stiffened,
 )
+from fe_models.elasticity.total_lagrangian import TotalLagrangian
+from fe_models.joints import friction
+from fe_models.joints.friction import FrictionalJoint
+from fe_models.motion import deformation
 from fe_models.structure import Structure
 from fe_models.supported_body import SupportedBody
-from fe_models.total_lagrangian import TotalLagrangian
 from sa_solver.types import resultant_change
 
 MU, PEAK = 0.4, 7

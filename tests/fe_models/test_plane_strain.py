@@ -9,11 +9,11 @@ import scipy.sparse as sp
 from skfem import MeshTet, MeshTri
 
 from fe_models.dovetail import dovetail_structure
-from fe_models.elasticity import ElasticBody
-from fe_models.friction import FrictionalJoint
-from fe_models.mesh import Body, MeshError
-from fe_models.remesh import element_volumes
-from fe_models.transfer import FaceTransfer
+from fe_models.elasticity.body import ElasticBody
+from fe_models.joints.friction import FrictionalJoint
+from fe_models.meshes.remesh import element_volumes
+from fe_models.meshes.structure_mesh import Body, MeshError
+from fe_models.meshes.transfer import FaceTransfer
 from sa_solver.types import Grid, Material
 
 ORDERS = [1, 2]

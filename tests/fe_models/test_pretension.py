@@ -4,14 +4,14 @@ import numpy as np
 import pytest
 from skfem import MeshTet
 
-from fe_models import friction
-from fe_models.applied_loads import Pressure
-from fe_models.friction import FrictionalJoint
+from fe_models.elasticity.stress import cycle_stress
 from fe_models.imported_structure import Support
-from fe_models.mesh import Body, MeshError
+from fe_models.joints import friction
+from fe_models.joints.friction import FrictionalJoint
+from fe_models.loads.applied_loads import Pressure
+from fe_models.loads.pretension import Bolt, Pretension, bolt_section, tightened
+from fe_models.meshes.structure_mesh import Body, MeshError
 from fe_models.motion import deformation
-from fe_models.pretension import Bolt, Pretension, bolt_section, tightened
-from fe_models.stress import cycle_stress
 from sa_solver.types import Material
 from tests.fe_models.test_many_bodies import box, built, imported, pair
 from tests.mirrored_blocks import along

@@ -11,11 +11,11 @@ import pytest
 import scipy.sparse.linalg as spla
 from skfem import FacetBasis, LinearForm, MeshTet, MeshTri
 
-from fe_models.constraints import Constraints
-from fe_models.elasticity import ELEMENTS, ElasticBody
-from fe_models.mesh import Body
-from fe_models.recovery import StressRecovery
-from fe_models.stress import stress_field
+from fe_models.elasticity.body import ELEMENTS, ElasticBody
+from fe_models.elasticity.recovery import StressRecovery
+from fe_models.elasticity.stress import stress_field
+from fe_models.loads.constraints import Constraints
+from fe_models.meshes.structure_mesh import Body
 from sa_solver.types import Material
 
 TITANIUM = Material(115e3, 0.29, 4.43e-9)

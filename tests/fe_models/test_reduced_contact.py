@@ -8,13 +8,13 @@ import scipy.linalg as sl
 from scipy.optimize import nnls
 from scipy.spatial import cKDTree
 
-from fe_models.complementarity import complementary
-from fe_models.constraints import Constraints
 from fe_models.geometry.specimens import Specimen
-from fe_models.mesh import Face
-from fe_models.reduced_contact import FrettingConditions, ReducedPair, masing_loop
+from fe_models.joints.reduced_contact import FrettingConditions, ReducedPair, masing_loop
+from fe_models.loads.constraints import Constraints
+from fe_models.meshes.structure_mesh import Face
+from fe_models.solvers.complementarity import complementary
 from sa_solver.errors import InputError
-from sa_solver.influence import rectangle_influence
+from sa_solver.half_space.influence import rectangle_influence
 from sa_solver.reference.mindlin import ShearedSphere
 from sa_solver.types import ElasticPair, Frame, Material
 from tests.reduced_pads import ALPHA, FRICTION, SOLVER, STROKE, coarse_pads, pad_stiffnesses

@@ -6,9 +6,9 @@ import pytest
 import scipy.linalg as sl
 import scipy.sparse as sp
 
-from fe_models.constraints import Constraints
-from fe_models.linear_solver import SolverError
-from fe_models.reduction import free_frequencies, load_reduced, reduce_body, save_reduced
+from fe_models.joints.reduction import free_frequencies, load_reduced, reduce_body, save_reduced
+from fe_models.loads.constraints import Constraints
+from fe_models.solvers.linear_solver import SolverError
 from fe_models.supported_body import SupportedBody
 from sa_solver.errors import InputError
 from sa_solver.types import Material

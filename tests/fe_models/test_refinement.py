@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from fe_models.dovetail import dovetail_structure
-from fe_models.friction import FrictionalJoint
+from fe_models.joints.friction import FrictionalJoint
 from tests.fe_models.conftest import stress_state
 
 FRICTION, PEAK = 0.4, 7

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from skfem import MeshTri
 
-from fe_models.mesh import Body, MeshError, StructureMesh
-from fe_models.mortar import mortar_interface
-from fe_models.remesh import element_volumes, form_of, formed_mesh, worn_mesh, worn_volume
+from fe_models.joints.mortar import mortar_interface
+from fe_models.meshes.remesh import element_volumes, form_of, formed_mesh, worn_mesh, worn_volume
+from fe_models.meshes.structure_mesh import Body, MeshError, StructureMesh
 from sa_solver.types import Frame
 
 

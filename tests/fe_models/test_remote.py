@@ -4,10 +4,7 @@ import numpy as np
 import pytest
 from skfem import MeshTet, MeshTri
 
-from fe_models.applied_loads import BoundaryForce, Displacement, RemoteDisplacement
-from fe_models.constraints import Constraints
-from fe_models.elasticity import ElasticBody
-from fe_models.friction import FrictionalJoint
+from fe_models.elasticity.body import ElasticBody
 from fe_models.imported_structure import (
     ContactPair,
     Support,
@@ -15,10 +12,13 @@ from fe_models.imported_structure import (
     imported_mesh,
     imported_structure,
 )
-from fe_models.imposed import impose, tie_rigid
-from fe_models.linear_solver import prepare
-from fe_models.mesh import Body, MeshError
-from fe_models.rigid_motions import rigid_motions
+from fe_models.joints.friction import FrictionalJoint
+from fe_models.loads.applied_loads import BoundaryForce, Displacement, RemoteDisplacement
+from fe_models.loads.constraints import Constraints
+from fe_models.loads.imposed import impose, tie_rigid
+from fe_models.loads.rigid_motions import rigid_motions
+from fe_models.meshes.structure_mesh import Body, MeshError
+from fe_models.solvers.linear_solver import prepare
 from sa_solver.types import Material
 from tests.fe_models.imported_blocks import BODIES, block_and_pad, imported
 from tests.marks import slow

@@ -6,17 +6,23 @@ import numpy as np
 import pytest
 from skfem import MeshTet, MeshTri
 
-from fe_models.elasticity import ElasticBody
-from fe_models.friction import FrictionalJoint
+from fe_models.elasticity.body import ElasticBody
 from fe_models.geometry.imported import ImportedMesh, read_bodies
-from fe_models.isoparametric import folded
-from fe_models.mesh import Body, MeshError, StructureMesh, matched_interface, write_msh
-from fe_models.remesh import worn_mesh
-from fe_models.second_order import (
+from fe_models.joints.friction import FrictionalJoint
+from fe_models.meshes.isoparametric import folded
+from fe_models.meshes.remesh import worn_mesh
+from fe_models.meshes.second_order import (
     curvature,
     distance_of_midsides,
     set_nodes,
     with_midsides,
+)
+from fe_models.meshes.structure_mesh import (
+    Body,
+    MeshError,
+    StructureMesh,
+    matched_interface,
+    write_msh,
 )
 from sa_solver.types import Frame, Material
 from tests.fe_models.test_calculix import blocks, structure_of

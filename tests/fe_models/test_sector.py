@@ -5,20 +5,27 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fe_models import friction, structure
-from fe_models.applied_loads import Acceleration, BoundaryForce, Displacement, Pressure, Rotation
-from fe_models.constraints import Constraints
-from fe_models.cyclic import Cuts
-from fe_models.elasticity import ElasticBody
-from fe_models.friction import FrictionalJoint
+from fe_models import structure
+from fe_models.cyclic.cuts import Cuts
+from fe_models.cyclic.sector import check_jumps, sector_cuts
+from fe_models.elasticity.body import ElasticBody
+from fe_models.elasticity.stress import cycle_stress
+from fe_models.elasticity.thermal import NodalTemperature
 from fe_models.geometry.imported import ImportedMesh
 from fe_models.imported_structure import ContactPair, Support, imported_mesh, imported_structure
-from fe_models.mesh import MeshError
+from fe_models.joints import friction
+from fe_models.joints.friction import FrictionalJoint
+from fe_models.loads.applied_loads import (
+    Acceleration,
+    BoundaryForce,
+    Displacement,
+    Pressure,
+    Rotation,
+)
+from fe_models.loads.constraints import Constraints
+from fe_models.meshes.structure_mesh import MeshError
 from fe_models.motion import deformation
-from fe_models.sector import check_jumps, sector_cuts
-from fe_models.stress import cycle_stress
 from fe_models.supported_body import SupportedBody
-from fe_models.thermal import NodalTemperature
 from sa_solver.types import Material
 from tests.marks import slow
 from tests.wheels import WIDTH, Y, about, sector, shoe, turned, wheel

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from fe_models.elasticity import ElasticBody
+from fe_models.elasticity.body import ElasticBody
 from fe_models.geometry.specimens import Specimen
-from fe_models.mesh import MeshError
-from fe_models.reduction import free_frequencies, reduce_body
+from fe_models.joints.reduction import free_frequencies, reduce_body
+from fe_models.meshes.structure_mesh import MeshError
 from fe_models.specimens import reduced_specimens, specimen_matrices
 from sa_solver.types import Material
 from tests.marks import slow

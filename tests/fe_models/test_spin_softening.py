@@ -5,10 +5,10 @@ import pytest
 import scipy.sparse.linalg as spla
 from skfem import MeshTri
 
-from fe_models.constraints import Constraints
-from fe_models.elasticity import ElasticBody
-from fe_models.mesh import Body
-from fe_models.spin_softening import CarriedMass, carried_motion, spin_softening
+from fe_models.elasticity.body import ElasticBody
+from fe_models.elasticity.spin_softening import CarriedMass, carried_motion, spin_softening
+from fe_models.loads.constraints import Constraints
+from fe_models.meshes.structure_mesh import Body
 from sa_solver.types import Material
 
 SPEED = 40.0

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from fe_models.mesh import Body
-from fe_models.remesh import element_volumes
-from fe_models.stress import PeakStress, StressField, cycle_stress, steps
+from fe_models.elasticity.stress import PeakStress, StressField, cycle_stress, steps
+from fe_models.meshes.remesh import element_volumes
+from fe_models.meshes.structure_mesh import Body
 from sa_solver import von_mises
 from sa_solver.types import Frame
 from tests.fe_models.conftest import stress_state

@@ -8,8 +8,14 @@ import pytest
 import scipy.sparse as sp
 
 from fe_models.dovetail import dovetail_structure
-from fe_models.joint import join
-from fe_models.symmetry import Mirror, SplitMatrix, halves, mirror_of_nodes, symmetric_product
+from fe_models.joints.joint import join
+from fe_models.solvers.symmetry import (
+    Mirror,
+    SplitMatrix,
+    halves,
+    mirror_of_nodes,
+    symmetric_product,
+)
 
 
 @pytest.fixture(scope="module", params=[1, 2], ids=["first order", "second order"])

@@ -4,8 +4,14 @@ import numpy as np
 import pytest
 from skfem import MeshTet, MeshTri
 
-from fe_models.elasticity import ElasticBody
-from fe_models.friction import FrictionalJoint
+from fe_models.elasticity.body import ElasticBody
+from fe_models.elasticity.relinearised import relinearised
+from fe_models.elasticity.stress import cycle_stress, stress_field
+from fe_models.elasticity.thermal import (
+    NodalTemperature,
+    TemperatureChange,
+    thermal_gradient,
+)
 from fe_models.geometry.imported import ImportedMesh
 from fe_models.imported_structure import (
     ContactPair,
@@ -14,15 +20,9 @@ from fe_models.imported_structure import (
     imported_mesh,
     imported_structure,
 )
-from fe_models.linear_solver import prepare
-from fe_models.mesh import Body, MeshError
-from fe_models.relinearised import relinearised
-from fe_models.stress import cycle_stress, stress_field
-from fe_models.thermal import (
-    NodalTemperature,
-    TemperatureChange,
-    thermal_gradient,
-)
+from fe_models.joints.friction import FrictionalJoint
+from fe_models.meshes.structure_mesh import Body, MeshError
+from fe_models.solvers.linear_solver import prepare
 from sa_solver.types import Material
 from tests.mirrored_blocks import along, with_faces
 

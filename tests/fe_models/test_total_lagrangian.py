@@ -9,10 +9,10 @@ from scipy.spatial.transform import Rotation
 from scipy.special import ellipe, ellipeinc, ellipk, ellipkinc
 from skfem import MeshTri
 
-from fe_models.constraints import Constraints
-from fe_models.elasticity import ElasticBody
-from fe_models.mesh import Body
-from fe_models.total_lagrangian import TotalLagrangian, rotation_angle
+from fe_models.elasticity.body import ElasticBody
+from fe_models.elasticity.total_lagrangian import TotalLagrangian, rotation_angle
+from fe_models.loads.constraints import Constraints
+from fe_models.meshes.structure_mesh import Body
 from sa_solver.types import Material
 
 ALONG, ACROSS = np.eye(3)[0], np.eye(3)[2]

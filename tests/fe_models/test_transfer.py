@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fe_models.transfer import FaceTransfer
+from fe_models.meshes.transfer import FaceTransfer
 from sa_solver.types import Grid, resultants
 
 

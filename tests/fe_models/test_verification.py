@@ -12,15 +12,15 @@ import numpy as np
 import pytest
 from skfem import Basis, ElementTetP1, ElementTetP2, ElementTriP1, ElementTriP2, MeshTet, MeshTri
 
-from fe_models import friction
-from fe_models.constraints import Constraints
-from fe_models.elasticity import ElasticBody
-from fe_models.friction import FrictionalJoint
-from fe_models.joint import join
-from fe_models.linear_solver import factorise
-from fe_models.mesh import Body
+from fe_models.elasticity.body import ElasticBody
+from fe_models.joints import friction
+from fe_models.joints.friction import FrictionalJoint
+from fe_models.joints.joint import join
+from fe_models.loads.constraints import Constraints
+from fe_models.meshes.structure_mesh import Body
+from fe_models.meshes.trace import LinearTrace
+from fe_models.solvers.linear_solver import factorise
 from fe_models.supported_body import SupportedBody
-from fe_models.trace import LinearTrace
 from sa_solver.types import Material
 
 ORDERS, DIMENSIONS = [1, 2], [2, 3]

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from sa_solver.half_space import HalfSpace
+from sa_solver.half_space.operator import HalfSpace
 from tests.oracles.uniform_traction import love_displacement
 
 SMALLEST = 1e-4

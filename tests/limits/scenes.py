@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from sa_solver.contact import FrictionalContact
-from sa_solver.half_space import HalfSpace
+from sa_solver.half_space.operator import HalfSpace
 from sa_solver.types import ElasticPair, Grid, Material
 
 FRICTION, P, RADIUS = 0.4, 100.0, 10.0

@@ -8,8 +8,8 @@ to 1 it therefore converges, ever more slowly; solving both together needs no su
 import numpy as np
 import pytest
 
-from sa_solver.coupled import CoupledContact
-from sa_solver.half_space import HalfSpace
+from sa_solver.dissimilar.contact import CoupledContact
+from sa_solver.half_space.operator import HalfSpace
 from sa_solver.types import ElasticPair, Grid, Material
 from tests.oracles.alternating import AlternatingContact
 

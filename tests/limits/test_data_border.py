@@ -5,11 +5,11 @@ import pytest
 
 from sa_solver.contact import FrictionalContact
 from sa_solver.contact_state import ContactLoad
-from sa_solver.coupled import CoupledContactError
-from sa_solver.half_space import HalfSpace
-from sa_solver.normal import NormalContact, NormalContactError
+from sa_solver.dissimilar.contact import CoupledContactError
+from sa_solver.half_space.operator import HalfSpace
+from sa_solver.normal.contact import NormalContact, NormalContactError
 from sa_solver.reference.hertz import HertzSphere
-from sa_solver.tangential import TangentialContactError
+from sa_solver.tangential.contact import TangentialContactError
 from sa_solver.types import ElasticPair, Grid, Material
 from tests.limits.conditions import frictional_error
 

@@ -10,17 +10,17 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from fe_models.dynamics.continuation import ContinuationControl
+from fe_models.dynamics.curves.continuation import ContinuationControl
+from fe_models.dynamics.curves.forced_response import along_frequency
 from fe_models.dynamics.excitation import HarmonicForce
-from fe_models.dynamics.forced_response import along_frequency
-from fe_models.dynamics.harmonic_balance import HarmonicBalance, PeriodicLoad
-from fe_models.dynamics.harmonics import Resolution
 from fe_models.dynamics.motion import Start
+from fe_models.dynamics.periodic.harmonic_balance import HarmonicBalance, PeriodicLoad
+from fe_models.dynamics.periodic.harmonics import Resolution
 from fe_models.dynamics.rig import natural_frequencies, unit_force
 from tests.oracles.event_driven import SliderJoints, integrate_exactly
 from tests.oracles.two_mass_rig import two_mass_rig
 from wear.joints.jenkins import Jenkins
-from wear.joints.periodic import PeriodicMarch
+from wear.joints.periodic.march import PeriodicMarch
 
 pytestmark = pytest.mark.slow
 

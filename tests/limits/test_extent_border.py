@@ -21,10 +21,10 @@ import pytest
 
 from sa_solver.contact import FrictionalContact
 from sa_solver.contact_state import ContactLoad
-from sa_solver.coupled import CoupledContact
-from sa_solver.half_space import HalfSpace
-from sa_solver.normal import NormalContact
-from sa_solver.tangential import FrictionLimitError
+from sa_solver.dissimilar.contact import CoupledContact
+from sa_solver.half_space.operator import HalfSpace
+from sa_solver.normal.contact import NormalContact
+from sa_solver.tangential.contact import FrictionLimitError
 from sa_solver.types import ElasticPair, Grid, Material
 from tests.limits.conditions import frictional_error, love_matrix, normal_error
 from tests.marks import slow

@@ -7,18 +7,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fe_models.dynamics import continuation, newton
+from fe_models.dynamics.curves import continuation, newton
+from fe_models.dynamics.curves.forced_response import along_frequency
 from fe_models.dynamics.excitation import HarmonicForce
-from fe_models.dynamics.forced_response import along_frequency
-from fe_models.dynamics.harmonic_balance import HarmonicBalance, PeriodicLoad
-from fe_models.dynamics.harmonics import Resolution
 from fe_models.dynamics.motion import Start
-from fe_models.dynamics.newmark import TimeStepControl, integrate
+from fe_models.dynamics.periodic.harmonic_balance import HarmonicBalance, PeriodicLoad
+from fe_models.dynamics.periodic.harmonics import Resolution
 from fe_models.dynamics.rig import unit_force
+from fe_models.dynamics.transient.newmark import TimeStepControl, integrate
 from tests.limits.contact_rigs import KT, MU, SOLVED, body
 from tests.marks import slow
 from wear.joints.friction_contact import FrictionContact
-from wear.joints.periodic import PeriodicMarch
+from wear.joints.periodic.march import PeriodicMarch
 
 SHORT = continuation.ContinuationControl(most=0.03)
 STOP = FrictionContact(KT, 1600.0, MU, gap=0.02)

@@ -5,17 +5,17 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from fe_models.dynamics.curves.forced_response import Accuracy, along_force, along_frequency
 from fe_models.dynamics.excitation import HarmonicForce
-from fe_models.dynamics.forced_response import Accuracy, along_force, along_frequency
-from fe_models.dynamics.harmonic_balance import HarmonicBalance, PeriodicLoad
-from fe_models.dynamics.harmonics import HarmonicBalanceError, Resolution
-from fe_models.dynamics.resolution_error import resolution_error
+from fe_models.dynamics.periodic.harmonic_balance import HarmonicBalance, PeriodicLoad
+from fe_models.dynamics.periodic.harmonics import HarmonicBalanceError, Resolution
+from fe_models.dynamics.periodic.resolution_error import resolution_error
 from fe_models.dynamics.rig import Link, lumped_rig, natural_frequencies, unit_force
 from tests.limits.contact_rigs import KN, KT, MU, SOLVED, balance, body, contact, linear, rig
 from tests.marks import slow
 from tests.oracles.event_driven import SliderJoints, integrate_exactly
 from wear.joints.jenkins import Jenkins
-from wear.joints.periodic import SEPARATED, SLIP, STICK, PeriodicMarch
+from wear.joints.periodic.march import SEPARATED, SLIP, STICK, PeriodicMarch
 
 # --- Resolution
 

@@ -10,11 +10,11 @@ import pytest
 
 from sa_solver.contact import FrictionalContact
 from sa_solver.contact_state import ContactLoad
-from sa_solver.half_space import HalfSpace
-from sa_solver.normal import NormalContact
+from sa_solver.half_space.operator import HalfSpace
+from sa_solver.normal.contact import NormalContact
 from sa_solver.reference.mindlin import ShearedSphere
 from sa_solver.reference.torsion import TwistedSphere
-from sa_solver.tangential import FrictionLimitError
+from sa_solver.tangential.contact import FrictionLimitError
 from sa_solver.types import ElasticPair, Grid, Material
 from tests.limits.conditions import frictional_error
 from tests.limits.scenes import ALIKE, BOTH, FRICTION, PAIRS, RADIUS, SOLVED, P, sphere

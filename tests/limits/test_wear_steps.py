@@ -8,12 +8,12 @@ smallest eigenvalue of the half-space on the grid.
 import numpy as np
 import pytest
 
-from sa_solver.half_space import HalfSpace
-from sa_solver.normal import NormalContact
+from sa_solver.half_space.operator import HalfSpace
+from sa_solver.normal.contact import NormalContact
 from sa_solver.types import Array, ElasticPair, Grid, LoadHistory, Material
 from tests.marks import slow
 from wear.laws import EnergyLaw
-from wear.stepping import SlidingCycle, WearingContact, WearState
+from wear.steps.stepping import SlidingCycle, WearingContact, WearState
 
 BODY = Material(115e3, 0.29)
 PAIR = ElasticPair(BODY, BODY)

@@ -3,7 +3,7 @@
 The plain iteration of the papers: pressure for a given shear, then shear for that pressure, until
 the normal displacement under shear no longer changes. Where the contact slides, every round shrinks
 the change by about µβ (β of Dundurs): the iteration slows down towards µβ = 1 and fails beyond,
-where :mod:`sa_solver.coupled` still converges.
+where :mod:`sa_solver.dissimilar.contact` still converges.
 
 Source: Gallego, Nélias & Jacq 2006, J. Tribol. 128, 476, doi:10.1115/1.2194914.
 """
@@ -15,10 +15,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sa_solver.half_space import HalfSpace
-from sa_solver.normal import NormalContact, NormalState
+from sa_solver.half_space.operator import HalfSpace
+from sa_solver.normal.contact import NormalContact, NormalState
 from sa_solver.rigid_modes import RESULTANTS
-from sa_solver.tangential import TangentialContact, TangentialState
+from sa_solver.tangential.contact import TangentialContact, TangentialState
 from sa_solver.types import Array
 
 TOLERANCE = 1e-8
@@ -69,7 +69,8 @@ class AlternatingContact:
         tolerance: float = TOLERANCE,
         max_rounds: int = ROUNDS,
     ) -> AlternatingState:
-        """One increment, with the arguments of :meth:`~sa_solver.coupled.CoupledContact.solve`.
+        """Solve one increment, given as to
+        :meth:`~sa_solver.dissimilar.contact.CoupledContact.solve`.
 
         Raises what the normal and the tangential solver raise.
         """

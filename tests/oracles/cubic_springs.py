@@ -11,7 +11,10 @@ from sa_solver.types import Array
 
 @dataclass(frozen=True)
 class CubicCycle:
-    """What :class:`wear.joints.periodic.PeriodicMarch` gives, of springs: no states, no losses."""
+    """A cycle of springs, which have no states and lose nothing.
+
+    See :class:`wear.joints.periodic.march.PeriodicMarch`.
+    """
 
     force: Array
     jacobian: Array

@@ -11,9 +11,9 @@ from __future__ import annotations
 import numpy as np
 import scipy.linalg as sl
 
-from fe_models.dynamics.harmonic_balance import HarmonicBalance
-from fe_models.dynamics.harmonic_solution import HarmonicSolution
-from fe_models.dynamics.harmonics import Resolution
+from fe_models.dynamics.periodic.harmonic_balance import HarmonicBalance
+from fe_models.dynamics.periodic.harmonic_solution import HarmonicSolution
+from fe_models.dynamics.periodic.harmonics import Resolution
 from sa_solver.types import Array
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.signal import find_peaks
 
-from fe_models.dynamics.impact_hammer import FrequencyResponse
+from fe_models.dynamics.transient.impact_hammer import FrequencyResponse
 from sa_solver.types import Array
 
 FINE = 2001

@@ -13,8 +13,8 @@ import numpy as np
 import scipy.linalg as sl
 from scipy.optimize import brentq
 
-from fe_models.dynamics.harmonic_balance import HarmonicBalance
-from fe_models.dynamics.harmonic_solution import HarmonicSolution
+from fe_models.dynamics.periodic.harmonic_balance import HarmonicBalance
+from fe_models.dynamics.periodic.harmonic_solution import HarmonicSolution
 from sa_solver.types import Array
 
 STEPS, MOST_SHOTS = 512, 12

@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 
 from sa_solver.contact import FrictionalContact, FrictionError
 from sa_solver.contact_state import ContactLoad
-from sa_solver.half_space import HalfSpace
-from sa_solver.tangential import FrictionLimitError
+from sa_solver.half_space.operator import HalfSpace
+from sa_solver.tangential.contact import FrictionLimitError
 from sa_solver.types import ElasticPair, Grid, Material
 
 TITANIUM, STEEL = Material(115e3, 0.29), Material(200e3, 0.3)

@@ -9,8 +9,8 @@ import pytest
 
 from sa_solver.contact import FrictionalContact
 from sa_solver.contact_state import ContactLoad
-from sa_solver.half_space import HalfSpace
-from sa_solver.normal import NormalContact
+from sa_solver.half_space.operator import HalfSpace
+from sa_solver.normal.contact import NormalContact
 from sa_solver.reference.flat_rounded import FlatRoundedPunch
 from sa_solver.reference.hertz import HertzCylinder, HertzEllipse
 from sa_solver.reference.line_partial_slip import BulkStressedCylinder

@@ -5,13 +5,13 @@ import pytest
 from scipy.optimize import brentq
 from scipy.special import ellipk
 
-import sa_solver.active_box as active_box
-import sa_solver.coupled as coupled
-from sa_solver.coupled import CoupledContact, CoupledContactError
-from sa_solver.half_space import HalfSpace
-from sa_solver.normal import NormalContact
+import sa_solver.dissimilar.contact as coupled
+import sa_solver.half_space.active_box as active_box
+from sa_solver.dissimilar.contact import CoupledContact, CoupledContactError
+from sa_solver.half_space.operator import HalfSpace
+from sa_solver.normal.contact import NormalContact
 from sa_solver.rigid_modes import RigidModes
-from sa_solver.tangential import FrictionLimitError, TangentialContact
+from sa_solver.tangential.contact import FrictionLimitError, TangentialContact
 from sa_solver.types import ElasticPair, Grid, Material, resultants
 from tests.marks import slow
 from tests.oracles.alternating import AlternatingContact

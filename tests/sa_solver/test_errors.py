@@ -12,7 +12,7 @@ from sa_solver.errors import (
     FretscaleError,
     InputError,
 )
-from sa_solver.tangential import FrictionLimitError
+from sa_solver.tangential.contact import FrictionLimitError
 
 ROOT = Path(__file__).parents[2]
 BUILT_IN = {"Exception", "ValueError", "RuntimeError", "ArithmeticError", "TypeError", "KeyError"}

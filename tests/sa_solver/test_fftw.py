@@ -5,7 +5,7 @@ import sys
 
 CODE = """
 import sys
-from sa_solver.fftw import load_pyfftw
+from sa_solver.transforms.fftw import load_pyfftw
 fftw = load_pyfftw()
 assert not {"scipy", "dask", "pyfftw.interfaces"} & set(sys.modules)
 import pyfftw
@@ -23,7 +23,7 @@ def test_interfaces_of_pyfftw_are_loaded_when_they_are_asked_for():
 AT_ONCE = """
 from concurrent.futures import ThreadPoolExecutor
 from threading import Barrier
-from sa_solver.fftw import load_pyfftw
+from sa_solver.transforms.fftw import load_pyfftw
 start = Barrier(4)
 def loaded(_):
     start.wait()

@@ -6,8 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import minimize
 
-from sa_solver.friction_limit import largest_share
 from sa_solver.rigid_modes import PlanarModes
+from sa_solver.tangential.friction_limit import largest_share
 from sa_solver.types import Grid
 
 GRID = Grid.covering((2.0, 2.0), (200, 200))

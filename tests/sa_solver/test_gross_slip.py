@@ -5,10 +5,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from sa_solver import gross_slip as module
-from sa_solver.gross_slip import gross_slip
-from sa_solver.half_space import HalfSpace
-from sa_solver.tangential import TangentialContact
+from sa_solver.half_space.operator import HalfSpace
+from sa_solver.tangential import gross_slip as module
+from sa_solver.tangential.contact import TangentialContact
+from sa_solver.tangential.gross_slip import gross_slip
 from sa_solver.types import ElasticPair, Grid, Material
 
 MATERIAL = Material(115e3, 0.29)

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from sa_solver.half_space import ALL, NORMAL, SHEAR, HalfSpace, HalfSpaceResolvent
-from sa_solver.influence import X, Y, Z, rectangle_influence, strip_influence
+from sa_solver.half_space.influence import X, Y, Z, rectangle_influence, strip_influence
+from sa_solver.half_space.operator import ALL, NORMAL, SHEAR, HalfSpace, HalfSpaceResolvent
 from sa_solver.types import ElasticPair, Grid, Material
 
 RIGID = Material(np.inf, 0.3)

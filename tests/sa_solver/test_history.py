@@ -6,11 +6,11 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from sa_solver import history
 from sa_solver.contact import FrictionalContact
-from sa_solver.half_space import HalfSpace
-from sa_solver.history import ContactLoadPath, HistoryError, march_history, turning_points
-from sa_solver.normal import NormalContact
+from sa_solver.cycles import history
+from sa_solver.cycles.history import ContactLoadPath, HistoryError, march_history, turning_points
+from sa_solver.half_space.operator import HalfSpace
+from sa_solver.normal.contact import NormalContact
 from sa_solver.reference.line_partial_slip import ciavarella_jaeger
 from sa_solver.types import ElasticPair, Grid, Material
 from tests.marks import slow

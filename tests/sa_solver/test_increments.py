@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from sa_solver.increments import (
+from sa_solver.cycles.increments import (
     before,
     dissipated,
     errors_of_increments,

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.integrate import quad, quad_vec
 
-from sa_solver.influence import X, Y, Z, rectangle_influence, strip_influence
+from sa_solver.half_space.influence import X, Y, Z, rectangle_influence, strip_influence
 from sa_solver.types import ElasticPair, Material
 
 RIGID = Material(np.inf, 0.3)

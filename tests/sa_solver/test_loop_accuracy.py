@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from sa_solver.contact import FrictionalContact
-from sa_solver.half_space import HalfSpace
-from sa_solver.loop_accuracy import LoopErrors, loop_errors
+from sa_solver.cycles.loop_accuracy import LoopErrors, loop_errors
+from sa_solver.cycles.tangential_loop import LoopPath, march_loop
+from sa_solver.half_space.operator import HalfSpace
 from sa_solver.reference.mindlin import ShearedSphere
-from sa_solver.tangential_loop import LoopPath, march_loop
 from sa_solver.types import ElasticPair, Grid, Material
 
 BODY = Material(115e3, 0.3)
@@ -70,7 +70,7 @@ def test_a_coarse_loop_that_fails_leaves_nothing_known(monkeypatch):
     path = LoopPath(100.0, 30.0, "force", 4)
     height = grid.x**2 / 40.0
     loop = march_loop(contact, height, path)
-    monkeypatch.setattr("sa_solver.tangential_loop.STUCK_ITERATIONS", 1)
+    monkeypatch.setattr("sa_solver.cycles.tangential_loop.STUCK_ITERATIONS", 1)
     known = loop_errors(contact, height, path, loop)
     # Two of the strips are at the rim.
     stiffness = loop.stiffness / 8.0 * 2.0 * grid.pitch[0] / loop.area

@@ -6,7 +6,8 @@ import sys
 import numpy as np
 import pytest
 
-from sa_solver import kernels, loops
+from sa_solver.transforms import kernels
+from sa_solver.transforms import passes as loops
 
 MATRIX = np.array([[0, 1, 2], [1, 3, 4], [2, 4, 5]])
 TURNED = np.array([False, False, True])

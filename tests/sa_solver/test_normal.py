@@ -5,9 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sa_solver import bound_cg, few_cells, normal_splitting
-from sa_solver.half_space import HalfSpace
-from sa_solver.normal import NormalContact, NormalContactError
+from sa_solver.half_space.operator import HalfSpace
+from sa_solver.normal import bound_cg, few_cells
+from sa_solver.normal import splitting as normal_splitting
+from sa_solver.normal.contact import NormalContact, NormalContactError
 from sa_solver.reference.flat_rounded import FlatRoundedPunch
 from sa_solver.reference.hertz import HertzSphere
 from sa_solver.rigid_modes import pseudoinverse

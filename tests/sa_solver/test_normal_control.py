@@ -5,8 +5,8 @@ import itertools
 import numpy as np
 import pytest
 
-from sa_solver.half_space import HalfSpace
-from sa_solver.normal import NormalContact, NormalContactError
+from sa_solver.half_space.operator import HalfSpace
+from sa_solver.normal.contact import NormalContact, NormalContactError
 from sa_solver.reference.hertz import HertzCylinder
 from sa_solver.types import ElasticPair, Grid, Material
 

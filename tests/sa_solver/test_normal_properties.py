@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sa_solver.half_space import HalfSpace
-from sa_solver.normal import NormalContact
+from sa_solver.half_space.operator import HalfSpace
+from sa_solver.normal.contact import NormalContact
 from sa_solver.types import ElasticPair, Grid, Material
 
 SOLVED = 1e-8

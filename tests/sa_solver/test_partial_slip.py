@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from sa_solver.contact import FrictionalContact
-from sa_solver.half_space import HalfSpace
-from sa_solver.normal import NormalContact
-from sa_solver.partial_slip import PartialSlipError, partial_slip_curve
+from sa_solver.cycles.partial_slip import PartialSlipError, partial_slip_curve
+from sa_solver.cycles.tangential_loop import LoopPath, march_loop
+from sa_solver.half_space.operator import HalfSpace
+from sa_solver.normal.contact import NormalContact
 from sa_solver.reference.mindlin import ShearedSphere
-from sa_solver.tangential_loop import LoopPath, march_loop
 from sa_solver.types import ElasticPair, Grid, Material
 
 LOAD, RADIUS, FRICTION = 60.0, 47.619, 0.5

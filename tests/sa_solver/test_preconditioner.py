@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from sa_solver.half_space import HalfSpace
-from sa_solver.influence import Z, rectangle_influence
-from sa_solver.preconditioner import NormalPreconditioner
+from sa_solver.half_space.influence import Z, rectangle_influence
+from sa_solver.half_space.operator import HalfSpace
+from sa_solver.half_space.preconditioner import NormalPreconditioner
 from sa_solver.types import ElasticPair, Grid, Material
 
 TITANIUM = Material(115e3, 0.29)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from sa_solver.pruned import LARGE, PARTS, PrunedColumns
+from sa_solver.transforms.pruned import LARGE, PARTS, PrunedColumns
 
 
 @pytest.mark.parametrize(

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from sa_solver.half_space import HalfSpace
-from sa_solver.normal import NormalContact
+from sa_solver.half_space.operator import HalfSpace
+from sa_solver.normal.contact import NormalContact
 from sa_solver.reference.hertz import HertzSphere
-from sa_solver.resolution import FEWEST_CELLS, cells_across, is_point, peak_error
+from sa_solver.surfaces.resolution import FEWEST_CELLS, cells_across, is_point, peak_error
 from sa_solver.types import ElasticPair, Grid, Material
 
 TITANIUM = Material(115e3, 0.29)

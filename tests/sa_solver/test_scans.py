@@ -5,8 +5,9 @@ import doctest
 import numpy as np
 import pytest
 
-from sa_solver import ElasticPair, Grid, HalfSpace, InputError, Material, NormalContact, scans
-from sa_solver.scans import Scan, cell_means, filled, fit, levelled, resampled, rms
+from sa_solver import ElasticPair, Grid, HalfSpace, InputError, Material, NormalContact
+from sa_solver.surfaces import scans
+from sa_solver.surfaces.scans import Scan, cell_means, filled, fit, levelled, resampled, rms
 
 RNG = np.random.default_rng
 

@@ -5,16 +5,9 @@ import itertools
 import numpy as np
 import pytest
 
-from sa_solver.reference.hertz import HertzCylinder, HertzSphere
-from sa_solver.reference.subsurface import (
-    cylinder_stress,
-    point_force_stress,
-    sphere_axis_stress,
-    sphere_surface_stress,
-)
-from sa_solver.stress import principal_stresses, von_mises
-from sa_solver.subsurface import SubsurfaceError, SubsurfaceStress, sections
-from sa_solver.subsurface_influence import (
+from sa_solver.half_space.stress import principal_stresses, von_mises
+from sa_solver.half_space.subsurface import SubsurfaceError, SubsurfaceStress, sections
+from sa_solver.half_space.subsurface_influence import (
     INDICES,
     XX,
     XY,
@@ -24,6 +17,13 @@ from sa_solver.subsurface_influence import (
     ZZ,
     rectangle_stress,
     strip_stress,
+)
+from sa_solver.reference.hertz import HertzCylinder, HertzSphere
+from sa_solver.reference.subsurface import (
+    cylinder_stress,
+    point_force_stress,
+    sphere_axis_stress,
+    sphere_surface_stress,
 )
 from sa_solver.types import Grid, Material
 

@@ -5,13 +5,17 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sa_solver import tangential
-from sa_solver.half_space import HalfSpace
+from sa_solver.half_space.operator import HalfSpace
 from sa_solver.reference.hertz import HertzCylinder
 from sa_solver.reference.line_partial_slip import BulkStressedCylinder, ShearedCylinder
 from sa_solver.reference.mindlin import ShearedSphere
 from sa_solver.reference.torsion import TwistedSphere
-from sa_solver.tangential import FrictionLimitError, TangentialContact, TangentialContactError
+from sa_solver.tangential import contact as tangential
+from sa_solver.tangential.contact import (
+    FrictionLimitError,
+    TangentialContact,
+    TangentialContactError,
+)
 from sa_solver.types import ElasticPair, Grid, Material
 
 TITANIUM, ISOCHORIC = Material(115e3, 0.29), Material(115e3, 0.0)

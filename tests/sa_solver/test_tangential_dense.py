@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from sa_solver.disk_gradient import gradients_on_disks
-from sa_solver.half_space import HalfSpace
+from sa_solver.half_space.operator import HalfSpace
 from sa_solver.rigid_modes import PlanarModes
-from sa_solver.tangential import TangentialContact
-from sa_solver.tangential_problem import BoxOperator, TangentialProblem
+from sa_solver.tangential.contact import TangentialContact
+from sa_solver.tangential.disk_gradient import gradients_on_disks
+from sa_solver.tangential.problem import BoxOperator, TangentialProblem
 from sa_solver.types import ElasticPair, Grid, Material
 
 MATERIAL = Material(115e3, 0.35)

@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 
-from sa_solver import tangential_loop as loops
 from sa_solver.contact import FrictionalContact
-from sa_solver.half_space import HalfSpace
+from sa_solver.cycles import tangential_loop as loops
+from sa_solver.cycles.tangential_loop import LoopError, LoopFailure, LoopPath, march_loop
+from sa_solver.half_space.operator import HalfSpace
 from sa_solver.reference.hertz import HertzCylinder
 from sa_solver.reference.line_partial_slip import ShearedCylinder
 from sa_solver.reference.mindlin import ShearedSphere
-from sa_solver.tangential import FrictionLimitError, TangentialContact
-from sa_solver.tangential_loop import LoopError, LoopFailure, LoopPath, march_loop
+from sa_solver.tangential.contact import FrictionLimitError, TangentialContact
 from sa_solver.types import ElasticPair, Grid, Material
 
 LOAD, RADIUS, FRICTION = 400.0, 10.0, 0.7

@@ -6,7 +6,7 @@ from functools import partial
 
 import pytest
 
-from sa_solver.threads import THREADS, at_once, begun, threads
+from sa_solver.transforms.threads import THREADS, at_once, begun, threads
 
 
 def _after(seconds: float, value: int) -> int:

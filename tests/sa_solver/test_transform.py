@@ -6,7 +6,7 @@ import sys
 import numpy as np
 import pytest
 
-from sa_solver.transform import SpectralFilter, Transform
+from sa_solver.transforms.padded import SpectralFilter, Transform
 
 SHAPE = (12, 7)
 PADDED = [(23, 13), (24, 14), (12, 7)]
@@ -116,14 +116,14 @@ def test_a_filter_leaves_its_input_and_earlier_output_alone():
     assert np.array_equal(output, kept)
 
 
-@pytest.mark.parametrize("before", ["", "from fe_models.pardiso import library; library()"])
+@pytest.mark.parametrize("before", ["", "from fe_models.solvers.pardiso import library; library()"])
 def test_a_transform_is_that_of_fftw_whatever_is_loaded_before_it(before):
     """MKL's functions of the same names round otherwise."""
     shape, padded = (100, 30), (256, 64)
     code = f"""{before}
 import sys
 import numpy as np
-from sa_solver.transform import Transform
+from sa_solver.transforms.padded import Transform
 transform = Transform({shape}, {padded})
 transform.forward(np.random.default_rng(0).standard_normal({shape}), 0)
 sys.stdout.buffer.write(transform.spectra[0].tobytes())

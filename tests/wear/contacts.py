@@ -7,11 +7,11 @@ from typing import Any
 import numpy as np
 
 from sa_solver.types import Array, ElasticPair, Grid, Material
-from wear.drive import Drive
-from wear.implicit import ImplicitStepper
-from wear.interface import InterfaceContact, InterfaceSettings
+from wear.contact.drive import Drive
+from wear.contact.interface import InterfaceContact, InterfaceSettings
+from wear.contact.link import CellNodes
 from wear.laws import EnergyLaw
-from wear.link import CellNodes
+from wear.steps.implicit import ImplicitStepper
 
 BODY, STEEL = Material(115e3, 0.29), Material(200e3, 0.3)
 PAIR = ElasticPair(BODY, BODY)

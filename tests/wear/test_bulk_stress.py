@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from sa_solver.half_space import HalfSpace
+from sa_solver.half_space.operator import HalfSpace
 from sa_solver.types import Array, ElasticPair, Grid, LoadHistory, Material
-from wear.bulk_stress import RIGID, SIDE, BodyFace
-from wear.link import CellNodes
+from wear.contact.link import CellNodes
+from wear.cracking.bulk_stress import RIGID, SIDE, BodyFace
 
 METAL = Material(115e3, 0.29)
 E, NU = METAL.young, METAL.poisson

@@ -27,14 +27,14 @@ import numpy as np
 import pytest
 import scipy.linalg
 
-from sa_solver.half_space import HalfSpace
-from sa_solver.normal import NormalContact
+from sa_solver.half_space.operator import HalfSpace
+from sa_solver.normal.contact import NormalContact
 from sa_solver.types import Array, ElasticPair, Grid, LoadHistory, Material
 from tests.marks import slow
 from tests.oracles.worn_shapes import worn_cylinder, worn_sphere
+from wear.contact.moving import LARGE_STROKE, passages
 from wear.laws import EnergyLaw
-from wear.moving import LARGE_STROKE, passages
-from wear.stepping import SlidingCycle, WearingContact, WearState
+from wear.steps.stepping import SlidingCycle, WearingContact, WearState
 from wear.surfaces import Surfaces
 
 BODY = Material(115e3, 0.29)
@@ -298,7 +298,10 @@ def test_over_a_long_stroke_the_slider_wears_alone_and_the_flat_evenly(stroke: f
 
 @pytest.mark.slow
 def test_neglecting_the_motion_costs_the_square_of_the_stroke() -> None:
-    """What :data:`wear.moving.LARGE_STROKE` rests on: less than 1 % at a tenth of the contact."""
+    """The motion counts for less than 1 % at a stroke of a tenth of the contact.
+
+    :data:`wear.contact.moving.LARGE_STROKE` rests on this.
+    """
     grid, load, volume = Grid.strips(1.6, 80), 50.0, 2.0 / 3.0 * 0.5**3 / RADIUS
     form = grid.x**2 / (2.0 * RADIUS)
     still = March(grid, form, load)

@@ -25,7 +25,11 @@ from sa_solver.errors import InputError
 from sa_solver.types import Array, ElasticPair, Grid, LoadHistory, Material
 from tests.marks import slow
 from tests.oracles.worn_shapes import worn_cylinder
-from wear.contacts import Contacts
+from wear.contact.contacts import Contacts
+from wear.contact.drive import Drive
+from wear.contact.face_loads import CycleLoads
+from wear.contact.interface import InterfaceContact, InterfaceSettings, InterfaceState, MotionError
+from wear.contact.link import CellNodes
 from wear.coupled import (
     AT_STOP,
     ConstantLoads,
@@ -36,16 +40,12 @@ from wear.coupled import (
     Observer,
     Stop,
 )
-from wear.drive import Drive
 from wear.evolution import EnergyTable
-from wear.face_loads import CycleLoads
-from wear.full_cycle import CycleStart
-from wear.implicit import ImplicitStepper
-from wear.interface import InterfaceContact, InterfaceSettings, InterfaceState, MotionError
 from wear.laws import EnergyLaw, EvolvingLaw
-from wear.link import CellNodes
-from wear.steppers import ErrorControl
-from wear.stepping import ContactFailure
+from wear.steps.full_cycle import CycleStart
+from wear.steps.implicit import ImplicitStepper
+from wear.steps.steppers import ErrorControl
+from wear.steps.stepping import ContactFailure
 
 BODY = Material(115e3, 0.29)
 PAIR = ElasticPair(BODY, BODY)

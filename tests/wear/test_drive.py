@@ -9,15 +9,15 @@ import numpy as np
 import pytest
 
 from sa_solver.contact import FrictionalContact
-from sa_solver.half_space import HalfSpace
+from sa_solver.half_space.operator import HalfSpace
 from sa_solver.types import Array, ElasticPair, Grid, LoadHistory, Material
 from tests.wear import contacts
 from tests.wear.contacts import BODY, FRICTION, PAIR, STEEL
-from wear.drive import Drive
-from wear.face_loads import CycleLoads
-from wear.full_cycle import march_cycle
-from wear.interface import InterfaceContact
-from wear.stepping import ContactFailure
+from wear.contact.drive import Drive
+from wear.contact.face_loads import CycleLoads
+from wear.contact.interface import InterfaceContact
+from wear.steps.full_cycle import march_cycle
+from wear.steps.stepping import ContactFailure
 
 RADIUS = 10.0
 BALL = Grid.covering((0.8, 0.8), (20, 20))

@@ -8,11 +8,11 @@ import pytest
 
 from sa_solver.contact import FrictionalContact
 from sa_solver.contact_state import ContactLoad
-from sa_solver.half_space import HalfSpace
+from sa_solver.half_space.operator import HalfSpace
 from sa_solver.types import Array, ElasticPair, Grid, LoadHistory, Material
-from wear.drive import Drive
-from wear.full_cycle import CLOSED, CycleStart, march_cycle, starts_near
-from wear.stepping import ContactFailure
+from wear.contact.drive import Drive
+from wear.steps.full_cycle import CLOSED, CycleStart, march_cycle, starts_near
+from wear.steps.stepping import ContactFailure
 
 TITANIUM, STEEL = Material(115e3, 0.29), Material(200e3, 0.3)
 GRID = Grid.covering((11.0, 24.0), (22, 24))
@@ -146,7 +146,7 @@ def test_an_increment_that_fails_is_named(monkeypatch):
 @pytest.mark.parametrize("first", [TITANIUM, STEEL], ids=["alike", "unlike"])
 def test_energy_that_is_not_met_is_told(monkeypatch, first):
     """One contact problem is too few for the elastic part to be known."""
-    monkeypatch.setattr("sa_solver.gross_slip.ITERATIONS", 1)
+    monkeypatch.setattr("sa_solver.tangential.gross_slip.ITERATIONS", 1)
     with pytest.raises(ContactFailure, match=r"increment 1: .*energy off by .*smaller increments"):
         march_cycle(contact(ElasticPair(first, TITANIUM)), GAP, mission())
 

@@ -5,8 +5,8 @@ from typing import cast
 import numpy as np
 import pytest
 
-from sa_solver.half_space import HalfSpace
-from sa_solver.normal import NormalContact
+from sa_solver.half_space.operator import HalfSpace
+from sa_solver.normal.contact import NormalContact
 from sa_solver.types import Array, ElasticPair, Grid, Material
 from wear.kinetics import LATEST_START, LinearRegime, linear_regime
 

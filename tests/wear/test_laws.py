@@ -7,16 +7,16 @@ import pytest
 
 from sa_solver.errors import InputError
 from sa_solver.types import Array, ElasticPair, Grid, LoadHistory, Material
+from wear.contact.face_loads import CycleLoads
+from wear.contact.interface import InterfaceContact, InterfaceSettings
+from wear.contact.link import CellNodes
 from wear.coupled import CoupledSettings, JumpSize, Stop
+from wear.cracking.life import findley, ruiz
 from wear.evolution import EnergyTable
-from wear.face_loads import CycleLoads
-from wear.implicit import ImplicitStepper
-from wear.interface import InterfaceContact, InterfaceSettings
 from wear.kinetics import linear_regime
 from wear.laws import ArchardLaw, EnergyAmplitudeLaw, EnergyLaw, EvolvingLaw, SlidingConditions
-from wear.life import findley, ruiz
-from wear.link import CellNodes
-from wear.steppers import ErrorControl
+from wear.steps.implicit import ImplicitStepper
+from wear.steps.steppers import ErrorControl
 
 UM3_PER_J = 1e-12  # [1/MPa]: 1e-9 mm³ per 1e3 N mm
 FRICTION = 0.4

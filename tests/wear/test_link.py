@@ -6,17 +6,17 @@ import numpy as np
 import pytest
 from scipy.spatial import Delaunay
 
-from fe_models.mesh import Face
-from fe_models.transfer import FaceTransfer
-from sa_solver.half_space import HalfSpace
+from fe_models.meshes.structure_mesh import Face
+from fe_models.meshes.transfer import FaceTransfer
+from sa_solver.half_space.operator import HalfSpace
 from sa_solver.types import Array, ElasticPair, Frame, Grid, LoadHistory, Material
 from tests.oracles.elastic_layer import layer_compliance, press
-from wear.drive import Drive
-from wear.face_loads import CycleLoads
-from wear.implicit import ImplicitStepper
-from wear.interface import FirstContact, InterfaceContact, InterfaceSettings
+from wear.contact.drive import Drive
+from wear.contact.face_loads import CycleLoads
+from wear.contact.interface import FirstContact, InterfaceContact, InterfaceSettings
+from wear.contact.link import linked
 from wear.laws import EnergyLaw
-from wear.link import linked
+from wear.steps.implicit import ImplicitStepper
 
 BODY, RIGID = Material(100e3, 0.3), Material(np.inf, 0.3)
 # A face of 10 mm and a cylinder that touches 5 of them, in N/mm and mm.

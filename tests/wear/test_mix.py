@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 
 from sa_solver.contact import FrictionalContact
-from sa_solver.half_space import HalfSpace
-from sa_solver.normal import NormalContact
+from sa_solver.half_space.operator import HalfSpace
+from sa_solver.normal.contact import NormalContact
 from sa_solver.types import Array, ElasticPair, Grid, LoadHistory, Material
 from tests.marks import slow
 from wear.evolution import EnergyTable
-from wear.full_cycle import march_cycle
 from wear.laws import EnergyAmplitudeLaw, EnergyLaw, EvolvingLaw, WearLaw
-from wear.stepping import SlidingCycle, WearingContact, WearState
+from wear.steps.full_cycle import march_cycle
+from wear.steps.stepping import SlidingCycle, WearingContact, WearState
 
 GRID = Grid.covering((4.0, 4.0), (16, 16))
 BODY = Material(12e4 * (1 - 0.3**2), 0.3)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from sa_solver.types import Array, Grid
-from wear.moving import (
+from wear.contact.moving import (
     Passage,
     TravelError,
     followed,

@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 
 from sa_solver.types import Array
+from wear.contact.nodes import NodalContact, NodalState
 from wear.evolution import EnergyTable
 from wear.laws import ArchardLaw, EnergyAmplitudeLaw, EnergyLaw, EvolvingLaw
-from wear.marching import SubcyclingStepper, advance_cycles, rest, steps
-from wear.nodes import NodalContact, NodalState
-from wear.steppers import ExplicitStepper, HeunStepper, StabilityError, step_errors
+from wear.steps.marching import SubcyclingStepper, advance_cycles, rest, steps
+from wear.steps.steppers import ExplicitStepper, HeunStepper, StabilityError, step_errors
 
 FRICTION = 0.5
 AREAS = np.array([0.1, 0.2, 0.4])

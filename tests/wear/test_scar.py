@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from sa_solver import Grid, InputError
-from sa_solver.scans import Scan
+from sa_solver.surfaces.scans import Scan
 from wear import scar as module
 from wear.scar import measure_scar
 

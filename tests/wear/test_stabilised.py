@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 
 from sa_solver.types import Array
+from wear.contact.nodes import NodalContact, NodalState
 from wear.evolution import EnergyTable
 from wear.laws import EnergyLaw, EvolvingLaw
-from wear.marching import advance_cycles
-from wear.nodes import NodalContact, NodalState
-from wear.stabilised import DAMPING, StabilisedStepper, chebyshev_step, stages_for
-from wear.steppers import ErrorControl, step_errors
+from wear.steps.marching import advance_cycles
+from wear.steps.stabilised import DAMPING, StabilisedStepper, chebyshev_step, stages_for
+from wear.steps.steppers import ErrorControl, step_errors
 
 NODES, FRICTION, SLIP, ALPHA = 40, 0.5, 0.02, 4e-8
 AREAS = np.full(NODES, 0.05)

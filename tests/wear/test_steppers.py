@@ -6,16 +6,16 @@ from functools import cache
 import numpy as np
 import pytest
 
-from sa_solver.half_space import HalfSpace
-from sa_solver.normal import NormalContact
+from sa_solver.half_space.operator import HalfSpace
+from sa_solver.normal.contact import NormalContact
 from sa_solver.types import Array, ElasticPair, Grid, LoadHistory, Material
 from tests.marks import slow
-from wear.drive import Drive
-from wear.implicit import ImplicitStepper, SecondOrderStepper
+from wear.contact.drive import Drive
 from wear.laws import EnergyLaw
-from wear.marching import advance_cycles
-from wear.steppers import ErrorControl, ExplicitStepper, root_mean_square, steps_to_come
-from wear.stepping import SlidingCycle, WearingContact, WearState
+from wear.steps.implicit import ImplicitStepper, SecondOrderStepper
+from wear.steps.marching import advance_cycles
+from wear.steps.steppers import ErrorControl, ExplicitStepper, root_mean_square, steps_to_come
+from wear.steps.stepping import SlidingCycle, WearingContact, WearState
 from wear.worn import Spent, WearStep
 
 BODY = Material(115e3, 0.29)

@@ -8,12 +8,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sa_solver.half_space import HalfSpace
-from sa_solver.normal import NormalContact
+from sa_solver.half_space.operator import HalfSpace
+from sa_solver.normal.contact import NormalContact
 from sa_solver.types import Array, ElasticPair, Grid, LoadHistory, Material
 from tests.marks import slow
 from wear.laws import ArchardLaw, EnergyAmplitudeLaw, EnergyLaw, WearLaw
-from wear.stepping import ContactFailure, SlidingCycle, WearingContact, WearState, WearStep
+from wear.steps.stepping import ContactFailure, SlidingCycle, WearingContact, WearState, WearStep
 from wear.surfaces import Surfaces
 
 GRID = Grid.covering((4.0, 4.0), (24, 24))

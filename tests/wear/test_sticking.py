@@ -3,8 +3,8 @@
 import numpy as np
 
 from sa_solver.types import Array, LoadHistory
-from wear.sticking import with_sticking_shear
-from wear.tractions import CycleTractions
+from wear.contact.sticking import with_sticking_shear
+from wear.contact.tractions import CycleTractions
 
 AREA, FRICTION = 0.25, 0.5
 

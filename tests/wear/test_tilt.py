@@ -6,20 +6,20 @@ from typing import Any
 import numpy as np
 import pytest
 
-from sa_solver.half_space import HalfSpace
-from sa_solver.normal import NormalContact
-from sa_solver.partial_slip import partial_slip_curve
+from sa_solver.cycles.partial_slip import partial_slip_curve
+from sa_solver.half_space.operator import HalfSpace
+from sa_solver.normal.contact import NormalContact
 from sa_solver.types import Array, ElasticPair, Grid, LoadHistory, Tilt
 from tests.oracles.sliding_cylinder import wear_without_tilt
 from tests.wear import contacts
 from tests.wear.contacts import BODY, COEFFICIENT, FRICTION, PAIR, STEEL
-from wear.drive import Drive
-from wear.face_loads import CycleLoads
-from wear.full_cycle import march_cycle
-from wear.implicit import ImplicitStepper, SecondOrderStepper
-from wear.interface import InterfaceContact
-from wear.steppers import ErrorControl, ExplicitStepper, root_mean_square
-from wear.stepping import WearState
+from wear.contact.drive import Drive
+from wear.contact.face_loads import CycleLoads
+from wear.contact.interface import InterfaceContact
+from wear.steps.full_cycle import march_cycle
+from wear.steps.implicit import ImplicitStepper, SecondOrderStepper
+from wear.steps.steppers import ErrorControl, ExplicitStepper, root_mean_square
+from wear.steps.stepping import WearState
 
 RADIUS, SOLVED = 6.0, 1e-8
 

@@ -9,7 +9,7 @@ from typing import Any, get_args, get_origin
 import numpy as np
 import pytest
 
-from fe_models.reduction import ReducedModel
+from fe_models.joints.reduction import ReducedModel
 from workflow.case.sections import Section, sections_of
 from workflow.kinds import kinds, template
 

@@ -13,9 +13,9 @@ import pytest
 import scipy.io
 from click.testing import Result
 
-from fe_models.gmsh_session import gmsh_model
-from fe_models.mesh import Body, StructureMesh, write_msh
-from fe_models.reduction import save_reduced
+from fe_models.joints.reduction import save_reduced
+from fe_models.meshes.gmsh_session import gmsh_model
+from fe_models.meshes.structure_mesh import Body, StructureMesh, write_msh
 from sa_solver.types import Array, Frame, Grid
 from tests.conftest import CASES
 from tests.wheels import sector, shoe

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 import workflow.analyses.wear.structures.resultants
-from fe_models.mesh import Interface
+from fe_models.meshes.structure_mesh import Interface
 from fe_models.structure import InterfaceHistory
 from sa_solver.types import Frame, LoadHistory
 from workflow.analyses.wear.structures.resultants.faces import facets_over

@@ -7,11 +7,11 @@ from typing import Any
 import numpy as np
 from skfem import MeshTri
 
-from fe_models.mesh import Body, StructureMesh, write_msh
+from fe_models.meshes.structure_mesh import Body, StructureMesh, write_msh
 from fe_models.structure import InterfaceHistory
 from sa_solver.types import Array
 from tests.workflow.mesh_scenes import STEEL, write_case
-from wear.interface import FirstContact
+from wear.contact.interface import FirstContact
 from workflow.analyses.wear.contact_stage import ContactStage
 from workflow.analyses.wear.structures import structure_of
 from workflow.kinds import load_case

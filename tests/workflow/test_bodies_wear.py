@@ -12,7 +12,7 @@ import pytest
 
 from tests.marks import slow
 from tests.workflow.commands import command
-from wear.interface import InterfaceState
+from wear.contact.interface import InterfaceState
 from workflow.analyses.wear import run as wear_run
 from workflow.analyses.wear.contact_loops import loop_path
 from workflow.analyses.wear.contact_stage import ContactStage
@@ -223,7 +223,7 @@ def test_the_flat_wears_as_the_punch_passes_over_it() -> None:
 
 
 def test_wear_beyond_the_grid_is_refused_with_the_remedy() -> None:
-    from wear.stepping import ContactFailure
+    from wear.steps.stepping import ContactFailure
 
     case = area("load_path.stroke=0.9 mm", "wear.cycles=10", "load_path.increments=2")
     with pytest.raises(ContactFailure, match="beyond the end of the grid along x: make the grid"):

@@ -7,14 +7,14 @@ import numpy as np
 import pytest
 from skfem import MeshTet
 
-from fe_models.mesh import Body, Face
-from fe_models.stress import StressField
-from fe_models.transfer import FaceTransfer
-from sa_solver.subsurface import SubsurfaceStress
+from fe_models.elasticity.stress import StressField
+from fe_models.meshes.structure_mesh import Body, Face
+from fe_models.meshes.transfer import FaceTransfer
+from sa_solver.half_space.subsurface import SubsurfaceStress
 from sa_solver.types import Array, Frame, Grid, Material
 from tests.conftest import CASES
-from wear.bulk_stress import SIDE
-from wear.life import ruiz, smith_watson_topper
+from wear.cracking.bulk_stress import SIDE
+from wear.cracking.life import ruiz, smith_watson_topper
 from workflow.analyses.wear.body_stress import (
     Planes,
     StressedBody,

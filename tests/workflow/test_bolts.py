@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from skfem import MeshTri
 
-from fe_models.mesh import Body, StructureMesh, write_msh
+from fe_models.meshes.structure_mesh import Body, StructureMesh, write_msh
 from tests.mirrored_blocks import along
 from tests.workflow.commands import invoke
 from tests.workflow.mesh_scenes import refused, run, write_case

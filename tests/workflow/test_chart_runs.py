@@ -331,7 +331,7 @@ def test_steppers_of_a_line_contact(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     errors = {rung.name: rung.error for rung in ladder.rungs}
     first = [errors[f"implicit, {count} jumps"] for count in (5, 10, 20)]
     for coarse, fine in pairwise(first):
-        # To and fro over unlike increments: see wear.implicit.
+        # To and fro over unlike increments: see wear.steps.implicit.
         assert 0.8 < np.log2(coarse / fine) < 2.0
     assert errors["second order, 10 jumps"] < 0.1 * errors["implicit, 10 jumps"]
     assert [rung.name for rung in ladder.rungs if rung.point.baseline] == ["implicit, 10 jumps"]

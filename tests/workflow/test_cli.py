@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 
-from fe_models.linear_solver import FactorMemoryError
+from fe_models.solvers.linear_solver import FactorMemoryError
 from sa_solver.errors import ConvergenceError, InputError
 from workflow import errors
 from workflow.cli import cli

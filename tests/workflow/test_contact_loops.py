@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 from sa_solver.contact import FrictionalContact
-from sa_solver.half_space import HalfSpace
+from sa_solver.half_space.operator import HalfSpace
 from sa_solver.reference.mindlin import ShearedSphere
 from sa_solver.types import ElasticPair, Grid, Material
 from tests.workflow.conftest import CONTENTS, Run, invoke
 from tests.workflow.interruptions import ctrl_c_after_jumps
-from wear.stepping import ContactFailure
+from wear.steps.stepping import ContactFailure
 from workflow.analyses.wear.case.loops import Loops
 from workflow.analyses.wear.contact_loops import (
     MEASURED,

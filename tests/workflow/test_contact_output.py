@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import pyvista as pv
 
-from sa_solver.history import History
+from sa_solver.cycles.history import History
 from sa_solver.reference.mindlin import ShearedSphere
 from sa_solver.reference.torsion import TwistedSphere
 from sa_solver.types import Grid, Material

@@ -11,7 +11,7 @@ import h5py
 import numpy as np
 import pytest
 
-from sa_solver.history import History
+from sa_solver.cycles.history import History
 from tests.workflow.commands import invoke
 from tests.workflow.conftest import manifest_has_all
 from workflow.analyses.contact import run as contact_run

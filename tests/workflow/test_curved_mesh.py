@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from fe_models.geometry.imported import patch, read_bodies
-from fe_models.gmsh_session import gmsh_model
+from fe_models.meshes.gmsh_session import gmsh_model
 from sa_solver.reference.hertz import HertzCylinder, HertzSphere
 from sa_solver.types import ElasticPair, Material
 from tests.workflow.commands import invoke

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from fe_models import structure
-from fe_models.mesh import StructureMesh, write_msh
+from fe_models.meshes.structure_mesh import StructureMesh, write_msh
 from tests.mirrored_blocks import pad_on_block
 from tests.workflow.commands import invoke
 from tests.workflow.mesh_scenes import WEAR, refused, run, write_case

@@ -2,7 +2,7 @@
 
 import pytest
 
-from fe_models.mesh import StructureMesh, write_msh
+from fe_models.meshes.structure_mesh import StructureMesh, write_msh
 from tests.marks import slow
 from tests.wheels import about, sector, shoe, turned
 from tests.workflow.commands import invoke

@@ -7,7 +7,7 @@ import h5py
 import numpy as np
 import pytest
 
-from fe_models.joint import JointResolvent
+from fe_models.joints.joint import JointResolvent
 from tests.workflow.commands import invoke
 from tests.workflow.scenes import ROLLER_LOADS, ROLLER_WEAR
 from workflow.case.sections import files_of

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from tests.conftest import CASES
-from wear.interface import FirstContact
+from wear.contact.interface import FirstContact
 from workflow.analyses.wear.contact_stage import ContactStage
 from workflow.analyses.wear.structure_stage import StructureStage
 from workflow.analyses.wear.structures import structure_of

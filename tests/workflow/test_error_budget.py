@@ -11,7 +11,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from fe_models.mesh import MeshError
+from fe_models.meshes.structure_mesh import MeshError
 from tests.workflow.commands import invoke
 from tests.workflow.mesh_scenes import settings
 from workflow.analyses.wear import run

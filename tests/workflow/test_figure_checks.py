@@ -20,7 +20,7 @@ from tests.workflow.figure_checks import problems
 from tests.workflow.test_chart import charted
 from tests.workflow.test_loops_command import LOAD, record
 from tests.workflow.test_sweep import worn
-from wear.joints.measured_loops import measure_loops
+from wear.joints.measured.measured_loops import measure_loops
 from workflow.analyses.wear.figures.wear import figures_of
 from workflow.analyses.wear.layout import Contents
 from workflow.chart import figures as chart_figures

@@ -10,7 +10,7 @@ import pytest
 import pyvista
 import yaml
 
-from fe_models.dynamics.harmonic_balance import HarmonicBalance
+from fe_models.dynamics.periodic.harmonic_balance import HarmonicBalance
 from fe_models.dynamics.rig import modal_damping, natural_frequencies
 from tests.workflow.conftest import invoke, manifest_has_all
 from tests.workflow.shown_files import check_arrays, check_scene, total
@@ -18,8 +18,8 @@ from tests.workflow.test_friction_rig import NODES, RIG, SPECIMENS
 from tests.workflow.time_scenes import refused
 from wear.evolution import EnergyTable
 from wear.laws import ArchardLaw, EnergyAmplitudeLaw, EnergyLaw, EvolvingLaw
-from wear.marching import advance_cycles
-from wear.steppers import ExplicitStepper, HeunStepper, step_errors
+from wear.steps.marching import advance_cycles
+from wear.steps.steppers import ExplicitStepper, HeunStepper, step_errors
 from workflow.analyses.vibration.model import VibrationModel
 from workflow.analyses.vibration_wear.body import body_model
 from workflow.analyses.vibration_wear.case import FrictionRigWearCase

@@ -312,7 +312,7 @@ def test_interruption_after_the_last_jump_writes_the_output(start, resume, monke
 
 @pytest.mark.slow
 def test_method_that_fails_later_says_how_to_go_on(start, resume, whole, monkeypatch, tmp_path):
-    from wear.stepping import ContactFailure
+    from wear.steps.stepping import ContactFailure
 
     jump = wear.coupled.CoupledWear._jump
 

@@ -12,13 +12,13 @@ import h5py
 import numpy as np
 import pytest
 
-from fe_models.dynamics.continuation import ContinuationControl
-from fe_models.dynamics.harmonic_balance import HarmonicBalance, PeriodicLoad
-from fe_models.dynamics.harmonics import Resolution
+from fe_models.dynamics.curves.continuation import ContinuationControl
+from fe_models.dynamics.periodic.harmonic_balance import HarmonicBalance, PeriodicLoad
+from fe_models.dynamics.periodic.harmonics import Resolution
 from fe_models.dynamics.rig import Link, lumped_rig, unit_force
 from tests.workflow.commands import invoke, runs_here
 from wear.joints.elastic import PolynomialSpring
-from wear.joints.periodic import PeriodicMarch
+from wear.joints.periodic.march import PeriodicMarch
 from workflow.analyses.vibration.figures import response as figures
 from workflow.kinds import analysis_of
 from workflow.runs import run as running

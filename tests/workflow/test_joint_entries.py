@@ -9,10 +9,10 @@ import pytest
 import scipy.linalg as sl
 from matplotlib import rc_context
 
+from fe_models.dynamics.curves.forced_response import along_force
 from fe_models.dynamics.excitation import CombinedForces, HarmonicForce
-from fe_models.dynamics.forced_response import along_force
-from fe_models.dynamics.newmark import TimeStepControl, integrate
-from fe_models.reduction import ReducedModel, save_reduced
+from fe_models.dynamics.transient.newmark import TimeStepControl, integrate
+from fe_models.joints.reduction import ReducedModel, save_reduced
 from tests.workflow.conftest import invoke
 from tests.workflow.figure_checks import problems
 from workflow.analyses.rig.building import rig_model

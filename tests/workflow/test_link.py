@@ -7,8 +7,8 @@ import pytest
 
 from fe_models.structure import InterfaceHistory
 from sa_solver.types import Array
-from wear.interface import FirstContact
-from wear.link import Link
+from wear.contact.interface import FirstContact
+from wear.contact.link import Link
 from workflow.analyses.wear.contact_stage import ContactStage
 from workflow.analyses.wear.link_report import report_link
 from workflow.analyses.wear.structures import structure_of

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from skfem import MeshTri
 
-from fe_models.mesh import Body, StructureMesh, write_msh
+from fe_models.meshes.structure_mesh import Body, StructureMesh, write_msh
 from tests.workflow.commands import invoke
 from tests.workflow.mesh_scenes import STEEL, edit, refused, run, write_case
 

@@ -6,8 +6,8 @@ import h5py
 import numpy as np
 import pytest
 
-from fe_models import friction
-from fe_models.gmsh_session import gmsh_model
+from fe_models.joints import friction
+from fe_models.meshes.gmsh_session import gmsh_model
 from fe_models.structure import CLOSED
 from tests.marks import slow
 from tests.workflow.commands import invoke

@@ -5,8 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fe_models import friction
-from fe_models.mesh import write_msh
+from fe_models.joints import friction
+from fe_models.meshes.structure_mesh import write_msh
 from tests.workflow.mesh_scenes import ABAQUS_FACES, write_case
 from workflow.analyses.wear.structure_stage import StructureStage
 from workflow.analyses.wear.structures.dovetail.model import DovetailModel

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from fe_models.geometry.imported import patch, read_bodies
-from fe_models.gmsh_session import gmsh_model
+from fe_models.meshes.gmsh_session import gmsh_model
 from tests.workflow.commands import invoke
 from tests.workflow.mesh_scenes import BLOCKS, TO_AND_FRO, edit, refused, run, write_case
 from workflow.kinds import load_case, template

@@ -6,7 +6,7 @@ import h5py
 import numpy as np
 import pytest
 
-from sa_solver.subsurface_influence import YY
+from sa_solver.half_space.subsurface_influence import YY
 from tests.workflow.commands import invoke
 from tests.workflow.mesh_scenes import STEEL, refused, run
 from tests.workflow.plane_blocks import Blocks, solved

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from ruamel.yaml import YAML
 
-from fe_models.gmsh_session import gmsh_model
+from fe_models.meshes.gmsh_session import gmsh_model
 from tests.workflow.commands import invoke
 from tests.workflow.mesh_scenes import ASSEMBLY, BLOCKS, TO_AND_FRO, WEAR, cube, run, write_case
 from workflow.commands.offered_case import TO_FILL

@@ -104,7 +104,7 @@ def test_damping_comes_to_that_of_the_modes(two):
 
 def test_what_a_specimens_run_leaves_is_read_as_matrices(two):
     """``reduced`` and ``matrices`` of one file: the same rig, its modes as modes."""
-    from fe_models.reduction import save_reduced
+    from fe_models.joints.reduction import save_reduced
 
     save_reduced(two / "body.h5", TWO_MASSES)
     own = rig_of(two, "structure.matrices={file: body.h5, units: {length: mm, force: N}}")

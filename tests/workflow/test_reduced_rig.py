@@ -8,8 +8,8 @@ import pytest
 import scipy.linalg as sl
 
 from fe_models.dynamics.excitation import HammerBlow
-from fe_models.dynamics.newmark import TimeStepControl
-from fe_models.reduction import ReducedModel, load_reduced, save_reduced
+from fe_models.dynamics.transient.newmark import TimeStepControl
+from fe_models.joints.reduction import ReducedModel, load_reduced, save_reduced
 from tests.workflow.time_scenes import MASS, RIG, STIFF, refused, run
 from wear.joints.law import march_joints
 from workflow.analyses.rig.building import rig_model

@@ -12,20 +12,20 @@ import pyvista
 from numpy.polynomial import Chebyshev
 from scipy.integrate import solve_ivp
 
-from fe_models.dynamics.cycle_energy import energy_lost, work_done
-from fe_models.dynamics.harmonic_balance import HarmonicBalance, PeriodicLoad
-from fe_models.dynamics.harmonics import Resolution
+from fe_models.dynamics.periodic.cycle_energy import energy_lost, work_done
+from fe_models.dynamics.periodic.harmonic_balance import HarmonicBalance, PeriodicLoad
+from fe_models.dynamics.periodic.harmonics import Resolution
 from fe_models.dynamics.rig import Link, lumped_rig, unit_force
+from fe_models.joints.reduction import save_reduced
 from fe_models.matrices import on_all, own_matrices
-from fe_models.reduction import save_reduced
 from tests.workflow.conftest import invoke
 from tests.workflow.shown_files import check_arrays, check_scene, total
 from tests.workflow.time_scenes import refused
 from wear.joints.jenkins import Jenkins
-from wear.joints.periodic import PeriodicMarch
+from wear.joints.periodic.march import PeriodicMarch
 from wear.laws import EnergyLaw
-from wear.marching import advance_cycles
-from wear.steppers import HeunStepper, step_errors
+from wear.steps.marching import advance_cycles
+from wear.steps.steppers import HeunStepper, step_errors
 from workflow.analyses.vibration.model import VibrationModel
 from workflow.analyses.vibration_wear.body import body_model
 from workflow.analyses.vibration_wear.case import ReducedWearCase

@@ -17,7 +17,7 @@ import h5py
 import numpy as np
 import pytest
 
-from fe_models.mesh import Face
+from fe_models.meshes.structure_mesh import Face
 from sa_solver.types import Array, Frame, LoadHistory
 from tests.workflow.commands import invoke
 from workflow import kinds

@@ -7,9 +7,9 @@ import h5py
 import numpy as np
 import pytest
 
-from fe_models.mesh import Face
+from fe_models.meshes.structure_mesh import Face
+from fe_models.meshes.transfer import FaceTransfer
 from fe_models.structure import CycleSolution, InterfaceHistory
-from fe_models.transfer import FaceTransfer
 from sa_solver.types import Frame, Grid, resultants
 from tests.workflow.contact_loads import (
     COLUMNS,

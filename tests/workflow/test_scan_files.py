@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from sa_solver import Grid
-from sa_solver.scans import Scan, resampled
+from sa_solver.surfaces.scans import Scan, resampled
 from tests.workflow import scan_corpus
 from tests.workflow.scenes import BALL
 from workflow.analyses.contact.surfaces import MeasuredSurfaces

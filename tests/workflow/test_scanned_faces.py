@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from ruamel.yaml import YAML
 
-from fe_models.remesh import form_of
-from fe_models.transfer import FaceTransfer
+from fe_models.meshes.remesh import form_of
+from fe_models.meshes.transfer import FaceTransfer
 from sa_solver import ElasticPair, Grid, Material
 from sa_solver.reference.hertz import HertzCylinder
 from tests.workflow.commands import invoke

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from fe_models.remesh import form_of
-from sa_solver.shapes import rounded_edge
+from fe_models.meshes.remesh import form_of
+from sa_solver.surfaces.shapes import rounded_edge
 from tests.conftest import CASES
 from tests.workflow.commands import invoke
 from tests.workflow.mesh_scenes import settings

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from sa_solver import Grid
-from sa_solver.scans import Scan
+from sa_solver.surfaces.scans import Scan
 from tests.wear.test_scar import scans
 from tests.workflow.commands import command
 from workflow.case.scan_files import read_scan, write_scan

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 import pyvista as pv
 
-from fe_models.mesh import Face
-from fe_models.transfer import FaceTransfer
+from fe_models.meshes.structure_mesh import Face
+from fe_models.meshes.transfer import FaceTransfer
 from sa_solver.types import Array, Frame, Grid
 from tests.workflow.conftest import CONTENTS
 from workflow.analyses.wear import ANALYSIS

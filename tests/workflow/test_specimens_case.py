@@ -7,14 +7,14 @@ import h5py
 import numpy as np
 import pytest
 
-from fe_models.mesh import Face
-from fe_models.reduction import free_frequencies, load_reduced
+from fe_models.joints.reduction import free_frequencies, load_reduced
+from fe_models.meshes.structure_mesh import Face
 from sa_solver.reference.hertz import HertzSphere
 from sa_solver.types import ElasticPair, Frame, Material
 from tests.workflow.commands import invoke
 from tests.workflow.conftest import manifest_has_all
 from tests.workflow.shown_files import check_arrays, check_scene, total
-from wear.link import LARGEST_RESIDUAL
+from wear.contact.link import LARGEST_RESIDUAL
 from workflow.analyses.specimens.case import SpecimensCase
 from workflow.analyses.specimens.half_space import NodeGrid, PadHalfSpace
 from workflow.analyses.specimens.model import SpecimensModel

@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 
 from fe_models.geometry.specimens import Specimen
-from fe_models.reduced_contact import FrettingConditions, ReducedPair
+from fe_models.joints.reduced_contact import FrettingConditions, ReducedPair
 from tests.reduced_pads import ALPHA, FRICTION, SOLVER, STROKE, coarse_pads, pad_stiffnesses
+from wear.contact.nodes import NodalState
 from wear.laws import EnergyLaw
-from wear.marching import rest
-from wear.nodes import NodalState
-from wear.steppers import ExplicitStepper, StabilityError
+from wear.steps.marching import rest
+from wear.steps.steppers import ExplicitStepper, StabilityError
 from workflow.analyses.specimens.case import SpecimensCase
 from workflow.analyses.specimens.wear import FrettedPair, wear_in_cycle_blocks
 from workflow.errors import CaseError

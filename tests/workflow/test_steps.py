@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from numpy.polynomial import Chebyshev
 
-from fe_models.dynamics.harmonics import Resolution
 from fe_models.dynamics.motion import Start
-from fe_models.dynamics.record import StepState
+from fe_models.dynamics.periodic.harmonics import Resolution
+from fe_models.dynamics.transient.record import StepState
 from wear.joints.law import JointResponse
 from workflow.errors import UserError
 from workflow.shell import checkpoint, packing, steps

@@ -16,7 +16,7 @@ from scipy.linalg import solve_toeplitz
 from scipy.optimize import brentq
 
 from tests.workflow.commands import invoke
-from wear.stick_border import EDGE
+from wear.steps.stick_border import EDGE
 
 MODULUS, RADIUS, FRICTION = 1e5, 10.0, 0.3  # E* [MPa], R [mm]; G* = E*
 CASE = """title: wear in partial slip to its limiting shape

@@ -9,15 +9,15 @@ import numpy as np
 import pytest
 
 from sa_solver import von_mises
-from sa_solver.subsurface import SubsurfaceStress
+from sa_solver.half_space.subsurface import SubsurfaceStress
 from sa_solver.types import Array, Grid, LoadHistory, Material
 from tests.marks import slow
 from tests.workflow.conftest import contents_of
 from tests.workflow.shown_files import check_arrays, check_scene
-from wear.bulk_stress import BulkStress
-from wear.face_loads import CycleLoads
-from wear.link import Link
-from wear.tractions import CycleTractions
+from wear.contact.face_loads import CycleLoads
+from wear.contact.link import Link
+from wear.contact.tractions import CycleTractions
+from wear.cracking.bulk_stress import BulkStress
 from workflow.analyses.wear.body_stress import Planes, StressedBody, StressedCycle
 from workflow.analyses.wear.case.sections import ContactStress, Life
 from workflow.analyses.wear.contact_stress import (
@@ -216,7 +216,7 @@ def test_reversed_sliding_is_alike_in_both_bodies_and_at_both_ends(parameter: st
     value, of_body_2 = (maps(life, grid, n, cycle, known)[name] for n in (1, 2))
     scale = value.max()
     assert scale > 0.0
-    # The search for the worst plane is not symmetric: see wear.life.PlaneSearch.
+    # The search for the worst plane is not symmetric: see wear.cracking.life.PlaneSearch.
     left = 1e-10 if parameter == "ruiz" else 0.02
     np.testing.assert_allclose(of_body_2, value, atol=left * scale)
     np.testing.assert_allclose(value[::-1], value, atol=left * scale)

@@ -9,9 +9,9 @@ import matplotlib
 import numpy as np
 import pytest
 
-from fe_models.mesh import Face
+from fe_models.meshes.structure_mesh import Face
+from fe_models.meshes.transfer import FaceTransfer
 from fe_models.structure import InterfaceHistory, load_history
-from fe_models.transfer import FaceTransfer
 from sa_solver.types import Frame, Grid
 from tests.marks import slow
 from tests.workflow.conftest import Run, contents_of, invoke

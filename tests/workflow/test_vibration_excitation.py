@@ -6,7 +6,7 @@ import h5py
 import numpy as np
 import pytest
 
-from fe_models.reduction import ReducedModel, save_reduced
+from fe_models.joints.reduction import ReducedModel, save_reduced
 from tests.workflow.test_vibration_case import RIG, SAMPLED, STIFFNESS
 from tests.workflow.time_scenes import MASS, linear_rig, refused, run
 

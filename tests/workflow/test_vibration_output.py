@@ -15,7 +15,7 @@ from sa_solver.types import Array
 from tests.workflow.conftest import invoke, manifest_has_all
 from tests.workflow.shown_files import check_arrays, check_scene
 from tests.workflow.vibration_pad import LOAD, ROWS, block, places, run_block
-from wear.joints.periodic import SEPARATED, SLIP
+from wear.joints.periodic.march import SEPARATED, SLIP
 from workflow.analyses.vibration import ANALYSIS
 from workflow.analyses.vibration.figures import loops as vibration_loops
 from workflow.analyses.vibration.figures import response as vibration

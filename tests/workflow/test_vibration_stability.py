@@ -8,13 +8,13 @@ import h5py
 import numpy as np
 import pytest
 
-from fe_models.dynamics.floquet import Floquet
-from fe_models.dynamics.harmonic_balance import HarmonicBalance, PeriodicLoad
-from fe_models.dynamics.harmonics import Resolution
+from fe_models.dynamics.periodic.harmonic_balance import HarmonicBalance, PeriodicLoad
+from fe_models.dynamics.periodic.harmonics import Resolution
+from fe_models.dynamics.stability.floquet import Floquet
 from tests.workflow.conftest import invoke
 from tests.workflow.vibration_pad import block
 from wear.joints.friction_contact import FrictionContact
-from wear.joints.periodic import PeriodicMarch
+from wear.joints.periodic.march import PeriodicMarch
 from workflow.analyses.vibration.figures.response import frequency_response
 from workflow.analyses.vibration.outcome import Contents
 

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from fe_models.mesh import Face
-from fe_models.transfer import FaceTransfer
+from fe_models.meshes.structure_mesh import Face
+from fe_models.meshes.transfer import FaceTransfer
 from sa_solver.types import Frame, Grid
 from tests.workflow.contact_loads import SIZE, flank, write
 from workflow.analyses.wear.structures.resultants.faces import FaceError, facets_over

@@ -1,12 +1,12 @@
 """Joint laws from measured hysteresis loops: the law's own loop beside those of a record.
 
 Nothing is averaged: samples of single loops are taken as they are, of those that are alike
-(:class:`wear.joints.measured_loops.MeasuredLoops`) some. The law goes through its settled loop from
-one turning point to the other. Where these are is fitted too, since the samples only pass them by,
-and so is a constant force of each step of like loops: of loops within others, Masing's laws leave
-just that. Every sample counts by the noise of its force and, where the loop is steep, that of its
-displacement. Bounds count what scatters about the law: a displacement that is wrong in every cycle
-alike is not seen.
+(:class:`wear.joints.measured.measured_loops.MeasuredLoops`) some. The law goes through its settled
+loop from one turning point to the other. Where these are is fitted too, since the samples only pass
+them by, and so is a constant force of each step of like loops: of loops within others, Masing's
+laws leave just that. Every sample counts by the noise of its force and, where the loop is steep,
+that of its displacement. Bounds count what scatters about the law: a displacement that is wrong in
+every cycle alike is not seen.
 """
 
 from __future__ import annotations
@@ -24,13 +24,13 @@ from wear.joints.bouc_wen import BoucWen
 from wear.joints.iwan import FourParameterIwan, UniformIwan
 from wear.joints.jenkins import Jenkins
 from wear.joints.law import march_joints
-from wear.joints.loop_record import (
+from wear.joints.measured.loop_record import (
     LoopBranch,
     LoopRecord,
     MeasuredLoopError,
     noise_along,
 )
-from wear.joints.measured_loops import MeasuredLoops
+from wear.joints.measured.measured_loops import MeasuredLoops
 from wear.joints.parameters import UniaxialLaw
 
 POINTS = 40

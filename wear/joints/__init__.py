@@ -58,11 +58,11 @@ if TYPE_CHECKING:
     from wear.joints.iwan import FourParameterIwan, UniformIwan
     from wear.joints.jenkins import Jenkins
     from wear.joints.law import JointLaw, march_joints
-    from wear.joints.measured_loops import measure_loops
+    from wear.joints.measured.measured_loops import measure_loops
     from wear.joints.mixed import JointGroup, MixedLaw
-    from wear.joints.parallel import ParallelSliders
     from wear.joints.parameters import JointError
-    from wear.joints.periodic import PeriodicMarch
+    from wear.joints.periodic.march import PeriodicMarch
+    from wear.joints.periodic.parallel import ParallelSliders
 
 __all__ = [
     "ArrheniusEvolution",
@@ -108,10 +108,10 @@ __getattr__, __dir__ = lazy_names(
         "iwan": ("FourParameterIwan", "UniformIwan"),
         "jenkins": ("Jenkins",),
         "law": ("JointLaw", "march_joints"),
-        "measured_loops": ("measure_loops",),
+        "measured.measured_loops": ("measure_loops",),
         "mixed": ("JointGroup", "MixedLaw"),
-        "parallel": ("ParallelSliders",),
+        "periodic.parallel": ("ParallelSliders",),
         "parameters": ("JointError",),
-        "periodic": ("PeriodicMarch",),
+        "periodic.march": ("PeriodicMarch",),
     },
 )

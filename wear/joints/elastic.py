@@ -22,7 +22,7 @@ from wear.joints.parameters import (
     require_one_each,
     require_positive,
 )
-from wear.joints.periodic_sliders import DrivenJoints, Period
+from wear.joints.periodic.sliders import DrivenJoints, Period
 
 POLYNOMIAL, STOP = 0.0, 1.0
 """First parameter of a joint: the coefficients of u, u², ... u⁵ follow; or stiffness, gap and how

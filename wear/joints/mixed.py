@@ -18,10 +18,10 @@ from wear.joints.elastic import ElasticLaw
 from wear.joints.friction_contact import FrictionContact
 from wear.joints.jenkins import Jenkins
 from wear.joints.law import JointResponse, JointState
-from wear.joints.linearised import LinearisedMarch, Maps
 from wear.joints.masing import MasingLaw
 from wear.joints.parameters import JointError
-from wear.joints.periodic import PeriodicMarch, SettledCycle
+from wear.joints.periodic.linearised import LinearisedMarch, Maps
+from wear.joints.periodic.march import PeriodicMarch, SettledCycle
 
 
 @dataclass(frozen=True)

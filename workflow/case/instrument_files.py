@@ -13,7 +13,7 @@ from collections.abc import Callable
 import numpy as np
 
 from sa_solver.errors import InputError
-from sa_solver.scans import Scan
+from sa_solver.surfaces.scans import Scan
 from sa_solver.types import Array
 
 # Sensofar's heights and steps are in um, Wyko's wavelength in nm and its steps in mm.

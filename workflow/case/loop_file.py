@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from sa_solver.types import Array
-from wear.joints.measured_loops import MeasuredLoops
+from wear.joints.measured.measured_loops import MeasuredLoops
 from workflow.case.fields import Quantity
 from workflow.case.input_files import InputFileError
 from workflow.case.table_file import read_table_file

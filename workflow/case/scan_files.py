@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from sa_solver.errors import InputError
-from sa_solver.scans import Scan
+from sa_solver.surfaces.scans import Scan
 from sa_solver.types import Array
 from workflow.case.fields import Quantity, shown, split_dataset, unreadable
 from workflow.case.input_files import (

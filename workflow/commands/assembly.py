@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fe_models.geometry.imported import ImportedMesh
-from fe_models.mesh import Body
+from fe_models.meshes.structure_mesh import Body
 from sa_solver.types import Array, Indices, Mask
 from workflow.pictures.vtk import write_xml
 

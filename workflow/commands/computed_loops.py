@@ -7,8 +7,8 @@ from pathlib import Path
 
 import h5py
 
-from wear.joints.loop_record import MeasuredLoopError
-from wear.joints.measured_loops import measure_loops
+from wear.joints.measured.loop_record import MeasuredLoopError
+from wear.joints.measured.measured_loops import measure_loops
 from workflow.case.input_files import open_hdf5
 from workflow.errors import UserError
 from workflow.runs.provenance import case_values

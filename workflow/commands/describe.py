@@ -8,8 +8,8 @@ from pathlib import Path
 from pydantic import TypeAdapter, ValidationError
 
 from fe_models.geometry.imported import ImportedMesh, read_bodies
-from fe_models.geometry.length_unit import SIZES
-from fe_models.mesh import MeshError
+from fe_models.meshes.structure_mesh import MeshError
+from fe_models.readers.length_unit import SIZES
 from workflow.case.sections import Length
 from workflow.errors import UserError
 from workflow.shell.folder import OutputFolder

@@ -9,8 +9,13 @@ from typing import NamedTuple
 import numpy as np
 
 from sa_solver.types import Array, Mask
-from wear.joints.loop_record import MeasuredLoopError
-from wear.joints.measured_loops import MeanEstimate, MeasuredLoops, mean_estimate, measure_loops
+from wear.joints.measured.loop_record import MeasuredLoopError
+from wear.joints.measured.measured_loops import (
+    MeanEstimate,
+    MeasuredLoops,
+    mean_estimate,
+    measure_loops,
+)
 from workflow.analyses.wear.loop_table import write_loop_table
 from workflow.case.loop_file import BASE_UNITS, account, read_loop_file
 from workflow.case.units import UnitError, to_base

@@ -10,8 +10,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from sa_solver.types import Array, Indices
-from wear.joints.loop_record import LoopBranch
-from wear.joints.measured_loops import MeasuredLoops
+from wear.joints.measured.loop_record import LoopBranch
+from wear.joints.measured.measured_loops import MeasuredLoops
 from workflow.pictures.panels import legend_below, new_figure
 from workflow.pictures.scales import PER_MICRON, TO_MICRONS
 from workflow.pictures.style import BLACK, BLUE, GREEN, ORANGE, write_figures

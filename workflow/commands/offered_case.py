@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 
 from fe_models.geometry.imported import GIVEN, ImportedMesh, Patch, patch
-from fe_models.geometry.scene import SaidContact, SaidLoad, SaidSupport, Vector
-from fe_models.mesh import Body
+from fe_models.meshes.structure_mesh import Body
+from fe_models.readers.scene import SaidContact, SaidLoad, SaidSupport, Vector
 from sa_solver.types import Array
 
 TO_FILL = "fill in"

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from sa_solver.errors import InputError
-from sa_solver.scans import Scan
+from sa_solver.surfaces.scans import Scan
 from sa_solver.types import Mask
 from wear.scar import Scar, measure_scar
 from workflow.case.input_files import InputFileError

@@ -8,7 +8,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 
-from sa_solver.scans import Scan
+from sa_solver.surfaces.scans import Scan
 from sa_solver.types import Array, Grid
 from workflow.case.input_files import open_hdf5
 from workflow.case.scan_files import write_scan

@@ -20,10 +20,10 @@ from platformdirs import user_cache_path
 
 import fe_models
 import sa_solver
-from fe_models.condensation import Condensed
-from fe_models.joint import JointResolvent
+from fe_models.joints.condensation import Condensed
+from fe_models.joints.joint import JointResolvent
+from fe_models.solvers.symmetry import Mirror, SplitMatrix
 from fe_models.structure import FIELDS, CycleSolution, Structure
-from fe_models.symmetry import Mirror, SplitMatrix
 from sa_solver.types import Array
 from workflow.shell.store import DamagedFile, read_arrays, write_arrays
 

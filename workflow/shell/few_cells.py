@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from math import ceil
 from typing import Any
 
-from sa_solver.resolution import cells_across, fewest_across, is_point, peak_error
+from sa_solver.surfaces.resolution import cells_across, fewest_across, is_point, peak_error
 from sa_solver.types import Array, Grid
 from workflow.errors import UserError
 from workflow.shell.reporter import Reporter

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from fe_models.memory import available_bytes as _available_bytes
+from fe_models.solvers.memory import available_bytes as _available_bytes
 from workflow.errors import OutOfMemory
 
 BYTES = 8

@@ -7,10 +7,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
-from fe_models.dynamics.bordered import Bordered, Preconditioned, solve_alone, solve_bordered
-from fe_models.dynamics.continuation import ContinuationControl, Refinement, first_point, follow
-from fe_models.dynamics.newton import NewtonControl, solve
-from fe_models.dynamics.sizes import relative_norm
+from fe_models.dynamics.curves.bordered import Bordered, Preconditioned, solve_alone, solve_bordered
+from fe_models.dynamics.curves.continuation import (
+    ContinuationControl,
+    Refinement,
+    first_point,
+    follow,
+)
+from fe_models.dynamics.curves.newton import NewtonControl, solve
+from fe_models.dynamics.curves.sizes import relative_norm
 
 EXACT = 1e-9
 

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from fe_models.dynamics.crossings import motions_at
-from fe_models.dynamics.followed_curve import Chord
-from fe_models.dynamics.forced_response import along_frequency
-from fe_models.dynamics.harmonic_balance import HarmonicBalance, PeriodicLoad
-from fe_models.dynamics.harmonics import Resolution
+from fe_models.dynamics.curves.crossings import motions_at
+from fe_models.dynamics.curves.followed_curve import Chord
+from fe_models.dynamics.curves.forced_response import along_frequency
+from fe_models.dynamics.periodic.harmonic_balance import HarmonicBalance, PeriodicLoad
+from fe_models.dynamics.periodic.harmonics import Resolution
 from fe_models.dynamics.rig import Link, lumped_rig, unit_force
 from tests.oracles.cubic_springs import CubicSprings
 

@@ -6,17 +6,17 @@ import numpy as np
 import pytest
 import scipy.linalg as sl
 
-from fe_models.dynamics.cycle_energy import damping_ratio, energy_lost
+from fe_models.dynamics.curves.phase_resonance import along_phase_resonance
 from fe_models.dynamics.damping import damped, rayleigh_factors
-from fe_models.dynamics.harmonic_balance import HarmonicBalance, PeriodicLoad
-from fe_models.dynamics.harmonics import Resolution
-from fe_models.dynamics.modal_inverse import MixedModes, ModesWithDashpots
-from fe_models.dynamics.newmark import TimeStepControl, integrate
-from fe_models.dynamics.phase_resonance import along_phase_resonance
-from fe_models.dynamics.receptance import Receptance
+from fe_models.dynamics.periodic.cycle_energy import damping_ratio, energy_lost
+from fe_models.dynamics.periodic.harmonic_balance import HarmonicBalance, PeriodicLoad
+from fe_models.dynamics.periodic.harmonics import Resolution
+from fe_models.dynamics.periodic.modal_inverse import MixedModes, ModesWithDashpots
+from fe_models.dynamics.periodic.receptance import Receptance
 from fe_models.dynamics.rig import Link, RigError, lumped_rig, natural_frequencies, unit_force
+from fe_models.dynamics.transient.newmark import TimeStepControl, integrate
 from wear.joints.jenkins import Jenkins
-from wear.joints.periodic import PeriodicMarch
+from wear.joints.periodic.march import PeriodicMarch
 
 MASSES = {"a": 1e-3, "b": 2e-3}
 SPRINGS = {Link("a"): 1e3, Link("b", "a"): 3e3}

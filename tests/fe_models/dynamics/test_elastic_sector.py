@@ -5,10 +5,10 @@ import scipy.linalg as sl
 from skfem import MeshTet
 
 from fe_models.dynamics.rig import natural_frequencies
-from fe_models.dynamics.sector import Ring, reduced_sector
-from fe_models.elasticity import ElasticBody
-from fe_models.mesh import Body
-from fe_models.reduction import reduce_body
+from fe_models.dynamics.rings.sector import Ring, reduced_sector
+from fe_models.elasticity.body import ElasticBody
+from fe_models.joints.reduction import reduce_body
+from fe_models.meshes.structure_mesh import Body
 from sa_solver.types import Material
 
 STEEL = Material(young=210e3, poisson=0.3, density=7.8e-9)

@@ -7,19 +7,19 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.special import mathieu_a, mathieu_b
 
-from fe_models.dynamics import floquet
-from fe_models.dynamics.bifurcations import find_bifurcations
-from fe_models.dynamics.continuation import ContinuationControl
+from fe_models.dynamics.curves.bifurcations import find_bifurcations
+from fe_models.dynamics.curves.continuation import ContinuationControl
+from fe_models.dynamics.curves.followed_curve import curve_by_force, curve_by_frequency
+from fe_models.dynamics.curves.forced_response import along_force, along_frequency
+from fe_models.dynamics.curves.further_branches import further_branches, vibrating_starts
 from fe_models.dynamics.excitation import CombinedForces, ConstantForce, HarmonicForce
-from fe_models.dynamics.floquet import Floquet
-from fe_models.dynamics.followed_curve import curve_by_force, curve_by_frequency
-from fe_models.dynamics.forced_response import along_force, along_frequency
-from fe_models.dynamics.further_branches import further_branches, vibrating_starts
-from fe_models.dynamics.harmonic_balance import HarmonicBalance, PeriodicLoad
-from fe_models.dynamics.harmonics import Resolution
 from fe_models.dynamics.motion import Start
-from fe_models.dynamics.newmark import TimeStepControl, integrate
+from fe_models.dynamics.periodic.harmonic_balance import HarmonicBalance, PeriodicLoad
+from fe_models.dynamics.periodic.harmonics import Resolution
 from fe_models.dynamics.rig import Link, lumped_rig, unit_force
+from fe_models.dynamics.stability import floquet
+from fe_models.dynamics.stability.floquet import Floquet
+from fe_models.dynamics.transient.newmark import TimeStepControl, integrate
 from tests.fe_models.dynamics.harmonic_rigs import KT, LOAD, MU, balance, contact_rig, pressed, rig
 from tests.limits.contact_rigs import body
 from tests.oracles.event_driven import SliderJoints, integrate_exactly
@@ -27,7 +27,7 @@ from tests.oracles.hill import hill_multipliers
 from wear.joints.elastic import ElasticStop, PolynomialSpring
 from wear.joints.friction_contact import FrictionContact
 from wear.joints.jenkins import Jenkins
-from wear.joints.periodic import PeriodicMarch
+from wear.joints.periodic.march import PeriodicMarch
 
 TURN = 2.0 * np.pi
 FINE = ContinuationControl(most=0.05)

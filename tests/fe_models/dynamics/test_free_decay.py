@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from fe_models.dynamics.free_decay import FLOOR, ring_down
-from fe_models.dynamics.impact_hammer import SignalError
+from fe_models.dynamics.transient.free_decay import FLOOR, ring_down
+from fe_models.dynamics.transient.impact_hammer import SignalError
 from tests.marks import slow
 
 FREQUENCY, STEP = 100.0, 1.0 / 10e3

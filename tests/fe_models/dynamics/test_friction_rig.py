@@ -8,7 +8,7 @@ import pytest
 from fe_models.dynamics.friction_rig import friction_rig
 from fe_models.dynamics.rig import RigError, natural_frequencies, unit_force
 from fe_models.geometry.specimens import Specimen
-from fe_models.reduced_contact import ReducedPair
+from fe_models.joints.reduced_contact import ReducedPair
 from fe_models.specimens import pad_stiffness, reduced_specimens
 from sa_solver.types import Material
 from tests.oracles.two_mass_rig import two_mass_rig

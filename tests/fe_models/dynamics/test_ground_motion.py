@@ -3,15 +3,15 @@
 import numpy as np
 import pytest
 
+from fe_models.dynamics.curves.phase_resonance import along_phase_resonance
 from fe_models.dynamics.friction_rig import ground_inertia
 from fe_models.dynamics.ground_motion import translation_of
-from fe_models.dynamics.harmonic_balance import HarmonicBalance, PeriodicLoad
-from fe_models.dynamics.harmonics import HarmonicBalanceError, Resolution
-from fe_models.dynamics.phase_resonance import along_phase_resonance
+from fe_models.dynamics.periodic.harmonic_balance import HarmonicBalance, PeriodicLoad
+from fe_models.dynamics.periodic.harmonics import HarmonicBalanceError, Resolution
 from fe_models.dynamics.rig import Link, RigError, lumped_rig
-from fe_models.reduction import ReducedModel
+from fe_models.joints.reduction import ReducedModel
 from wear.joints.jenkins import Jenkins
-from wear.joints.periodic import PeriodicMarch
+from wear.joints.periodic.march import PeriodicMarch
 
 FREE = PeriodicMarch(Jenkins(stiffness=1e3, friction=0.0, normal_load=10.0))
 SLIDER = PeriodicMarch(Jenkins(stiffness=2e3, friction=0.5, normal_load=10.0))

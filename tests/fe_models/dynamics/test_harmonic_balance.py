@@ -8,17 +8,17 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from fe_models.dynamics import harmonic_balance, harmonic_jacobian, modal_inverse
-from fe_models.dynamics.cycle_energy import energy_lost
+from fe_models.dynamics.curves.forced_response import Accuracy, along_force, along_frequency
 from fe_models.dynamics.excitation import HarmonicForce
-from fe_models.dynamics.forced_response import Accuracy, along_force, along_frequency
-from fe_models.dynamics.harmonic_balance import PeriodicLoad
-from fe_models.dynamics.harmonic_jacobian import HarmonicJacobian
-from fe_models.dynamics.harmonics import HarmonicBalanceError, Resolution
-from fe_models.dynamics.receptance import Receptance, ReceptanceError
-from fe_models.dynamics.resolution_error import resolution_error
+from fe_models.dynamics.periodic import harmonic_balance, harmonic_jacobian, modal_inverse
+from fe_models.dynamics.periodic.cycle_energy import energy_lost
+from fe_models.dynamics.periodic.harmonic_balance import PeriodicLoad
+from fe_models.dynamics.periodic.harmonic_jacobian import HarmonicJacobian
+from fe_models.dynamics.periodic.harmonics import HarmonicBalanceError, Resolution
+from fe_models.dynamics.periodic.receptance import Receptance, ReceptanceError
+from fe_models.dynamics.periodic.resolution_error import resolution_error
+from fe_models.dynamics.periodic.static_residual import AT_REST, ResidualReceptance, modes_that_move
 from fe_models.dynamics.rig import Link, lumped_rig, natural_frequencies, unit_force
-from fe_models.dynamics.static_residual import AT_REST, ResidualReceptance, modes_that_move
 from tests.fe_models.dynamics.harmonic_rigs import (
     EXACT,
     KT,
@@ -36,7 +36,7 @@ from tests.oracles.cubic_springs import CubicSprings
 from tests.oracles.event_driven import SliderJoints, integrate_exactly
 from wear.joints.friction_contact import FrictionContact
 from wear.joints.jenkins import Jenkins
-from wear.joints.periodic import STICK, PeriodicMarch
+from wear.joints.periodic.march import STICK, PeriodicMarch
 
 
 def mixed_rig():

@@ -7,13 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fe_models.dynamics.forced_response import along_force
-from fe_models.dynamics.harmonic_balance import PeriodicLoad
+from fe_models.dynamics.curves.forced_response import along_force
 from fe_models.dynamics.model import DynamicModel
+from fe_models.dynamics.periodic.harmonic_balance import PeriodicLoad
 from fe_models.dynamics.rig import unit_force
 from tests.fe_models.dynamics.harmonic_rigs import EXACT, balance, contact_rig, pressed, rig
 from wear.joints.friction_contact import FrictionContact
-from wear.joints.periodic import SEPARATED, SLIP, STICK, PeriodicMarch
+from wear.joints.periodic.march import SEPARATED, SLIP, STICK, PeriodicMarch
 
 
 def test_preload_alone_closes_the_gap():

@@ -12,17 +12,17 @@ import numpy as np
 import pytest
 
 from fe_models.dynamics.excitation import CombinedForces, HarmonicForce, RecordedForce
-from fe_models.dynamics.harmonic_balance import HarmonicBalance, PeriodicLoad
-from fe_models.dynamics.harmonics import Resolution
 from fe_models.dynamics.motion import Start
-from fe_models.dynamics.newmark import TimeStepControl, integrate
+from fe_models.dynamics.periodic.harmonic_balance import HarmonicBalance, PeriodicLoad
+from fe_models.dynamics.periodic.harmonics import Resolution
 from fe_models.dynamics.rig import Link, lumped_rig, unit_force
+from fe_models.dynamics.transient.newmark import TimeStepControl, integrate
 from tests.marks import slow
 from tests.oracles.event_driven import SliderJoints, integrate_exactly
 from tests.oracles.two_mass_rig import two_mass_rig
 from wear.joints.friction_contact import FrictionContact
 from wear.joints.jenkins import Jenkins
-from wear.joints.periodic import SEPARATED, SLIP, STICK, PeriodicMarch
+from wear.joints.periodic.march import SEPARATED, SLIP, STICK, PeriodicMarch
 
 KT, MU, LOAD = 45e3, 0.88, 60.0
 JENKINS = Jenkins(KT, MU, LOAD)

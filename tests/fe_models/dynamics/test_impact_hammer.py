@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from fe_models.dynamics.impact_hammer import SignalError, frequency_response
+from fe_models.dynamics.transient.impact_hammer import SignalError, frequency_response
 from tests.oracles.mode_fit import resonances
 
 # The rig with its contact stuck, in t and N/mm: 2 masses, one of 21.2 kg held by 1.4 N/µm.

@@ -7,8 +7,8 @@ import pytest
 
 from fe_models.dynamics.excitation import HammerBlow, HarmonicForce
 from fe_models.dynamics.motion import Start
-from fe_models.dynamics.newmark import TimeStepControl, integrate
 from fe_models.dynamics.rig import Link, lumped_rig, unit_force
+from fe_models.dynamics.transient.newmark import TimeStepControl, integrate
 from tests.oracles.event_driven import SliderJoints, integrate_exactly
 from tests.oracles.two_mass_rig import two_mass_rig
 from wear.joints.jenkins import Jenkins

@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 
 from fe_models.dynamics.excitation import CombinedForces, ExcitationError, HarmonicForce
-from fe_models.dynamics.harmonic_balance import HarmonicBalance, PeriodicLoad
-from fe_models.dynamics.harmonics import Resolution
-from fe_models.dynamics.newmark import TimeStepControl, integrate
-from fe_models.dynamics.periodic_record import PeriodicRecord
+from fe_models.dynamics.periodic.harmonic_balance import HarmonicBalance, PeriodicLoad
+from fe_models.dynamics.periodic.harmonics import Resolution
+from fe_models.dynamics.periodic.record import PeriodicRecord
 from fe_models.dynamics.rig import Link, lumped_rig, unit_force
+from fe_models.dynamics.transient.newmark import TimeStepControl, integrate
 from wear.joints.jenkins import Jenkins
-from wear.joints.periodic import PeriodicMarch
+from wear.joints.periodic.march import PeriodicMarch
 
 
 def uneven():

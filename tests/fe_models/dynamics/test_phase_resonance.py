@@ -8,18 +8,18 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from fe_models.dynamics import harmonic_balance
-from fe_models.dynamics.continuation import ContinuationControl
-from fe_models.dynamics.cycle_energy import (
+from fe_models.dynamics.curves.continuation import ContinuationControl
+from fe_models.dynamics.curves.forced_response import Accuracy, along_frequency
+from fe_models.dynamics.curves.phase_resonance import PhaseResonance, along_phase_resonance
+from fe_models.dynamics.excitation import HarmonicForce
+from fe_models.dynamics.periodic import harmonic_balance
+from fe_models.dynamics.periodic.cycle_energy import (
     damping_ratio,
     energy_lost,
     largest_kinetic_energy,
 )
-from fe_models.dynamics.excitation import HarmonicForce
-from fe_models.dynamics.forced_response import Accuracy, along_frequency
-from fe_models.dynamics.harmonic_balance import HarmonicBalance, PeriodicLoad
-from fe_models.dynamics.harmonics import HarmonicBalanceError, Resolution
-from fe_models.dynamics.phase_resonance import PhaseResonance, along_phase_resonance
+from fe_models.dynamics.periodic.harmonic_balance import HarmonicBalance, PeriodicLoad
+from fe_models.dynamics.periodic.harmonics import HarmonicBalanceError, Resolution
 from fe_models.dynamics.rig import Link, lumped_rig, natural_frequencies, unit_force
 from tests.marks import slow
 from tests.oracles.cubic_springs import CubicSprings
@@ -27,7 +27,7 @@ from tests.oracles.event_driven import SliderJoints, integrate_exactly
 from tests.oracles.two_mass_rig import two_mass_rig
 from wear.joints.friction_contact import FrictionContact
 from wear.joints.jenkins import Jenkins
-from wear.joints.periodic import SLIP, STICK, PeriodicMarch
+from wear.joints.periodic.march import SLIP, STICK, PeriodicMarch
 
 # What 1e-10 of the equations leaves of a motion with a joint that changes its state.
 SOLVED = 1e-8

@@ -14,7 +14,7 @@ from fe_models.dynamics.rig import (
     reduced_rig,
     unit_force,
 )
-from fe_models.reduction import reduce_body
+from fe_models.joints.reduction import reduce_body
 from tests.oracles.two_mass_rig import two_mass_rig
 
 THESIS = two_mass_rig((21.152e-3, 1.189e-3), (1.3469e3, 273e3), 1e-3)

@@ -5,16 +5,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fe_models.dynamics.continuation import ContinuationControl
-from fe_models.dynamics.floquet import Floquet
-from fe_models.dynamics.forced_response import along_frequency
-from fe_models.dynamics.harmonic_balance import HarmonicBalance, PeriodicLoad
-from fe_models.dynamics.harmonics import Resolution
-from fe_models.dynamics.period_times import PeriodTimes
+from fe_models.dynamics.curves.continuation import ContinuationControl
+from fe_models.dynamics.curves.forced_response import along_frequency
+from fe_models.dynamics.periodic.harmonic_balance import HarmonicBalance, PeriodicLoad
+from fe_models.dynamics.periodic.harmonics import Resolution
+from fe_models.dynamics.periodic.period_times import PeriodTimes
 from fe_models.dynamics.rig import Link, lumped_rig, unit_force
+from fe_models.dynamics.stability.floquet import Floquet
 from tests.oracles.stop_shooting import shoot
 from wear.joints.elastic import ElasticStop
-from wear.joints.periodic import PeriodicMarch
+from wear.joints.periodic.march import PeriodicMarch
 
 # Masses of 1 on springs of 1; the last meets a stop that is a hundred times as stiff.
 DAMPING, GAP, STIFFNESS, FORCE = 0.03, 1.0, 100.0, 0.1

@@ -5,21 +5,21 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fe_models.dynamics.cycle_energy import energy_lost
+from fe_models.dynamics.curves.nonlinear_mode import LinearMode
+from fe_models.dynamics.curves.phase_resonance import PhaseResonance, along_phase_resonance
 from fe_models.dynamics.damping import damped
-from fe_models.dynamics.floquet import Floquet
-from fe_models.dynamics.harmonic_balance import HarmonicBalance, PeriodicLoad
-from fe_models.dynamics.harmonics import HarmonicBalanceError, Resolution
 from fe_models.dynamics.model import DynamicModel
-from fe_models.dynamics.nonlinear_mode import LinearMode
-from fe_models.dynamics.phase_resonance import PhaseResonance, along_phase_resonance
-from fe_models.dynamics.resolution_error import resolution_error
+from fe_models.dynamics.periodic.cycle_energy import energy_lost
+from fe_models.dynamics.periodic.harmonic_balance import HarmonicBalance, PeriodicLoad
+from fe_models.dynamics.periodic.harmonics import HarmonicBalanceError, Resolution
+from fe_models.dynamics.periodic.resolution_error import resolution_error
 from fe_models.dynamics.rig import Link, RigError, lumped_rig, natural_frequencies
-from fe_models.dynamics.sector import Ring, lumped_sector, reduced_sector
-from fe_models.reduction import ReducedModel
+from fe_models.dynamics.rings.sector import Ring, lumped_sector, reduced_sector
+from fe_models.dynamics.stability.floquet import Floquet
+from fe_models.joints.reduction import ReducedModel
 from wear.joints.friction_contact import FrictionContact
 from wear.joints.jenkins import Jenkins
-from wear.joints.periodic import PeriodicMarch
+from wear.joints.periodic.march import PeriodicMarch
 
 SECTORS, ORDER = 5, 2
 # The same times in every sector: 2/5 of a period later.

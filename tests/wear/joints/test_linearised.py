@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from fe_models.dynamics.harmonics import Resolution
+from fe_models.dynamics.periodic.harmonics import Resolution
 from wear.joints.bouc_wen import BoucWen
 from wear.joints.elastic import ElasticStop, PolynomialSpring
 from wear.joints.friction_contact import FrictionContact
@@ -11,7 +11,7 @@ from wear.joints.iwan import FourParameterIwan, UniformIwan
 from wear.joints.jenkins import Jenkins
 from wear.joints.law import march_joints
 from wear.joints.parameters import JointError
-from wear.joints.periodic import PeriodicMarch
+from wear.joints.periodic.march import PeriodicMarch
 
 EXACT = 1e-11
 RESOLUTION = Resolution((0, 1, 2, 3), 96)

@@ -15,8 +15,8 @@ from wear.joints.bouc_wen import BoucWen
 from wear.joints.iwan import UniformIwan
 from wear.joints.jenkins import Jenkins
 from wear.joints.law import march_joints
-from wear.joints.loop_record import MeasuredLoopError, reversals
-from wear.joints.measured_loops import mean_estimate, measure_loops
+from wear.joints.measured.loop_record import MeasuredLoopError, reversals
+from wear.joints.measured.measured_loops import mean_estimate, measure_loops
 
 STIFFNESS, RESIDUAL, FRICTION, LOAD = 60e3, 900.0, 0.9, 60.0
 LIMIT = FRICTION * LOAD

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from fe_models.dynamics.excitation import CombinedForces, ConstantForce, HarmonicForce
-from fe_models.dynamics.floquet import Floquet
-from fe_models.dynamics.harmonic_balance import HarmonicBalance, PeriodicLoad
-from fe_models.dynamics.harmonics import Resolution
-from fe_models.dynamics.newmark import TimeStepControl, integrate
+from fe_models.dynamics.periodic.harmonic_balance import HarmonicBalance, PeriodicLoad
+from fe_models.dynamics.periodic.harmonics import Resolution
 from fe_models.dynamics.rig import Link, lumped_rig, unit_force
+from fe_models.dynamics.stability.floquet import Floquet
+from fe_models.dynamics.transient.newmark import TimeStepControl, integrate
 from wear.joints.bouc_wen import BoucWen
 from wear.joints.elastic import ElasticStop, PolynomialSpring
 from wear.joints.friction_contact import FrictionContact
@@ -21,7 +21,7 @@ from wear.joints.jenkins import Jenkins
 from wear.joints.law import march_joints
 from wear.joints.mixed import JointGroup, MixedLaw
 from wear.joints.parameters import JointError
-from wear.joints.periodic import PeriodicMarch
+from wear.joints.periodic.march import PeriodicMarch
 
 SLIDER = Jenkins(stiffness=1e3, friction=0.5, normal_load=10.0)
 IWAN = UniformIwan(stiffness=2e3, friction=0.4, normal_load=20.0)

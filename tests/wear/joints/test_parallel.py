@@ -5,9 +5,9 @@ import pytest
 
 from wear.joints.jenkins import Jenkins
 from wear.joints.law import march_joints
-from wear.joints.parallel import ParallelSliders
 from wear.joints.parameters import JointError
-from wear.joints.periodic import SLIP, STICK, PeriodicMarch
+from wear.joints.periodic.march import SLIP, STICK, PeriodicMarch
+from wear.joints.periodic.parallel import ParallelSliders
 
 SLIDERS = Jenkins(np.array([4.0, 3.0, 2.0, 1.0]), 0.5, np.array([0.4, 0.9, 1.2, 1.6]))
 REACH = SLIDERS.limit / SLIDERS.stiffness

@@ -13,7 +13,7 @@ from wear.joints.iwan import FourParameterIwan, UniformIwan
 from wear.joints.jenkins import Jenkins
 from wear.joints.law import march_joints
 from wear.joints.parameters import JointError
-from wear.joints.periodic import SEPARATED, SLIP, STICK, PeriodicMarch
+from wear.joints.periodic.march import SEPARATED, SLIP, STICK, PeriodicMarch
 
 KT, MU, LOAD, KR = 10.0, 0.5, 4.0, 1.0
 REACH = MU * LOAD / KT

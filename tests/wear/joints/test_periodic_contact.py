@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from wear.joints.friction_contact import FrictionContact
-from wear.joints.periodic import SEPARATED, SLIP, STICK, PeriodicMarch
+from wear.joints.periodic.march import SEPARATED, SLIP, STICK, PeriodicMarch
 
 KT, KN, MU, LOAD = 10.0, 13.0, 0.5, 4.0
 REACH = MU * LOAD / KT  # stretch at which the slider slips under the preload

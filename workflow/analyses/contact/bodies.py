@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from sa_solver.half_space import HalfSpace
+from sa_solver.half_space.operator import HalfSpace
 from sa_solver.types import Array, ElasticPair, Grid, Material
 from workflow.analyses.contact.case import BodiesCase, LineContactCase, elastic
 from workflow.analyses.contact.load_table import LoadTable

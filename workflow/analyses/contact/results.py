@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from sa_solver.contact_state import ContactState
-from sa_solver.history import History
+from sa_solver.cycles.history import History
 from sa_solver.types import Array, Frame, Grid
 from workflow.analyses.contact.case import BodiesCase
 from workflow.analyses.contact.datasets import (

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from sa_solver.contact_state import ContactState
+from sa_solver.cycles.history import ContactLoadPath, History, HistoryError, march_history
 from sa_solver.errors import ContactProblemError
-from sa_solver.history import ContactLoadPath, History, HistoryError, march_history
 from workflow.analyses.contact.bodies import bodies_of, bulk_strain, half_space_of
 from workflow.analyses.contact.case import BodiesCase, surface_doubts
 from workflow.analyses.contact.results import (

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from sa_solver.contact_state import ContactState
-from sa_solver.history import History
+from sa_solver.cycles.history import History
 from sa_solver.ties import first_largest
 from sa_solver.types import Array, Grid, Mask
 from workflow.analyses.contact.load_table import FORCES, MOTIONS, LoadTable

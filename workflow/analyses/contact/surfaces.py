@@ -10,7 +10,16 @@ from typing import Annotated, Any, ClassVar, Self
 from pydantic import StrictBool, model_validator
 
 from sa_solver.errors import InputError
-from sa_solver.scans import Beyond, Level, Resampled, Scan, filled, levelled, resampled, rms
+from sa_solver.surfaces.scans import (
+    Beyond,
+    Level,
+    Resampled,
+    Scan,
+    filled,
+    levelled,
+    resampled,
+    rms,
+)
 from sa_solver.types import Array, Grid
 from workflow.case.fields import File, Quantity, Word, split_dataset
 from workflow.case.input_files import InputFileError

@@ -9,7 +9,7 @@ import numpy as np
 from fe_models.dynamics.friction_rig import friction_rig, ground_inertia
 from fe_models.dynamics.ground_motion import Translation, along
 from fe_models.dynamics.rig import RigError, unit_force
-from fe_models.reduction import ReducedModel
+from fe_models.joints.reduction import ReducedModel
 from workflow.analyses.rig.reduced_rig import AXES, reduced_specimens
 from workflow.analyses.rig.rig_model import RigModel
 from workflow.analyses.rig.structure import FrictionRig

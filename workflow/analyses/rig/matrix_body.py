@@ -27,8 +27,8 @@ from workflow.shell.memory import Memory, factor_bytes
 from workflow.shell.run_time import factors
 
 if TYPE_CHECKING:
+    from fe_models.joints.reduction import ReducedModel
     from fe_models.matrices import OwnMatrices
-    from fe_models.reduction import ReducedModel
 
 # Files with the times they were written at, and their sizes.
 Stamps = tuple[tuple[str, int, int], ...]
@@ -479,8 +479,8 @@ def _resultant(matrices: OwnMatrices, number: int) -> str:
 @lru_cache(4)
 def _frequencies(files: MatrixFiles, stamps: Stamps) -> Array:
     """The lowest natural frequencies [Hz], rigid motions 0; none where they are not found."""
-    from fe_models.linear_solver import SolverError
     from fe_models.matrices import MatrixError, lowest_frequencies
+    from fe_models.solvers.linear_solver import SolverError
 
     try:
         return lowest_frequencies(files.read(), TOLD)

@@ -13,7 +13,7 @@ from workflow.analyses.rig.structure import JointedBody, Mass
 from workflow.case.sections import Section, Title, disagreement, entry
 
 if TYPE_CHECKING:
-    from fe_models.reduction import ReducedModel
+    from fe_models.joints.reduction import ReducedModel
 
 
 class PointMass(Section):
@@ -54,7 +54,7 @@ class PointBody(JointedBody):
 
     def body(self) -> ReducedModel:
         """The masses, that nothing holds."""
-        from fe_models.reduction import ReducedModel
+        from fe_models.joints.reduction import ReducedModel
 
         size = len(self.names)
         masses = np.repeat([point.mass for point in self.points], len(self.directions))

@@ -11,13 +11,13 @@ import scipy.linalg as sl
 
 from fe_models.dynamics.ground_motion import Translation, along, translation_of
 from fe_models.dynamics.model import DynamicModel
-from fe_models.dynamics.receptance import RIGID
+from fe_models.dynamics.periodic.receptance import RIGID
 from fe_models.dynamics.rig import Link, RigError, reduced_rig, unit_force
-from fe_models.dynamics.sector import CyclicSector, reduced_sector
+from fe_models.dynamics.rings.sector import CyclicSector, reduced_sector
+from fe_models.joints.reduction import STEPS, ReducedModel
 from fe_models.matrices import MatrixError
 from fe_models.matrices.reduction import listed_names
-from fe_models.mesh import MeshError
-from fe_models.reduction import STEPS, ReducedModel
+from fe_models.meshes.structure_mesh import MeshError
 from sa_solver.types import Array, Progress, Tally
 from workflow.analyses.rig.joint_sections import ElasticJoint, FrictionContactJoint, Joint
 from workflow.analyses.rig.matrix_body import LoadCase, MatrixBody

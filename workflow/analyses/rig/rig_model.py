@@ -14,9 +14,9 @@ from fe_models.dynamics.excitation import CombinedForces, ConstantForce, Excitat
 from fe_models.dynamics.ground_motion import Translation
 from fe_models.dynamics.model import DynamicModel
 from fe_models.dynamics.motion import Motion
-from fe_models.dynamics.receptance import RIGID
+from fe_models.dynamics.periodic.receptance import RIGID
 from fe_models.dynamics.rig import natural_frequencies
-from fe_models.dynamics.sector import CyclicSector
+from fe_models.dynamics.rings.sector import CyclicSector
 from sa_solver.types import Array, Indices
 from wear.joints.elastic import ElasticLaw
 from wear.joints.friction_contact import FrictionContact

@@ -11,7 +11,7 @@ from workflow.case.sections import Section, Title, entry
 from workflow.errors import EntryError
 
 if TYPE_CHECKING:
-    from fe_models.dynamics.sector import Ring
+    from fe_models.dynamics.rings.sector import Ring
     from workflow.analyses.rig.place_names import PlaceNames
 
 
@@ -49,7 +49,7 @@ class RingOfSectors(Section):
 
     def diameters(self, engine_order: int, harmonics: Sequence[int]) -> list[int]:
         """Nodal diameters of harmonics, below zero where the wave travels from the next sector."""
-        from fe_models.dynamics.sector import Ring
+        from fe_models.dynamics.rings.sector import Ring
 
         return list(map(Ring(self.sectors, engine_order).diameters, harmonics))
 
@@ -58,7 +58,7 @@ class RingOfSectors(Section):
 
         Raises EntryError for faces that do not fit each other.
         """
-        from fe_models.dynamics.sector import Ring
+        from fe_models.dynamics.rings.sector import Ring
 
         ties: dict[str, str] = {}
         for number, face in enumerate(self.faces):

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from fe_models.reduction import ReducedModel
+from fe_models.joints.reduction import ReducedModel
 from fe_models.specimens import PAD, RING
 from workflow.analyses.rig.matrix_body import SMALL, MatrixBody
 from workflow.analyses.specimens.case import SpecimensCase

@@ -26,7 +26,7 @@ from workflow.case.plain import entries
 from workflow.case.sections import Length, Section, Title, disagreement, entry
 
 if TYPE_CHECKING:
-    from fe_models.reduction import ReducedModel
+    from fe_models.joints.reduction import ReducedModel
 
 # Names of displacements that are those of modes, whichever body has them.
 MODE = r"(.* )?mode \d+"
@@ -271,7 +271,7 @@ class ReducedBody(JointedBody, StoredBody):
 
     def stored(self) -> ReducedModel:
         """The model in a file that holds one. Raises InputFileError."""
-        from fe_models.reduction import load_reduced
+        from fe_models.joints.reduction import load_reduced
 
         with open_hdf5(self.file):
             return load_reduced(Path(self.file))

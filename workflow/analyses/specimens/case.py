@@ -43,7 +43,7 @@ from workflow.case.sections import (
 
 if TYPE_CHECKING:
     from fe_models.geometry.specimens import Specimen
-    from fe_models.mesh import StructureMesh
+    from fe_models.meshes.structure_mesh import StructureMesh
 
 # Of matrices; the first if nothing is said.
 MATRIX_FORMATS = "npz", "mat", "mtx"
@@ -80,7 +80,7 @@ class Specimens(Section):
 
     @model_validator(mode="after")
     def _can_be_drawn(self) -> Specimens:
-        from fe_models.mesh import MeshError
+        from fe_models.meshes.structure_mesh import MeshError
 
         try:
             self.geometry().check()

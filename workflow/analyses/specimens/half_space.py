@@ -3,7 +3,7 @@
 Same shape, loads, friction and motions: normal force imposed, no tilt, then body 2 moved along x
 and nothing else; pressure and shear one after the other, as if both materials were alike. The
 half-space goes on beyond the pad and below it without end; the specimens are finite and held at the
-ring. Linked to them (:mod:`wear.link`), it moves by what they do beside it,
+ring. Linked to them (:mod:`wear.contact.link`), it moves by what they do beside it,
 
     d = A f - K Π f,
 
@@ -22,14 +22,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import RectBivariateSpline
 
-from fe_models.mesh import Face
-from fe_models.reduced_contact import NormalSolution, ReducedPair, X, Z
-from fe_models.transfer import FaceTransfer
-from sa_solver.half_space import HalfSpace
-from sa_solver.normal import NormalContact, NormalState
-from sa_solver.tangential import TangentialContact, TangentialState
+from fe_models.joints.reduced_contact import NormalSolution, ReducedPair, X, Z
+from fe_models.meshes.structure_mesh import Face
+from fe_models.meshes.transfer import FaceTransfer
+from sa_solver.half_space.operator import HalfSpace
+from sa_solver.normal.contact import NormalContact, NormalState
+from sa_solver.tangential.contact import TangentialContact, TangentialState
 from sa_solver.types import Array, ElasticPair, Grid, Indices
-from wear.link import Link, fitted
+from wear.contact.link import Link, fitted
 from workflow.errors import MethodFailed
 
 # A tied pad: any motion does, and a limit that no shear comes near.
@@ -42,7 +42,7 @@ State = TypeVar("State", NormalState, TangentialState)
 
 @dataclass(frozen=True)
 class HalfSpaceState:
-    """One cycle on one shape, as :class:`~fe_models.reduced_contact.FrettingCycle` has it.
+    """One cycle on one shape, as :class:`~fe_models.joints.reduced_contact.FrettingCycle` has it.
 
     Fields ``(nx, ny)``: ``pressure`` [MPa], ``shear`` along x at the end of first loading [MPa] and
     ``slip`` of body 2 there [mm]; ``nodal_pressure`` and ``nodal_shear`` ``(n,)`` are their means

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from fe_models.geometry.specimens import Specimen
-from fe_models.mesh import Interface, StructureMesh
-from fe_models.reduced_contact import ReducedPair
-from fe_models.reduction import ReducedModel, free_frequencies
+from fe_models.joints.reduced_contact import ReducedPair
+from fe_models.joints.reduction import ReducedModel, free_frequencies
+from fe_models.meshes.structure_mesh import Interface, StructureMesh
 from fe_models.specimens import STEPS, pad_stiffness, reduced_specimens, specimen_matrices
 from sa_solver.types import Array, Grid, Progress, Tally, unseen
 from workflow.analyses.specimens.case import SpecimensCase
@@ -47,7 +47,7 @@ class SpecimensModel:
 
     @cached_property
     def mesh(self) -> StructureMesh:
-        """Both specimens; raises :class:`~fe_models.mesh.MeshError`."""
+        """Both specimens; raises :class:`~fe_models.meshes.structure_mesh.MeshError`."""
         mesh = self.case.meshed()
         (face,) = mesh.interfaces
         for scanned in self.case.scanned():

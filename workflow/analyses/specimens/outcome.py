@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from fe_models.reduced_contact import VirginCurve
+from fe_models.joints.reduced_contact import VirginCurve
 from sa_solver.types import Array
 from workflow.analyses.specimens.half_space import BulkCompliance, HalfSpaceState, PadHalfSpace
 from workflow.analyses.specimens.model import SpecimensModel

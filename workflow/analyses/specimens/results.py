@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
+from fe_models.joints.reduced_contact import masing_loop
+from fe_models.joints.reduction import ReducedModel, save_reduced
 from fe_models.matrices import write_matrices
-from fe_models.reduced_contact import masing_loop
-from fe_models.reduction import ReducedModel, save_reduced
 from sa_solver.types import Array
 from workflow.analyses.specimens.case import SpecimensCase
 from workflow.analyses.specimens.outcome import KeptState, LoadOutcome, SpecimensOutcome

@@ -12,13 +12,13 @@ from functools import partial
 
 import numpy as np
 
-from fe_models.mesh import MeshError
-from fe_models.reduced_contact import FrettingConditions, ReducedPair, VirginCurve
+from fe_models.joints.reduced_contact import FrettingConditions, ReducedPair, VirginCurve
+from fe_models.meshes.structure_mesh import MeshError
 from sa_solver.steps import Steps
 from sa_solver.types import Array, ElasticPair
-from wear.link import LARGEST_RESIDUAL
-from wear.marching import rest
-from wear.steppers import ExplicitStepper, StabilityError
+from wear.contact.link import LARGEST_RESIDUAL
+from wear.steps.marching import rest
+from wear.steps.steppers import ExplicitStepper, StabilityError
 from workflow.analyses.specimens.case import SpecimensCase
 from workflow.analyses.specimens.half_space import HalfSpaceState, PadHalfSpace, bulk_compliance
 from workflow.analyses.specimens.memory import memory

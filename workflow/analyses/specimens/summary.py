@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from fe_models.reduced_contact import ReducedPair
+from fe_models.joints.reduced_contact import ReducedPair
 from sa_solver.types import Array
 from workflow.analyses.specimens.case import Reported
 from workflow.analyses.specimens.half_space import BulkCompliance, HalfSpaceState

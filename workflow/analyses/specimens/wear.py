@@ -7,13 +7,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fe_models.reduced_contact import FrettingConditions, FrettingCycle, ReducedPair
+from fe_models.joints.reduced_contact import FrettingConditions, FrettingCycle, ReducedPair
 from sa_solver.steps import COMPUTED, Steps
 from sa_solver.types import Array
+from wear.contact.nodes import NodalContact, NodalState
 from wear.laws import WearLaw
-from wear.marching import steps
-from wear.nodes import NodalContact, NodalState
-from wear.steppers import ExplicitStepper
+from wear.steps.marching import steps
+from wear.steps.steppers import ExplicitStepper
 
 
 @dataclass(frozen=True)
@@ -42,7 +42,7 @@ class BlockState:
 
 
 class PairCycle:
-    """A fretting cycle of a pair, as the wear of nodes takes it: see :mod:`wear.nodes`.
+    """A fretting cycle of a pair, as the wear of nodes takes it: see :mod:`wear.contact.nodes`.
 
     By Masing's rule each node slides its whole way at one pressure.
     """
@@ -109,7 +109,7 @@ def wear_in_cycle_blocks(
     """States of a contact of unworn ``gap`` ``(n,)`` that frets until nothing is ``to_go``.
 
     That gives the most cycles that the block after a state may have. Raises
-    :class:`~wear.steppers.StabilityError` where a block of a given length would be unstable.
+    :class:`~wear.steps.steppers.StabilityError` where a block of a given length would be unstable.
     """
     block = fretted.block(NodalState.unworn(gap), 0.0)
     yield block

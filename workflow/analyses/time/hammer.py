@@ -9,13 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fe_models.dynamics.excitation import HammerBlow
-from fe_models.dynamics.free_decay import ring_down
-from fe_models.dynamics.impact_hammer import (
+from fe_models.dynamics.motion import Motion
+from fe_models.dynamics.transient.free_decay import ring_down
+from fe_models.dynamics.transient.impact_hammer import (
     FrequencyResponse,
     SignalError,
     frequency_response,
 )
-from fe_models.dynamics.motion import Motion
 from sa_solver.steps import Steps
 from sa_solver.types import Array
 from workflow.analyses.rig import excitation as given

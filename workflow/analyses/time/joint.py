@@ -20,8 +20,8 @@ from wear.joints.ageing import (
     steady_stroke,
 )
 from wear.joints.law import march_joints
-from wear.joints.loop_record import MeasuredLoopError
-from wear.joints.measured_loops import measure_loops
+from wear.joints.measured.loop_record import MeasuredLoopError
+from wear.joints.measured.measured_loops import measure_loops
 from workflow.analyses.rig.laws import Laws
 from workflow.analyses.time.case import Ageing, JointCase, joules
 from workflow.analyses.time.joint_model import JointModel

@@ -9,7 +9,7 @@ import numpy as np
 
 from fe_models.dynamics.excitation import ExcitationForce
 from fe_models.dynamics.motion import Motion, Start
-from fe_models.dynamics.newmark import TimeStepControl, integrate
+from fe_models.dynamics.transient.newmark import TimeStepControl, integrate
 from sa_solver.steps import COMPUTED, Steps
 from workflow.analyses.rig.rig_model import RigModel
 from workflow.analyses.time.case import RigCase, joules

@@ -11,7 +11,7 @@ from scipy.interpolate import PchipInterpolator
 
 from fe_models.dynamics.excitation import HarmonicForce, RecordedForce
 from fe_models.dynamics.motion import Start
-from fe_models.dynamics.newmark import TimeStepControl
+from fe_models.dynamics.transient.newmark import TimeStepControl
 from sa_solver.steps import Steps
 from sa_solver.types import Array
 from wear.joints.ageing import LongTest

@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from fe_models.dynamics.crossings import motions_at
-from fe_models.dynamics.forced_response import Accuracy, ResponseBranch
-from fe_models.dynamics.harmonic_solution import HarmonicSolution
+from fe_models.dynamics.curves.crossings import motions_at
+from fe_models.dynamics.curves.forced_response import Accuracy, ResponseBranch
+from fe_models.dynamics.periodic.harmonic_solution import HarmonicSolution
 from sa_solver.steps import Steps
 from workflow.analyses.vibration.case import VibrationCase
 from workflow.analyses.vibration.harmonics import ANSWER, harmonics_of

@@ -19,7 +19,7 @@ from workflow.case.sections import Section, Title, disagreement, entry
 from workflow.case.table_file import read_table_file
 
 if TYPE_CHECKING:
-    from fe_models.dynamics.periodic_record import PeriodicRecord
+    from fe_models.dynamics.periodic.record import PeriodicRecord
 
 HIGHEST = 999
 Level = Annotated[float, Quantity("1", above=0.0, at_most=1e9)]
@@ -124,7 +124,7 @@ class RecordAt(Moved):
 
     def read(self) -> PeriodicRecord:
         """The record of the file. Raises InputFileError, and ExcitationError for no period."""
-        from fe_models.dynamics.periodic_record import PeriodicRecord
+        from fe_models.dynamics.periodic.record import PeriodicRecord
 
         table = read_table_file(self.file)
         column, quantity = ("phase", TURN) if "phase" in table.names else ("time", TIME)

@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from fe_models.dynamics.followed_curve import curve_by_frequency
-from fe_models.dynamics.forced_response import ResponseBranch
-from fe_models.dynamics.further_branches import (
+from fe_models.dynamics.curves.followed_curve import curve_by_frequency
+from fe_models.dynamics.curves.forced_response import ResponseBranch
+from fe_models.dynamics.curves.further_branches import (
     FurtherBranch,
     further_branches,
     vibrating_starts,

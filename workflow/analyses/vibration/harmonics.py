@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from fe_models.dynamics.forced_response import ResponseBranch
-from fe_models.dynamics.harmonic_solution import HarmonicSolution
-from fe_models.dynamics.harmonics import ComplexArray
+from fe_models.dynamics.curves.forced_response import ResponseBranch
+from fe_models.dynamics.periodic.harmonic_solution import HarmonicSolution
+from fe_models.dynamics.periodic.harmonics import ComplexArray
 from sa_solver.types import Array
 from workflow.analyses.rig.rig_model import RigModel
 from workflow.analyses.vibration.outcome import RESONANCE, Response

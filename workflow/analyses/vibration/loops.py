@@ -8,18 +8,18 @@ from functools import partial
 
 import numpy as np
 
-from fe_models.dynamics.forced_response import ResponseBranch
-from fe_models.dynamics.harmonic_balance import SAMPLES_PER_PERIOD, HarmonicBalance
-from fe_models.dynamics.harmonic_solution import HarmonicSolution
-from fe_models.dynamics.harmonics import Resolution
-from fe_models.dynamics.resolution_error import resolution_error
+from fe_models.dynamics.curves.forced_response import ResponseBranch
+from fe_models.dynamics.periodic.harmonic_balance import SAMPLES_PER_PERIOD, HarmonicBalance
+from fe_models.dynamics.periodic.harmonic_solution import HarmonicSolution
+from fe_models.dynamics.periodic.harmonics import Resolution
+from fe_models.dynamics.periodic.resolution_error import resolution_error
 from sa_solver.steps import Steps
 from sa_solver.types import Array
 from wear.joints.friction_contact import FrictionContact
 from wear.joints.jenkins import Jenkins
-from wear.joints.loop_record import MeasuredLoopError
-from wear.joints.measured_loops import measure_loops
-from wear.joints.periodic import SLIP, STICK
+from wear.joints.measured.loop_record import MeasuredLoopError
+from wear.joints.measured.measured_loops import measure_loops
+from wear.joints.periodic.march import SLIP, STICK
 from workflow.analyses.rig.laws import grouped
 from workflow.analyses.vibration.case import VibrationCase
 from workflow.analyses.vibration.model import VibrationModel

@@ -10,14 +10,14 @@ from typing import Any
 import numpy as np
 import scipy.linalg as sl
 
-from fe_models.dynamics.harmonic_balance import HarmonicBalance
-from fe_models.dynamics.harmonic_solution import HarmonicSolution
-from fe_models.dynamics.harmonics import Resolution
-from fe_models.dynamics.receptance import Receptance
+from fe_models.dynamics.periodic.harmonic_balance import HarmonicBalance
+from fe_models.dynamics.periodic.harmonic_solution import HarmonicSolution
+from fe_models.dynamics.periodic.harmonics import Resolution
+from fe_models.dynamics.periodic.receptance import Receptance
 from sa_solver.types import Array
 from wear.joints.friction_contact import FrictionContact
 from wear.joints.mixed import MixedLaw
-from wear.joints.periodic import PeriodicMarch
+from wear.joints.periodic.march import PeriodicMarch
 from workflow.analyses.rig.building import rig_model
 from workflow.analyses.rig.laws import Laws, grouped, law_of, law_of_all, laws_of
 from workflow.analyses.rig.rig_model import RigModel

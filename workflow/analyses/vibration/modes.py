@@ -6,11 +6,11 @@ from typing import Any
 
 import numpy as np
 
-from fe_models.dynamics.harmonic_balance import HarmonicBalance
-from fe_models.dynamics.harmonics import HarmonicBalanceError
-from fe_models.dynamics.nonlinear_mode import LinearMode, ModeMotion, along_nonlinear_mode
+from fe_models.dynamics.curves.nonlinear_mode import LinearMode, ModeMotion, along_nonlinear_mode
+from fe_models.dynamics.periodic.harmonic_balance import HarmonicBalance
+from fe_models.dynamics.periodic.harmonics import HarmonicBalanceError
 from sa_solver.steps import Steps
-from wear.joints.periodic import SLIP
+from wear.joints.periodic.march import SLIP
 from workflow.analyses.vibration.case import VibrationCase
 from workflow.analyses.vibration.model import VibrationModel
 from workflow.analyses.vibration.outcome import Curves

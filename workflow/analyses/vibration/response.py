@@ -10,25 +10,29 @@ from typing import Any
 import numpy as np
 from scipy.optimize import minimize_scalar
 
-from fe_models.dynamics.continuation import ContinuationControl
-from fe_models.dynamics.cycle_energy import damping_ratio
-from fe_models.dynamics.followed_curve import curve_by_force, curve_by_frequency, curve_by_phase
-from fe_models.dynamics.forced_response import (
+from fe_models.dynamics.curves.continuation import ContinuationControl
+from fe_models.dynamics.curves.followed_curve import (
+    curve_by_force,
+    curve_by_frequency,
+    curve_by_phase,
+)
+from fe_models.dynamics.curves.forced_response import (
     Accuracy,
     ResponseBranch,
     along_force,
     along_frequency,
     finer_resolution,
 )
-from fe_models.dynamics.further_branches import FurtherBranch
-from fe_models.dynamics.harmonic_balance import HarmonicBalance
-from fe_models.dynamics.harmonic_solution import HarmonicSolution
-from fe_models.dynamics.phase_resonance import along_phase_resonance
-from fe_models.dynamics.resolution_error import resolution_error
+from fe_models.dynamics.curves.further_branches import FurtherBranch
+from fe_models.dynamics.curves.phase_resonance import along_phase_resonance
+from fe_models.dynamics.periodic.cycle_energy import damping_ratio
+from fe_models.dynamics.periodic.harmonic_balance import HarmonicBalance
+from fe_models.dynamics.periodic.harmonic_solution import HarmonicSolution
+from fe_models.dynamics.periodic.resolution_error import resolution_error
 from sa_solver.steps import Steps
 from sa_solver.types import Array
-from wear.joints.periodic import SEPARATED, SLIP
-from wear.moving import LARGE_STROKE
+from wear.contact.moving import LARGE_STROKE
+from wear.joints.periodic.march import SEPARATED, SLIP
 from workflow.analyses.vibration.case import VibrationCase
 from workflow.analyses.vibration.harmonics import harmonics_of
 from workflow.analyses.vibration.loops import loops_of

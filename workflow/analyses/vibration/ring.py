@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from fe_models.dynamics.rig import natural_frequencies
-from fe_models.dynamics.sector import CyclicSector
+from fe_models.dynamics.rings.sector import CyclicSector
 from sa_solver.types import Array
 from workflow.analyses.rig.rig_model import MOST_FREQUENCIES
 from workflow.shell.dataset import Dataset

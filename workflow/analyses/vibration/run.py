@@ -6,10 +6,10 @@ from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
 from typing import Any
 
-from fe_models.dynamics.forced_response import ResponseBranch
-from fe_models.dynamics.further_branches import FurtherBranch
-from fe_models.dynamics.harmonics import HarmonicBalanceError
-from fe_models.dynamics.receptance import ReceptanceError
+from fe_models.dynamics.curves.forced_response import ResponseBranch
+from fe_models.dynamics.curves.further_branches import FurtherBranch
+from fe_models.dynamics.periodic.harmonics import HarmonicBalanceError
+from fe_models.dynamics.periodic.receptance import ReceptanceError
 from sa_solver.steps import Steps
 from wear.joints.parameters import JointError
 from workflow.analyses.vibration.answers import answers_under

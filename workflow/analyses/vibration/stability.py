@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from fe_models.dynamics.bifurcations import Bifurcation, find_bifurcations
-from fe_models.dynamics.floquet import Floquet, Stability
-from fe_models.dynamics.followed_curve import FollowedCurve
-from fe_models.dynamics.harmonic_solution import HarmonicSolution
+from fe_models.dynamics.curves.bifurcations import Bifurcation, find_bifurcations
+from fe_models.dynamics.curves.followed_curve import FollowedCurve
+from fe_models.dynamics.periodic.harmonic_solution import HarmonicSolution
+from fe_models.dynamics.stability.floquet import Floquet, Stability
 from sa_solver.steps import Steps
 from sa_solver.types import Array
 from workflow.analyses.vibration.case import VibrationCase

@@ -12,14 +12,14 @@ from typing import Any
 
 import numpy as np
 
-from fe_models.dynamics.harmonics import Resolution
+from fe_models.dynamics.periodic.harmonics import Resolution
+from sa_solver.cycles.tangential_loop import TangentialLoop
 from sa_solver.steps import Steps
-from sa_solver.tangential_loop import TangentialLoop
+from wear.contact.moving import LARGE_STROKE
 from wear.joints.jenkins import Jenkins
-from wear.marching import SubcyclingStepper
-from wear.moving import LARGE_STROKE
-from wear.steppers import first_cycles
-from wear.stepping import WearState
+from wear.steps.marching import SubcyclingStepper
+from wear.steps.steppers import first_cycles
+from wear.steps.stepping import WearState
 from workflow.analyses.rig.building import row_of_masses
 from workflow.analyses.vibration.load import driving_of
 from workflow.analyses.vibration.loops import closed

@@ -7,16 +7,16 @@ from typing import Any
 
 import numpy as np
 
-from fe_models.dynamics.cycle_energy import energy_lost, work_done
-from fe_models.dynamics.forced_response import along_frequency
-from fe_models.dynamics.harmonic_balance import HarmonicBalance
-from fe_models.dynamics.harmonic_solution import HarmonicSolution
-from fe_models.dynamics.phase_resonance import along_phase_resonance
+from fe_models.dynamics.curves.forced_response import along_frequency
+from fe_models.dynamics.curves.phase_resonance import along_phase_resonance
+from fe_models.dynamics.periodic.cycle_energy import energy_lost, work_done
+from fe_models.dynamics.periodic.harmonic_balance import HarmonicBalance
+from fe_models.dynamics.periodic.harmonic_solution import HarmonicSolution
 from sa_solver.steps import Steps
+from wear.contact.nodes import NodalState
 from wear.laws import WearLaw
-from wear.nodes import NodalState
-from wear.steppers import HeunStepper
-from wear.stepping import ContactFailure
+from wear.steps.steppers import HeunStepper
+from wear.steps.stepping import ContactFailure
 from workflow.analyses.rig.rig_model import RigModel
 from workflow.analyses.specimens.case import SpecimensCase
 from workflow.analyses.vibration.case import VibrationCase
@@ -91,7 +91,7 @@ def _unworn(
 def resonance_that_wears(case: NodesWearCase, problem: HarmonicBalance) -> HarmonicSolution:
     """The phase resonance under what wears: the largest of the response within the frequencies.
 
-    Raises :class:`wear.stepping.ContactFailure` where there is none.
+    Raises :class:`wear.steps.stepping.ContactFailure` where there is none.
     """
     force, upward = case.wearing, case.continuation.start == "lower"
     branch = along_frequency(

@@ -15,15 +15,15 @@ from functools import cached_property
 
 import numpy as np
 
-from fe_models.dynamics.harmonic_balance import HarmonicBalance
-from fe_models.dynamics.harmonic_solution import HarmonicSolution
-from fe_models.dynamics.phase_resonance import along_phase_resonance
+from fe_models.dynamics.curves.phase_resonance import along_phase_resonance
+from fe_models.dynamics.periodic.harmonic_balance import HarmonicBalance
+from fe_models.dynamics.periodic.harmonic_solution import HarmonicSolution
 from sa_solver.types import Array
+from wear.contact.nodes import NodalContact, NodalState
 from wear.joints.friction_contact import FrictionContact
-from wear.joints.periodic import PeriodicMarch
+from wear.joints.periodic.march import PeriodicMarch
 from wear.laws import WearLaw
-from wear.nodes import NodalContact, NodalState
-from wear.stepping import ContactFailure
+from wear.steps.stepping import ContactFailure
 from wear.surfaces import Surfaces
 from workflow.analyses.vibration.excitation import FORCE, Amount
 from workflow.analyses.vibration.model import VibrationModel
@@ -40,7 +40,7 @@ class PadCycle:
     """Pads of one shape in a cycle of their ``motion`` under the force that wears them.
 
     ``model`` is the rig on them. For wear each node slides its path at one pressure, with which it
-    dissipates what it does (:class:`wear.nodes.NodalCycle`).
+    dissipates what it does (:class:`wear.contact.nodes.NodalCycle`).
     """
 
     model: VibrationModel
@@ -138,7 +138,7 @@ class WearingPads:
     def at(self, state: NodalState) -> PadCycle:
         """The cycle of the pads in a state, its motion solved for from that which wore to it.
 
-        Raises :class:`wear.stepping.ContactFailure` where no motion is found.
+        Raises :class:`wear.steps.stepping.ContactFailure` where no motion is found.
         """
         for surfaces, cycle in self._solved:
             if surfaces is state.surfaces:

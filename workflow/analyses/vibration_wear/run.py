@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from fe_models.dynamics.harmonics import HarmonicBalanceError
-from fe_models.dynamics.receptance import ReceptanceError
-from sa_solver.normal import NormalContactError
+from fe_models.dynamics.periodic.harmonics import HarmonicBalanceError
+from fe_models.dynamics.periodic.receptance import ReceptanceError
+from sa_solver.normal.contact import NormalContactError
 from wear.joints.parameters import JointError
-from wear.stepping import ContactFailure
+from wear.steps.stepping import ContactFailure
 from workflow.analyses.vibration_wear.case import VibrationWearCase
 from workflow.analyses.vibration_wear.half_space_run import wear_half_space
 from workflow.analyses.vibration_wear.nodes_run import wear_nodes

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import partial
 
-from fe_models.dynamics.harmonic_solution import HarmonicSolution
-from fe_models.dynamics.resolution_error import resolution_error
+from fe_models.dynamics.periodic.harmonic_solution import HarmonicSolution
+from fe_models.dynamics.periodic.resolution_error import resolution_error
 from sa_solver.steps import Steps
-from wear.marching import advance_cycles
-from wear.steppers import Contact, Stepper
+from wear.steps.marching import advance_cycles
+from wear.steps.steppers import Contact, Stepper
 from wear.worn import State
 from workflow.analyses.vibration.case import VibrationCase
 from workflow.analyses.vibration.model import VibrationModel

@@ -2,9 +2,10 @@
 
 The surfaces of the present make the joint: under its load every cell of the grid is an elementary
 contact with its pressure, or its gap, and the shift at which it begins to slip, and all of them
-together, tied by the half-space, are so many sliders in parallel (:mod:`sa_solver.partial_slip`).
-The rig's steady motion by harmonic balance says what each slider dissipates, and so how far every
-cell slips in a cycle. That slip, and the pressure that wear itself changes, wear the surfaces.
+together, tied by the half-space, are so many sliders in parallel
+(:mod:`sa_solver.cycles.partial_slip`). The rig's steady motion by harmonic balance says what each
+slider dissipates, and so how far every cell slips in a cycle. That slip, and the pressure that wear
+itself changes, wear the surfaces.
 """
 
 from __future__ import annotations
@@ -14,20 +15,20 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fe_models.dynamics.harmonic_balance import HarmonicBalance
-from fe_models.dynamics.harmonic_solution import HarmonicSolution
-from fe_models.dynamics.harmonics import Resolution
-from fe_models.dynamics.receptance import Receptance
+from fe_models.dynamics.periodic.harmonic_balance import HarmonicBalance
+from fe_models.dynamics.periodic.harmonic_solution import HarmonicSolution
+from fe_models.dynamics.periodic.harmonics import Resolution
+from fe_models.dynamics.periodic.receptance import Receptance
 from sa_solver.contact import FrictionalContact
-from sa_solver.half_space import HalfSpace
-from sa_solver.normal import NormalContact
-from sa_solver.partial_slip import PartialSlip, PartialSlipError, partial_slip_curve
-from sa_solver.tangential_loop import LoopFailure, LoopPath, TangentialLoop, march_loop
+from sa_solver.cycles.partial_slip import PartialSlip, PartialSlipError, partial_slip_curve
+from sa_solver.cycles.tangential_loop import LoopFailure, LoopPath, TangentialLoop, march_loop
+from sa_solver.half_space.operator import HalfSpace
+from sa_solver.normal.contact import NormalContact
 from sa_solver.types import Array, ElasticPair, Grid, LoadHistory
-from wear.drive import Drive
+from wear.contact.drive import Drive
 from wear.joints.jenkins import Jenkins
-from wear.joints.parallel import ParallelSliders
-from wear.stepping import ContactFailure, SlidingCycle, WearingContact, WearState
+from wear.joints.periodic.parallel import ParallelSliders
+from wear.steps.stepping import ContactFailure, SlidingCycle, WearingContact, WearState
 from workflow.analyses.rig.rig_model import RigModel
 from workflow.analyses.vibration.load import Driving
 from workflow.analyses.wear.structures.bodies.case import (

@@ -1,9 +1,10 @@
 """Stress of one body under its contact: a section at peak load, a history at a depth.
 
 Tractions on the fine grid stress a half-space; a structure adds what it carries past the contact.
-On the face and just below that is told by the motion of its nodes (:mod:`wear.bulk_stress`), from
-one element's depth on by the stress of its mesh, less that of half-spaces under its nodal forces:
-there the stress is the mesh's, to which fine tractions differ from nodal forces by nothing much.
+On the face and just below that is told by the motion of its nodes
+(:mod:`wear.cracking.bulk_stress`), from one element's depth on by the stress of its mesh, less that
+of half-spaces under its nodal forces: there the stress is the mesh's, to which fine tractions
+differ from nodal forces by nothing much.
 """
 
 from __future__ import annotations
@@ -14,15 +15,15 @@ from typing import Literal
 
 import numpy as np
 
-from fe_models.cut_face import WholeStress
-from sa_solver import subsurface
-from sa_solver.subsurface import SubsurfaceStress
+from fe_models.meshes.cut_face import WholeStress
+from sa_solver.half_space import subsurface
+from sa_solver.half_space.subsurface import SubsurfaceStress
 from sa_solver.types import Array, Grid, Mask, Material
-from wear.bulk_stress import SIDE, BodyFace, BulkStress
-from wear.face_loads import FaceLoads
-from wear.life import tension_along
-from wear.sticking import with_sticking_shear
-from wear.tractions import CycleTractions
+from wear.contact.face_loads import FaceLoads
+from wear.contact.sticking import with_sticking_shear
+from wear.contact.tractions import CycleTractions
+from wear.cracking.bulk_stress import SIDE, BodyFace, BulkStress
+from wear.cracking.life import tension_along
 from workflow.analyses.wear.case.sections import ContactStress
 from workflow.analyses.wear.contact_stage import ContactStage
 
@@ -44,7 +45,7 @@ class Planes:
     def sections(self, wanted: Sequence[tuple[SubsurfaceStress, Array, Array]]) -> list[Array]:
         """Stress ``(6, n, k)`` in the section of bodies under tractions at depths, each as wanted.
 
-        See :func:`sa_solver.subsurface.sections`.
+        See :func:`sa_solver.half_space.subsurface.sections`.
         """
         return subsurface.sections(wanted, "y" if self._along else "x", self.at)
 

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from sa_solver.types import Array
+from wear.contact.face_loads import FaceLoads
 from wear.coupled import CoupledState
-from wear.face_loads import FaceLoads
 from workflow.analyses.wear.load_source import LoadSource
 from workflow.analyses.wear.structure_stage import StructureStage
 from workflow.shell.dataset import Dataset

@@ -8,12 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from sa_solver.normal import NormalStart
+from sa_solver.normal.contact import NormalStart
 from sa_solver.types import LoadHistory
+from wear.contact.interface import InterfaceState
+from wear.contact.link import Link
 from wear.coupled import CoupledState
-from wear.full_cycle import CycleStart
-from wear.interface import InterfaceState
-from wear.link import Link
+from wear.steps.full_cycle import CycleStart
 from wear.surfaces import Surfaces
 from wear.worn import Spent
 from workflow.errors import UserError

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from fe_models.mesh import MeshError
+from fe_models.meshes.structure_mesh import MeshError
 from workflow.analyses.wear.case.base import WearCase
 from workflow.analyses.wear.figures.faces import write_faces
 from workflow.analyses.wear.structure_stage import StructureStage

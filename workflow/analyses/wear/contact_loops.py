@@ -15,18 +15,18 @@ import h5py
 import numpy as np
 
 from sa_solver.contact import FrictionalContact
-from sa_solver.errors import ContactProblemError
-from sa_solver.loop_accuracy import loop_errors
-from sa_solver.tangential_loop import (
+from sa_solver.cycles.loop_accuracy import loop_errors
+from sa_solver.cycles.tangential_loop import (
     CLOSED,
     MOST_CYCLES,
     LoopFailure,
     LoopPath,
     march_loop,
 )
+from sa_solver.errors import ContactProblemError
 from sa_solver.types import Array, Tilt
-from wear.interface import InterfaceState
-from wear.stepping import ContactFailure
+from wear.contact.interface import InterfaceState
+from wear.steps.stepping import ContactFailure
 from workflow.analyses.wear.case.loops import Loops
 from workflow.analyses.wear.loop_table import COLUMNS, SLIDES, Column, write_loop_table
 from workflow.errors import UserError

@@ -7,17 +7,17 @@ from typing import Literal
 
 import numpy as np
 
-from fe_models.mesh import Face
-from fe_models.transfer import FaceTransfer
-from sa_solver.half_space import HalfSpace
-from sa_solver.normal import NormalContact
+from fe_models.meshes.structure_mesh import Face
+from fe_models.meshes.transfer import FaceTransfer
+from sa_solver.half_space.operator import HalfSpace
+from sa_solver.normal.contact import NormalContact
 from sa_solver.types import Array, ElasticPair, Grid, LoadHistory
-from wear.implicit import ImplicitStepper, SecondOrderStepper
-from wear.interface import InterfaceContact, InterfaceSettings, InterfaceState
-from wear.link import Link
-from wear.steppers import ErrorControl, ExplicitStepper, Stepper, step_errors
-from wear.stepping import WearingContact, WearState
-from wear.tractions import CycleTractions
+from wear.contact.interface import InterfaceContact, InterfaceSettings, InterfaceState
+from wear.contact.link import Link
+from wear.contact.tractions import CycleTractions
+from wear.steps.implicit import ImplicitStepper, SecondOrderStepper
+from wear.steps.steppers import ErrorControl, ExplicitStepper, Stepper, step_errors
+from wear.steps.stepping import WearingContact, WearState
 from workflow.analyses.wear.case.base import ContactTerms, WearCase
 from workflow.analyses.wear.case.sections import ContactStress, Duration
 from workflow.analyses.wear.contact_loops import WornLoop, worn_loop

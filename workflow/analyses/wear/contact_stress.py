@@ -15,14 +15,14 @@ from typing import Any, Literal
 
 import numpy as np
 
-from sa_solver.stress import von_mises
-from sa_solver.subsurface import COMPONENTS
-from sa_solver.threads import at_once
+from sa_solver.half_space.stress import von_mises
+from sa_solver.half_space.subsurface import COMPONENTS
 from sa_solver.ties import first_largest
+from sa_solver.transforms.threads import at_once
 from sa_solver.types import Array, Mask, Material, Progress, Tally
-from wear.bulk_stress import BulkStress
-from wear.life import Ruiz, findley, smith_watson_topper
-from wear.tractions import CycleTractions
+from wear.contact.tractions import CycleTractions
+from wear.cracking.bulk_stress import BulkStress
+from wear.cracking.life import Ruiz, findley, smith_watson_topper
 from workflow.analyses.wear.body_stress import (
     Planes,
     Stressed,
@@ -67,7 +67,7 @@ class ContactMoment:
 
     ``carried`` is what a structure carries past the contact, where it tells;
     ``left_out`` are the increments, counted from 0, whose shear is not known (see
-    :class:`wear.tractions.CycleTractions`) and that the maps do without.
+    :class:`wear.contact.tractions.CycleTractions`) and that the maps do without.
     """
 
     bodies: Mapping[Literal[1, 2], BodyStress]

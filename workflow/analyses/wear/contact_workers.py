@@ -8,11 +8,11 @@ from functools import partial
 from typing import Any
 
 from sa_solver.types import Tally
-from wear.contacts import Contacts
+from wear.contact.contacts import Contacts
+from wear.contact.face_loads import FaceLoads
+from wear.contact.interface import FirstContact, InterfaceState
+from wear.contact.tractions import ContactFields
 from wear.coupled import CoupledState
-from wear.face_loads import FaceLoads
-from wear.interface import FirstContact, InterfaceState
-from wear.tractions import ContactFields
 from wear.worn import Spent
 from workflow.analyses.wear.case.base import WearCase
 from workflow.analyses.wear.contact_loops import WornLoop

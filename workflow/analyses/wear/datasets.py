@@ -5,10 +5,10 @@ Extensive quantities are in the units of a contact over an area.
 
 from __future__ import annotations
 
-from fe_models.mesh import Face
+from fe_models.meshes.structure_mesh import Face
 from sa_solver.types import Array
-from wear.drive import TILTS, Drive
-from wear.face_loads import FaceLoads
+from wear.contact.drive import TILTS, Drive
+from wear.contact.face_loads import FaceLoads
 from workflow.analyses.contact.datasets import (
     load_columns,
     pressure_field,

@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from fe_models.mesh import Interface, MeshError
+from fe_models.meshes.structure_mesh import Interface, MeshError
 from fe_models.structure import InterfaceHistory
 from workflow.analyses.wear.case.base import FiniteElementCase, WearCase
 from workflow.analyses.wear.choice import report_choice

@@ -8,7 +8,7 @@ from functools import partial
 
 import numpy as np
 
-from sa_solver.shapes import rounded_edge
+from sa_solver.surfaces.shapes import rounded_edge
 from sa_solver.types import Array, Grid
 from workflow.analyses.contact.surfaces import SurfacesOfTwo
 from workflow.analyses.wear.case.gaps import GapShape, HeightsGap, ParaboloidGap, RoundedGap

@@ -1,11 +1,11 @@
 """As many increments of a structure's cycle as an error asks for (``load_path.increments: auto``).
 
 The structure's own cycle is solved, unworn, in few increments, and what each leg of them leaves of
-worn depth and energy is estimated (:func:`sa_solver.increments.errors_of_increments`). That is of
-second order: a leg of n increments leaves c/n². The fewest in all, Σ n, of a given Σ c/n² have n in
-proportion to the cubic root of c, so that legs along which much slips under pressures that bend
-get the most. Twice as many then say what these leave indeed (Richardson): where a front of slip
-passes node by node the estimate from one cycle is too low, by up to five on dovetails.
+worn depth and energy is estimated (:func:`sa_solver.cycles.increments.errors_of_increments`). That
+is of second order: a leg of n increments leaves c/n². The fewest in all, Σ n, of a given Σ c/n²
+have n in proportion to the cubic root of c, so that legs along which much slips under pressures
+that bend get the most. Twice as many then say what these leave indeed (Richardson): where a front
+of slip passes node by node the estimate from one cycle is too low, by up to five on dovetails.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from typing import Any, Generic, TypeVar
 import numpy as np
 
 from fe_models.structure import InterfaceHistory
-from sa_solver.increments import depth_and_energy, errors_of_increments, friction_work
+from sa_solver.cycles.increments import depth_and_energy, errors_of_increments, friction_work
 from sa_solver.types import Array, Mask
 from workflow.analyses.wear.case.base import MOST_INCREMENTS, FiniteElementCase
 from workflow.analyses.wear.choice import Decision, record_of, since

@@ -1,10 +1,10 @@
-"""What a run says of the link of its structure to the contact: see :mod:`wear.link`."""
+"""What a run says of the link of its structure to the contact: see :mod:`wear.contact.link`."""
 
 from __future__ import annotations
 
 from typing import Any
 
-from wear.link import Link
+from wear.contact.link import Link
 from workflow.shell.reporter import Reporter
 
 

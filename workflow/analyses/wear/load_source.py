@@ -9,11 +9,11 @@ from typing import Literal, Protocol
 
 import numpy as np
 
-from fe_models.mesh import Face
+from fe_models.meshes.structure_mesh import Face
 from sa_solver.types import Array, Frame, Grid, Indices
 from wear import coupled
-from wear.drive import Drive
-from wear.face_loads import CycleLoads, FaceLoads
+from wear.contact.drive import Drive
+from wear.contact.face_loads import CycleLoads, FaceLoads
 
 BODIES: tuple[Literal[1, 2], ...] = (1, 2)
 # Without a mesh, the grid that shows what a coarse one misses has cells so many times larger.

@@ -1,8 +1,9 @@
 """Finite elements alone: the nodes of a structure's contact faces wear, without a half-space.
 
 Every cycle of the wear is one of the structure, on the surfaces at hand: half the slip before a
-solved state and half the slip after it count at its pressure (:mod:`sa_solver.increments`). What is
-written lies on the contact grid, like a half-space's: means of the nodal fields over its cells.
+solved state and half the slip after it count at its pressure (:mod:`sa_solver.cycles.increments`).
+What is written lies on the contact grid, like a half-space's: means of the nodal fields over its
+cells.
 """
 
 from __future__ import annotations
@@ -14,19 +15,19 @@ from functools import cached_property
 
 import numpy as np
 
-from fe_models.cut_face import whole_values
+from fe_models.meshes.cut_face import whole_values
 from fe_models.structure import CycleSolution, InterfaceHistory
 from sa_solver.types import Array
+from wear.contact.face_loads import FaceLoads
+from wear.contact.interface import FirstContact, InterfaceState
+from wear.contact.link import Link
+from wear.contact.nodes import NodalContact, NodalState
+from wear.contact.tractions import ContactFields, CycleTractions, acting_slip
 from wear.coupled import CoupledState
-from wear.face_loads import FaceLoads
-from wear.interface import FirstContact, InterfaceState
-from wear.link import Link
-from wear.marching import advance_cycles
-from wear.nodes import NodalContact, NodalState
-from wear.stabilised import StabilisedStepper
-from wear.steppers import first_cycles
+from wear.steps.marching import advance_cycles
+from wear.steps.stabilised import StabilisedStepper
+from wear.steps.steppers import first_cycles
 from wear.surfaces import Surfaces
-from wear.tractions import ContactFields, CycleTractions, acting_slip
 from wear.worn import Spent
 from workflow.analyses.wear.case.base import WearCase
 from workflow.analyses.wear.contact_stage import ContactStage, error_control
@@ -40,7 +41,9 @@ KEPT = 4
 
 @dataclass(frozen=True)
 class StructureCycle:
-    """A closed cycle as the nodes of all interfaces feel it: see :class:`wear.nodes.NodalCycle`.
+    """A closed cycle at the nodes of all interfaces.
+
+    It is a :class:`wear.contact.nodes.NodalCycle`.
 
     ``stiffness`` [MPa/mm] is the most that the pressure of a node answers to its gap.
     """

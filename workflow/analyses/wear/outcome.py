@@ -9,14 +9,14 @@ from functools import cached_property
 import numpy as np
 
 from sa_solver.types import Array, LoadHistory
+from wear.contact.face_loads import FaceLoads
+from wear.contact.interface import FirstContact, InterfaceState
+from wear.contact.tractions import CycleTractions, increments_change, increments_error
 from wear.coupled import CoupledState
-from wear.face_loads import FaceLoads
-from wear.interface import FirstContact, InterfaceState
 from wear.kinetics import LinearRegime, linear_regime
-from wear.steppers import step_errors
-from wear.stepping import ContactFailure
-from wear.stick_border import border_errors
-from wear.tractions import CycleTractions, increments_change, increments_error
+from wear.steps.steppers import step_errors
+from wear.steps.stepping import ContactFailure
+from wear.steps.stick_border import border_errors
 from workflow.analyses.wear.case.base import WearCase
 from workflow.analyses.wear.contact_stage import ContactEnd, ContactStage
 from workflow.analyses.wear.load_source import LoadSource

@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from sa_solver.normal import NormalContactError
+from sa_solver.normal.contact import NormalContactError
 from sa_solver.types import Array, Progress
-from wear.contacts import KINETICS
+from wear.contact.contacts import KINETICS
 from wear.kinetics import LinearRegime
 from workflow.analyses.contact.datasets import LOADS, pressure_field, traction_fields
 from workflow.analyses.wear.body_stress import StressedCycle, with_known_shear

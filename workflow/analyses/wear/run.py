@@ -7,13 +7,13 @@ from contextlib import ExitStack
 from functools import cache, partial
 from threading import Lock
 
-from fe_models.blas_threads import one_thread
-from fe_models.mesh import MeshError
-from sa_solver.normal import NormalContactError
+from fe_models.meshes.structure_mesh import MeshError
+from fe_models.solvers.blas_threads import one_thread
+from sa_solver.normal.contact import NormalContactError
+from wear.contact.face_loads import FaceLoads
+from wear.contact.interface import FirstContact, MotionError
 from wear.coupled import CoupledSettings, CoupledState, CoupledWear, JumpSize, Stop
-from wear.face_loads import FaceLoads
-from wear.interface import FirstContact, MotionError
-from wear.stepping import ContactFailure
+from wear.steps.stepping import ContactFailure
 from workflow.analyses.wear import checkpoint
 from workflow.analyses.wear.budget.finding import Begun, lives_of_companions
 from workflow.analyses.wear.case.base import WearCase

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from wear.steppers import root_mean_square
+from wear.steps.steppers import root_mean_square
 from workflow.analyses.wear.budget.report import Budget, warning_of
 from workflow.analyses.wear.case.base import WearCase
 from workflow.analyses.wear.case.sections import Duration
@@ -56,7 +56,7 @@ def shorter_steps(wear: Duration, contact: InterfaceOutcome) -> str:
     """Return the setting that makes the steps of a finished run shorter.
 
     Automatic ones follow their tolerance. On surfaces that move over each other they are shorter
-    than it asks for (:meth:`wear.stepping.WearingContact.comparable_cycles`), so that it does
+    than it asks for (:meth:`wear.steps.stepping.WearingContact.comparable_cycles`), so that it does
     nothing, and those of second order leave edges less high.
     """
     step, moving = wear.step, len(contact.state.paths) > 0

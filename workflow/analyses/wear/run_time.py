@@ -27,7 +27,8 @@ PROBLEMS = {"explicit": 1, "implicit": 1, "second_order": 4}
 DISSIPATING = 0.6
 # A way [mm] that contacts of structures slip in a cycle.
 SLIP = 0.03
-# Longest stable explicit step, of the pitch over E* times the wear per pressure (wear.stepping).
+# Longest stable explicit step, of the pitch over E* times the wear per pressure
+# (wear.steps.stepping).
 STABLE = 1.16
 # Iterations of friction in the structure in an increment, each entry of its dense matrix in one of
 # them; and the same of its inverse [s].

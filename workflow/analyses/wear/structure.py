@@ -13,8 +13,8 @@ from workflow.shell.analysis import as_written
 from workflow.shell.memory import Memory, factor_bytes
 
 if TYPE_CHECKING:
-    from wear.interface import InterfaceState
-    from wear.tractions import CycleTractions
+    from wear.contact.interface import InterfaceState
+    from wear.contact.tractions import CycleTractions
     from workflow.analyses.wear.contact_stage import ContactStage
     from workflow.analyses.wear.load_source import LoadSource
 

@@ -10,21 +10,21 @@ from typing import Literal, Protocol, TypeVar
 import numpy as np
 from scipy.linalg import eigvalsh
 
-from fe_models.cut_face import whole_history, whole_resultants
-from fe_models.friction import FrictionalJoint, FrictionState
-from fe_models.joint import JointResolvent
-from fe_models.mesh import Interface, MeshError, StructureMesh
-from fe_models.motion import deformation
-from fe_models.nonlinear import NonlinearCheck, check_nonlinearity
-from fe_models.pretension import Bolt, tightened
-from fe_models.relinearised import (
+from fe_models.elasticity.nonlinear import NonlinearCheck, check_nonlinearity
+from fe_models.elasticity.relinearised import (
     PrestressedStructure,
     Softening,
     relinearised,
     stress_stiffened,
 )
-from fe_models.remesh import worn_mesh
-from fe_models.stress import CycleStress, cycle_stress
+from fe_models.elasticity.stress import CycleStress, cycle_stress
+from fe_models.joints.friction import FrictionalJoint, FrictionState
+from fe_models.joints.joint import JointResolvent
+from fe_models.loads.pretension import Bolt, tightened
+from fe_models.meshes.cut_face import whole_history, whole_resultants
+from fe_models.meshes.remesh import worn_mesh
+from fe_models.meshes.structure_mesh import Interface, MeshError, StructureMesh
+from fe_models.motion import deformation
 from fe_models.structure import CycleSolution, InterfaceHistory, Structure, mixed
 from sa_solver.types import Array, Indices, LoadHistory
 from workflow.analyses.wear.case.sections import Nonlinearity
@@ -430,7 +430,7 @@ class StructureStage(Heard):
         """Stress of all bodies on unworn or worn meshes: at peak load, and in those ``shown``.
 
         Of the increments that are shown it is that of the surface. For ``done`` see
-        :func:`fe_models.stress.cycle_stress`.
+        :func:`fe_models.elasticity.stress.cycle_stress`.
         """
         jobs = [
             partial(self._stress, self._on(mesh), of, shown, done) for mesh, of in states.values()
@@ -441,7 +441,7 @@ class StructureStage(Heard):
         """The mesh with faces that have lost nodal ``depths`` ``(n,)`` of body 1 and 2 [mm].
 
         The structure on it is built and assembled, for :meth:`stresses`. Raises as
-        :func:`fe_models.remesh.worn_mesh`.
+        :func:`fe_models.meshes.remesh.worn_mesh`.
         """
         mesh = worn_mesh(self.mesh, depths)
         structure = self._on(mesh)

@@ -13,11 +13,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fe_models.meshes.transfer import FaceTransfer
 from fe_models.structure import InterfaceHistory
-from fe_models.transfer import FaceTransfer
-from sa_solver.increments import friction_work
+from sa_solver.cycles.increments import friction_work
 from sa_solver.types import Array
-from wear.interface import InterfaceState
+from wear.contact.interface import InterfaceState
 from workflow.analyses.wear.contact_stage import ContactStage
 from workflow.analyses.wear.load_source import LoadSource
 from workflow.analyses.wear.structure_stage import StructureStage

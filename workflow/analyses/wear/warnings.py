@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from fe_models.mesh import Face, Interface
+from fe_models.meshes.structure_mesh import Face, Interface
 from fe_models.structure import CLOSED, InterfaceHistory
 from sa_solver.types import ElasticPair, LoadHistory, Mask
+from wear.contact.interface import FirstContact
 from wear.coupled import CoupledState
-from wear.interface import FirstContact
 from workflow.analyses.wear.case.base import WearCase
 from workflow.analyses.wear.case.sections import SIZES, Duration
 from workflow.analyses.wear.contact_stage import ContactStage

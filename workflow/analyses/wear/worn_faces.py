@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from wear.interface import InterfaceState
+from wear.contact.interface import InterfaceState
 from workflow.analyses.wear.contact_stage import ContactStage
 from workflow.analyses.wear.load_source import LoadSource, UserFace
 from workflow.analyses.wear.worn_nodes import (

@@ -14,8 +14,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from fe_models.mesh import Face
-from fe_models.transfer import FaceTransfer
+from fe_models.meshes.structure_mesh import Face
+from fe_models.meshes.transfer import FaceTransfer
 from sa_solver.types import Array, Frame, Grid, Indices
 from workflow.analyses.wear.structures.resultants.faces import FaceError, facets_over
 from workflow.case.fields import Quantity

@@ -9,16 +9,16 @@ from typing import Any
 
 import numpy as np
 
-from fe_models.cut_face import WholeStress, whole_components, whole_values
-from fe_models.elasticity import maximum_principal
-from fe_models.mesh import Body, Interface, MeshError, StructureMesh, write_msh
-from fe_models.mesh_quality import element_sizes, elements_across, radius_ratios
-from fe_models.nonlinear import NonlinearCheck
-from fe_models.remesh import form_of, formed_mesh, worn_volume
-from fe_models.stress import CycleStress, PeakStress, StressField, SurfaceHistory, steps
+from fe_models.elasticity.body import maximum_principal
+from fe_models.elasticity.nonlinear import NonlinearCheck
+from fe_models.elasticity.stress import CycleStress, PeakStress, StressField, SurfaceHistory, steps
+from fe_models.meshes.cut_face import WholeStress, whole_components, whole_values
+from fe_models.meshes.quality import element_sizes, elements_across, radius_ratios
+from fe_models.meshes.remesh import form_of, formed_mesh, worn_volume
+from fe_models.meshes.structure_mesh import Body, Interface, MeshError, StructureMesh, write_msh
 from fe_models.structure import CycleSolution, InterfaceHistory
-from sa_solver.stress import von_mises
-from sa_solver.threads import begun
+from sa_solver.half_space.stress import von_mises
+from sa_solver.transforms.threads import begun
 from sa_solver.types import Array, LoadHistory, Tally
 from wear.coupled import CoupledState
 from workflow.analyses.wear.bolts import BoltTensions

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from sa_solver.threads import at_once
+from sa_solver.transforms.threads import at_once
 from sa_solver.types import Array, Progress, unseen
 from workflow.analyses.wear.budget.companions import Companions, late, scaled
 from workflow.analyses.wear.budget.lives import LIFE_FAILURES, Worn

@@ -11,13 +11,13 @@ from dataclasses import replace
 from itertools import islice
 from typing import Any, Literal
 
-from fe_models.mesh import MeshError
-from sa_solver.normal import NormalContactError
-from wear.contacts import Contacts
+from fe_models.meshes.structure_mesh import MeshError
+from sa_solver.normal.contact import NormalContactError
+from wear.contact.contacts import Contacts
+from wear.contact.interface import MotionError
 from wear.coupled import CoupledSettings, CoupledState, CoupledWear, JumpSize
-from wear.implicit import ImplicitStepper
-from wear.interface import MotionError
-from wear.stepping import ContactFailure
+from wear.steps.implicit import ImplicitStepper
+from wear.steps.stepping import ContactFailure
 from workflow.analyses.wear.case.base import WearCase
 from workflow.analyses.wear.case.sections import ContactStress, Life, Step
 from workflow.analyses.wear.contact_stage import ContactStage

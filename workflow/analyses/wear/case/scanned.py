@@ -10,15 +10,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from sa_solver.scans import rms
+from sa_solver.surfaces.scans import rms
 from sa_solver.types import Array, Grid
 from workflow.analyses.contact.surfaces import LOST, SurfacesOfTwo
 from workflow.case.plain import plain
 from workflow.case.sections import disagreement
 
 if TYPE_CHECKING:
-    from fe_models.mesh import Interface
-    from fe_models.transfer import FaceTransfer
+    from fe_models.meshes.structure_mesh import Interface
+    from fe_models.meshes.transfer import FaceTransfer
 
 # Cells along a facet at least: with one and a half of them nodal forces under a cylinder were up to
 # 4 % of the largest off, with four 0.02 %. Their steps leave a hundredth of the rise over a facet.
@@ -63,8 +63,8 @@ class ScannedFace:
     @cached_property
     def _fine(self) -> FaceTransfer:
         """From that grid to the nodes of the whole face."""
-        from fe_models.cut_face import whole_face
-        from fe_models.transfer import FaceTransfer
+        from fe_models.meshes.cut_face import whole_face
+        from fe_models.meshes.transfer import FaceTransfer
 
         assert self.face is not None
         return FaceTransfer.between(whole_face(self.face), self._fine_grid)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from math import ceil
 
-from fe_models.mesh import MeshError
-from fe_models.transfer import FaceTransfer
+from fe_models.meshes.structure_mesh import MeshError
+from fe_models.meshes.transfer import FaceTransfer
 from workflow.analyses.wear.choice import Decision
 from workflow.analyses.wear.fidelity.estimate import Numbers, scales
 from workflow.analyses.wear.fidelity.probe import NOTCH

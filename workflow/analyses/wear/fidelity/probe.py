@@ -11,14 +11,14 @@ from functools import lru_cache
 
 import numpy as np
 
-from sa_solver.half_space import HalfSpace
-from sa_solver.normal import NormalContact
+from sa_solver.half_space.operator import HalfSpace
+from sa_solver.normal.contact import NormalContact
 from sa_solver.types import Array, ElasticPair, Grid, LoadHistory, resultant_change
-from wear.contacts import Contacts
-from wear.implicit import ImplicitStepper
-from wear.marching import advance_cycles
-from wear.stepping import SlidingCycle, WearingContact, WearState
-from wear.tractions import acting_slip
+from wear.contact.contacts import Contacts
+from wear.contact.tractions import acting_slip
+from wear.steps.implicit import ImplicitStepper
+from wear.steps.marching import advance_cycles
+from wear.steps.stepping import SlidingCycle, WearingContact, WearState
 from workflow.analyses.wear.budget.lives import STEPS, TOLERANCE, live, shortened, worn_by
 from workflow.analyses.wear.case.sections import Contact
 from workflow.analyses.wear.fidelity.estimate import Numbers

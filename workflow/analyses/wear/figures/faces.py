@@ -12,7 +12,7 @@ from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
-from fe_models.mesh import Body, Interface, StructureMesh
+from fe_models.meshes.structure_mesh import Body, Interface, StructureMesh
 from sa_solver.types import Array
 from workflow.pictures.panels import new_figure, widen
 from workflow.pictures.style import BLUE, COLOUR_MAP, ORANGE, write_figures

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import h5py
 import numpy as np
 
-from fe_models.stress import turned
+from fe_models.elasticity.stress import turned
 from sa_solver.types import Array, Frame
 from workflow.analyses.wear.layout import Contents
 from workflow.pictures.vtk import (

@@ -25,8 +25,8 @@ from pathlib import Path
 import h5py
 import numpy as np
 
-from fe_models.mesh import Face
-from fe_models.transfer import FaceTransfer
+from fe_models.meshes.structure_mesh import Face
+from fe_models.meshes.transfer import FaceTransfer
 from workflow.analyses.wear.datasets import OTHER_FACE
 from workflow.analyses.wear.layout import Contents, jump_name
 from workflow.analyses.wear.paraview.structure import write_structure

@@ -16,8 +16,8 @@ from workflow.analyses.wear.structures.bodies.case import (
 )
 
 if TYPE_CHECKING:
-    from wear.interface import InterfaceState
-    from wear.tractions import CycleTractions
+    from wear.contact.interface import InterfaceState
+    from wear.contact.tractions import CycleTractions
     from workflow.analyses.wear.load_source import LoadSource
 
 # Path of slip in a cycle of a contact that forces shear, to tell about how long it takes [mm].

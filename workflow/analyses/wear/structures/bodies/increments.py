@@ -15,13 +15,13 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from sa_solver.history import MOST_INCREMENTS, NO_ENERGY
-from sa_solver.increments import depth_and_energy
+from sa_solver.cycles.history import MOST_INCREMENTS, NO_ENERGY
+from sa_solver.cycles.increments import depth_and_energy
 from sa_solver.rigid_modes import PLANAR
 from sa_solver.types import Array
-from wear.interface import InterfaceState
-from wear.stepping import ContactFailure
-from wear.tractions import CycleTractions
+from wear.contact.interface import InterfaceState
+from wear.contact.tractions import CycleTractions
+from wear.steps.stepping import ContactFailure
 from workflow.analyses.contact.load_path import Leg, LineLeg
 from workflow.analyses.wear.choice import Decision, record_of, since
 from workflow.analyses.wear.contact_stage import ContactStage

@@ -7,12 +7,12 @@ from functools import cached_property
 
 import numpy as np
 
-from sa_solver.half_space import HalfSpace
-from sa_solver.normal import NormalContact
+from sa_solver.half_space.operator import HalfSpace
+from sa_solver.normal.contact import NormalContact
 from sa_solver.ties import SAME, first_largest
 from sa_solver.types import Array, ElasticPair, Grid, LoadHistory
-from wear.drive import Drive
-from wear.face_loads import CycleLoads
+from wear.contact.drive import Drive
+from wear.contact.face_loads import CycleLoads
 from workflow.analyses.contact.bodies import bulk_strain
 from workflow.analyses.contact.case import Heights, Shape
 from workflow.analyses.contact.load_table import LoadTable

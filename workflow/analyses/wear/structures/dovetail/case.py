@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 from pydantic import field_validator, model_validator
 from pydantic_core import PydanticCustomError
 
-from fe_models.mesh import MeshError, StructureMesh
+from fe_models.meshes.structure_mesh import MeshError, StructureMesh
 from sa_solver.types import Grid
 from workflow.analyses.wear.case.base import FiniteElementCase
 from workflow.analyses.wear.case.gaps import check_arcs

@@ -9,9 +9,9 @@ from typing import Self
 import numpy as np
 
 from fe_models.dovetail import Mission, dovetail_softening, dovetail_structure
-from fe_models.mesh import Interface, StructureMesh
-from fe_models.pretension import Bolt
-from fe_models.relinearised import Softening
+from fe_models.elasticity.relinearised import Softening
+from fe_models.loads.pretension import Bolt
+from fe_models.meshes.structure_mesh import Interface, StructureMesh
 from fe_models.structure import Structure
 from workflow.analyses.wear.case.scanned import ScannedFace
 from workflow.analyses.wear.gaps import GapFunction, with_measured

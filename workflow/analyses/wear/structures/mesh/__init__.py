@@ -55,7 +55,7 @@ def _memory(case: MeshCase, nodes: int = 0, interface_nodes: int = 0) -> Memory:
 def _choose(case: MeshCase) -> tuple[MeshCase, dict[str, Any] | None]:
     if any(case.legs):
         return case, None
-    from fe_models.mesh import MeshError
+    from fe_models.meshes.structure_mesh import MeshError
     from workflow.analyses.wear.increments import choose_increments
     from workflow.analyses.wear.structures.mesh.model import MeshModel
 

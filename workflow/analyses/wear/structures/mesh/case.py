@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import model_validator
 
-from fe_models.geometry.endings import CAD
-from fe_models.mesh import MeshError, StructureMesh
+from fe_models.meshes.structure_mesh import MeshError, StructureMesh
+from fe_models.readers.endings import CAD
 from sa_solver.types import Grid
 from workflow.analyses.wear.case.base import (
     ContactTerms,
@@ -173,7 +173,7 @@ def _joined(structure: ImportedStructure, size: float | None, stamp: Stamp) -> S
 
 @lru_cache(maxsize=1)
 def _curved(structure: ImportedStructure, size: float | None, stamp: Stamp) -> StructureMesh:
-    from fe_models.second_order import with_midsides
+    from fe_models.meshes.second_order import with_midsides
 
     return with_midsides(_joined(structure, size, stamp), structure.read(size))
 
@@ -449,7 +449,7 @@ class MeshCase(FiniteElementCase):
     def _check_supports(self, imported: ImportedMesh) -> None:
         """Build what holds the bodies, on elements of order 1 and without forces."""
         from fe_models.imported_structure import imported_structure
-        from fe_models.pretension import Pretension, bolt_section
+        from fe_models.loads.pretension import Pretension, bolt_section
 
         structure = self.structure
         supports = [support.described() for support in structure.supports]

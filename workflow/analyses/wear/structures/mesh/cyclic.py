@@ -14,8 +14,8 @@ from workflow.case.fields import OrAlone, Whole
 from workflow.case.sections import Section, disagreement, entry
 
 if TYPE_CHECKING:
-    from fe_models import cyclic as fe
-    from fe_models.mesh import StructureMesh
+    from fe_models.cyclic import cuts as fe
+    from fe_models.meshes.structure_mesh import StructureMesh
     from sa_solver.types import Indices
     from workflow.analyses.wear.structures.mesh.contacts import Support
     from workflow.analyses.wear.structures.mesh.loads import Load
@@ -51,14 +51,14 @@ class CyclicCuts(Section):
 
     def described(self) -> fe.Cyclic:
         """As the structure takes it."""
-        from fe_models.cyclic import Cyclic
+        from fe_models.cyclic.cuts import Cyclic
 
         axis, through = np.array(self.axis), np.array(self.through)
         return Cyclic(self.low, self.high, axis, through, self.sectors)
 
     def outline(self, mesh: StructureMesh) -> str:
         """What a user should see of the cuts before anything runs."""
-        from fe_models.sector import sector_cuts
+        from fe_models.cyclic.sector import sector_cuts
 
         low, high = (" + ".join(names) for names in (self.low, self.high))
         parts = []
@@ -91,7 +91,7 @@ def check_sector(
     ``numbers`` are those of the nodes in the file, by body; ``pointing_at`` says of which entry a
     :class:`MeshError` is.
     """
-    from fe_models.sector import (
+    from fe_models.cyclic.sector import (
         check_alike,
         check_cuts,
         check_off_cuts,

@@ -9,7 +9,7 @@ from workflow.case.plain import counted
 
 if TYPE_CHECKING:
     from fe_models.geometry.imported import ImportedMesh
-    from fe_models.mesh import Interface, StructureMesh
+    from fe_models.meshes.structure_mesh import Interface, StructureMesh
 
 # Midside nodes of faces that meet node to node are apart by more than this share of the face.
 APART = 1e-6
@@ -17,7 +17,7 @@ APART = 1e-6
 
 def elements_outline(mesh: StructureMesh, imported: ImportedMesh, order: int) -> Iterator[str]:
     """How curved the elements are of each body; nothing where neither file nor case says of it."""
-    from fe_models.second_order import curvature
+    from fe_models.meshes.second_order import curvature
 
     known = {body.name: curvature(body, imported) for body in mesh.bodies}
     if order == 1:
@@ -43,7 +43,7 @@ def elements_outline(mesh: StructureMesh, imported: ImportedMesh, order: int) ->
 
 def folded_elements(mesh: StructureMesh, imported: ImportedMesh) -> Iterator[str]:
     """Doubts about elements that midside nodes would fold, and what is done about them."""
-    from fe_models.second_order import curvature
+    from fe_models.meshes.second_order import curvature
 
     for body in mesh.bodies:
         if body.midsides is None or not (found := curvature(body, imported)):
@@ -58,7 +58,7 @@ def folded_elements(mesh: StructureMesh, imported: ImportedMesh) -> Iterator[str
 
 def apart(mesh: StructureMesh, interface: Interface) -> str:
     """A doubt about faces that meet node to node, but for their midside nodes; empty if none."""
-    from fe_models.second_order import distance_of_midsides
+    from fe_models.meshes.second_order import distance_of_midsides
 
     between = distance_of_midsides(interface, [mesh.bodies[place] for place in interface.bodies])
     if between <= APART * float(interface.facet_sizes.max()) ** (1.0 if interface.line else 0.5):

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from fe_models.mesh import Interface, StructureMesh
+from fe_models.meshes.structure_mesh import Interface, StructureMesh
 from workflow.analyses.wear.case.gaps import Gap, HeightsGap
 from workflow.analyses.wear.case.scanned import MIRRORED
 from workflow.case.input_files import read_heights

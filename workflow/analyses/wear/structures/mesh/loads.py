@@ -23,7 +23,7 @@ from workflow.case.fields import Quantity, Word
 from workflow.case.sections import disagreement, entry
 
 if TYPE_CHECKING:
-    from fe_models import applied_loads as fe
+    from fe_models.loads import applied_loads as fe
 
 ForceComponent = Annotated[float, Quantity("N", at_least=-1e9, at_most=1e9)]
 MomentComponent = Annotated[float, Quantity("N mm", at_least=-1e12, at_most=1e12)]
@@ -54,7 +54,7 @@ class PressureLoad(MeshLoad):
 
     def described(self) -> fe.Pressure:
         """As the structure takes it."""
-        from fe_models.applied_loads import Pressure
+        from fe_models.loads.applied_loads import Pressure
 
         return Pressure(self.group, self.pressure)
 
@@ -76,7 +76,7 @@ class ForceLoad(MeshLoad):
 
     def described(self) -> fe.BoundaryForce:
         """As the structure takes it."""
-        from fe_models.applied_loads import BoundaryForce
+        from fe_models.loads.applied_loads import BoundaryForce
 
         at = None if self.at is None else np.array(self.at)
         return BoundaryForce(self.group, np.array(self.force), at, rigid=self.tie == "rigid")
@@ -95,7 +95,7 @@ class MomentLoad(MeshLoad):
 
     def described(self) -> fe.BoundaryForce:
         """As the structure takes it."""
-        from fe_models.applied_loads import BoundaryForce
+        from fe_models.loads.applied_loads import BoundaryForce
 
         moment = np.array(self.moment)
         return BoundaryForce(self.group, np.zeros(3), moment=moment, rigid=self.tie == "rigid")
@@ -125,7 +125,7 @@ class DisplacementLoad(MeshLoad):
 
     def described(self) -> fe.Displacement:
         """As the structure takes it."""
-        from fe_models.applied_loads import Displacement
+        from fe_models.loads.applied_loads import Displacement
 
         return Displacement(self.group, np.array(self.displacement))
 
@@ -179,7 +179,7 @@ class RemoteDisplacementLoad(MeshLoad):
 
     def described(self) -> fe.RemoteDisplacement:
         """As the structure takes it."""
-        from fe_models.applied_loads import RemoteDisplacement
+        from fe_models.loads.applied_loads import RemoteDisplacement
 
         motion = np.array([*self.displacement, *self.rotation])
         free = np.array([name in self.free for name in MOTIONS])
@@ -198,7 +198,7 @@ class RotationLoad(MeshLoad):
 
     def described(self) -> fe.Rotation:
         """As the structure takes it."""
-        from fe_models.applied_loads import Rotation
+        from fe_models.loads.applied_loads import Rotation
 
         return Rotation(np.array(self.axis), np.array(self.through), self.speed)
 
@@ -213,7 +213,7 @@ class AccelerationLoad(MeshLoad):
 
     def described(self) -> fe.Acceleration:
         """As the structure takes it."""
-        from fe_models.applied_loads import Acceleration
+        from fe_models.loads.applied_loads import Acceleration
 
         return Acceleration(np.array(self.acceleration))
 

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 
-from fe_models.geometry.endings import READ, why_not_read
-from fe_models.geometry.length_unit import SIZES
+from fe_models.readers.endings import READ, why_not_read
+from fe_models.readers.length_unit import SIZES
 from workflow.analyses.wear.structures.mesh.load import MeshLoad
 from workflow.analyses.wear.structures.mesh.loads import (
     DisplacementLoad,
@@ -26,7 +26,7 @@ from workflow.case.plain import plain
 
 if TYPE_CHECKING:
     from fe_models.geometry.imported import ImportedMesh
-    from fe_models.mesh import Body
+    from fe_models.meshes.structure_mesh import Body
     from workflow.analyses.wear.structures.mesh.contacts import MeshMaterial
 
 LengthName = Annotated[str, Word(tuple(SIZES))]

@@ -9,14 +9,14 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial import cKDTree
 
-from fe_models.curved_face import Surface
-from fe_models.cut_face import whole_face
+from fe_models.elasticity.relinearised import Softening
 from fe_models.imported_structure import imported_softening, imported_structure
-from fe_models.mesh import Face, Interface, StructureMesh
-from fe_models.pretension import Bolt, Pretension, bolt_section
-from fe_models.relinearised import Softening
+from fe_models.loads.pretension import Bolt, Pretension, bolt_section
+from fe_models.meshes.curved_face import Surface
+from fe_models.meshes.cut_face import whole_face
+from fe_models.meshes.structure_mesh import Face, Interface, StructureMesh
 from fe_models.structure import Structure
-from sa_solver.shapes import PARTING_SLOPE
+from sa_solver.surfaces.shapes import PARTING_SLOPE
 from sa_solver.types import Array, Grid, Indices
 from workflow.analyses.wear.case.scanned import ScannedFace
 from workflow.analyses.wear.gaps import GapFunction, gap_over, with_measured

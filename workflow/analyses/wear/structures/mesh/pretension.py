@@ -21,7 +21,7 @@ from workflow.case.fields import Quantity
 from workflow.case.sections import disagreement, entry
 
 if TYPE_CHECKING:
-    from fe_models import pretension as fe
+    from fe_models.loads import pretension as fe
 
 Shortening = Annotated[float, Quantity("mm", above=0.0, at_most=100.0)]
 
@@ -52,7 +52,7 @@ class BoltLoad(MeshLoad):
 
     def described(self) -> fe.Pretension:
         """As the structure takes it: shortened by 1 mm where it has its force."""
-        from fe_models.pretension import Pretension
+        from fe_models.loads.pretension import Pretension
 
         through, axis = np.array(self.through), np.array(self.axis)
         return Pretension(self.body, through, axis, getattr(self, "shortening", 1.0))

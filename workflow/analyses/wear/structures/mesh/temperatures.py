@@ -17,7 +17,7 @@ from workflow.case.sections import disagreement, entry
 from workflow.case.table_file import read_table_file
 
 if TYPE_CHECKING:
-    from fe_models import thermal as fe
+    from fe_models.elasticity import thermal as fe
 
 # Solids expand by less; 12 stands for 12e-6, then.
 Expansion = Annotated[float, Quantity("1/K", at_least=-1e-3, at_most=1e-3)]
@@ -40,7 +40,7 @@ class TemperatureLoad(_Temperature):
 
     def described(self) -> fe.TemperatureChange:
         """As the structure takes it."""
-        from fe_models.thermal import TemperatureChange
+        from fe_models.elasticity.thermal import TemperatureChange
 
         return TemperatureChange(self.change, self.body)
 
@@ -77,7 +77,7 @@ class NodalTemperatureLoad(_Temperature):
 
     def described(self) -> fe.NodalTemperature:
         """As the structure takes it."""
-        from fe_models.thermal import NodalTemperature
+        from fe_models.elasticity.thermal import NodalTemperature
 
         numbers, values = self._table()
         return NodalTemperature(numbers, values - self.reference, self.body)

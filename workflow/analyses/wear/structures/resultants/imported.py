@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fe_models.mesh import Face
+from fe_models.meshes.structure_mesh import Face
 from sa_solver.types import Array, Frame, Indices, LoadHistory, Tilt
 from workflow.analyses.contact.datasets import LOADS
 from workflow.shell.dataset import unit_in
@@ -34,7 +34,8 @@ class ImportedLoads:
     line contact, ``(m, 2)``, the ``frame`` in the user's axes, the user's node numbers on body 1
     and body 2 ``(n,)``, and the gap of the unloaded, unworn faces [mm]: ``nodal_height`` ``(n,)``
     at these nodes, ``height`` ``(nx, ny)`` on the grid of the case. None where not given.
-    ``weighted`` tells how force and displacement are those of nodes (:class:`fe_models.mesh.Face`).
+    ``weighted`` tells how force and displacement are those of nodes
+    (:class:`fe_models.meshes.structure_mesh.Face`).
     """
 
     loads: LoadHistory

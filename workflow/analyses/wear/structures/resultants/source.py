@@ -7,11 +7,11 @@ from functools import cached_property
 
 import numpy as np
 
-from fe_models.mesh import Face
+from fe_models.meshes.structure_mesh import Face
 from sa_solver.ties import first_largest
 from sa_solver.types import Array, Frame, Grid
-from wear.drive import Drive
-from wear.face_loads import CycleLoads
+from wear.contact.drive import Drive
+from wear.contact.face_loads import CycleLoads
 from workflow.analyses.wear.gaps import gap_over, with_measured
 from workflow.analyses.wear.load_source import (
     BODIES,

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fe_models.mesh import Interface
+from fe_models.meshes.structure_mesh import Interface
 from fe_models.structure import CycleSolution, InterfaceHistory
 from sa_solver.types import Array, LoadHistory
 from workflow.analyses.contact.datasets import load_columns, slip_field

@@ -1,0 +1,1 @@
+"""Cyclic symmetry: one sector of a wheel."""

@@ -1,0 +1,1 @@
+"""Curves of periodic motions: forced responses, nonlinear modes, bifurcations."""

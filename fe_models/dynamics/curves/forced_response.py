@@ -1,0 +1,328 @@
+"""Forced response of a structure with joints: its periodic motions along frequency or force."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Literal
+
+import numpy as np
+
+from fe_models.dynamics.curves.continuation import (
+    ContinuationControl,
+    CurvePoint,
+    Refinement,
+    SolutionCurve,
+    first_point,
+    follow,
+)
+from fe_models.dynamics.curves.newton import Equations, solve
+from fe_models.dynamics.periodic.harmonic_balance import (
+    SAMPLES_PER_PERIOD,
+    Balance,
+    HarmonicBalance,
+)
+from fe_models.dynamics.periodic.harmonic_solution import HarmonicSolution, ResolutionError
+from fe_models.dynamics.periodic.harmonics import HarmonicBalanceError, Resolution
+from fe_models.dynamics.periodic.resolution_error import resolution_error, richer_problem
+from sa_solver.steps import COMPUTED, Steps
+from sa_solver.types import Array
+
+# Of the tolerance, what harmonics that stay left out may have of the error, and samples.
+HARMONICS_LEAVE, SAMPLES_LEAVE = 0.3, 0.5
+
+
+@dataclass(frozen=True)
+class Accuracy:
+    """How accurate motions are to be: ``tolerance`` of their ``error``, vibration and energy.
+
+    Harmonics and samples grow as needed up to the ``highest`` harmonic and ``most_samples``; what
+    then is left is in the solutions.
+
+    Examples
+    --------
+    A slider's force has a third harmonic: it is added where motions are to be accurate to 0.1 %.
+
+    >>> import numpy as np
+    >>> from fe_models.dynamics import *
+    >>> from wear.joints import Jenkins, PeriodicMarch
+    >>> rig = lumped_rig({"m": 1e-3}, {Link("m"): 1e3}, [[Link("m")]], damping_ratio=0.02)
+    >>> load = PeriodicLoad({1: -1j * unit_force(rig, "m")})
+    >>> law = Jenkins(stiffness=1e3, friction=0.5, normal_load=10.0)
+    >>> problem = HarmonicBalance(rig, PeriodicMarch(law), load, Resolution((1,), 64))
+    >>> branch = along_frequency(problem, 10.0, (180.0, 190.0), accuracy=Accuracy(1e-3))
+    >>> print(3 in branch.problem.resolution.harmonics, branch.solutions[-1].error.largest < 1e-3)
+    True True
+    """
+
+    tolerance: float
+    highest: int = 63
+    most_samples: int = 4096
+
+
+@dataclass(frozen=True)
+class Motions:
+    """Motions ``(s,)`` in the order of a curve."""
+
+    solutions: tuple[HarmonicSolution, ...]
+
+    @property
+    def frequencies(self) -> Array:
+        return np.array([solution.frequency for solution in self.solutions])
+
+    @property
+    def forces(self) -> Array:
+        return np.array([solution.force for solution in self.solutions])
+
+    def first_amplitudes(self, place: int) -> Array:
+        """Size of harmonic 1 of a degree of freedom ``(s,)`` [mm]."""
+        return np.array([abs(solution.amplitude(place)) for solution in self.solutions])
+
+
+@dataclass(frozen=True)
+class ResponseBranch(Motions):
+    """Motions in the order in which they were found, the first one included.
+
+    ``message`` is empty if the branch reached the far end of its span. ``points`` are those of the
+    curve, and ``problem`` is what it ended with, to go on from its last point.
+    """
+
+    curve: SolutionCurve
+    problem: HarmonicBalance
+
+    @property
+    def message(self) -> str:
+        return self.curve.message
+
+
+def along_frequency(
+    problem: HarmonicBalance,
+    force: float,
+    span: tuple[float, float],
+    start: HarmonicSolution | ResponseBranch | None = None,
+    *,
+    upward: bool = True,
+    control: ContinuationControl | None = None,
+    accuracy: Accuracy | None = None,
+    steps: Steps = COMPUTED,
+) -> ResponseBranch:
+    """Motions under a force for the frequencies of ``span`` [Hz], folds included.
+
+    From its lower end upward or from its upper end downward: a branch that does not get to the
+    other end says why. From a ``start`` if there is one: a solution as a first guess; or a branch,
+    to go on from its last point to either end. Without ``accuracy`` the
+    resolution is that of the problem. Each of the ``steps`` finds a motion.
+
+    Examples
+    --------
+    Without friction the resonance is that of the mass and spring alone, F / (2 ζ k):
+
+    >>> import numpy as np
+    >>> from fe_models.dynamics import *
+    >>> from wear.joints import Jenkins, PeriodicMarch
+    >>> rig = lumped_rig({"m": 1e-3}, {Link("m"): 1e3}, [[Link("m")]], damping_ratio=0.02)
+    >>> load = PeriodicLoad({1: -1j * unit_force(rig, "m")})
+    >>> free = PeriodicMarch(Jenkins(stiffness=1e3, friction=0.0, normal_load=10.0))
+    >>> problem = HarmonicBalance(rig, free, load, Resolution((1,), 64))
+    >>> branch = along_frequency(problem, 1.0, (140.0, 180.0))
+    >>> print(f"{branch.first_amplitudes(0).max():.3f} mm of {1.0 / (2.0 * 0.02 * 1e3):.3f}")
+    0.025 mm of 0.025
+    """
+    along = Along("frequency", force)
+    return _branch(problem, along, span, start, upward, control, accuracy, steps)
+
+
+def along_force(
+    problem: HarmonicBalance,
+    frequency: float,
+    span: tuple[float, float],
+    start: HarmonicSolution | ResponseBranch | None = None,
+    *,
+    upward: bool = True,
+    control: ContinuationControl | None = None,
+    accuracy: Accuracy | None = None,
+    steps: Steps = COMPUTED,
+) -> ResponseBranch:
+    """Motions at a frequency [Hz] for the forces of ``span``; see :func:`along_frequency`.
+
+    Examples
+    --------
+    Far above its resonance a mass moves by F / (m ω²) at its frequency, whatever the joint does:
+
+    >>> import numpy as np
+    >>> from fe_models.dynamics import *
+    >>> from wear.joints import Jenkins, PeriodicMarch
+    >>> rig = lumped_rig({"m": 1e-3}, {Link("m"): 1e3}, [[Link("m")]], damping_ratio=0.02)
+    >>> load = PeriodicLoad({1: -1j * unit_force(rig, "m")})
+    >>> law = Jenkins(stiffness=1e3, friction=0.5, normal_load=10.0)
+    >>> problem = HarmonicBalance(rig, PeriodicMarch(law), load, Resolution((1,), 64))
+    >>> branch = along_force(problem, 5000.0, (100.0, 1000.0))
+    >>> share = branch.first_amplitudes(0) * 1e-3 * (2.0 * np.pi * 5000.0) ** 2 / branch.forces
+    >>> print(share.round(2))
+    [1. 1. 1. 1. 1. 1. 1. 1. 1. 1. 1. 1. 1. 1. 1. 1.]
+    """
+    along = Along("force", frequency)
+    return _branch(problem, along, span, start, upward, control, accuracy, steps)
+
+
+@dataclass(frozen=True)
+class Along:
+    """What varies along a branch, and the value of the other."""
+
+    varies: Literal["frequency", "force"]
+    other: float
+
+    def equations(self, problem: HarmonicBalance) -> Equations[Balance]:
+        if self.varies == "frequency":
+            return problem.by_frequency(self.other)
+        return problem.by_force(self.other)
+
+    def frequency_and_force(self, parameter: float) -> tuple[float, float]:
+        return (parameter, self.other) if self.varies == "frequency" else (self.other, parameter)
+
+
+class BranchRecorder:
+    """Describes every new point of a branch, and asks for finer equations where needed."""
+
+    def __init__(self, problem: HarmonicBalance, along: Along, accuracy: Accuracy | None) -> None:
+        self.problem, self._along, self._accuracy = problem, along, accuracy
+        self.solutions: list[HarmonicSolution] = []
+
+    def describe(self, point: CurvePoint, at: Balance) -> HarmonicSolution:
+        """The motion at a point, with its error if it is to be accurate."""
+        frequency, force = self._along.frequency_and_force(point.parameter)
+        solution = self.problem.describe(point.unknowns, at, frequency, force, point.iterations)
+        if self._accuracy is None:
+            return solution
+        return replace(solution, error=resolution_error(self.problem, solution))
+
+    def take(self, description: HarmonicSolution) -> Refinement[Balance] | None:
+        """Keep a motion, or ask for finer equations where it is not accurate."""
+        finer = finer_for(self.problem, description, self._accuracy)
+        if finer is not None:
+            return self._refine(finer)
+        if description.resolution is not self.problem.resolution:
+            # One that was found in an earlier run: a resolution for all.
+            description = replace(description, resolution=self.problem.resolution)
+        self.solutions.append(description)
+        return None
+
+    def _refine(self, finer: Resolution) -> Refinement[Balance]:
+        coarse, self.problem = self.problem.resolution, self.problem.refined(finer)
+        size = coarse.size, self.problem.joints.directions
+
+        def lift(unknowns: Array) -> Array:
+            return finer.adopt(unknowns.reshape(-1, *size), coarse).ravel()
+
+        return Refinement(self._along.equations(self.problem), lift)
+
+
+def finer_for(
+    problem: HarmonicBalance, motion: HarmonicSolution, accuracy: Accuracy | None
+) -> Resolution | None:
+    """The resolution that a motion of known error asks for, None if that of the problem will do."""
+    if accuracy is None or motion.error is None:
+        return None
+    # An error that was estimated in an earlier run let the richer problem grow; this one must too.
+    richer_problem(problem, motion)
+    return finer_resolution(problem.resolution, motion.error, accuracy)
+
+
+def finer_resolution(
+    present: Resolution, error: ResolutionError, accuracy: Accuracy
+) -> Resolution | None:
+    """The resolution that an error asks for, None if the present will do or is the finest allowed.
+
+    The harmonics that cause most of the error are added.
+    """
+    tolerance, harmonics, samples = accuracy.tolerance, present.harmonics, present.samples
+    if error.largest > tolerance:
+        parts = error.harmonics[: accuracy.highest + 1]
+        order = np.argsort(parts)
+        # What is left out if the harmonics up to this one, in the order of their parts, are.
+        left = np.sqrt(np.cumsum(parts[order] ** 2))
+        added = order[left > HARMONICS_LEAVE * tolerance]
+        harmonics = tuple(sorted({*harmonics, *added.tolist()}))
+        if error.sampling > SAMPLES_LEAVE * tolerance:
+            samples *= 2
+    while samples < SAMPLES_PER_PERIOD * harmonics[-1]:
+        samples *= 2
+    finer = Resolution(harmonics, min(samples, max(accuracy.most_samples, present.samples)))
+    return None if finer == present else finer
+
+
+def _branch(
+    problem: HarmonicBalance,
+    along: Along,
+    span: tuple[float, float],
+    start: HarmonicSolution | ResponseBranch | None,
+    upward: bool,
+    control: ContinuationControl | None,
+    accuracy: Accuracy | None,
+    steps: Steps,
+) -> ResponseBranch:
+    above = 0.0 if along.varies == "frequency" else -np.inf
+    if not above < span[0] < span[1] < np.inf:
+        raise HarmonicBalanceError(
+            f"a span from {span[0]:g} to {span[1]:g}: give its lower end first, and finite ends, "
+            "above 0 if they are frequencies"
+        )
+    control = control or ContinuationControl()
+    end: float | None = span[1] if upward else span[0]
+    if isinstance(start, ResponseBranch):
+        record, point = BranchRecorder(start.problem, along, accuracy), start.curve.points[-1]
+        # Which way it leads is in its last point.
+        end = None
+    else:
+        record = BranchRecorder(problem, along, accuracy)
+        first = _first(record, along, span[0 if upward else 1], start, upward, control, steps)
+        if isinstance(first, str):
+            return ResponseBranch((), SolutionCurve((), first), problem)
+        point = first
+    # Steps are shares of the vibration: the displacement under the constant load may be far larger.
+    rest = record.problem.guess(None)
+    curve = follow(
+        along.equations(record.problem),
+        point,
+        span,
+        control,
+        record,
+        rest,
+        record.problem.rounding,
+        end=end,
+        steps=steps,
+    )
+    return ResponseBranch(tuple(record.solutions), curve, record.problem)
+
+
+def _first(
+    record: BranchRecorder,
+    along: Along,
+    parameter: float,
+    start: HarmonicSolution | None,
+    upward: bool,
+    control: ContinuationControl,
+    steps: Steps,
+) -> CurvePoint | str:
+    """The first point of a branch, recorded; or why there is none."""
+    frequency, force = along.frequency_and_force(parameter)
+
+    def found(unknowns: Array) -> tuple[CurvePoint, HarmonicSolution] | str:
+        solution = record.problem.find(frequency, force, unknowns, control)
+        if not solution.converged:
+            return solution.message
+        if along.varies == "force":
+            solution = solve(along.equations(record.problem), solution.unknowns, parameter)
+        point = first_point(solution, parameter, upward, control.first)
+        return point, record.describe(point, solution.at)
+
+    unknowns = record.problem.guess(start)
+    while True:
+        first = steps("first point of a curve", partial(found, unknowns))
+        if isinstance(first, str):
+            return first
+        point, motion = first
+        finer = record.take(motion)
+        if finer is None:
+            return point
+        unknowns = finer.lift(point.unknowns)

@@ -1,0 +1,1 @@
+"""Rings of identical sectors, and waves that travel round them."""

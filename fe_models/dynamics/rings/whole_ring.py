@@ -1,0 +1,83 @@
+"""All sectors of a ring in a wave that was found of one: what small deviations of each do.
+
+Deviations need not travel as the wave does: whether it holds is a matter of all sectors.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from fe_models.dynamics.periodic.harmonic_solution import HarmonicSolution
+from fe_models.dynamics.periodic.joints import Deviations
+from fe_models.dynamics.periodic.receptance import Receptance
+from fe_models.dynamics.rings.sector import CyclicSector, Ring
+from fe_models.dynamics.stability.deviating_structure import ModalStructure
+from sa_solver.types import Array, Indices
+
+
+@dataclass(frozen=True)
+class JoinedDeviations:
+    """:class:`Deviations` of several sets of joints, one after the other."""
+
+    kept: Array
+    by_start: Array
+    by_end: Array
+    pull: Array
+    tangent: Array
+    regimes: np.ndarray
+    force: Array
+    remembered: Indices
+
+    @classmethod
+    def of(cls, parts: Iterable[Deviations]) -> JoinedDeviations:
+        """Joined; all have room for as much memory."""
+        every = tuple(parts)
+
+        def joined(name: str, axis: int) -> Array:
+            return np.concatenate([getattr(part, name) for part in every], axis=axis)
+
+        return cls(
+            joined("kept", 1),
+            joined("by_start", 1),
+            joined("by_end", 1),
+            joined("pull", 0),
+            joined("tangent", 1),
+            joined("regimes", 1),
+            joined("force", 1),
+            np.concatenate([part.remembered for part in every]),
+        )
+
+
+def ring_structure(sector: CyclicSector, directions: int) -> ModalStructure:
+    """The modes of all sectors, without joints, which are of so many directions."""
+    return ModalStructure.without_joints(Receptance(sector.whole()), directions)
+
+
+def motion_of(ring: Ring, motion: HarmonicSolution, sector: int) -> HarmonicSolution:
+    """That of a sector, counted from 0, by that of sector 0: the same, later.
+
+    Examples
+    --------
+    The first of four sectors under engine order 1 moves a quarter of a period after sector 0:
+
+    >>> import numpy as np
+    >>> from fe_models.dynamics import *
+    >>> from fe_models.dynamics.rings.sector import Ring, lumped_sector
+    >>> from fe_models.dynamics.rings.whole_ring import motion_of
+    >>> from wear.joints import Jenkins, PeriodicMarch
+    >>> sector = lumped_sector({"a": 1e-3}, {Link("a"): 1e3}, [[Link("a")]], Ring(4, 1), 0.01)
+    >>> joints = PeriodicMarch(Jenkins(stiffness=1e3, friction=0.0, normal_load=1.0))
+    >>> load = PeriodicLoad({1: np.ones(1)})
+    >>> problem = HarmonicBalance.of_sector(sector, joints, load, Resolution((1,), 64))
+    >>> motion = problem.solve(100.0, force=1.0)
+    >>> print(np.round(motion_of(sector.ring, motion, 1).amplitude(0) / motion.amplitude(0), 6))
+    -0-1j
+    """
+    harmonics = motion.resolution.harmonics
+    later = np.array([ring.phase(sector * ring.shift(harmonic)) for harmonic in harmonics])
+    amplitudes = later[:, None] * motion.resolution.amplitudes(motion.coefficients)
+    coefficients = motion.resolution.coefficients(amplitudes, motion.coefficients.shape[2])
+    return replace(motion, coefficients=coefficients, motion=later[:, None] * motion.motion)

@@ -1,0 +1,1 @@
+"""Elasticity of bodies: stiffness, stress, heat and geometric nonlinearity."""

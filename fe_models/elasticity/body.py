@@ -1,0 +1,361 @@
+"""Linear elasticity of one body with scikit-fem: stiffness, loads, stress."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import cached_property
+
+import numpy as np
+import scipy.sparse as sp
+from skfem import (
+    Basis,
+    BilinearForm,
+    Element,
+    ElementTetP1,
+    ElementTetP2,
+    ElementTriP1,
+    ElementTriP2,
+    FacetBasis,
+    LinearForm,
+)
+from skfem.helpers import grad
+
+from fe_models.meshes.isoparametric import INTEGRATED, facet_normals, mapping_of
+from fe_models.meshes.structure_mesh import Body, in_space
+from sa_solver.half_space.stress import principal_stresses
+from sa_solver.half_space.subsurface_influence import INDICES
+from sa_solver.types import Array, Indices, Material
+
+# The rotor axis, the global Y, through the origin.
+ROTOR, ORIGIN = np.array([0.0, 1.0, 0.0]), np.zeros(3)
+# By dimension and order.
+ELEMENTS = {
+    (3, 1): ElementTetP1,
+    (3, 2): ElementTetP2,
+    (2, 1): ElementTriP1,
+    (2, 2): ElementTriP2,
+}
+
+
+class ElasticBody:
+    """A body of one material, with displacements numbered ``dimension node + component``.
+
+    Triangles are in plane strain; their forces are per length. ``order`` is that of the elements,
+    1 or 2. Vertices are the first nodes; with order 2 the midsides follow. Elements of order 2 are
+    as curved as the midsides of the body say (:mod:`fe_models.meshes.isoparametric`).
+
+    Examples
+    --------
+    A cube of 1 mm³ that is stretched by ε in one direction only: stress, and force on a face, are
+    (λ + 2 G) ε.
+
+    >>> import numpy as np
+    >>> from skfem import MeshTet
+    >>> from fe_models import Body, ElasticBody
+    >>> from sa_solver import Material
+    >>> steel = Material(young=210e3, poisson=0.3)
+    >>> cube = ElasticBody(Body("cube", MeshTet().refined(1)), steel)
+    >>> stretched = (1e-3 * cube.nodes * [0.0, 0.0, 1.0]).ravel()
+    >>> exact = 1e-3 * (steel.lame + 2.0 * steel.shear_modulus)
+    >>> forces = (cube.stiffness @ stretched).reshape(-1, 3)
+    >>> force = forces[cube.nodes[:, 2] == 1.0, 2].sum()
+    >>> print(f"{cube.stress(stretched)[2].mean():.3f} MPa, {force:.3f} N of {exact:.3f}")
+    282.692 MPa, 282.692 N of 282.692
+    """
+
+    def __init__(self, body: Body, material: Material, order: int = 1) -> None:
+        self.body = body
+        self.material = material
+        self.order = order
+        self.dimension = body.mesh.dim()
+        self._element = ELEMENTS[self.dimension, order]
+        self.curved = order == 2 and body.midsides is not None
+        self._basis = self.basis()
+
+    def basis(self, degree: int | None = None) -> Basis:
+        """Of the displacements, with integration exact up to a ``degree`` on straight elements."""
+        if not self.curved:
+            return Basis(self.body.mesh, self._element(), intorder=degree)
+        mapping = mapping_of(self.body)
+        intorder = max(INTEGRATED, degree or 0)
+        basis = Basis(self.body.mesh, self._element(), mapping, intorder)
+        # Jacobians of all elements, which nothing asks for again.
+        vars(mapping).pop("_cache", None)
+        return basis
+
+    @property
+    def nodes(self) -> Array:
+        """Node coordinates in space ``(n, 3)`` [mm]; Y is 0 in the plane."""
+        return in_space(self._basis.doflocs.T)
+
+    @property
+    def element_nodes(self) -> Indices:
+        """Nodes of the elements ``(k, elements)``, midsides included."""
+        return np.asarray(self._basis.element_dofs)
+
+    @property
+    def size(self) -> int:
+        """Number of displacements."""
+        return int(self.dimension * self._basis.N)
+
+    @cached_property
+    def stiffness(self) -> sp.csr_matrix:
+        """Stiffness matrix ``(size, size)`` [N/mm].
+
+        Its blocks of two nodes are λ F + G Fᵀ + G tr(F) with F_ab = ∫ ∂a φi ∂b φj. Summing these
+        pair by pair of nodes takes a third of the time of scikit-fem's scalar forms, and these a
+        tenth of that of its vector form.
+        Whatever the shape of the elements, it has entries between all components of their nodes.
+        """
+        sums, d = _NodePairs(self.element_nodes), self.dimension
+        gradients = [np.asarray(field.grad) for (field,) in self._basis.basis]
+        weights = self._basis.dx
+        if self.order == 1:
+            # The same all over the element.
+            gradients = [gradient[..., :1] for gradient in gradients]
+            weights = weights.sum(axis=1, keepdims=True)
+        forms = np.empty((d, d, len(sums.columns)))
+        for a, b in np.ndindex(d, d):
+            weighted = [gradient[a] * weights for gradient in gradients]
+            forms[a, b] = sums.of(
+                [np.einsum("eq,eq->e", one, two[b]) for one in weighted for two in gradients]
+            )
+        lame, shear = self.material.lame, self.material.shear_modulus
+        blocks = lame * forms + shear * forms.swapaxes(0, 1)
+        blocks[range(d), range(d)] += shear * np.trace(forms)
+        by_pair = np.ascontiguousarray(np.moveaxis(blocks, -1, 0))
+        return sp.bsr_matrix((by_pair, sums.columns, sums.pointers), (self.size,) * 2).tocsr()
+
+    @cached_property
+    def mass(self) -> sp.csr_matrix:
+        """Consistent mass matrix ``(size, size)`` [t]."""
+        scalar = BilinearForm(lambda u, v, w: u * v).assemble(self._basis)
+        identity = sp.identity(self.dimension)
+        return sp.kron(self.material.density * scalar, identity, format="csr")
+
+    def body_load(self, force: Callable[[Array], Array]) -> Array:
+        """Forces ``(size,)`` of a force per volume ``(3, ...)`` at points ``(3, ...)`` [N/mm³]."""
+        points = _spatial(np.asarray(self._basis.global_coordinates()))
+        density = force(points)
+        forms = [
+            LinearForm(lambda v, w: w.f * v).assemble(self._basis, f=density[axis])
+            for axis in self.body.axes
+        ]
+        return np.stack(forms, axis=1).ravel()
+
+    def centrifugal_load(self, axis: Array = ROTOR, through: Array = ORIGIN) -> Array:
+        """Forces ``(size,)`` of 1 rad/s about a unit ``axis`` ``through`` a point [N s²]."""
+        radial = self.material.density * (np.eye(3) - np.outer(axis, axis))
+        return self.body_load(
+            lambda x: np.einsum("ab,b...->a...", radial, x - through[:, None, None])
+        )
+
+    def traction_load(
+        self, boundary: str, traction: Callable[[Array], Array], direction: Array
+    ) -> Array:
+        """Forces ``(size,)`` of a traction on a named boundary.
+
+        ``traction`` gives its size at points ``(3, ...)`` [MPa], ``direction`` ``(3,)`` its sense.
+        """
+        basis = self._facet_basis(boundary)
+        size = traction(_spatial(np.asarray(basis.global_coordinates())))
+        load = LinearForm(lambda v, w: w.f * v).assemble(basis, f=size)
+        return np.outer(load, direction[list(self.body.axes)]).ravel()
+
+    def thermal_load(self, strain: Array) -> Array:
+        """Forces ``(size,)`` of an expansion ``(vertices,)``, linear between these.
+
+        ∫ (3 λ + 2 G) θ div φ_i, in plane strain too (:mod:`fe_models.elasticity.thermal`).
+        """
+        linear = self._basis.with_element(ELEMENTS[self.dimension, 1]())
+        pressure = 3.0 * self.material.lame + 2.0 * self.material.shear_modulus
+        held = linear.interpolate(pressure * strain)
+        forms = [
+            LinearForm(lambda v, w, a=a: w.held * grad(v)[a]).assemble(self._basis, held=held)
+            for a in range(self.dimension)
+        ]
+        return np.stack(forms, axis=1).ravel()
+
+    def pressure_load(self, boundary: str) -> Array:
+        """Forces ``(size,)`` of a pressure of 1 MPa on a named boundary, into the body."""
+        return -_normal_integrals(self._facet_basis(boundary)).ravel()
+
+    def boundary_integral(self, boundary: str, integrand: Callable[[Array], Array]) -> float:
+        """Integral over a named boundary of a function of points ``(3, ...)``."""
+        basis = self._facet_basis(boundary)
+        points = _spatial(np.asarray(basis.global_coordinates()))
+        return float(np.sum(integrand(points) * basis.dx))
+
+    def boundary_weights(self, boundary: str) -> tuple[Indices, Array]:
+        """Nodes of a boundary and the area each stands for, so that Σ w u = ∫ u dA."""
+        weights = LinearForm(lambda v, w: 1.0 * v).assemble(self._facet_basis(boundary))
+        nodes = self.boundary_nodes(boundary)
+        return nodes, weights[nodes]
+
+    def boundary_nodes(self, boundary: str) -> Indices:
+        """Nodes on a named boundary, midsides included."""
+        # What scikit-fem has for it numbers the edges of the mesh, which take a second to find.
+        mesh = self.body.mesh
+        vertices = np.unique(mesh.facets[:, mesh.boundaries[boundary]])
+        return np.append(vertices, np.sort(self.midsides(boundary)[0]))
+
+    def boundary_normals(
+        self, boundary: str, whole: Callable[[Array], Array] = lambda integrals: integrals
+    ) -> tuple[Indices, Array]:
+        """Nodes of a boundary and the outward unit normal at each, ``(n, dimension)``.
+
+        ``whole`` makes of the integrals of normals ``(nodes, dimension)``, of which straight
+        elements have those of vertices alone, what they are of a boundary that goes on beyond the
+        body, as in the next sector of a wheel.
+        """
+        mesh = self.body.mesh
+        normals = np.zeros((len(self.nodes), self.dimension))
+        if self.curved:
+            facets = mesh.boundaries[boundary]
+            at_nodes = facet_normals(self.body, facets)[..., self.body.axes]
+            np.add.at(normals, self.body.facet_nodes(facets), at_nodes)
+            normals = whole(normals)
+        else:
+            basis = self._facet_basis(boundary, ELEMENTS[self.dimension, 1]())
+            normals[: mesh.nvertices] = _normal_integrals(basis)
+            normals = whole(normals)
+            middle, parents = self.midsides(boundary)
+            normals[middle] = normals[parents].sum(axis=1)
+        nodes = self.boundary_nodes(boundary)
+        return nodes, normals[nodes] / np.linalg.norm(normals[nodes], axis=1, keepdims=True)
+
+    def facet_nodes(self, facets: Indices) -> Indices:
+        """Nodes of facets by their numbers, ``(m, k)``: corners, then midsides.
+
+        The midsides are those between corners 0 and 1, in space also 1 and 2, and 2 and 0.
+        """
+        mesh = self.body.mesh
+        corners: Indices = mesh.facets[:, facets].T
+        if self.order == 1:
+            return corners
+        if self.dimension == 2:
+            return np.column_stack([corners, self._basis.facet_dofs[0, facets]])
+        edges = mesh.f2e[:, facets].T
+        ends = mesh.edges[:, edges]
+        middles = []
+        for opposite in (2, 0, 1):
+            away = np.all(ends != corners[None, :, opposite, None], axis=0)
+            middles.append(self._basis.edge_dofs[0, edges[away]])
+        return np.column_stack([corners, *middles])
+
+    def midsides(self, boundary: str) -> tuple[Indices, Indices]:
+        """Midside nodes of a boundary ``(n,)`` and the vertices beside each, ``(n, 2)``."""
+        if self.order == 1:
+            return np.empty(0, np.int64), np.empty((0, 2), np.int64)
+        mesh = self.body.mesh
+        facets = mesh.boundaries[boundary]
+        if self.dimension == 2:
+            return self._basis.facet_dofs[0, facets], mesh.facets[:, facets].T
+        edges = np.unique(mesh.f2e[:, facets])
+        return self._basis.edge_dofs[0, edges], mesh.edges[:, edges].T
+
+    def linear_moments(
+        self, boundary: str, vertices: Indices
+    ) -> tuple[sp.csr_matrix, sp.csr_matrix]:
+        """∫ φ_i φ_k dA and ∫ φ_i N_j dA, φ linear and N the elements' functions.
+
+        Over the facets of a boundary between such ``vertices`` ``(m,)``; of all vertices and of all
+        vertices and nodes, ``(v, v)`` and ``(v, n)`` [mm²].
+        """
+        mesh = self.body.mesh
+        facets = np.asarray(mesh.boundaries[boundary])
+        facets = facets[np.isin(mesh.facets[:, facets], vertices).all(axis=0)]
+        linear = ELEMENTS[self.dimension, 1]()
+        # Products of linear functions and the elements' own, exact.
+        tests, trials = (
+            self._facet_basis(facets, element, 1 + self.order)
+            for element in (linear, self._element())
+        )
+        product = BilinearForm(lambda u, v, w: u * v)
+        return product.assemble(tests).tocsr(), product.assemble(trials, tests).tocsr()
+
+    def stress(self, displacement: Array) -> Array:
+        """Cauchy stress of displacements ``(size,)``, element means, ``(6, elements)`` [MPa].
+
+        Ordered xx, yy, zz, xy, yz, zx of the global axes.
+        """
+        weights = self._basis.dx / self._basis.dx.sum(axis=1, keepdims=True)
+        gradient = np.zeros((3, 3, weights.shape[0]))
+        for u, axis in zip(displacement.reshape(-1, self.dimension).T, self.body.axes, strict=True):
+            field = np.asarray(self._basis.interpolate(u).grad)
+            gradient[axis, list(self.body.axes)] = np.einsum("aeq,eq->ae", field, weights)
+        return self.cauchy(gradient)
+
+    def cauchy(self, gradient: Array) -> Array:
+        """Cauchy stress ``(6, n)`` [MPa] of displacement gradients ``(3, 3, n)``, ∂u_a/∂x_b."""
+        strain = 0.5 * (gradient + gradient.transpose(1, 0, 2))
+        trace = strain[0, 0] + strain[1, 1] + strain[2, 2]
+        lame, shear = self.material.lame, self.material.shear_modulus
+        return components(lame * trace * np.eye(3)[:, :, None] + 2.0 * shear * strain)
+
+    def _facet_basis(
+        self,
+        boundary: str | Indices,
+        element: Element | None = None,
+        degree: int | None = None,
+    ) -> FacetBasis:
+        """On a boundary, named or by its facets, of displacements or of another ``element``."""
+        mesh, mapping = self.body.mesh, None
+        if self.curved:
+            mapping, degree = mapping_of(self.body), max(INTEGRATED, degree or 0)
+        facets = mesh.boundaries[boundary] if isinstance(boundary, str) else boundary
+        return FacetBasis(mesh, element or self._element(), mapping, degree, facets=facets)
+
+
+class _NodePairs:
+    """All pairs of nodes that share an element, row by row, and sums over the elements of each.
+
+    ``nodes`` are those of the elements ``(k, m)``; ``columns`` and ``pointers`` as of a sparse
+    matrix of the nodes, which every one of them has a row in.
+    """
+
+    def __init__(self, nodes: Indices) -> None:
+        k, elements = nodes.shape
+        size = int(nodes.max()) + 1
+        pairs = (nodes.astype(np.int64)[:, None] * size + nodes).ravel()
+        order = np.argsort(pairs, kind="stable")
+        ordered = pairs[order]
+        first = np.flatnonzero(np.diff(ordered, prepend=-1))
+        rows, self.columns = np.divmod(ordered[first], size)
+        self.pointers = np.searchsorted(rows, np.arange(size + 1))
+        added = np.ones(len(order)), order, np.append(first, len(order))
+        self._sum = sp.csr_matrix(added, shape=(len(first), k * k * elements))
+
+    def of(self, values: Sequence[Array]) -> Array:
+        """Sums ``(pairs,)`` of ``k²`` values ``(m,)``, of each node with each in their order."""
+        return np.asarray(self._sum @ np.concatenate(values))
+
+
+def _normal_integrals(basis: FacetBasis) -> Array:
+    """∫ n φi dA ``(nodes, dimension)`` over the facets of a basis, n the outward normal."""
+    forms = [
+        LinearForm(lambda v, w, axis=axis: w.n[axis] * v).assemble(basis)
+        for axis in range(basis.mesh.dim())
+    ]
+    return np.stack(forms, axis=1)
+
+
+def _spatial(points: Array) -> Array:
+    """Points ``(3, ...)`` from those ``(dimension, ...)`` of scikit-fem."""
+    return np.moveaxis(in_space(np.moveaxis(points, 0, -1)), -1, 0)
+
+
+def maximum_principal(stress: Array) -> Array:
+    """Largest principal stress of ``(6, ...)`` components."""
+    return principal_stresses(stress)[0]
+
+
+def tensors(stress: Array) -> Array:
+    """Tensors ``(3, 3, n)`` of ``(6, n)`` components."""
+    xx, yy, zz, xy, yz, zx = stress
+    return np.array([[xx, xy, zx], [xy, yy, yz], [zx, yz, zz]])
+
+
+def components(tensors: Array) -> Array:
+    """Components ``(6, n)`` of symmetric tensors ``(3, 3, n)``."""
+    return tensors[tuple(np.transpose(INDICES))]

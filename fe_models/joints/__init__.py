@@ -1,0 +1,1 @@
+"""Condensed bodies, and the joints and ties between them."""

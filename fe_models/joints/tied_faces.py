@@ -1,0 +1,136 @@
+"""Plane faces of elements of either order, tied for good where their meshes do not match.
+
+As :mod:`fe_models.joints.mortar` for contact, with the elements' own functions on both sides: ψ
+dual to the slave's φ carries the traction, and the slave follows the master, u = N u_master. A
+traction that is constant passes, and so does a displacement that the slave's functions hold,
+exactly.
+
+Of second order ∫φ of a corner is nothing or less, and has no dual. So corners take a share α of the
+midsides beside them,
+
+    φ̃_corner = φ_corner + α Σ φ_midside,   φ̃_midside = (1 - 2α) φ_midside,
+
+which span the same displacements: those of the nodes are T ũ, and N = T D⁻¹ M.
+Popp, Wohlmuth, Gee & Wall 2012, doi:10.1137/110848190.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy.sparse as sp
+
+from fe_models.joints.mortar import Overlap, ProjectedFace, overlap_of
+from sa_solver.types import Array, Indices
+
+# What corners take of midsides (Popp et al. 2012).
+SHIFTED = 0.2
+# A facet of which less is covered is left out: its ψ would have to tell apart displacements at all
+# its nodes from what they do to a sliver.
+SLIVER_SHARE = 0.05
+# Corners at the ends of the edges whose midsides follow them.
+ENDS = {2: ((0, 1),), 3: ((0, 1), (1, 2), (2, 0))}
+
+
+def tied_projection(
+    slave_points: Array,
+    slave_facets: Indices,
+    master_points: Array,
+    master_facets: Indices,
+    order: int,
+) -> tuple[sp.csr_matrix, float]:
+    """N ``(n, m)`` of two faces in one plane z = const, and the share of the slave that is tied.
+
+    Points ``(n, 3)`` and ``(m, 3)`` [mm]; facets of an ``order`` list their corners, triangles or
+    segments along x, then their midsides (:meth:`ElasticBody.facet_nodes`). Rows of nodes that the
+    master does not cover are empty. Raises :class:`MeshError` if the faces have nothing in common.
+
+    Examples
+    --------
+    Two elements of a segment follow three of another:
+
+    >>> import numpy as np
+    >>> from fe_models.joints.tied_faces import tied_projection
+    >>> slave, master = (np.outer(np.linspace(0.0, 6.0, n), [1.0, 0.0, 0.0]) for n in (3, 4))
+    >>> facets = np.array([[0, 1], [1, 2], [2, 3]])
+    >>> follows, tied = tied_projection(slave, facets[:2], master, facets, order=1)
+    >>> print((follows @ master[:, 0]).round(12), round(tied, 12))
+    [0. 3. 6.] 1.0
+    """
+    slave, slave_nodes = _face(slave_points, slave_facets, order)
+    master, master_nodes = _face(master_points, master_facets, order)
+    overlap = overlap_of(slave, master, 2 * order)
+    corners = slave.facets.shape[1]
+    mixing = _mixing(corners, order)
+    shapes = _functions(slave.shapes(overlap.slave, overlap.points), order) @ mixing
+    dual, integrals = _dual(shapes, overlap, slave.sizes)
+    areas = np.bincount(slave_nodes.ravel(), integrals.ravel(), minlength=len(slave_points))
+    tested = _functions(master.shapes(overlap.master, overlap.points), order)
+    values = np.einsum("q,qi,qk->qik", overlap.weights, dual, tested)
+    rows = np.broadcast_to(slave_nodes[overlap.slave][:, :, None], values.shape)
+    columns = np.broadcast_to(master_nodes[overlap.master][:, None, :], values.shape)
+    coupling = sp.csr_matrix(
+        (values.ravel(), (rows.ravel(), columns.ravel())),
+        shape=(len(slave_points), len(master_points)),
+    )
+    scale = np.divide(1.0, areas, out=np.zeros_like(areas), where=areas > 0.0)
+    follows = _nodal(slave_nodes, mixing, len(slave_points)) @ sp.diags(scale) @ coupling
+    return follows.tocsr(), float(areas.sum() / slave.sizes.sum())
+
+
+def _face(points: Array, facets: Indices, order: int) -> tuple[ProjectedFace, Indices]:
+    """A face, and the nodes of its facets in the order that it has their corners in."""
+    corners = facets.shape[1] if order == 1 else {3: 2, 6: 3}[facets.shape[1]]
+    face = ProjectedFace(points, facets[:, :corners])
+    turned = facets.copy()
+    turned[:, :corners] = face.facets
+    if facets.shape[1] == 6:
+        # Corners 0, 1, 2 in the other order: the midsides of the first two edges change places.
+        turned[face.clockwise, 3:5] = facets[face.clockwise, 4:2:-1]
+    return face, turned
+
+
+def _functions(linear: Array, order: int) -> Array:
+    """The elements' functions ``(q, k)`` from those of the corners ``(q, corners)``."""
+    if order == 1:
+        return linear
+    middles = [4.0 * linear[:, a] * linear[:, b] for a, b in ENDS[linear.shape[1]]]
+    return np.column_stack([linear * (2.0 * linear - 1.0), *middles])
+
+
+def _mixing(corners: int, order: int) -> Array:
+    """What the functions φ ``(k,)`` of a facet are multiplied with to be φ̃, ``(k, k)``."""
+    if order == 1:
+        return np.eye(corners)
+    ends = ENDS[corners]
+    mixing = np.eye(corners + len(ends))
+    for middle, (a, b) in enumerate(ends, start=corners):
+        mixing[middle, [a, b]] = SHIFTED
+        mixing[middle, middle] = 1.0 - 2.0 * SHIFTED
+    return mixing
+
+
+def _nodal(facet_nodes: Indices, mixing: Array, count: int) -> sp.csr_matrix:
+    """T ``(count, count)``: displacements of nodes from the factors of φ̃."""
+    shape = (len(facet_nodes), *mixing.shape)
+    rows = np.broadcast_to(facet_nodes[:, :, None], shape)
+    columns = np.broadcast_to(facet_nodes[:, None, :], shape)
+    places = np.stack([rows.ravel(), columns.ravel()])[:, np.tile(mixing.ravel() != 0.0, shape[0])]
+    values = np.tile(mixing.ravel()[mixing.ravel() != 0.0], shape[0])
+    # Facets that share an edge say the same of it.
+    places, first = np.unique(places, axis=1, return_index=True)
+    return sp.csr_matrix((values[first], places), shape=(count, count))
+
+
+def _dual(shapes: Array, overlap: Overlap, sizes: Array) -> tuple[Array, Array]:
+    """ψ at the Gauss points ``(q, k)``, and ∫φ̃ over what is covered ``(m, k)``.
+
+    ``shapes`` are φ̃ ``(q, k)``, ``sizes`` ``(m,)`` those of the slave's facets.
+    """
+    mass = np.zeros((len(sizes), shapes.shape[1], shapes.shape[1]))
+    np.add.at(mass, overlap.slave, np.einsum("q,qi,qj->qij", overlap.weights, shapes, shapes))
+    integrals = mass.sum(axis=2)
+    used = integrals.sum(axis=1) > SLIVER_SHARE * sizes
+    integrals[~used] = 0.0
+    factors = np.zeros_like(mass)
+    factors[used] = np.linalg.solve(mass[used], integrals[used, :, None] * np.eye(mass.shape[1]))
+    return np.einsum("qji,qj->qi", factors[overlap.slave], shapes), integrals

@@ -1,0 +1,1 @@
+"""Meshes of structures: bodies, contact faces, element shapes and worn nodes."""

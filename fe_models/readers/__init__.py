@@ -1,0 +1,1 @@
+"""Readers of mesh files written by other programs."""

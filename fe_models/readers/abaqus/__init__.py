@@ -1,0 +1,1 @@
+"""Abaqus input files: meshes, materials, contacts, supports and loads."""

@@ -1,0 +1,124 @@
+"""Keywords of an Abaqus input file with their parameters and data lines, and where they stand."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import NamedTuple
+
+from fe_models.meshes.structure_mesh import MeshError
+from fe_models.readers.text_files import open_text
+
+
+class SourceLine(NamedTuple):
+    """A line of a file, for messages; 0 of files without lines."""
+
+    path: Path
+    line: int
+
+    def __str__(self) -> str:
+        return f"{self.path}{f':{self.line}' * (self.line > 0)}"
+
+    @property
+    def short(self) -> str:
+        """With the name of the file alone."""
+        return f"{self.path.name}:{self.line}"
+
+
+class DataLine(NamedTuple):
+    """A data line: its fields without blanks, and where it stands."""
+
+    place: SourceLine
+    fields: list[str]
+
+
+@dataclass
+class Card:
+    """A keyword, upper case and without blanks, and what belongs to it."""
+
+    place: SourceLine
+    keyword: str
+    parameters: dict[str, str] = field(default_factory=dict)
+    rows: list[DataLine] = field(default_factory=list)
+
+    def name(self, parameter: str) -> str:
+        """The value of a parameter that has to be there."""
+        if not self.parameters.get(parameter):
+            raise MeshError(f"{self.place}: *{self.keyword} needs {parameter.lower()}=name")
+        return self.parameters[parameter]
+
+
+def cards(path: Path) -> Iterator[Card]:
+    """Keywords of a file in their order; ``*Include`` is followed, comments are skipped.
+
+    Raises :class:`MeshError` if data come before any keyword or an included file is missing.
+    """
+    card = None
+    unfinished = ""
+    for place, text in _lines(path, ()):
+        if unfinished or text.startswith("*"):
+            unfinished += text
+            if text.endswith(","):  # goes on in the next line
+                continue
+            if card is not None:
+                yield card
+            card = _card(place, unfinished)
+            unfinished = ""
+        elif card is None:
+            raise MeshError(f"{place}: is no Abaqus input; allowed: keywords that begin with *")
+        else:
+            card.rows.append(
+                DataLine(place, [part.strip() for part in text.rstrip(",").split(",")])
+            )
+    if card is None:
+        raise MeshError(f"{path}: has no keywords")
+    yield card
+
+
+def integer(place: SourceLine, text: str) -> int:
+    """A number of a node or an element."""
+    try:
+        return int(text)
+    except ValueError:
+        raise MeshError(f"{place}: {text!r} is no whole number") from None
+
+
+def real(place: SourceLine, text: str) -> float:
+    """A coordinate or an angle; an empty field is 0, as in Abaqus."""
+    try:
+        return float(text.upper().replace("D", "E")) if text else 0.0
+    except ValueError:
+        raise MeshError(f"{place}: {text!r} is no number") from None
+
+
+def _lines(path: Path, including: tuple[Path, ...]) -> Iterator[tuple[SourceLine, str]]:
+    """Lines that are neither blank nor comments, those of included files in their place."""
+    # Comments may be in any encoding.
+    with open_text(path) as file:
+        for number, line in enumerate(file, start=1):
+            text = line.strip()
+            if not text or text.startswith("**"):
+                continue
+            if not text.replace(" ", "").upper().startswith("*INCLUDE,"):
+                yield SourceLine(path, number), text
+                continue
+            card = _card(SourceLine(path, number), text)
+            included = path.parent / card.name("INPUT")
+            if not included.is_file() or included in (*including, path):
+                raise MeshError(
+                    f"{card.place}: the included file {card.name('INPUT')} "
+                    + ("is missing" if not included.is_file() else "includes itself")
+                )
+            yield from _lines(included, (*including, path))
+
+
+def _card(place: SourceLine, text: str) -> Card:
+    """A keyword line; values in quotes may hold commas and blanks."""
+    keyword, *parts = re.findall(r'(?:"[^"]*"|[^,"])+', text)
+    parameters = {}
+    for part in parts:
+        key, _, value = part.partition("=")
+        parameters[key.strip().upper()] = value.strip().strip('"')
+    return Card(place, re.sub(r"\s", "", keyword)[1:].upper(), parameters)

@@ -1,0 +1,222 @@
+"""A mesh as a file gives it: nodes, elements of any shape, and their named groups.
+
+The elements of a shape are split into triangles or tetrahedra so that neighbours agree on the
+diagonals of the quadrilaterals between them, whatever they are split from.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field, replace
+from itertools import pairwise
+
+import numpy as np
+
+from fe_models.meshes.curved_face import Midsides
+from fe_models.meshes.structure_mesh import MeshError
+from fe_models.readers.length_unit import LengthUnit
+from fe_models.readers.scene import Scene
+from sa_solver.types import Array, Indices
+
+# Corner nodes of every shape that is read, and its dimension.
+CORNERS = {
+    "vertex": 1, "line": 2, "triangle": 3, "quad": 4, "tetra": 4, "pyramid": 5, "wedge": 6,
+    "hexahedron": 8,
+}  # fmt: skip
+DIMENSION = {
+    "vertex": 0, "line": 1, "triangle": 2, "quad": 2, "tetra": 3, "pyramid": 3, "wedge": 3,
+    "hexahedron": 3,
+}  # fmt: skip
+# Shape of a face with that many corners.
+FACE_SHAPES = {2: "line", 3: "triangle", 4: "quad"}
+# Corners of the faces S1, S2, ... of every shape, in the order of the Abaqus manual (Elements:
+# two-dimensional and three-dimensional solid element libraries), counted from zero.
+FACES: dict[str, tuple[tuple[int, ...], ...]] = {
+    "triangle": ((0, 1), (1, 2), (2, 0)),
+    "quad": ((0, 1), (1, 2), (2, 3), (3, 0)),
+    "tetra": ((0, 1, 2), (0, 3, 1), (1, 3, 2), (2, 3, 0)),
+    "pyramid": ((0, 1, 2, 3), (0, 4, 1), (1, 4, 2), (2, 4, 3), (3, 4, 0)),
+    "wedge": ((0, 1, 2), (3, 5, 4), (0, 3, 4, 1), (1, 4, 5, 2), (2, 5, 3, 0)),
+    "hexahedron": (
+        (0, 1, 2, 3), (4, 7, 6, 5), (0, 4, 5, 1), (1, 5, 6, 2), (2, 6, 7, 3), (3, 7, 4, 0),
+    ),
+}  # fmt: skip
+
+HEXAHEDRON_DIAGONALS = ((0, 6), (1, 7), (2, 4), (3, 5))
+
+# Midside nodes are this share of their edge off its middle at most; a quarter where cracks begin.
+MIDDLE = 0.3
+
+# Elements of one shape and their corner nodes ``(m, corners)``, as rows of the file's points.
+Blocks = list[tuple[str, Indices]]
+
+
+@dataclass(frozen=True)
+class GroupedMesh:
+    """Nodes and named groups of a file; nothing of it is checked.
+
+    ``points`` ``(n, 3)`` [mm], from a reader in ``unit``, which is the file's, and ``numbers``
+    ``(n,)``, the file's own node numbers; per name the elements of a body, the facets of a surface
+    and the rows of a node set. ``midsides`` are the points in the middle of edges that elements of
+    second order have, ``left`` lines of the file that say more than a mesh and are not taken over,
+    ``scene`` what a case could have of them.
+    """
+
+    points: Array
+    numbers: Indices
+    bodies: dict[str, Blocks]
+    surfaces: dict[str, Blocks]
+    node_sets: dict[str, Indices]
+    midsides: Midsides | None = None
+    left: tuple[str, ...] = ()
+    scene: Scene = field(default_factory=Scene)
+    unit: LengthUnit = field(default_factory=LengthUnit)
+
+    def in_millimetres(self) -> GroupedMesh:
+        """Return a mesh with lengths in its ``unit`` in mm, and what it says in N, mm and t."""
+        size, midsides = self.unit.size, self.midsides
+        if size == 1.0:
+            return self
+        if midsides is not None:
+            midsides = replace(midsides, points=size * midsides.points)
+        scene = self.scene.converted(size, self.unit.force)
+        return replace(self, points=size * self.points, midsides=midsides, scene=scene)
+
+
+def midsides_of(points: Array, blocks: Iterable[tuple[str, Indices]]) -> Midsides | None:
+    """Midsides of elements ``(m, nodes)`` of second order by shape; None where all are of first.
+
+    Programs list midside nodes in different orders, all elements of a shape alike: they are given
+    to the edges whose middles they are nearest to. Quadrilaterals have one in their middle too,
+    on both diagonals, since they are split along one: where the eight nodes of their edges put it;
+    hexahedra have one in their middle.
+    """
+    edges, middles, rows = [], [], []
+    for shape, cells in blocks:
+        corners, pairs = CORNERS[shape], edges_of_shape(shape)
+        if cells.shape[1] < corners + len(pairs) or not len(pairs):
+            continue
+        # Takes a tenth of a second to load: where it is used.
+        from scipy.optimize import linear_sum_assignment
+
+        chords = 0.5 * (points[cells[:, pairs[:, 0]]] + points[cells[:, pairs[:, 1]]])
+        given = points[cells[:, corners : corners + len(pairs)]]
+        apart = np.linalg.norm(given[:, None] - chords[:, :, None], axis=3).mean(axis=0)
+        order = linear_sum_assignment(apart)[1]
+        lengths = np.linalg.norm(np.diff(points[cells[:, pairs]], axis=2), axis=3)
+        if np.any(apart[np.arange(len(order)), order] > MIDDLE * lengths.mean(axis=(0, 2))):
+            raise MeshError(f"midside nodes of {shape} elements are not in the middle of its edges")
+        given = given[:, order]
+        edges.append(cells[:, pairs].reshape(-1, 2))
+        middles.append(given.reshape(-1, 3))
+        rows.append(cells[:, corners : corners + len(pairs)][:, order].ravel())
+        place = {tuple(sorted(pair)): k for k, pair in enumerate(pairs.tolist())}
+        inner: list[tuple[tuple[int, ...], Array]] = []
+        for face in _quadrilaterals(shape):
+            around = [place[tuple(sorted(pair))] for pair in pairwise([*face, face[0]])]
+            middle = 0.5 * given[:, around].sum(axis=1) - 0.25 * points[cells[:, face]].sum(axis=1)
+            diagonals = (face[0::2], face[1::2])
+            inner += [(diagonal, middle) for diagonal in diagonals]
+        if shape == "hexahedron":
+            # One of its diagonals is an edge of the tetrahedra it is split into.
+            centre = 0.25 * (given.sum(axis=1) - points[cells[:, :corners]].sum(axis=1))
+            inner += [(diagonal, centre) for diagonal in HEXAHEDRON_DIAGONALS]
+        for diagonal, middle in inner:
+            edges.append(cells[:, diagonal])
+            middles.append(middle)
+            rows.append(np.full(len(cells), -1))
+    if not edges:
+        return None
+    return Midsides(np.concatenate(edges), np.concatenate(middles), np.concatenate(rows))
+
+
+def edges_of_shape(shape: str) -> Indices:
+    """Corners of the edges of a shape, ``(k, 2)``."""
+    rings = FACES[shape] if DIMENSION[shape] > 1 else ((0, 1),) * (shape == "line")
+    pairs = {tuple(sorted(pair)) for ring in rings for pair in pairwise([*ring, ring[0]])}
+    return np.array(sorted(pairs), dtype=np.int64).reshape(-1, 2)
+
+
+def _quadrilaterals(shape: str) -> list[tuple[int, ...]]:
+    """Corners of the faces of a solid that have four, or those of a plane shape that has."""
+    faces = FACES[shape] if DIMENSION[shape] == 3 else (tuple(range(CORNERS[shape])),)
+    return [face for face in faces if len(face) == 4]
+
+
+def simplices(shape: str, cells: Indices) -> Indices:
+    """Split elements of a shape ``(m, corners)`` into lines, triangles or tetrahedra.
+
+    Every quadrilateral is cut by the diagonal from its lowest node, so that the two elements beside
+    it agree, and every element is a fan of tetrahedra round its lowest node: 2 in a pyramid, 3 in a
+    wedge, 6 in a hexahedron (Dompierre, Labbé, Vallet and Camarero, 8th International Meshing
+    Roundtable, 1999).
+    """
+    if shape == "quad":
+        return _halved(cells)
+    if shape not in ("pyramid", "wedge", "hexahedron"):
+        return cells
+    lowest = np.argmin(cells, axis=1)
+    return np.concatenate(
+        [_fan(shape, cells[lowest == apex], apex) for apex in range(CORNERS[shape])]
+    )
+
+
+def split_blocks(blocks: Blocks) -> Indices:
+    """The elements of all blocks, each split by :func:`simplices`."""
+    return np.concatenate([simplices(shape, cells) for shape, cells in blocks])
+
+
+def nodes_of(blocks: Blocks) -> Indices:
+    """Nodes of the elements of all blocks, sorted, each once."""
+    return np.unique(np.concatenate([cells.ravel() for _, cells in blocks]))
+
+
+def _halved(quads: Indices) -> Indices:
+    """Two triangles of each quadrilateral, beside the diagonal from its lowest node."""
+    cyclic = (np.argmin(quads, axis=1)[:, None] + np.arange(4)) % 4
+    quads = np.take_along_axis(quads, cyclic, axis=1)
+    return np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
+
+
+def _fan(shape: str, cells: Indices, apex: int) -> Indices:
+    """Tetrahedra from the corner ``apex`` to all faces that do not touch it."""
+    fan = []
+    for face in FACES[shape]:
+        if apex not in face:
+            triangles = simplices(FACE_SHAPES[len(face)], cells[:, face])
+            tip = np.tile(cells[:, apex], len(triangles) // max(len(cells), 1))
+            fan.append(np.column_stack([tip, triangles]))
+    return np.concatenate(fan)
+
+
+def pieces(blocks: Blocks) -> list[Indices]:
+    """Number of the piece that each element of each block belongs to, ``(m,)`` per block.
+
+    Elements that share a node are in one piece; pieces are numbered as the blocks name them first.
+    """
+    # Sparse matrices take a fifth of a second to load: where they are used.
+    import scipy.sparse as sp
+    from scipy.sparse.csgraph import connected_components
+
+    count = 1 + max(int(cells.max()) for _, cells in blocks)
+    # Every element's corners with its first.
+    links = np.concatenate([cells[:, [0, k]] for _, cells in blocks for k in range(cells.shape[1])])
+    graph = sp.coo_matrix((np.ones(len(links)), links.T), shape=(count, count))
+    _, label = connected_components(graph, directed=False)
+    labels = np.concatenate([label[cells[:, 0]] for _, cells in blocks])
+    _, first, piece = np.unique(labels, return_index=True, return_inverse=True)
+    ordered = np.argsort(np.argsort(first))[piece]
+    return np.split(ordered, np.cumsum([len(cells) for _, cells in blocks])[:-1])
+
+
+def piece_blocks(blocks: Blocks) -> list[Blocks]:
+    """The elements of each piece: see :func:`pieces`."""
+    labels = pieces(blocks)
+    return [
+        [
+            (shape, cells[label == piece])
+            for (shape, cells), label in zip(blocks, labels, strict=True)
+            if np.any(label == piece)
+        ]
+        for piece in range(1 + max(int(label.max()) for label in labels))
+    ]

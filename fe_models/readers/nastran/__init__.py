@@ -1,0 +1,1 @@
+"""Nastran bulk data: meshes, materials, contacts, supports and loads."""

@@ -1,0 +1,143 @@
+"""What a mesh file defines, by its numbers and names: nodes, elements, sets and surfaces."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Collection, Iterator
+from copy import deepcopy
+from dataclasses import dataclass, field
+from typing import Generic, TypeVar
+
+from fe_models.meshes.structure_mesh import MeshError
+from fe_models.readers.abaqus.cards import Card, SourceLine
+from sa_solver.types import Array
+
+# Numbers of nodes or elements, or ranges of which those that exist are meant, by the instance they
+# belong to; those of the scope itself are under "".
+Members = dict[str, list[int | range]]
+_Value = TypeVar("_Value")
+
+
+class Names(Generic[_Value]):
+    """Values by name. Abaqus reads upper and lower case alike; the first spelling is kept."""
+
+    def __init__(self) -> None:
+        self._entries: dict[str, tuple[str, _Value]] = {}
+
+    def __contains__(self, name: str) -> bool:
+        return name.upper() in self._entries
+
+    def __getitem__(self, name: str) -> _Value:
+        return self._entries[name.upper()][1]
+
+    def __len__(self) -> int:
+        return len(self._entries)
+
+    def __str__(self) -> str:
+        return ", ".join(name for name, _ in self.items())
+
+    def add(self, name: str, value: _Value) -> _Value:
+        """Keep the value unless the name has one; return the one kept."""
+        return self._entries.setdefault(name.upper(), (name, value))[1]
+
+    def items(self) -> Iterator[tuple[str, _Value]]:
+        return iter(self._entries.values())
+
+
+@dataclass(frozen=True)
+class Element:
+    """Shape, corner nodes, nodes on its edges, of second order, place and type of an element.
+
+    One whose ``stands_alone`` is false is a facet or an edge of a body, and none itself; ``advice``
+    says what it is and what to do where it is taken for neither.
+    """
+
+    shape: str
+    nodes: tuple[int, ...]
+    midsides: tuple[int, ...]
+    place: SourceLine
+    kind: str = ""
+    stands_alone: bool = True
+    advice: str = ""
+
+
+@dataclass
+class Scope:
+    """A part, an instance, the assembly, or a flat file: nodes, elements, sets and surfaces.
+
+    ``blocks`` are the element sets named on an ``*Element`` line only, as programs name them;
+    ``placing`` takes points ``(n, 3)`` to where an instance has them.
+    """
+
+    name: str
+    place: SourceLine
+    nodes: dict[int, tuple[float, float, float]] = field(default_factory=dict)
+    elements: dict[int, Element] = field(default_factory=dict)
+    node_sets: Names[Members] = field(default_factory=Names)
+    element_sets: Names[Members] = field(default_factory=Names)
+    surfaces: Names[Card] = field(default_factory=Names)
+    blocks: set[str] = field(default_factory=set)
+    placing: Callable[[Array], Array] = lambda points: points
+
+    def instance(self, name: str, place: SourceLine, placing: Callable[[Array], Array]) -> Scope:
+        """An instance of this part."""
+        return Scope(
+            name=name,
+            place=place,
+            nodes=dict(self.nodes),
+            elements=dict(self.elements),
+            node_sets=deepcopy(self.node_sets),
+            element_sets=deepcopy(self.element_sets),
+            surfaces=deepcopy(self.surfaces),
+            placing=placing,
+        )
+
+    def is_empty(self) -> bool:
+        """Whether nothing is defined in it."""
+        return not (
+            self.nodes or self.elements or self.node_sets or self.element_sets or self.surfaces
+        )
+
+
+def resolve(
+    place: SourceLine, text: str, kind: str, scope: Scope, instances: Names[Scope]
+) -> Members:
+    """What a data line means by a number, the name of a set, or ``Instance.`` and either.
+
+    ``kind`` is ``node_sets`` or ``element_sets``.
+    """
+    text = text.strip('"')
+    if re.fullmatch(r"\d+", text):
+        return {"": [int(text)]}
+    sets: Names[Members] = getattr(scope, kind)
+    if text in sets:
+        return sets[text]
+    # Names may have dots in them, too.
+    for dot in (match.start() for match in re.finditer(r"\.", text)):
+        if text[:dot] in instances:
+            inner = instances[text[:dot]]
+            members = resolve(place, text[dot + 1 :], kind, inner, Names())
+            return {inner.name: members.get("", [])}
+    raise MeshError(
+        f"{place}: no {kind[:-1].replace('_', ' ')} {text or '(no name)'}; allowed: "
+        f"{sets or 'those defined above'}"
+    )
+
+
+def extend(members: Members, more: Members) -> None:
+    """Add members to a set."""
+    for instance, numbers in more.items():
+        members.setdefault(instance, []).extend(numbers)
+
+
+def existing(members: list[int | range], known: Collection[int], what: str) -> list[int]:
+    """All numbers meant, of ranges those that exist; raises if any other does not."""
+    numbers: list[int] = []
+    for member in members:
+        if isinstance(member, range):
+            numbers.extend(number for number in member if number in known)
+        elif member in known:
+            numbers.append(member)
+        else:
+            raise MeshError(f"{what} names number {member}, which is not defined")
+    return numbers

@@ -1,0 +1,1 @@
+"""Solvers for the linear systems of structures, and for complementarity."""

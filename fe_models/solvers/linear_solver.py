@@ -1,0 +1,242 @@
+"""Sparse symmetric linear systems: factorised, condensed, or solved by multigrid.
+
+Direct: MKL PARDISO (pypardiso) where it is installed, SuperLU otherwise. PARDISO is never trusted
+blindly: every solution's residual is checked and a bad one is solved again with SuperLU. The
+memory of a factorisation is estimated before it begins. Iterative, for a few right-hand sides of a
+system whose factors do not fit: conjugate gradients with multigrid.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+
+from fe_models.solvers import superlu
+from fe_models.solvers.memory import available_bytes
+from fe_models.solvers.multigrid import MultigridSolver, softness
+from fe_models.solvers.pardiso import Pardiso, PardisoError
+from sa_solver.errors import ConvergenceError
+from sa_solver.types import Array, Indices
+
+# A backward-stable factorisation leaves about 1e-13; anything above this is a wrong answer.
+RESIDUAL_LIMIT = 1e-9
+# |K| |u| / |f|, at most the condition number: 1e2 to 1e4 if a body is held, 1e16 if it is not.
+GROWTH_LIMIT = 1e12
+# Right-hand sides solved at once, where there may be thousands: enough to amortise, little memory.
+COLUMNS_AT_ONCE = 256
+# Inner unknowns from which PARDISO condenses: its analysis has crashed the process with one.
+FEWEST_INNER = 8
+BYTES = 8
+# Residual over the load at which iterations end, and how many of them are an error.
+ITERATED = 1e-10
+MOST_ITERATIONS = 500
+
+# A factorised matrix: call it with right-hand sides ``(n,)`` or ``(n, m)``.
+Factorisation = Callable[[Array], Array]
+
+SINGULAR = (
+    "the stiffness matrix is close to singular: a body is not held, or the mesh has a "
+    "degenerate element"
+)
+
+
+class SolverError(ConvergenceError):
+    """A linear system could not be solved; the message says what is likely wrong with it."""
+
+
+class FactorMemoryError(SolverError, MemoryError):
+    """A factorisation needs more memory than there is; nothing was allocated.
+
+    ``needed`` and ``available`` are in bytes.
+    """
+
+    def __init__(self, task: str, needed: float, available: float) -> None:
+        super().__init__(
+            f"{task} needs about {needed / 1e9:.2g} GB of memory, {available / 1e9:.2g} GB are "
+            "free: take a coarser mesh or fewer interface nodes; a few right-hand sides, but no "
+            "condensation, can be solved iteratively"
+        )
+        self.needed, self.available = needed, available
+
+
+def factorise(matrix: sp.csr_matrix, memory: float | None = None) -> Factorisation:
+    """Factorise a sparse symmetric positive definite matrix.
+
+    ``memory`` is what it may take [bytes]; None stands for all that is free. Raises
+    :class:`FactorMemoryError` before anything large is allocated, and :class:`SolverError` if the
+    matrix is singular, which one random load shows.
+    """
+    solve = _Checked(matrix, _limit(memory))
+    load = np.random.default_rng(0).standard_normal(matrix.shape[0])
+    if np.abs(matrix).max() * np.abs(solve(load)).max() > GROWTH_LIMIT * np.abs(load).max():
+        raise SolverError(SINGULAR)
+    return solve
+
+
+def prepare(
+    matrix: sp.csr_matrix, near_nullspace: Array | None = None, memory: float | None = None
+) -> Factorisation:
+    """Solver of a sparse symmetric positive definite matrix for a few right-hand sides.
+
+    It is factorised where the factors fit into ``memory`` [bytes], all that is free unless given,
+    and iterated by conjugate gradients with multigrid elsewhere.
+    ``near_nullspace`` ``(n, k)`` are motions of little energy, for the iterative solver: those of
+    :func:`fe_models.loads.rigid_motions.rigid_body_modes` if the matrix is an elastic body's.
+    Raises :class:`SolverError`, here if the matrix is singular, or when called if the iterations do
+    not converge.
+    """
+    try:
+        return factorise(matrix, memory)
+    except FactorMemoryError:
+        return _Iterative(matrix, near_nullspace)
+
+
+def condense(
+    matrix: sp.csr_matrix, loads: Array, kept: Indices, memory: float | None = None
+) -> tuple[Array, Array]:
+    """Condense a symmetric system onto the unknowns ``kept`` ``(c,)``, with ``loads`` ``(n, m)``.
+
+    K_cc - K_ci K_ii⁻¹ K_ic ``(c, c)``, dense, and f_c - K_ci K_ii⁻¹ f_i ``(c, m)``, in the order of
+    ``kept``; ``i`` are all other unknowns. K_ii must be positive definite, K need not be. Raises
+    :class:`SolverError` if it is not, and :class:`FactorMemoryError` if it needs more than
+    ``memory`` [bytes], by default all that is free: no iteration replaces it.
+    """
+    limit = _limit(memory)
+    # A load whose displacements are known tells whether the result is right.
+    displacement = np.random.default_rng(0).standard_normal(matrix.shape[0])
+    every = np.column_stack([loads, matrix @ displacement])
+    condensed = _condense_by_pardiso(matrix, every, kept, limit)
+    if condensed is None or not _is_condensed(*condensed, displacement[kept]):
+        condensed = _condense_by_columns(matrix, every, kept, limit)
+    return condensed[0], condensed[1][:, :-1]
+
+
+class _Iterative:
+    """Conjugate gradients whose end is looked at."""
+
+    def __init__(self, matrix: sp.csr_matrix, near_nullspace: Array | None) -> None:
+        soft = np.ones((matrix.shape[0], 1)) if near_nullspace is None else near_nullspace
+        if not softness(matrix, soft) * GROWTH_LIMIT > 1.0:
+            raise SolverError(SINGULAR)
+        self._grids = MultigridSolver(matrix, soft)
+
+    def __call__(self, rhs: Array) -> Array:
+        columns = rhs.reshape(len(rhs), -1).T
+        return np.stack([self._column(column) for column in columns], axis=1).reshape(rhs.shape)
+
+    def _column(self, rhs: Array) -> Array:
+        result = self._grids.solve(rhs, ITERATED, MOST_ITERATIONS)
+        if not result.converged:
+            raise SolverError(
+                f"conjugate gradients did not converge: residual {result.residual:.1e} of the load "
+                f"after {result.iterations} iterations; factorise, allow more iterations, or see "
+                "that all bodies are held and no element is degenerate"
+            )
+        return result.solution
+
+
+def _limit(memory: float | None) -> float:
+    """The memory allowed: what is free, unless given."""
+    return available_bytes() if memory is None else memory
+
+
+class _Checked:
+    """Solutions whose residual has been looked at."""
+
+    def __init__(self, matrix: sp.csr_matrix, limit: float) -> None:
+        self._matrix, self._limit = matrix, limit
+        self._largest = np.abs(matrix).max()
+        self._solve = _pardiso(matrix, limit) or _superlu(matrix, limit)
+
+    def __call__(self, rhs: Array) -> Array:
+        try:
+            solution = self._solve(rhs)
+        except PardisoError:
+            solution = np.full(rhs.shape, np.nan)
+        if not self._is_good(rhs, solution):
+            self._solve = None  # gives its memory back
+            self._solve = _superlu(self._matrix, self._limit)
+            solution = self._solve(rhs)
+            if not self._is_good(rhs, solution):
+                raise SolverError(SINGULAR)
+        return solution
+
+    def _is_good(self, rhs: Array, solution: Array) -> bool:
+        """Whether the residual of every column is that of rounding; NaN is not."""
+        scale = self._largest * np.abs(solution).max(axis=0, initial=0.0)
+        error = np.abs(self._matrix @ solution - rhs).max(axis=0, initial=0.0)
+        load = np.abs(rhs).max(axis=0, initial=0.0)
+        return bool(np.all(error <= RESIDUAL_LIMIT * np.maximum(scale, load)))
+
+
+def _superlu(matrix: sp.csr_matrix, limit: float) -> Any:
+    _require(superlu.factor_bytes(matrix), limit, f"factorising {matrix.shape[0]} unknowns")
+    try:
+        return superlu.factors(matrix).solve
+    except RuntimeError as error:
+        raise SolverError(SINGULAR) from error
+
+
+def _pardiso(matrix: sp.csr_matrix, limit: float) -> Pardiso | None:
+    """PARDISO's factors; None where it is not installed, or refuses the matrix."""
+    try:
+        analysed = Pardiso(matrix)
+        _require(analysed.factor_bytes, limit, f"factorising {matrix.shape[0]} unknowns")
+        analysed.factorise()
+    except PardisoError:
+        return None
+    return analysed
+
+
+def _condense_by_pardiso(
+    matrix: sp.csr_matrix, loads: Array, kept: Indices, limit: float
+) -> tuple[Array, Array] | None:
+    """PARDISO's own Schur complement; None where it is not installed, fails, or hardly pays.
+
+    That of the matrix bordered by the loads as if they were more unknowns to keep: its entries
+    between these and the others are the condensed loads.
+    """
+    size, cases = loads.shape
+    if size - len(kept) < FEWEST_INNER:
+        return None
+    border = sp.csr_matrix(loads)
+    bordered = sp.bmat([[matrix, border], [border.T, sp.identity(cases)]], format="csr")
+    try:
+        analysed = Pardiso(bordered, np.append(kept, np.arange(size, size + cases)))
+        # Its result and the same in the order asked for.
+        needed = analysed.factor_bytes + 2 * BYTES * (len(kept) + cases) ** 2
+        _require(needed, limit, f"condensing {size} unknowns onto {len(kept)}")
+        schur = analysed.schur()
+    except PardisoError:
+        return None
+    return schur[: len(kept), : len(kept)], schur[: len(kept), len(kept) :]
+
+
+def _require(needed: float, limit: float, task: str) -> None:
+    if needed > limit:
+        raise FactorMemoryError(task, needed, limit)
+
+
+def _is_condensed(stiffness: Array, loads: Array, displacement: Array) -> bool:
+    """Whether the last of the loads is that of the ``displacement``."""
+    expected = stiffness @ displacement
+    return bool(np.abs(loads[:, -1] - expected).max() < RESIDUAL_LIMIT * np.abs(expected).max())
+
+
+def _condense_by_columns(
+    matrix: sp.csr_matrix, loads: Array, kept: Indices, limit: float
+) -> tuple[Array, Array]:
+    inner = np.setdiff1d(np.arange(matrix.shape[0]), kept)
+    # The result and its symmetric part; right-hand sides and solutions of one block.
+    dense = 2 * len(kept) ** 2 + 3 * len(inner) * min(COLUMNS_AT_ONCE, len(kept))
+    _require(BYTES * dense, limit, f"condensing {matrix.shape[0]} unknowns onto {len(kept)}")
+    solve = factorise(matrix[inner][:, inner].tocsr(), limit)
+    coupling = matrix[inner][:, kept].tocsc()
+    condensed = matrix[kept][:, kept].toarray()
+    for start in range(0, len(kept), COLUMNS_AT_ONCE):
+        block = slice(start, start + COLUMNS_AT_ONCE)
+        condensed[:, block] -= coupling.T @ solve(coupling[:, block].toarray())
+    return 0.5 * (condensed + condensed.T), loads[kept] - coupling.T @ solve(loads[inner])

@@ -1,0 +1,1 @@
+"""Loading histories and cycles of frictional contacts: loops, slips and energies."""

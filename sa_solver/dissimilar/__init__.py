@@ -1,0 +1,1 @@
+"""Contact of dissimilar elastic bodies: pressure and shear solved together."""

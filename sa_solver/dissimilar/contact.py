@@ -1,0 +1,489 @@
+"""Contact of dissimilar bodies: pressure and shear found together.
+
+Where the bodies differ, pressure moves the surfaces tangentially and shear moves them normally
+(:mod:`sa_solver.dissimilar.problem` states the problem of one increment). Adjusting the normal and
+the tangential problem to each other in turns slows down with µ times Dundurs' β and fails from µβ =
+1; here both are one problem, solved by Newton's method (:mod:`sa_solver.dissimilar.newton`) and,
+where it gives up, by Douglas-Rachford splitting (:mod:`sa_solver.dissimilar.splitting`), slower and
+more often successful. The friction limit follows the pressure, so that no minimum principle and no
+proof of convergence exist: a result carries residuals that do not depend on the method.
+
+Source: Gallego, Nélias & Jacq 2006, J. Tribol. 128, 476, doi:10.1115/1.2194914 (the problem).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from sa_solver import checks
+from sa_solver.contact_law import sticking
+from sa_solver.dissimilar.levels import CoupledLevel, pressed_without_friction
+from sa_solver.dissimilar.problem import CoupledProblem, CoupledResiduals, coupled_residuals
+from sa_solver.dissimilar.splitting import CoupledSplitting
+from sa_solver.errors import ContactProblemError
+from sa_solver.half_space.influence import Z
+from sa_solver.half_space.operator import HalfSpace
+from sa_solver.normal.contact import NormalContact, checked_compliance, checked_heights
+from sa_solver.normal.problem import border_share, messages
+from sa_solver.rigid_modes import NORMAL, PLANAR, RESULTANTS, RigidModes
+from sa_solver.splitting import douglas_rachford
+from sa_solver.surfaces.absent_cells import without_absent
+from sa_solver.tangential.contact import UNCARRIED, FrictionLimitError, listed
+from sa_solver.tangential.friction_limit import largest_share
+from sa_solver.types import Array, Mask
+
+TOLERANCE = 1e-8
+"""Default bound on every residual of :class:`CoupledResiduals`."""
+
+NEWTON_ITERATIONS = 200
+"""Directions of Newton's method; 10 to 35 are usual, 150 on lines with µ far below β."""
+
+ROUNDS = 4
+"""Most searches in larger and larger boxes."""
+
+ITERATIONS = 2000
+"""The splitting takes 40 to 110 on spheres and punches with µ from 0.005 to 1 and β up to 0.5, 200
+within 0.1 % of sliding, and up to 1000 on lines of 1024 cells with µ below 0.02."""
+
+CHUNK = 400
+"""After as many iterations a load is checked for being more than friction can carry."""
+
+LOST = 1e-2
+"""Residual above which the search begins anew then, once, from the pressure without friction. Those
+that are only slow are below it; on rough heights far above the elastic displacement, resting on
+three cells, others still had 0.4 to 0.9 after 2000 iterations, and took 70 to 310 from there."""
+
+TIGHTENING, TIGHTEST = 0.1, 1e-4
+"""The splitting's own residual is no bound on those of the state: its tolerance is lowered by this
+factor until they are met, down to this share of the tolerance asked for."""
+
+OVERLOAD = 0.999
+"""A load is taken to be more than friction can carry where at most this share of it can be: the
+pressure of a search that has not converged is not more accurate than that."""
+
+BARELY = 1.001
+"""Where at most this multiple of a load can be carried, it is taken to be all that can: the motion
+is hardly determined there, and the splitting crawls."""
+
+FEW_CELLS = 8
+"""Contacts of fewer cells can hardly carry the moments imposed on them, and the splitting crawls:
+of random rough contacts those that failed had 0 to 3 cells."""
+
+ALL_FORCES = (False,) * 6
+"""Every resultant imposed, no motion."""
+
+TILTS = (3, 4)
+"""Places of Mx and My among the resultants."""
+
+
+class CoupledContactError(ContactProblemError):
+    """The data of a coupled contact problem admit no solution."""
+
+
+@dataclass(frozen=True)
+class CoupledState:
+    """Solution of one increment.
+
+    ``traction`` ``(qx, qy, p)`` [MPa] and ``displacement`` K t [mm] are ``(3, nx, ny)``, ``slip``
+    Δs of the increment [mm] (0 off the contact) is ``(2, nx, ny)``, ``gap`` [mm] ``(nx, ny)``.
+    ``resultants`` are (P, Qx, Qy, Mx, My, Mz) [N, N mm] and ``rigid`` the motions (δz, δx, δy, φx,
+    φy, φz) [mm, rad], those in the plane being of the increment. ``sticking`` ``(nx, ny)`` are the
+    cells in contact that do not slip, ``cell_area`` [mm²] is that of the grid. ``border_load`` is
+    the share of P on the outermost cells: above 0, the grid is too small. ``message`` says what is
+    wrong and what to try, of a state that has not ``converged`` and of a contact that reaches the
+    grid's border; else it is empty. ``convolutions`` of three components
+    are in units of one on the whole grid, by the size of their transforms, rounded up. (Each
+    iteration also transforms unpadded fields, a quarter of a convolution.)
+    """
+
+    traction: Array
+    displacement: Array
+    slip: Array
+    gap: Array
+    rigid: Array
+    resultants: Array
+    residuals: CoupledResiduals
+    border_load: float
+    sticking: Mask
+    cell_area: float
+    converged: bool = False
+    message: str = ""
+    iterations: int = 0
+    convolutions: int = 0
+
+    @property
+    def contact_area(self) -> float:
+        """Area of the cells in contact [mm²; in a line contact, per mm, its width in mm]."""
+        return float(np.count_nonzero(self.pressure)) * self.cell_area
+
+    @property
+    def stick_area(self) -> float:
+        """Area of the cells that stick [mm²; in a line contact, per mm, their width in mm]."""
+        return float(np.count_nonzero(self.sticking)) * self.cell_area
+
+    @property
+    def elastic_energy(self) -> float:
+        """Energy ½ Σ t·u S that all tractions store in both bodies [N mm], with u = K t."""
+        return 0.5 * float(np.vdot(self.traction, self.displacement)) * self.cell_area
+
+    @property
+    def pressure(self) -> Array:
+        """p ``(nx, ny)`` [MPa]."""
+        pressure: Array = self.traction[Z]
+        return pressure
+
+    @property
+    def shear(self) -> Array:
+        """(qx, qy) ``(2, nx, ny)`` [MPa]."""
+        return self.traction[:Z]
+
+    @property
+    def start(self) -> Array:
+        """Start of a next solve on the same grid."""
+        return self.traction
+
+    @property
+    def touches_border(self) -> bool:
+        """Whether the contact reaches the outermost cells of the grid."""
+        return self.border_load > 0.0
+
+
+class CoupledContact:
+    """Contact of dissimilar bodies with friction on one grid; owns the planned transforms.
+
+    Examples
+    --------
+    A cylinder pressed on a rigid flat: with friction its surface sticks in the middle, and the
+    pressure is higher than Hertz's.
+
+    >>> from sa_solver import CoupledContact, ElasticPair, Grid, HalfSpace, Material
+    >>> from sa_solver.reference.hertz import HertzCylinder
+    >>> rigid, titanium = Material(float("inf"), 0.3), Material(young=115e3, poisson=0.29)
+    >>> grid = Grid.strips(1.2, 128)
+    >>> half_space = HalfSpace(grid, ElasticPair(rigid, titanium))
+    >>> hertz = HertzCylinder(400.0, 50.0, half_space.pair.contact_modulus)
+    >>> for friction in (0.0, 0.5):
+    ...     contact = CoupledContact(half_space, friction)
+    ...     state = contact.solve(hertz.gap(grid.x), None, [400.0, 0, 0, 0, 0, 0])
+    ...     print(f"µ = {friction}: {state.pressure.max() / hertz.peak_pressure:.3f} of Hertz")
+    µ = 0.0: 1.000 of Hertz
+    µ = 0.5: 1.081 of Hertz
+    """
+
+    def __init__(self, half_space: HalfSpace, friction: float) -> None:
+        """Plan for ``half_space`` and the coefficient of friction µ.
+
+        Raises CoupledContactError for a µ below 0 or not finite.
+        """
+        friction = checks.number("friction", friction, least=0.0, error=CoupledContactError)
+        self.half_space, self.friction = half_space, friction
+        self.grid = half_space.grid
+        self._modes = RigidModes(half_space.grid)
+        self._level = CoupledLevel(half_space)
+
+    def solve(
+        self,
+        height: Array,
+        offset: Array | None,
+        values: Array | Sequence[float],
+        motion: tuple[bool, ...] = ALL_FORCES,
+        *,
+        tolerance: float = TOLERANCE,
+        start: Array | None = None,
+        compliance: Array | None = None,
+    ) -> CoupledState:
+        """Tractions and motions at the end of one increment.
+
+        ``height`` is the gap before all loading ``(nx, ny)``, infinite or masked where a body has
+        no surface, and ``offset`` ``(2, nx, ny)`` (0 if None) less the displacement u_τ of the
+        previous state plus any imposed mismatch [mm].
+        ``values`` ``(6,)`` are P, Qx, Qy [N], Mx, My, Mz [N mm] or, where ``motion`` is true, the
+        motion conjugate to each: δz, δx, δy [mm], φx, φy, φz [rad]. ``compliance`` ``(nx, ny)``
+        [mm/MPa] adds D p to the gap. Converged means that every residual is within ``tolerance``.
+        Moments of 0 let the bodies turn: to hold them give a φx and φy of 0.
+
+        Raises CoupledContactError for fields that are not finite or have another shape, a load
+        that pulls, a moment that the cells cannot carry or feel; FrictionLimitError for a shear
+        force above µP.
+        """
+        error, shape = CoupledContactError, self.grid.shape
+        height = checked_heights(height, self.grid, error)
+        if compliance is not None:
+            compliance = checked_compliance(compliance, self.grid, error)
+        if offset is not None:
+            offset = checks.array("offsets", offset, (2, *shape), error=error)
+        tolerance = checks.number("tolerance", tolerance, above=0.0, error=error)
+        if np.shape(values) != (6,) or np.shape(motion) != (6,):
+            raise error("give six values and six switches: P, Qx, Qy, Mx, My, Mz")
+        values = checks.array("values", values, (6,), error=error)
+        self._check(values, motion)
+
+        def pressed(height: Array) -> CoupledState:
+            problem = self._problem(height, offset, values, motion, compliance)
+            apart = self._apart(problem)
+            state = self._unloaded(problem) if apart else self._search(problem, tolerance, start)
+            return replace(state, message=messages(state.message, state.border_load))
+
+        delta, *tilts = (float(values[k]) if motion[k] else 0.0 for k in NORMAL)
+        imposed = 0.0 if motion[0] else float(values[0]), delta, tilts[0], tilts[1]
+        return without_absent(height, self.half_space, imposed, pressed, error)
+
+    # -- steps of solve -----------------------------------------------------------------------
+    def _search(
+        self, problem: CoupledProblem, tolerance: float, start: Array | None
+    ) -> CoupledState:
+        """Newton's method and, where it gives up, the splitting from where it has got to."""
+        if start is not None and start.shape != problem.offset.shape:
+            raise CoupledContactError("start belongs to another grid: start from a state on this")
+        before = self._level.transformed
+        solution, iterations, verified = None, 0, 0
+        begun, missed = self._begun(problem, start), None
+        while begun is not None and verified < ROUNDS:
+            left = NEWTON_ITERATIONS - iterations
+            found = self._level.search(problem, begun, tolerance, left, missed)
+            solution = self._state(problem, found.traction, found.rigid)
+            iterations, verified = iterations + found.iterations, verified + 1
+            begun = found.traction, found.slipping
+            # A box knows no gap around it.
+            missed = solution.gap < -tolerance * solution.displacement[Z].max()
+            if not (found.converged and (missed & (solution.pressure == 0.0)).any()):
+                break
+        transformed = self._level.transformed - before
+        convolutions = verified + int(np.ceil(transformed / np.prod(self.half_space.padded)))
+        if solution is None or solution.residuals.largest > tolerance:
+            solution = self._split(problem, tolerance, solution)
+        else:
+            solution = replace(solution, converged=True)
+        return replace(
+            solution,
+            iterations=iterations + solution.iterations,
+            convolutions=convolutions + solution.convolutions,
+        )
+
+    def _begun(self, problem: CoupledProblem, start: Array | None) -> tuple[Array, Mask] | None:
+        """Traction and slipping cells to search from; None where there are none to be had."""
+        if start is not None and start[Z].any():
+            begun = self._level.near(problem, start)
+            if begun is not None:
+                return begun
+        return self._level.begin(problem)
+
+    def _split(
+        self, problem: CoupledProblem, tolerance: float, last: CoupledState | None
+    ) -> CoupledState:
+        """Iterate the splitting until the residuals of its solution are met, or cannot be."""
+        before = self.half_space.count
+        whole, free = self._splitting, list(problem.free)
+        splitting = whole.of(problem)
+        if last is not None and np.isfinite(last.residuals.largest):
+            state = self._splitting_state(problem, last)
+        else:
+            state = whole.touching(problem)
+        inner, iterations, message, begun_anew = tolerance, 0, "", False
+        while True:
+            result = douglas_rachford(
+                splitting.elastic_step,
+                splitting.local_law,
+                state,
+                tolerance=inner,
+                max_iterations=min(CHUNK, ITERATIONS - iterations),
+            )
+            state, iterations = result.state, iterations + result.iterations
+            rigid = np.zeros(6)
+            rigid[free] = splitting.rigid
+            solution = self._state(problem, whole.resolvent.on_grid(result.solution), rigid)
+            converged = solution.residuals.largest <= tolerance
+            if converged:
+                break
+            if not result.converged:
+                message = self._overload(problem, solution)
+                if not (message or begun_anew or solution.residuals.largest <= LOST):
+                    state, begun_anew = self._pressed(problem), True
+            elif inner > TIGHTEST * tolerance:
+                inner *= TIGHTENING
+            else:
+                message = self._failure(problem, solution, tolerance)
+            if iterations >= ITERATIONS or not np.all(np.isfinite(state)):
+                message = message or self._failure(problem, solution, tolerance)
+            if message:
+                break
+        return replace(
+            solution,
+            converged=converged,
+            message=message,
+            iterations=iterations,
+            convolutions=self.half_space.count - before,
+        )
+
+    def _splitting_state(self, problem: CoupledProblem, last: CoupledState) -> Array:
+        """The splitting's state at a ``last`` one."""
+        slip = problem.relative(last.traction, last.displacement, self._free(problem, last.rigid))
+        slip[Z] -= problem.compliance * last.pressure
+        return self._splitting.state(last.traction, slip)
+
+    def _free(self, problem: CoupledProblem, rigid: Array) -> Array:
+        """The part of the motions ``(6,)`` [mm, rad] that is not imposed [mm]."""
+        return np.asarray(rigid * self._modes.lengths - problem.imposed)
+
+    @cached_property
+    def _splitting(self) -> CoupledSplitting:
+        return CoupledSplitting(self.half_space, self.friction, self._modes)
+
+    def _problem(
+        self,
+        height: Array,
+        offset: Array | None,
+        values: Array,
+        motion: tuple[bool, ...],
+        compliance: Array | None,
+    ) -> CoupledProblem:
+        modes = self._modes
+        imposed = np.where(motion, values * modes.lengths, 0.0)
+        if not motion[0]:
+            # Counted from where the bodies touch, a small displacement keeps its digits.
+            imposed[0] = height.min()
+        free = tuple(k for k in modes.present if not motion[k])
+        moved = np.zeros((3, *self.grid.shape))
+        moved[:Z] = 0.0 if offset is None else offset
+        moved[Z] = height
+        return CoupledProblem(
+            half_space=self.half_space,
+            modes=modes,
+            friction=self.friction,
+            offset=moved - modes.motion(imposed),
+            imposed=imposed,
+            free=free,
+            target=(values / (modes.lengths * self.grid.cell_area))[list(free)],
+            compliance=0.0 if compliance is None else compliance,
+        )
+
+    def _state(self, problem: CoupledProblem, traction: Array, rigid: Array) -> CoupledState:
+        """The state with these tractions and free motions; whether it will do is left open."""
+        displacement = self.half_space.displacement(traction)
+        relative = problem.relative(traction, displacement, rigid)
+        return CoupledState(
+            traction=traction,
+            displacement=displacement,
+            slip=np.where(traction[Z] > 0.0, relative[:Z], 0.0),
+            gap=relative[Z],
+            rigid=(rigid + problem.imposed) / self._modes.lengths,
+            resultants=self._modes.resultants(traction),
+            residuals=coupled_residuals(problem, traction, displacement, relative),
+            border_load=border_share(traction[Z]),
+            sticking=sticking(traction, self.friction),
+            cell_area=self.grid.cell_area,
+        )
+
+    def _pressed(self, problem: CoupledProblem) -> Array:
+        """The splitting's state of the bodies pressed without friction."""
+        pressed = pressed_without_friction(problem, self._normal)
+        traction, elastic = np.zeros((2, *problem.offset.shape))
+        traction[Z] = pressed.pressure
+        elastic[Z] = pressed.gap - problem.compliance * pressed.pressure
+        return self._splitting.state(traction, elastic)
+
+    @cached_property
+    def _normal(self) -> NormalContact:
+        return NormalContact(self.half_space)
+
+    @staticmethod
+    def _apart(problem: CoupledProblem) -> bool:
+        """Whether no load acts: P = 0, or motions imposed that leave a gap."""
+        if problem.load is not None:
+            return problem.load == 0.0
+        tilting = TILTS[0] in problem.free or TILTS[1] in problem.free
+        return not tilting and float(problem.offset[Z].min()) >= 0.0
+
+    def _unloaded(self, problem: CoupledProblem) -> CoupledState:
+        """No load: the bodies just touch, or stay apart where their motion is imposed."""
+        if any(value for k, value in zip(problem.free, problem.target, strict=True) if k in PLANAR):
+            raise FrictionLimitError(0.0, UNCARRIED)
+        traction = np.zeros((3, *self.grid.shape))
+        rigid = np.zeros(6)
+        if problem.load is not None:
+            rigid[0] = problem.offset[Z].min()
+        return replace(
+            self._state(problem, traction, rigid),
+            residuals=CoupledResiduals(*[0.0] * 5),
+            converged=True,
+            border_load=0.0,
+        )
+
+    def _failure(self, problem: CoupledProblem, state: CoupledState, tolerance: float) -> str:
+        measured, cells = state.residuals, np.count_nonzero(state.pressure)
+        remedy = "take smaller increments, loosen the tolerance, or smooth or refine the heights"
+        if cells < FEW_CELLS:
+            remedy = f"only {cells} cells carry the load, refine the grid or smooth the heights"
+        elif self._overload(problem, state, BARELY):
+            remedy = (
+                "the shear load is all that friction can carry, within 0.1 %, lower it or impose "
+                "the sliding motion instead"
+            )
+        return (
+            f"the contact of dissimilar bodies stopped at a residual of {measured.largest:.1e} "
+            f"(stick and slip {measured.coulomb:.1e}, penetration {measured.penetration:.1e}, "
+            f"force {measured.force:.1e}) above the tolerance {tolerance:.0e}: {remedy}"
+        )
+
+    def _overload(
+        self, problem: CoupledProblem, state: CoupledState, least: float = OVERLOAD
+    ) -> str:
+        """The load, where friction carries less than ``least`` of it, and the largest; or nothing.
+
+        The pressure is that found.
+        """
+        limit = self.friction * state.pressure
+        planar = [k for k in problem.free if k in PLANAR]
+        target = np.array([problem.target[problem.free.index(k)] for k in planar])
+        resolved = np.all(np.isfinite(limit)) and np.count_nonzero(limit) >= FEW_CELLS
+        if not (resolved and target.any()):
+            return ""
+        shapes = np.array([self._modes.motion(np.eye(6)[k])[:Z] for k in planar])
+        share = largest_share(limit.ravel(), shapes.reshape(len(planar), 2, -1), target)
+        if share >= least:
+            return ""
+        forces = target * (self._modes.lengths * self.grid.cell_area)[planar]
+        places = [PLANAR.index(k) for k in planar]
+        given, largest = (listed(places, scale * forces) for scale in (1.0, share))
+        return (
+            f"friction cannot carry {given}; under the pressure found the largest in this "
+            f"direction is {largest}: lower the force, or impose the sliding motion instead"
+        )
+
+    # -- what is refused ----------------------------------------------------------------------
+    def _check(self, values: Array, motion: tuple[bool, ...]) -> None:
+        for k, name in enumerate(RESULTANTS):
+            if k not in self._modes.present and values[k] != 0.0:
+                raise CoupledContactError(
+                    f"{name} or its motion has no meaning on this grid (a line contact or a "
+                    "single row of cells): give 0"
+                )
+        if not motion[0]:
+            self._check_load(values, motion)
+
+    def _check_load(self, values: Array, motion: tuple[bool, ...]) -> None:
+        """Signs and bounds that hold for any pressure with the resultant P."""
+        load = values[0]
+        if load < 0.0:
+            raise CoupledContactError(f"load {load:g} N pulls: give P >= 0")
+        for k, centres in zip(TILTS, (self.grid.y, self.grid.x), strict=True):
+            reach = float(centres.max())
+            if not motion[k] and values[k] != 0.0 and not abs(values[k]) < load * reach:
+                raise CoupledContactError(
+                    f"{RESULTANTS[k]} = {values[k]:g} N mm under P = {load:g} N puts the load "
+                    f"outside the cells, over {reach:g} mm off centre: enlarge the grid or lower "
+                    "the moment"
+                )
+        planar = [k for k in (1, 2) if not motion[k]]
+        shear = float(np.hypot.reduce(values[planar])) if planar else 0.0
+        largest = self.friction * load
+        if shear > largest:
+            raise FrictionLimitError(
+                largest / shear,
+                f"friction cannot carry a shear force of {shear:.6g} N; the largest is µP = "
+                f"{largest:.6g} N: lower the force, or impose the sliding motion instead",
+            )

@@ -1,0 +1,194 @@
+"""Contact of dissimilar bodies on one grid: begun on coarser ones, searched in a box around it.
+
+Both only save time: the answer is verified by a convolution on the whole grid.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cached_property, lru_cache
+
+import numpy as np
+
+from sa_solver.dissimilar.newton import (
+    ROUNDING,
+    CoupledIterate,
+    CoupledOperator,
+    balanced,
+    newton_on_cones,
+)
+from sa_solver.dissimilar.problem import CoupledProblem
+from sa_solver.half_space.active_box import Box
+from sa_solver.half_space.influence import Z
+from sa_solver.half_space.nested_grids import GridTransfer, coarsened
+from sa_solver.half_space.operator import HalfSpace
+from sa_solver.normal.contact import NormalContact, NormalContactError, NormalState
+from sa_solver.rigid_modes import NORMAL, RigidModes
+from sa_solver.types import Array, Mask
+
+COARSE_TOLERANCE = 3e-3
+"""Residual of solutions on coarser grids, which are off by more than that."""
+
+COARSE_ITERATIONS = 40
+"""Directions on coarser grids: a poor start is worth no more."""
+
+BOXES = 4
+"""Boxes whose transforms are kept, the last used."""
+
+
+class CoupledLevel:
+    """Searches contacts on one grid; owns what was planned for it.
+
+    ``transformed`` counts the points of all padded transforms so far, for three components.
+    """
+
+    def __init__(self, half_space: HalfSpace) -> None:
+        """Plan for ``half_space``."""
+        self.half_space = half_space
+        self.transformed = 0.0
+        self._boxed = lru_cache(BOXES)(self._plan)
+
+    def begin(self, problem: CoupledProblem) -> tuple[Array, Mask] | None:
+        """Admissible, balanced traction ``(3, nx, ny)`` to search from, and the cells that slip.
+
+        From the solutions on coarser grids, or without friction where there are none. None where
+        there is no such traction.
+        """
+        return self._from_coarser(problem) or self.near(problem, self._pressed(problem))
+
+    def near(self, problem: CoupledProblem, traction: Array) -> tuple[Array, Mask] | None:
+        """The same near a traction of p >= 0, of which the cells on their circle slip."""
+        limit = problem.friction * traction[Z]
+        slipping = (np.hypot(*traction[:Z]) >= limit * (1.0 - ROUNDING)) & (traction[Z] > 0.0)
+        return self._on_cones(problem, traction, slipping)
+
+    def search(
+        self,
+        problem: CoupledProblem,
+        begun: tuple[Array, Mask],
+        tolerance: float,
+        max_iterations: int,
+        missed: Mask | None = None,
+    ) -> CoupledIterate:
+        """Newton's method from a traction and its slipping cells, in a box around the contact.
+
+        And around cells ``missed`` so far. The box is enlarged while the contact reaches its sides.
+        """
+        (traction, slipping), iterations = begun, 0
+        pressed = traction[Z] > 0.0
+        box = Box.around(pressed if missed is None else pressed | missed)
+        while True:
+            operator = self._operator(box)
+            before = operator.half_space.count
+            found = newton_on_cones(
+                problem.cropped(box.window, operator.half_space),
+                operator,
+                np.ascontiguousarray(traction[:, *box.window]),
+                slipping[box.window],
+                tolerance,
+                max_iterations - iterations,
+                box.left_by,
+            )
+            self._count(operator.half_space, operator.half_space.count - before)
+            traction = np.array([box.placed(component) for component in found.traction])
+            slipping = box.placed(found.slipping.astype(np.float64)) > 0.0
+            iterations += found.iterations
+            if not found.left:
+                return replace(found, traction=traction, slipping=slipping, iterations=iterations)
+            box = box.grown()
+
+    # -- starts -------------------------------------------------------------------------------
+    def _on_cones(
+        self, problem: CoupledProblem, traction: Array, slipping: Mask
+    ) -> tuple[Array, Mask] | None:
+        if not traction[Z].any():
+            return None
+        within = balanced(problem, self._whole, traction, slipping)
+        return None if within is None else (within, slipping)
+
+    def _pressed(self, problem: CoupledProblem) -> Array:
+        """Traction without friction, 0 where there is none to be had."""
+        traction = np.zeros((3, *self.half_space.grid.shape))
+        try:
+            state = pressed_without_friction(problem, self._normal)
+        except NormalContactError:
+            return traction
+        traction[Z] = state.pressure
+        self._count(self.half_space, state.convolutions / 3.0)
+        return traction
+
+    def _from_coarser(self, problem: CoupledProblem) -> tuple[Array, Mask] | None:
+        """From the solution on the next coarser grid; None without one."""
+        if self._coarser is None:
+            return None
+        level, transfer = self._coarser
+        coarse, before = level._restricted(problem, transfer), level.transformed
+        begun = level.begin(coarse)
+        if begun is None:
+            return None
+        found = level.search(coarse, begun, COARSE_TOLERANCE, COARSE_ITERATIONS)
+        self.transformed += level.transformed - before
+        traction = np.array([transfer.interpolated(component) for component in found.traction])
+        pressed, slipping = (
+            transfer.interpolated(cells.astype(np.float64)) > 0.5
+            for cells in (found.traction[Z] > 0.0, found.slipping)
+        )
+        # Interpolation smears tractions over cells beyond the edge: five directions more.
+        return self._on_cones(problem, traction * pressed, slipping & pressed)
+
+    def _restricted(self, fine: CoupledProblem, transfer: GridTransfer) -> CoupledProblem:
+        """The problem on this level that is the mean of one on the next finer grid."""
+        grid, compliance = self.half_space.grid, fine.compliance
+        return replace(
+            fine,
+            half_space=self.half_space,
+            modes=RigidModes(grid),
+            offset=np.array([transfer.averaged(component) for component in fine.offset]),
+            target=fine.target * (transfer.fine.cell_area / grid.cell_area),
+            compliance=(
+                compliance if isinstance(compliance, float) else transfer.averaged(compliance)
+            ),
+        )
+
+    @cached_property
+    def _coarser(self) -> tuple[CoupledLevel, GridTransfer] | None:
+        coarser = coarsened(self.half_space)
+        return None if coarser is None else (CoupledLevel(coarser[0]), coarser[1])
+
+    @cached_property
+    def _normal(self) -> NormalContact:
+        return NormalContact(self.half_space)
+
+    # -- boxes --------------------------------------------------------------------------------
+    def _operator(self, box: Box) -> CoupledOperator:
+        return self._whole if box.size == box.shape else self._boxed(box.size)
+
+    @cached_property
+    def _whole(self) -> CoupledOperator:
+        return CoupledOperator(self.half_space)
+
+    def _plan(self, size: tuple[int, int]) -> CoupledOperator:
+        grid = replace(self.half_space.grid, shape=size)
+        return CoupledOperator(self.half_space.on(grid))
+
+    def _count(self, half_space: HalfSpace, convolutions: float) -> None:
+        self.transformed += convolutions * float(np.prod(half_space.padded))
+
+
+def pressed_without_friction(problem: CoupledProblem, normal: NormalContact) -> NormalState:
+    """The bodies pressed as ``problem`` says, without friction.
+
+    Raises NormalContactError where no pressure on the grid can be balanced.
+    """
+    units = problem.modes.lengths * problem.half_space.grid.cell_area
+    loads = {k: float(problem.target[n] * units[k]) for n, k in enumerate(problem.free)}
+    held = [0.0 if k in problem.modes.present and k not in loads else None for k in NORMAL]
+    compliance = problem.compliance
+    return normal.solve(
+        problem.offset[Z],
+        *(loads.get(k) for k in NORMAL),
+        approach=held[0],
+        tilt_x=held[1],
+        tilt_y=held[2],
+        compliance=None if isinstance(compliance, float) else compliance,
+    )

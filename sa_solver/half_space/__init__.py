@@ -1,0 +1,1 @@
+"""Elastic half-spaces on a grid: displacements and stresses under surface tractions."""

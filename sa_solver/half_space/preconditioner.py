@@ -1,0 +1,81 @@
+"""An approximate inverse of the half-space for conjugate gradients.
+
+The inverse kernel decays as 1/r³, so periodicity without padding costs few iterations, and the
+transform takes a quarter of the time of the convolution.
+Source: Vollebregt 2014, J. Comput. Phys. 257, 333, doi:10.1016/j.jcp.2013.10.005.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from sa_solver.half_space.influence import Z
+from sa_solver.half_space.operator import NORMAL, HalfSpace, fast_lengths, spectral_filter
+from sa_solver.transforms.padded import SpectralFilter
+from sa_solver.types import Array
+
+SMALLEST_RELATIVE_EIGENVALUE = 1e-6
+"""Floor of a circulant symbol relative to its largest value. The smallest true one is of the order
+of half a cell over the grid's length, far above; the floor only keeps an inverse finite."""
+
+LEVELS = 4
+LEVEL_SPACING = 2.0
+"""Most levels of local compliance in the preconditioner, and their spacing in natural logarithm.
+Where D runs from 0 to a thousand times a cell's own compliance, one level needs over 100 iterations
+and four need 20; more gain nothing."""
+
+
+class NormalPreconditioner:
+    """The inverse symbol of pressure, on the grid made periodic with next to no padding."""
+
+    def __init__(self, half_space: HalfSpace) -> None:
+        """Plan for ``half_space``."""
+        self.half_space = half_space
+        shape = half_space.grid.shape
+        period = fast_lengths(*shape)
+        self._transform = half_space.transform(shape, period, 1)
+        symbol = half_space.symbol(Z, Z, period)
+        self._symbol = np.maximum(symbol, SMALLEST_RELATIVE_EIGENVALUE * symbol.max())
+        self._parts: list[tuple[Array | None, SpectralFilter]] = []
+        self.include(None)
+
+    def include(self, compliance: Array | None) -> None:
+        """Make it approximate ``(K + D)⁻¹`` for a local ``compliance`` D ``(nx, ny)`` [mm/MPa].
+
+        Each level j of D has its own inverse symbol and a window χj on the cells near that level,
+        with Σ χj² = 1: the inverse is Σ χj (K + Dj)⁻¹ χj.
+        """
+        if compliance is None:
+            self._parts = [(None, self._inverse(0.0))]
+            return
+        levels, windows = _compliance_levels(compliance, float(self._symbol.min()))
+        self._parts = [
+            (window, self._inverse(float(level)))
+            for level, window in zip(levels, windows, strict=True)
+        ]
+
+    def apply(self, displacement: Array) -> Array:
+        """Pressure ``(nx, ny)`` [MPa] that causes about ``displacement`` ``(nx, ny)`` [mm]."""
+        total = np.zeros_like(displacement)
+        for window, inverse in self._parts:
+            if window is None:
+                pressure: Array = inverse.apply(displacement[None])[0]
+                return pressure
+            total += window * inverse.apply((window * displacement)[None])[0]
+        return total
+
+    def _inverse(self, level: float) -> SpectralFilter:
+        return spectral_filter(self._transform, [[1.0 / (self._symbol + level)]], NORMAL, NORMAL)
+
+
+def _compliance_levels(compliance: Array, stiffest: float) -> tuple[Array, list[Array | None]]:
+    """Levels of ``compliance`` evenly spaced in log(D + ``stiffest``), and windows around them."""
+    logarithm = np.log(compliance + stiffest)
+    lowest, highest = float(logarithm.min()), float(logarithm.max())
+    intervals = min(LEVELS - 1, round((highest - lowest) / LEVEL_SPACING))
+    if intervals == 0:
+        return np.array([np.mean(compliance)]), [None]
+    position = (logarithm - lowest) * (intervals / (highest - lowest))
+    hats = [np.maximum(0.0, 1.0 - np.abs(position - j)) for j in range(intervals + 1)]
+    centres = np.linspace(lowest, highest, intervals + 1)
+    return np.exp(centres) - stiffest, [np.sqrt(hat) for hat in hats]

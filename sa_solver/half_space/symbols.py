@@ -1,0 +1,123 @@
+"""Symbols: Fourier transforms of influence coefficients on a grid made periodic.
+
+Coefficients are even or odd along each axis, so those at distances from zero to half a period tell
+all, and their spectrum is found along one axis after the other from half of the other: with half
+of the work and of the memory of a transform of the whole.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from sa_solver.half_space.influence import rectangle_influence, strip_influence
+from sa_solver.types import Array, ElasticPair, Grid
+
+Period = tuple[int, int]
+Odd = tuple[bool, bool]
+
+
+class Coefficients:
+    """Influence coefficients of the cells of a grid at distances from zero on, kept.
+
+    Kernels of rectangles are homogeneous of degree one: twice as large cells displace each other
+    twice as far. So those of a grid whose cells are larger in proportion, or which is smaller, are
+    taken from those of a ``finer`` one, where this one's convolutions will be needed anyway.
+    """
+
+    def __init__(
+        self,
+        grid: Grid,
+        pair: ElasticPair,
+        datum: float,
+        padded: Period,
+        finer: Coefficients | None = None,
+    ) -> None:
+        """Of a grid padded to ``padded`` cells; ``datum`` [mm] is for lines."""
+        self._grid, self._pair, self._datum = grid, pair, datum
+        self._counts = _counts(padded)
+        self._finer = finer if finer is not None and self._lies_in(finer) else None
+        self._kept: dict[tuple[int, int], Array] = {}
+
+    def quarter(self, row: int, column: int, period: Period) -> Array:
+        """Those at distances 0 to ``period``//2 along both axes [mm/MPa]; not to be written to."""
+        nx, ny = counts = _counts(period)
+        if not _within(counts, self._counts):
+            return self._computed(row, column, counts)
+        if (row, column) not in self._kept:
+            self._kept[row, column] = self._whole(row, column)
+        return self._kept[row, column][:nx, :ny]
+
+    def between(self, edges_x: Array, edges_y: Array, row: int, column: int) -> Array:
+        """Those of rectangles, or strips, between neighbouring edges [mm]: point less source."""
+        if self._grid.line:
+            return strip_influence(edges_x, self._pair, row, column, self._datum)[:, None]
+        return rectangle_influence(edges_x, edges_y, self._pair, row, column)
+
+    def _whole(self, row: int, column: int) -> Array:
+        if self._finer is None:
+            return self._computed(row, column, self._counts)
+        nx, ny = self._counts
+        found = self._finer.quarter(row, column, self._finer.period)[:nx, :ny]
+        scale = self._grid.pitch[0] / self._finer._grid.pitch[0]
+        return found if scale == 1.0 else scale * found
+
+    @property
+    def period(self) -> Period:
+        """The least whose coefficients are all that are kept."""
+        nx, ny = self._counts
+        return 2 * nx - 2, 2 * ny - 2
+
+    def _computed(self, row: int, column: int, counts: Period) -> Array:
+        edges_x, edges_y = (
+            quarter_edges(2 * n - 2, pitch)
+            for n, pitch in zip(counts, self._grid.pitch, strict=True)
+        )
+        return self.between(edges_x, edges_y, row, column)
+
+    def _lies_in(self, finer: Coefficients) -> bool:
+        """Whether a grid's cells have the proportions of a ``finer`` one's, and are no more."""
+        (x, y), (fine_x, fine_y) = self._grid.pitch, finer._grid.pitch
+        alike = not self._grid.line and x / fine_x == y / fine_y
+        return alike and _within(self._counts, finer._counts)
+
+
+def _counts(period: Period) -> Period:
+    """Numbers of distances from zero to half a period."""
+    return period[0] // 2 + 1, period[1] // 2 + 1
+
+
+def _within(counts: Period, others: Period) -> bool:
+    return counts[0] <= others[0] and counts[1] <= others[1]
+
+
+def quarter_edges(period: int, pitch: float) -> Array:
+    """Edges about the distances 0 to period//2 [mm]."""
+    return (np.arange(period // 2 + 2, dtype=np.float64) - 0.5) * pitch
+
+
+def symbol_of(quarter: Array, period: Period, odd: Odd) -> Array:
+    """Sums of a kernel times cosines or, along axes where it is ``odd``, sines, over a period.
+
+    The kernel is given at distances 0 to ``period``//2 along both axes; the sums
+    ``(mx, my//2 + 1)`` have the frequencies of numpy's ``rfft2``, which is ``(-i)^k`` times as much
+    where the kernel is odd along k axes.
+    """
+    sums = _half_spectrum(_half_spectrum(quarter, 1, period[1], odd[1]), 0, period[0], odd[0])
+    return np.ascontiguousarray(continued(sums, 0, period[0], odd[0]))
+
+
+def _half_spectrum(kernel: Array, axis: int, period: int, odd: bool) -> Array:
+    """Those sums along one axis, at frequencies 0 to ``period``//2."""
+    spectrum = np.fft.rfft(continued(kernel, axis, period, odd), axis=axis)
+    return -spectrum.imag if odd else spectrum.real
+
+
+def continued(kernel: Array, axis: int, period: int, odd: bool) -> Array:
+    """A kernel at distances 0 to period//2 along ``axis``, continued to a whole period."""
+    kernel = np.moveaxis(kernel, axis, 0)[: period // 2 + 1]
+    mirrored = kernel[1 : (period + 1) // 2][::-1]
+    if odd:
+        kernel, mirrored = kernel.copy(), -mirrored
+        if period % 2 == 0:
+            kernel[-1] = 0.0  # as far from one image as from the next, which cancels it
+    return np.moveaxis(np.concatenate([kernel, mirrored]), 0, axis)

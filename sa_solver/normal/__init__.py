@@ -1,0 +1,1 @@
+"""Normal contact: pressures under imposed forces or motions."""

@@ -1,0 +1,137 @@
+"""The discrete normal contact problem and its residuals, whichever method solves it."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from sa_solver.half_space.operator import HalfSpace
+from sa_solver.rigid_modes import APPROACH, NormalModes, Window
+from sa_solver.types import Array
+
+Work = Counter[tuple[int, int]]
+"""How many convolutions were done, by the shape of their transforms."""
+
+
+@dataclass(frozen=True)
+class NormalProblem:
+    """p >= 0, g = h + K p + D p - rigid >= 0, p g = 0, with the resultants of free modes imposed.
+
+    ``height`` ``(nx, ny)`` [mm] is the gap before loading, imposed motions taken off;
+    ``compliance`` is D ``(nx, ny)`` [mm/MPa] or None for 0; ``target`` ``(k,)`` holds the sums of
+    pressure times mode. ``work`` counts convolutions, those of all problems made from this one too.
+    """
+
+    height: Array
+    target: Array
+    modes: NormalModes
+    half_space: HalfSpace
+    compliance: Array | None
+    work: Work
+
+    def displacement(self, pressure: Array) -> Array:
+        """``(K + D) p`` [mm], one convolution."""
+        self.work[self.half_space.padded] += 1
+        elastic = self.half_space.normal(pressure)
+        return elastic if self.compliance is None else elastic + self.compliance * pressure
+
+    def yielded(self, pressure: Array) -> Array | float:
+        """``D p`` [mm]."""
+        return 0.0 if self.compliance is None else self.compliance * pressure
+
+    def cropped(self, window: Window, half_space: HalfSpace) -> NormalProblem:
+        """The problem with pressure only on the cells of ``window``."""
+        return replace(
+            self,
+            height=np.ascontiguousarray(self.height[window]),
+            modes=self.modes.cropped(window),
+            half_space=half_space,
+            compliance=None if self.compliance is None else self.compliance[window],
+        )
+
+
+@dataclass(frozen=True)
+class Iterate:
+    """Pressure, its displacement ``(K + D) p`` and the free rigid motions ``(k,)``."""
+
+    pressure: Array
+    displacement: Array
+    rigid: Array
+
+    def gap(self, problem: NormalProblem) -> Array:
+        """``g = h + (K + D) p - rigid`` [mm]."""
+        gap = problem.height + self.displacement
+        problem.modes.subtract(gap, self.rigid, out=gap)
+        return gap
+
+
+@dataclass(frozen=True)
+class NormalResiduals:
+    """How far a state is from solving the problem, dimensionless, independent of the method.
+
+    ``force``: |Σ p S - P| / P; ``moment``: the larger of |Σ p y S - Mx| / (P Ly) and
+    |Σ p x S + My| / (P Lx) with Lx, Ly half the grid's size; both count what is imposed only.
+    ``penetration``: largest negative gap over the largest displacement (K + D) p;
+    ``complementarity``: max |p g| over the largest pressure times the largest displacement.
+    Pressure is never negative.
+    """
+
+    force: float
+    moment: float
+    penetration: float
+    complementarity: float
+
+    @property
+    def largest(self) -> float:
+        """The largest of the four."""
+        return max(self.force, self.moment, self.penetration, self.complementarity)
+
+
+def contact_residuals(pressure: Array, displacement: Array, gap: Array) -> tuple[float, float]:
+    """Penetration and complementarity as in :class:`NormalResiduals`."""
+    scale = float(displacement.max())
+    if not scale > 0.0:
+        return np.inf, np.inf
+    product = pressure * gap
+    largest = max(product.max(), -product.min())
+    return max(0.0, -float(gap.min())) / scale, float(largest / (pressure.max() * scale))
+
+
+def normal_residuals(problem: NormalProblem, iterate: Iterate) -> NormalResiduals:
+    """All four residuals of ``iterate``."""
+    total = iterate.pressure.sum()
+    if not total > 0.0:
+        return NormalResiduals(np.inf, np.inf, np.inf, np.inf)
+    missing = np.abs(problem.modes.sums(iterate.pressure) - problem.target) / total
+    first = 1 if APPROACH in problem.modes.free else 0
+    penetration, complementarity = contact_residuals(
+        iterate.pressure, iterate.displacement, iterate.gap(problem)
+    )
+    return NormalResiduals(
+        float(missing[:first].max(initial=0.0)),
+        float(missing[first:].max(initial=0.0)),
+        penetration,
+        complementarity,
+    )
+
+
+def border_share(pressure: Array) -> float:
+    """Share of the load on the outermost cells, along each direction that has more than two."""
+    border = np.zeros(pressure.shape, dtype=bool)
+    if pressure.shape[0] > 2:
+        border[[0, -1], :] = True
+    if pressure.shape[1] > 2:
+        border[:, [0, -1]] = True
+    total = float(pressure.sum())
+    return float(pressure[border].sum()) / total if total > 0.0 else 0.0
+
+
+def messages(failure: str, border_load: float) -> str:
+    """Return the message of a state: its ``failure``, and whether its grid cuts the contact off."""
+    border = (
+        f"the contact reaches the border of its grid, where cells carry {border_load:.2g} of the "
+        "load, and is cut off there: take a larger grid, unless the bodies end with it"
+    )
+    return "; ".join(text for text in (failure, border if border_load > 0.0 else "") if text)

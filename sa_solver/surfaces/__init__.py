@@ -1,0 +1,1 @@
+"""Shapes and scans of contact faces, and whether a grid resolves their contact."""

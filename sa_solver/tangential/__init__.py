@@ -1,0 +1,1 @@
+"""Tangential contact: shear and slip under Coulomb's law for a given pressure."""

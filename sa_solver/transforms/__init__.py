@@ -1,0 +1,1 @@
+"""Fourier transforms of zero-padded fields, and compiled loops over grids."""

@@ -1,0 +1,162 @@
+"""Loops over the cells of a grid that are compiled, where numpy would pass over memory many times.
+
+They are called through their namesakes in :mod:`sa_solver.transforms.passes`. None calls another,
+so that what is kept of each stays right as long as this file does. Sums keep the order in which
+they are written: a function gives the same digits on every machine.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+
+@njit(cache=True, nogil=True)
+def multiply_spectrum(spectrum, symbol):  # type: ignore[no-untyped-def]
+    """Multiply a spectrum ``(mx, m)`` by a real symbol of that shape."""
+    for line in range(len(spectrum)):
+        for n in range(spectrum.shape[1]):
+            s, z = symbol[line, n], spectrum[line, n]
+            spectrum[line, n] = complex(s * z.real, s * z.imag)
+
+
+@njit(cache=True, nogil=True)
+def multiply_spectra(spectra, symbols, places, turned_inputs, turned_outputs):  # type: ignore[no-untyped-def]
+    """Replace the first spectra ``(k, mx, m)`` by sums of them times real symbols ``(s, mx, m)``.
+
+    ``places`` ``(r, c)`` names the symbol that takes input j to output i. Inputs that are
+    ``turned`` ``(c,)`` are divided by the imaginary unit first, outputs ``(r,)`` multiplied by it.
+    """
+    outputs, inputs = places.shape
+    _, lines, length = spectra.shape
+    given = np.empty((inputs, length), np.complex128)
+    for line in range(lines):
+        for j in range(inputs):
+            for n in range(length):
+                z = spectra[j, line, n]
+                given[j, n] = complex(z.imag, -z.real) if turned_inputs[j] else z
+        for i in range(outputs):
+            first = places[i, 0]
+            for n in range(length):
+                s, z = symbols[first, line, n], given[0, n]
+                spectra[i, line, n] = complex(s * z.real, s * z.imag)
+            for j in range(1, inputs):
+                place = places[i, j]
+                for n in range(length):
+                    s, z, y = symbols[place, line, n], given[j, n], spectra[i, line, n]
+                    spectra[i, line, n] = complex(y.real + s * z.real, y.imag + s * z.imag)
+            if turned_outputs[i]:
+                for n in range(length):
+                    z = spectra[i, line, n]
+                    spectra[i, line, n] = complex(-z.imag, z.real)
+
+
+@njit(cache=True, nogil=True)
+def split_in_two(spectrum, turns):  # type: ignore[no-untyped-def]
+    """Set the second half of rows ``(2 m, k)`` to the first times ``turns[1]`` ``(m,)``."""
+    half, columns = len(spectrum) // 2, spectrum.shape[1]
+    for n in range(half):
+        c, s = turns[1, n].real, turns[1, n].imag
+        for j in range(columns):
+            a = spectrum[n, j]
+            spectrum[half + n, j] = complex(a.real * c - a.imag * s, a.real * s + a.imag * c)
+
+
+@njit(cache=True, nogil=True)
+def join_two(spectrum, turns):  # type: ignore[no-untyped-def]
+    """Add the second half of rows ``(2 m, k)``, times ``turns[1]`` conjugate, to the first."""
+    half, columns = len(spectrum) // 2, spectrum.shape[1]
+    for n in range(half):
+        c, s = turns[1, n].real, turns[1, n].imag
+        for j in range(columns):
+            a, b = spectrum[n, j], spectrum[half + n, j]
+            spectrum[n, j] = complex(
+                a.real + (b.real * c + b.imag * s), a.imag + (b.imag * c - b.real * s)
+            )
+
+
+@njit(cache=True, nogil=True)
+def split_in_four(spectrum, turns):  # type: ignore[no-untyped-def]
+    """Of rows ``(4 m, k)``, a and b the first two quarters: (a + (-i)^r b) ``turns[r]`` in each."""
+    quarter, columns = len(spectrum) // 4, spectrum.shape[1]
+    for n in range(quarter):
+        c, s = turns[:, n].real, turns[:, n].imag
+        for j in range(columns):
+            a, b = spectrum[n, j], spectrum[quarter + n, j]
+            spectrum[n, j] = a + b
+            x, y = a.real + b.imag, a.imag - b.real
+            spectrum[quarter + n, j] = complex(x * c[1] - y * s[1], x * s[1] + y * c[1])
+            x, y = a.real - b.real, a.imag - b.imag
+            spectrum[2 * quarter + n, j] = complex(x * c[2] - y * s[2], x * s[2] + y * c[2])
+            x, y = a.real - b.imag, a.imag + b.real
+            spectrum[3 * quarter + n, j] = complex(x * c[3] - y * s[3], x * s[3] + y * c[3])
+
+
+@njit(cache=True, nogil=True)
+def join_four(spectrum, turns):  # type: ignore[no-untyped-def]
+    """Sum the quarters z_r times ``turns[r]`` conjugate into a, and i^r times them into b."""
+    quarter, columns = len(spectrum) // 4, spectrum.shape[1]
+    for n in range(quarter):
+        c, s = turns[:, n].real, turns[:, n].imag
+        for j in range(columns):
+            z0, z1 = spectrum[n, j], spectrum[quarter + n, j]
+            z2, z3 = spectrum[2 * quarter + n, j], spectrum[3 * quarter + n, j]
+            x1, y1 = z1.real * c[1] + z1.imag * s[1], z1.imag * c[1] - z1.real * s[1]
+            x2, y2 = z2.real * c[2] + z2.imag * s[2], z2.imag * c[2] - z2.real * s[2]
+            x3, y3 = z3.real * c[3] + z3.imag * s[3], z3.imag * c[3] - z3.real * s[3]
+            spectrum[n, j] = complex((z0.real + x2) + (x1 + x3), (z0.imag + y2) + (y1 + y3))
+            spectrum[quarter + n, j] = complex(
+                (z0.real - x2) - (y1 - y3), (z0.imag - y2) + (x1 - x3)
+            )
+
+
+@njit(cache=True, nogil=True)
+def tensor_product(xx, xy, yy, field, product):  # type: ignore[no-untyped-def]
+    """``product`` ``(2, nx, ny)`` of symmetric tensors ``(nx, ny)`` with a ``field``."""
+    rows, columns = xx.shape
+    for i in range(rows):
+        for j in range(columns):
+            x, y = field[0, i, j], field[1, i, j]
+            product[0, i, j] = xx[i, j] * x + xy[i, j] * y
+            product[1, i, j] = yy[i, j] * y + xy[i, j] * x
+
+
+@njit(cache=True, nogil=True)
+def add_scaled(total, field, scale):  # type: ignore[no-untyped-def]
+    """Add ``scale`` times a ``field`` to ``total``, both ``(k, nx, ny)``."""
+    parts, rows, columns = total.shape
+    for k in range(parts):
+        for i in range(rows):
+            for j in range(columns):
+                total[k, i, j] += scale * field[k, i, j]
+
+
+@njit(cache=True, nogil=True)
+def spread_product(tensor, values, cells, field):  # type: ignore[no-untyped-def]
+    """Set cells of a field ``(3, n)`` to tensors xx, xy, yy, zz ``(4, m)`` times ``(3, m)``."""
+    for i in range(len(cells)):
+        x, y, cell = values[0, i], values[1, i], cells[i]
+        field[0, cell] = tensor[0, i] * x + tensor[1, i] * y
+        field[1, cell] = tensor[1, i] * x + tensor[2, i] * y
+        field[2, cell] = tensor[3, i] * values[2, i]
+
+
+@njit(cache=True, nogil=True)
+def gather_product(tensor, field, cells, product):  # type: ignore[no-untyped-def]
+    """Add the same tensors times what a ``field`` ``(3, n)`` has on cells to ``product``."""
+    for i in range(len(cells)):
+        cell = cells[i]
+        x, y = field[0, cell], field[1, cell]
+        product[0, i] += tensor[0, i] * x + tensor[1, i] * y
+        product[1, i] += tensor[1, i] * x + tensor[2, i] * y
+        product[2, i] += tensor[3, i] * field[2, cell]
+
+
+@njit(cache=True, nogil=True)
+def add_product(tensor, values, product):  # type: ignore[no-untyped-def]
+    """Add the same tensors times ``values`` ``(3, m)`` to ``product`` ``(3, m)``."""
+    for i in range(values.shape[1]):
+        x, y = values[0, i], values[1, i]
+        product[0, i] += tensor[0, i] * x + tensor[1, i] * y
+        product[1, i] += tensor[1, i] * x + tensor[2, i] * y
+        product[2, i] += tensor[3, i] * values[2, i]

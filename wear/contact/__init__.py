@@ -1,0 +1,1 @@
+"""Contacts that wear: their loads, tractions and link to a structure."""

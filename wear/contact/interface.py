@@ -1,0 +1,496 @@
+"""The contact of one interface: its grid, its loads and slips, and how it wears.
+
+Loads and slips come from outside, over one closed cycle (:class:`FaceLoads`). Slips are those of
+the structure's nodes, or the half-space's own under the same loads (wear methods 1 and 2 of Gallego
+2007); these are found anew on every worn surface. What an interface is lies in
+:class:`InterfaceSettings`, all that it remembers in :class:`InterfaceState`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from typing import Literal
+
+import numpy as np
+
+from sa_solver import checks
+from sa_solver.contact import FrictionalContact
+from sa_solver.contact_state import ContactState
+from sa_solver.errors import InputError
+from sa_solver.half_space.operator import HalfSpace
+from sa_solver.normal.contact import NormalContact, checked_heights
+from sa_solver.rigid_modes import NORMAL
+from sa_solver.ties import first_largest
+from sa_solver.types import Array, ElasticPair, Grid, LoadHistory, Mask
+from wear.contact.drive import Drive
+from wear.contact.face_loads import FaceLoads
+from wear.contact.link import Link, Transfer, linked
+from wear.contact.moving import followed, passages
+from wear.contact.tractions import ContactFields, CycleTractions, acting_slip
+from wear.laws import EvolvingLaw, WearLaw
+from wear.steps.full_cycle import CycleStart, march_cycle, slip_known, starts_near
+from wear.steps.marching import advance_cycles
+from wear.steps.steppers import Stepper, first_cycles
+from wear.steps.stepping import (
+    CycleResult,
+    SlidingCycle,
+    Starts,
+    WearingContact,
+    WearState,
+)
+from wear.surfaces import Surfaces
+from wear.worn import Spent
+
+
+class MotionError(InputError):
+    """Surfaces that move over each other, under a law that no wear step follows then."""
+
+
+# --- what an interface is -------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class InterfaceSettings:
+    """One interface and how it wears.
+
+    It is called ``name``, of an elastic ``pair`` of bodies, and computed on ``grid``; ``transfer``
+    leads from the nodes of the loads there (:class:`wear.CellNodes` where these are the cells), and
+    ``stepper`` says in which steps it wears.
+
+    ``gap`` ``(nx, ny)`` [mm] is that of the unloaded, unworn bodies, infinite or masked where one
+    of them has no surface, ``laws`` those of body 1 and
+    body 2, and ``friction`` gives Coulomb's coefficient after so much dissipated energy [N mm].
+    Slips are those of the loads, or with ``method`` full the half-space's own; there ``gross_slip``
+    says in which direction it slides as a whole. A ``drive`` may impose motions of the bodies in
+    the place of the loads' forces (:class:`wear.contact.drive.Drive`). ``follow`` says
+    whether surfaces that move over each other are followed; None: where that counts
+    (:func:`wear.contact.moving.moves`). The ``link`` to the structure of the loads is corrected for
+    what its bodies do beyond half-spaces (:mod:`wear.contact.link`), where they say it at their
+    nodes, or they are taken for half-spaces. ``tolerance`` is the contact solver's.
+
+    Examples
+    --------
+    A steel cylinder on steel whose bodies wear by Archard's law:
+
+    >>> from sa_solver import ElasticPair, Grid, Material
+    >>> from wear import ArchardLaw, CellNodes, ImplicitStepper, InterfaceSettings
+    >>> grid, steel, law = Grid.strips(1.4, 70), Material(210e3, 0.3), ArchardLaw(1e-4, 3000.0)
+    >>> settings = InterfaceSettings(
+    ...     name="cylinder", grid=grid, gap=grid.x**2 / 20.0, transfer=CellNodes(grid),
+    ...     pair=ElasticPair(steel, steel), laws=(law, law),
+    ...     friction=lambda energy: 0.5, stepper=ImplicitStepper(),
+    ... )
+    >>> print(settings.method, settings.friction(0.0))
+    normal 0.5
+    """
+
+    name: str
+    grid: Grid
+    gap: Array
+    transfer: Transfer
+    pair: ElasticPair
+    laws: tuple[WearLaw, WearLaw]
+    friction: Callable[[float], float]
+    stepper: Stepper[WearState, WearingContact]
+    method: Literal["normal", "full"] = "normal"
+    gross_slip: Literal["force", "energies"] = "force"
+    drive: Drive = field(default_factory=Drive)
+    follow: bool | None = None
+    link: Literal["corrected", "half_space"] = "corrected"
+    tolerance: float = 1e-8
+
+    def __post_init__(self) -> None:
+        checks.settle(self, gap=checked_heights(self.gap, self.grid))
+        checks.choice("method", self.method, ("normal", "full"))
+        checks.choice("link", self.link, ("corrected", "half_space"))
+
+
+@dataclass(frozen=True, kw_only=True)
+class InterfaceState(WearState):
+    """What an interface must remember between two jumps.
+
+    ``loads``, nodal ``slip`` ``(t, 2, n)`` and ``link`` are those of the last solution of the
+    source, ``pressed`` ``(n,)`` how the largest of ``loads`` was shared out over the nodes then,
+    none where the source does not know its nodes; ``paths`` ``(t, 3, 2)`` [mm] lead body 2 round
+    its place in each state, none where its motion is too little to follow
+    (:func:`wear.contact.moving.followed`); ``start`` is a :class:`wear.steps.full_cycle.CycleStart`
+    where the half-space has a cycle of its own (method full).
+    """
+
+    loads: LoadHistory
+    slip: Array
+    link: Link
+    pressed: Array
+    paths: Array
+
+
+# --- what it says of itself -----------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class FirstContact:
+    """What the contact of the unworn cycle says: see :class:`wear.steps.stepping.CycleResult`.
+
+    ``energy`` ``(t,)`` [N mm]; ``pressure`` ``(t, nx, ny)`` [MPa]; ``stable_cycles`` the longest
+    stable explicit step; ``link`` is that to the unworn structure; ``cycle`` the states at its
+    increments where the half-space has its own friction (method full), else empty.
+    """
+
+    energy: Array
+    pressure: Array
+    touches_border: bool
+    largest_residual: float
+    spent: Spent
+    stable_cycles: float
+    link: Link
+    cycle: tuple[ContactState, ...]
+
+
+# --- the contact ----------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class _Loaded:
+    """A contact under its loads, ``slip`` ``(t, 2, nx, ny)`` [mm], and the cycle of the half-space
+    that it comes from (empty: from the loads).
+    """
+
+    contact: WearingContact
+    slip: Array
+    cycle: tuple[ContactState, ...]
+
+
+class InterfaceContact:
+    """One interface on its grid.
+
+    All of its methods raise :class:`~wear.steps.stepping.ContactFailure` where a contact problem
+    does not converge.
+
+    Examples
+    --------
+    How much a sliding cylinder wears in its first cycle, by Archard's K s P / H, and how long steps
+    may be:
+
+    >>> import numpy as np
+    >>> from sa_solver import ElasticPair, Grid, LoadHistory, Material
+    >>> from wear import *
+    >>> grid, steel, law = Grid.strips(1.4, 70), Material(210e3, 0.3), ArchardLaw(1e-4, 3000.0)
+    >>> contact = InterfaceContact(InterfaceSettings(
+    ...     name="cylinder", grid=grid, gap=grid.x**2 / 20.0, transfer=CellNodes(grid),
+    ...     pair=ElasticPair(steel, steel), laws=(law, law),
+    ...     friction=lambda energy: 0.5, stepper=ImplicitStepper(),
+    ... ))
+    >>> zero, slip = np.zeros(1), np.zeros((1, 2, 70))
+    >>> slip[:, 0] = 0.04
+    >>> loads = CycleLoads(LoadHistory(zero + 50.0, *[zero] * 7, sliding=zero == 0.0), slip)
+    >>> state, first = contact.begin(loads, cycles=1e5)
+    >>> print(f"{state.volume_rate:.3e} mm^3/mm of {2 * 1e-4 * 0.04 * 50.0 / 3000.0:.3e}")
+    1.333e-07 mm^3/mm of 1.333e-07
+    >>> print(f"explicit steps of up to {first.stable_cycles:.0f} cycles")
+    explicit steps of up to 96 cycles
+    """
+
+    def __init__(self, settings: InterfaceSettings) -> None:
+        self.settings, self.name = settings, settings.name
+        self.grid, self.transfer, self.pair = settings.grid, settings.transfer, settings.pair
+        self._contact = NormalContact(HalfSpace(settings.grid, settings.pair))
+        self._frictional: FrictionalContact | None = None
+        self._spent = self._told = Spent()
+        self._current: tuple[tuple[Array, ...], _Loaded] | None = None
+        # Called after each increment of a cycle of the half-space with its own friction.
+        self.solved: Callable[[], None] = lambda: None
+
+    # -- wear ------------------------------------------------------------------------------------
+    def begin(self, history: FaceLoads, cycles: float) -> tuple[InterfaceState, FirstContact]:
+        """The unworn state of a run of so many ``cycles``, and the contact of its first cycle.
+
+        At every loaded increment. Raises :class:`MotionError`.
+        """
+        state = InterfaceState.unworn(
+            self.settings.gap,
+            loads=history.loads,
+            slip=history.slip,
+            link=self._link(history),
+            pressed=np.empty(0),
+            paths=np.empty((0, 3, 2)),
+        )
+        loaded = self._loaded(state)
+        if self.pair.similar:
+            # Unlike bodies are pressed otherwise while friction holds them.
+            solved = {increment: end.pressed for increment, end in enumerate(loaded.cycle)}
+            state = replace(state, starts=solved)
+        result = loaded.contact.cycle(state, np.flatnonzero(history.loads.P > 0.0).tolist())
+        depth_rate, volume_rate = result.per_cycle(self.grid.cell_area)
+        starts = {t: pressed.start for t, pressed in result.states.items()}
+        known = slip_known(loaded.cycle, history.loads)
+        state = replace(
+            state,
+            depth_rate=depth_rate,
+            volume_rate=volume_rate,
+            starts=starts,
+            start=loaded.contact.start,
+            pressed=self._pressed(starts, history),
+            paths=self._paths(loaded.slip, starts, history.loads, known),
+        )
+        first_step = first_cycles(loaded.contact, state, cycles)
+        states, pressure = result.states.values(), self._pressure(result)
+        work = self._unworn_tractions(history, pressure, loaded.cycle).work.sum(axis=(1, 2))
+        return replace(state, next_cycles=first_step), FirstContact(
+            energy=history.loads.share * work * self.grid.cell_area,
+            pressure=pressure,
+            touches_border=any(s.touches_border for s in states),
+            largest_residual=max((s.residuals.largest for s in states), default=0.0),
+            spent=self._newly_spent() + Spent(len(states), result.convolutions),
+            stable_cycles=loaded.contact.stable_cycles(state),
+            link=state.link,
+            cycle=loaded.cycle,
+        )
+
+    def follow(self, state: InterfaceState, history: FaceLoads) -> tuple[InterfaceState, Spent]:
+        """The state under the loads of a new solution, and what it took. Raises MotionError."""
+        return self._followed(state, history, self._link(history)), self._newly_spent()
+
+    def _followed(self, state: InterfaceState, history: FaceLoads, link: Link) -> InterfaceState:
+        if isinstance(state.coarse, InterfaceState):
+            state = replace(state, coarse=self._followed(state.coarse, history, link))
+        starts = {t: start for t, start in state.starts.items() if history.loads.P[t] > 0.0}
+        state = replace(
+            state,
+            loads=history.loads,
+            slip=history.slip,
+            link=link,
+            pressed=self._pressed(starts, history),
+            starts=starts,
+        )
+        if self.settings.method == "full":
+            return state  # body 2 goes on as the half-space's own slip has it
+        paths = self._paths(self.transfer.to_cells(history.slip), starts, history.loads)
+        return replace(state, paths=paths)
+
+    def jump(
+        self, state: InterfaceState, cycles: float, left: float
+    ) -> tuple[InterfaceState, Spent]:
+        """Wear ``cycles`` of the ``left`` cycles of the run; also what it took."""
+        result = advance_cycles(self.settings.stepper, state, cycles, left, self.wearing)
+        assert isinstance(result.state, InterfaceState)
+        return result.state, result.spent + self._newly_spent()
+
+    def stable_cycles(self, state: InterfaceState) -> float:
+        """Longest explicit step that is stable."""
+        return self._loaded(state).contact.stable_cycles(state)
+
+    def on_grid(self, state: InterfaceState) -> Surfaces:
+        """The surfaces on the cells of the grid."""
+        return state.surfaces
+
+    @property
+    def areas(self) -> Array | float:
+        """Of what the surfaces of states consist of: cells, or nodes ``(n,)`` [mm²]."""
+        return self.grid.cell_area
+
+    def volume(self, depth: Array) -> float:
+        """Volume of a worn ``depth``, as the surfaces of states have it [mm³]."""
+        return float(depth.sum()) * self.grid.cell_area
+
+    def moved(self, state: InterfaceState) -> float:
+        """Share of the load that wear has moved since the last solution; 0 without known nodes."""
+        if not state.pressed.size:
+            return 0.0
+        now = self._shared_out(state.starts, state.loads)
+        return 0.5 * float(np.abs(now - state.pressed).sum())
+
+    def nodal_depth(self, state: InterfaceState) -> Array:
+        """Worn depth of both bodies together at the nodes of the face ``(n,)`` [mm]."""
+        return self.transfer.to_nodes(state.surfaces.depth)
+
+    # -- tractions ---------------------------------------------------------------------------------
+    def fields(self, state: InterfaceState, increment: int) -> ContactFields:
+        """Tractions and slip of an increment on the present surfaces."""
+        loaded = self._loaded(state)
+        if loaded.cycle:
+            solved = loaded.cycle[increment]
+            return ContactFields(solved.pressure, solved.shear, solved.slip)
+        slip, start = self.transfer.to_cells(state.slip[increment]), state.starts.get(increment)
+        pressure = loaded.contact.solve(state.surfaces, increment, start).pressure
+        return ContactFields(pressure, self._sliding_shear(pressure, slip, state.energy), slip)
+
+    def tractions(self, state: InterfaceState) -> CycleTractions:
+        """Tractions of a cycle on the present surfaces."""
+        loaded = self._loaded(state)
+        if loaded.cycle:
+            return self._half_space_tractions(state.loads, loaded.cycle, state.energy)
+        result = loaded.contact.cycle(state, np.flatnonzero(state.loads.P > 0.0).tolist())
+        return self._given_tractions(state, self._pressure(result), state.energy)
+
+    def unworn_tractions(self, history: FaceLoads, first: FirstContact) -> CycleTractions:
+        """Tractions of the first cycle, solved already."""
+        return self._unworn_tractions(history, first.pressure, first.cycle)
+
+    def _unworn_tractions(
+        self, history: FaceLoads, pressure: Array, cycle: tuple[ContactState, ...]
+    ) -> CycleTractions:
+        if cycle:
+            return self._half_space_tractions(history.loads, cycle, 0.0)
+        return self._given_tractions(history, pressure, 0.0)
+
+    def carried(self, loads: LoadHistory, pressure: Array) -> LoadHistory:
+        """``loads``, with what ``pressure`` ``(t, nx, ny)`` [MPa] carries where motions press."""
+        force, grid = pressure * self.grid.cell_area, self.grid
+        arms = {"P": np.ones(1), "Mx": grid.y, "My": -grid.x}
+        imposed = zip(arms.items(), NORMAL, strict=True)
+        driven = {name: arm for (name, arm), k in imposed if self.settings.drive.motion[k]}
+        if not driven:
+            return loads
+        found = {name: np.sum(force * arm, axis=(1, 2)) for name, arm in driven.items()}
+        return replace(loads, **found)
+
+    def frictional(self, energy: float) -> FrictionalContact:
+        """The contact with the half-space's own friction, after so much ``energy`` [N mm]."""
+        friction = self.settings.friction(energy)
+        if self._frictional is None or self._frictional.friction != friction:
+            self._frictional = FrictionalContact(
+                self._contact.half_space,
+                friction,
+                self.settings.tolerance,
+                self.settings.gross_slip,
+            )
+        return self._frictional
+
+    def _newly_spent(self) -> Spent:
+        """What cycles of the half-space and links have taken since this was asked for last."""
+        spent, self._told = self._spent - self._told, self._spent
+        return spent
+
+    # -- loads -------------------------------------------------------------------------------------
+    def _link(self, history: FaceLoads) -> Link:
+        """What the structure of the loads adds to the half-space."""
+        settings, force, displacement = self.settings, history.force, history.displacement
+        if settings.link == "half_space" or force is None or displacement is None:
+            return Link.none()
+        half_space, shear = self._contact.half_space, settings.method == "full"
+        before = half_space.count
+        link = linked(half_space, self.transfer, history.loads, force, displacement, shear)
+        self._spent += Spent(0, half_space.count - before)
+        return link.level() if settings.drive.tilt == "free" else link
+
+    def wearing(self, state: WearState) -> WearingContact:
+        """Return what wears under the loads and slips of a state."""
+        assert isinstance(state, InterfaceState)
+        return self._loaded(state).contact
+
+    def _loaded(self, state: InterfaceState) -> _Loaded:
+        """The contact under the state's loads and slips, kept until these change.
+
+        Slips of the loads change with these, those of the half-space with wear.
+        """
+        settings, friction = self.settings, self.settings.friction(state.energy)
+        columns = np.array([*vars(state.loads).values()], dtype=float)
+        key: tuple[Array, ...] = columns, state.slip, state.paths, np.array([friction])
+        key = *key, state.link.coefficients, state.link.region
+        if settings.method == "full":
+            # What it starts from leaves its rounding, which a run that goes on must find again.
+            starts = [start.pressure for start in state.starts.values()]
+            key = *key, state.surfaces.gap, state.surfaces.depth_1, np.array([*state.starts])
+            key = *key, *starts, *(vars(state.start).values() if state.start else ())
+        if self._current is not None and all(map(np.array_equal, self._current[0], key)):
+            return self._current[1]
+        slip, ways = self.transfer.to_cells(state.slip), passages(self.grid, state.paths)
+        acting = acting_slip(slip, state.loads)
+        moved = state.link.fields(self.transfer.places) if state.link.corrects else None
+        uplift = None if moved is None else moved[:, 2]
+        sliding = SlidingCycle(state.loads, acting, uplift, ways, settings.drive)
+        cycle: tuple[ContactState, ...] = ()
+        if settings.method == "full":
+            cycle = self._half_space_cycle(state, sliding, moved)
+            slip = np.stack([increment.slip for increment in cycle])
+            sliding = replace(sliding, slip=acting_slip(slip, state.loads))
+            if not self.pair.similar:
+                lift = self._contact.half_space.normal_under_shear
+                lifted = np.stack([lift(increment.shear) for increment in cycle])
+                sliding = replace(sliding, uplift=lifted if uplift is None else uplift + lifted)
+        contact = WearingContact(
+            *(self._contact, settings.laws, friction, sliding, settings.tolerance),
+            start=CycleStart.of(cycle) if cycle else None,
+        )
+        self._current = key, _Loaded(contact, slip, cycle)
+        return self._current[1]
+
+    def _half_space_cycle(
+        self, state: InterfaceState, sliding: SlidingCycle, moved: Array | None
+    ) -> tuple[ContactState, ...]:
+        """The closed cycle with its own friction, on surfaces ``moved`` ``(t, 3, nx, ny)`` [mm]."""
+        gaps = np.stack([sliding.gap(state.surfaces, t) for t in range(len(state.loads))])
+        contact = self.frictional(state.energy)
+        known = state.start if isinstance(state.start, CycleStart) else None
+        drive, starts = self.settings.drive, starts_near(known, state.starts, len(state.loads))
+        cycle = tuple(march_cycle(contact, gaps, state.loads, drive, moved, starts, self.solved))
+        self._spent += Spent(len(cycle), sum(increment.convolutions for increment in cycle))
+        return cycle
+
+    def _paths(
+        self, slip: Array, starts: Starts, loads: LoadHistory, known: Mask | None = None
+    ) -> Array:
+        """The ways of body 2 over which the states act, if its motion is to be followed."""
+        pressure = sum((start.pressure for start in starts.values()), np.zeros(self.grid.shape))
+        law, forced = self.settings.laws[0], self.settings.follow
+        paths = followed(self.grid, slip, pressure, loads.missions, forced, known)
+        if len(paths) and isinstance(law, EvolvingLaw) and law.scope == "local":
+            raise MotionError(
+                "the surfaces move over each other, and that of body 1 changes from place to "
+                "place, which no wear step follows: neglect the motion, or let the law change with "
+                "the energy of the whole contact"
+            )
+        return paths
+
+    def _pressed(self, starts: Starts, history: FaceLoads) -> Array:
+        """See :class:`InterfaceState`."""
+        return np.empty(0) if history.force is None else self._shared_out(starts, history.loads)
+
+    def _shared_out(self, starts: Starts, loads: LoadHistory) -> Array:
+        """Share of the largest of ``loads`` on every node ``(n,)``; 0 without load."""
+        start = starts.get(first_largest(loads.P))
+        if start is None:
+            return np.zeros(len(self.transfer.areas))
+        forces = self.transfer.to_nodes(start.pressure) * self.transfer.areas
+        shares: Array = forces / forces.sum()
+        return shares
+
+    # -- tractions of given slips ------------------------------------------------------------------
+    def _pressure(self, result: CycleResult) -> Array:
+        """Pressure of every increment of a cycle ``(t, nx, ny)``."""
+        pressure = np.zeros((len(result.energy), *self.grid.shape))
+        for t, state in result.states.items():
+            pressure[t] = state.pressure
+        return pressure
+
+    def _given_tractions(
+        self, loads: FaceLoads | InterfaceState, pressure: Array, energy: float
+    ) -> CycleTractions:
+        """Those where slip is the loads', once so much ``energy`` [N mm] is dissipated."""
+        slip = self.transfer.to_cells(loads.slip)
+        stuck = ~slip.any(axis=1)
+        force = pressure.sum(axis=(1, 2))
+        held = np.where(stuck, pressure, 0.0).sum(axis=(1, 2))
+        unknown = np.divide(held, force, out=np.zeros_like(force), where=force > 0.0)
+        shear = self._sliding_shear(pressure, slip, energy)
+        friction = self.settings.friction(energy)
+        return CycleTractions(loads.loads, friction, pressure, shear, slip, unknown)
+
+    def _half_space_tractions(
+        self, loads: LoadHistory, cycle: tuple[ContactState, ...], energy: float
+    ) -> CycleTractions:
+        """Tractions where the half-space has its own friction: known everywhere."""
+        pressure, shear, slip = (
+            np.stack([getattr(increment, name) for increment in cycle])
+            for name in ("pressure", "shear", "slip")
+        )
+        friction = self.settings.friction(energy)
+        return CycleTractions(loads, friction, pressure, shear, slip, np.zeros(len(cycle)))
+
+    def _sliding_shear(self, pressure: Array, slip: Array, energy: float) -> Array:
+        """µp against ``slip`` ``(..., 2, nx, ny)``; 0 where nothing slips."""
+        size = np.hypot(slip[..., 0, :, :], slip[..., 1, :, :])[..., None, :, :]
+        opposing = np.divide(-slip, size, out=np.zeros_like(slip), where=size > 0.0)
+        shear: Array = self.settings.friction(energy) * pressure[..., None, :, :] * opposing
+        return shear

@@ -1,0 +1,1 @@
+"""Where fretting cracks start: life parameters and the stresses they need."""

@@ -1,0 +1,1 @@
+"""Measured hysteresis loops of joints."""

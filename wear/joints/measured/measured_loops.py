@@ -1,0 +1,374 @@
+"""Friction, stiffness and energy of hysteresis loops, measured or computed.
+
+Each loop that closes in a record gives its stick slope and, where it slides, residual stiffness and
+friction (:mod:`wear.joints.measured.loop_shape`); its energy, ∮ T dδ by trapezoids (the shoelace
+formula), and its stroke.
+
+Loops are averaged only with loops that are like them: a step is made of loops that close one after
+the other and have the same stroke, range of force, energy and normal load, within :data:`ALIKE` and
+the noise. Whether and how far loops slide, and how their stick branches bend, is found step by
+step. A mean position that drifts makes no other step: nothing here depends on it.
+
+The stick slope is what the loop shows, residual stiffness included, as measured stiffnesses are
+printed; laws with the residual spring in parallel (Jenkins, Iwan) need it without, which is
+:attr:`MeasuredLoops.contact_stiffness`; Bouc-Wen takes the whole one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from sa_solver.types import Array, Indices, Mask
+from wear.joints.measured.loop_record import (
+    LoopPair,
+    LoopRecord,
+    MeasuredLoopError,
+    closed_loops,
+    loop_record,
+    noise_along,
+    resolution,
+    smoothed,
+)
+from wear.joints.measured.loop_shape import (
+    FEWEST_STUCK,
+    WINDOW,
+    chords_of,
+    sliding_lines,
+    sliding_share,
+    stick_slopes,
+)
+
+FEWEST_SAMPLES = 8
+"""Of a branch: with fewer neither sticking nor sliding shows."""
+
+ALIKE = 0.02
+"""Loops of one step differ by less than this share of stroke, force and load, ..."""
+
+ALIKE_NOISE = 4.0
+"""... or by less than this many standard deviations that noise makes of it."""
+
+RANGE_NOISE = 4.0
+"""Standard deviations by which noise makes half of a range larger, at most."""
+
+GIVING = 0.01
+"""Loops give energy, by a wrong sign, if they give more than this share of force times stroke."""
+
+NOUGHT = 1e-12
+"""Share of force times stroke that is an energy of rounding."""
+
+
+@dataclass(frozen=True)
+class MeanEstimate:
+    """Mean over cycles and its standard error, which is NaN for a single cycle."""
+
+    value: float
+    error: float
+
+
+def mean_estimate(values: Array) -> MeanEstimate:
+    """Mean of the cycles' ``values`` ``(c,)``."""
+    count = len(values)
+    error = float(np.std(values, ddof=1)) / np.sqrt(count) if count > 1 else np.nan
+    return MeanEstimate(float(np.mean(values)), float(error))
+
+
+@dataclass(frozen=True)
+class MeasuredLoops:
+    """What the ``c`` loops of a record say, in the order in which they close.
+
+    Each ``(c,)``: ``stroke`` [mm] peak to peak, ``energy`` [N mm] of a loop, ``stick_stiffness``
+    [N/mm] the slope after a reversal, NaN where there are too few samples (``bend_spread`` is the
+    relative standard error that a step has in common, that of the branches' bend),
+    ``residual_stiffness`` [N/mm] and ``friction_force`` [N], half the height between the sliding
+    branches, both NaN where they do not slide; ``force`` [N] half the range of the force;
+    ``normal_load`` [N] its mean, NaN if not given. ``sliding`` is the share of the stroke taken to
+    slide, 0 where none does. ``step`` counts the steps of like loops from 0 on. ``branches`` are
+    the two branches of each loop in the ``record``. Reversals closer to each other than
+    ``resolution`` [mm] were taken for noise.
+    """
+
+    stroke: Array
+    energy: Array
+    stick_stiffness: Array
+    bend_spread: Array
+    residual_stiffness: Array
+    friction_force: Array
+    force: Array
+    normal_load: Array
+    sliding: Array
+    step: Indices
+    branches: tuple[LoopPair, ...]
+    record: LoopRecord
+    resolution: float
+
+    @property
+    def steps(self) -> tuple[MeasuredLoops, ...]:
+        """The loops step by step: those of one are alike, and may be averaged."""
+        return tuple(self._of(self.step == number) for number in np.unique(self.step))
+
+    def _of(self, chosen: Mask) -> MeasuredLoops:
+        """Some of the loops."""
+        values: dict[str, Any] = {
+            name: value[chosen]
+            for name, value in vars(self).items()
+            if isinstance(value, np.ndarray)
+        }
+        values["branches"] = tuple(self.branches[place] for place in np.flatnonzero(chosen))
+        return replace(self, **values)
+
+    @property
+    def widest(self) -> MeasuredLoops:
+        """The step of the largest stroke."""
+        return self._of(self.step == self.step[np.argmax(self.stroke)])
+
+    @property
+    def reversals(self) -> Indices:
+        """Samples of ``record`` at which loops begin, turn and end, ``(c, 3)``."""
+        return np.array([(out.begin, out.end, back.end) for out, back in self.branches])
+
+    @property
+    def slides(self) -> bool:
+        """True where the branches of all loops end in sliding."""
+        return bool((self.sliding > 0.0).all())
+
+    @property
+    def stick_estimate(self) -> MeanEstimate:
+        """Stick stiffness of loops that are alike [N/mm]: that of their mean compliance.
+
+        Raises MeasuredLoopError for loops of several steps.
+        """
+        self.require_alike()
+        compliance = mean_estimate(1.0 / self.stick_stiffness)
+        value = 1.0 / compliance.value
+        spread = float(self.bend_spread[0])
+        return MeanEstimate(value, float(np.hypot(compliance.error * value, spread)) * value)
+
+    def require_alike(self) -> None:
+        """Raise MeasuredLoopError unless the loops are all of one step."""
+        if (self.step != self.step[0]).any():
+            raise MeasuredLoopError(
+                f"the loops are of {len(np.unique(self.step))} steps, strokes of "
+                f"{self.stroke.min():.4g} to {self.stroke.max():.4g} mm, and have no mean; "
+                "allowed: one of their steps"
+            )
+
+    @property
+    def contact_stiffness(self) -> Array:
+        """Stick slope without the residual stiffness, ``(c,)`` [N/mm]: kt of Jenkins and Iwan."""
+        return self.stick_stiffness - self.residual_stiffness
+
+    @property
+    def friction(self) -> Array:
+        """Friction coefficient ΔT / 2N, ``(c,)``, NaN of loops that do not slide.
+
+        Raises MeasuredLoopError where none slides (:attr:`mobilised` is a lower bound then) and
+        without a normal load.
+        """
+        if not self.sliding.any():
+            bound = "" if np.isnan(self.normal_load).any() else f" of {np.max(self.mobilised):.4g}"
+            raise MeasuredLoopError(
+                "the loops have no sliding branch, so that their force over the normal load is "
+                f"only a lower bound{bound} of the friction coefficient; allowed: a larger stroke"
+            )
+        return self.friction_force / self._loads()
+
+    @property
+    def mobilised(self) -> Array:
+        """Half the range of the force over the normal load, ``(c,)``.
+
+        A lower bound of the friction coefficient where nothing slides, a residual stiffness apart.
+        Raises MeasuredLoopError without a normal load.
+        """
+        return self.force / self._loads()
+
+    def _loads(self) -> Array:
+        if np.isnan(self.normal_load).any():
+            raise MeasuredLoopError("a friction coefficient needs the normal load of the record")
+        return self.normal_load
+
+    @property
+    def work(self) -> Array:
+        """Work of the force since the record began, at each of its samples ``(t,)`` [N mm]."""
+        motion, force = self.record.displacement, self.record.force
+        steps = 0.5 * (force[1:] + force[:-1]) * np.diff(motion)
+        return np.append(0.0, np.cumsum(steps))
+
+    @property
+    def left_out(self) -> tuple[float, float, float]:
+        """Work of a record that is in none of its loops, before, between and after them [N mm]."""
+        work, reversals = self.work, self.reversals
+        begin, end = work[reversals.min()], work[reversals.max()]
+        between = float(end - begin - self.energy.sum())
+        return float(begin), between, float(work[-1] - end)
+
+
+def measure_loops(
+    displacement: Array,
+    force: Array,
+    normal_load: float | Array | None = None,
+    time: Array | None = None,
+) -> MeasuredLoops:
+    """Measure the closed loops of a record of ``t`` samples.
+
+    ``displacement`` [mm] and the resisting ``force`` [N] are ``(t,)``, in the order of time;
+    ``normal_load`` [N] is a number or ``(t,)``; ``time`` ``(t,)``, in any unit, is needed where the
+    samples are not evenly spaced. Strokes may change: :attr:`MeasuredLoops.steps` has like loops
+    together. Raises MeasuredLoopError for a record without a closed loop, with too few samples to
+    tell anything but energies, or whose loops give energy instead of taking it.
+
+    Examples
+    --------
+    Two cycles of a joint of known friction and stiffness:
+
+    >>> import numpy as np
+    >>> from wear.joints import Jenkins, march_joints, measure_loops
+    >>> law = Jenkins(stiffness=1e4, friction=0.5, normal_load=100.0)
+    >>> motion = 0.03 * np.sin(2.0 * np.pi * np.arange(401) / 160)
+    >>> record = march_joints(law, law.rest(1), np.zeros((1, 1)), motion[:, None, None])
+    >>> loops = measure_loops(motion, record.force.ravel(), normal_load=100.0)
+    >>> print(f"µ = {loops.friction.mean():.4f}, kt = {loops.stick_estimate.value:.0f} N/mm")
+    µ = 0.5000, kt = 10000 N/mm
+    >>> print(f"{loops.energy.mean():.3f} N mm of {law.loop_energy(0.03):.3f}")
+    4.998 N mm of 5.000
+    """
+    record, pairs = closed_loops(loop_record(displacement, force, normal_load, time))
+    energy = np.array([_energy(record, pair) for pair in pairs])
+    sizes = np.array([_of_pair(record, pair) for pair in pairs])
+    box = 2.0 * sizes[:, 0] * sizes[:, 1]
+    if (box <= 0.0).all() or energy.sum() < -GIVING * np.abs(box).sum():
+        raise MeasuredLoopError(
+            "the loops give energy; allowed: the force that resists the displacement "
+            "(change the sign of one of them)"
+        )
+    energy = np.where(np.abs(energy) > NOUGHT * np.abs(box), energy, 0.0)
+    # Of a few points the outermost may lie on either branch, at any force: then the range counts.
+    noise = noise_along(record, [branch for pair in pairs for branch in pair])
+    ranges = np.array([0.5 * np.ptp(record.force[_samples(pair)]) for pair in pairs])
+    sizes[:, 1] = np.maximum(sizes[:, 1], ranges - RANGE_NOISE * noise[1])
+    loads = np.array([record.normal_load[_samples(pair)].mean() for pair in pairs])
+    step = _steps(record, pairs, sizes, energy, loads, noise)
+    measured = [
+        _measured(record, [pairs[k] for k in np.flatnonzero(step == number)])
+        for number in range(step[-1] + 1)
+    ]
+    stick, spread, residual, friction, sliding, stroke = map(
+        np.concatenate, zip(*measured, strict=True)
+    )
+    longest = max(len(branch.samples) for pair in pairs for branch in pair)
+    if not sliding.any() and np.isnan(stick).all() and longest < FEWEST_SAMPLES:
+        raise MeasuredLoopError(
+            f"sample {pairs[0][0].begin}: fewer than {FEWEST_STUCK} samples from this reversal, as "
+            "from all others, until half of the loop's height; allowed: a record sampled faster"
+        )
+    return MeasuredLoops(
+        stroke=stroke,
+        energy=energy,
+        stick_stiffness=stick,
+        bend_spread=spread,
+        residual_stiffness=residual,
+        friction_force=friction,
+        force=sizes[:, 1],
+        normal_load=loads,
+        sliding=sliding,
+        step=step,
+        branches=pairs,
+        record=record,
+        resolution=resolution(record.displacement),
+    )
+
+
+def _samples(pair: LoopPair) -> Indices:
+    """All samples of a loop."""
+    return np.concatenate([pair[0].samples, pair[1].samples[1:]])
+
+
+def _of_pair(record: LoopRecord, pair: LoopPair) -> tuple[float, float]:
+    """Means of the two branches: displacement that they cover, and half of what the force gains."""
+    travel = float(np.mean([record.travel(branch) for branch in pair]))
+    return travel, 0.5 * float(np.mean([record.rise(branch) for branch in pair]))
+
+
+def _steps(
+    record: LoopRecord,
+    pairs: Sequence[LoopPair],
+    sizes: Array,
+    energy: Array,
+    loads: Array,
+    noise: tuple[float, float],
+) -> Indices:
+    """The step ``(c,)`` that each loop is of: a new one where it is unlike the mean of the last."""
+    motion, force = noise
+    stroke, half = np.maximum(np.abs(sizes), np.finfo(float).tiny).T
+    counts = np.array([len(_samples(pair)) for pair in pairs])
+    # Reversals lie between samples: what these are apart there.
+    gaps = np.array([_gaps(record, pair) for pair in pairs])
+    # Noise of the energy: that of the force on the increments of the motion, and the reverse.
+    uncertain = np.pi * np.hypot(force * stroke, 2.0 * motion * half) / np.sqrt(counts)
+    features = [
+        # Values, what they are measured by, and what may be wrong with them.
+        (sizes[:, 0], stroke, ALIKE_NOISE * 2.0 * motion + gaps[:, 0]),
+        (sizes[:, 1], half, ALIKE_NOISE * force + gaps[:, 1]),
+        (energy, 2.0 * stroke * half, ALIKE_NOISE * uncertain + 4.0 * half * gaps[:, 0]),
+        (loads, loads, np.zeros_like(loads)),
+    ]
+    step = np.zeros(len(pairs), dtype=np.int64)
+    first = 0
+    for place in range(1, len(pairs)):
+        alike = all(
+            not abs(values[place] - values[first:place].mean())
+            > ALIKE * scale[place] + max(wrong[place], wrong[first:place].mean())
+            for values, scale, wrong in features
+        )
+        step[place] = step[place - 1] + (not alike)
+        first = first if alike else place
+    return step
+
+
+def _gaps(record: LoopRecord, pair: LoopPair) -> tuple[float, float]:
+    """Largest distances of samples beside the reversals of a loop, in displacement and force."""
+    beside = np.concatenate([branch.samples[[0, 1, -2, -1]] for branch in pair]).reshape(-1, 2)
+    motion, force = (np.abs(np.diff(record[k][beside], axis=1)).max() for k in (0, 1))
+    return float(motion), float(force)
+
+
+def _measured(record: LoopRecord, pairs: Sequence[LoopPair]) -> tuple[Array, ...]:
+    """What the loops of one step say, each ``(c,)``.
+
+    Stick stiffness and the standard error common to all, residual stiffness, friction force, share
+    that slides, and stroke.
+    """
+    branches = [branch for pair in pairs for branch in pair]
+    record = record._replace(displacement=smoothed(record.displacement, branches))
+    rises = [WINDOW * record.rise(branch) for branch in branches]
+    slopes, spread = stick_slopes(record, branches, rises)
+    rough = slopes if np.isfinite(slopes).all() else chords_of(record, branches, rises)
+    sliding = sliding_share(record, branches, float(np.mean(rough)))
+    lines = np.full((len(pairs), 2), np.nan)
+    if sliding > 0.0:
+        lines = np.array([sliding_lines(record, pair, sliding) for pair in pairs])
+    if (lines[:, 1] <= 0.0).any():
+        # Of a few points: the branches lie the wrong way about each other.
+        lines, sliding = np.full((len(pairs), 2), np.nan), 0.0
+    if sliding > 0.0:
+        heights = np.repeat(2.0 * lines[:, 1], 2)
+        slopes, spread = stick_slopes(record, branches, (WINDOW * heights).tolist())
+    alike = np.ones(len(pairs))
+    stroke = _of_cycles([record.travel(branch) for branch in branches])
+    stick = 1.0 / _of_cycles(1.0 / slopes)
+    return stick, spread * alike, lines[:, 0], lines[:, 1], sliding * alike, stroke
+
+
+def _of_cycles(values: Sequence[float] | Array) -> Array:
+    """Means of the two branches of each cycle, ``(c,)``."""
+    return np.asarray(np.reshape(values, (-1, 2)).mean(axis=1))
+
+
+def _energy(record: LoopRecord, pair: LoopPair) -> float:
+    """∮ T dδ of the closed polygon [N mm]."""
+    here = _samples(pair)
+    motion, force = record.displacement[here], record.force[here]
+    return float(0.5 * np.sum((force + np.roll(force, -1)) * (np.roll(motion, -1) - motion)))

@@ -1,0 +1,1 @@
+"""Joints over one period of a given motion."""

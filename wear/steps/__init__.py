@@ -1,0 +1,1 @@
+"""Wear steps of one contact over many cycles."""
