@@ -47,9 +47,10 @@ from sa_solver.reference.hertz import HertzSphere
 from sa_solver.transforms import passes as loops
 from workflow.analyses.vibration.case import VibrationCase
 from workflow.analyses.vibration.model import VibrationModel
-from workflow.analyses.wear.structure_stage import StructureStage
-from workflow.analyses.wear.structures.dovetail.model import DovetailModel
+from workflow.analyses.wear.structures.dovetail.model import dovetail_joint
+from workflow.analyses.wear.translation import structure_loads
 from workflow.kinds import load_case
+from workflow.models.structure import StructureLoads
 from workflow.shell.reporter import Reporter
 
 CASES = Path(__file__).parent.parent / "cases"
@@ -130,10 +131,10 @@ def missions(nodes: int) -> Sized:
     """Its two missions of 22 increments with friction, once condensed; counts iterations."""
     stage = _dovetail(nodes)
     structure, joint, model = stage.structure, stage.joint, stage.model
-    cycle = partial(structure.solve_cycle, joint, model.missions[0].amplitudes, structure.gap())
+    cycle = partial(structure.solve_cycle, joint, model.load_cycles[0].amplitudes, structure.gap())
 
     def run() -> int:
-        solution = cycle(model.friction[0])
+        solution = cycle(stage.friction[0])
         assert solution.converged
         return solution.iterations
 
@@ -174,10 +175,10 @@ def _stack(bodies: int) -> Structure:
     return imported_structure(mesh, imported, [TITANIUM] * bodies, held, loads, 1)
 
 
-def _dovetail(nodes: int) -> StructureStage:
+def _dovetail(nodes: int) -> StructureLoads:
     along = round(nodes * FLANK[1] / FLANK[0])
     case: Any = load_case(CASES / "dovetail.yaml", [f"mesh.flank_nodes=[{nodes}, {along}]"])
-    return StructureStage(DovetailModel(case))
+    return structure_loads(case, dovetail_joint)
 
 
 # --- vibration ----------------------------------------------------------------------------------

@@ -40,8 +40,8 @@ from sa_solver.types import Array
 from wear import findley
 from wear.cracking.life import PlaneSearch
 from workflow.analyses.specimens.model import SpecimensModel
-from workflow.analyses.wear.structure_stage import StructureStage
-from workflow.analyses.wear.structures.dovetail.model import DovetailModel
+from workflow.analyses.wear.structures.dovetail.model import dovetail_joint
+from workflow.analyses.wear.translation import structure_loads
 from workflow.chart.axes import Axis, Rung
 from workflow.chart.costs import Cost
 from workflow.chart.figures import axis_figure
@@ -74,7 +74,7 @@ def structure() -> Ladder:
 
 
 def _mission(case: Any) -> dict[str, float]:
-    stage = StructureStage(DovetailModel(case))
+    stage = structure_loads(case, dovetail_joint)
     history = stage.unworn()[0]
     place = history.interface.coordinates[:, 0]
     order, pressure = np.argsort(place), history.pressure[stage.peak]

@@ -122,7 +122,7 @@ __getattr__, __dir__ = lazy_names(
             *("ConstantLoads", "CoupledSettings", "CoupledState"),
             *("CoupledWear", "JumpSize", "Observer", "Stop"),
         ),
-        "evolution": ("EnergyTable",),
+        "evolution": ("CoulombFriction", "EnergyTable"),
         "contact.face_loads": ("CycleLoads",),
         "steps.implicit": ("ImplicitStepper", "SecondOrderStepper"),
         "contact.interface": ("InterfaceContact", "InterfaceSettings"),

@@ -68,3 +68,35 @@ class EnergyTable:
 
     def _line(self, energy: Array | float) -> Array:
         return np.asarray(np.interp(energy, self.energy, self.factor), dtype=np.float64)
+
+
+@dataclass(frozen=True)
+class CoulombFriction:
+    """Coulomb's coefficient of friction, and how it changes with dissipated energy.
+
+    Parameters
+    ----------
+    coefficient : float
+        Coefficient µ before any wear.
+    evolution : EnergyTable, optional
+        Factor of the coefficient against the energy that the contact has dissipated [N mm].
+
+    Examples
+    --------
+    >>> from wear import CoulombFriction, EnergyTable
+    >>> friction = CoulombFriction(0.4, EnergyTable(energy=(0.0, 1e6), factor=(1.0, 1.5)))
+    >>> print(f"{friction.at(0.0):.1f} {friction.at(1e6):.1f}")
+    0.4 0.6
+    """
+
+    coefficient: float
+    evolution: EnergyTable | None = None
+
+    def __post_init__(self) -> None:
+        checks.numbers(self, "coefficient", least=0.0)
+
+    def at(self, energy: float) -> float:
+        """Return the coefficient after the contact has dissipated ``energy`` [N mm]."""
+        if self.evolution is None:
+            return self.coefficient
+        return self.coefficient * float(self.evolution.at(energy))

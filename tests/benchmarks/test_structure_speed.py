@@ -17,10 +17,11 @@ from fe_models.meshes.structure_mesh import Body
 from fe_models.solvers.linear_solver import factorise, prepare
 from fe_models.solvers.multigrid import MultigridSolver
 from sa_solver.types import Array, Material
-from workflow.analyses.wear.structure_stage import StructureStage
 from workflow.analyses.wear.structures.dovetail.case import DovetailCase
-from workflow.analyses.wear.structures.dovetail.model import DovetailModel
+from workflow.analyses.wear.structures.dovetail.model import dovetail_joint
+from workflow.analyses.wear.translation import structure_loads
 from workflow.kinds import load_case
+from workflow.models.structure import StructureLoads
 
 CASE = load_case(Path(__file__).parents[2] / "cases" / "dovetail.yaml")
 TITANIUM = Material(115e3, 0.29, 4.43e-9)
@@ -91,8 +92,8 @@ def test_default_joint(
     assert isinstance(CASE, DovetailCase)
     monkeypatch.setenv("FRETSCALE_CACHE", str(tmp_path))
 
-    def stage() -> StructureStage:
-        return StructureStage(DovetailModel(CASE))
+    def stage() -> StructureLoads:
+        return structure_loads(CASE, dovetail_joint)
 
     first = stage()
     structure = first.structure
@@ -108,7 +109,7 @@ def test_default_joint(
 
     cached = shortest(from_cache)
     record["joint from the cache [s]"] = cached
-    amplitudes, friction = first.model.missions[0].amplitudes, first.model.friction
+    amplitudes, friction = first.model.load_cycles[0].amplitudes, first.friction
     gap = structure.gap()
     cycle = shortest(lambda: structure.solve_cycle(first.joint, amplitudes, gap, friction))
     record["cycle of 22 increments, twice [s]"] = cycle

@@ -12,9 +12,10 @@ from fe_models.structure import InterfaceHistory
 from sa_solver.types import Array
 from tests.workflow.mesh_scenes import STEEL, write_case
 from wear.contact.interface import FirstContact
-from workflow.analyses.wear.contact_stage import ContactStage
 from workflow.analyses.wear.structures import structure_of
+from workflow.analyses.wear.translation import face_contact
 from workflow.kinds import load_case
+from workflow.models.contact import FaceContact
 
 RADIUS, GROWTH = 400.0, 1.3
 RUBBER, CERAMIC = {"young": "0.2 GPa"}, {"young": "2000 GPa"}
@@ -83,11 +84,11 @@ class Blocks:
         return self.write(folder, size, [pressed], {"increments": [1, 1]})
 
 
-def solved(path: Path, *settings: str) -> tuple[InterfaceHistory, ContactStage, FirstContact]:
+def solved(path: Path, *settings: str) -> tuple[InterfaceHistory, FaceContact, FirstContact]:
     """The unworn cycle of the structure, the contact, and its first cycle."""
     case = load_case(path, list(settings))
     source = structure_of(case).source(case)
-    (history,), stage = source.unworn(), ContactStage(case, source.faces[0])
+    (history,), stage = source.unworn(), face_contact(case, source.faces[0])
     return history, stage, stage.begin(history, 1.0)[1]
 
 

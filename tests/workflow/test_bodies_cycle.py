@@ -11,9 +11,9 @@ import pytest
 from tests.marks import slow
 from tests.workflow.commands import command
 from workflow.analyses.wear import ANALYSIS
-from workflow.analyses.wear.contact_stage import ContactStage
 from workflow.analyses.wear.structures.bodies.case import BodiesWearCase, LineBodiesWearCase
 from workflow.analyses.wear.structures.bodies.source import BodiesSource
+from workflow.analyses.wear.translation import face_contact
 from workflow.case.writing import dump_case
 from workflow.errors import CaseError
 from workflow.kinds import parse_case, template
@@ -170,7 +170,7 @@ TURNING = "{legs: [{P: 60 N, Qx: 12 N}, {P: 40 N, Qx: -12 N}]}"
 def cycle_energy(case: BodiesWearCase, parts: int = 1) -> float:
     """What an unworn cycle dissipates, its increments in so many parts [N mm]."""
     source = BodiesSource(case, parts)
-    _, first = ContactStage(case, source.faces[0]).begin(source.unworn()[0], 1.0)
+    _, first = face_contact(case, source.faces[0]).begin(source.unworn()[0], 1.0)
     return float(first.energy.sum())
 
 

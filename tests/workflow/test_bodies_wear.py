@@ -14,14 +14,14 @@ from tests.marks import slow
 from tests.workflow.commands import command
 from wear.contact.interface import InterfaceState
 from workflow.analyses.wear import run as wear_run
-from workflow.analyses.wear.contact_loops import loop_path
-from workflow.analyses.wear.contact_stage import ContactStage
 from workflow.analyses.wear.structures.bodies.case import BodiesWearCase, LineBodiesWearCase
 from workflow.analyses.wear.structures.bodies.source import BodiesSource
 from workflow.analyses.wear.structures.resultants.reading import read_resultants
+from workflow.analyses.wear.translation import face_contact
 from workflow.case.writing import dump_case
 from workflow.errors import CaseError
 from workflow.kinds import load_case, parse_case, template
+from workflow.models.contact import FaceContact
 
 CASES = Path(__file__).parents[2] / "cases"
 AREA, LINE = template("bodies_wear"), template("line_wear")
@@ -44,10 +44,10 @@ def line(*overrides: str) -> LineBodiesWearCase:
 
 def worn(
     case: BodiesWearCase | LineBodiesWearCase, jumps: int = 4
-) -> tuple[ContactStage, InterfaceState]:
+) -> tuple[FaceContact, InterfaceState]:
     """The contact after the cycles of the case, in this process."""
     source = BodiesSource(case)
-    stage = ContactStage(case, source.faces[0])
+    stage = face_contact(case, source.faces[0])
     state, _ = stage.begin(source.unworn()[0], case.wear.cycles)
     for jump in range(jumps):
         left = case.wear.cycles * (1.0 - jump / jumps)
@@ -241,7 +241,7 @@ def test_partial_slip_over_a_given_stroke_is_that_of_mindlin() -> None:
         *("friction.coefficient=0.7", "contact.method=full", "wear.cycles=1"),
     )
     source = BodiesSource(case)
-    stage = ContactStage(case, source.faces[0])
+    stage = face_contact(case, source.faces[0])
     _, first = stage.begin(source.unworn()[0], case.wear.cycles)
     assert first.energy.sum() == pytest.approx(0.414092, rel=2e-2)
     forces = [state.resultants[1] for state in first.cycle]
@@ -316,9 +316,9 @@ def test_moments_that_hold_the_tilt_are_results(dimension: int, tmp_path: Path) 
 def test_a_loop_on_worn_surfaces_keeps_the_tilt_too() -> None:
     for tilt, moments in (("held", None), ("free", (0.0, 0.0))):
         case = line(f"load_path.tilt={tilt}", "loops.amplitude=1 um")
-        stage = ContactStage(case, BodiesSource(case).faces[0])
+        stage = face_contact(case, BodiesSource(case).faces[0])
         state, _ = stage.begin(BodiesSource(case).unworn()[0], 1.0)
-        path = loop_path(case.loops, stage.name, state, 0, stage.settings.drive.tilt)
+        path = case.loops.described().path(stage.name, state, 0, stage.settings.drive.tilt)
         assert path.moments == moments
 
 

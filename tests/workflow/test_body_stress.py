@@ -22,10 +22,11 @@ from workflow.analyses.wear.body_stress import (
     with_known_shear,
 )
 from workflow.analyses.wear.case.sections import ContactStress
-from workflow.analyses.wear.contact_stage import ContactStage
-from workflow.analyses.wear.structure_stage import StructureStage
 from workflow.analyses.wear.structures import structure_of
+from workflow.analyses.wear.translation import face_contact
 from workflow.kinds import load_case
+from workflow.models.contact import FaceContact
+from workflow.models.structure import StructureLoads
 
 PLANE = CASES / "dovetail_2d.yaml"
 COARSE = (
@@ -41,8 +42,8 @@ FLAT = Frame(np.zeros(3), np.eye(3))
 class Flank:
     """The unworn intrados of the section."""
 
-    source: StructureStage
-    stage: ContactStage
+    source: StructureLoads
+    stage: FaceContact
     cycle: StressedCycle
     stuck: Array
     planes: Planes
@@ -52,10 +53,10 @@ class Flank:
     def of(cls, *overrides: str) -> "Flank":
         case = load_case(PLANE, overrides)
         source = structure_of(case).source(case)
-        assert isinstance(source, StructureStage)
+        assert isinstance(source, StructureLoads)
         states = {"unworn": (source.mesh, source.unworn_cycle)}
         stress = source.stresses(states)["unworn"]
-        stage, loads = ContactStage(case, source.faces[0]), source.unworn()[0]
+        stage, loads = face_contact(case, source.faces[0]), source.unworn()[0]
         given = stage.unworn_tractions(loads, stage.begin(loads, 1.0)[1])
         known = with_known_shear(stage, given, loads)
         cycle = StressedCycle(known, loads, stress.faces[0], stress.fields)

@@ -19,10 +19,7 @@ from workflow.analyses.wear.case.loops import Loops
 from workflow.analyses.wear.contact_loops import (
     MEASURED,
     kept_loops,
-    loop_path,
-    loops_due,
     warn_of_border,
-    worn_loop,
     write_loops,
 )
 from workflow.analyses.wear.figures import loops as loops_figure
@@ -34,6 +31,7 @@ from workflow.case.table_file import read_columns
 from workflow.commands.computed_loops import report_of_loops
 from workflow.errors import CaseError, UserError
 from workflow.kinds import load_case
+from workflow.models.loops import TangentialLoops, worn_loop
 from workflow.shell.folder import OutputFolder
 from workflow.shell.results import writing
 from workflow.shell.store import write_arrays
@@ -93,7 +91,7 @@ def sphere():
     size = 2.2 * SPHERE.contact.contact_radius
     grid = Grid.covering((size, size), (32, 32))
     contact = FrictionalContact(HalfSpace(grid, ElasticPair(BODY, BODY)), SPHERE.friction)
-    return worn_loop(contact, Loops(force=FORCE), "sphere", state(grid=grid), 1)
+    return worn_loop(contact, TangentialLoops(force=FORCE), "sphere", state(grid=grid), 1)
 
 
 # --- what is imposed ----------------------------------------------------------------------------
@@ -110,26 +108,25 @@ def sphere():
     ],
 )
 def test_loops_are_due(every, jump, ended, due):
-    assert loops_due(Loops(amplitude=5e-3, every=every), jump, ended) is due
-    assert not loops_due(Loops(every=every), jump, ended)
+    assert TangentialLoops(amplitude=5e-3, every=every).due(jump, ended) is due
 
 
 def test_path_is_that_of_the_peak_load():
-    path = loop_path(Loops(amplitude=5e-3, axis="y", increments=7), "face", state(My=-80.0), 1)
+    path = TangentialLoops(amplitude=5e-3, axis="y", increments=7).path("face", state(My=-80.0), 1)
     assert (path.P, path.moments, path.amplitude, path.by) == (400.0, (0.0, -80.0), 5e-3, "motion")
     assert (path.axis, path.increments) == ("y", 7)
 
 
 def test_a_normal_force_of_ones_own_acts_along_the_same_line():
-    path = loop_path(Loops(force=3.0, normal_force=100.0), "face", state(Mx=40.0, My=-80.0), 1)
+    path = TangentialLoops(force=3.0, normal_force=100.0).path("face", state(Mx=40.0, My=-80.0), 1)
     assert (path.P, path.moments, path.amplitude, path.by) == (100.0, (10.0, -20.0), 3.0, "force")
-    open_face = loop_path(Loops(force=3.0, normal_force=100.0), "face", state(P=0.0), 1)
+    open_face = TangentialLoops(force=3.0, normal_force=100.0).path("face", state(P=0.0), 1)
     assert (open_face.P, open_face.moments) == (100.0, (0.0, 0.0))
 
 
 def test_a_face_without_load_is_refused():
     with pytest.raises(UserError, match=r"face carries nothing .* loops.normal_force"):
-        loop_path(Loops(amplitude=5e-3), "face", state(P=0.0), 1)
+        TangentialLoops(amplitude=5e-3).path("face", state(P=0.0), 1)
 
 
 def test_both_drives_are_refused(small_path):
@@ -159,7 +156,7 @@ def test_force_beyond_friction_ends_the_run_in_one_line():
     grid = Grid.covering((1.0, 1.0), (8, 8))
     contact = FrictionalContact(HalfSpace(grid, ElasticPair(BODY, BODY)), SPHERE.friction)
     with pytest.raises(ContactFailure, match="tangential loop: friction cannot carry"):
-        worn_loop(contact, Loops(force=1e4), "sphere", state(grid=grid), 1)
+        worn_loop(contact, TangentialLoops(force=1e4), "sphere", state(grid=grid), 1)
 
 
 # --- kept and written ---------------------------------------------------------------------------
@@ -211,7 +208,7 @@ def test_computed_loops_are_read_as_measured_ones(tmp_path):
     grid = Grid.covering((size, size), (16, 16))
     contact = FrictionalContact(HalfSpace(grid, ElasticPair(BODY, BODY)), SPHERE.friction)
     amplitude = 3.0 * SPHERE.displacement(SPHERE.sliding_force)
-    asked = Loops(amplitude=amplitude, increments=48)
+    asked = TangentialLoops(amplitude=amplitude, increments=48)
     loop = worn_loop(contact, asked, "sphere", state(grid=grid), 1)
     with h5py.File(with_loops(tmp_path, loop).results) as file:
         name, headings, unworn, worn, *_ = report_of_loops(file["loops"])

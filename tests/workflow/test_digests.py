@@ -69,6 +69,16 @@ def joint(rho):
     return JointResolvent(inverse=np.eye(3), rho=rho, loads=np.ones((3, 1)), rigid_modes=0)
 
 
+def joint_file(folder, name):
+    return folder / f"joint-{cache.content_key(name)}.h5"
+
+
+def stored(key, rho):
+    """Return rho of the joint of a key, and whether it was stored; make it if it was not."""
+    found, known = cache.DiskStore().joint(key, lambda: joint(rho))
+    return found.rho, known
+
+
 def doubled(path):
     with h5py.File(path, "r+") as file:
         file["inverse"][0, 0] *= 2.0
@@ -86,24 +96,23 @@ def flipped(path):
 
 
 def anothers(path):
-    cache.save_joint("another", joint(3.0))
-    shutil.copy(path.with_name("joint-another.h5"), path)
+    stored(("another",), 3.0)
+    shutil.copy(joint_file(path.parent, "another"), path)
 
 
 @pytest.mark.parametrize("damage", [doubled, lacking, flipped, anothers])
 def test_what_is_damaged_in_the_cache_is_not_there(damage, tmp_path, monkeypatch, caplog):
     monkeypatch.setenv("FRETSCALE_CACHE", str(tmp_path))
-    assert cache.load_joint("key") is None
+    assert stored(("key",), 2.0) == (2.0, False)
     assert not caplog.messages
-    cache.save_joint("key", joint(2.0))
-    assert cache.load_joint("key").rho == 2.0
-    damage(tmp_path / "joint-key.h5")
-    assert cache.load_joint("key") is None
-    (told,) = caplog.messages
-    assert told.startswith(f"cache: {tmp_path}/joint-key.h5: damaged")
-    assert told.endswith("computed again")
-    cache.save_joint("key", joint(2.0))
-    assert cache.load_joint("key").rho == 2.0
+    assert stored(("key",), 9.0) == (2.0, True)
+    path = joint_file(tmp_path, "key")
+    damage(path)
+    assert stored(("key",), 4.0) == (4.0, False)
+    (logged,) = caplog.messages
+    assert logged.startswith(f"cache: {path}: damaged")
+    assert logged.endswith("computed again")
+    assert stored(("key",), 9.0) == (4.0, True)
 
 
 @pytest.mark.slow

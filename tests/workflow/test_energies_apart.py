@@ -7,12 +7,12 @@ import pytest
 
 from tests.conftest import CASES
 from wear.contact.interface import FirstContact
-from workflow.analyses.wear.contact_stage import ContactStage
-from workflow.analyses.wear.structure_stage import StructureStage
 from workflow.analyses.wear.structures import structure_of
 from workflow.analyses.wear.structures.resultants.source import ResultantsSource
+from workflow.analyses.wear.translation import face_contact
 from workflow.analyses.wear.warnings import warn_of_contact
 from workflow.kinds import load_case, parse_case, template
+from workflow.models.structure import StructureLoads
 from workflow.shell.reporter import Reporter
 
 # A cylinder that is sheared to and fro below its limit: ends slip, the middle sticks.
@@ -37,7 +37,7 @@ def of_file(folder: Path, energy: float):
     (folder / "loads.csv").write_text(ROWS.format(energy, energy), encoding="utf-8")
     case = parse_case(template("resultants"), str(folder / "case.yaml"), SETTINGS)
     source = ResultantsSource(case)
-    return case, *begun(source, ContactStage(case, source.faces[0]), source.unworn()[0])
+    return case, *begun(source, face_contact(case, source.faces[0]), source.unworn()[0])
 
 
 def told(folder, case, source, stage, state, first) -> list[str]:
@@ -76,8 +76,8 @@ def test_nodes_that_dissipate_what_the_half_space_does_not(tmp_path, share, warn
     """Method full wears by the half-space's own energies: 36 of the nodes against 0.006."""
     case = load_case(CASES / "dovetail_2d.yaml", COARSE)
     source = structure_of(case).source(case)
-    assert isinstance(source, StructureStage)
-    scene = begun(source, ContactStage(case, source.faces[0]), source.unworn()[0])
+    assert isinstance(source, StructureLoads)
+    scene = begun(source, face_contact(case, source.faces[0]), source.unworn()[0])
     first: FirstContact = scene[-1]
     less = replace(first, energy=share * first.energy)
     lines = told(tmp_path, case, *scene[:-1], less)

@@ -20,8 +20,8 @@ from workflow.analyses.wear.fidelity.probe import (
     life,
     plane_section,
 )
-from workflow.analyses.wear.structure_stage import StructureStage
-from workflow.analyses.wear.structures.dovetail.model import DovetailModel
+from workflow.analyses.wear.structures.dovetail.model import dovetail_joint
+from workflow.analyses.wear.translation import structure_loads
 from workflow.case.changing import changed
 from workflow.case.writing import dump_case
 from workflow.errors import MethodFailed
@@ -162,7 +162,7 @@ def test_the_profile_along_the_slot_wears_most_at_its_ends(case):
     """Strips resolve the peaks at its ends; the volume is α µ Σ P s, slip s being uniform."""
     section = plane_section(case)
     coarse, fine = (end_life(section, cells)["intrados"] for cells in (64, 256))
-    structure = StructureStage(DovetailModel(section))
+    structure = structure_loads(section, dovetail_joint)
     history = structure.unworn()[0]
     slip = np.hypot(history.slip[:, 0], history.slip[:, 1]).mean(axis=1)
     slip[history.loads.P == 0.0] = 0.0

@@ -16,12 +16,13 @@ from tests.workflow.mesh_scenes import ASSEMBLY, BLOCKS, cube, refused, write_ca
 from workflow.analyses.wear import ANALYSIS
 from workflow.analyses.wear.case.base import MOST_INCREMENTS
 from workflow.analyses.wear.increments import decide_increments, differences
-from workflow.analyses.wear.structure_stage import StructureStage
-from workflow.analyses.wear.structures.dovetail.model import DovetailModel
+from workflow.analyses.wear.structures.dovetail.model import dovetail_joint
 from workflow.analyses.wear.structures.mesh.model import MeshModel
+from workflow.analyses.wear.translation import structure_loads
 from workflow.case.changing import changed
 from workflow.errors import MethodFailed
 from workflow.kinds import load_case
+from workflow.models.structure import StructureLoads
 
 pytestmark = pytest.mark.usefixtures("reads_here")
 
@@ -51,7 +52,7 @@ def blocks(tmp_path: Path) -> Path:
 
 
 def unworn(case, model, legs):
-    return StructureStage(model(changed(case, case.divided(legs)))).unworn()
+    return structure_loads(changed(case, case.divided(legs)), model).unworn()
 
 
 @pytest.mark.parametrize(
@@ -61,12 +62,12 @@ def unworn(case, model, legs):
 def test_dovetails_wear_as_in_very_many(settings, tolerance):
     case = load_case(PLANE, [AUTO, *settings, *COARSE, f"wear.tolerance={tolerance}"])
     chosen, record = ANALYSIS.choose(case)
-    fine = unworn(case, DovetailModel, MANY)
+    fine = unworn(case, dovetail_joint, MANY)
     assert record["met"]
-    assert np.max(differences(unworn(case, DovetailModel, chosen.legs), fine)) <= tolerance
+    assert np.max(differences(unworn(case, dovetail_joint, chosen.legs), fine)) <= tolerance
     assert sum(chosen.legs) < sum(MANY)
     few = [max(2, round(0.5 * count)) for count in chosen.legs]
-    assert np.max(differences(unworn(case, DovetailModel, few), fine)) > tolerance
+    assert np.max(differences(unworn(case, dovetail_joint, few), fine)) > tolerance
 
 
 @pytest.mark.slow
@@ -74,8 +75,8 @@ def test_increments_are_of_second_order():
     """From 6 to 176 in depth, root mean square; energy passes its limit before 11."""
     case = load_case(PLANE)
     cycles = {6: (2, 4)} | {11 * 2**k: (4 * 2**k, 7 * 2**k) for k in range(5)}
-    fine = unworn(case, DovetailModel, (256, 448))
-    errors = np.array([differences(unworn(case, DovetailModel, n), fine) for n in cycles.values()])
+    fine = unworn(case, dovetail_joint, (256, 448))
+    errors = np.array([differences(unworn(case, dovetail_joint, n), fine) for n in cycles.values()])
     counts, (depth, energy) = np.log(list(cycles)), np.log(errors.T)
     assert -2.4 < np.polyfit(counts, depth, 1)[0] < -1.8
     assert -2.4 < np.polyfit(counts[1:], energy[1:], 1)[0] < -1.8
@@ -129,22 +130,22 @@ def test_what_is_chosen_does_not_depend_on_what_is_kept(tmp_path, monkeypatch):
 def test_more_than_the_most_are_not_chosen_and_it_is_told(monkeypatch):
     case = load_case(PLANE, [AUTO, *COARSE])
     monkeypatch.setattr(module, "MOST_INCREMENTS", 12)
-    decision = decide_increments(case, DovetailModel, 1e-4)
+    decision = decide_increments(case, dovetail_joint, 1e-4)
     assert sum(decision.value) == 12
     assert not decision.met
     assert "the most that are offered" in decision.why
 
 
 def test_cycles_of_few_increments_that_fail_ask_for_more(monkeypatch):
-    solve = StructureStage.cycle_under
+    solve = StructureLoads.cycle_under
 
     def failing(stage, missions):
         if len(missions[0].amplitudes) < 12:
             raise MethodFailed("no convergence")
         return solve(stage, missions)
 
-    monkeypatch.setattr(StructureStage, "cycle_under", failing)
-    decision = decide_increments(load_case(PLANE, [AUTO, *COARSE]), DovetailModel, 0.5)
+    monkeypatch.setattr(StructureLoads, "cycle_under", failing)
+    decision = decide_increments(load_case(PLANE, [AUTO, *COARSE]), dovetail_joint, 0.5)
     assert sum(decision.value) >= 12
 
 

@@ -9,10 +9,11 @@ from fe_models.structure import InterfaceHistory
 from sa_solver.types import Array
 from wear.contact.interface import FirstContact
 from wear.contact.link import Link
-from workflow.analyses.wear.contact_stage import ContactStage
 from workflow.analyses.wear.link_report import report_link
 from workflow.analyses.wear.structures import structure_of
+from workflow.analyses.wear.translation import face_contact
 from workflow.kinds import load_case
+from workflow.models.contact import FaceContact
 from workflow.shell.reporter import Reporter
 
 # Places on a flank of the section [mm]: its rounded edges begin at 4 mm.
@@ -42,11 +43,11 @@ def test_what_a_fit_leaves_is_warned_of(tmp_path, quality, told) -> None:
     assert all(told in line and "refine the mesh" in line for line in reporter.warnings)
 
 
-def flank(path, nodes: int, *settings: str) -> tuple[InterfaceHistory, ContactStage, FirstContact]:
+def flank(path, nodes: int, *settings: str) -> tuple[InterfaceHistory, FaceContact, FirstContact]:
     """The unworn intrados of the section, so many nodes of first-order elements across it."""
     case = load_case(path, [f"mesh.flank_nodes=[{nodes}, 34]", "mesh.order=1", *settings])
     source = structure_of(case).source(case)
-    stage = ContactStage(case, source.faces[0])
+    stage = face_contact(case, source.faces[0])
     history = source.unworn()[0]
     return history, stage, stage.begin(history, 1.0)[1]
 

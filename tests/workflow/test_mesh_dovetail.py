@@ -8,9 +8,9 @@ import pytest
 from fe_models.joints import friction
 from fe_models.meshes.structure_mesh import write_msh
 from tests.workflow.mesh_scenes import ABAQUS_FACES, write_case
-from workflow.analyses.wear.structure_stage import StructureStage
-from workflow.analyses.wear.structures.dovetail.model import DovetailModel
+from workflow.analyses.wear.structures.dovetail.model import dovetail_joint
 from workflow.analyses.wear.structures.mesh.model import MeshModel
+from workflow.analyses.wear.translation import structure_loads
 from workflow.kinds import load_case
 
 pytestmark = pytest.mark.usefixtures("reads_here")
@@ -43,12 +43,12 @@ def dovetail_as_mesh(folder, dovetail, ending):
 
     Every increment is a leg of its own: the pull follows the square of the speed.
     """
-    model = DovetailModel(dovetail)
-    mesh = model.mesh()
+    model = dovetail_joint(dovetail)
+    mesh = model.meshed()
     file = folder / f"joint{ending}"
     (write_msh if ending == ".msh" else write_inp)(file, mesh)
     path, shape = dovetail.load_path, dovetail.structure
-    speeds = np.sqrt(model.missions[0].amplitudes[:, 0]) / path.rotation_speed
+    speeds = np.sqrt(model.load_cycles[0].amplitudes[:, 0]) / path.rotation_speed
     pull = path.airfoil_mass * path.airfoil_radius * path.rotation_speed**2
     widths = ("edge_width", "edge_radius", "end_width", "end_radius")
     rounded = {"shape": "rounded"} | {name: getattr(shape, name) for name in widths}
@@ -93,8 +93,8 @@ def test_dovetail_as_a_mesh_is_the_dovetail(tmp_path, small_path, ending, monkey
     monkeypatch.setattr(friction, "TOLERANCE", 1e-11)
     monkeypatch.setenv("FRETSCALE_CACHE", str(tmp_path / "cache"))
     dovetail = load_case(small_path)
-    ours = StructureStage(DovetailModel(dovetail))
-    theirs = StructureStage(MeshModel(load_case(dovetail_as_mesh(tmp_path, dovetail, ending))))
+    ours = structure_loads(dovetail, dovetail_joint)
+    theirs = structure_loads(load_case(dovetail_as_mesh(tmp_path, dovetail, ending)), MeshModel)
     assert theirs.peak == ours.peak
     for one, two in zip(ours.unworn(), theirs.unworn(), strict=True):
         assert one.interface.name == two.interface.name

@@ -10,8 +10,8 @@ from sa_solver.half_space.subsurface_influence import YY
 from tests.workflow.commands import invoke
 from tests.workflow.mesh_scenes import STEEL, refused, run
 from tests.workflow.plane_blocks import Blocks, solved
-from workflow.analyses.wear.structure_stage import StructureStage
 from workflow.analyses.wear.structures.mesh.model import MeshModel
+from workflow.analyses.wear.translation import structure_loads
 from workflow.errors import CaseError
 from workflow.kinds import load_case, parse_case, template
 
@@ -177,7 +177,7 @@ def blocks(tmp_path):
 def first_cycle(path, *loads):
     supports = f"structure.supports={json.dumps(BASE)}"
     case = load_case(path, [supports, f"structure.loads={json.dumps(loads)}"])
-    return StructureStage(MeshModel(case)).unworn_cycle
+    return structure_loads(case, MeshModel).unworn_cycle
 
 
 def test_rigid_face_that_does_not_turn_is_imposed_a_displacement(blocks):

@@ -8,7 +8,6 @@ import pytest
 from sa_solver.types import LoadHistory
 from tests.workflow.conftest import Run, invoke
 from workflow.analyses.contact.datasets import load_columns
-from workflow.analyses.wear.structure_stage import StructureStage
 from workflow.analyses.wear.structures import structure_of
 from workflow.analyses.wear.structures.mesh.model import MeshModel
 from workflow.analyses.wear.structures.resultants.reading import read_resultants
@@ -19,6 +18,7 @@ from workflow.analyses.wear.structures.resultants.writing import (
 from workflow.case.input_files import InputFileError
 from workflow.errors import CaseError
 from workflow.kinds import load_case, parse_case, template
+from workflow.models.structure import StructureLoads
 
 COARSE = "mesh.flank_nodes=[10, 10]", "mesh.size=8", "contact.grid=[48, 64]"
 QUIET = "output.paraview=false", "output.figures=false", "stress.section=none"
@@ -42,10 +42,10 @@ def plane_path(dovetail_path: Path) -> Path:
 def staged(plane_path):
     """The structure of the plane dovetail with overrides."""
 
-    def make(*overrides: str) -> StructureStage:
+    def make(*overrides: str) -> StructureLoads:
         case = load_case(plane_path, [*COARSE, *SHORT, *overrides])
         source = structure_of(case).source(case)
-        assert isinstance(source, StructureStage)
+        assert isinstance(source, StructureLoads)
         return source
 
     return make
@@ -143,7 +143,7 @@ def test_factors_of_a_mix_scale_the_loads_of_a_mesh(template_files):
         "structure.loads=[{kind: pressure, group: blade_top, pressure: 10, path: [1, 0]}, "
         f"{turning}]",
     ]
-    first, second = MeshModel(parse_case(template("mesh"), str(path), overrides)).missions
+    first, second = MeshModel(parse_case(template("mesh"), str(path), overrides)).load_cycles
     assert (first.share, second.share) == (0.6, 0.4)
     np.testing.assert_allclose(second.amplitudes, first.amplitudes * [0.5, 0.25], rtol=1e-14)
     with pytest.raises(CaseError, match=r"load_path\.mix\.0\.factors: 2 factors for 1 loads"):

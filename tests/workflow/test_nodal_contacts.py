@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -10,13 +11,14 @@ from sa_solver.types import Array
 from tests.conftest import CASES
 from wear.coupled import CoupledState, CoupledWear
 from wear.steps.steppers import step_errors
-from workflow.analyses.wear.nodal_contacts import NodalContacts, StructureCycle
 from workflow.analyses.wear.run import coupled_settings
-from workflow.analyses.wear.structure_stage import StructureStage
 from workflow.analyses.wear.structures import structure_of
+from workflow.analyses.wear.translation import contact_of, wear_of
 from workflow.chart.axes import axes_of
 from workflow.errors import CaseError
 from workflow.kinds import load_case
+from workflow.models.nodal import NodalContacts, StructureCycle
+from workflow.models.structure import StructureLoads
 
 PLANE = CASES / "dovetail_2d.yaml"
 NODES = "contact.method=nodes", "wear.step={kind: second_order}", "contact.grid=[64, 64]"
@@ -31,7 +33,7 @@ ALPHA, FRICTION, LOAD = 1e-8, 0.4, 1301.33
 class Wearing:
     """The loop of a case whose nodes wear."""
 
-    source: StructureStage
+    source: StructureLoads
     contacts: NodalContacts
     loop: CoupledWear
 
@@ -39,8 +41,8 @@ class Wearing:
     def of(cls, *overrides: str) -> "Wearing":
         case = load_case(PLANE, (*NODES, *overrides))
         source = structure_of(case).source(case)
-        assert isinstance(source, StructureStage)
-        contacts = NodalContacts(case, source.faces, source)
+        assert isinstance(source, StructureLoads)
+        contacts = NodalContacts(source.faces, partial(contact_of, case), wear_of(case), source)
         return cls(source, contacts, CoupledWear(coupled_settings(case), source, contacts))
 
     def states(self) -> Iterator[CoupledState]:

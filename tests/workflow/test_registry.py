@@ -25,11 +25,11 @@ from workflow.analyses import wear
 from workflow.analyses.wear import structures
 from workflow.analyses.wear.case.base import WearCase
 from workflow.analyses.wear.case.sections import TwoMaterials, Wear
-from workflow.analyses.wear.load_source import ContactFace, UserFace
 from workflow.analyses.wear.run_time import Extent
 from workflow.analyses.wear.structure import WearStructure
 from workflow.case.fields import Quantity
 from workflow.case.sections import Case, Length, Section, Stress, entry
+from workflow.models.loads import ContactFace, UserFace
 from workflow.shell.analysis import Analysis, Run
 from workflow.shell.memory import Memory
 from workflow.shell.run_time import RunTime

@@ -17,13 +17,14 @@ from tests.workflow.commands import command
 from tests.workflow.conftest import contents_of
 from workflow.analyses.wear import ANALYSIS
 from workflow.analyses.wear.case.gaps import ParaboloidGap, RoundedGap
-from workflow.analyses.wear.gaps import GridHeights, gap_over
+from workflow.analyses.wear.gaps import gap_over
 from workflow.analyses.wear.structures.resultants.case import ResultantsCase
 from workflow.analyses.wear.structures.resultants.source import ResultantsSource
 from workflow.analyses.wear.warnings import warn_of_file
 from workflow.case.writing import dump_case
 from workflow.errors import CaseError
 from workflow.kinds import load_case, parse_case, template
+from workflow.models.gaps import GridHeights
 from workflow.pictures.drawing import write_figures, write_paraview
 from workflow.shell.reporter import Reporter
 

@@ -8,9 +8,9 @@ from sa_solver.surfaces.shapes import rounded_edge
 from tests.conftest import CASES
 from tests.workflow.commands import invoke
 from tests.workflow.mesh_scenes import settings
-from workflow.analyses.wear.contact_stage import ContactStage
 from workflow.analyses.wear.structures import structure_of
-from workflow.analyses.wear.structures.dovetail.model import DovetailModel
+from workflow.analyses.wear.structures.dovetail.model import dovetail_joint
+from workflow.analyses.wear.translation import face_contact
 from workflow.kinds import load_case
 
 PLANE, SPACE = CASES / "dovetail_2d.yaml", CASES / "dovetail_small.yaml"
@@ -24,7 +24,7 @@ def solved(path, *changes):
     source = structure_of(case).source(case)
     pairs = zip(source.unworn(), source.faces, strict=True)
     return [
-        (history.loads, ContactStage(case, face).begin(history, 1.0)[1]) for history, face in pairs
+        (history.loads, face_contact(case, face).begin(history, 1.0)[1]) for history, face in pairs
     ]
 
 
@@ -99,10 +99,10 @@ def test_planes_are_exact_on_flanks(tmp_path):
     cancels = {"disk": tilted, "blade": down | {"flipped": True}}
     for body, sign in (("disk", -1.0), ("blade", 1.0)):
         changes = [surfaces(intrados={body: tilted}, extrados=cancels), *coarse]
-        model = DovetailModel(load_case(SPACE, changes))
-        mesh = model.mesh()
+        model = dovetail_joint(load_case(SPACE, changes))
+        mesh = model.meshed()
         for face, on in zip(mesh.interfaces, (1.0, 0.0), strict=True):
-            side, form = FLANKS[face.name], model.dovetail.flank_gap
+            side, form = FLANKS[face.name], model.geometry.flank_gap
             contact = model.contact_face(face)
             grid = contact.grid((24, 20))
 
@@ -154,8 +154,8 @@ def test_a_run_wears_what_was_measured(tmp_path):
         assert invoke("surface", out, file, *at, *unworn).exit_code == 0
         heights.append(np.load(file)["heights"])
     before, after = heights
-    model = DovetailModel(load_case(out / "case.yaml"))
-    contact = model.contact_face(model.mesh().interfaces[0])
+    model = dovetail_joint(load_case(out / "case.yaml"))
+    contact = model.contact_face(model.meshed().interfaces[0])
     grid = contact.grid(before.shape)
     # It lies turned over about x.
     np.testing.assert_allclose(before, -contact.gap(grid.x, grid.y)[:, ::-1], atol=1e-12)

@@ -17,16 +17,16 @@ from tests.marks import slow
 from tests.workflow.conftest import Run, contents_of, invoke
 from tests.workflow.shown_files import check_arrays, check_scene
 from workflow.analyses.wear import ANALYSIS
-from workflow.analyses.wear.contact_stage import ContactStage
 from workflow.analyses.wear.fidelity import choosing
 from workflow.analyses.wear.fidelity.dimension import choose_dimension
 from workflow.analyses.wear.figures.wear import figures_of
-from workflow.analyses.wear.structure_stage import StructureStage
 from workflow.analyses.wear.structures import structure_of
+from workflow.analyses.wear.translation import face_contact
 from workflow.analyses.wear.uniformity import ALIKE, Uniformity, sections, uniformities
 from workflow.case.writing import dump_case
 from workflow.errors import CaseError, MethodFailed
 from workflow.kinds import load_case
+from workflow.models.structure import StructureLoads
 from workflow.pictures.style import STYLE
 from workflow.shell.folder import OutputFolder
 
@@ -229,7 +229,7 @@ def slot(small_path):
         small_path, ["mesh.flank_nodes=[6, 8]", "mesh.size=12", "contact.grid=[24, 48]"]
     )
     source = structure_of(case).source(case)
-    stages = [ContactStage(case, face) for face in source.faces]
+    stages = [face_contact(case, face) for face in source.faces]
     return (
         source,
         stages,
@@ -357,7 +357,7 @@ def test_a_probe_that_fails_decides_nothing(plane_path, monkeypatch):
     def fail(stage):
         raise MethodFailed("no convergence")
 
-    monkeypatch.setattr(StructureStage, "unworn", fail)
+    monkeypatch.setattr(StructureLoads, "unworn", fail)
     decision = choose_dimension(auto(plane_path))
     assert decision.value == 3
     assert "no convergence" in decision.why
@@ -419,7 +419,7 @@ def in_the_middle(run: Run, name: str) -> dict[str, float]:
     case = load_case(run.folder / "case.yaml")
     source = structure_of(case).source(case)
     faces = {face.face.name: number for number, face in enumerate(source.faces)}
-    stage = ContactStage(case, source.faces[faces[name]])
+    stage = face_contact(case, source.faces[faces[name]])
     unworn, friction = source.unworn()[faces[name]], case.friction.at(0.0)
     middle = sections(stage.transfer, unworn, source.peak, friction).middle
     with h5py.File(run.folder / "results.h5") as file:

@@ -206,18 +206,18 @@ def test_template_shows_how_a_body_names_its_own_law():
 
 
 def amplitudes(path, *overrides) -> list[Array]:
-    from workflow.analyses.wear.structures.dovetail.model import DovetailModel
+    from workflow.analyses.wear.structures.dovetail.model import dovetail_joint
 
-    return [loads.amplitudes for loads in DovetailModel(load_case(path, overrides)).missions]
+    return [loads.amplitudes for loads in dovetail_joint(load_case(path, overrides)).load_cycles]
 
 
 def test_missions_of_a_mix_differ_only_in_what_they_name(dovetail_path):
-    from workflow.analyses.wear.structures.dovetail.model import DovetailModel
+    from workflow.analyses.wear.structures.dovetail.model import dovetail_joint
 
     mix = "[{share: 30 %, rotation_speed: 3000 rpm, aerodynamic_moment: 20 N*m}, {share: 0.7}]"
-    model = DovetailModel(load_case(dovetail_path, [f"load_path.mix={mix}"]))
+    model = dovetail_joint(load_case(dovetail_path, [f"load_path.mix={mix}"]))
     (whole,) = amplitudes(dovetail_path)
-    low, full = model.missions
+    low, full = model.load_cycles
     assert (low.share, full.share) == (0.3, 0.7)
     np.testing.assert_array_equal(full.amplitudes, whole)
     np.testing.assert_allclose(low.amplitudes[:, 0], 0.25 * whole[:, 0], rtol=1e-14)

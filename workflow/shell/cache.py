@@ -59,11 +59,49 @@ def _code() -> bytes:
     return digest.digest()
 
 
-def load_joint(key: str) -> JointResolvent | None:
-    """The condensed joint of that key, or None."""
-    if (kept := _load(f"joint-{key}")) is None:
-        return None
-    arrays, attributes = kept
+class DiskStore:
+    """Condensed bodies, joints and cycles in the cache folder.
+
+    It is a :class:`workflow.models.structure.StructureStore`.
+    """
+
+    def body(self, made_from: Sequence[np.ndarray], make: Callable[[], Condensed]) -> Condensed:
+        """Return the condensed body made from these arrays; ``make`` it if it is not stored."""
+        name = f"body-{content_key(*(_digest(array) for array in made_from))}"
+        if (stored := _load(name)) is not None:
+            return stored[0]["stiffness"], stored[0]["loads"]
+        stiffness, loads = make()
+        _save(name, {"stiffness": stiffness, "loads": loads}, {})
+        return stiffness, loads
+
+    def joint(
+        self, key: tuple[object, ...], make: Callable[[], JointResolvent]
+    ) -> tuple[JointResolvent, bool]:
+        """Return the condensed joint of a key, and whether it was stored."""
+        name = f"joint-{content_key(*key)}"
+        if (stored := _load(name)) is not None:
+            return _restored_joint(*stored), True
+        joint = make()
+        _save_joint(name, joint)
+        return joint, False
+
+    def cycle(
+        self,
+        key: tuple[object, ...],
+        structure: Structure,
+        friction: float | Array,
+        make: Callable[[], CycleSolution],
+    ) -> CycleSolution:
+        """Return the solved cycle of a key on its structure."""
+        name = f"cycle-{content_key(*key)}"
+        if (stored := _load(name)) is not None:
+            return _restored_cycle(*stored, structure, friction)
+        cycle = make()
+        _save_cycle(name, cycle)
+        return cycle
+
+
+def _restored_joint(arrays: dict[str, Any], attributes: dict[str, Any]) -> JointResolvent:
     inverse: Array | SplitMatrix
     if "inverse" in arrays:
         inverse = arrays["inverse"]
@@ -78,8 +116,7 @@ def load_joint(key: str) -> JointResolvent | None:
     )
 
 
-def save_joint(key: str, joint: JointResolvent) -> None:
-    """Keep a condensed joint."""
+def _save_joint(name: str, joint: JointResolvent) -> None:
     inverse = joint.inverse
     arrays: dict[str, Any] = {"loads": joint.loads}
     if isinstance(inverse, SplitMatrix):
@@ -87,30 +124,15 @@ def save_joint(key: str, joint: JointResolvent) -> None:
         arrays["kept"], arrays["turned"] = inverse.blocks
     else:
         arrays["inverse"] = inverse
-    _save(f"joint-{key}", arrays, {"rho": joint.rho, "rigid_modes": joint.rigid_modes})
+    _save(name, arrays, {"rho": joint.rho, "rigid_modes": joint.rigid_modes})
 
 
-def keep_body(made_from: Sequence[np.ndarray], make: Callable[[], Condensed]) -> Condensed:
-    """A condensed body, found by all arrays that it is made from, or made and kept."""
-    name = f"body-{content_key(*(_digest(array) for array in made_from))}"
-    if (kept := _load(name)) is not None:
-        return kept[0]["stiffness"], kept[0]["loads"]
-    stiffness, loads = make()
-    _save(name, {"stiffness": stiffness, "loads": loads}, {})
-    return stiffness, loads
-
-
-def _digest(array: np.ndarray) -> tuple[str, tuple[int, ...], str]:
-    """What an array is: kind and shape of its numbers, and a hash of them."""
-    bits = hashlib.sha256(np.ascontiguousarray(array).data)
-    return array.dtype.str, array.shape, bits.hexdigest()
-
-
-def load_cycle(key: str, structure: Structure, friction: float | Array) -> CycleSolution | None:
-    """The solved cycle of that key on its structure, or None."""
-    if (kept := _load(f"cycle-{key}")) is None:
-        return None
-    arrays, attributes = kept
+def _restored_cycle(
+    arrays: dict[str, Any],
+    attributes: dict[str, Any],
+    structure: Structure,
+    friction: float | Array,
+) -> CycleSolution:
     fields = {name: arrays[name] for name in FIELDS}
     return CycleSolution(
         histories=structure.histories(**fields, friction=friction),
@@ -125,12 +147,17 @@ def load_cycle(key: str, structure: Structure, friction: float | Array) -> Cycle
     )
 
 
-def save_cycle(key: str, cycle: CycleSolution) -> None:
-    """Keep a solved, converged cycle."""
+def _save_cycle(name: str, cycle: CycleSolution) -> None:
     arrays = {"states": np.stack(cycle.states), "equilibrium": cycle.equilibrium}
     names = ("iterations", "residual", "closure", "cycles")
     attributes = {name: getattr(cycle, name) for name in names}
-    _save(f"cycle-{key}", cycle.fields() | arrays, attributes)
+    _save(name, cycle.fields() | arrays, attributes)
+
+
+def _digest(array: np.ndarray) -> tuple[str, tuple[int, ...], str]:
+    """Return the type, the shape and a hash of an array."""
+    bits = hashlib.sha256(np.ascontiguousarray(array).data)
+    return array.dtype.str, array.shape, bits.hexdigest()
 
 
 def load_arrays(name: str) -> dict[str, Any] | None:

@@ -40,8 +40,8 @@ from workflow.analyses.vibration_wear.outcome import (
 )
 from workflow.analyses.vibration_wear.states import responses_to_all, worn_states
 from workflow.analyses.vibration_wear.vibrating_contact import ContactCycle, VibratingContact
-from workflow.analyses.wear.contact_stage import stepper_of
 from workflow.analyses.wear.structures.bodies.case import BodiesWearCase
+from workflow.analyses.wear.translation import wear_of
 from workflow.case.loading import load_case
 from workflow.case.plain import counted
 from workflow.shell.dataset import Dataset
@@ -65,7 +65,7 @@ def wear_half_space(
     resolution = Resolution(case.harmonics, case.resolution.samples)
     driving = driving_of(case.excitation, rig, case.resolution.harmonics[-1])
     contact = VibratingContact(bodies, rig, driving, case.wearing, wear.frequency, resolution)
-    stepper = SubcyclingStepper(stepper_of(bodies.wear), contact.alike_cycles, steps)
+    stepper = SubcyclingStepper(wear_of(bodies).stepper(), contact.alike_cycles, steps)
     with reporter.stage("contact, first cycle"):
         state = contact.unworn()
         first = first_cycles(contact.wearing(state), state, wear.cycles[-1])

@@ -25,7 +25,7 @@ from wear.contact.tractions import CycleTractions
 from wear.cracking.bulk_stress import SIDE, BodyFace, BulkStress
 from wear.cracking.life import tension_along
 from workflow.analyses.wear.case.sections import ContactStress
-from workflow.analyses.wear.contact_stage import ContactStage
+from workflow.models.contact import FaceContact
 
 
 class Planes:
@@ -81,9 +81,7 @@ class StressedCycle:
         return np.concatenate([self.tractions.shear[t], self.tractions.pressure[t, None]])
 
 
-def with_known_shear(
-    stage: ContactStage, cycle: CycleTractions, loads: FaceLoads
-) -> CycleTractions:
+def with_known_shear(stage: FaceContact, cycle: CycleTractions, loads: FaceLoads) -> CycleTractions:
     """The tractions with shear where the contact sticks, if the nodes of the loads know it."""
     if loads.force is None or not cycle.unknown.any():
         return cycle
@@ -94,7 +92,7 @@ def with_known_shear(
 class StressedBody:
     """Body 1 or 2 under the contact of a ``stage``."""
 
-    def __init__(self, stage: ContactStage, material: Material, number: Literal[1, 2]) -> None:
+    def __init__(self, stage: FaceContact, material: Material, number: Literal[1, 2]) -> None:
         self.material, self.number = material, number
         self._stage = stage
         # Each keeps the symbols of a depth, or its own: one per body serves both moments.

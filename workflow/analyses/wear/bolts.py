@@ -10,8 +10,8 @@ import numpy as np
 from sa_solver.types import Array
 from wear.contact.face_loads import FaceLoads
 from wear.coupled import CoupledState
-from workflow.analyses.wear.load_source import LoadSource
-from workflow.analyses.wear.structure_stage import StructureStage
+from workflow.models.loads import LoadSource
+from workflow.models.structure import StructureLoads
 from workflow.shell.dataset import Dataset
 from workflow.shell.folder import OutputFolder
 from workflow.shell.results import Along, ResultsWriter
@@ -23,7 +23,7 @@ BOLTS, TENSION = "bolts", "bolts/tension"
 
 def kept_tensions(source: LoadSource, state: CoupledState) -> dict[str, Array]:
     """Tensions ``(bolts, t)`` of a state, as its loads were last solved: what its jump keeps."""
-    if not isinstance(source, StructureStage) or not source.bolts:
+    if not isinstance(source, StructureLoads) or not source.bolts:
         return {}
     return {TENSION: source.tensions([interface.loads for interface in state.interfaces])}
 
@@ -31,7 +31,7 @@ def kept_tensions(source: LoadSource, state: CoupledState) -> dict[str, Array]:
 class BoltTensions:
     """Tensions ``(bolts, t)`` [N] of the ``stage``'s bolts over its unworn and its worn cycle."""
 
-    def __init__(self, stage: StructureStage, worn: Sequence[FaceLoads]) -> None:
+    def __init__(self, stage: StructureLoads, worn: Sequence[FaceLoads]) -> None:
         self._stage = stage
         cycles: Mapping[str, Sequence[FaceLoads]] = {"unworn": stage.unworn(), "worn": worn}
         self.moments = {

@@ -7,9 +7,9 @@ from pathlib import Path
 from fe_models.meshes.structure_mesh import MeshError
 from workflow.analyses.wear.case.base import WearCase
 from workflow.analyses.wear.figures.faces import write_faces
-from workflow.analyses.wear.structure_stage import StructureStage
 from workflow.analyses.wear.structures import structure_of
 from workflow.errors import UserError
+from workflow.models.structure import StructureLoads
 from workflow.shell.folder import OutputFolder
 from workflow.shell.lock import locked
 
@@ -23,7 +23,7 @@ def draw_faces(case: WearCase, name: str, out: Path, force: bool) -> Path:
     """
     structure = structure_of(case)
     source = structure.source(case)
-    if not isinstance(source, StructureStage):
+    if not isinstance(source, StructureLoads):
         raise UserError(
             f"{name}: structure.kind: {structure.name} has no meshed faces to draw; allowed with "
             "--out: mesh or dovetail"

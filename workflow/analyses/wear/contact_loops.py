@@ -8,28 +8,15 @@ per loop, in ``loops_<interface>.csv`` (:mod:`workflow.analyses.wear.loop_table`
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any
 
 import h5py
 import numpy as np
 
-from sa_solver.contact import FrictionalContact
-from sa_solver.cycles.loop_accuracy import loop_errors
-from sa_solver.cycles.tangential_loop import (
-    CLOSED,
-    MOST_CYCLES,
-    LoopFailure,
-    LoopPath,
-    march_loop,
-)
-from sa_solver.errors import ContactProblemError
-from sa_solver.types import Array, Tilt
-from wear.contact.interface import InterfaceState
-from wear.steps.stepping import ContactFailure
+from sa_solver.types import Array
 from workflow.analyses.wear.case.loops import Loops
 from workflow.analyses.wear.loop_table import COLUMNS, SLIDES, Column, write_loop_table
-from workflow.errors import UserError
+from workflow.models.loops import WornLoop
 from workflow.shell.dataset import Dataset
 from workflow.shell.folder import OutputFolder
 from workflow.shell.reporter import Reporter
@@ -40,100 +27,6 @@ MEASURED = tuple(column.name for column in COLUMNS if column.name != "cycles")
 # Interfaces and jumps are groups of a file.
 LOOPS, LOOPS_OVER_ENERGY = "loops", "loops_over_energy"
 OVER_ENERGY = "energy", "kt", "kt_error", "mu", "mu_error"
-
-
-@dataclass(frozen=True)
-class WornLoop:
-    """A loop on worn surfaces: ``values`` by the names ``MEASURED``, in base units.
-
-    ``displacement`` [mm] and ``force`` [N] ``(k,)`` are its curve, first loading included.
-    """
-
-    values: dict[str, float]
-    displacement: Array
-    force: Array
-
-
-# --- running ------------------------------------------------------------------------------------
-
-
-def loops_due(loops: Loops, jump: int, ended: bool) -> bool:
-    """Whether a loop is to be run after ``jump``."""
-    return loops.wanted and (loops.every == "jump" or jump == 0 or ended)
-
-
-def worn_loop(
-    contact: FrictionalContact,
-    loops: Loops,
-    name: str,
-    state: InterfaceState,
-    peak: int,
-    tilt: Tilt = "free",
-    lift: Array | float = 0.0,
-) -> WornLoop:
-    """The loop of the contact ``name`` in its present state, under its loads at ``peak``.
-
-    These widen the gap by ``lift`` ``(nx, ny)`` [mm]. Its ``tilt`` is held, or free under their
-    moments. A normal force of one's own acts along the same line, and lifts by its share. Raises
-    ContactFailure if it does not converge or friction cannot carry it, UserError for a contact
-    without load.
-    """
-    path = loop_path(loops, name, state, peak, tilt)
-    height = state.surfaces.gap + _share(path.P, state, peak) * lift
-    try:
-        loop = march_loop(contact, height, path)
-    except (LoopFailure, ContactProblemError) as error:
-        raise ContactFailure(
-            f"tangential loop: {error}; allowed: lower loops.force or loops.amplitude"
-        ) from error
-    if loop.closure > CLOSED:
-        raise ContactFailure(
-            f"tangential loop: still open by {loop.closure:.1e} of its range after {MOST_CYCLES} "
-            "cycles; allowed: lower loops.amplitude or loops.force"
-        )
-    errors = loop_errors(contact, height, path, loop)
-    values = {
-        "energy": state.energy,
-        "P": loop.P,
-        "kt": loop.stiffness,
-        "mu": loop.friction,
-        "energy_per_loop": loop.energy,
-        "area": loop.area,
-        "amplitude": loop.amplitude,
-        "force": loop.force_amplitude,
-        "sliding": loop.sliding,
-        "residual_stiffness": loop.residual_stiffness,
-        "border_load": loop.border_load,
-        "kt_error": errors.stiffness,
-        "mu_error": errors.friction,
-        "energy_per_loop_error": errors.energy,
-    }
-    return WornLoop(values, loop.displacement, loop.force)
-
-
-def loop_path(
-    loops: Loops, name: str, state: InterfaceState, peak: int, tilt: Tilt = "free"
-) -> LoopPath:
-    """What the loop imposes on the contact ``name``."""
-    loads = state.loads
-    P, Mx, My = (float(column[peak]) for column in (loads.P, loads.Mx, loads.My))
-    if loops.normal_force is None and not P > 0.0:
-        raise UserError(
-            f"loops: {name} carries nothing at peak load; allowed: loops.normal_force above 0"
-        )
-    force = P if loops.normal_force is None else loops.normal_force
-    share = _share(force, state, peak)
-    amplitude = loops.amplitude if loops.force is None else loops.force
-    assert amplitude is not None, "loops that are not wanted"
-    drive: Literal["motion", "force"] = "motion" if loops.force is None else "force"
-    moments = None if tilt == "held" else (share * Mx, share * My)
-    return LoopPath(force, amplitude, drive, loops.increments, loops.axis, moments)
-
-
-def _share(force: float, state: InterfaceState, peak: int) -> float:
-    """A normal force over that at peak load; 0 where that is none."""
-    P = float(state.loads.P[peak])
-    return force / P if P > 0.0 else 0.0
 
 
 def kept_loops(names: Sequence[str], loops: Sequence[WornLoop]) -> dict[str, Array]:

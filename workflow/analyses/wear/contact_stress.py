@@ -32,8 +32,8 @@ from workflow.analyses.wear.body_stress import (
 )
 from workflow.analyses.wear.case.base import ContactTerms, WearCase
 from workflow.analyses.wear.case.sections import ContactStress, Life
-from workflow.analyses.wear.contact_stage import ContactStage
 from workflow.analyses.wear.layout import MOMENTS
+from workflow.models.contact import FaceContact
 from workflow.shell.dataset import Dataset
 from workflow.shell.reporter import Reporter
 from workflow.shell.results import On, ResultsWriter
@@ -190,7 +190,7 @@ class InterfaceStress:
 def contact_stresses(
     case: WearCase,
     peak: int,
-    contacts: Sequence[tuple[ContactStage, tuple[StressedCycle, StressedCycle]]],
+    contacts: Sequence[tuple[FaceContact, tuple[StressedCycle, StressedCycle]]],
     reporter: Reporter,
     progress: Progress,
 ) -> list[InterfaceStress]:
@@ -217,7 +217,7 @@ def contact_stresses(
 def _interface_stress(
     case: WearCase,
     peak: int,
-    stage: ContactStage,
+    stage: FaceContact,
     cycles: tuple[StressedCycle, StressedCycle],
     done: Callable[[], None],
 ) -> InterfaceStress:

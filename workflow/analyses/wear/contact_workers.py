@@ -11,14 +11,12 @@ from sa_solver.types import Tally
 from wear.contact.contacts import Contacts
 from wear.contact.face_loads import FaceLoads
 from wear.contact.interface import FirstContact, InterfaceState
-from wear.contact.tractions import ContactFields
-from wear.coupled import CoupledState
 from wear.worn import Spent
 from workflow.analyses.wear.case.base import WearCase
-from workflow.analyses.wear.contact_loops import WornLoop
-from workflow.analyses.wear.contact_stage import ContactEnd, ContactStage
-from workflow.analyses.wear.heard import Heard
-from workflow.analyses.wear.load_source import ContactFace
+from workflow.analyses.wear.translation import face_contact
+from workflow.models.contact import ContactEnd, FaceContact
+from workflow.models.contacts import FaceContacts
+from workflow.models.loads import ContactFace
 from workflow.shell.processes import Done, Workers, workers
 
 # Increments with friction of the first jump over those of the first cycle, as far as that is known
@@ -36,7 +34,7 @@ def contact_workers(
 
 def _worker(case: WearCase, face: ContactFace, solved: Done) -> Callable[..., Any]:
     """What answers for one contact, made where it is to live; ``solved`` is told of increments."""
-    stage = ContactStage(case, face)
+    stage = face_contact(case, face)
     stage.solved = solved
     contacts = Contacts([stage])
 
@@ -47,43 +45,10 @@ def _worker(case: WearCase, face: ContactFace, solved: Done) -> Callable[..., An
     return answer
 
 
-class StagedContacts(Heard, Contacts):
-    """The contacts of all faces of a case, as ``stages`` describe them.
-
-    Those in processes are heard: of increments with friction, and how many to expect.
-    """
-
-    def __init__(self, stages: list[ContactStage]) -> None:
-        super().__init__(stages)
-        self.stages = stages
-
-    def restored(self, state: CoupledState) -> CoupledState:
-        """A state that was kept on the disk, with what had not to be."""
-        return state
-
-    @property
-    def names(self) -> list[str]:
-        return [stage.name for stage in self.stages]
-
-    def fields(self, states: Sequence[InterfaceState], increment: int) -> list[ContactFields]:
-        """Tractions and slip of an increment on the present surfaces."""
-        pairs = zip(self.stages, states, strict=True)
-        seen = [stage.seen(state, increment) for stage, state in pairs]
-        return self.call("fields", seen, self.each(increment))
-
-    def loops(self, states: Sequence[InterfaceState], increment: int) -> list[WornLoop]:
-        """Tangential loops on the present surfaces, under the loads of an increment."""
-        return self.call("loop", states, self.each(increment))
-
-    def ends(self, states: Sequence[InterfaceState]) -> Callable[[], list[ContactEnd]]:
-        """What tells the cycle on the surfaces at the end; they may find it while others work."""
-        return partial(self.call, "end", states)
-
-
-class ContactProcesses(StagedContacts):
+class ContactProcesses(FaceContacts):
     """Contacts that wear side by side; what is quick is done here, by ``stages`` like theirs."""
 
-    def __init__(self, stages: list[ContactStage], team: Workers) -> None:
+    def __init__(self, stages: Sequence[FaceContact], team: Workers) -> None:
         super().__init__(stages)
         self._team, self._expected = team, 1
 

@@ -11,11 +11,8 @@ from fe_models.meshes.structure_mesh import Interface, MeshError
 from fe_models.structure import InterfaceHistory
 from workflow.analyses.wear.case.base import FiniteElementCase, WearCase
 from workflow.analyses.wear.choice import report_choice
-from workflow.analyses.wear.contact_stage import gap_on
-from workflow.analyses.wear.load_source import ContactFace
-from workflow.analyses.wear.recording import heard_stage
+from workflow.analyses.wear.recording import reported_stage
 from workflow.analyses.wear.run import meshed_faces
-from workflow.analyses.wear.structure_stage import StructureStage
 from workflow.analyses.wear.structures import resultants, structure_of
 from workflow.analyses.wear.structures.resultants.case import ResultantsCase
 from workflow.analyses.wear.structures.resultants.writing import (
@@ -26,6 +23,9 @@ from workflow.analyses.wear.structures.resultants.writing import (
 from workflow.analyses.wear.warnings import warn_of_structure
 from workflow.case.writing import dump_case
 from workflow.errors import UserError
+from workflow.models.contact import gap_on
+from workflow.models.loads import ContactFace
+from workflow.models.structure import StructureLoads
 from workflow.shell.folder import OutputFolder
 from workflow.shell.lock import locked
 from workflow.shell.reporter import Reporter
@@ -56,7 +56,7 @@ def export_resultants(case: WearCase, name: str, out: Path, force: bool) -> list
     structure.memory(case, 0, 0).check()
     case, choice = structure.choose(case)
     source = structure.source(case)
-    assert isinstance(source, StructureStage)
+    assert isinstance(source, StructureLoads)
     with locked(out) as gone:
         folder = OutputFolder(out, "resultants")
         folder.replace(dict.fromkeys((TABLE, FIELDS, CASE), "loads of the contacts"), force)
@@ -78,15 +78,16 @@ def export_resultants(case: WearCase, name: str, out: Path, force: bool) -> list
     ]
 
 
-def _write(case: WearCase, source: StructureStage, out: Path, reporter: Reporter) -> None:
+def _write(case: WearCase, source: StructureLoads, out: Path, reporter: Reporter) -> None:
     faces = meshed_faces(case, source, reporter)
-    with heard_stage(reporter, source, "condensation", "steps"):
+    with reported_stage(reporter, source, "condensation", "steps"):
         source.prepare()
-    with heard_stage(reporter, source, "structural friction", "increments"):
+    with reported_stage(reporter, source, "structural friction", "increments"):
         histories = {
             history.interface.name: _numbered(source, history) for history in source.unworn()
         }
-    warn_of_structure(source, reporter)
+    assert isinstance(case, FiniteElementCase)
+    warn_of_structure(case, source, reporter)
     # All contacts are alike, or they were refused.
     cells = case.every_terms[0].grid
     heights = {face.face.name: gap_on(face, face.grid(cells)) for face in faces}
@@ -98,7 +99,7 @@ def _write(case: WearCase, source: StructureStage, out: Path, reporter: Reporter
     write_text(out / CASE, dump_case(_imported(case, faces, out)))
 
 
-def _numbered(source: StructureStage, history: InterfaceHistory) -> InterfaceHistory:
+def _numbered(source: StructureLoads, history: InterfaceHistory) -> InterfaceHistory:
     """The history with the user's own node numbers, where the mesh has them."""
     face = history.interface
     if not isinstance(face, Interface):

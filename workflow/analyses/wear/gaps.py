@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 
@@ -13,51 +12,31 @@ from sa_solver.types import Array, Grid
 from workflow.analyses.contact.surfaces import SurfacesOfTwo
 from workflow.analyses.wear.case.gaps import GapShape, HeightsGap, ParaboloidGap, RoundedGap
 from workflow.case.input_files import read_heights
-
-GapFunction = Callable[[Array, Array], Array]
-
-
-@dataclass(frozen=True)
-class GridHeights:
-    """Heights ``(nx, ny)`` [mm] at the centres of a grid; bilinear between and beyond them."""
-
-    grid: Grid
-    heights: Array
-
-    def __call__(self, x: Array, y: Array) -> Array:
-        """Heights at ``x`` ``(n, 1)`` and ``y`` ``(1, m)``; on the grid itself as they are."""
-        grid = self.grid
-        if np.array_equal(x, grid.x) and np.array_equal(y, grid.y):
-            return self.heights
-        along_x = _linear(grid.x.ravel(), x.ravel())
-        along_y = _linear(grid.y.ravel(), y.ravel())
-        heights: Array = along_x @ self.heights @ along_y.T
-        return heights
+from workflow.models.gaps import AddedGap, GapFunction, GridHeights
 
 
 @dataclass(frozen=True)
-class MeasuredGap:
-    """Gap of a ``form`` [mm] and of measured ``surfaces``, of the cells of any grid over a face.
+class MeasuredHeights:
+    """Gap of surfaces as measured, on the cells of any grid over a face.
 
-    ``face`` is the grid that tells its size.
+    ``face`` is a grid of the size of the face.
     """
 
-    form: GapFunction
     surfaces: SurfacesOfTwo
     face: Grid
 
     def __call__(self, x: Array, y: Array) -> Array:
-        """Means over cells at ``x`` ``(n, 1)`` and ``y`` ``(1, m)``, which cover the face."""
+        """Return means over cells centred at ``x`` ``(n, 1)`` and ``y`` ``(1, m)``."""
         grid = Grid.over(self.face.size, (x.size, y.size), self.face.line)
         # No other places are asked for.
         assert np.allclose(grid.x, x)
         assert np.allclose(grid.y, y)
-        return self.form(x, y) + self.surfaces.gap(grid)
+        return self.surfaces.gap(grid)
 
 
 def with_measured(form: GapFunction, surfaces: SurfacesOfTwo | None, face: Grid) -> GapFunction:
-    """The gap of a form, and of measured surfaces where there are any."""
-    return form if surfaces is None else MeasuredGap(form, surfaces, face)
+    """Return the gap of a form, and of measured surfaces where there are any."""
+    return form if surfaces is None else AddedGap(MeasuredHeights(surfaces, face)).on(form)
 
 
 def gap_over(shape: GapShape | None, heights: Array | None, grid: Grid) -> GapFunction:
@@ -93,13 +72,3 @@ def _paraboloid(shape: ParaboloidGap, x: Array, y: Array) -> Array:
         0.0 if radius is None else 1.0 / radius for radius in (shape.radius_x, shape.radius_y)
     )
     return 0.5 * (curvature_x * x**2 + curvature_y * y**2)
-
-
-def _linear(known: Array, wanted: Array) -> Array:
-    """Weights ``(m, n)`` of values at ``known`` ``(n,)``, ascending, for those at ``wanted``."""
-    if len(known) == 1:
-        return np.ones((len(wanted), 1))
-    # A fifth of a second to import: where it is used.
-    from scipy.interpolate import make_interp_spline
-
-    return np.asarray(make_interp_spline(known, np.eye(len(known)), k=1)(wanted))

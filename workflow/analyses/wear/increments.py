@@ -25,9 +25,10 @@ from sa_solver.types import Array, Mask
 from workflow.analyses.wear.case.base import MOST_INCREMENTS, FiniteElementCase
 from workflow.analyses.wear.choice import Decision, record_of, since
 from workflow.analyses.wear.fidelity.estimate import LESSER_FLANK
-from workflow.analyses.wear.structure_stage import StructureModel, StructureStage
+from workflow.analyses.wear.translation import structure_loads
 from workflow.case.changing import changed
 from workflow.errors import MethodFailed
+from workflow.models.structure import StructureModel
 
 ENTRY = "load_path.increments"
 # Of a leg: two leave 6 % of the depth of a dovetail and are estimated to leave 0.2 %, since what
@@ -47,9 +48,9 @@ AnyCase = TypeVar("AnyCase", bound=FiniteElementCase)
 def choose_increments(
     case: AnyCase, model: Callable[[AnyCase], StructureModel]
 ) -> tuple[AnyCase, dict[str, Any]]:
-    """The case with as many increments as leave ``wear.tolerance``, and a record of why.
+    """Return the case with as many increments as ``wear.tolerance`` asks for, and a record of why.
 
-    ``model`` makes a structure of such a case. Raises what that raises.
+    ``model`` makes a structure of such a case, or one that stands for it. Raises what that raises.
     """
     begin, allowed = time.perf_counter(), case.wear.tolerance
     decision = decide_increments(case, model, allowed)
@@ -88,15 +89,16 @@ class _Cycle(Generic[AnyCase]):
 
     def __init__(self, case: AnyCase, model: Callable[[AnyCase], StructureModel]) -> None:
         self._case, self._model, self._few = case, model, (FEWEST,) * len(case.legs)
-        self._stage = StructureStage(self._of(self._few))
+        self._stage = structure_loads(self._of(self._few), model)
 
-    def _of(self, counts: Counts) -> StructureModel:
-        return self._model(changed(self._case, self._case.divided(counts)))
+    def _of(self, counts: Counts) -> AnyCase:
+        return changed(self._case, self._case.divided(counts))
 
     def _solved(self, counts: Counts) -> Histories | None:
         """What all faces do, None where so few increments do not converge; MethodFailed of many."""
         try:
-            return self._stage.cycle_under(self._of(counts).missions).histories
+            cycles = self._model(self._of(counts)).load_cycles
+            return self._stage.cycle_under(cycles).histories
         except MethodFailed:
             if sum(counts) >= MOST_INCREMENTS:
                 raise

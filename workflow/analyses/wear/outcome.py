@@ -18,8 +18,8 @@ from wear.steps.steppers import step_errors
 from wear.steps.stepping import ContactFailure
 from wear.steps.stick_border import border_errors
 from workflow.analyses.wear.case.base import WearCase
-from workflow.analyses.wear.contact_stage import ContactEnd, ContactStage
-from workflow.analyses.wear.load_source import LoadSource
+from workflow.models.contact import ContactEnd, FaceContact
+from workflow.models.loads import LoadSource
 
 # Order of the pressure at worn edges in the length of steps that go over increments to and fro: 4,
 # 8 and 16 implicit ones left 5.5, 1.9 and 0.75 % of it on a dovetail's flank, 2, 4 and 8 of second
@@ -41,7 +41,7 @@ class InterfaceOutcome:
     knows the loads in between.
     """
 
-    stage: ContactStage
+    stage: FaceContact
     unworn: FaceLoads
     first: FirstContact
     state: InterfaceState

@@ -15,12 +15,12 @@ from wear.coupled import CoupledSettings, CoupledState, Observer, Stage
 from workflow.analyses.wear import checkpoint
 from workflow.analyses.wear.bolts import kept_tensions
 from workflow.analyses.wear.case.base import WearCase
-from workflow.analyses.wear.contact_loops import kept_loops, loops_due
-from workflow.analyses.wear.contact_workers import StagedContacts
-from workflow.analyses.wear.heard import Heard
-from workflow.analyses.wear.load_source import LoadSource
+from workflow.analyses.wear.contact_loops import kept_loops
 from workflow.analyses.wear.warnings import warn_of_growth, warn_of_instability
 from workflow.case.plain import counted
+from workflow.models.contacts import FaceContacts
+from workflow.models.loads import LoadSource
+from workflow.models.progress import ReportsProgress
 from workflow.shell import steps
 from workflow.shell.analysis import Run
 from workflow.shell.reporter import Reporter
@@ -28,14 +28,14 @@ from workflow.shell.store import write_arrays
 
 
 @contextmanager
-def heard_stage(reporter: Reporter, working: object, name: str, of: str) -> Iterator[None]:
+def reported_stage(reporter: Reporter, working: object, name: str, of: str) -> Iterator[None]:
     """A stage in which what is ``working`` tells how many ``of`` its things are done.
 
     Of what cannot be heard, as other sources of loads, nothing takes long.
     """
     with reporter.stage(name, of) as told, ExitStack() as stack:
-        if isinstance(working, Heard):
-            stack.enter_context(working.heard(told))
+        if isinstance(working, ReportsProgress):
+            stack.enter_context(working.reporting_to(told))
         yield
 
 
@@ -44,12 +44,12 @@ class RunLog(Observer):
     """Times the parts of the loop, and says how far it has got and what to beware of."""
 
     run: Run[WearCase]
-    contacts: StagedContacts
+    contacts: FaceContacts
     source: LoadSource
 
     def stage(self, name: Stage) -> AbstractContextManager[object]:
         working = self.source if name == "structural friction" else self.contacts
-        return heard_stage(self.run.reporter, working, name, "increments")
+        return reported_stage(self.run.reporter, working, name, "increments")
 
     def jumping(self, state: CoupledState, cycles: float) -> None:
         step = self.run.case.wear.step
@@ -83,7 +83,7 @@ class Recorder(Observer):
     run: Run[WearCase]
     settings: CoupledSettings
     peak: int
-    contacts: StagedContacts
+    contacts: FaceContacts
     jumps: list[str]
     source: LoadSource
 
@@ -143,8 +143,9 @@ class Recorder(Observer):
 
     def _loops(self, state: CoupledState) -> dict[str, Array]:
         """Tangential loops on the present surfaces, where they are due."""
-        if not loops_due(self.run.case.loops, state.jump, self.settings.ended(state)):
+        loops = self.run.case.loops.described()
+        if loops is None or not loops.due(state.jump, self.settings.ended(state)):
             return {}
         with self.run.reporter.stage("tangential loops"):
-            loops = self.contacts.loops(state.interfaces, self.peak)
-        return kept_loops(self.contacts.names, loops)
+            found = self.contacts.loops(state.interfaces, self.peak, loops)
+        return kept_loops(self.contacts.names, found)

@@ -35,7 +35,6 @@ from workflow.analyses.wear.layout import EXTRAPOLATION, MOMENTS, Contents, ener
 from workflow.analyses.wear.link_report import link_summary
 from workflow.analyses.wear.outcome import STOPPED, InterfaceOutcome, Outcome
 from workflow.analyses.wear.run_errors import warn_of_errors
-from workflow.analyses.wear.structure_stage import StructureStage
 from workflow.analyses.wear.uniformity import uniformities
 from workflow.analyses.wear.worn_faces import write_worn_faces
 from workflow.analyses.wear.worn_structure import (
@@ -44,6 +43,7 @@ from workflow.analyses.wear.worn_structure import (
     resultants_at,
     worn_structure,
 )
+from workflow.models.structure import StructureLoads
 from workflow.shell.analysis import Run
 from workflow.shell.dataset import Dataset
 from workflow.shell.folder import OutputFolder
@@ -88,7 +88,7 @@ def write_output(outcome: Outcome, lives: Begun, run: Run[WearCase]) -> None:
     folder, reporter = run.folder, run.reporter
     stages = [contact.stage for contact in outcome.interfaces]
     structure = None
-    if isinstance(source, StructureStage):
+    if isinstance(source, StructureLoads):
         moves = case.output.paraview
         structure = worn_structure(
             source, stages, state, case.friction_evolves, moves, folder, reporter

@@ -12,27 +12,23 @@ from fe_models.solvers.blas_threads import one_thread
 from sa_solver.normal.contact import NormalContactError
 from wear.contact.face_loads import FaceLoads
 from wear.contact.interface import FirstContact, MotionError
-from wear.coupled import CoupledSettings, CoupledState, CoupledWear, JumpSize, Stop
+from wear.coupled import CoupledSettings, CoupledState, CoupledWear
 from wear.steps.stepping import ContactFailure
 from workflow.analyses.wear import checkpoint
 from workflow.analyses.wear.budget.finding import Begun, lives_of_companions
-from workflow.analyses.wear.case.base import WearCase
+from workflow.analyses.wear.case.base import FiniteElementCase, WearCase
 from workflow.analyses.wear.choice import report_choice
-from workflow.analyses.wear.contact_stage import ContactEnd, ContactStage
 from workflow.analyses.wear.contact_workers import (
     ContactProcesses,
-    StagedContacts,
     contact_workers,
 )
-from workflow.analyses.wear.load_source import ContactFace, LoadSource
-from workflow.analyses.wear.nodal_contacts import NodalContacts
 from workflow.analyses.wear.outcome import InterfaceOutcome, Outcome
-from workflow.analyses.wear.recording import Recorder, RunLog, heard_stage
+from workflow.analyses.wear.recording import Recorder, RunLog, reported_stage
 from workflow.analyses.wear.results import write_output
-from workflow.analyses.wear.structure_stage import StructureStage
 from workflow.analyses.wear.structures import structure_of
 from workflow.analyses.wear.structures.resultants.source import ResultantsSource
 from workflow.analyses.wear.structures.resultants.writing import marched
+from workflow.analyses.wear.translation import contact_of, face_contact, wear_of
 from workflow.analyses.wear.warnings import (
     warn_of_contact,
     warn_of_file,
@@ -42,12 +38,15 @@ from workflow.analyses.wear.warnings import (
 )
 from workflow.analyses.wear.worn_structure import nonlinearity_sentence
 from workflow.errors import MethodFailed, UserError
+from workflow.models.contact import ContactEnd
+from workflow.models.contacts import FaceContacts
+from workflow.models.loads import ContactFace, LoadSource
+from workflow.models.nodal import NodalContacts
+from workflow.models.structure import StructureLoads
 from workflow.shell.analysis import Run
 from workflow.shell.processes import Workers
 from workflow.shell.reporter import Reporter
 
-# Jumps of a run whose explicit steps are too short to be recorded one by one.
-RECORDS = 10
 # Jumps, more than which are warned of.
 MANY_JUMPS = 300
 
@@ -90,13 +89,14 @@ def _compute(run: Run[WearCase], working: ExitStack) -> tuple[Outcome, Begun]:
     workers = working.enter_context(
         contact_workers(case, faces if _worn_apart(case, source) else ())
     )
-    with heard_stage(reporter, source, "condensation", "steps"):
+    with reported_stage(reporter, source, "condensation", "steps"):
         source.prepare()
     lives = lives_of_companions(case, source, reporter, run.beside)
     with one_thread():
-        with heard_stage(reporter, source, "structural friction", "increments"):
+        with reported_stage(reporter, source, "structural friction", "increments"):
             unworn = source.unworn()
-        if isinstance(source, StructureStage):
+        if isinstance(source, StructureLoads):
+            assert isinstance(case, FiniteElementCase)
             _check_structure(case, source, reporter)
         if isinstance(source, ResultantsSource):
             warn_of_file(source, reporter)
@@ -133,15 +133,15 @@ def _told_once(
 
 def _contacts(
     case: WearCase, source: LoadSource, faces: Sequence[ContactFace], workers: Workers
-) -> StagedContacts:
+) -> FaceContacts:
     """What wears: half-spaces in the workers or here, or the nodes of the structure."""
     if case.contact.method == "nodes":
-        assert isinstance(source, StructureStage)
-        return NodalContacts(case, faces, source)
-    stages = [ContactStage(case, face) for face in faces]
+        assert isinstance(source, StructureLoads)
+        return NodalContacts(faces, partial(contact_of, case), wear_of(case), source)
+    stages = [face_contact(case, face) for face in faces]
     if _worn_apart(case, source):
         return ContactProcesses(stages, workers)
-    return StagedContacts(stages)
+    return FaceContacts(stages)
 
 
 def _worn_apart(case: WearCase, source: LoadSource) -> bool:
@@ -153,7 +153,7 @@ def _worn_apart(case: WearCase, source: LoadSource) -> bool:
 def _march(
     run: Run[WearCase],
     source: LoadSource,
-    contacts: StagedContacts,
+    contacts: FaceContacts,
     unworn: Sequence[FaceLoads],
     kept: CoupledState | None,
 ) -> tuple[CoupledState, list[FirstContact]]:
@@ -177,10 +177,12 @@ def _march(
     return end, first
 
 
-def _check_structure(case: WearCase, structure: StructureStage, reporter: Reporter) -> None:
+def _check_structure(
+    case: FiniteElementCase, structure: StructureLoads, reporter: Reporter
+) -> None:
     """Warnings about the structure, and the check of its nonlinearity."""
     reporter.log(f"loads: {marched(structure.unworn_cycle)}")
-    warn_of_structure(structure, reporter)
+    warn_of_structure(case, structure, reporter)
     if case.friction_evolves and case.recoupling.resultants == "constant":
         reporter.warn(
             "friction.evolution: the structure keeps its first coefficient "
@@ -196,21 +198,12 @@ def meshed_faces(case: WearCase, source: LoadSource, reporter: Reporter) -> tupl
     """The faces of a source of loads, once it is known that the memory is enough for the run."""
     with reporter.stage("mesh"):
         faces = source.faces
-    if isinstance(source, StructureStage):
+    if isinstance(source, StructureLoads):
         nodes, interface_nodes = source.node_count(), source.interface_count()
         structure_of(case).memory(case, nodes, interface_nodes).check()
     return faces
 
 
 def coupled_settings(case: WearCase) -> CoupledSettings:
-    """How far a run goes and when its structure is solved again, as the loop takes it."""
-    wear, step, coupling = case.wear, case.wear.step, case.recoupling
-    cycles = step.cycles if step.fraction is None else wear.cycles / RECORDS
-    return CoupledSettings(
-        cycles=wear.cycles,
-        jump=JumpSize(cycles, step.depth, step.volume),
-        stop=Stop(wear.stop.depth, wear.stop.volume),
-        resultants=coupling.resultants,
-        drift=coupling.drift,
-        friction="evolving" if case.friction_evolves else "constant",
-    )
+    """Return how far a run goes and when its structure is solved again."""
+    return wear_of(case).coupled("evolving" if case.friction_evolves else "constant")

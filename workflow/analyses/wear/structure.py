@@ -15,8 +15,8 @@ from workflow.shell.memory import Memory, factor_bytes
 if TYPE_CHECKING:
     from wear.contact.interface import InterfaceState
     from wear.contact.tractions import CycleTractions
-    from workflow.analyses.wear.contact_stage import ContactStage
-    from workflow.analyses.wear.load_source import LoadSource
+    from workflow.models.contact import FaceContact
+    from workflow.models.loads import LoadSource
 
 AnyWearCase = TypeVar("AnyWearCase", bound=WearCase)
 
@@ -91,7 +91,7 @@ class WearStructure(Generic[AnyWearCase]):
     extent: Callable[[AnyWearCase], Extent]
     memory: Callable[[AnyWearCase, int, int], Memory] = memory
     choose: Callable[[AnyWearCase], tuple[AnyWearCase, dict[str, Any] | None]] = as_written
-    warnings: Callable[[AnyWearCase, ContactStage, float], Iterable[str]] = lambda *_: ()
+    warnings: Callable[[AnyWearCase, FaceContact, float], Iterable[str]] = lambda *_: ()
     finer: Callable[[AnyWearCase], Finer[AnyWearCase] | None] = lambda _: None
     finer_cycles: Callable[[AnyWearCase, InterfaceState], list[CycleTractions] | None] = no_cycles
     settings: Callable[[AnyWearCase], Mapping[str, str]] = lambda _: {}

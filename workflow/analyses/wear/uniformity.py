@@ -18,9 +18,9 @@ from fe_models.structure import InterfaceHistory
 from sa_solver.cycles.increments import friction_work
 from sa_solver.types import Array
 from wear.contact.interface import InterfaceState
-from workflow.analyses.wear.contact_stage import ContactStage
-from workflow.analyses.wear.load_source import LoadSource
-from workflow.analyses.wear.structure_stage import StructureStage
+from workflow.models.contact import FaceContact
+from workflow.models.loads import LoadSource
+from workflow.models.structure import StructureLoads
 
 # A middle below this share of the largest is rounding.
 ROUNDING = 1e-9
@@ -105,10 +105,10 @@ class Uniformity:
 
 
 def uniformities(
-    source: LoadSource, stages: Sequence[ContactStage], states: Sequence[InterfaceState]
+    source: LoadSource, stages: Sequence[FaceContact], states: Sequence[InterfaceState]
 ) -> dict[str, Uniformity]:
     """Uniformity of every loaded contact of a structure in three dimensions, by interface."""
-    if not isinstance(source, StructureStage) or source.line:
+    if not isinstance(source, StructureLoads) or source.line:
         return {}
     return {
         stage.name: result
@@ -118,7 +118,7 @@ def uniformities(
 
 
 def uniformity(
-    stage: ContactStage, history: InterfaceHistory, state: InterfaceState, peak: int
+    stage: FaceContact, history: InterfaceHistory, state: InterfaceState, peak: int
 ) -> Uniformity | None:
     """Uniformity of the unworn contact and of the wear so far; None without load in the middle."""
     carried = sections(stage.transfer, history, peak, stage.settings.friction(0.0))

@@ -9,15 +9,15 @@ from fe_models.structure import CLOSED, InterfaceHistory
 from sa_solver.types import ElasticPair, LoadHistory, Mask
 from wear.contact.interface import FirstContact
 from wear.coupled import CoupledState
-from workflow.analyses.wear.case.base import WearCase
+from workflow.analyses.wear.case.base import FiniteElementCase, WearCase
 from workflow.analyses.wear.case.sections import SIZES, Duration
-from workflow.analyses.wear.contact_stage import ContactStage
 from workflow.analyses.wear.link_report import report_link
-from workflow.analyses.wear.load_source import LoadSource
-from workflow.analyses.wear.structure_stage import StructureStage
 from workflow.analyses.wear.structures import structure_of
 from workflow.analyses.wear.structures.resultants.source import ResultantsSource
 from workflow.case.plain import counted
+from workflow.models.contact import FaceContact
+from workflow.models.loads import LoadSource
+from workflow.models.structure import StructureLoads
 from workflow.shell.few_cells import check_cells
 from workflow.shell.reporter import Reporter
 
@@ -38,9 +38,12 @@ FULL_APART = 0.6
 NO_ENERGY = 1e-3
 
 
-def warn_of_structure(stage: StructureStage, reporter: Reporter) -> None:
-    """What the model knows, cycles that do not close, faces that lose their contact."""
-    stage.model.warn(stage.structure, reporter)
+def warn_of_structure(case: FiniteElementCase, stage: StructureLoads, reporter: Reporter) -> None:
+    """Report remarks on the model, cycles that do not close, and faces that lose contact."""
+    for text in case.told_of_nodes():
+        reporter.say(text)
+    for remark in stage.remarks():
+        (reporter.warn if remark.is_warning else reporter.say)(remark.text)
     unworn = stage.unworn_cycle
     if unworn.closure > CLOSED:
         reporter.warn(
@@ -65,7 +68,7 @@ def warn_of_structure(stage: StructureStage, reporter: Reporter) -> None:
 
 
 def _warn_of_few_nodes(
-    history: InterfaceHistory, stage: StructureStage, reporter: Reporter
+    history: InterfaceHistory, stage: StructureLoads, reporter: Reporter
 ) -> None:
     """A contact on so few nodes that the structure hardly knows its size."""
     face = history.interface
@@ -79,7 +82,7 @@ def _warn_of_few_nodes(
         )
 
 
-def _warn_of_form(history: InterfaceHistory, stage: StructureStage, reporter: Reporter) -> None:
+def _warn_of_form(history: InterfaceHistory, stage: StructureLoads, reporter: Reporter) -> None:
     """A contact on faces that its mesh knows no better than pressure can tell."""
     face = history.interface
     assert isinstance(face, Interface)
@@ -127,7 +130,7 @@ def warn_of_file(source: ResultantsSource, reporter: Reporter) -> None:
 def warn_of_contact(
     case: WearCase,
     source: LoadSource,
-    stages: list[ContactStage],
+    stages: list[FaceContact],
     state: CoupledState,
     first: list[FirstContact],
     reporter: Reporter,
@@ -169,7 +172,7 @@ def warn_of_contact(
 
 
 def _energies_apart(
-    source: LoadSource, stage: ContactStage, loads: LoadHistory, first: FirstContact
+    source: LoadSource, stage: FaceContact, loads: LoadHistory, first: FirstContact
 ) -> str:
     """What is wrong where source and half-space disagree on the energy of a cycle, if they do."""
     from_file, told = isinstance(source, ResultantsSource), loads.mean_energy
@@ -190,7 +193,7 @@ def _energies_apart(
             "increment alone), friction.coefficient, size and gap of the face, and that the mesh "
             "that they are from is fine enough for the slip zone"
         )
-    if isinstance(source, StructureStage) and told > found / (1.0 - FULL_APART):
+    if isinstance(source, StructureLoads) and told > found / (1.0 - FULL_APART):
         return (
             f"the structure's nodes dissipate {told:.3g} {unit} a cycle, the half-space with its "
             f"own friction {found:.3g}, and wears by it: the mesh is too coarse for the slip zone; "
@@ -199,7 +202,7 @@ def _energies_apart(
     return ""
 
 
-def _work_of_sliding(stage: ContactStage, loads: LoadHistory) -> float:
+def _work_of_sliding(stage: FaceContact, loads: LoadHistory) -> float:
     """About the work of friction as a contact begins to slide: µP on µP over its stiffness."""
     friction = stage.settings.friction(0.0)
     shear, modulus = friction * float(loads.P.max()), stage.pair.contact_modulus
@@ -208,7 +211,7 @@ def _work_of_sliding(stage: ContactStage, loads: LoadHistory) -> float:
 
 
 def warn_of_instability(
-    stages: list[ContactStage], state: CoupledState, cycles: float, reporter: Reporter
+    stages: list[FaceContact], state: CoupledState, cycles: float, reporter: Reporter
 ) -> None:
     """Explicit steps of so many cycles that are too long."""
     pairs = zip(stages, state.interfaces, strict=True)
@@ -220,7 +223,7 @@ def warn_of_instability(
         )
 
 
-def warn_of_growth(stages: list[ContactStage], state: CoupledState, reporter: Reporter) -> None:
+def warn_of_growth(stages: list[FaceContact], state: CoupledState, reporter: Reporter) -> None:
     """Half-spaces in contact that have grown to the border of their grid: they have worn there."""
     for stage, interface in zip(stages, state.interfaces, strict=True):
         worn = interface.surfaces.depth
@@ -240,7 +243,7 @@ def warn_of_many_jumps(wear: Duration, state: CoupledState, left: int, reporter:
 
 
 def warn_of_worn_cells(
-    case: WearCase, peak: int, stages: list[ContactStage], state: CoupledState, reporter: Reporter
+    case: WearCase, peak: int, stages: list[FaceContact], state: CoupledState, reporter: Reporter
 ) -> None:
     """Contacts that carry the peak load on few cells after they have worn."""
     for stage, interface in zip(stages, state.interfaces, strict=True):
@@ -250,7 +253,7 @@ def warn_of_worn_cells(
             check_cells(stage.name, settings, stage.grid, pressure, reporter, worn=True)
 
 
-def warn_of_border(stage: ContactStage, reporter: Reporter) -> None:
+def warn_of_border(stage: FaceContact, reporter: Reporter) -> None:
     """A contact cut off by the end of its grid."""
     reporter.warn(
         f"{stage.name}: the contact touches the border of its grid, where it is cut off: "

@@ -9,14 +9,14 @@ from typing import Any
 import numpy as np
 
 from wear.contact.interface import InterfaceState
-from workflow.analyses.wear.contact_stage import ContactStage
-from workflow.analyses.wear.load_source import LoadSource, UserFace
 from workflow.analyses.wear.worn_nodes import (
     NodalDepths,
     nodal_depths,
     worn_displacement,
     write_worn_nodes,
 )
+from workflow.models.contact import FaceContact
+from workflow.models.loads import LoadSource, UserFace
 from workflow.shell.folder import OutputFolder
 from workflow.shell.reporter import Reporter
 
@@ -26,7 +26,7 @@ FULL_SHARE = 0.99
 
 def write_worn_faces(
     source: LoadSource,
-    stages: Sequence[ContactStage],
+    stages: Sequence[FaceContact],
     states: Sequence[InterfaceState],
     folder: OutputFolder,
     reporter: Reporter,
@@ -54,7 +54,7 @@ def write_worn_faces(
     return summary
 
 
-def _worn_nodes(face: UserFace, stage: ContactStage, state: InterfaceState) -> NodalDepths:
+def _worn_nodes(face: UserFace, stage: FaceContact, state: InterfaceState) -> NodalDepths:
     """What the user's nodes lose: those of the contact's own face, or at places of their own."""
     depth = stage.on_grid(state).depths[face.body - 1]
     if face.points is not None:

@@ -24,11 +24,11 @@ from wear.coupled import CoupledState
 from workflow.analyses.wear.bolts import BoltTensions
 from workflow.analyses.wear.budget.parts import ResultError
 from workflow.analyses.wear.budget.report import datasets_of, summary_of
-from workflow.analyses.wear.contact_stage import ContactStage
 from workflow.analyses.wear.datasets import put_face
-from workflow.analyses.wear.recording import heard_stage
-from workflow.analyses.wear.structure_stage import StructureStage
+from workflow.analyses.wear.recording import reported_stage
 from workflow.analyses.wear.structures.resultants.writing import put_closure
+from workflow.models.contact import FaceContact
+from workflow.models.structure import StructureLoads
 from workflow.shell.dataset import Dataset
 from workflow.shell.folder import OutputFolder
 from workflow.shell.reporter import Reporter
@@ -54,7 +54,7 @@ class WornStructure:
     which the stresses tell the surfaces.
     """
 
-    stage: StructureStage
+    stage: StructureLoads
     mesh: StructureMesh
     cycle: CycleSolution
     stresses: dict[str, CycleStress]
@@ -273,8 +273,8 @@ def _mission(body: Body, surface: SurfaceHistory, shown: Sequence[int]) -> dict[
 
 
 def worn_structure(
-    stage: StructureStage,
-    contacts: list[ContactStage],
+    stage: StructureLoads,
+    contacts: list[FaceContact],
     state: CoupledState,
     evolves: bool,
     moves: bool,
@@ -291,7 +291,7 @@ def worn_structure(
     meshed = list(map(meshed_depths, stage.mesh.interfaces, depths))
     # Friction takes one thread, and knows the worn faces by their gaps.
     worn = begun(partial(stage.worn_mesh, meshed))
-    with heard_stage(reporter, stage, "structural friction", "increments"):
+    with reported_stage(reporter, stage, "structural friction", "increments"):
         cycle = stage.worn_cycle(
             [contact.nodal_depth(interface) for contact, interface in pairs],
             [contact.settings.friction(interface.energy) for contact, interface in pairs]
@@ -380,7 +380,7 @@ def nonlinearity_sentence(check: NonlinearCheck) -> str:
     )
 
 
-def nonlinearity_summary(stage: StructureStage) -> dict[str, Any]:
+def nonlinearity_summary(stage: StructureLoads) -> dict[str, Any]:
     """The stiffness used and, where the case wants one, the total Lagrangian check."""
     chosen = stage.model.nonlinearity
     if not chosen.check:

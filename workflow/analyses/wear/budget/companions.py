@@ -25,7 +25,7 @@ from workflow.case.changing import changed
 
 if TYPE_CHECKING:
     from wear.coupled import CoupledState
-    from workflow.analyses.wear.load_source import LoadSource
+    from workflow.models.loads import LoadSource
 
 # Order of what a contact wears in the size of its cells.
 ORDER = 2.0

@@ -14,10 +14,10 @@ from workflow.analyses.wear.budget.companions import Companions, late, scaled
 from workflow.analyses.wear.budget.lives import LIFE_FAILURES, Worn
 from workflow.analyses.wear.budget.parts import Errors, errors_of
 from workflow.analyses.wear.case.base import WearCase
-from workflow.analyses.wear.load_source import LoadSource
 from workflow.analyses.wear.outcome import Outcome
-from workflow.analyses.wear.structure_stage import StructureStage
 from workflow.analyses.wear.structures import structure_of
+from workflow.models.loads import LoadSource
+from workflow.models.structure import StructureLoads
 from workflow.shell.processes import Beside
 from workflow.shell.reporter import Reporter
 
@@ -66,7 +66,7 @@ def lives_of_companions(
         return lives
 
     of = case, companions, source if companions.same else None
-    if companions.same and not (source.line and isinstance(source, StructureStage)):
+    if companions.same and not (source.line and isinstance(source, StructureLoads)):
         return lambda shares, progress: heard(_lived(*of, progress), shares)
     answer = beside.begin(_lived, *of)
     return lambda shares, _: heard(answer(), shares)

@@ -20,14 +20,15 @@ from wear.steps.implicit import ImplicitStepper
 from wear.steps.stepping import ContactFailure
 from workflow.analyses.wear.case.base import WearCase
 from workflow.analyses.wear.case.sections import ContactStress, Life, Step
-from workflow.analyses.wear.contact_stage import ContactStage
-from workflow.analyses.wear.load_source import LoadSource
 from workflow.analyses.wear.structure import AnyWearCase
+from workflow.analyses.wear.translation import face_contact
 from workflow.case.changing import changed
 from workflow.errors import MethodFailed, UserError
+from workflow.models.contact import FaceContact
+from workflow.models.loads import LoadSource
 
 Worn = dict[str, dict[str, float]]  # by interface and quantity
-Lived = tuple[list[ContactStage], list[CoupledState]]
+Lived = tuple[list[FaceContact], list[CoupledState]]
 
 # What a life may end in.
 FAILURES = (MeshError, NormalContactError, ContactFailure, MethodFailed)
@@ -67,7 +68,7 @@ def live(
     """
     if begun is None:
         # What its steps leave is not asked, nor what loads the structure lays on the last surfaces.
-        stages = [ContactStage(case, face, ImplicitStepper(alone=True)) for face in source.faces]
+        stages = [face_contact(case, face, ImplicitStepper(alone=True)) for face in source.faces]
     else:
         stages = begun[0]
     cycles, contacts = case.wear.cycles, Contacts(stages)
@@ -79,7 +80,7 @@ def live(
     return stages, [*states, *last.march(states[-1])]
 
 
-def worn_by(stages: Sequence[ContactStage], state: CoupledState) -> Worn:
+def worn_by(stages: Sequence[FaceContact], state: CoupledState) -> Worn:
     """Largest depth [mm] and volume [mm³, per length mm²] of both bodies together."""
     depths = [interface.surfaces.depth for interface in state.interfaces]
     return {

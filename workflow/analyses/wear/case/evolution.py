@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
-from wear.evolution import EnergyTable
+from wear.evolution import CoulombFriction, EnergyTable
 from workflow.case.fields import Quantity
 from workflow.case.sections import Friction, Section, disagreement, entry
 
@@ -112,8 +112,11 @@ class EvolvingFriction(Friction):
             )
         return self
 
+    def described(self) -> CoulombFriction:
+        """Return the friction as the model takes it."""
+        evolution = None if self.evolution is None else self.evolution.described()
+        return CoulombFriction(self.coefficient, evolution)
+
     def at(self, energy: float) -> float:
-        """Coefficient after a contact has dissipated so much ``energy`` [N mm]."""
-        if self.evolution is None:
-            return self.coefficient
-        return self.coefficient * float(self.evolution.described().at(energy))
+        """Return the coefficient after a contact has dissipated ``energy`` [N mm]."""
+        return self.described().at(energy)

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from pydantic import model_validator
 
 from workflow.case.fields import Quantity, Whole
 from workflow.case.sections import Length, Section, disagreement, entry
+
+if TYPE_CHECKING:
+    from workflow.models.loops import TangentialLoops
 
 LoopForce = Annotated[float, Quantity("N", above=0.0, at_most=1e9, range_text="above 0 to 1e6 kN")]
 
@@ -45,3 +48,11 @@ class Loops(Section):
     def wanted(self) -> bool:
         """Whether there are any."""
         return self.amplitude is not None or self.force is not None
+
+    def described(self) -> TangentialLoops | None:
+        """Return the loops as the model takes them; None where there are none."""
+        if not self.wanted:
+            return None
+        from workflow.models.loops import TangentialLoops
+
+        return TangentialLoops(**self.model_dump())

@@ -19,6 +19,7 @@ from workflow.case.sections import disagreement
 if TYPE_CHECKING:
     from fe_models.meshes.structure_mesh import Interface
     from fe_models.meshes.transfer import FaceTransfer
+    from workflow.models.gaps import GapFunction
 
 # Cells along a facet at least: with one and a half of them nodal forces under a cylinder were up to
 # 4 % of the largest off, with four 0.02 %. Their steps leave a hundredth of the rise over a facet.
@@ -49,6 +50,13 @@ class ScannedFace:
         assert self.face is not None
         # Of a whole face the nodes of the part that is meshed come first.
         return self._fine.fitted(self.surfaces.gap(self._fine.grid))[: len(self.face)]
+
+    @property
+    def over(self) -> GapFunction:
+        """The gap of the surfaces on the cells of any grid over the face."""
+        from workflow.analyses.wear.gaps import MeasuredHeights
+
+        return MeasuredHeights(self.surfaces, self.grid)
 
     @cached_property
     def _fine_grid(self) -> Grid:

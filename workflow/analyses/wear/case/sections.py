@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from math import ceil
-from typing import Annotated, Any, ClassVar, Generic, Literal, TypeVar, get_args
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Generic, Literal, TypeVar, get_args
 
 from pydantic import StrictBool, model_validator
 from pydantic_core import PydanticCustomError
@@ -27,6 +27,9 @@ from workflow.case.sections import (
     disagreement,
     entry,
 )
+
+if TYPE_CHECKING:
+    from workflow.models import structure
 
 # The sizes that a wear step may be given.
 SIZES = ("cycles", "depth", "volume", "fraction")
@@ -308,6 +311,12 @@ class Nonlinearity(Section):
         """The entries that ask for more than a linear structure."""
         beyond = {"stiffness": self.stiffness != "linear", "check": self.check}
         return tuple(key for key, asks in beyond.items() if asks)
+
+    def described(self) -> structure.Nonlinearity:
+        """Return it as the model takes it."""
+        from workflow.models import structure
+
+        return structure.Nonlinearity(self.stiffness, self.check)
 
 
 class Coupling(Section):

@@ -24,7 +24,7 @@ from workflow.analyses.wear.fidelity.probe import (
 )
 from workflow.analyses.wear.increments import decide_increments
 from workflow.analyses.wear.structures.dovetail.case import DovetailCase
-from workflow.analyses.wear.structures.dovetail.model import DovetailModel
+from workflow.analyses.wear.structures.dovetail.model import section_joint
 from workflow.case.changing import changed
 
 # What meshes and grids are of at most.
@@ -69,7 +69,7 @@ class Axis:
 
 def choose_increments(case: DovetailCase, allowed: float) -> Decision:
     """As many increments as the cycle of the section asks for."""
-    return decide_increments(case, DovetailModel.in_plane, allowed)
+    return decide_increments(case, section_joint, allowed)
 
 
 # --- ladders of meshes and grids ------------------------------------------------------------------

@@ -9,9 +9,9 @@ from fe_models.meshes.transfer import FaceTransfer
 from workflow.analyses.wear.choice import Decision
 from workflow.analyses.wear.fidelity.estimate import Numbers, scales
 from workflow.analyses.wear.fidelity.probe import NOTCH
-from workflow.analyses.wear.structure_stage import StructureStage
 from workflow.analyses.wear.structures.dovetail.case import DovetailCase
-from workflow.analyses.wear.structures.dovetail.model import DovetailModel
+from workflow.analyses.wear.structures.dovetail.model import dovetail_joint
+from workflow.analyses.wear.translation import structure_loads
 from workflow.analyses.wear.uniformity import sections
 from workflow.errors import MethodFailed
 
@@ -64,7 +64,7 @@ def _mid_slot(case: DovetailCase, dimension: int) -> Numbers:
     mesh = case.mesh.model_copy(update=coarsest)
     structure = case.structure.model_copy(update={"dimension": dimension})
     coarse = case.model_copy(update={"structure": structure, "mesh": mesh})
-    stage = StructureStage(DovetailModel(coarse))
+    stage = structure_loads(coarse, dovetail_joint)
     middles = {}
     for contact, history in zip(stage.faces, stage.unworn(), strict=True):
         transfer = FaceTransfer.between(contact.face, contact.grid(contact.coarse))

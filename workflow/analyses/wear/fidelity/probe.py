@@ -22,11 +22,12 @@ from wear.steps.stepping import SlidingCycle, WearingContact, WearState
 from workflow.analyses.wear.budget.lives import STEPS, TOLERANCE, live, shortened, worn_by
 from workflow.analyses.wear.case.sections import Contact
 from workflow.analyses.wear.fidelity.estimate import Numbers
-from workflow.analyses.wear.structure_stage import StructureStage
 from workflow.analyses.wear.structures.dovetail.case import SIDES, DovetailCase
-from workflow.analyses.wear.structures.dovetail.model import DovetailModel
+from workflow.analyses.wear.structures.dovetail.model import dovetail_joint
+from workflow.analyses.wear.translation import structure_loads
 from workflow.case.changing import changed
 from workflow.errors import MethodFailed
+from workflow.models.structure import StructureLoads
 
 # Settings of a probe along the axes that it does not vary: strips across a flank, nodes across it,
 # and increments to the peak and after it. Differences along one axis hardly depend on the others.
@@ -52,14 +53,14 @@ def plane_section(case: DovetailCase) -> DovetailCase:
     )
 
 
-def _structure(case: DovetailCase) -> StructureStage:
+def _structure(case: DovetailCase) -> StructureLoads:
     """The structure, which rungs of a contact's ladder share."""
     return _last_structure(changed(case, {"contact": Contact()}))
 
 
 @lru_cache(1)
-def _last_structure(case: DovetailCase) -> StructureStage:
-    return StructureStage(DovetailModel(case))
+def _last_structure(case: DovetailCase) -> StructureLoads:
+    return structure_loads(case, dovetail_joint)
 
 
 def life(case: DovetailCase) -> Numbers:

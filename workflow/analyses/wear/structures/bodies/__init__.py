@@ -18,7 +18,7 @@ from workflow.analyses.wear.structures.bodies.case import (
 if TYPE_CHECKING:
     from wear.contact.interface import InterfaceState
     from wear.contact.tractions import CycleTractions
-    from workflow.analyses.wear.load_source import LoadSource
+    from workflow.models.loads import LoadSource
 
 # Path of slip in a cycle of a contact that forces shear, to tell about how long it takes [mm].
 PARTIAL_SLIP = 5e-3

@@ -24,10 +24,11 @@ from wear.contact.tractions import CycleTractions
 from wear.steps.stepping import ContactFailure
 from workflow.analyses.contact.load_path import Leg, LineLeg
 from workflow.analyses.wear.choice import Decision, record_of, since
-from workflow.analyses.wear.contact_stage import ContactStage
 from workflow.analyses.wear.structures.bodies.case import Stroke, TwoBodiesWearCase
 from workflow.analyses.wear.structures.bodies.source import BodiesSource
+from workflow.analyses.wear.translation import face_contact
 from workflow.case.changing import changed
+from workflow.models.contact import FaceContact
 
 AnyCase = TypeVar("AnyCase", bound=TwoBodiesWearCase)
 
@@ -82,10 +83,10 @@ def finer_cycles(case: TwoBodiesWearCase, state: InterfaceState) -> list[CycleTr
     return [stage.unworn_tractions(loads, first), stage.tractions(worn)]
 
 
-def _staged(case: TwoBodiesWearCase, parts: int) -> tuple[ContactStage, Any]:
+def _staged(case: TwoBodiesWearCase, parts: int) -> tuple[FaceContact, Any]:
     source = BodiesSource(case, parts)
     (face,), (loads,) = source.faces, source.unworn()
-    return ContactStage(case, face), loads
+    return face_contact(case, face), loads
 
 
 def _cycle(case: TwoBodiesWearCase, parts: int) -> tuple[Array, float] | None:

@@ -16,15 +16,7 @@ from wear.contact.face_loads import CycleLoads
 from workflow.analyses.contact.bodies import bulk_strain
 from workflow.analyses.contact.case import Heights, Shape
 from workflow.analyses.contact.load_table import LoadTable
-from workflow.analyses.wear.gaps import GapFunction, GridHeights, with_measured
-from workflow.analyses.wear.load_source import (
-    COARSER,
-    ContactFace,
-    UncoupledSource,
-    UserFace,
-    coarse_cells,
-    nominal_face,
-)
+from workflow.analyses.wear.gaps import with_measured
 from workflow.analyses.wear.structures.bodies.case import (
     NAME,
     SHIFTS,
@@ -34,6 +26,15 @@ from workflow.analyses.wear.structures.bodies.case import (
     with_held,
 )
 from workflow.case.input_files import read_heights
+from workflow.models.gaps import GapFunction, GridHeights
+from workflow.models.loads import (
+    COARSER,
+    ContactFace,
+    UncoupledSource,
+    UserFace,
+    coarse_cells,
+    nominal_face,
+)
 
 REMEDY = "enlarge contact.size, and contact.grid with it"
 

@@ -13,8 +13,8 @@ from workflow.case.changing import changed
 from workflow.shell.memory import Memory
 
 if TYPE_CHECKING:
-    from workflow.analyses.wear.contact_stage import ContactStage
-    from workflow.analyses.wear.load_source import LoadSource
+    from workflow.models.contact import FaceContact
+    from workflow.models.loads import LoadSource
 
 # Fields per cell and increment: slips, depths per pressure, pressures, starts.
 FIELDS = 12
@@ -28,10 +28,10 @@ MESH_SHARES = {1: 1.0, 2: 4.0 / 3.0}
 
 def _source(case: DovetailCase) -> LoadSource:
     # Finite elements take a second to load: where they are used.
-    from workflow.analyses.wear.structure_stage import StructureStage
-    from workflow.analyses.wear.structures.dovetail.model import DovetailModel
+    from workflow.analyses.wear.structures.dovetail.model import dovetail_joint
+    from workflow.analyses.wear.translation import structure_loads
 
-    return StructureStage(DovetailModel(case))
+    return structure_loads(case, dovetail_joint)
 
 
 def _memory(case: DovetailCase, nodes: int = 0, interface_nodes: int = 0) -> Memory:
@@ -71,12 +71,12 @@ def _choose(case: DovetailCase) -> tuple[DovetailCase, dict[str, Any] | None]:
     if any(case.legs):
         return case, None
     from workflow.analyses.wear.increments import choose_increments
-    from workflow.analyses.wear.structures.dovetail.model import DovetailModel
+    from workflow.analyses.wear.structures.dovetail.model import section_joint
 
-    return choose_increments(case, DovetailModel.in_plane)
+    return choose_increments(case, section_joint)
 
 
-def _warnings(case: DovetailCase, stage: ContactStage, load: float) -> Iterator[str]:
+def _warnings(case: DovetailCase, stage: FaceContact, load: float) -> Iterator[str]:
     from workflow.analyses.wear.structures.dovetail.edge_peaks import warnings
 
     return warnings(case, stage, load)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from functools import lru_cache
 from math import cos, pi, radians, sin, tan
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
@@ -30,6 +29,7 @@ from workflow.case.sections import Length, RoundingRadius, Section, disagreement
 
 if TYPE_CHECKING:
     from fe_models.geometry.dovetail import Dovetail as Geometry
+    from workflow.models.dovetail import DovetailMesh
 
 Mass = Annotated[float, Quantity("t", at_least=0.0, at_most=1.0, range_text="0 to 1000 kg")]
 FlankAngle = Annotated[
@@ -196,20 +196,13 @@ class Dovetail(Section):
         return Geometry(**self.model_dump(exclude={"kind", "dimension", "sides", "surfaces"}))
 
     def meshed(self, mesh: Mesh) -> StructureMesh:
-        """Both bodies, made once, without surfaces as measured. Raises MeshError."""
-        return _meshed(self.geometry(), mesh.flank_nodes, mesh.size, self.dimension, mesh.notch)
+        """Return both bodies without surfaces as measured. Raises MeshError.
 
+        A look at the case and the run that follows it share the mesh.
+        """
+        from workflow.models.dovetail import dovetail_mesh
 
-# A look at the case and the run that follows it share what they find.
-@lru_cache(maxsize=1)
-def _meshed(
-    geometry: Geometry,
-    flank_nodes: tuple[int, int],
-    size: float,
-    dimension: Literal[2, 3],
-    notch: int,
-) -> StructureMesh:
-    return geometry.mesh(flank_nodes, size, dimension, notch)
+        return dovetail_mesh(self.geometry(), mesh.described(), self.dimension)
 
 
 def _require_below(section: Section, key: str, limit: float, name: str) -> None:
@@ -315,6 +308,12 @@ class Mesh(Section):
     )
     order: Literal[1, 2] = entry("of the tetrahedra, 1 or 2", 1, default=1)
 
+    def described(self) -> DovetailMesh:
+        """Return the mesh as the model takes it."""
+        from workflow.models.dovetail import DovetailMesh
+
+        return DovetailMesh(self.flank_nodes, self.size, self.notch, self.order)
+
 
 class DovetailCase(FiniteElementCase):
     """A dovetail under its mission."""
@@ -388,6 +387,14 @@ class DovetailCase(FiniteElementCase):
         for name, surfaces in self.structure.surfaces.flanks.items():
             grid = self._flank_grid(name)
             yield ScannedFace(name, f"{SURFACES}.{name}", surfaces, grid, faces[name])
+
+    def told_of_nodes(self) -> Iterator[str]:
+        yield from super().told_of_nodes()
+        if self.structure.surfaces is not None and self.structure.dimension == 3:
+            yield (
+                "structure.surfaces: the section by which increments are chosen and the error of "
+                "the mesh is estimated is without them"
+            )
 
     def _flank_grid(self, name: str) -> Grid:
         """The grid over a flank."""

@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from sa_solver.reference.flat_rounded import FlatRoundedPunch
-from workflow.analyses.wear.contact_stage import ContactStage
 from workflow.analyses.wear.structures.dovetail.case import DovetailCase
+from workflow.models.contact import FaceContact
 
 # Share of the closed form's edge peak that the grid may miss.
 PEAK_ERROR = 0.05
 
 
-def warnings(case: DovetailCase, stage: ContactStage, load: float) -> Iterator[str]:
+def warnings(case: DovetailCase, stage: FaceContact, load: float) -> Iterator[str]:
     """What to say of each edge whose peak the grid misses."""
     for edge, error in edge_peak_errors(case, stage, load).items():
         if abs(error) > PEAK_ERROR:
@@ -22,7 +22,7 @@ def warnings(case: DovetailCase, stage: ContactStage, load: float) -> Iterator[s
             )
 
 
-def edge_peak_errors(case: DovetailCase, stage: ContactStage, load: float) -> dict[str, float]:
+def edge_peak_errors(case: DovetailCase, stage: FaceContact, load: float) -> dict[str, float]:
     """What the grid makes of the closed form's edge peaks, relative, under a centred ``load``.
 
     The plane strain profile across the flank stands for both: the peak at the slot ends is set by

@@ -5,13 +5,18 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from workflow.analyses.wear.run_time import DISSIPATING, Extent
-from workflow.analyses.wear.structure import DENSE_MATRICES, Finer, WearStructure, memory
+from workflow.analyses.wear.structure import (
+    DENSE_MATRICES,
+    Finer,
+    WearStructure,
+    memory,
+)
 from workflow.analyses.wear.structures.mesh.case import MeshCase
 from workflow.errors import UserError
 from workflow.shell.memory import Memory
 
 if TYPE_CHECKING:
-    from workflow.analyses.wear.load_source import LoadSource
+    from workflow.models.loads import LoadSource
 
 # Dense matrices of the interfaces at once while more than two bodies are joined: of 12 blocks on
 # each other 9.6.
@@ -22,10 +27,10 @@ MOST_NODES = 4000
 
 def _source(case: MeshCase) -> LoadSource:
     # Finite elements take a second to load: where they are used.
-    from workflow.analyses.wear.structure_stage import StructureStage
     from workflow.analyses.wear.structures.mesh.model import MeshModel
+    from workflow.analyses.wear.translation import structure_loads
 
-    return StructureStage(MeshModel(case))
+    return structure_loads(case, MeshModel)
 
 
 def _extent(case: MeshCase) -> Extent:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
@@ -19,14 +20,15 @@ from fe_models.structure import Structure
 from sa_solver.surfaces.shapes import PARTING_SLOPE
 from sa_solver.types import Array, Grid, Indices
 from workflow.analyses.wear.case.scanned import ScannedFace
-from workflow.analyses.wear.gaps import GapFunction, gap_over, with_measured
-from workflow.analyses.wear.load_source import ContactFace
-from workflow.analyses.wear.structure_stage import MissionLoads
+from workflow.analyses.wear.gaps import gap_over
+from workflow.analyses.wear.structures.dovetail.model import added_gap
 from workflow.analyses.wear.structures.mesh.case import MeshCase
 from workflow.analyses.wear.structures.mesh.faces import face_size, planes_of_symmetry
 from workflow.analyses.wear.structures.mesh.loads import RotationLoad
 from workflow.analyses.wear.structures.mesh.pretension import BoltLoad
-from workflow.shell.reporter import Reporter
+from workflow.models.gaps import GapFunction
+from workflow.models.loads import ContactFace
+from workflow.models.structure import LoadCycle, Remark
 
 
 class MeshModel:
@@ -34,8 +36,7 @@ class MeshModel:
 
     def __init__(self, case: MeshCase) -> None:
         self._case = case
-        self.friction = tuple(terms.friction.at(0.0) for terms in case.every_terms)
-        self.nonlinearity = case.nonlinearity
+        self.nonlinearity = case.nonlinearity.described()
         self.order = case.mesh.order
         path = case.load_path
         tightens = any(isinstance(load, BoltLoad) for load in case.structure.loads)
@@ -57,11 +58,11 @@ class MeshModel:
         return contents, described, loads, self._case.mesh, materials
 
     @property
-    def missions(self) -> tuple[MissionLoads, ...]:
+    def load_cycles(self) -> tuple[LoadCycle, ...]:
         before, missions = self._increments_before, []
         for factors, share in self._case.load_path.mixed(len(self._case.structure.loads)):
             path = self._path(factors)
-            missions.append(MissionLoads(path[before:], path[:before], share))
+            missions.append(LoadCycle(path[before:], path[:before], share))
         return tuple(missions)
 
     @property
@@ -83,7 +84,7 @@ class MeshModel:
         squared = [isinstance(load, RotationLoad) for load in loads]
         return np.stack([c**2 if s else c for c, s in zip(columns, squared, strict=True)], axis=1)
 
-    def mesh(self) -> StructureMesh:
+    def meshed(self) -> StructureMesh:
         return self._mesh
 
     @cached_property
@@ -146,43 +147,40 @@ class MeshModel:
 
     def softening(self, structure: Structure) -> Softening:
         loads = [load.described() for load in self._case.structure.loads]
-        return imported_softening(structure, loads, self.missions[0].amplitudes[self.peak])
+        return imported_softening(structure, loads, self.load_cycles[0].amplitudes[self.peak])
 
     def contact_face(self, interface: Interface) -> ContactFace:
         size, extra = face_size(interface), self._case_gap(interface)
         face = whole_face(interface)
         gap: GapFunction = _MeshGap(face, extra)
         if interface.name in self._scanned:
-            scanned = self._scanned[interface.name]
-            gap = with_measured(gap, scanned.surfaces, scanned.grid)
+            gap = added_gap(self._scanned[interface.name]).on(gap)
         return ContactFace(face, size, gap, _coarse(face, size))
 
     def node_numbers(self, place: int) -> Indices:
         numbers = self._case.structure.read(self._case.mesh.size).node_numbers
         return numbers[self._mesh.bodies[place].name]
 
-    def warn(self, structure: Structure, reporter: Reporter) -> None:
-        """Of a mesh in another unit, contacts that planes of symmetry cut, supports that are none,
-        and surfaces as measured that are finer than the mesh.
-        """
+    def remarks(self, structure: Structure, friction: Sequence[float]) -> Iterator[Remark]:
+        """Return the unit of the mesh, and contacts that supports or planes of symmetry cut."""
         unit = self._case.structure.read(self._case.mesh.size).unit
         if unit.size != 1.0:
-            reporter.say(
+            yield Remark(
                 f"lengths of the mesh file are {unit}; worn.msh, worn_nodes and ParaView files are "
-                "in mm"
+                "in mm",
+                is_warning=False,
             )
-        for told in self._case.told_of_nodes():
-            reporter.say(told)
         for interface in structure.mesh.interfaces:
             name, planes = interface.name, interface.planes
             if planes:
-                reporter.say(
+                yield Remark(
                     f"{name}: cut by {planes_of_symmetry(planes)}: its half-space has the mirror "
                     "image too, and what is told of the contact is that of the whole face; "
-                    "worn.msh and worn_nodes are the part that is meshed"
+                    "worn.msh and worn_nodes are the part that is meshed",
+                    is_warning=False,
                 )
             elif name in structure.held_faces:
-                reporter.warn(
+                yield Remark(
                     f"{name}: supports hold some of its nodes along it, and not as a plane of "
                     "symmetry does, across x or y of the contact with all nodes that both bodies "
                     "have on it: the structure knows of them, the half-space of the contact does "

@@ -12,7 +12,7 @@ from workflow.analyses.wear.structure import WearStructure
 from workflow.analyses.wear.structures.resultants.case import ResultantsCase
 
 if TYPE_CHECKING:
-    from workflow.analyses.wear.load_source import LoadSource
+    from workflow.models.loads import LoadSource
 
 
 def _source(case: ResultantsCase) -> LoadSource:

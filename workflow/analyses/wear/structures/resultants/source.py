@@ -13,7 +13,10 @@ from sa_solver.types import Array, Frame, Grid
 from wear.contact.drive import Drive
 from wear.contact.face_loads import CycleLoads
 from workflow.analyses.wear.gaps import gap_over, with_measured
-from workflow.analyses.wear.load_source import (
+from workflow.analyses.wear.structures.resultants.case import ResultantsCase
+from workflow.analyses.wear.structures.resultants.imported import ImportedLoads
+from workflow.analyses.wear.worn_nodes import read_nodes
+from workflow.models.loads import (
     BODIES,
     COARSER,
     ContactFace,
@@ -22,9 +25,6 @@ from workflow.analyses.wear.load_source import (
     coarse_cells,
     nominal_face,
 )
-from workflow.analyses.wear.structures.resultants.case import ResultantsCase
-from workflow.analyses.wear.structures.resultants.imported import ImportedLoads
-from workflow.analyses.wear.worn_nodes import read_nodes
 
 REMEDY = "enlarge structure.size, and contact.grid with it"
 

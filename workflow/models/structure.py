@@ -1,11 +1,11 @@
-"""The structural stage of a run: mesh, condensed joint, cycles, stress, worn mesh."""
+"""Loads of contacts from a structure of finite elements: joint, cycles, stress and worn mesh."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
-from typing import Literal, Protocol, TypeVar
+from typing import Literal, NamedTuple, Protocol, TypeVar
 
 import numpy as np
 from scipy.linalg import eigvalsh
@@ -18,6 +18,7 @@ from fe_models.elasticity.relinearised import (
     stress_stiffened,
 )
 from fe_models.elasticity.stress import CycleStress, cycle_stress
+from fe_models.joints.condensation import Condensed
 from fe_models.joints.friction import FrictionalJoint, FrictionState
 from fe_models.joints.joint import JointResolvent
 from fe_models.loads.pretension import Bolt, tightened
@@ -27,29 +28,25 @@ from fe_models.meshes.structure_mesh import Interface, MeshError, StructureMesh
 from fe_models.motion import deformation
 from fe_models.structure import CycleSolution, InterfaceHistory, Structure, mixed
 from sa_solver.types import Array, Indices, LoadHistory
-from workflow.analyses.wear.case.sections import Nonlinearity
-from workflow.analyses.wear.heard import Heard
-from workflow.analyses.wear.load_source import BODIES, ContactFace, UserFace
 from workflow.errors import MethodFailed
-from workflow.shell.cache import (
-    content_key,
-    keep_body,
-    load_cycle,
-    load_joint,
-    save_cycle,
-    save_joint,
-)
-from workflow.shell.reporter import Reporter
+from workflow.models.loads import BODIES, ContactFace, UserFace
+from workflow.models.progress import ReportsProgress
 
 Solved = TypeVar("Solved", CycleSolution, FrictionState)
 
 
 @dataclass(frozen=True)
-class MissionLoads:
-    """The loads of a mission, a closed cycle that is so large a ``share`` of all cycles.
+class LoadCycle:
+    """One closed cycle of the loads of a structure, such as a mission.
 
-    ``amplitudes`` ``(t, cases)`` are those of the load cases over the cycle and ``preload``
-    ``(s, cases)`` those before the first one.
+    Parameters
+    ----------
+    amplitudes : array (t, cases)
+        Amplitudes of the load cases at the end of each increment.
+    preload : array (s, cases)
+        Amplitudes on the way to the first cycle, such as tightened bolts.
+    share : float
+        Share of all cycles that are like this one.
     """
 
     amplitudes: Array
@@ -57,75 +54,168 @@ class MissionLoads:
     share: float = 1.0
 
 
-class StructureModel(Protocol):
-    """A structure as a case describes it.
+@dataclass(frozen=True)
+class Nonlinearity:
+    """Which geometric nonlinearity of a structure is taken into account.
 
-    ``key`` is everything that its condensed joint depends on, ``missions`` are the closed cycles of
-    its loads, one unless several are mixed; ``peak`` is the increment of peak load, counted from 0
-    over all missions, ``friction`` µ of every interface before any wear, or one for all, ``order``
-    that of the elements, ``tightening`` how many increments tighten the bolts, 0 without any;
-    ``finer`` tells a user how to refine the mesh where stress is large.
+    Parameters
+    ----------
+    stiffness : {"linear", "stress_stiffened", "relinearised"}
+        Stiffness of the bodies: linear; with the stress and spin of peak load; or the tangent of
+        the nonlinear structure there.
+    check : bool
+        Whether to compare with a total Lagrangian model at peak load, which takes two more
+        condensations.
     """
 
-    peak: int
-    order: Literal[1, 2]
-    friction: tuple[float, ...]
-    tightening: int
-    nonlinearity: Nonlinearity
+    stiffness: Literal["linear", "stress_stiffened", "relinearised"] = "linear"
+    check: bool = False
+
+
+class Remark(NamedTuple):
+    """A remark about a structure: a warning, or something worth knowing."""
+
+    text: str
+    is_warning: bool = True
+
+
+class StructureModel(Protocol):
+    """A structure of finite elements: its mesh, loads, supports and contact faces.
+
+    Attributes
+    ----------
+    key
+        Everything that the condensed joint depends on; equal keys mean equal joints.
+    load_cycles
+        Closed cycles of the loads: one, unless several take turns.
+    peak
+        Increment of peak load, counted from 0 over all load cycles.
+    order
+        Order of the elements.
+    tightening
+        Number of increments that tighten the bolts; 0 without bolts.
+    nonlinearity
+        Geometric nonlinearity that is taken into account.
+    finer
+        Advice on how to refine the mesh, for messages.
+    """
 
     @property
     def key(self) -> tuple[object, ...]: ...
     @property
-    def missions(self) -> tuple[MissionLoads, ...]: ...
+    def load_cycles(self) -> tuple[LoadCycle, ...]: ...
+    @property
+    def peak(self) -> int: ...
+    @property
+    def order(self) -> Literal[1, 2]: ...
+    @property
+    def tightening(self) -> int: ...
+    @property
+    def nonlinearity(self) -> Nonlinearity: ...
     @property
     def finer(self) -> str: ...
 
     def softening(self, structure: Structure) -> Softening:
-        """Spin softening of all bodies at peak load."""
+        """Return the spin softening of all bodies at peak load."""
         ...
 
-    def mesh(self) -> StructureMesh:
-        """The unworn mesh."""
+    def meshed(self) -> StructureMesh:
+        """Return the unworn mesh."""
         ...
 
     def structure(self, mesh: StructureMesh) -> Structure:
-        """All bodies with supports and loads, on the mesh as it is or worn."""
+        """Return all bodies with supports and loads, on the unworn or a worn mesh."""
         ...
 
     def bolts(self, structure: Structure) -> tuple[Bolt, ...]:
-        """The bolts of the structure, which its loads tighten."""
+        """Return the bolts that the loads tighten."""
         ...
 
     def contact_face(self, interface: Interface) -> ContactFace:
-        """What the contact stage needs of an interface."""
+        """Return the contact face of an interface."""
         ...
 
     def node_numbers(self, place: int) -> Indices | None:
-        """The user's numbers of the vertices of the body at a place; None where the mesh is ours.
+        """Return the user's numbers of a body's vertices, or None where the mesh is generated.
 
-        Places are those of the mesh's bodies.
+        ``place`` is the body's place among those of the mesh.
         """
         ...
 
-    def warn(self, structure: Structure, reporter: Reporter) -> None:
-        """Say what only this kind of structure can know."""
+    def remarks(self, structure: Structure, friction: Sequence[float]) -> Iterable[Remark]:
+        """Return what a user should know of this structure under this friction."""
         ...
 
 
-class StructureStage(Heard):
-    """Everything the run asks of the structure: a load source, and stress and worn mesh after it.
+class StructureStore(Protocol):
+    """Where condensed structures and their unworn cycles are stored between runs."""
+
+    def body(self, made_from: Sequence[np.ndarray], make: Callable[[], Condensed]) -> Condensed:
+        """Return the condensed body made from these arrays; ``make`` it if it is not stored."""
+        ...
+
+    def joint(
+        self, key: tuple[object, ...], make: Callable[[], JointResolvent]
+    ) -> tuple[JointResolvent, bool]:
+        """Return the condensed joint of a key, and whether it was stored."""
+        ...
+
+    def cycle(
+        self,
+        key: tuple[object, ...],
+        structure: Structure,
+        friction: float | Array,
+        make: Callable[[], CycleSolution],
+    ) -> CycleSolution:
+        """Return the solved cycle of a key on its structure."""
+        ...
+
+
+class NoStore:
+    """A store that keeps nothing: everything is computed anew."""
+
+    def body(self, made_from: Sequence[np.ndarray], make: Callable[[], Condensed]) -> Condensed:
+        return make()
+
+    def joint(
+        self, key: tuple[object, ...], make: Callable[[], JointResolvent]
+    ) -> tuple[JointResolvent, bool]:
+        return make(), False
+
+    def cycle(
+        self,
+        key: tuple[object, ...],
+        structure: Structure,
+        friction: float | Array,
+        make: Callable[[], CycleSolution],
+    ) -> CycleSolution:
+        return make()
+
+
+class StructureLoads(ReportsProgress):
+    """Loads of the contacts of a structure, and its stresses and worn mesh.
+
+    It is a :class:`workflow.models.loads.LoadSource`. Condensed bodies, joints and unworn cycles
+    come from the ``store`` where they are there. ``friction`` gives the coefficient of an interface
+    before any wear, by its name; methods take one per interface after wear.
 
     Worn depths are nodal, ``(n,)`` per contact face, of both bodies together [mm]. Of a face that
-    planes of symmetry cut the contact is that of the whole, whose first nodes are the meshed ones;
-    cycles, stress and worn meshes are those of the part that is meshed. Coefficients of friction
-    are one per interface; those before any wear where they are not given.
+    planes of symmetry cut, the contact is that of the whole face, whose first nodes are the meshed
+    ones; cycles, stress and worn meshes are those of the meshed part.
     """
 
     slip_known = True
 
-    def __init__(self, model: StructureModel) -> None:
+    def __init__(
+        self,
+        model: StructureModel,
+        friction: Callable[[str], float],
+        store: StructureStore | None = None,
+    ) -> None:
         self.model = model
+        self._friction = friction
         self.peak = model.peak
+        self._store = NoStore() if store is None else store
         self.from_cache = False
         self._worn: tuple[Array, CycleSolution] | None = None
         self._on_worn: tuple[StructureMesh, Structure] | None = None
@@ -133,7 +223,16 @@ class StructureStage(Heard):
     @cached_property
     def mesh(self) -> StructureMesh:
         """The unworn mesh."""
-        return self.model.mesh().weighted(self.model.order)
+        return self.model.meshed().weighted(self.model.order)
+
+    @cached_property
+    def friction(self) -> tuple[float, ...]:
+        """Coulomb's coefficient of every interface before any wear."""
+        return tuple(self._friction(interface.name) for interface in self.mesh.interfaces)
+
+    def remarks(self) -> Iterable[Remark]:
+        """Return what a user should know of the structure."""
+        return self.model.remarks(self.structure, self.friction)
 
     @property
     def faces(self) -> tuple[ContactFace, ...]:
@@ -165,12 +264,11 @@ class StructureStage(Heard):
 
     @cached_property
     def _linear_resolvent(self) -> JointResolvent:
-        key = content_key(*self.model.key)
-        joint = load_joint(key)
-        self.from_cache = joint is not None
-        if joint is None:
-            joint = self._linear.condense(progress=self._progress, keep=keep_body).resolvent()
-            save_joint(key, joint)
+        def condense() -> JointResolvent:
+            keep = self._store.body
+            return self._linear.condense(progress=self._progress, keep=keep).resolvent()
+
+        joint, self.from_cache = self._store.joint(self.model.key, condense)
         return joint
 
     @cached_property
@@ -236,19 +334,19 @@ class StructureStage(Heard):
         """The closed cycle from rest with unworn faces, of all missions one after the other."""
         return self._mixed(self._unworn_missions)
 
-    def cycle_under(self, missions: Sequence[MissionLoads]) -> CycleSolution:
-        """The same under other missions, whose load cases are those of the model."""
+    def cycle_under(self, missions: Sequence[LoadCycle]) -> CycleSolution:
+        """Return the unworn cycle under other loads, whose cases are those of the model."""
         cycles = [self._unworn_mission(self._tight(mission)) for mission in missions]
         return mixed(cycles, [mission.share for mission in missions])
 
     @cached_property
     def _unworn_missions(self) -> tuple[CycleSolution, ...]:
-        return tuple(map(self._unworn_mission, self.missions))
+        return tuple(map(self._unworn_mission, self.load_cycles))
 
     @cached_property
-    def missions(self) -> tuple[MissionLoads, ...]:
-        """The closed cycles of the loads, in which bolts are as short as they were tightened."""
-        return tuple(map(self._tight, self.model.missions))
+    def load_cycles(self) -> tuple[LoadCycle, ...]:
+        """Closed cycles of the loads, with bolts as short as they were tightened."""
+        return tuple(map(self._tight, self.model.load_cycles))
 
     @cached_property
     def bolts(self) -> tuple[Bolt, ...]:
@@ -261,7 +359,7 @@ class StructureStage(Heard):
         found = np.ones(len(self.bolts))
         asked = [k for k, bolt in enumerate(self.bolts) if bolt.force is not None]
         if asked:
-            mission = self.model.missions[0]
+            mission = self.model.load_cycles[0]
             path = mission.preload[: self.model.tightening]
             bolts = [self.bolts[k] for k in asked]
             try:
@@ -270,7 +368,7 @@ class StructureStage(Heard):
                 raise MethodFailed(str(error)) from error
         return found
 
-    def _tight(self, mission: MissionLoads) -> MissionLoads:
+    def _tight(self, mission: LoadCycle) -> LoadCycle:
         """The mission with the bolts as short as they are when tight."""
         if not self.bolts:
             return mission
@@ -287,19 +385,20 @@ class StructureStage(Heard):
         resultants = np.stack([of.resultants / n for of, n in zip(loads, sides, strict=True)], 1)
         return np.array([b.section.tension(resultants, self._amplitudes) for b in self.bolts])
 
-    def _unworn_mission(self, mission: MissionLoads) -> CycleSolution:
+    def _unworn_mission(self, mission: LoadCycle) -> CycleSolution:
         """The closed cycle of one mission from rest, from the cache if it is there."""
         friction = self._nodal_friction()
         loads = [path.tolist() for path in (mission.preload, mission.amplitudes)]
         stiffness = self.model.nonlinearity.stiffness
         at = None if stiffness == "linear" else self._peak_amplitudes.tolist()
         gaps = [interface.gap.tobytes() for interface in self.mesh.interfaces]
-        key = content_key(*self.model.key, *loads, stiffness, at, self.model.friction, gaps)
-        cycle = load_cycle(key, self.structure, friction)
-        if cycle is None:
-            cycle = self._cycle(mission, self._no_wear(), None, None)
-            save_cycle(key, cycle)
-        return cycle
+        key = *self.model.key, *loads, stiffness, at, self.friction, gaps
+        return self._store.cycle(
+            key,
+            self.structure,
+            friction,
+            lambda: self._cycle(mission, self._no_wear(), None, None),
+        )
 
     def unworn(self) -> tuple[InterfaceHistory, ...]:
         return self.on_faces(self.unworn_cycle)
@@ -325,7 +424,7 @@ class StructureStage(Heard):
         elif self._worn is not None and np.array_equal(asked, self._worn[0]):
             # A run's end is asked for again where its loads have just followed it.
             return self._worn[1]
-        pairs = zip(self.missions, missions, strict=True)
+        pairs = zip(self.load_cycles, missions, strict=True)
         cycles = [self._cycle(mission, depths, unworn, friction) for mission, unworn in pairs]
         cycle = self._mixed(cycles)
         if after is None:
@@ -338,11 +437,11 @@ class StructureStage(Heard):
         return self.on_faces(self.worn_cycle(depths, friction))
 
     def _mixed(self, cycles: Sequence[CycleSolution]) -> CycleSolution:
-        return mixed(cycles, [mission.share for mission in self.missions])
+        return mixed(cycles, [mission.share for mission in self.load_cycles])
 
     def _cycle(
         self,
-        mission: MissionLoads,
+        mission: LoadCycle,
         depths: list[Array],
         after: CycleSolution | None,
         friction: Sequence[float] | None,
@@ -400,7 +499,7 @@ class StructureStage(Heard):
     def _nodal_friction(self, friction: Sequence[float] | None = None) -> float | Array:
         """Coefficients of the interfaces at all nodes ``(n,)``; one if all have the model's."""
         if friction is None:
-            friction = self.model.friction
+            friction = self.friction
             if len(set(friction)) == 1:
                 return friction[0]
         return np.repeat(friction, [len(interface) for interface in self.mesh.interfaces])
@@ -413,7 +512,7 @@ class StructureStage(Heard):
     @property
     def _amplitudes(self) -> Array:
         """Amplitudes of the load cases in all increments ``(t, cases)``."""
-        return np.concatenate([mission.amplitudes for mission in self.missions])
+        return np.concatenate([mission.amplitudes for mission in self.load_cycles])
 
     @property
     def _peak_amplitudes(self) -> Array:

@@ -29,11 +29,10 @@ from wear.steps.stabilised import StabilisedStepper
 from wear.steps.steppers import first_cycles
 from wear.surfaces import Surfaces
 from wear.worn import Spent
-from workflow.analyses.wear.case.base import WearCase
-from workflow.analyses.wear.contact_stage import ContactStage, error_control
-from workflow.analyses.wear.contact_workers import StagedContacts
-from workflow.analyses.wear.load_source import ContactFace
-from workflow.analyses.wear.structure_stage import StructureStage
+from workflow.models.contact import Contact, ContactOf, FaceContact, Wear
+from workflow.models.contacts import FaceContacts
+from workflow.models.loads import ContactFace
+from workflow.models.structure import StructureLoads
 
 # Cycles that are kept: those before and after a jump, and the same of its companion.
 KEPT = 4
@@ -71,14 +70,16 @@ class StructureCycle:
         return 2.0 / fastest if fastest > 0.0 else np.inf
 
 
-class NodalStage(ContactStage):
+class NodalFace(FaceContact):
     """One face whose nodes wear. The surfaces of its states are nodal, ``(n,)``.
 
     ``start`` of a state is the depth of the nodes of all faces, by which their cycle is found.
     """
 
-    def __init__(self, case: WearCase, face: ContactFace, cycles: _Cycles, number: int) -> None:
-        super().__init__(case, face)
+    def __init__(
+        self, face: ContactFace, contact: Contact, wear: Wear, cycles: _Cycles, number: int
+    ) -> None:
+        super().__init__(face, contact, wear)
         self._cycles, self._number = cycles, number
 
     def history(self, state: InterfaceState) -> InterfaceHistory:
@@ -125,7 +126,7 @@ class NodalStage(ContactStage):
 class _Cycles:
     """The structure's cycles on worn surfaces, each a function of these alone."""
 
-    def __init__(self, source: StructureStage, faces: Sequence[ContactFace]) -> None:
+    def __init__(self, source: StructureLoads, faces: Sequence[ContactFace]) -> None:
         self._source, self.on_faces = source, source.on_faces
         self._ends = np.cumsum([len(contact.face) for contact in faces])[:-1]
         self._solved: deque[tuple[Array, CycleSolution]] = deque(maxlen=KEPT)
@@ -150,15 +151,22 @@ class _Cycles:
         return self._source.worn_cycle(self.split(depth), after=other)
 
 
-class NodalContacts(StagedContacts):
+class NodalContacts(FaceContacts):
     """The faces of a structure that wear at their nodes, all of them together."""
 
     def __init__(
-        self, case: WearCase, faces: Sequence[ContactFace], source: StructureStage
+        self,
+        faces: Sequence[ContactFace],
+        contact: ContactOf,
+        wear: Wear,
+        source: StructureLoads,
     ) -> None:
         self._cycles = _Cycles(source, faces)
         super().__init__(
-            [NodalStage(case, face, self._cycles, number) for number, face in enumerate(faces)]
+            [
+                NodalFace(face, contact(face.face.name), wear, self._cycles, number)
+                for number, face in enumerate(faces)
+            ]
         )
         self._laws = self.stages[0].settings.laws
         self._friction = np.concatenate(
@@ -168,7 +176,7 @@ class NodalContacts(StagedContacts):
         self._gap = np.concatenate([whole_values(face, face.gap) for face in meshed])
         self._areas = np.concatenate([stage.face.nodal_areas for stage in self.stages])
         self._stiffness = source.stiffest(np.concatenate([face.nodal_areas for face in meshed]))
-        self._stepper = StabilisedStepper(error_control(case.wear))
+        self._stepper = StabilisedStepper(wear.error_control())
 
     def begin(
         self, histories: Sequence[FaceLoads], cycles: float
@@ -295,7 +303,7 @@ def _fields(surfaces: Surfaces) -> Array:
     return np.stack([surfaces.depth_1, surfaces.depth_2, surfaces.work_2])
 
 
-def _on_cells(stage: ContactStage, history: InterfaceHistory) -> CycleTractions:
+def _on_cells(stage: FaceContact, history: InterfaceHistory) -> CycleTractions:
     """A cycle of a face on the cells of its grid."""
     areas, force = history.interface.nodal_areas, history.force
     traction = np.divide(force, areas, out=np.zeros_like(force), where=areas > 0.0)

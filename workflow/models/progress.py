@@ -1,4 +1,4 @@
-"""What takes long and tells whoever listens how far it is."""
+"""Progress of long computations, reported to whoever asks for it."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ from contextlib import contextmanager
 from sa_solver.types import Progress, unseen
 
 
-class Heard:
-    """Tells ``_progress``, which is nobody's but within :meth:`heard`."""
+class ReportsProgress:
+    """A computation that reports its progress while :meth:`reporting_to` is entered."""
 
     _progress: Progress = staticmethod(unseen)
 
     @contextmanager
-    def heard(self, progress: Progress) -> Iterator[None]:
-        """What is costly of it tells ``progress`` how far it is."""
+    def reporting_to(self, progress: Progress) -> Iterator[None]:
+        """Call ``progress`` with the steps done and the steps in all, within this context."""
         self._progress = progress
         try:
             yield

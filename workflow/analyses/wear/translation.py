@@ -1,0 +1,83 @@
+"""A wear case as a model: its contacts and how they wear, one function for each section."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TypeVar
+
+from sa_solver.types import Grid
+from wear.coupled import JumpSize, Stop
+from workflow.analyses.wear.case.base import WearCase
+from workflow.analyses.wear.case.sections import ContactStress
+from workflow.errors import UserError
+from workflow.models.contact import Contact, FaceContact, Wear, WearStepper
+from workflow.models.loads import ContactFace
+from workflow.models.structure import StructureLoads, StructureModel
+from workflow.shell.cache import DiskStore
+
+AnyWearCase = TypeVar("AnyWearCase", bound=WearCase)
+
+
+def contact_of(case: WearCase, name: str) -> Contact:
+    """Return the contact of a name."""
+    terms, settings = case.terms(name), case.contact
+    return Contact(
+        grid=terms.grid,
+        bodies=terms.materials,
+        laws=(terms.laws[0].described(), terms.laws[1].described()),
+        friction=terms.friction.described(),
+        method=settings.method,
+        link=settings.link,
+        gross_slip=settings.gross_slip,
+        tolerance=settings.tolerance,
+    )
+
+
+def wear_of(case: WearCase) -> Wear:
+    """Return how far the contacts of a case wear, and when they change their loads."""
+    wear, step, coupling = case.wear, case.wear.step, case.recoupling
+    return Wear(
+        cycles=wear.cycles,
+        steps=step.kind,
+        tolerance=wear.tolerance,
+        depth_tolerance=wear.depth_tolerance,
+        jump=JumpSize(step.cycles, step.depth, step.volume),
+        fraction=step.fraction,
+        stop=Stop(wear.stop.depth, wear.stop.volume),
+        resultants=coupling.resultants,
+        drift=coupling.drift,
+        motion=wear.motion,
+    )
+
+
+def face_contact(
+    case: WearCase, face: ContactFace, stepper: WearStepper | None = None
+) -> FaceContact:
+    """Return the contact of a face; it wears by the steps of the case unless others are given."""
+    contact = contact_of(case, face.face.name)
+    _check_section(case.stress, face.grid(contact.grid))
+    return FaceContact(face, contact, wear_of(case), stepper)
+
+
+def structure_loads(
+    case: AnyWearCase, model: Callable[[AnyWearCase], StructureModel]
+) -> StructureLoads:
+    """Return the loads of the structure that ``model`` makes of a case.
+
+    Its condensed parts are stored in the user's cache.
+    """
+    return StructureLoads(model(case), lambda name: case.terms(name).friction.at(0.0), DiskStore())
+
+
+def _check_section(stress: ContactStress, grid: Grid) -> None:
+    """Refuse at once a section that could not be drawn at the end."""
+    if stress.section == "none":
+        return
+    if stress.section == "y" and grid.line:
+        raise UserError("stress.section: y: a line contact has no length along y; allowed: x, none")
+    reach = 0.5 * grid.size[1 if stress.section == "x" else 0]
+    if abs(stress.at) > reach:
+        raise UserError(
+            f"stress.at: {stress.at:g} mm is off the contact's grid; "
+            f"allowed: {-reach:.4g} to {reach:.4g} mm"
+        )

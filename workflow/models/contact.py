@@ -1,0 +1,287 @@
+"""Contacts of a model: what they are made of, how they wear, and one face on its grid."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from typing import Literal
+
+import numpy as np
+
+from fe_models.meshes.structure_mesh import Face
+from fe_models.meshes.transfer import FaceTransfer
+from sa_solver import checks
+from sa_solver.half_space.operator import HalfSpace
+from sa_solver.normal.contact import NormalContact
+from sa_solver.types import Array, ElasticPair, Grid, LoadHistory, Material
+from wear.contact.interface import InterfaceContact, InterfaceSettings, InterfaceState
+from wear.contact.link import Link
+from wear.contact.tractions import CycleTractions
+from wear.coupled import CoupledSettings, JumpSize, Stop
+from wear.evolution import CoulombFriction
+from wear.laws import WearLaw
+from wear.steps.implicit import ImplicitStepper, SecondOrderStepper
+from wear.steps.steppers import ErrorControl, ExplicitStepper, Stepper, step_errors
+from wear.steps.stepping import WearingContact, WearState
+from workflow.models.loads import ContactFace
+from workflow.models.loops import TangentialLoops, WornLoop, worn_loop
+
+WearStepper = Stepper[WearState, WearingContact]
+
+MOTIONS = "auto", "follow", "neglect"
+STEPS = "implicit", "second_order", "explicit"
+# Jumps in which a run is recorded whose explicit steps are a fraction of their stability limit:
+# the steps themselves are too short to be recorded one by one.
+RECORDS = 10
+
+
+# --- what is given --------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Contact:
+    """What a contact is made of, and how it is computed.
+
+    Parameters
+    ----------
+    grid : (int, int)
+        Cells along x and y over the face; one along y in a line contact.
+    bodies : (Material, Material)
+        Body 1 and body 2, which deform as half-spaces near the contact.
+    laws : (WearLaw, WearLaw)
+        Wear laws of body 1 and body 2.
+    friction : float or CoulombFriction
+        Coulomb's coefficient.
+    method : {"normal", "full", "nodes"}
+        Pressure of the half-space under the slips of the loads; pressure, shear and slip of the
+        half-space; or no half-space: the nodes of the structure wear.
+    link : {"corrected", "half_space"}
+        Whether bodies deform as their structure says where it knows, or as half-spaces.
+    gross_slip : {"force", "energies"}
+        How a face that slides as a whole finds its direction (``method`` "full"): with the shear
+        force of the loads, or sharing their energy between x and y.
+    tolerance : float
+        Relative tolerance on equilibrium and complementarity.
+    """
+
+    grid: tuple[int, int]
+    bodies: tuple[Material, Material]
+    laws: tuple[WearLaw, WearLaw]
+    friction: float | CoulombFriction
+    method: Literal["normal", "full", "nodes"] = "normal"
+    link: Literal["corrected", "half_space"] = "corrected"
+    gross_slip: Literal["force", "energies"] = "force"
+    tolerance: float = 1e-8
+
+    def __post_init__(self) -> None:
+        checks.choice("method", self.method, ("normal", "full", "nodes"))
+        checks.choice("link", self.link, ("corrected", "half_space"))
+        checks.choice("gross_slip", self.gross_slip, ("force", "energies"))
+        checks.numbers(self, "tolerance", above=0.0)
+        if not isinstance(self.friction, CoulombFriction):
+            checks.settle(self, friction=CoulombFriction(self.friction))
+
+    @property
+    def coulomb(self) -> CoulombFriction:
+        """The coefficient of friction as a function of dissipated energy."""
+        assert isinstance(self.friction, CoulombFriction)
+        return self.friction
+
+
+@dataclass(frozen=True)
+class Wear:
+    """How far contacts wear, in which steps, and when worn surfaces change their loads.
+
+    Without ``jump`` and ``fraction`` the length of steps is chosen for an error of the depth.
+
+    Parameters
+    ----------
+    cycles : float
+        Length of the run in load cycles.
+    steps : {"implicit", "second_order", "explicit"}
+        Kind of wear steps. The first two are stable at any length, explicit ones below a limit.
+    tolerance : float
+        Error of the depth that steps may make: root mean square over the worn area, relative to
+        the depth at the end.
+    depth_tolerance : float, optional
+        Such an error in mm, instead of ``tolerance``.
+    jump : JumpSize
+        Length of a step, if it is given.
+    fraction : float, optional
+        Length of explicit steps over their stability limit, if it is given.
+    stop : Stop
+        Depth or volume at which the run ends before its cycles are over.
+    resultants : {"drift", "constant", "every"}
+        When the loads are computed again with worn surfaces: after they have drifted by the share
+        ``drift``, never, or after every jump.
+    drift : float
+        Change of the resultants that asks for new loads, relative.
+    motion : {"auto", "follow", "neglect"}
+        Whether to follow surfaces that move over each other within a cycle; auto: where the motion
+        counts and the grid resolves it.
+    """
+
+    cycles: float
+    steps: Literal["implicit", "second_order", "explicit"] = "implicit"
+    tolerance: float = 0.01
+    depth_tolerance: float | None = None
+    jump: JumpSize = field(default_factory=JumpSize)
+    fraction: float | None = None
+    stop: Stop = field(default_factory=Stop)
+    resultants: Literal["drift", "constant", "every"] = "drift"
+    drift: float = 0.02
+    motion: Literal["auto", "follow", "neglect"] = "auto"
+
+    def __post_init__(self) -> None:
+        checks.choice("steps", self.steps, STEPS)
+        checks.choice("motion", self.motion, MOTIONS)
+        checks.numbers(self, "cycles", least=0.0)
+        checks.numbers(self, "tolerance", "depth_tolerance", "fraction", above=0.0)
+
+    @property
+    def automatic(self) -> bool:
+        """Whether an error estimate chooses the length of steps."""
+        return self.jump == JumpSize() and self.fraction is None
+
+    def error_control(self) -> ErrorControl | None:
+        """Return what chooses the length of steps, or None where it is given."""
+        if not self.automatic:
+            return None
+        relative = self.tolerance if self.depth_tolerance is None else None
+        return ErrorControl(relative, self.depth_tolerance)
+
+    def stepper(self) -> WearStepper:
+        """Return what advances the surfaces of a half-space contact."""
+        if self.steps == "explicit":
+            return ExplicitStepper(self.fraction)
+        control = self.error_control()
+        return ImplicitStepper(control) if self.steps == "implicit" else SecondOrderStepper(control)
+
+    def coupled(self, friction: Literal["constant", "evolving"] = "constant") -> CoupledSettings:
+        """Return the settings of the coupled loop."""
+        jump = self.jump if self.fraction is None else JumpSize(cycles=self.cycles / RECORDS)
+        return CoupledSettings(
+            self.cycles, jump, self.stop, self.resultants, self.drift, friction=friction
+        )
+
+
+# --- one face -------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class ContactEnd:
+    """A cycle on the surfaces that a run ends with.
+
+    ``pressure_of_companion`` ``(t, nx, ny)`` [MPa] is that on the surfaces which steps of twice the
+    length leave; None where no such steps were taken.
+    """
+
+    tractions: CycleTractions
+    pressure_of_companion: Array | None
+
+
+class FaceContact(InterfaceContact):
+    """One contact face on its grid.
+
+    Parameters
+    ----------
+    face : ContactFace
+        The face and the gap over it.
+    contact : Contact
+        What the contact is made of.
+    wear : Wear
+        How it wears.
+    stepper : Stepper, optional
+        Steps in the place of those of ``wear``.
+    """
+
+    transfer: FaceTransfer
+
+    def __init__(
+        self, face: ContactFace, contact: Contact, wear: Wear, stepper: WearStepper | None = None
+    ) -> None:
+        grid = face.grid(contact.grid)
+        self._contact_face, self.face = face, face.face
+        self.remedy, self.coarse_grid = face.remedy, face.grid(face.coarse)
+        transfer = FaceTransfer.between(face.face, grid)
+        super().__init__(
+            InterfaceSettings(
+                name=face.face.name,
+                grid=grid,
+                gap=gap_on(face, grid),
+                transfer=transfer,
+                pair=ElasticPair(*contact.bodies),
+                laws=contact.laws,
+                friction=contact.coulomb.at,
+                stepper=stepper or wear.stepper(),
+                method="full" if contact.method == "full" else "normal",
+                gross_slip=contact.gross_slip,
+                drive=face.drive,
+                follow=_follow(contact, wear),
+                link=contact.link,
+                tolerance=contact.tolerance,
+            )
+        )
+
+    def coarse_pressure(self, loads: LoadHistory, link: Link, peak: int) -> Array:
+        """Return the unworn peak pressure [MPa] on a grid as coarse as the structure's mesh."""
+        contact = NormalContact(HalfSpace(self.coarse_grid, self.pair))
+        grid = self.coarse_grid
+        gap = gap_on(self._contact_face, grid) + link.lift(peak, grid.centres)
+        load = self.settings.drive.pressing(loads, peak)
+        return contact.solve(gap, **load, start=None, compliance=None).pressure
+
+    def face_of(self, body: Literal[1, 2]) -> Face:
+        """Return the face of one body, with its own nodes."""
+        return self.face.face(body)
+
+    def transfer_of(self, body: Literal[1, 2]) -> FaceTransfer:
+        """Return the transfer between the face of one body and the grid."""
+        face = self.face_of(body)
+        return self.transfer if face is self.face else FaceTransfer.between(face, self.grid)
+
+    def depths_of_bodies(self, state: InterfaceState) -> tuple[Array, Array]:
+        """Return the worn depths of both bodies at their own nodes [mm]; volumes are kept."""
+        surfaces = state.surfaces
+        to_1 = self.transfer_of(1)
+        return to_1.to_nodes(surfaces.depth_1), self.transfer.to_nodes(surfaces.depth_2)
+
+    def seen(self, state: InterfaceState, increment: int) -> InterfaceState:
+        """Return the part of a state that :meth:`fields` of an increment need.
+
+        It is a tenth of the state where slips are given, and quicker to send to a process.
+        """
+        if self.settings.method == "full":
+            return state
+        starts = {t: start for t, start in state.starts.items() if t == increment}
+        return replace(state, starts=starts, coarse=None)
+
+    def end(self, state: InterfaceState) -> ContactEnd:
+        """Return a cycle on the surfaces of a state that a run ends with."""
+        companion, pressure = state.coarse, None
+        if step_errors(state, self.areas) is not None and isinstance(companion, InterfaceState):
+            pressure = self.tractions(companion).pressure
+        return ContactEnd(self.tractions(state), pressure)
+
+    def loop(self, state: InterfaceState, peak: int, loops: TangentialLoops) -> WornLoop:
+        """Return a tangential loop on the present surfaces, under the loads at ``peak``."""
+        contact, lift = self.frictional(state.energy), state.link.lift(peak, self.transfer.places)
+        return worn_loop(contact, loops, self.name, state, peak, self.settings.drive.tilt, lift)
+
+
+def gap_on(face: ContactFace, grid: Grid) -> Array:
+    """Return the unworn gap of a face on a grid over it ``(nx, ny)`` [mm]."""
+    gap = face.gap(grid.x, grid.y)
+    return np.ascontiguousarray(np.broadcast_to(gap, grid.shape))
+
+
+def _follow(contact: Contact, wear: Wear) -> bool | None:
+    """Return whether to follow surfaces that move over each other; None: where that counts."""
+    follow = {"auto": None, "follow": True, "neglect": False}[wear.motion]
+    if follow is None and getattr(contact.laws[0], "coefficient", None) == 0.0:
+        return False  # a surface that does not wear looks the same everywhere
+    return follow
+
+
+ContactOf = Callable[[str], Contact]
+"""Return the contact of an interface by its name."""

@@ -1,0 +1,192 @@
+"""A blade root in a disk sector, in contact along two flanks (dovetail attachment)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import lru_cache, partial
+from typing import Literal
+
+import numpy as np
+
+from fe_models.dovetail import Mission, dovetail_softening, dovetail_structure
+from fe_models.elasticity.relinearised import Softening
+from fe_models.geometry.dovetail import Dovetail
+from fe_models.loads.pretension import Bolt
+from fe_models.meshes.structure_mesh import Interface, StructureMesh
+from fe_models.structure import Structure
+from sa_solver.errors import InputError
+from sa_solver.types import Material
+from workflow.models.gaps import AddedGap, GapFunction
+from workflow.models.loads import ContactFace
+from workflow.models.structure import LoadCycle, Nonlinearity, Remark
+
+SIDES = {"intrados": 1, "extrados": -1}
+"""Flanks by name: the one at X > 0 and the one at X < 0."""
+
+
+@dataclass(frozen=True)
+class DovetailMesh:
+    """Finite elements of a dovetail joint.
+
+    Parameters
+    ----------
+    flank_nodes : (int, int)
+        Nodes across each flank and along the slot.
+    size : float
+        Size of the elements away from the flanks [mm].
+    notch : int
+        Elements round a full circle of a fillet.
+    order : {1, 2}
+        Order of the elements.
+    """
+
+    flank_nodes: tuple[int, int] = (20, 34)
+    size: float = 5.0
+    notch: int = 48
+    order: Literal[1, 2] = 1
+
+
+@dataclass(frozen=True)
+class DovetailJoint:
+    """A dovetail joint under its missions.
+
+    It is a :class:`workflow.models.structure.StructureModel`. Body 1 is the disk, body 2 the blade;
+    the interfaces are called ``intrados`` (X > 0) and ``extrados``.
+
+    Parameters
+    ----------
+    geometry : Dovetail
+        The section of both bodies and the slot.
+    disk, blade : Material
+        Their materials, with density.
+    missions : tuple of Mission
+        Closed cycles of the loads, which take turns. All have the same airfoil.
+    mesh : DovetailMesh
+        Finite elements.
+    dimension : {3, 2}
+        In space, or the section in the middle of the slot in plane strain, loads per length.
+    sides : {"guided", "cyclic"}
+        Sides of the disk's sector: guided along their planes, or as those of the next sectors.
+    shares : tuple of float
+        Share of each mission in all cycles.
+    added : mapping of str to AddedGap
+        Gaps on top of the form of the flanks, by their names.
+    nonlinearity : Nonlinearity
+        Geometric nonlinearity that is taken into account.
+    finer : str
+        Advice on how to refine the mesh, for messages.
+    """
+
+    geometry: Dovetail
+    disk: Material
+    blade: Material
+    missions: tuple[Mission, ...]
+    mesh: DovetailMesh = field(default_factory=DovetailMesh)
+    dimension: Literal[2, 3] = 3
+    sides: Literal["guided", "cyclic"] = "guided"
+    shares: tuple[float, ...] = (1.0,)
+    added: Mapping[str, AddedGap] = field(default_factory=dict)
+    nonlinearity: Nonlinearity = field(default_factory=Nonlinearity)
+    finer: str = "give flanks more nodes and notches more elements, or take elements of order 2"
+
+    def __post_init__(self) -> None:
+        if len(self.missions) != len(self.shares) or not self.missions:
+            raise InputError(
+                f"{len(self.missions)} missions and {len(self.shares)} shares: give as many of "
+                "both, one at least"
+            )
+        if unknown := self.added.keys() - SIDES.keys():
+            raise InputError(f"no flank called {', '.join(unknown)}: give intrados or extrados")
+
+    tightening = 0
+
+    @property
+    def heaviest(self) -> int:
+        """The mission of the highest speed; of several, the one of the largest moment."""
+        peaks = [(m.rotation_speed, abs(m.aerodynamic_moment)) for m in self.missions]
+        return peaks.index(max(peaks))
+
+    @property
+    def peak(self) -> int:
+        before = sum(mission.increments for mission in self.missions[: self.heaviest])
+        return before + self.missions[self.heaviest].peak_at - 1
+
+    @property
+    def order(self) -> Literal[1, 2]:
+        return self.mesh.order
+
+    @property
+    def key(self) -> tuple[object, ...]:
+        mission = self.missions[self.heaviest]
+        pull = mission.airfoil_mass, mission.airfoil_radius
+        return self.geometry, self.dimension, self.sides, self.mesh, self.disk, self.blade, pull
+
+    @property
+    def load_cycles(self) -> tuple[LoadCycle, ...]:
+        paths = [mission.amplitudes() for mission in self.missions]
+        pairs = zip(paths, self.shares, strict=True)
+        return tuple(LoadCycle(path, path[:0], share) for path, share in pairs)
+
+    def meshed(self) -> StructureMesh:
+        mesh = dovetail_mesh(self.geometry, self.mesh, self.dimension)
+        return replace(mesh, interfaces=tuple(map(self._with_gap, mesh.interfaces)))
+
+    def _with_gap(self, flank: Interface) -> Interface:
+        """Return the flank with the gap that is added to its form."""
+        if flank.name not in self.added:
+            return flank
+        nodal = self.added[flank.name].at_nodes(flank.coordinates)
+        return replace(flank, gap=flank.gap + nodal)
+
+    def structure(self, mesh: StructureMesh) -> Structure:
+        mission, cyclic = self.missions[self.heaviest], self.sides == "cyclic"
+        given = self.geometry, mesh, self.disk, self.blade, mission, self.order
+        return dovetail_structure(*given, cyclic)
+
+    def bolts(self, structure: Structure) -> tuple[Bolt, ...]:
+        """Return no bolts."""
+        return ()
+
+    def softening(self, structure: Structure) -> Softening:
+        return dovetail_softening(structure, self.geometry, self.missions[self.heaviest])
+
+    def contact_face(self, interface: Interface) -> ContactFace:
+        side = SIDES[interface.name]
+        gap: GapFunction = partial(self.geometry.flank_gap, side=side)
+        if interface.name in self.added:
+            gap = self.added[interface.name].on(gap)
+        size, nodes = self.geometry.flank_size(side), self.mesh.flank_nodes
+        widen = "widen structure.edge_width or structure.end_width"
+        return ContactFace(interface, size, gap, nodes, widen)
+
+    def node_numbers(self, place: int) -> None:
+        """Return None: the mesh is generated."""
+
+    def remarks(self, structure: Structure, friction: Sequence[float]) -> Iterator[Remark]:
+        """Return whether the joint locks itself, and sides that a moment would move."""
+        moments = any(mission.aerodynamic_moment for mission in self.missions)
+        if moments and self.sides == "guided" and self.geometry.skew == 0.0:
+            yield Remark(
+                "the sides of the disk's sector are guided, as the next sectors do without a "
+                "moment; structure.sides: cyclic has them move as those do with one",
+                is_warning=False,
+            )
+        slope, largest = float(np.tan(self.geometry.flank_angle)), max(friction)
+        if largest > slope:
+            yield Remark(
+                f"friction.coefficient {largest:g} exceeds the tangent of the flank angle, "
+                f"{slope:.3g}: the joint locks itself and the blade does not come back when the "
+                "load falls"
+            )
+
+
+@lru_cache(maxsize=1)
+def dovetail_mesh(
+    geometry: Dovetail, mesh: DovetailMesh, dimension: Literal[2, 3]
+) -> StructureMesh:
+    """Return the mesh of both bodies without added gaps; the last one is kept.
+
+    Raises MeshError where the section cannot be drawn.
+    """
+    return geometry.mesh(mesh.flank_nodes, mesh.size, dimension, mesh.notch)

@@ -1,0 +1,90 @@
+"""Gaps between unloaded bodies over a contact face, as functions of the place on it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from sa_solver.types import Array, Grid
+
+GapFunction = Callable[[Array, Array], Array]
+"""Return the gap ``(n, m)`` [mm] at ``x`` ``(n, 1)`` and ``y`` ``(1, m)`` of the face [mm]."""
+
+
+@dataclass(frozen=True)
+class AddedGap:
+    """A gap that comes on top of the form of a contact face, such as a measured or worn profile.
+
+    Parameters
+    ----------
+    over : GapFunction
+        The gap [mm] at x and y of the face's frame.
+    nodal : callable, optional
+        Returns the gap at the nodes of the face ``(n,)`` [mm]. Without it ``over`` is sampled
+        there; give it where ``over`` has more detail than the facets can follow.
+
+    Examples
+    --------
+    A groove of 2 µm across the middle of a face:
+
+    >>> import numpy as np
+    >>> from workflow.models.gaps import AddedGap
+    >>> groove = AddedGap(lambda x, y: 2e-3 * np.exp(-(x**2)) + 0.0 * y)
+    >>> print(groove.at_nodes(np.array([[0.0, 1.0], [9.0, 0.0]])))
+    [0.002 0.   ]
+    """
+
+    over: GapFunction
+    nodal: Callable[[], Array] | None = None
+
+    def at_nodes(self, coordinates: Array) -> Array:
+        """Return the gap at nodes of these ``coordinates`` ``(n, 2)`` [mm]."""
+        if self.nodal is not None:
+            return self.nodal()
+        points = np.asarray(coordinates)[:, :, None, None]
+        return np.array([float(np.asarray(self.over(x, y))[0, 0]) for x, y in points])
+
+    def on(self, form: GapFunction) -> GapFunction:
+        """Return the sum of a ``form`` and this gap."""
+        return _Sum(form, self.over)
+
+
+@dataclass(frozen=True)
+class _Sum:
+    """The sum of two gaps; unlike a nested function it can be sent to another process."""
+
+    form: GapFunction
+    added: GapFunction
+
+    def __call__(self, x: Array, y: Array) -> Array:
+        return self.form(x, y) + self.added(x, y)
+
+
+@dataclass(frozen=True)
+class GridHeights:
+    """Heights ``(nx, ny)`` [mm] at the centres of a grid; bilinear between and beyond them."""
+
+    grid: Grid
+    heights: Array
+
+    def __call__(self, x: Array, y: Array) -> Array:
+        """Return heights at ``x`` ``(n, 1)`` and ``y`` ``(1, m)``; on the grid as they are."""
+        grid = self.grid
+        if np.array_equal(x, grid.x) and np.array_equal(y, grid.y):
+            return self.heights
+        along_x = _linear(grid.x.ravel(), x.ravel())
+        along_y = _linear(grid.y.ravel(), y.ravel())
+        heights: Array = along_x @ self.heights @ along_y.T
+        return heights
+
+
+def _linear(known: Array, wanted: Array) -> Array:
+    """Return weights ``(m, n)`` of values at ``known`` ``(n,)``, ascending, for ``wanted``."""
+    if len(known) == 1:
+        return np.ones((len(wanted), 1))
+    # A fifth of a second to import: where it is used.
+    from scipy.interpolate import make_interp_spline
+
+    return np.asarray(make_interp_spline(known, np.eye(len(known)), k=1)(wanted))
