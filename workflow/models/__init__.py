@@ -3,3 +3,48 @@
 Models are plain frozen dataclasses with numpy in them. They know :mod:`fe_models`, :mod:`wear` and
 :mod:`sa_solver`, and nothing of case files, folders, caches, printing or plots.
 """
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from sa_solver.lazy import lazy_names
+
+if TYPE_CHECKING:
+    from workflow.models.contact import Contact, Wear
+    from workflow.models.dovetail import DovetailJoint, DovetailMesh
+    from workflow.models.gaps import AddedGap
+    from workflow.models.loads import ContactFace, LoadSource, UncoupledSource
+    from workflow.models.loops import TangentialLoops
+    from workflow.models.structure import LoadCycle, Nonlinearity, StructureLoads, StructureModel
+    from workflow.models.wear import WearModel
+
+__all__ = [
+    "AddedGap",
+    "Contact",
+    "ContactFace",
+    "DovetailJoint",
+    "DovetailMesh",
+    "LoadCycle",
+    "LoadSource",
+    "Nonlinearity",
+    "StructureLoads",
+    "StructureModel",
+    "TangentialLoops",
+    "UncoupledSource",
+    "Wear",
+    "WearModel",
+]
+
+__getattr__, __dir__ = lazy_names(
+    __name__,
+    {
+        "contact": ("Contact", "Wear"),
+        "dovetail": ("DovetailJoint", "DovetailMesh"),
+        "gaps": ("AddedGap",),
+        "loads": ("ContactFace", "LoadSource", "UncoupledSource"),
+        "loops": ("TangentialLoops",),
+        "structure": ("LoadCycle", "Nonlinearity", "StructureLoads", "StructureModel"),
+        "wear": ("WearModel",),
+    },
+)

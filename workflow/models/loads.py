@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import Literal, Protocol
+from typing import Literal, Protocol, Self
 
 import numpy as np
 
@@ -26,10 +26,20 @@ FEWEST = 8
 class ContactFace:
     """A nominal contact face and the gap of the unloaded, unworn bodies over it.
 
-    ``size`` (x, y) [mm] is what the contact grid covers, ``gap`` gives the distance [mm] at x and y
-    of the face, and ``coarse`` as many cells as the face has nodes. ``remedy`` is what to do where
-    the contact reaches the end of the face. A ``drive`` may impose motions in the place of the
-    forces of its loads.
+    Parameters
+    ----------
+    face : Face
+        Nodes and facets at which the loads are known, in the frame of the face.
+    size : (float, float)
+        Extent of the contact grid along x and y [mm].
+    gap : callable
+        Returns the distance of the unloaded bodies [mm] at ``x`` ``(n, 1)`` and ``y`` ``(1, m)``.
+    coarse : (int, int)
+        About as many cells as the face has nodes.
+    remedy : str
+        What to do where the contact reaches the end of the face, for messages.
+    drive : Drive
+        Motions that are imposed in the place of forces of the loads.
     """
 
     face: Face
@@ -39,8 +49,35 @@ class ContactFace:
     remedy: str = "make the face larger or round its edges"
     drive: Drive = field(default_factory=Drive)
 
+    @classmethod
+    def nominal(
+        cls,
+        name: str,
+        size: tuple[float, float],
+        gap: Callable[[Array, Array], Array],
+        *,
+        line: bool = False,
+        drive: Drive | None = None,
+    ) -> Self:
+        """Return a face without a mesh, of a ``size`` [mm]; the loads know its corners alone.
+
+        A ``line`` contact extends along x, with loads per length.
+
+        Examples
+        --------
+        A cylinder of 10 mm on a flat:
+
+        >>> from workflow.models.loads import ContactFace
+        >>> face = ContactFace.nominal("pad", (1.4, 1.0), lambda x, y: x**2 / 20.0, line=True)
+        >>> print(face.grid((70, 1)).shape)
+        (70, 1)
+        """
+        coarse = FEWEST, 1 if line else FEWEST
+        face = nominal_face(name, size, line)
+        return cls(face, size, gap, coarse, drive=drive or Drive())
+
     def grid(self, cells: tuple[int, int]) -> Grid:
-        """The grid of so many cells along x and y over the face."""
+        """Return the grid of this many cells along x and y over the face."""
         return Grid.over(self.size, cells, self.face.line)
 
 
@@ -93,28 +130,65 @@ class LoadSource(coupled.LoadSource, Protocol):
 
 
 class UncoupledSource(ABC):
-    """Base of load sources without a structure of ours: nothing to solve, no response to wear."""
+    """Base of sources of loads that wear does not change.
+
+    A subclass has the ``faces``, whether they are ``line`` contacts, the increment of ``peak`` load
+    and :meth:`unworn`, the closed cycle of loads and slips.
+
+    Examples
+    --------
+    A cylinder pressed by 50 N/mm that slides by 40 µm in each of two increments:
+
+    >>> import numpy as np
+    >>> from sa_solver import LoadHistory, Material
+    >>> from wear import ArchardLaw, CycleLoads
+    >>> from workflow.models import Contact, ContactFace, UncoupledSource, Wear, WearModel
+    >>> class Reciprocation(UncoupledSource):
+    ...     peak, line = 0, True
+    ...     faces = (ContactFace.nominal("pad", (1.4, 1.0), lambda x, y: x**2 / 20.0, line=True),)
+    ...
+    ...     def unworn(self):
+    ...         zero, slip = np.zeros(2), np.zeros((2, 2, 2))
+    ...         slip[0, 0], slip[1, 0] = 0.04, -0.04
+    ...         loads = LoadHistory(zero + 50.0, *[zero] * 7, sliding=zero == 0.0)
+    ...         return (CycleLoads(loads, slip),)
+    >>> steel, law = Material(210e3, 0.3), ArchardLaw(1e-4, 3000.0)
+    >>> contact = Contact(grid=(70, 1), bodies=(steel, steel), laws=(law, law), friction=0.5)
+    >>> results = WearModel(Reciprocation(), contact, Wear(cycles=2000.0)).run()
+    >>> volume = results["pad"]["volume_1"]
+    >>> print(f"{float(volume[-1]):.4f} {volume.attrs['units']}")
+    """
 
     peak: int
+    line: bool
     slip_known: bool = True
 
-    def prepare(self) -> None:  # noqa: B027 - nothing is costly here
-        """Nothing."""
+    @property
+    @abstractmethod
+    def faces(self) -> tuple[ContactFace, ...]:
+        """The contact faces."""
 
     @abstractmethod
     def unworn(self) -> tuple[CycleLoads, ...]:
-        """The closed cycle."""
+        """Return the closed cycle of each face."""
+
+    def prepare(self) -> None:  # noqa: B027 - nothing is costly here
+        """Do nothing: no part of such loads is costly."""
 
     def worn(
         self, depths: Sequence[Array], friction: Sequence[float] | None = None
     ) -> tuple[CycleLoads, ...]:
-        """As unworn: no structure responds to wear."""
+        """Return the unworn cycle: no structure responds to wear."""
         return self.unworn()
 
     def probe(self, depths: Sequence[Array], friction: Sequence[float] | None = None) -> Array:
-        """Resultants ``(faces, 6)`` at peak load, whatever the wear."""
+        """Return the resultants ``(faces, 6)`` at peak load."""
         cycles = self.worn(depths, friction)
         return np.array([cycle.loads.resultants[self.peak] for cycle in cycles])
+
+    def user_faces(self, number: int) -> tuple[UserFace, ...]:
+        """Return no faces: there are no nodes of the user's own."""
+        return ()
 
 
 def nominal_face(

@@ -1,0 +1,178 @@
+"""Results of a wear model as a tree of labelled arrays."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from sa_solver.types import Array, LoadHistory
+from wear.contact.contacts import KINETICS
+from wear.contact.face_loads import FaceLoads
+from wear.contact.tractions import ContactFields
+from wear.coupled import CoupledState, Observer
+from wear.surfaces import Surfaces
+from workflow.models.contacts import FaceContacts
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+
+class Declared(NamedTuple):
+    """What a variable of the results is: its unit, its description and its dimensions."""
+
+    unit: str
+    description: str
+    dims: tuple[str, ...]
+
+
+CELLS = ("x", "y")
+PLANE = ("component", *CELLS)
+LOADS = ("state", "increment")
+COORDINATES = {
+    "cycles": Declared("1", "load cycles so far", ("cycles",)),
+    "x": Declared("mm", "centres of cells along x of the face", ("x",)),
+    "y": Declared("mm", "centres of cells along y of the face", ("y",)),
+}
+FIELDS = {
+    "gap": Declared("mm", "between the unloaded, unworn bodies", CELLS),
+    "depth_1": Declared("mm", "worn off body 1", ("cycles", *CELLS)),
+    "depth_2": Declared("mm", "worn off body 2", ("cycles", *CELLS)),
+    "pressure": Declared("MPa", "at peak load", ("cycles", *CELLS)),
+    "shear": Declared("MPa", "on body 2 at peak load", ("cycles", *PLANE)),
+    "slip": Declared("mm", "of body 2 in the increment of peak load", ("cycles", *PLANE)),
+}
+SCALARS = {
+    "largest_depth_1": Declared("mm", "largest depth worn off body 1", ("cycles",)),
+    "largest_depth_2": Declared("mm", "largest depth worn off body 2", ("cycles",)),
+    "volume_1": Declared("mm^3", "worn off body 1", ("cycles",)),
+    "volume_2": Declared("mm^3", "worn off body 2", ("cycles",)),
+    "energy": Declared("N mm", "dissipated so far", ("cycles",)),
+}
+RESULTANTS = {
+    "P": Declared("N", "normal force, positive where the bodies are pressed together", LOADS),
+    "Qx": Declared("N", "force on body 2 along x", LOADS),
+    "Qy": Declared("N", "force on body 2 along y", LOADS),
+    "Mx": Declared("N mm", "moment on body 2 about x", LOADS),
+    "My": Declared("N mm", "moment on body 2 about y", LOADS),
+    "Mz": Declared("N mm", "moment on body 2 about z", LOADS),
+}
+RUN = {
+    "drift": Declared("1", "change of the resultants after each jump, relative", ("cycles",)),
+}
+FORCES = {"N", "N mm", "mm^3"}
+"""Units of quantities that are per length [1/mm] in a line contact."""
+
+
+@dataclass
+class Recorder(Observer):
+    """Records surfaces and tractions after every jump; those at the increment ``peak``."""
+
+    contacts: FaceContacts
+    peak: int
+    cycles: list[float] = field(default_factory=list)
+    surfaces: list[list[Surfaces]] = field(default_factory=list)
+    fields: list[list[ContactFields]] = field(default_factory=list)
+
+    def begin(self, state: CoupledState) -> None:
+        self._record(state)
+
+    def jumped(self, before: CoupledState, after: CoupledState) -> None:
+        self._record(after)
+
+    def _record(self, state: CoupledState) -> None:
+        pairs = zip(self.contacts.stages, state.interfaces, strict=True)
+        self.cycles.append(float(state.cycles[-1]))
+        self.surfaces.append([contact.on_grid(interface) for contact, interface in pairs])
+        self.fields.append(self.contacts.fields(state.interfaces, self.peak))
+
+
+@dataclass(frozen=True)
+class WearResults:
+    """Results of a run, from what was recorded and its ``state`` at the end.
+
+    The tree has a group for each contact face, by its name: fields over ``x`` and ``y`` of the face
+    after every jump (``cycles``), depths, volumes and energy, and the resultants of the closed
+    cycle, ``unworn`` and at the end (``state``). In a ``line`` contact forces, moments, energies
+    and volumes are per length.
+    """
+
+    recorder: Recorder
+    state: CoupledState
+    unworn: Sequence[FaceLoads]
+    line: bool
+
+    def tree(self) -> xr.DataTree:
+        """Return the results as a tree of labelled arrays."""
+        import xarray as xr
+
+        faces = {
+            contact.name: self._face(number)
+            for number, contact in enumerate(self.recorder.contacts.stages)
+        }
+        run = xr.Dataset(
+            {"drift": self._variable(RUN["drift"], self._recorded(self.state.drift))},
+            coords={"cycles": self._cycles()},
+            attrs={"solutions_of_the_loads": self.state.solutions, "per_length": int(self.line)},
+        )
+        return xr.DataTree.from_dict({"/": run, **faces})
+
+    def _face(self, number: int) -> xr.Dataset:
+        """Return the results of one contact face."""
+        import xarray as xr
+
+        grid = self.recorder.contacts.stages[number].grid
+        surfaces = [at[number] for at in self.recorder.surfaces]
+        fields = [at[number] for at in self.recorder.fields]
+        arrays = {
+            "gap": surfaces[0].initial_gap,
+            "depth_1": np.stack([at.depth_1 for at in surfaces]),
+            "depth_2": np.stack([at.depth_2 for at in surfaces]),
+            "pressure": np.stack([at.pressure for at in fields]),
+            "shear": np.stack([at.shear for at in fields]),
+            "slip": np.stack([at.slip for at in fields]),
+        }
+        rows = self._recorded(self.state.kinetics)[:, number]
+        loads = [self.unworn[number].loads, self.state.interfaces[number].loads]
+        variables = {name: self._variable(FIELDS[name], array) for name, array in arrays.items()}
+        variables |= {
+            name: self._variable(SCALARS[name], rows[:, column])
+            for column, name in enumerate(SCALARS)
+        }
+        variables |= {
+            name: self._variable(RESULTANTS[name], _both(loads, name)) for name in RESULTANTS
+        }
+        coordinates = {
+            "cycles": self._cycles(),
+            "x": self._variable(COORDINATES["x"], grid.x.ravel()),
+            "y": self._variable(COORDINATES["y"], grid.y.ravel()),
+            "component": ("component", ["x", "y"]),
+            "state": ("state", ["unworn", "worn"]),
+        }
+        return xr.Dataset(variables, coords=coordinates)
+
+    def _recorded(self, of_all_jumps: Array) -> Array:
+        """Return the rows of the jumps that were recorded: of a run that went on, the last ones."""
+        return of_all_jumps[-len(self.recorder.cycles) :]
+
+    def _cycles(self) -> xr.Variable:
+        return self._variable(COORDINATES["cycles"], np.array(self.recorder.cycles))
+
+    def _variable(self, declared: Declared, values: Array) -> xr.Variable:
+        import xarray as xr
+
+        unit = declared.unit
+        if self.line and unit in FORCES:
+            unit = f"{unit}/mm"
+        attributes = {"units": unit, "long_name": declared.description}
+        return xr.Variable(declared.dims, values, attributes)
+
+
+def _both(loads: Sequence[LoadHistory], name: str) -> Array:
+    """Return a resultant of the unworn and the worn cycle ``(2, t)``."""
+    return np.stack([getattr(history, name) for history in loads])
+
+
+assert len(SCALARS) == len(KINETICS)

@@ -1,0 +1,147 @@
+"""A structure, its contacts and how they wear: the model of a wear analysis."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, cast
+
+import numpy as np
+
+from sa_solver.errors import InputError
+from wear.coupled import CoupledState, CoupledWear, Observer
+from workflow.models.contact import Contact, FaceContact, Wear
+from workflow.models.contacts import FaceContacts
+from workflow.models.loads import LoadSource
+from workflow.models.nodal import NodalContacts
+from workflow.models.results import Recorder, WearResults
+from workflow.models.structure import StructureLoads, StructureModel, StructureStore
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+
+@dataclass(frozen=True)
+class WearModel:
+    """A structure, its contacts and how they wear.
+
+    Parameters
+    ----------
+    structure : StructureModel or LoadSource
+        What loads the contacts: a structure of finite elements, or any source of loads.
+    contacts : Contact or mapping of str to Contact
+        What the contacts are made of: one for all, or one for each face by its name.
+    wear : Wear
+        How far they wear, and in which steps.
+
+    Examples
+    --------
+    See :class:`workflow.models.loads.UncoupledSource` for a source of loads of one's own.
+    """
+
+    structure: StructureModel | LoadSource
+    contacts: Contact | Mapping[str, Contact]
+    wear: Wear
+
+    def contact(self, name: str) -> Contact:
+        """Return the contact of a face. Raises InputError where the model has none."""
+        if isinstance(self.contacts, Contact):
+            return self.contacts
+        if name not in self.contacts:
+            raise InputError(
+                f"no contact for the face {name!r}: give one of that name, or one for all faces"
+            )
+        return self.contacts[name]
+
+    def loads(self, store: StructureStore | None = None) -> LoadSource:
+        """Return the loads of the contacts; a structure is condensed, or found in the ``store``."""
+        if hasattr(self.structure, "meshed"):
+            model = cast("StructureModel", self.structure)
+            return StructureLoads(model, self._unworn_friction, store)
+        return self.structure
+
+    def _unworn_friction(self, name: str) -> float:
+        return self.contact(name).coulomb.at(0.0)
+
+    def face_contacts(self, loads: LoadSource) -> FaceContacts:
+        """Return the contacts of all faces, which wear in this process."""
+        faces = loads.faces
+        methods = {self.contact(face.face.name).method for face in faces}
+        if methods == {"nodes"}:
+            if not isinstance(loads, StructureLoads):
+                raise InputError("method nodes needs a structure of finite elements")
+            return NodalContacts(faces, self.contact, self.wear, loads)
+        if "nodes" in methods:
+            raise InputError("method nodes is for all contacts of a model or for none")
+        return FaceContacts(
+            [FaceContact(face, self.contact(face.face.name), self.wear) for face in faces]
+        )
+
+    def loop(
+        self, loads: LoadSource, contacts: FaceContacts, observers: Sequence[Observer] = ()
+    ) -> CoupledWear:
+        """Return the coupled loop of loads and contacts."""
+        names = (face.face.name for face in loads.faces)
+        evolves = any(self.contact(name).coulomb.evolution is not None for name in names)
+        settings = self.wear.coupled("evolving" if evolves else "constant")
+        return CoupledWear(settings, loads, contacts, observers)
+
+    def run(
+        self,
+        observers: Sequence[Observer] = (),
+        start: CoupledState | None = None,
+        store: StructureStore | None = None,
+    ) -> xr.DataTree:
+        """Compute the wear and return its results.
+
+        Parameters
+        ----------
+        observers : sequence of Observer
+            Called while the run goes on, such as :class:`fretscale.Progress`.
+        start : CoupledState, optional
+            State of an earlier run of the same model to go on from, such as that of a
+            :class:`fretscale.Checkpoint`.
+        store : StructureStore, optional
+            Where condensed structures are kept between runs.
+
+        Returns
+        -------
+        xarray.DataTree
+            A group for each contact face and one of the run, with units and descriptions as
+            attributes: see :class:`workflow.models.results.WearResults`.
+
+        Raises
+        ------
+        InputError
+            The model does not fit together, or ``start`` is of another model.
+        MethodFailed, ContactFailure
+            A solver did not converge.
+        """
+        loads = self.loads(store)
+        loads.prepare()
+        unworn = loads.unworn()
+        contacts = self.face_contacts(loads)
+        recorder = Recorder(contacts, loads.peak)
+        loop = self.loop(loads, contacts, [*observers, recorder])
+        state, _ = loop.begin(unworn)
+        if start is not None:
+            check_start(start, state)
+            state = contacts.restored(start)
+        *_, end = state, *loop.march(state)
+        return WearResults(recorder, end, unworn, loads.line).tree()
+
+
+def check_start(start: CoupledState, unworn: CoupledState) -> None:
+    """Raise InputError unless a state to go on from can be of the model of an ``unworn`` one.
+
+    Faces and their gaps must be the same, and the loads too where wear has not changed them yet.
+    """
+    pairs = zip(start.interfaces, unworn.interfaces, strict=False)
+    if len(start.interfaces) != len(unworn.interfaces) or not all(
+        np.array_equal(one.surfaces.initial_gap, other.surfaces.initial_gap) for one, other in pairs
+    ):
+        raise InputError("the state to start from is of another model: its faces differ")
+    if start.solutions == 1 and not np.array_equal(
+        start.solved_resultants, unworn.solved_resultants
+    ):
+        raise InputError("the state to start from is of another model: its loads differ")
