@@ -30,6 +30,15 @@ class Mission:
     ``airfoil_mass`` [t] pulls with its centre at ``airfoil_radius`` [mm]; ``aerodynamic_moment``
     [N mm] about the slot, at peak, presses on the intrados (X > 0). Both follow the square of the
     speed.
+
+    Examples
+    --------
+    Half of the peak speed after four of eight increments, and a quarter of the forces:
+
+    >>> from fe_models.dovetail import Mission
+    >>> mission = Mission(22, 8, 600.0, 0.8e-3, 400.0, 30e3)
+    >>> print(mission.speeds()[3], mission.amplitudes()[3, 1])
+    300.0 7500.0
     """
 
     increments: int

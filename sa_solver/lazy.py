@@ -12,14 +12,15 @@ from importlib import import_module
 
 
 def lazy_names(
-    package: str, modules: Mapping[str, Sequence[str]], within: str = ""
+    package: str, modules: Mapping[str, Sequence[str]], within: str | None = None
 ) -> tuple[Callable[[str], object], Callable[[], list[str]]]:
-    """``__getattr__`` and ``__dir__`` of a ``package`` that offers names of its ``modules``.
+    """Return ``__getattr__`` and ``__dir__`` of a ``package`` that offers names of its ``modules``.
 
-    The modules may lie ``within`` another package.
+    The modules lie ``within`` the package itself, or another one; "" if their names are complete.
     """
-    home = within or package
-    homes = {name: f"{home}.{module}" for module, names in modules.items() for name in names}
+    home = package if within is None else within
+    prefix = f"{home}." if home else ""
+    homes = {name: f"{prefix}{module}" for module, names in modules.items() for name in names}
 
     def find(name: str) -> object:
         if name not in homes:

@@ -1,6 +1,5 @@
 """``import fretscale``: cases from dictionaries, runs, and results as arrays and tables."""
 
-import builtins
 import os
 import shutil
 from pathlib import Path
@@ -229,7 +228,6 @@ def test_every_axis_of_a_wear_run_is_along_what_it_says(whole):
     results = fretscale.open(whole.folder)
     labels = {dim for item in labelled(results) for dim in item.dims}
     assert labels == {"", "x", "y", "cycles"}
-    pytest.importorskip("xarray")
     jumps = results["surfaces/intrados"].xarray()
     assert jumps["body_1"].dims == ("cycles", "x", "y")
     assert list(jumps["cycles"].values) == list(results["kinetics/cycles"])
@@ -238,7 +236,6 @@ def test_every_axis_of_a_wear_run_is_along_what_it_says(whole):
 
 
 def test_xarray_has_units_and_coordinates(ball):
-    pytest.importorskip("xarray")
     shear = ball["contact/bodies/00003/shear"].xarray()
     assert shear.dims == ("shear_0", "x", "y")
     assert shear.attrs["units"] == "MPa"
@@ -251,7 +248,6 @@ def test_xarray_has_units_and_coordinates(ball):
 
 
 def test_pandas_has_units_and_an_index(ball):
-    pytest.importorskip("pandas")
     table = ball["history"].pandas()
     assert table.index.name == "increment"
     assert list(table["P [N]"]) == pytest.approx([400.0] * 3)
@@ -263,19 +259,6 @@ def test_pandas_has_units_and_an_index(ball):
     with pytest.raises(fretscale.UserError, match="contact/bodies/00003: no table; allowed: "):
         ball["contact/bodies/00003"].pandas()
     assert list(ball["contact/bodies"].pandas().index) == [1, 2, 3]
-
-
-@pytest.mark.parametrize(("library", "ask"), [("xarray", "xarray"), ("pandas", "pandas")])
-def test_what_is_not_installed_is_told(ball, library, ask, monkeypatch):
-    def refuse(name, *arguments, original=builtins.__import__):
-        if name.partition(".")[0] == library:
-            raise ImportError(name)
-        return original(name, *arguments)
-
-    monkeypatch.setattr("workflow.interface.datasets.import_module", refuse)
-    told = f"{library} is not installed; install it with: pip install 'fretscale\\[results\\]'"
-    with pytest.raises(fretscale.UserError, match=told):
-        getattr(ball["history"], ask)()
 
 
 def test_folders_without_whole_results_are_refused(ball, tmp_path):

@@ -11,7 +11,6 @@ from sa_solver.types import Array
 from tests.conftest import CASES
 from wear.coupled import CoupledState, CoupledWear
 from wear.steps.steppers import step_errors
-from workflow.analyses.wear.run import coupled_settings
 from workflow.analyses.wear.structures import structure_of
 from workflow.analyses.wear.translation import contact_of, wear_of
 from workflow.chart.axes import axes_of
@@ -43,7 +42,7 @@ class Wearing:
         source = structure_of(case).source(case)
         assert isinstance(source, StructureLoads)
         contacts = NodalContacts(source.faces, partial(contact_of, case), wear_of(case), source)
-        return cls(source, contacts, CoupledWear(coupled_settings(case), source, contacts))
+        return cls(source, contacts, CoupledWear(wear_of(case).coupled(), source, contacts))
 
     def states(self) -> Iterator[CoupledState]:
         state, _ = self.loop.begin(self.source.unworn())

@@ -259,9 +259,7 @@ class StampLoads:
         return np.array([[self._case.structure.force, 0.0, 0.0, 0.0, 0.0, 0.0]])
 
 
-STAMP = WearStructure(
-    name="stamp", case=StampCase, source=StampLoads, extent=lambda case: Extent(2)
-)
+STAMP = WearStructure(name="stamp", case=StampCase, model=StampLoads, extent=lambda case: Extent(2))
 # Of a small run: two jumps, no stress below the contact.
 SMALL = (
     *("contact.grid=[32, 32]", "wear.cycles=1e5", "wear.step.cycles=5e4", "stress.section=none"),

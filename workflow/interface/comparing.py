@@ -11,7 +11,6 @@ from workflow import comparing
 from workflow.comparing.compared import Row
 from workflow.comparing.showing import columns_of, text_of
 from workflow.comparing.writing import write_comparison
-from workflow.interface.datasets import library
 from workflow.interface.results import Results
 
 if TYPE_CHECKING:
@@ -140,10 +139,11 @@ class Comparison:
     def pandas(self) -> pd.DataFrame:
         """The table that ``compare.csv`` has, a row for each result, by what it is of and its name.
 
-        Values are in base units; errors and differences are relative. Raises :class:`UserError`
-        without pandas.
+        Values are in base units; errors and differences are relative.
         """
-        frame = library("pandas").DataFrame(columns_of(self._compared))
+        import pandas
+
+        frame = pandas.DataFrame(columns_of(self._compared))
         return frame.set_index(["of", "quantity"])
 
     def report(self, out: str | os.PathLike[str], force: bool = False) -> Path:

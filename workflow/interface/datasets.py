@@ -7,7 +7,6 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
 from html import escape
-from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -130,7 +129,7 @@ class Values(NDArrayOperatorsMixin):
         return found
 
     def xarray(self) -> xr.DataArray:
-        """The same as an ``xarray.DataArray``. Raises :class:`UserError` without xarray."""
+        """The same as an ``xarray.DataArray``."""
         return _data_array(self)
 
     def pandas(self) -> pd.Series:
@@ -222,15 +221,14 @@ class Group(Mapping[str, "Group | Values"]):
     def xarray(self) -> xr.Dataset:
         """Its datasets as an ``xarray.Dataset``; those of numbered groups are put together.
 
-        The new axis is the cycles, increments or forces that tell the groups apart. Raises
-        :class:`UserError` without xarray.
+        The new axis is the cycles, increments or forces that tell the groups apart.
         """
         return _data_set(self)
 
     def pandas(self) -> pd.DataFrame:
         """Its curves as a ``pandas.DataFrame``, or the numbers of numbered groups, a row for each.
 
-        Raises :class:`UserError` without pandas, and where there is nothing of the kind.
+        Raises :class:`UserError` where there is nothing of the kind.
         """
         return _data_frame(self)
 
@@ -251,7 +249,8 @@ def _plain(value: Any) -> Any:
 
 def _data_array(values: Values) -> xr.DataArray:
     """A dataset over its coordinates."""
-    xarray = library("xarray")
+    import xarray
+
     dims = _dims(values)
     coordinates = {
         dim: xarray.Variable((dim,), along.values, _attributes(along))
@@ -265,7 +264,8 @@ def _data_array(values: Values) -> xr.DataArray:
 
 def _data_set(group: Group) -> xr.Dataset:
     """The datasets of a group, and those of the numbered groups in it put together."""
-    xarray = library("xarray")
+    import xarray
+
     arrays = {name: _data_array(item) for name, item in _datasets(group).items()}
     curves = {name: array for name, array in arrays.items() if name not in array.coords}
     numbered = _numbered(group)
@@ -280,7 +280,8 @@ def _data_set(group: Group) -> xr.Dataset:
 
 def _series(values: Values) -> pd.Series:
     """A curve over what it is along."""
-    pandas = library("pandas")
+    import pandas
+
     if values.ndim != 1:
         raise UserError(f"{values.name}: of {values.ndim} axes; allowed: curves, of one")
     return pandas.Series(values.values, _index(values), name=_heading(values))
@@ -288,7 +289,8 @@ def _series(values: Values) -> pd.Series:
 
 def _data_frame(group: Group) -> pd.DataFrame:
     """The curves of a group side by side, or the numbers of the numbered groups in it."""
-    pandas = library("pandas")
+    import pandas
+
     datasets = {name: item for name, item in _datasets(group).items() if item.ndim == 1}
     if datasets and len({item.shape for item in datasets.values()}) == 1:
         index = _index(next(iter(datasets.values())))
@@ -309,16 +311,6 @@ def _data_frame(group: Group) -> pd.DataFrame:
     return pandas.DataFrame(rows, pandas.Index(places, name=axis)).drop(
         columns=axis, errors="ignore"
     )
-
-
-def library(name: str) -> Any:
-    """A library that not all have. Raises :class:`UserError` where it is not installed."""
-    try:
-        return import_module(name)
-    except ImportError:
-        raise UserError(
-            f"{name} is not installed; install it with: pip install 'fretscale[results]'"
-        ) from None
 
 
 def _attributes(values: Values) -> dict[str, str]:
@@ -342,7 +334,9 @@ def _index(values: Values) -> Any:
     along = values.coordinates.get(values.dims[0])
     if along is None:
         return None
-    return library("pandas").Index(along.values, name=_heading(along))
+    import pandas
+
+    return pandas.Index(along.values, name=_heading(along))
 
 
 def _datasets(group: Group) -> dict[str, Values]:

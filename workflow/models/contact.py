@@ -62,6 +62,18 @@ class Contact:
         force of the loads, or sharing their energy between x and y.
     tolerance : float
         Relative tolerance on equilibrium and complementarity.
+
+    Examples
+    --------
+    Titanium on titanium that wears by dissipated energy, 1e4 µm³/J:
+
+    >>> import fretscale
+    >>> from sa_solver import Material
+    >>> from wear import EnergyLaw
+    >>> titanium, law = Material(115e3, 0.29), EnergyLaw(1e-8)
+    >>> contact = fretscale.Contact((64, 1), (titanium, titanium), (law, law), friction=0.4)
+    >>> print(contact.method, contact.coulomb.at(0.0))
+    normal 0.4
     """
 
     grid: tuple[int, int]
@@ -119,6 +131,15 @@ class Wear:
     motion : {"auto", "follow", "neglect"}
         Whether to follow surfaces that move over each other within a cycle; auto: where the motion
         counts and the grid resolves it.
+
+    Examples
+    --------
+    Steps as long as an error of 0.5 % of the depth allows, until 20 µm are worn:
+
+    >>> import fretscale
+    >>> wear = fretscale.Wear(cycles=1e6, tolerance=0.005, stop=fretscale.Stop(depth=0.02))
+    >>> print(wear.steps, wear.automatic)
+    implicit True
     """
 
     cycles: float

@@ -39,6 +39,13 @@ class DovetailMesh:
         Elements round a full circle of a fillet.
     order : {1, 2}
         Order of the elements.
+
+    Examples
+    --------
+    >>> import fretscale
+    >>> fine = fretscale.DovetailMesh(flank_nodes=(39, 67), size=2.5, order=2)
+    >>> print(fine.notch)
+    48
     """
 
     flank_nodes: tuple[int, int] = (20, 34)
@@ -76,6 +83,19 @@ class DovetailJoint:
         Geometric nonlinearity that is taken into account.
     finer : str
         Advice on how to refine the mesh, for messages.
+
+    Examples
+    --------
+    The joint of a case, with a groove of 2 µm across one flank:
+
+    >>> from dataclasses import replace
+    >>> import fretscale
+    >>> import numpy as np
+    >>> joint = fretscale.wear_model("cases/dovetail.yaml").structure
+    >>> groove = fretscale.AddedGap(lambda x, y: 2e-3 * np.exp(-(x**2)) + 0.0 * y)
+    >>> grooved = replace(joint, added={"intrados": groove})
+    >>> print(grooved.peak, list(grooved.added))
+    7 ['intrados']
     """
 
     geometry: Dovetail
@@ -88,7 +108,10 @@ class DovetailJoint:
     shares: tuple[float, ...] = (1.0,)
     added: Mapping[str, AddedGap] = field(default_factory=dict)
     nonlinearity: Nonlinearity = field(default_factory=Nonlinearity)
-    finer: str = "give flanks more nodes and notches more elements, or take elements of order 2"
+    finer: str = field(
+        default="give flanks more nodes and notches more elements, or take elements of order 2",
+        compare=False,
+    )
 
     def __post_init__(self) -> None:
         if len(self.missions) != len(self.shares) or not self.missions:

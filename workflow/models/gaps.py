@@ -30,10 +30,10 @@ class AddedGap:
     A groove of 2 µm across the middle of a face:
 
     >>> import numpy as np
-    >>> from workflow.models.gaps import AddedGap
-    >>> groove = AddedGap(lambda x, y: 2e-3 * np.exp(-(x**2)) + 0.0 * y)
-    >>> print(groove.at_nodes(np.array([[0.0, 1.0], [9.0, 0.0]])))
-    [0.002 0.   ]
+    >>> import fretscale
+    >>> groove = fretscale.AddedGap(lambda x, y: 2e-3 * np.exp(-(x**2)) + 0.0 * y)
+    >>> print(groove.at_nodes(np.array([[0.0, 1.0], [1.0, 0.0]])))
+    [0.002      0.00073576]
     """
 
     over: GapFunction

@@ -40,6 +40,16 @@ class ContactFace:
         What to do where the contact reaches the end of the face, for messages.
     drive : Drive
         Motions that are imposed in the place of forces of the loads.
+
+    Examples
+    --------
+    A cylinder of 10 mm on a flat, of which no mesh is known:
+
+    >>> import fretscale
+    >>> gap = lambda x, y: x**2 / 20.0
+    >>> face = fretscale.ContactFace.nominal("pad", (1.4, 1.0), gap, line=True)
+    >>> print(face.face.name, face.grid((70, 1)).shape)
+    pad (70, 1)
     """
 
     face: Face
@@ -62,15 +72,6 @@ class ContactFace:
         """Return a face without a mesh, of a ``size`` [mm]; the loads know its corners alone.
 
         A ``line`` contact extends along x, with loads per length.
-
-        Examples
-        --------
-        A cylinder of 10 mm on a flat:
-
-        >>> from workflow.models.loads import ContactFace
-        >>> face = ContactFace.nominal("pad", (1.4, 1.0), lambda x, y: x**2 / 20.0, line=True)
-        >>> print(face.grid((70, 1)).shape)
-        (70, 1)
         """
         coarse = FEWEST, 1 if line else FEWEST
         face = nominal_face(name, size, line)
@@ -142,10 +143,11 @@ class UncoupledSource(ABC):
     >>> import numpy as np
     >>> from sa_solver import LoadHistory, Material
     >>> from wear import ArchardLaw, CycleLoads
-    >>> from workflow.models import Contact, ContactFace, UncoupledSource, Wear, WearModel
-    >>> class Reciprocation(UncoupledSource):
+    >>> import fretscale
+    >>> gap = lambda x, y: x**2 / 20.0
+    >>> class Reciprocation(fretscale.UncoupledSource):
     ...     peak, line = 0, True
-    ...     faces = (ContactFace.nominal("pad", (1.4, 1.0), lambda x, y: x**2 / 20.0, line=True),)
+    ...     faces = (fretscale.ContactFace.nominal("pad", (1.4, 1.0), gap, line=True),)
     ...
     ...     def unworn(self):
     ...         zero, slip = np.zeros(2), np.zeros((2, 2, 2))
@@ -153,10 +155,11 @@ class UncoupledSource(ABC):
     ...         loads = LoadHistory(zero + 50.0, *[zero] * 7, sliding=zero == 0.0)
     ...         return (CycleLoads(loads, slip),)
     >>> steel, law = Material(210e3, 0.3), ArchardLaw(1e-4, 3000.0)
-    >>> contact = Contact(grid=(70, 1), bodies=(steel, steel), laws=(law, law), friction=0.5)
-    >>> results = WearModel(Reciprocation(), contact, Wear(cycles=2000.0)).run()
+    >>> contact = fretscale.Contact((70, 1), (steel, steel), (law, law), friction=0.5)
+    >>> results = fretscale.WearModel(Reciprocation(), contact, fretscale.Wear(2000.0)).run()
     >>> volume = results["pad"]["volume_1"]
-    >>> print(f"{float(volume[-1]):.4f} {volume.attrs['units']}")
+    >>> print(f"{float(volume[-1]):.3e} {volume.attrs['units']}")
+    2.667e-04 mm^3/mm
     """
 
     peak: int

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, cast
 import numpy as np
 
 from sa_solver.errors import InputError
-from wear.coupled import CoupledState, CoupledWear, Observer
+from wear.coupled import CoupledSettings, CoupledState, CoupledWear, Observer
 from workflow.models.contact import Contact, FaceContact, Wear
 from workflow.models.contacts import FaceContacts
 from workflow.models.loads import LoadSource
@@ -36,7 +36,16 @@ class WearModel:
 
     Examples
     --------
-    See :class:`workflow.models.loads.UncoupledSource` for a source of loads of one's own.
+    The model of a case, whose first contact is coarser than that of the case:
+
+    >>> from dataclasses import replace
+    >>> import fretscale
+    >>> model = fretscale.wear_model("cases/dovetail_2d.yaml")
+    >>> coarse = replace(model, contacts=replace(model.contacts, grid=(64, 1)))
+    >>> print(model.contact("intrados").grid, coarse.contact("intrados").grid)
+    (256, 1) (64, 1)
+
+    The example of :class:`fretscale.UncoupledSource` runs a model.
     """
 
     structure: StructureModel | LoadSource
@@ -56,8 +65,8 @@ class WearModel:
     def loads(self, store: StructureStore | None = None) -> LoadSource:
         """Return the loads of the contacts; a structure is condensed, or found in the ``store``."""
         if hasattr(self.structure, "meshed"):
-            model = cast("StructureModel", self.structure)
-            return StructureLoads(model, self._unworn_friction, store)
+            structure = cast("StructureModel", self.structure)
+            return StructureLoads(structure, self._unworn_friction, store)
         return self.structure
 
     def _unworn_friction(self, name: str) -> float:
@@ -81,10 +90,13 @@ class WearModel:
         self, loads: LoadSource, contacts: FaceContacts, observers: Sequence[Observer] = ()
     ) -> CoupledWear:
         """Return the coupled loop of loads and contacts."""
+        return CoupledWear(self.settings(loads), loads, contacts, observers)
+
+    def settings(self, loads: LoadSource) -> CoupledSettings:
+        """Return how far the coupled loop goes, and when loads are computed again."""
         names = (face.face.name for face in loads.faces)
         evolves = any(self.contact(name).coulomb.evolution is not None for name in names)
-        settings = self.wear.coupled("evolving" if evolves else "constant")
-        return CoupledWear(settings, loads, contacts, observers)
+        return self.wear.coupled("evolving" if evolves else "constant")
 
     def run(
         self,

@@ -21,7 +21,7 @@ from workflow.runs.first_look import first_look
 from workflow.runs.provenance import case_values, provenance_of
 from workflow.shell import checkpoint
 from workflow.shell.analysis import Analysis, Pictures, Run, Share, Summary
-from workflow.shell.checkpoint import Checkpoint
+from workflow.shell.checkpoint import StoredState
 from workflow.shell.folder import ASIDE, MANIFEST, REPORT, OutputFolder
 from workflow.shell.forecast import in_words
 from workflow.shell.lock import locked
@@ -123,7 +123,7 @@ def _kept_and_damaged(root: Path, case: Case) -> tuple[Kept, str]:
     return "nothing", damaged
 
 
-def _state(folder: OutputFolder, case: Case) -> Checkpoint | None:
+def _state(folder: OutputFolder, case: Case) -> StoredState | None:
     """What an unfinished run goes on from; None if it left nothing before it was cut off."""
     if not folder.checkpoint.exists():
         return None
@@ -210,7 +210,7 @@ def _run(
     told: Sequence[str],
     loudness: Loudness,
     resume: bool = False,
-    kept: Checkpoint | None = None,
+    kept: StoredState | None = None,
     stays: Sequence[str] = (),
 ) -> None:
     def compute(file: Path, root: Path) -> bool:

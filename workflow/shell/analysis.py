@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     import h5py
     from matplotlib.figure import Figure
 
-    from workflow.shell.checkpoint import Checkpoint
+    from workflow.shell.checkpoint import StoredState
     from workflow.shell.folder import OutputFolder
     from workflow.shell.quantities import CurvesOf, Quantity
     from workflow.shell.reporter import Reporter
@@ -48,7 +48,7 @@ class Run(Generic[AnyCase]):
     folder: OutputFolder
     reporter: Reporter
     resume: bool
-    kept: Checkpoint | None
+    kept: StoredState | None
     provenance: Mapping[str, Any]
     choice: dict[str, Any] | None
     compute: Callable[[Path, Path], bool]

@@ -25,7 +25,7 @@ ABSENT = "not given"
 
 
 @dataclass(frozen=True)
-class Checkpoint:
+class StoredState:
     """The last state of a run, as its analysis keeps it, and the digests of all its jumps."""
 
     arrays: Mapping[str, Any]
@@ -33,13 +33,13 @@ class Checkpoint:
     jumps: Sequence[str]
 
 
-def save(folder: OutputFolder, state: Checkpoint, provenance: Mapping[str, Any]) -> None:
+def save(folder: OutputFolder, state: StoredState, provenance: Mapping[str, Any]) -> None:
     """Write the state; the old file stays until the new one is whole."""
     ties = {PROVENANCE: json.dumps(provenance), JUMPS: np.array(state.jumps, dtype="S64")}
     write_arrays(folder.checkpoint, {**state.arrays, **ties}, state.attributes)
 
 
-def load(folder: OutputFolder, provenance: Mapping[str, Any]) -> Checkpoint:
+def load(folder: OutputFolder, provenance: Mapping[str, Any]) -> StoredState:
     """The last state. Raises UserError unless it, its jumps and its case belong together."""
     try:
         arrays, attributes = read_arrays(folder.checkpoint)
@@ -61,7 +61,7 @@ def load(folder: OutputFolder, provenance: Mapping[str, Any]) -> Checkpoint:
             raise UserError(f"{error}; {folder.again}") from error
         if not same:
             raise UserError(f"{path}: of another run than {folder.checkpoint}; {folder.again}")
-    return Checkpoint(arrays, attributes, jumps)
+    return StoredState(arrays, attributes, jumps)
 
 
 def _changed(folder: OutputFolder, begun: Mapping[str, Any], now: Mapping[str, Any]) -> str:

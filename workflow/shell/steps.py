@@ -21,7 +21,7 @@ from workflow.case.plain import counted
 from workflow.errors import UserError
 from workflow.shell import checkpoint
 from workflow.shell.analysis import Run
-from workflow.shell.checkpoint import Checkpoint
+from workflow.shell.checkpoint import StoredState
 from workflow.shell.packing import PackingError, packed, unpacked
 from workflow.shell.store import read_arrays, write_arrays
 
@@ -117,7 +117,7 @@ class RunSteps:
             self._files.append(write_arrays(path, _joined(self._new)))
             self._new.clear()
         steps = {STEPS: self._before + self._computed}
-        state = Checkpoint(_joined(self._marches), steps, self._files)
+        state = StoredState(_joined(self._marches), steps, self._files)
         checkpoint.save(self._folder, state, self._provenance)
         self._saved = time.perf_counter()
         self._cost = self._saved - begun

@@ -18,7 +18,7 @@ from wear.surfaces import Surfaces
 from wear.worn import Spent
 from workflow.errors import UserError
 from workflow.shell.analysis import Run
-from workflow.shell.checkpoint import Checkpoint, save
+from workflow.shell.checkpoint import StoredState, save
 
 # What the state has of all jumps.
 HISTORIES = ("cycles", "kinetics", "drift", "solved_resultants")
@@ -36,12 +36,20 @@ SCALARS = ("energy", "depth_rate", "volume_rate", "next_cycles", "order")
 
 def keep(run: Run[Any], state: CoupledState, jumps: Sequence[str]) -> None:
     """Write the state after jumps whose files have these digests."""
+    save(run.folder, StoredState(*stored_state(state), jumps), run.provenance)
+
+
+def stored_state(state: CoupledState) -> tuple[dict[str, object], dict[str, object]]:
+    """Return the arrays and the numbers by which a state is stored."""
     arrays: dict[str, object] = {name: getattr(state, name) for name in HISTORIES}
     for number, interface in enumerate(state.interfaces):
         arrays |= _arrays_of(interface, f"interface_{number}")
-    attributes = {"solutions": state.solutions, "interfaces": len(state.interfaces)}
+    attributes: dict[str, object] = {
+        "solutions": state.solutions,
+        "interfaces": len(state.interfaces),
+    }
     attributes |= vars(state.spent)
-    save(run.folder, Checkpoint(arrays, attributes, jumps), run.provenance)
+    return arrays, attributes
 
 
 def _arrays_of(interface: InterfaceState, group: str) -> dict[str, object]:
@@ -66,10 +74,13 @@ def _arrays_of(interface: InterfaceState, group: str) -> dict[str, object]:
     return arrays
 
 
-def restored(run: Run[Any], kept: Checkpoint) -> CoupledState:
-    """The state that a run goes on from. Raises UserError for one that another version kept."""
+def restored(run: Run[Any], kept: StoredState) -> CoupledState:
+    """Return the state that a run goes on from.
+
+    Raises UserError for a state that another version stored.
+    """
     try:
-        return _restored(kept.arrays, kept.attributes)
+        return restored_state(kept.arrays, kept.attributes)
     except (KeyError, TypeError, ValueError) as error:
         folder = run.folder
         raise UserError(
@@ -77,7 +88,8 @@ def restored(run: Run[Any], kept: Checkpoint) -> CoupledState:
         ) from error
 
 
-def _restored(arrays: Mapping[str, Any], attributes: Mapping[str, Any]) -> CoupledState:
+def restored_state(arrays: Mapping[str, Any], attributes: Mapping[str, Any]) -> CoupledState:
+    """Return a stored state; raises KeyError, TypeError or ValueError for anything else."""
     return CoupledState(
         interfaces=tuple(
             _load_interface(arrays, f"interface_{number}")

@@ -12,7 +12,7 @@ from fe_models.solvers.blas_threads import one_thread
 from sa_solver.normal.contact import NormalContactError
 from wear.contact.face_loads import FaceLoads
 from wear.contact.interface import FirstContact, MotionError
-from wear.coupled import CoupledSettings, CoupledState, CoupledWear
+from wear.coupled import CoupledState
 from wear.steps.stepping import ContactFailure
 from workflow.analyses.wear import checkpoint
 from workflow.analyses.wear.budget.finding import Begun, lives_of_companions
@@ -22,13 +22,14 @@ from workflow.analyses.wear.contact_workers import (
     ContactProcesses,
     contact_workers,
 )
+from workflow.analyses.wear.model import wear_model
 from workflow.analyses.wear.outcome import InterfaceOutcome, Outcome
 from workflow.analyses.wear.recording import Recorder, RunLog, reported_stage
 from workflow.analyses.wear.results import write_output
 from workflow.analyses.wear.structures import structure_of
 from workflow.analyses.wear.structures.resultants.source import ResultantsSource
 from workflow.analyses.wear.structures.resultants.writing import marched
-from workflow.analyses.wear.translation import contact_of, face_contact, wear_of
+from workflow.analyses.wear.translation import face_contact
 from workflow.analyses.wear.warnings import (
     warn_of_contact,
     warn_of_file,
@@ -41,9 +42,10 @@ from workflow.errors import MethodFailed, UserError
 from workflow.models.contact import ContactEnd
 from workflow.models.contacts import FaceContacts
 from workflow.models.loads import ContactFace, LoadSource
-from workflow.models.nodal import NodalContacts
 from workflow.models.structure import StructureLoads
+from workflow.models.wear import WearModel
 from workflow.shell.analysis import Run
+from workflow.shell.cache import DiskStore
 from workflow.shell.processes import Workers
 from workflow.shell.reporter import Reporter
 
@@ -84,7 +86,8 @@ def _compute(run: Run[WearCase], working: ExitStack) -> tuple[Outcome, Begun]:
     kept = checkpoint.restored(run, run.kept) if run.kept else None
     for doubt in case.surface_doubts():
         reporter.warn(doubt)
-    source = structure_of(case).source(case)
+    model = wear_model(case)
+    source = model.loads(DiskStore())
     faces = meshed_faces(case, source, reporter)
     workers = working.enter_context(
         contact_workers(case, faces if _worn_apart(case, source) else ())
@@ -101,8 +104,8 @@ def _compute(run: Run[WearCase], working: ExitStack) -> tuple[Outcome, Begun]:
         if isinstance(source, ResultantsSource):
             warn_of_file(source, reporter)
         with reporter.stage("contact set-up"):
-            contacts = _contacts(case, source, faces, workers)
-        state, first = _march(run, source, contacts, unworn, kept)
+            contacts = _contacts(case, model, source, faces, workers)
+        state, first = _march(run, model, source, contacts, unworn, kept)
         ends = _told_once(contacts.ends(state.interfaces), working, len(faces))
     columns = contacts.stages, unworn, first, state.interfaces, ends
     finer = partial(structure_of(case).finer_cycles, case)
@@ -132,16 +135,16 @@ def _told_once(
 
 
 def _contacts(
-    case: WearCase, source: LoadSource, faces: Sequence[ContactFace], workers: Workers
+    case: WearCase,
+    model: WearModel,
+    source: LoadSource,
+    faces: Sequence[ContactFace],
+    workers: Workers,
 ) -> FaceContacts:
-    """What wears: half-spaces in the workers or here, or the nodes of the structure."""
-    if case.contact.method == "nodes":
-        assert isinstance(source, StructureLoads)
-        return NodalContacts(faces, partial(contact_of, case), wear_of(case), source)
-    stages = [face_contact(case, face) for face in faces]
+    """Return what wears: half-spaces in worker processes or here, or nodes of the structure."""
     if _worn_apart(case, source):
-        return ContactProcesses(stages, workers)
-    return FaceContacts(stages)
+        return ContactProcesses([face_contact(case, face) for face in faces], workers)
+    return model.face_contacts(source)
 
 
 def _worn_apart(case: WearCase, source: LoadSource) -> bool:
@@ -152,16 +155,17 @@ def _worn_apart(case: WearCase, source: LoadSource) -> bool:
 
 def _march(
     run: Run[WearCase],
+    model: WearModel,
     source: LoadSource,
     contacts: FaceContacts,
     unworn: Sequence[FaceLoads],
     kept: CoupledState | None,
 ) -> tuple[CoupledState, list[FirstContact]]:
     """The state at the end, from ``kept`` or from unworn surfaces; and the first contact."""
-    case, reporter, settings = run.case, run.reporter, coupled_settings(run.case)
+    case, reporter, settings = run.case, run.reporter, model.settings(source)
     jumps = list(run.kept.jumps) if run.kept else []
     recorder = Recorder(run, settings, source.peak, contacts, jumps, source)
-    loop = CoupledWear(settings, source, contacts, (RunLog(run, contacts, source), recorder))
+    loop = model.loop(source, contacts, (RunLog(run, contacts, source), recorder))
     state, first = loop.begin(unworn)
     warn_of_contact(case, source, contacts.stages, state, first, reporter)
     end = contacts.restored(kept) if kept else state
@@ -202,8 +206,3 @@ def meshed_faces(case: WearCase, source: LoadSource, reporter: Reporter) -> tupl
         nodes, interface_nodes = source.node_count(), source.interface_count()
         structure_of(case).memory(case, nodes, interface_nodes).check()
     return faces
-
-
-def coupled_settings(case: WearCase) -> CoupledSettings:
-    """Return how far a run goes and when its structure is solved again."""
-    return wear_of(case).coupled("evolving" if case.friction_evolves else "constant")

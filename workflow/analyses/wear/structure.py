@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from math import prod
-from typing import TYPE_CHECKING, Any, Generic, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, TypeVar, cast
 
 from workflow.analyses.wear.case.base import WearCase
 from workflow.analyses.wear.run_time import Extent
@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from wear.contact.tractions import CycleTractions
     from workflow.models.contact import FaceContact
     from workflow.models.loads import LoadSource
+    from workflow.models.structure import StructureModel
 
 AnyWearCase = TypeVar("AnyWearCase", bound=WearCase)
 
@@ -75,7 +76,8 @@ def no_cycles(case: WearCase, state: InterfaceState) -> None:
 class WearStructure(Generic[AnyWearCase]):
     """What a wear run needs to know of a kind of structure.
 
-    ``case`` is the kind of case that has it, ``source`` gives the loads of its contacts, ``extent``
+    ``case`` is the kind of case that has it, ``model`` gives the structure that it describes, or
+    another source of loads, ``extent``
     how many they are, by which the time of a run is told, and ``memory`` what a run needs, given
     the nodes of both bodies and of all interfaces (0: unknown). ``choose`` gives the case with the
     settings that it leaves open, and a record of why; ``warnings`` are about the unworn contact of
@@ -87,7 +89,7 @@ class WearStructure(Generic[AnyWearCase]):
 
     name: str
     case: type[AnyWearCase]
-    source: Callable[[AnyWearCase], LoadSource]
+    model: Callable[[AnyWearCase], StructureModel | LoadSource]
     extent: Callable[[AnyWearCase], Extent]
     memory: Callable[[AnyWearCase, int, int], Memory] = memory
     choose: Callable[[AnyWearCase], tuple[AnyWearCase, dict[str, Any] | None]] = as_written
@@ -95,3 +97,13 @@ class WearStructure(Generic[AnyWearCase]):
     finer: Callable[[AnyWearCase], Finer[AnyWearCase] | None] = lambda _: None
     finer_cycles: Callable[[AnyWearCase, InterfaceState], list[CycleTractions] | None] = no_cycles
     settings: Callable[[AnyWearCase], Mapping[str, str]] = lambda _: {}
+
+    def source(self, case: AnyWearCase) -> LoadSource:
+        """Return the loads of the contacts of a case."""
+        model = self.model(case)
+        if not hasattr(model, "meshed"):
+            return model
+        # Finite elements take a second to load: where they are used.
+        from workflow.analyses.wear.translation import structure_loads
+
+        return structure_loads(case, lambda _: cast("StructureModel", model))

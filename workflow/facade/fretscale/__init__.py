@@ -6,6 +6,17 @@ What is done with a case
     - ``check``: what it would run, in what memory and time.
     - ``Check``: that, as numbers.
 
+What is modelled in Python
+    - ``WearModel``: a structure, its contacts and how they wear; ``run`` computes the wear.
+    - ``wear_model``: the model that a case describes.
+    - ``DovetailJoint``, ``DovetailMesh``, ``Dovetail``, ``Mission``: the built-in blade root in its
+      disk: the joint, its mesh, its section and its loads.
+    - ``UncoupledSource``, ``LoadSource``: the bases of loads of one's own, for ``ContactFace`` s.
+    - ``Contact``, ``CoulombFriction``: what a contact is made of, and how it is computed.
+    - ``Wear``, ``JumpSize``, ``Stop``: how far contacts wear, and in which steps.
+    - ``AddedGap``: a profile on top of the form of a face.
+    - ``Observer``, ``Progress``, ``Checkpoint``: what is called while a model runs.
+
 What comes out
     - ``open``: the results in the folder of a finished run.
     - ``Results``: its summary, warnings and case, and all that it has computed.
@@ -93,37 +104,66 @@ _check_packages()
 from sa_solver.lazy import lazy_names  # noqa: E402
 
 if TYPE_CHECKING:
+    from fe_models.dovetail import Mission
+    from fe_models.geometry.dovetail import Dovetail
     from sa_solver.errors import FretscaleError
+    from wear.coupled import JumpSize, Observer, Stop
+    from wear.evolution import CoulombFriction
     from workflow.errors import CaseError, MethodFailed, NotWritten, OutOfMemory, UserError
     from workflow.interface.cases import Check, check, load_case
     from workflow.interface.comparing import ComparedResult, Comparison, compare
     from workflow.interface.datasets import Group, Values
     from workflow.interface.fitting import FitResult, FittedParameter, fit
+    from workflow.interface.modelling import wear_model
+    from workflow.interface.observers import Checkpoint, Progress
     from workflow.interface.results import MainResult, Results, open  # noqa: A004
     from workflow.interface.running import run
+    from workflow.models.contact import Contact, Wear
+    from workflow.models.dovetail import DovetailJoint, DovetailMesh
+    from workflow.models.gaps import AddedGap
+    from workflow.models.loads import ContactFace, LoadSource, UncoupledSource
+    from workflow.models.wear import WearModel
 
 __all__ = [
+    "AddedGap",
     "CaseError",
     "Check",
+    "Checkpoint",
     "ComparedResult",
     "Comparison",
+    "Contact",
+    "ContactFace",
+    "CoulombFriction",
+    "Dovetail",
+    "DovetailJoint",
+    "DovetailMesh",
     "FitResult",
     "FittedParameter",
     "FretscaleError",
     "Group",
+    "JumpSize",
+    "LoadSource",
     "MainResult",
     "MethodFailed",
+    "Mission",
     "NotWritten",
+    "Observer",
     "OutOfMemory",
+    "Progress",
     "Results",
+    "Stop",
+    "UncoupledSource",
     "UserError",
     "Values",
+    "Wear",
+    "WearModel",
     "check",
     "compare",
     "fit",
     "load_case",
     "open",
     "run",
+    "wear_model",
 ]
 
 try:
@@ -134,7 +174,11 @@ except PackageNotFoundError:  # a checkout that is not installed
 __getattr__, __dir__ = lazy_names(
     __name__,
     {
-        "errors": (
+        "fe_models.dovetail": ("Mission",),
+        "fe_models.geometry.dovetail": ("Dovetail",),
+        "wear.coupled": ("JumpSize", "Observer", "Stop"),
+        "wear.evolution": ("CoulombFriction",),
+        "workflow.errors": (
             "CaseError",
             "FretscaleError",
             "MethodFailed",
@@ -142,12 +186,19 @@ __getattr__, __dir__ = lazy_names(
             "OutOfMemory",
             "UserError",
         ),
-        "interface.cases": ("Check", "check", "load_case"),
-        "interface.comparing": ("ComparedResult", "Comparison", "compare"),
-        "interface.datasets": ("Group", "Values"),
-        "interface.fitting": ("FitResult", "FittedParameter", "fit"),
-        "interface.results": ("MainResult", "Results", "open"),
-        "interface.running": ("run",),
+        "workflow.interface.cases": ("Check", "check", "load_case"),
+        "workflow.interface.comparing": ("ComparedResult", "Comparison", "compare"),
+        "workflow.interface.datasets": ("Group", "Values"),
+        "workflow.interface.fitting": ("FitResult", "FittedParameter", "fit"),
+        "workflow.interface.results": ("MainResult", "Results", "open"),
+        "workflow.interface.running": ("run",),
+        "workflow.interface.modelling": ("wear_model",),
+        "workflow.interface.observers": ("Checkpoint", "Progress"),
+        "workflow.models.contact": ("Contact", "Wear"),
+        "workflow.models.dovetail": ("DovetailJoint", "DovetailMesh"),
+        "workflow.models.gaps": ("AddedGap",),
+        "workflow.models.loads": ("ContactFace", "LoadSource", "UncoupledSource"),
+        "workflow.models.wear": ("WearModel",),
     },
-    within="workflow",
+    within="",
 )

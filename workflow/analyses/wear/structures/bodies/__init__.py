@@ -65,7 +65,7 @@ STRUCTURE, LINE_STRUCTURE = (
     WearStructure(
         name=name,
         case=case,
-        source=_source,
+        model=_source,
         extent=_extent,
         choose=_choose,
         finer_cycles=_finer_cycles,

@@ -14,7 +14,7 @@ from workflow.shell.memory import Memory
 
 if TYPE_CHECKING:
     from workflow.models.contact import FaceContact
-    from workflow.models.loads import LoadSource
+    from workflow.models.structure import StructureModel
 
 # Fields per cell and increment: slips, depths per pressure, pressures, starts.
 FIELDS = 12
@@ -26,12 +26,11 @@ FLANK_NODES, VOLUME_NODES, QUADRATIC = 40.0, 1.5, 7.0
 MESH_SHARES = {1: 1.0, 2: 4.0 / 3.0}
 
 
-def _source(case: DovetailCase) -> LoadSource:
+def _model(case: DovetailCase) -> StructureModel:
     # Finite elements take a second to load: where they are used.
     from workflow.analyses.wear.structures.dovetail.model import dovetail_joint
-    from workflow.analyses.wear.translation import structure_loads
 
-    return structure_loads(case, dovetail_joint)
+    return dovetail_joint(case)
 
 
 def _memory(case: DovetailCase, nodes: int = 0, interface_nodes: int = 0) -> Memory:
@@ -102,7 +101,7 @@ def _finer(case: DovetailCase) -> Finer[DovetailCase]:
 STRUCTURE = WearStructure(
     name="dovetail",
     case=DovetailCase,
-    source=_source,
+    model=_model,
     extent=_extent,
     memory=_memory,
     choose=_choose,

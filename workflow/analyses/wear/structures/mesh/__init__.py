@@ -16,7 +16,7 @@ from workflow.errors import UserError
 from workflow.shell.memory import Memory
 
 if TYPE_CHECKING:
-    from workflow.models.loads import LoadSource
+    from workflow.models.structure import StructureModel
 
 # Dense matrices of the interfaces at once while more than two bodies are joined: of 12 blocks on
 # each other 9.6.
@@ -25,12 +25,11 @@ OF_MANY = 10
 MOST_NODES = 4000
 
 
-def _source(case: MeshCase) -> LoadSource:
+def _model(case: MeshCase) -> StructureModel:
     # Finite elements take a second to load: where they are used.
     from workflow.analyses.wear.structures.mesh.model import MeshModel
-    from workflow.analyses.wear.translation import structure_loads
 
-    return structure_loads(case, MeshModel)
+    return MeshModel(case)
 
 
 def _extent(case: MeshCase) -> Extent:
@@ -75,7 +74,7 @@ def _choose(case: MeshCase) -> tuple[MeshCase, dict[str, Any] | None]:
 STRUCTURE = WearStructure(
     name="mesh",
     case=MeshCase,
-    source=_source,
+    model=_model,
     extent=_extent,
     memory=_memory,
     choose=_choose,

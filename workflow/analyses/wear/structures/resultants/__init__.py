@@ -30,7 +30,7 @@ def _extent(case: ResultantsCase) -> Extent:
 STRUCTURE = WearStructure(
     name="resultants",
     case=ResultantsCase,
-    source=_source,
+    model=_source,
     extent=_extent,
     settings=lambda _: {
         "link": "displacements of the nodes in structure.file",

@@ -1,0 +1,170 @@
+"""Wear models that are built and run in Python."""
+
+import subprocess
+import sys
+from importlib.util import module_from_spec, spec_from_file_location
+
+import fretscale
+import numpy as np
+import pytest
+import xarray
+
+from sa_solver import InputError
+from tests.conftest import CASES
+from workflow.analyses.wear.model import wear_model
+
+ROOT = CASES.parent
+SCRIPTS = ROOT / "docs" / "scripts"
+# Names that a program which builds a model has no use for.
+UNNEEDED = {"pydantic", "ruamel", "click", "rich", "matplotlib", "pyvista", "workflow.case"}
+
+
+def script(name):
+    """Return a script of the documentation as a module."""
+    spec = spec_from_file_location(name, SCRIPTS / f"{name}.py")
+    module = module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.fixture
+def model():
+    """A cylinder that slides: four jumps of 500 cycles."""
+    own = script("own_loads")
+    wear = fretscale.Wear(2000.0, jump=fretscale.JumpSize(cycles=500.0))
+    return fretscale.WearModel(own.Reciprocation(), own.contact, wear)
+
+
+class Interrupted(fretscale.Observer):
+    """Raise KeyboardInterrupt after so many jumps."""
+
+    def __init__(self, jumps):
+        self.jumps = jumps
+
+    def jumped(self, before, after):
+        if after.jump == self.jumps:
+            raise KeyboardInterrupt
+
+
+def test_the_default_dovetail_is_built_in_python():
+    """Equal models give equal numbers: a run depends on nothing else."""
+    assert script("dovetail_joint").model == wear_model(
+        fretscale.load_case(CASES / "dovetail.yaml")
+    )
+
+
+@pytest.mark.slow
+def test_a_model_wears_as_its_case(tmp_path):
+    case = fretscale.load_case(
+        CASES / "dovetail_small.yaml",
+        load_path__increments=[3, 5],
+        error_budget="known",
+        output__paraview=False,
+        output__figures=False,
+        stress__section="none",
+        stress__life__parameter="none",
+    )
+    written = fretscale.run(case, tmp_path / "out", quiet=True)
+    results = wear_model(case).run()
+    for flank in ("intrados", "extrados"):
+        surfaces = written.group(f"surfaces/{flank}") if hasattr(written, "group") else None
+        assert surfaces is None or len(surfaces)
+        kinetics = written.summary["kinetics"][flank]
+        assert results[flank]["largest_depth_1"].values.tolist() == kinetics["depth_1"]
+        assert results[flank]["volume_2"].values.tolist() == kinetics["volume_2"]
+
+
+def test_own_loads_wear_by_archard():
+    """V = K P s / H for each body, whatever the pressure: 50 N/mm over 80 um and 2000 cycles."""
+    face = script("own_loads").model.run()["pad"]
+    for body in (1, 2):
+        worn = 1e-4 / 3000.0 * 50.0 * 0.08 * 2000.0
+        assert face[f"volume_{body}"].values[-1] == pytest.approx(worn, rel=1e-12)
+        cell = 1.4 / 70
+        by_depth = face[f"depth_{body}"].isel(cycles=-1).sum() * cell
+        assert float(by_depth) == pytest.approx(worn, rel=1e-12)
+    assert face["P"].attrs["units"] == "N/mm"
+    force = face["pressure"].sum(("x", "y")) * cell
+    np.testing.assert_allclose(force, 50.0, rtol=1e-7)
+
+
+def test_results_open_as_netcdf(tmp_path, model):
+    results = model.run()
+    results.to_netcdf(tmp_path / "results.nc", engine="h5netcdf")
+    again = xarray.open_datatree(tmp_path / "results.nc", engine="h5netcdf")
+    np.testing.assert_array_equal(again["pad"]["depth_1"], results["pad"]["depth_1"])
+    assert again["pad"]["depth_1"].attrs == results["pad"]["depth_1"].attrs
+
+
+def test_a_run_goes_on_from_a_checkpoint(tmp_path, model):
+    checkpoint = fretscale.Checkpoint(tmp_path / "state.h5")
+    assert checkpoint.state() is None
+    with pytest.raises(KeyboardInterrupt):
+        model.run([checkpoint, Interrupted(2)])
+    assert checkpoint.state().jump == 2
+    whole, rest = model.run(), model.run(start=checkpoint.state())
+    assert rest["pad"]["cycles"].values.tolist() == [1000.0, 1500.0, 2000.0]
+    np.testing.assert_array_equal(
+        rest["pad"]["depth_1"].values, whole["pad"]["depth_1"].values[-3:]
+    )
+
+
+def test_a_state_of_another_model_is_refused(tmp_path, model):
+    checkpoint = fretscale.Checkpoint(tmp_path / "state.h5")
+    with pytest.raises(KeyboardInterrupt):
+        model.run([checkpoint, Interrupted(1)])
+    own = script("own_loads")
+
+    class Heavier(own.Reciprocation):
+        def unworn(self):
+            (cycle,) = super().unworn()
+            heavier = type(cycle.loads)(**vars(cycle.loads) | {"P": 2.0 * cycle.loads.P})
+            return (type(cycle)(heavier, cycle.slip),)
+
+    coarse = fretscale.Contact((50, 1), *(getattr(own.contact, k) for k in ("bodies", "laws")), 0.5)
+    for other in (
+        fretscale.WearModel(Heavier(), own.contact, model.wear),
+        fretscale.WearModel(own.Reciprocation(), coarse, model.wear),
+    ):
+        with pytest.raises(InputError, match="another model"):
+            other.run(start=checkpoint.state())
+    (tmp_path / "state.h5").write_bytes(b"nothing")
+    with pytest.raises(fretscale.UserError):
+        checkpoint.state()
+
+
+def test_contacts_are_found_by_name(model):
+    named = fretscale.WearModel(model.structure, {"pad": model.contacts}, model.wear)
+    assert named.contact("pad") is model.contacts
+    lacking = fretscale.WearModel(model.structure, {"foot": model.contacts}, model.wear)
+    with pytest.raises(InputError, match="no contact for the face 'pad'"):
+        lacking.run()
+
+
+def test_a_profile_is_added_to_structure_and_contact():
+    joint = script("dovetail_joint").model.structure
+    groove = fretscale.AddedGap(lambda x, y: 2e-3 * np.exp(-(x**2)) + 0.0 * y)
+    changed = {"dimension": 2, "mesh": fretscale.DovetailMesh((10, 10), 8.0)}
+    plain, grooved = (
+        type(joint)(**vars(joint) | changed | {"added": added})
+        for added in ({}, {"intrados": groove})
+    )
+    for before, after in zip(plain.meshed().interfaces, grooved.meshed().interfaces, strict=True):
+        x = after.coordinates[:, 0]
+        rise = 2e-3 * np.exp(-(x**2)) if after.name == "intrados" else 0.0 * x
+        np.testing.assert_allclose(after.gap - before.gap, rise, atol=1e-15)
+        at = np.linspace(-4.0, 4.0, 9)[:, None], np.zeros((1, 1))
+        form, gap = (m.contact_face(f).gap(*at) for m, f in ((plain, before), (grooved, after)))
+        expected = 2e-3 * np.exp(-(at[0] ** 2)) if after.name == "intrados" else 0.0 * at[0]
+        np.testing.assert_allclose(gap - form, expected, atol=1e-15)
+
+
+def test_models_load_nothing_of_cases():
+    code = (
+        "import fretscale, sys; fretscale.WearModel; fretscale.DovetailJoint; "
+        "print(*(name for name in sys.modules))"
+    )
+    run = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=ROOT
+    )
+    assert not UNNEEDED & set(run.stdout.split())

@@ -1,0 +1,18 @@
+"""A wear case as a model that runs without it."""
+
+from __future__ import annotations
+
+from workflow.analyses.wear.case.base import WearCase
+from workflow.analyses.wear.structures import structure_of
+from workflow.analyses.wear.translation import contact_of, wear_of
+from workflow.models.contact import Contact
+from workflow.models.wear import WearModel
+
+
+def wear_model(case: WearCase) -> WearModel:
+    """Return the model that a case describes: its structure, its contacts and how they wear."""
+    names = case.contact_names
+    contacts: Contact | dict[str, Contact] = contact_of(case, names[0])
+    if len(names) > 1:
+        contacts = {name: contact_of(case, name) for name in names}
+    return WearModel(structure_of(case).model(case), contacts, wear_of(case))

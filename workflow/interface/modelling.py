@@ -1,0 +1,37 @@
+"""Models from cases."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from workflow.analyses.wear.case.base import WearCase
+from workflow.analyses.wear.model import wear_model as translated
+from workflow.errors import UserError
+from workflow.interface.cases import AnyCase, load_case
+from workflow.models.wear import WearModel
+
+
+def wear_model(case: AnyCase, /, **overrides: Any) -> WearModel:
+    """Return the model that a wear case describes, to be changed and run in Python.
+
+    Case and overrides are those of :func:`fretscale.load_case`. Raises :class:`CaseError` for a bad
+    case, and :class:`UserError` for a case of another kind.
+
+    Examples
+    --------
+    The same joint with another friction on both flanks:
+
+    >>> from dataclasses import replace
+    >>> import fretscale
+    >>> model = fretscale.wear_model("cases/dovetail_2d.yaml")
+    >>> smoother = replace(model, contacts=replace(model.contacts, friction=0.2))
+    >>> print(*(of.contact("intrados").coulomb.coefficient for of in (model, smoother)))
+    0.4 0.2
+    """
+    read = load_case(case, **overrides)
+    if not isinstance(read, WearCase):
+        raise UserError(
+            f"{read.title!r} is no case of the wear of contacts; allowed: analysis wear of a "
+            "dovetail, a mesh, resultants or bodies"
+        )
+    return translated(read)

@@ -1,0 +1,89 @@
+"""Observers of a model that runs in Python: its progress, and a checkpoint to go on from."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TextIO
+
+from wear.coupled import CoupledState, Observer, Stage
+from workflow.analyses.wear.checkpoint import restored_state, stored_state
+from workflow.errors import UserError
+from workflow.shell.store import DamagedFile, read_arrays, write_arrays
+
+
+class Progress(Observer):
+    """Print a line for each part of a run, and one after every jump.
+
+    Parameters
+    ----------
+    stream : text file, optional
+        Where to print; standard error if not given.
+
+    Examples
+    --------
+    >>> import sys
+    >>> import fretscale
+    >>> watching = fretscale.Progress(sys.stdout)
+    """
+
+    def __init__(self, stream: TextIO | None = None) -> None:
+        self._stream = stream
+
+    @contextmanager
+    def stage(self, name: Stage) -> Iterator[None]:
+        if name != "drift probe":
+            self._print(name)
+        yield
+
+    def jumped(self, before: CoupledState, after: CoupledState) -> None:
+        self._print(
+            f"jump {after.jump}: {after.cycles[-1]:.6g} cycles, "
+            f"largest depth {1e3 * after.depth:.4g} um"
+        )
+
+    def _print(self, text: str) -> None:
+        print(text, file=self._stream or sys.stderr, flush=True)
+
+
+class Checkpoint(Observer):
+    """Write the state of a run to a file after every jump, so that another run can go on from it.
+
+    Parameters
+    ----------
+    path : path
+        The file. It is replaced when a new state is written in full, so that it is always whole.
+
+    Examples
+    --------
+    The second run goes on where the first one ended, or was interrupted:
+
+    >>> import tempfile, fretscale
+    >>> folder = tempfile.TemporaryDirectory()
+    >>> checkpoint = fretscale.Checkpoint(folder.name + "/state.h5")
+    >>> print(checkpoint.state())
+    None
+    """
+
+    def __init__(self, path: str | os.PathLike[str]) -> None:
+        self.path = Path(path)
+
+    def jumped(self, before: CoupledState, after: CoupledState) -> None:
+        write_arrays(self.path, *stored_state(after))
+
+    def state(self) -> CoupledState | None:
+        """Return the state that was written last, or None without a file.
+
+        Raises UserError for a file that holds no such state.
+        """
+        if not self.path.exists():
+            return None
+        try:
+            return restored_state(*read_arrays(self.path))
+        except DamagedFile as error:
+            raise UserError(str(error)) from error
+        except (KeyError, TypeError, ValueError) as error:
+            raise UserError(f"{self.path}: not a state of this version of fretscale") from error
