@@ -36,14 +36,14 @@ class WearModel:
 
     Examples
     --------
-    The model of a case, whose first contact is coarser than that of the case:
+    The model of a case on a coarser grid:
 
     >>> from dataclasses import replace
     >>> import fretscale
-    >>> model = fretscale.wear_model("cases/dovetail_2d.yaml")
-    >>> coarse = replace(model, contacts=replace(model.contacts, grid=(64, 1)))
+    >>> model = fretscale.wear_model("cases/dovetail.yaml")
+    >>> coarse = replace(model, contacts=replace(model.contacts, grid=(64, 128)))
     >>> print(model.contact("intrados").grid, coarse.contact("intrados").grid)
-    (256, 1) (64, 1)
+    (128, 256) (64, 128)
 
     The example of :class:`fretscale.UncoupledSource` runs a model.
     """
