@@ -9,7 +9,7 @@ import pytest
 from sa_solver.types import Array
 from tests.conftest import CASES
 from wear.coupled import CoupledState, CoupledWear
-from wear.steps.steppers import step_errors
+from wear.steps.step_errors import step_errors
 from workflow.analyses.wear.nodal_contacts import NodalContacts, StructureCycle
 from workflow.analyses.wear.run import coupled_settings
 from workflow.analyses.wear.structure_stage import StructureStage

@@ -16,7 +16,8 @@ from wear.contact.interface import InterfaceContact, InterfaceSettings, Interfac
 from wear.contact.link import Link
 from wear.contact.tractions import CycleTractions
 from wear.steps.implicit import ImplicitStepper, SecondOrderStepper
-from wear.steps.steppers import ErrorControl, ExplicitStepper, Stepper, step_errors
+from wear.steps.step_errors import ErrorControl, step_errors
+from wear.steps.steppers import ExplicitStepper, Stepper
 from wear.steps.stepping import WearingContact, WearState
 from workflow.analyses.wear.case.base import ContactTerms, WearCase
 from workflow.analyses.wear.case.sections import ContactStress, Duration
