@@ -28,24 +28,9 @@ from sa_solver.half_space.operator import HalfSpace
 from sa_solver.normal.contact import NormalContact, NormalStart, NormalState, checked_heights
 from sa_solver.rigid_modes import NORMAL, PLANAR, PlanarModes
 from sa_solver.tangential.ciavarella_jaeger import first_loading
-from sa_solver.tangential.contact import (
-    FrictionLimitError,
-    TangentialContact,
-    TangentialContactError,
-    TangentialState,
-)
-from sa_solver.tangential.friction_limit import largest_share
-from sa_solver.tangential.gross_slip import SlidingRule, gross_slip, sliding_direction
+from sa_solver.tangential.contact import FrictionLimitError, TangentialContact, TangentialState
+from sa_solver.tangential.gross_slip import SlidingRule, gross_slip, slides, sliding_direction
 from sa_solver.types import Array, Mask
-
-GROSS_SHARE = 0.99
-"""Share of the largest shear force from which the contact counts as sliding, where energies are at
-hand: from there on the force hardly says how far, the energy does. A structure whose last nodes
-stick at the ends of a flank holds 0.2 % less than friction could while it slides by tens of µm."""
-
-SHARE_CHECKED = 0.5
-"""Share of µP or of its moment from which the largest force is computed."""
-
 
 _State = TypeVar("_State", TangentialState, CoupledState)
 
@@ -139,7 +124,7 @@ class FrictionalContact:
         normal = self._press(before, height, load, known.normal)
         limit = self.friction * normal.pressure
         offset, area = self.offset(before, load), self.grid.cell_area
-        sliding = self._slides(limit, load)
+        sliding = slides(limit, load, self._modes, self.grid.cell_area)
         if sliding:
             tangential, creeps = self._slide(before, limit, offset, load, known)
             held = self._held(before, limit, offset, load) if creeps else None
@@ -319,31 +304,6 @@ class FrictionalContact:
         state = replace(found, convolutions=spent, converged=converged, message=message)
         return state, slip.creeps
 
-    def _slides(self, limit: Array, load: ContactLoad) -> bool:
-        """Whether the energy is known and forces are within 1 % of the largest friction carries."""
-        if load.energy is None:
-            return False
-        if not np.all(np.isfinite(load.energy)):
-            raise TangentialContactError(
-                f"energies {load.energy} must be finite: check the load history"
-            )
-        if load.energy.sum() <= 0.0:
-            return False
-        modes = self._modes
-        forces = load.values[[PLANAR[k] for k in modes.free]]
-        target = forces / (modes.lengths * self.grid.cell_area)
-        carried = float(limit.sum())
-        if any(load.motion[k] for k in PLANAR) or carried == 0.0:
-            return False
-        if np.linalg.norm(target) < SHARE_CHECKED * carried:
-            return False
-        pressed = limit > 0.0
-        shapes = modes.fields()[:, :, pressed]
-        enough = 1.0 / GROSS_SHARE
-        accuracy = 0.1 * (1.0 - GROSS_SHARE)
-        share = largest_share(limit[pressed], shapes, target, accuracy=accuracy, enough=enough)
-        return share <= enough
-
     def _state(
         self,
         before: ContactState,
@@ -423,7 +383,7 @@ class FrictionalContact:
             # The pressure hardly changes with shear: that without friction will do to judge it.
             unsheared = NormalStart(before.pressure, self.half_space.normal(before.pressure))
             limit = self.friction * self._press(before, height, load, unsheared).pressure
-            sliding = self._slides(limit, load)
+            sliding = slides(limit, load, self._modes, self.grid.cell_area)
         if sliding:
             near = _increment(before, known)
             state = self._slide_together(before, height, offset, load, limit, start, near)

@@ -10,6 +10,7 @@ from sa_solver import checks
 from sa_solver.errors import InputError
 from sa_solver.normal.contact import NormalStart
 from sa_solver.rigid_modes import NORMAL, RESULTANTS
+from sa_solver.traction_state import TractionState
 from sa_solver.types import Array, Mask
 
 MOTIONS = ("approach", "shift_x", "shift_y", "tilt_x", "tilt_y", "twist")
@@ -138,7 +139,7 @@ class ContactStart:
 
 
 @dataclass(frozen=True)
-class ContactState:
+class ContactState(TractionState):
     """State of a frictional contact at the end of an increment.
 
     Fields: ``traction`` ``(3, nx, ny)`` ordered qx, qy, p [MPa], its ``displacement`` K t
@@ -171,37 +172,6 @@ class ContactState:
     message: str = ""
     convolutions: int = 0
     border_load: float = 0.0
-
-    @property
-    def pressure(self) -> Array:
-        """p ``(nx, ny)`` [MPa]."""
-        pressure: Array = self.traction[2]
-        return pressure
-
-    @property
-    def shear(self) -> Array:
-        """qx, qy ``(2, nx, ny)`` [MPa]."""
-        return self.traction[:2]
-
-    @property
-    def contact_area(self) -> float:
-        """Area of the cells in contact [mm²; in a line contact, per mm, its width in mm]."""
-        return float(np.count_nonzero(self.pressure)) * self.cell_area
-
-    @property
-    def stick_area(self) -> float:
-        """Area of the cells that stick [mm²; in a line contact, per mm, their width in mm]."""
-        return float(np.count_nonzero(self.sticking)) * self.cell_area
-
-    @property
-    def elastic_energy(self) -> float:
-        """Energy ½ Σ t·u S that all tractions store in both bodies [N mm], with u = K t.
-
-        In an increment forces and moments do as much work as this grows by and slip dissipates
-        (``energy``). Bulk strain does work as well, which neither counts. In a line contact, per
-        mm, it counts up to the datum of the half-space.
-        """
-        return 0.5 * float(np.vdot(self.traction, self.displacement)) * self.cell_area
 
     @property
     def slipping(self) -> Mask:

@@ -29,15 +29,19 @@ def modules(package, *names):
 # things is told, when a step ends. Elsewhere rounding stays rounding. The compiled joints and the
 # branches of vibrations would double the time.
 CONTACTS = [
-    *modules("sa_solver", "contact", "coupled", "friction_limit", "gross_slip", "history"),
+    *modules("sa_solver", "contact", "coupled", "coupled_failures", "friction_limit"),
+    *modules("sa_solver", "gross_slip", "history"),
     *modules("sa_solver", "normal", "normal_control", "normal_properties", "partial_slip"),
     *modules("sa_solver", "convergence", "subsurface"),
     *modules("sa_solver", "tangential", "tangential_dense", "tangential_loop"),
     *modules("fe_models", "friction", "friction_independent", "joint", "linear_solver"),
     *modules("fe_models", "mortar_contact", "mortar_frames", "reduced_contact"),
 ]
-WEAR = modules("wear", "coupled", "full_cycle", "life", "moving", "steppers", "stepping", "tilt")
-EIGENPROBLEMS = modules("workflow", "specimens_case")
+WEAR = [
+    *modules("wear", "coupled", "full_cycle", "jumps", "life", "moving", "steppers", "stepping"),
+    *modules("wear", "tilt"),
+]
+SPECIMENS = modules("workflow", "pad_half_space", "specimens_case")
 
 
 def run_tests(*arguments, **environment):
@@ -63,4 +67,4 @@ def test_solvers_do_not_notice_perturbed_matrices():
 @pytest.mark.long
 def test_solvers_do_not_notice_another_processor(tmp_path):
     # What is compiled for it is kept apart.
-    run_tests(*CONTACTS, *WEAR, *EIGENPROBLEMS, **OLD_PROCESSOR, NUMBA_CACHE_DIR=str(tmp_path))
+    run_tests(*CONTACTS, *WEAR, *SPECIMENS, **OLD_PROCESSOR, NUMBA_CACHE_DIR=str(tmp_path))

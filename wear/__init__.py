@@ -80,7 +80,8 @@ if TYPE_CHECKING:
     from wear.kinetics import linear_regime
     from wear.laws import ArchardLaw, EnergyAmplitudeLaw, EnergyLaw, EvolvingLaw, WearLaw
     from wear.steps.implicit import ImplicitStepper, SecondOrderStepper
-    from wear.steps.steppers import ErrorControl, ExplicitStepper, HeunStepper
+    from wear.steps.step_errors import ErrorControl
+    from wear.steps.steppers import ExplicitStepper, HeunStepper
     from wear.steps.stepping import ContactFailure
 
 __all__ = [
@@ -130,7 +131,8 @@ __getattr__, __dir__ = lazy_names(
         "laws": ("ArchardLaw", "EnergyAmplitudeLaw", "EnergyLaw", "EvolvingLaw", "WearLaw"),
         "cracking.life": ("findley", "ruiz", "smith_watson_topper"),
         "contact.link": ("CellNodes",),
-        "steps.steppers": ("ErrorControl", "ExplicitStepper", "HeunStepper"),
+        "steps.step_errors": ("ErrorControl",),
+        "steps.steppers": ("ExplicitStepper", "HeunStepper"),
         "steps.stepping": ("ContactFailure",),
     },
 )

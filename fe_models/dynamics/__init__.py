@@ -53,8 +53,9 @@ if TYPE_CHECKING:
         RecordedForce,
     )
     from fe_models.dynamics.model import DynamicModel
-    from fe_models.dynamics.periodic.harmonic_balance import HarmonicBalance, PeriodicLoad
+    from fe_models.dynamics.periodic.harmonic_balance import HarmonicBalance
     from fe_models.dynamics.periodic.harmonics import Resolution
+    from fe_models.dynamics.periodic.load import PeriodicLoad
     from fe_models.dynamics.rig import (
         Link,
         lumped_rig,
@@ -118,10 +119,7 @@ __getattr__, __dir__ = lazy_names(
             "along_frequency",
         ),
         "transient.free_decay": ("ring_down",),
-        "periodic.harmonic_balance": (
-            "HarmonicBalance",
-            "PeriodicLoad",
-        ),
+        "periodic.harmonic_balance": ("HarmonicBalance",),
         "periodic.harmonics": ("Resolution",),
         "transient.impact_hammer": ("frequency_response",),
         "model": ("DynamicModel",),
@@ -133,6 +131,7 @@ __getattr__, __dir__ = lazy_names(
             "LinearMode",
             "along_nonlinear_mode",
         ),
+        "periodic.load": ("PeriodicLoad",),
         "curves.phase_resonance": ("along_phase_resonance",),
         "rig": (
             "Link",

@@ -34,6 +34,7 @@ from sa_solver.splitting import douglas_rachford
 from sa_solver.surfaces.absent_cells import without_absent
 from sa_solver.tangential.contact import UNCARRIED, FrictionLimitError, listed
 from sa_solver.tangential.friction_limit import largest_share
+from sa_solver.traction_state import TractionState
 from sa_solver.types import Array, Mask
 
 TOLERANCE = 1e-8
@@ -85,7 +86,7 @@ class CoupledContactError(ContactProblemError):
 
 
 @dataclass(frozen=True)
-class CoupledState:
+class CoupledState(TractionState):
     """Solution of one increment.
 
     ``traction`` ``(qx, qy, p)`` [MPa] and ``displacement`` K t [mm] are ``(3, nx, ny)``, ``slip``
@@ -114,32 +115,6 @@ class CoupledState:
     message: str = ""
     iterations: int = 0
     convolutions: int = 0
-
-    @property
-    def contact_area(self) -> float:
-        """Area of the cells in contact [mm²; in a line contact, per mm, its width in mm]."""
-        return float(np.count_nonzero(self.pressure)) * self.cell_area
-
-    @property
-    def stick_area(self) -> float:
-        """Area of the cells that stick [mm²; in a line contact, per mm, their width in mm]."""
-        return float(np.count_nonzero(self.sticking)) * self.cell_area
-
-    @property
-    def elastic_energy(self) -> float:
-        """Energy ½ Σ t·u S that all tractions store in both bodies [N mm], with u = K t."""
-        return 0.5 * float(np.vdot(self.traction, self.displacement)) * self.cell_area
-
-    @property
-    def pressure(self) -> Array:
-        """p ``(nx, ny)`` [MPa]."""
-        pressure: Array = self.traction[Z]
-        return pressure
-
-    @property
-    def shear(self) -> Array:
-        """(qx, qy) ``(2, nx, ny)`` [MPa]."""
-        return self.traction[:Z]
 
     @property
     def start(self) -> Array:

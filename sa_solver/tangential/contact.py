@@ -25,6 +25,7 @@ from sa_solver.half_space.operator import HalfSpace
 from sa_solver.rigid_modes import PlanarModes, Window
 from sa_solver.tangential.friction_limit import largest_share
 from sa_solver.tangential.problem import TangentialProblem, squared
+from sa_solver.traction_state import StickingState
 from sa_solver.types import Array, Mask
 
 if TYPE_CHECKING:
@@ -94,7 +95,7 @@ class TangentialResiduals:
 
 
 @dataclass(frozen=True)
-class TangentialState:
+class TangentialState(StickingState):
     """Solution of a tangential contact problem.
 
     ``shear`` [MPa], ``slip`` Δs (0 off the contact) and ``displacement`` K q [mm] are
@@ -120,11 +121,6 @@ class TangentialState:
     cell_area: float
     message: str = ""
     convolutions: int = 0
-
-    @property
-    def stick_area(self) -> float:
-        """Area of the cells that stick [mm²; in a line contact, per mm, their width in mm]."""
-        return float(np.count_nonzero(self.sticking)) * self.cell_area
 
     @property
     def elastic_energy(self) -> float:

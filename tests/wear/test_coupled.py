@@ -12,144 +12,43 @@ that stay the same during a jump are Euler's method on that.
 import subprocess
 import sys
 from contextlib import contextmanager
-from dataclasses import replace
-from itertools import islice
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from sa_solver.errors import InputError
-from sa_solver.types import Array, ElasticPair, Grid, LoadHistory, Material
+from sa_solver.types import Array
 from tests.marks import slow
 from tests.oracles.worn_shapes import worn_cylinder
-from wear.contact.contacts import Contacts
-from wear.contact.drive import Drive
-from wear.contact.face_loads import CycleLoads
-from wear.contact.interface import InterfaceContact, InterfaceSettings, InterfaceState, MotionError
-from wear.contact.link import CellNodes
-from wear.coupled import (
-    AT_STOP,
-    ConstantLoads,
-    CoupledSettings,
-    CoupledState,
-    CoupledWear,
-    JumpSize,
-    Observer,
-    Stop,
+from tests.wear.formula_loads import (
+    AREA,
+    COEFFICIENTS,
+    FALL,
+    FRICTION,
+    LOAD,
+    PAIR,
+    PER_LOAD,
+    RADIUS,
+    SCALE,
+    SLIP,
+    Falling,
+    cylinder,
+    falling,
+    in_turn,
+    patch,
+    run,
+    run_constant,
 )
+from wear.contact.drive import Drive
+from wear.contact.interface import InterfaceState, MotionError
+from wear.coupled import CoupledSettings, CoupledWear, JumpSize, Observer
 from wear.evolution import EnergyTable
 from wear.laws import EnergyLaw, EvolvingLaw
 from wear.steps.full_cycle import CycleStart
 from wear.steps.implicit import ImplicitStepper
-from wear.steps.steppers import ErrorControl
+from wear.steps.step_errors import ErrorControl
 from wear.steps.stepping import ContactFailure
-
-BODY = Material(115e3, 0.29)
-PAIR = ElasticPair(BODY, BODY)
-FRICTION, SLIP = 0.5, 0.04
-COEFFICIENTS = 5e-8, 1e-8
-# Volume of both bodies per cycle and load [mm³/N].
-PER_LOAD = sum(COEFFICIENTS) * FRICTION * SLIP
-RADIUS = 10.0
-
-
-def cylinder(**settings) -> InterfaceSettings:
-    """A line contact on 70 strips."""
-    grid = Grid.strips(1.4, 70)
-    return interface(grid, grid.x**2 / (2.0 * RADIUS), **settings)
-
-
-def patch(**settings) -> InterfaceSettings:
-    """A flat of 1 mm on a step that never touches."""
-    grid = Grid.strips(1.2, 24)
-    return interface(grid, np.where(np.abs(grid.x) < 0.5, 0.0, 1.0), **settings)
-
-
-def interface(grid: Grid, gap: Array, **settings) -> InterfaceSettings:
-    return InterfaceSettings(
-        **{
-            "name": "contact",
-            "grid": grid,
-            "gap": np.ascontiguousarray(gap),
-            "transfer": CellNodes(grid),
-            "pair": PAIR,
-            "laws": tuple(EnergyLaw(coefficient) for coefficient in COEFFICIENTS),
-            "friction": lambda energy: FRICTION,
-            "stepper": ImplicitStepper(),
-            "follow": False,
-            "tolerance": 1e-10,
-        }
-        | settings
-    )
-
-
-AREA = 1.0  # of the patch, per length
-
-
-class Falling:
-    """Loads of some patches that fall as they wear, each P0 (1 - h/h0), h its mean depth."""
-
-    def __init__(self, loads: tuple[float, ...], depth: float, grid: Grid) -> None:
-        self._loads, self._depth, self._grid = loads, depth, grid
-        self.solved: list[list[float]] = []
-        self.probed = 0
-
-    def forces(self, depths: list[Array]) -> list[float]:
-        means = [depth.sum() * self._grid.cell_area / AREA for depth in depths]
-        pairs = zip(self._loads, means, strict=True)
-        return [load * (1.0 - mean / self._depth) for load, mean in pairs]
-
-    def worn(self, depths: list[Array], friction=None) -> list[CycleLoads]:
-        self.solved.append(self.forces(depths))
-        return [cycle(load, self._grid) for load in self.solved[-1]]
-
-    def unworn(self) -> list[CycleLoads]:
-        return [cycle(load, self._grid) for load in self._loads]
-
-    def probe(self, depths: list[Array], friction=None) -> Array:
-        self.probed += 1
-        return np.array([[load, *[0.0] * 5] for load in self.forces(depths)])
-
-
-def cycle(load: float, grid: Grid) -> CycleLoads:
-    """There and back as a whole, under a load."""
-    zero = np.zeros(2)
-    slip = 0.5 * SLIP * np.array([1.0, -1.0])[:, None, None] * [[[1.0], [0.0]]]
-    loads = LoadHistory(zero + load, *(zero,) * 7, sliding=np.ones(2, dtype=bool))
-    cells = grid.shape[0] * grid.shape[1]
-    return CycleLoads(loads, np.broadcast_to(slip, (2, 2, cells)).copy())
-
-
-def to_and_fro(load: float, grid: Grid) -> CycleLoads:
-    """There under a load, and back under less."""
-    there = cycle(load, grid)
-    return replace(there, loads=replace(there.loads, P=load * np.array([1.0, 0.4])))
-
-
-def run(settings: CoupledSettings, source: Falling, contacts, *observers) -> list[CoupledState]:
-    """All states of a run, the unworn one first."""
-    loop = CoupledWear(settings, source, in_turn(contacts), observers)
-    state, _ = loop.begin(source.unworn())
-    return [state, *loop.march(state)]
-
-
-def run_constant(
-    settings: CoupledSettings, load: float, contact: InterfaceSettings
-) -> CoupledState:
-    """The end of a run of one contact under a constant load."""
-    histories = [cycle(load, contact.grid)]
-    loop = CoupledWear(settings, ConstantLoads(histories), in_turn([contact]))
-    state, _ = loop.begin(histories)
-    *_, end = loop.march(state)
-    return end
-
-
-def in_turn(contacts: list[InterfaceSettings]) -> Contacts:
-    return Contacts([InterfaceContact(settings) for settings in contacts])
-
 
 # --- against closed forms -------------------------------------------------------------------------
 
@@ -180,16 +79,6 @@ def test_volume_is_coefficient_times_energy() -> None:
     np.testing.assert_allclose(volume_1, COEFFICIENTS[0] * energy, rtol=1e-10)
     np.testing.assert_allclose(volume_2, COEFFICIENTS[1] * energy, rtol=1e-10)
     np.testing.assert_allclose(energy, FRICTION * load * SLIP * end.cycles, rtol=1e-9)
-
-
-FALL = 1e-3  # h0 [mm]
-LOAD = 80.0
-# Cycles in which the volume comes to within 1/e of its end.
-SCALE = AREA * FALL / (PER_LOAD * LOAD)
-
-
-def falling(*loads: float) -> Falling:
-    return Falling(loads or (LOAD,), FALL, patch().grid)
 
 
 def exact_volume(cycles: float) -> float:
@@ -270,98 +159,6 @@ def test_a_source_is_told_of_friction_that_changes() -> None:
     states = run(settings, source, contacts)
     energies = states[-1].kinetics[1:, :, 4]
     np.testing.assert_allclose(told, FRICTION * (1.0 + energies))
-
-
-# --- stops and sizes of jumps ---------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("jump", [None, 0.37 * SCALE])
-@pytest.mark.parametrize("stop", [Stop(volume=4e-4), Stop(depth=3.1e-4)])
-def test_a_stop_is_met_to_a_thousandth(stop: Stop, jump: float | None) -> None:
-    """Whatever the jumps, and although the loads fall on the way."""
-    contact = patch(stepper=ImplicitStepper(ErrorControl(0.01)))
-    settings = CoupledSettings(10.0 * SCALE, JumpSize(jump), stop, "every")
-    states = run(settings, falling(), [contact])
-    reached = states[-1].volume if stop.volume else states[-1].depth
-    assert reached == pytest.approx(stop.volume or stop.depth, rel=1.001 * AT_STOP)
-    assert settings.ended(states[-1])
-    assert not any(map(settings.ended, states[:-1]))
-    assert states[-1].cycles[-1] < settings.cycles
-
-
-@pytest.mark.parametrize(
-    ("size", "column"), [(JumpSize(volume=1e-4), slice(2, 4)), (JumpSize(depth=6e-5), slice(0, 1))]
-)
-def test_jumps_may_be_as_long_as_they_wear(size: JumpSize, column: slice) -> None:
-    """Volumes of a jump are known from its rates, depths nearly: pressures even out."""
-    settings = CoupledSettings(SCALE, size, resultants="constant")
-    end = run_constant(settings, LOAD, patch())
-    worn = np.diff(end.kinetics[:, 0, column].sum(axis=1))
-    asked = size.volume or size.depth
-    np.testing.assert_allclose(worn[1:-1], asked, rtol=1e-6 if size.volume else 0.15)
-
-
-@pytest.mark.parametrize(
-    ("jump", "tolerance", "left"),
-    [
-        (JumpSize(0.3 * SCALE), None, [4, 3, 2, 1, 0]),
-        (JumpSize(), 0.01, None),
-        (JumpSize(volume=1e-4), None, None),
-    ],
-    ids=["given", "automatic", "by volume"],
-)
-def test_jumps_that_are_left_are_foreseen(
-    jump: JumpSize, tolerance: float | None, left: list[int] | None
-) -> None:
-    """Of given ones all; where they grow, within a factor of two from the third on."""
-    control = None if tolerance is None else ErrorControl(tolerance)
-    settings = CoupledSettings(SCALE, jump, resultants="constant")
-    histories = [cycle(LOAD, patch().grid)]
-    contacts = in_turn([patch(stepper=ImplicitStepper(control))])
-    loop = CoupledWear(settings, ConstantLoads(histories), contacts)
-    state, _ = loop.begin(histories)
-    foreseen = [loop.jumps_left(state)] + [loop.jumps_left(each) for each in loop.march(state)]
-    true = np.arange(len(foreseen))[::-1]
-    assert left is None or foreseen == left
-    assert foreseen[-1] == 0
-    assert np.all(foreseen[2:] <= 2 * true[2:])
-    assert np.all(true[2:] <= 2 * np.array(foreseen[2:]))
-
-
-def test_jumps_that_grow_are_foreseen_as_they_grow() -> None:
-    """Of 1, 2, 4 and 8 cycles sixteen more come to 2^20 - 1; of equal ones as many as are left."""
-    settings = CoupledSettings(2.0**20 - 1.0)
-    loop = CoupledWear(settings, ConstantLoads([]), in_turn([]))
-    steady = SimpleNamespace(half_way=False, depth_rate=0.0, volume_rate=0.0)
-    for lengths, following, left in (([1, 2, 4, 8], 16.0, 16), ([8, 8, 8], 8.0, 2**17 - 3)):
-        cycles = np.cumsum([0.0, *lengths])
-        steady.next_cycles = following
-        state = SimpleNamespace(cycles=cycles, interfaces=(steady,))
-        assert loop.jumps_left(state) == pytest.approx(left, abs=1)
-
-
-def test_contacts_of_unlike_steps_end_together() -> None:
-    """In no more jumps than they take by themselves, one after the other.
-
-    Each takes its steps two by two, and not as many of them as the other.
-    """
-    contacts = [cylinder(stepper=ImplicitStepper(ErrorControl(share))) for share in (0.02, 0.01)]
-    histories = [to_and_fro(load, contacts[0].grid) for load in (50.0, 20.0)]
-    settings = CoupledSettings(2.0 / 3.0 * 0.5**3 / RADIUS / (PER_LOAD * 50.0))
-
-    def jumps(of: slice) -> int:
-        loop = CoupledWear(settings, ConstantLoads(histories[of]), in_turn(contacts[of]))
-        state, _ = loop.begin(histories[of])
-        states = list(islice(loop.march(state), 50))
-        assert states[-1].cycles[-1] == pytest.approx(settings.cycles, rel=1e-12)
-        return len(states)
-
-    assert jumps(slice(0, 2)) <= jumps(slice(0, 1)) + jumps(slice(1, 2))
-
-
-def test_a_jump_has_one_size() -> None:
-    with pytest.raises(InputError, match="more than one size"):
-        JumpSize(cycles=1.0, depth=1e-3)
 
 
 # --- observers ------------------------------------------------------------------------------------

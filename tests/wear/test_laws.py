@@ -16,7 +16,7 @@ from wear.evolution import EnergyTable
 from wear.kinetics import linear_regime
 from wear.laws import ArchardLaw, EnergyAmplitudeLaw, EnergyLaw, EvolvingLaw, SlidingConditions
 from wear.steps.implicit import ImplicitStepper
-from wear.steps.steppers import ErrorControl
+from wear.steps.step_errors import ErrorControl
 
 UM3_PER_J = 1e-12  # [1/MPa]: 1e-9 mm³ per 1e3 N mm
 FRICTION = 0.4

@@ -15,7 +15,8 @@ from wear.contact.nodes import NodalContact, NodalState
 from wear.evolution import EnergyTable
 from wear.laws import ArchardLaw, EnergyAmplitudeLaw, EnergyLaw, EvolvingLaw
 from wear.steps.marching import SubcyclingStepper, advance_cycles, rest, steps
-from wear.steps.steppers import ExplicitStepper, HeunStepper, StabilityError, step_errors
+from wear.steps.step_errors import step_errors
+from wear.steps.steppers import ExplicitStepper, HeunStepper, StabilityError
 
 FRICTION = 0.5
 AREAS = np.array([0.1, 0.2, 0.4])

@@ -16,7 +16,7 @@ from wear.evolution import EnergyTable
 from wear.laws import EnergyLaw, EvolvingLaw
 from wear.steps.marching import advance_cycles
 from wear.steps.stabilised import DAMPING, StabilisedStepper, chebyshev_step, stages_for
-from wear.steps.steppers import ErrorControl, step_errors
+from wear.steps.step_errors import ErrorControl, step_errors
 
 NODES, FRICTION, SLIP, ALPHA = 40, 0.5, 0.02, 4e-8
 AREAS = np.full(NODES, 0.05)

@@ -14,7 +14,8 @@ from wear.contact.drive import Drive
 from wear.laws import EnergyLaw
 from wear.steps.implicit import ImplicitStepper, SecondOrderStepper
 from wear.steps.marching import advance_cycles
-from wear.steps.steppers import ErrorControl, ExplicitStepper, root_mean_square, steps_to_come
+from wear.steps.step_errors import ErrorControl, root_mean_square, steps_to_come
+from wear.steps.steppers import ExplicitStepper
 from wear.steps.stepping import SlidingCycle, WearingContact, WearState
 from wear.worn import Spent, WearStep
 

@@ -18,7 +18,8 @@ from wear.contact.face_loads import CycleLoads
 from wear.contact.interface import InterfaceContact
 from wear.steps.full_cycle import march_cycle
 from wear.steps.implicit import ImplicitStepper, SecondOrderStepper
-from wear.steps.steppers import ErrorControl, ExplicitStepper, root_mean_square
+from wear.steps.step_errors import ErrorControl, root_mean_square
+from wear.steps.steppers import ExplicitStepper
 from wear.steps.stepping import WearState
 
 RADIUS, SOLVED = 6.0, 1e-8

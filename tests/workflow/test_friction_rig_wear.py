@@ -19,7 +19,8 @@ from tests.workflow.time_scenes import refused
 from wear.evolution import EnergyTable
 from wear.laws import ArchardLaw, EnergyAmplitudeLaw, EnergyLaw, EvolvingLaw
 from wear.steps.marching import advance_cycles
-from wear.steps.steppers import ExplicitStepper, HeunStepper, step_errors
+from wear.steps.step_errors import step_errors
+from wear.steps.steppers import ExplicitStepper, HeunStepper
 from workflow.analyses.vibration.model import VibrationModel
 from workflow.analyses.vibration_wear.body import body_model
 from workflow.analyses.vibration_wear.case import FrictionRigWearCase

@@ -10,7 +10,7 @@ import pytest
 from sa_solver.types import Array
 from tests.conftest import CASES
 from wear.coupled import CoupledState, CoupledWear
-from wear.steps.steppers import step_errors
+from wear.steps.step_errors import step_errors
 from workflow.analyses.wear.structures import structure_of
 from workflow.analyses.wear.translation import contact_of, wear_of
 from workflow.chart.axes import axes_of

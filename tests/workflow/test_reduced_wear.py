@@ -13,8 +13,9 @@ from numpy.polynomial import Chebyshev
 from scipy.integrate import solve_ivp
 
 from fe_models.dynamics.periodic.cycle_energy import energy_lost, work_done
-from fe_models.dynamics.periodic.harmonic_balance import HarmonicBalance, PeriodicLoad
+from fe_models.dynamics.periodic.harmonic_balance import HarmonicBalance
 from fe_models.dynamics.periodic.harmonics import Resolution
+from fe_models.dynamics.periodic.load import PeriodicLoad
 from fe_models.dynamics.rig import Link, lumped_rig, unit_force
 from fe_models.joints.reduction import save_reduced
 from fe_models.matrices import on_all, own_matrices
@@ -25,7 +26,8 @@ from wear.joints.jenkins import Jenkins
 from wear.joints.periodic.march import PeriodicMarch
 from wear.laws import EnergyLaw
 from wear.steps.marching import advance_cycles
-from wear.steps.steppers import HeunStepper, step_errors
+from wear.steps.step_errors import step_errors
+from wear.steps.steppers import HeunStepper
 from workflow.analyses.vibration.model import VibrationModel
 from workflow.analyses.vibration_wear.body import body_model
 from workflow.analyses.vibration_wear.case import ReducedWearCase

@@ -9,15 +9,17 @@ import numpy as np
 import pytest
 import pyvista
 
-from fe_models.dynamics.periodic.harmonic_balance import HarmonicBalance, PeriodicLoad
+from fe_models.dynamics.periodic.harmonic_balance import HarmonicBalance
 from fe_models.dynamics.periodic.harmonics import Resolution
+from fe_models.dynamics.periodic.load import PeriodicLoad
 from tests.workflow.conftest import invoke
 from tests.workflow.scenes import RIG_OF_THESIS
 from tests.workflow.shown_files import check_arrays, check_scene, total
 from wear.joints.periodic.march import PeriodicMarch
 from wear.steps.implicit import ImplicitStepper
 from wear.steps.marching import advance_cycles
-from wear.steps.steppers import ErrorControl, first_cycles
+from wear.steps.step_errors import ErrorControl
+from wear.steps.steppers import first_cycles
 from workflow.analyses.rig.building import row_of_masses
 from workflow.analyses.rig.structure import Rig
 from workflow.analyses.vibration.load import Driving

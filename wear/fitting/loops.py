@@ -20,7 +20,7 @@ import numpy as np
 
 from sa_solver.types import Array, Indices
 from wear.fitting.problem import FitError, FitProblem, Series, Unknown
-from wear.joints.bouc_wen import BoucWen
+from wear.joints.bouc_wen_curve import TabulatedBoucWen
 from wear.joints.iwan import FourParameterIwan, UniformIwan
 from wear.joints.jenkins import Jenkins
 from wear.joints.law import march_joints
@@ -88,7 +88,7 @@ LAWS: Mapping[str, LoopLaw] = {
     "jenkins": LoopLaw(Jenkins, {}, {}),
     "uniform_iwan": LoopLaw(UniformIwan, {}, {}),
     "bouc_wen": LoopLaw(
-        BoucWen,
+        TabulatedBoucWen,
         {"sigma": (0.5, 1.0), "exponent": (1.0, 100.0)},
         {"sigma": (0.5,), "exponent": (1.5, 4.0)},
     ),
@@ -389,7 +389,7 @@ def _law(made: LoopFit, given: Mapping[str, float], loads: Array) -> UniaxialLaw
     if np.isnan(parameters["normal_load"]):
         parameters["normal_load"] = loads
     parameters["stiffness"] = max(parameters["stiffness"], np.finfo(float).tiny)
-    if made.law.law is BoucWen:
+    if made.law.law is TabulatedBoucWen:
         most = STIFFER * parameters["stiffness"]
         parameters["residual_stiffness"] = min(parameters["residual_stiffness"], most)
     return made.law.law(**parameters)
@@ -421,7 +421,7 @@ def _starts(made: LoopFit) -> list[Array]:
     first = max(made.data, key=lambda one: one.amplitude)
     load = made.held.get("normal_load", 1.0)
     load = first.normal_load if np.isnan(load) else load
-    parallel = 0.0 if made.law.law is BoucWen else first.residual_stiffness
+    parallel = 0.0 if made.law.law is TabulatedBoucWen else first.residual_stiffness
     begin = {
         "stiffness": max(first.stiffness - parallel, 0.1 * first.stiffness),
         "residual_stiffness": max(first.residual_stiffness, 0.0),

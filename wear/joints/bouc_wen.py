@@ -93,24 +93,39 @@ def _unload(u: float, s: float, exponent: float, gain: float) -> tuple[float, fl
 
 
 @compiled()
+def rule_step(eta: float, step: float, exponent: float, gain: float) -> tuple[float, float]:
+    """From η by one step of the fourth-order rule: η there, and the loss."""
+    rate = xi_rate(eta, exponent, gain)
+    second = xi_rate(eta + 0.5 * step * rate, exponent, gain)
+    third = xi_rate(eta + 0.5 * step * second, exponent, gain)
+    fourth = xi_rate(eta + step * third, exponent, gain)
+    end = eta + step * (rate + 2.0 * second + 2.0 * third + fourth) / 6.0
+    middle = 0.5 * (eta + end) + step * (rate - xi_rate(end, exponent, gain)) / 8.0
+    # Simpson's rule on η, at the middle of Hermite's cubic.
+    lost = step * (eta + 4.0 * middle + end) / 6.0 - 0.5 * (end * end - eta * eta)
+    return end, lost
+
+
+@compiled()
+def longest_step(eta: float, exponent: float, gain: float) -> float:
+    """Step that the rule takes from η where the way does not end before."""
+    step = min(SUBSTEP / exponent, max(GRADING * abs(eta), FIRST_SUBSTEP))
+    if eta < 0.0:
+        # Falls short of ξ = 0, where the rate has a corner, by ever less.
+        step = min(step, -eta / xi_rate(eta, exponent, gain))
+    return step
+
+
+@compiled()
 def _step_finely(eta: float, s: float, exponent: float, gain: float) -> tuple[float, float]:
     """From η over s by the fourth-order rule: η there, and the loss."""
     lost = 0.0
     while s > 0.0 and eta < SATURATED:
-        rate = xi_rate(eta, exponent, gain)
-        step = min(s, SUBSTEP / exponent, max(GRADING * abs(eta), FIRST_SUBSTEP))
-        if eta < 0.0:
-            # Falls short of ξ = 0, where the rate has a corner, by ever less.
-            step = min(step, -eta / rate)
-        second = xi_rate(eta + 0.5 * step * rate, exponent, gain)
-        third = xi_rate(eta + 0.5 * step * second, exponent, gain)
-        fourth = xi_rate(eta + step * third, exponent, gain)
-        end = eta + step * (rate + 2.0 * second + 2.0 * third + fourth) / 6.0
-        middle = 0.5 * (eta + end) + step * (rate - xi_rate(end, exponent, gain)) / 8.0
-        # Simpson's rule on η, at the middle of Hermite's cubic.
-        lost += step * (eta + 4.0 * middle + end) / 6.0 - 0.5 * (end * end - eta * eta)
+        step = min(s, longest_step(eta, exponent, gain))
+        eta, more = rule_step(eta, step, exponent, gain)
+        lost += more
         s -= step
-        eta = 0.0 if -NOUGHT < end < 0.0 else end
+        eta = 0.0 if -NOUGHT < eta < 0.0 else eta
     return eta, lost + max(s, 0.0)
 
 
@@ -126,6 +141,25 @@ def travel(eta: float, s: float, exponent: float, gain: float) -> tuple[float, f
         eta = 0.0
     eta, more = _load(eta, s, exponent) if closed else _step_finely(eta, s, exponent, gain)
     return eta, lost + more
+
+
+@compiled()
+def end_bouc_wen(
+    stiffness: float,
+    residual: float,
+    limit: float,
+    exponent: float,
+    gain: float,
+    displacement: float,
+    sign: float,
+    eta: float,
+    lost: float,
+) -> tuple[float, float, float, float, float]:
+    """Return what :func:`advance_bouc_wen` does for a joint that has moved by ``sign`` to η."""
+    spring = stiffness - residual
+    tangent = residual + spring * xi_rate(eta, exponent, gain)
+    force = limit * sign * eta + residual * displacement
+    return force, tangent, displacement, sign * eta, limit * (limit / spring) * max(lost, 0.0)
 
 
 @compiled()
@@ -147,13 +181,12 @@ def advance_bouc_wen(
             xi = copysign(1.0, increment)
         return residual * displacement, residual, displacement, xi, 0.0
     if increment == 0.0:
-        slope, lost = 1.0 - 0.5 * (1.0 - gain) * abs(xi) ** exponent, 0.0
-    else:
-        sign = copysign(1.0, increment)
-        eta, lost = travel(sign * xi, spring * abs(increment) / limit, exponent, gain)
-        xi, slope = sign * eta, xi_rate(eta, exponent, gain)
-    force, lost = limit * xi + residual * displacement, limit * (limit / spring) * max(lost, 0.0)
-    return force, residual + spring * slope, displacement, xi, lost
+        slope = 1.0 - 0.5 * (1.0 - gain) * abs(xi) ** exponent
+        force = limit * xi + residual * displacement
+        return force, residual + spring * slope, displacement, xi, 0.0
+    sign = copysign(1.0, increment)
+    eta, lost = travel(sign * xi, spring * abs(increment) / limit, exponent, gain)
+    return end_bouc_wen(stiffness, residual, limit, exponent, gain, displacement, sign, eta, lost)
 
 
 @compiled()

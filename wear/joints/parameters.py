@@ -92,13 +92,19 @@ class CompiledLaw(ABC):
 
         Raises :class:`JointError` where shapes differ: the kernel itself checks no bounds.
         """
+        return JointResponse(*self.kernel(self.parameters, state, self.fitting(state, increment)))
+
+    def fitting(self, state: JointState, increment: Array) -> Array:
+        """Return ``increment`` ``(n, d)`` as a kernel takes it.
+
+        Raises :class:`JointError` where the increment or the law does not fit the state.
+        """
         shape, laws = (len(state), self.directions), len(self.parameters)
         if increment.shape != shape:
             raise JointError(f"the increment has shape {increment.shape}: it must be {shape}")
         if laws not in (1, len(state)):
             raise JointError(f"the law is that of {laws} joints, the state of {len(state)}")
-        moved = np.ascontiguousarray(increment, float)
-        return JointResponse(*self.kernel(self.parameters, state, moved))
+        return np.ascontiguousarray(increment, float)
 
 
 @dataclass(frozen=True)

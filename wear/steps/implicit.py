@@ -17,16 +17,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from wear.steps.steppers import (
-    EARLY,
-    ROUNDING,
-    SAFETY,
-    ComparingStepper,
-    ErrorControl,
-    in_pairs,
-    root_mean_square,
-    steps_to_come,
-)
+from wear.steps.step_errors import EARLY, SAFETY, ErrorControl, root_mean_square, steps_to_come
+from wear.steps.steppers import ROUNDING, ComparingStepper, in_pairs
 from wear.steps.stepping import WearingContact, WearState
 from wear.worn import Spent, WearStep
 

@@ -21,7 +21,8 @@ from wear.coupled import CoupledSettings, JumpSize, Stop
 from wear.evolution import CoulombFriction
 from wear.laws import WearLaw
 from wear.steps.implicit import ImplicitStepper, SecondOrderStepper
-from wear.steps.steppers import ErrorControl, ExplicitStepper, Stepper, step_errors
+from wear.steps.step_errors import ErrorControl, step_errors
+from wear.steps.steppers import ExplicitStepper, Stepper
 from wear.steps.stepping import WearingContact, WearState
 from workflow.models.loads import ContactFace
 from workflow.models.loops import TangentialLoops, WornLoop, worn_loop

@@ -97,7 +97,8 @@ def monodromy(
     slopes, matrix = np.empty((count, directions, directions)), np.empty((forces, forces))
     given = np.empty(forces)
     # Displacements at the beginning: those of the structure, less what forces do at once.
-    _memory_forces(joints, memory, force)
+    force[:] = 0.0
+    _add_blocks(1.0, joints.pull, memory, force)
     _add_last(1.0, motion.force[0], force)
     _add_product(1.0, structure.at_joints, state, moved)
     _add_product(-1.0, structure.residual, force, moved)
@@ -106,22 +107,23 @@ def monodromy(
     for joint in range(count):
         _copy(joints.tangent[-1, joint], slopes[joint])
     _solve(_coupled(structure.residual, slopes, matrix), moved)
-    _add_springs(1.0, joints.tangent[-1], moved, force)
+    _add_blocks(1.0, joints.tangent[-1], moved, force)
     if len(course):
         _copy(moved, course[0])
     for step in range(len(joints.kinds)):
         kind = joints.kinds[step]
         springs = structure.springs[kind]
-        _add_springs(-1.0, springs, moved, force)
+        _add_blocks(-1.0, springs, moved, force)
         _beside_springs(motion, step, springs, given)
         _add_last(1.0, given, force)
         new_state[:] = 0.0
         _add_product(1.0, structure.forward[kind], state, new_state)
         _add_product(1.0, structure.by_start[kind], force, new_state)
         new_memory[:] = 0.0
-        _add_kept(joints.kept[step], memory, new_memory)
-        _add_moved(joints.by_start[step], moved, new_memory)
-        _memory_forces(joints, new_memory, force)
+        _add_blocks(1.0, joints.kept[step], memory, new_memory)
+        _add_blocks(1.0, joints.by_start[step], moved, new_memory)
+        force[:] = 0.0
+        _add_blocks(1.0, joints.pull, new_memory, force)
         _beside_springs(motion, step + 1, springs, given)
         _add_last(1.0, given, force)
         moved[:] = 0.0
@@ -130,12 +132,12 @@ def monodromy(
         _add_last(-1.0, motion.moved[step + 1], moved)
         _slopes(joints, step, springs, slopes)
         _solve(_coupled(compliance[kind], slopes, matrix), moved)
-        _add_springs(1.0, slopes, moved, force)
+        _add_blocks(1.0, slopes, moved, force)
         _add_product(1.0, structure.by_end[kind], force, new_state)
-        _add_moved(joints.by_end[step], moved, new_memory)
+        _add_blocks(1.0, joints.by_end[step], moved, new_memory)
         # Whole forces again: those of springs in the structure are the joints'.
         _add_last(-1.0, given, force)
-        _add_springs(1.0, springs, moved, force)
+        _add_blocks(1.0, springs, moved, force)
         if len(course):
             _copy(moved, course[step + 1])
         _forget(new_memory)
@@ -208,48 +210,14 @@ def _forget(memory: Array) -> None:
 
 
 @njit(cache=True, nogil=True)
-def _add_kept(kept: Array, memory: Array, to: Array) -> None:
-    """A s ``(a p, n)``, added."""
-    count, remembered, _ = kept.shape
+def _add_blocks(factor: float, blocks: Array, rows: Array, to: Array) -> None:
+    """Add factor times the joints' ``blocks`` ``(a, p, q)``, on rows ``(a q, n)``: ``(a p, n)``."""
+    count, height, width = blocks.shape
     for joint in range(count):
-        first = joint * remembered
-        for i in range(remembered):
-            for k in range(remembered):
-                _add_row(kept[joint, i, k], memory[first + k], to[first + i])
-
-
-@njit(cache=True, nogil=True)
-def _add_moved(maps: Array, moved: Array, to: Array) -> None:
-    """E u or D u ``(a p, n)``, added."""
-    count, remembered, directions = maps.shape
-    for joint in range(count):
-        for i in range(remembered):
-            for k in range(directions):
-                row = joint * remembered + i
-                _add_row(maps[joint, i, k], moved[joint * directions + k], to[row])
-
-
-@njit(cache=True, nogil=True)
-def _memory_forces(joints: JointSteps, memory: Array, force: Array) -> None:
-    """S s ``(a d, n)``."""
-    count, directions, remembered = joints.pull.shape
-    force[:] = 0.0
-    for joint in range(count):
-        for i in range(directions):
-            for k in range(remembered):
-                row = memory[joint * remembered + k]
-                _add_row(joints.pull[joint, i, k], row, force[joint * directions + i])
-
-
-@njit(cache=True, nogil=True)
-def _add_springs(factor: float, springs: Array, moved: Array, force: Array) -> None:
-    """Forces ``(a d, n)`` of springs ``(a, d, d)``, added."""
-    count, directions, _ = springs.shape
-    for joint in range(count):
-        first = joint * directions
-        for i in range(directions):
-            for k in range(directions):
-                _add_row(factor * springs[joint, i, k], moved[first + k], force[first + i])
+        for i in range(height):
+            for k in range(width):
+                row = rows[joint * width + k]
+                _add_row(factor * blocks[joint, i, k], row, to[joint * height + i])
 
 
 @njit(cache=True, nogil=True)

@@ -14,8 +14,9 @@ from fe_models.dynamics.curves.forced_response import along_force, along_frequen
 from fe_models.dynamics.curves.further_branches import further_branches, vibrating_starts
 from fe_models.dynamics.excitation import CombinedForces, ConstantForce, HarmonicForce
 from fe_models.dynamics.motion import Start
-from fe_models.dynamics.periodic.harmonic_balance import HarmonicBalance, PeriodicLoad
+from fe_models.dynamics.periodic.harmonic_balance import HarmonicBalance
 from fe_models.dynamics.periodic.harmonics import Resolution
+from fe_models.dynamics.periodic.load import PeriodicLoad
 from fe_models.dynamics.rig import Link, lumped_rig, unit_force
 from fe_models.dynamics.stability import floquet
 from fe_models.dynamics.stability.floquet import Floquet

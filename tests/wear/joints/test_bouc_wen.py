@@ -8,8 +8,10 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 from wear.joints.bouc_wen import BoucWen
+from wear.joints.bouc_wen_curve import TabulatedBoucWen, bouc_wen_curve
 from wear.joints.iwan import UniformIwan
 from wear.joints.law import march_joints
+from wear.joints.parameters import JointError
 
 LAW = BoucWen(stiffness=40e3, friction=0.5, normal_load=60.0, residual_stiffness=900.0)
 LIMIT, SPRING = 30.0, 40e3 - 900.0
@@ -60,9 +62,10 @@ def test_unloading_branch_is_straight_until_no_force(exponent):
         assert beyond.state[0, 1] == pytest.approx(-np.tanh(0.7), rel=1e-12)
 
 
+@pytest.mark.parametrize("kind", [BoucWen, TabulatedBoucWen])
 @pytest.mark.parametrize(("sigma", "exponent"), SHAPES)
-def test_any_shape_against_an_independent_integration(sigma, exponent):
-    law = replace(LAW, sigma=sigma, exponent=exponent)
+def test_any_shape_against_an_independent_integration(sigma, exponent, kind):
+    law = kind(40e3, 0.5, 60.0, 900.0, sigma=sigma, exponent=exponent)
     path = np.array([0.6, -0.3, 1.7, 1.2, 1.6, -2.5, 0.4]) * REACH
     history = lead(law, path)
     xi, work, start = 0.0, 0.0, 0.0
@@ -158,3 +161,69 @@ def test_force_follows_new_parameters_at_the_same_xi():
     worn = replace(LAW, friction=0.2)
     response = worn.respond(loaded.state, np.zeros((1, 1)))
     assert response.force[0, 0] == pytest.approx(0.2 * 60.0 * np.tanh(0.8) + 900.0 * 0.8 * REACH)
+
+
+# What the fourth-order rule of both leaves in ξ and the loss, 2e-9 each.
+RULE = 4e-9
+MANY = 500
+
+
+def joints(kind, sigma, exponent):
+    """Many joints of one shape, with all that a kernel has to tell apart among them."""
+    rng = np.random.default_rng(5)
+    stiffness, load = 10.0 ** rng.uniform(3.0, 6.0, MANY), 10.0 ** rng.uniform(0.0, 3.0, MANY)
+    load[:20] = 0.0
+    law = kind(stiffness, 0.5, load, 0.1 * stiffness, sigma=sigma, exponent=exponent)
+    state = np.stack([rng.uniform(-1e-3, 1e-3, MANY), rng.uniform(-1.0, 1.0, MANY)], axis=1)
+    state[20:40, 1], state[40:60, 1], state[60:80, 1] = 0.0, 1.0, -1.0
+    reach = law.limit / (0.9 * stiffness)
+    moved = rng.choice([-1.0, 1.0], MANY) * 10.0 ** rng.uniform(-9.0, 2.0, MANY) * reach
+    moved[:10] = 1e-3
+    moved[15:100:5] = 0.0
+    return law, state, moved[:, None]
+
+
+@pytest.mark.parametrize(("sigma", "exponent"), [*SHAPES, (0.5, 1.01), (1.0, 40.0)])
+def test_pieces_of_the_curve_are_joints_that_are_marched_alone(sigma, exponent):
+    law, state, moved = joints(BoucWen, sigma, exponent)
+    alone = law.respond(state, moved)
+    at_once = joints(TabulatedBoucWen, sigma, exponent)[0].respond(state, moved)
+    limit, spring = law.limit, 0.9 * law.stiffness
+    np.testing.assert_allclose(at_once.state[:, 1], alone.state[:, 1], atol=RULE)
+    assert np.all(
+        np.abs(at_once.force - alone.force)[:, 0] <= RULE * (limit + np.abs(alone.force[:, 0]))
+    )
+    # The rate is 1 - |ξ|^n, with the slope n.
+    off = np.abs(at_once.tangent - alone.tangent)[:, 0, 0]
+    assert np.all(off <= exponent * RULE * spring)
+    # The loss of a way far into sliding is as long as that.
+    lost = (1.0 + spring * np.abs(moved[:, 0]) / np.maximum(limit, 1e-300)) * limit**2 / spring
+    assert np.all(np.abs(at_once.dissipated - alone.dissipated) <= RULE * lost)
+    assert np.all(at_once.dissipated >= 0.0)
+
+
+@pytest.mark.parametrize(("sigma", "exponent"), SHAPES)
+def test_a_piece_of_the_curve_is_its_parts(sigma, exponent):
+    """To rounding, wherever it is divided; of joints marched alone, to the error of the rule."""
+    law = TabulatedBoucWen(40e3, 0.5, 60.0, 900.0, sigma=sigma, exponent=exponent)
+    state = np.stack([np.zeros(MANY), np.linspace(-1.0, 1.0, MANY)], axis=1)
+    whole = law.respond(state, np.full((MANY, 1), 2.0 * REACH))
+    divided = state
+    for share in (0.013, 0.4, 0.587):
+        divided = law.respond(divided, np.full((MANY, 1), share * 2.0 * REACH)).state
+    np.testing.assert_allclose(divided[:, 1], whole.state[:, 1], rtol=0.0, atol=1e-13)
+
+
+def test_a_curve_is_that_of_its_shape_alone():
+    """Many joints of other limits and ways take no more steps than one."""
+    bouc_wen_curve.cache_clear()
+    for kind in range(3):
+        law, state, moved = joints(TabulatedBoucWen, 0.7, 2.5)
+        law.respond(state, (kind + 1) * moved)
+        replace(law, friction=0.1 * (kind + 1)).respond(state, moved)
+    assert bouc_wen_curve.cache_info().misses == 1
+
+
+def test_a_curve_needs_one_shape():
+    with pytest.raises(JointError, match="exponent"):
+        TabulatedBoucWen(40e3, 0.5, 60.0, exponent=np.array([1.5, 2.5]))

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from workflow.analyses.rig.matrix_body import MatrixBody
-from workflow.analyses.vibration.case import VibrationCase, VibrationCaseBase
+from workflow.analyses.vibration.case import VibrationCase
+from workflow.analyses.vibration.case_base import VibrationCaseBase
 from workflow.shell.memory import Memory
 
 # Points of a forced response, of each of which the samples of the joints' forces and the motion are

@@ -9,7 +9,8 @@ from workflow.analyses.rig.point_body import PointBody
 from workflow.analyses.rig.structure import FrictionRig, ReducedBody, RowOfMasses, joints_of
 from workflow.analyses.specimens.case import SpecimensCase
 from workflow.analyses.specimens.run_time import reduction_of
-from workflow.analyses.vibration.case import VibrationCase, VibrationCaseBase
+from workflow.analyses.vibration.case import VibrationCase
+from workflow.analyses.vibration.case_base import VibrationCaseBase
 from workflow.case.loading import load_case
 from workflow.shell.run_time import RunTime
 

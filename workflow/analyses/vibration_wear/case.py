@@ -21,7 +21,8 @@ from workflow.analyses.rig.structure import (
     RowOfMasses,
     structure_outline,
 )
-from workflow.analyses.vibration.case import DrivenMass, VibrationCase, VibrationCaseBase, wears
+from workflow.analyses.vibration.case import VibrationCase
+from workflow.analyses.vibration.case_base import DrivenMass, VibrationCaseBase, wears
 from workflow.analyses.vibration.excitation import Level, VibrationExcitation
 from workflow.analyses.vibration_wear.node_contacts import NodeContacts, PadContacts
 from workflow.analyses.wear.case.sections import Cycles, Laws, TwoBodies

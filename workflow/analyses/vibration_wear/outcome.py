@@ -10,7 +10,7 @@ import numpy as np
 
 from sa_solver.types import Array, Grid
 from wear import worn
-from wear.steps.steppers import step_errors
+from wear.steps.step_errors import step_errors
 from workflow.analyses.vibration.outcome import Response
 from workflow.analyses.vibration_wear.case import VibrationWearCaseBase
 from workflow.shell.dataset import Dataset, Datasets

@@ -14,7 +14,7 @@ from wear.contact.interface import FirstContact, InterfaceState
 from wear.contact.tractions import CycleTractions, increments_change, increments_error
 from wear.coupled import CoupledState
 from wear.kinetics import LinearRegime, linear_regime
-from wear.steps.steppers import step_errors
+from wear.steps.step_errors import step_errors
 from wear.steps.stepping import ContactFailure
 from wear.steps.stick_border import border_errors
 from workflow.analyses.wear.case.base import WearCase

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from wear.steps.steppers import root_mean_square
+from wear.steps.step_errors import root_mean_square
 from workflow.analyses.wear.budget.report import Budget, warning_of
 from workflow.analyses.wear.case.base import WearCase
 from workflow.analyses.wear.case.sections import Duration

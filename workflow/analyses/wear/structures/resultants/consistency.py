@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from sa_solver.contact import GROSS_SHARE
+from sa_solver.tangential.gross_slip import GROSS_SHARE
 from sa_solver.types import Array, LoadHistory, Mask
 from workflow.analyses.wear.case.sections import SHARES_APART
 from workflow.analyses.wear.structures.resultants.imported import COLUMNS

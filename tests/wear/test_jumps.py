@@ -1,0 +1,115 @@
+"""How long the jumps of the coupled loop are, where they stop, and how many are foreseen."""
+
+from itertools import islice
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from sa_solver.errors import InputError
+from tests.wear.formula_loads import (
+    LOAD,
+    PER_LOAD,
+    RADIUS,
+    SCALE,
+    cycle,
+    cylinder,
+    falling,
+    in_turn,
+    patch,
+    run,
+    run_constant,
+    to_and_fro,
+)
+from wear.coupled import AT_STOP, ConstantLoads, CoupledSettings, CoupledWear, JumpSize, Stop
+from wear.steps.implicit import ImplicitStepper
+from wear.steps.step_errors import ErrorControl
+
+
+@pytest.mark.parametrize("jump", [None, 0.37 * SCALE])
+@pytest.mark.parametrize("stop", [Stop(volume=4e-4), Stop(depth=3.1e-4)])
+def test_a_stop_is_met_to_a_thousandth(stop: Stop, jump: float | None) -> None:
+    """Whatever the jumps, and although the loads fall on the way."""
+    contact = patch(stepper=ImplicitStepper(ErrorControl(0.01)))
+    settings = CoupledSettings(10.0 * SCALE, JumpSize(jump), stop, "every")
+    states = run(settings, falling(), [contact])
+    reached = states[-1].volume if stop.volume else states[-1].depth
+    assert reached == pytest.approx(stop.volume or stop.depth, rel=1.001 * AT_STOP)
+    assert settings.ended(states[-1])
+    assert not any(map(settings.ended, states[:-1]))
+    assert states[-1].cycles[-1] < settings.cycles
+
+
+@pytest.mark.parametrize(
+    ("size", "column"), [(JumpSize(volume=1e-4), slice(2, 4)), (JumpSize(depth=6e-5), slice(0, 1))]
+)
+def test_jumps_may_be_as_long_as_they_wear(size: JumpSize, column: slice) -> None:
+    """Volumes of a jump are known from its rates, depths nearly: pressures even out."""
+    settings = CoupledSettings(SCALE, size, resultants="constant")
+    end = run_constant(settings, LOAD, patch())
+    worn = np.diff(end.kinetics[:, 0, column].sum(axis=1))
+    asked = size.volume or size.depth
+    np.testing.assert_allclose(worn[1:-1], asked, rtol=1e-6 if size.volume else 0.15)
+
+
+@pytest.mark.parametrize(
+    ("jump", "tolerance", "left"),
+    [
+        (JumpSize(0.3 * SCALE), None, [4, 3, 2, 1, 0]),
+        (JumpSize(), 0.01, None),
+        (JumpSize(volume=1e-4), None, None),
+    ],
+    ids=["given", "automatic", "by volume"],
+)
+def test_jumps_that_are_left_are_foreseen(
+    jump: JumpSize, tolerance: float | None, left: list[int] | None
+) -> None:
+    """Of given ones all; where they grow, within a factor of two from the third on."""
+    control = None if tolerance is None else ErrorControl(tolerance)
+    settings = CoupledSettings(SCALE, jump, resultants="constant")
+    histories = [cycle(LOAD, patch().grid)]
+    contacts = in_turn([patch(stepper=ImplicitStepper(control))])
+    loop = CoupledWear(settings, ConstantLoads(histories), contacts)
+    state, _ = loop.begin(histories)
+    foreseen = [loop.jumps_left(state)] + [loop.jumps_left(each) for each in loop.march(state)]
+    true = np.arange(len(foreseen))[::-1]
+    assert left is None or foreseen == left
+    assert foreseen[-1] == 0
+    assert np.all(foreseen[2:] <= 2 * true[2:])
+    assert np.all(true[2:] <= 2 * np.array(foreseen[2:]))
+
+
+def test_jumps_that_grow_are_foreseen_as_they_grow() -> None:
+    """Of 1, 2, 4 and 8 cycles sixteen more come to 2^20 - 1; of equal ones as many as are left."""
+    settings = CoupledSettings(2.0**20 - 1.0)
+    loop = CoupledWear(settings, ConstantLoads([]), in_turn([]))
+    steady = SimpleNamespace(half_way=False, depth_rate=0.0, volume_rate=0.0)
+    for lengths, following, left in (([1, 2, 4, 8], 16.0, 16), ([8, 8, 8], 8.0, 2**17 - 3)):
+        cycles = np.cumsum([0.0, *lengths])
+        steady.next_cycles = following
+        state = SimpleNamespace(cycles=cycles, interfaces=(steady,))
+        assert loop.jumps_left(state) == pytest.approx(left, abs=1)
+
+
+def test_contacts_of_unlike_steps_end_together() -> None:
+    """In no more jumps than they take by themselves, one after the other.
+
+    Each takes its steps two by two, and not as many of them as the other.
+    """
+    contacts = [cylinder(stepper=ImplicitStepper(ErrorControl(share))) for share in (0.02, 0.01)]
+    histories = [to_and_fro(load, contacts[0].grid) for load in (50.0, 20.0)]
+    settings = CoupledSettings(2.0 / 3.0 * 0.5**3 / RADIUS / (PER_LOAD * 50.0))
+
+    def jumps(of: slice) -> int:
+        loop = CoupledWear(settings, ConstantLoads(histories[of]), in_turn(contacts[of]))
+        state, _ = loop.begin(histories[of])
+        states = list(islice(loop.march(state), 50))
+        assert states[-1].cycles[-1] == pytest.approx(settings.cycles, rel=1e-12)
+        return len(states)
+
+    assert jumps(slice(0, 2)) <= jumps(slice(0, 1)) + jumps(slice(1, 2))
+
+
+def test_a_jump_has_one_size() -> None:
+    with pytest.raises(InputError, match="more than one size"):
+        JumpSize(cycles=1.0, depth=1e-3)
