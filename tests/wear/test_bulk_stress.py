@@ -5,7 +5,7 @@ import pytest
 
 from sa_solver.half_space.operator import HalfSpace
 from sa_solver.types import Array, ElasticPair, Grid, LoadHistory, Material
-from wear.contact.link import CellNodes
+from wear.contact.transfer import CellNodes
 from wear.cracking.bulk_stress import RIGID, SIDE, BodyFace
 
 METAL = Material(115e3, 0.29)

@@ -29,7 +29,7 @@ from wear.contact.contacts import Contacts
 from wear.contact.drive import Drive
 from wear.contact.face_loads import CycleLoads
 from wear.contact.interface import InterfaceContact, InterfaceSettings, InterfaceState, MotionError
-from wear.contact.link import CellNodes
+from wear.contact.transfer import CellNodes
 from wear.coupled import (
     AT_STOP,
     ConstantLoads,

@@ -9,7 +9,7 @@ from sa_solver.errors import InputError
 from sa_solver.types import Array, ElasticPair, Grid, LoadHistory, Material
 from wear.contact.face_loads import CycleLoads
 from wear.contact.interface import InterfaceContact, InterfaceSettings
-from wear.contact.link import CellNodes
+from wear.contact.transfer import CellNodes
 from wear.coupled import CoupledSettings, JumpSize, Stop
 from wear.cracking.life import findley, ruiz
 from wear.evolution import EnergyTable

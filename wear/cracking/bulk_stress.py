@@ -35,7 +35,8 @@ import numpy as np
 from sa_solver.half_space.operator import HalfSpace
 from sa_solver.half_space.subsurface_influence import XX, XY, YY, YZ, ZX
 from sa_solver.types import Array, ElasticPair, Grid, LoadHistory, Material
-from wear.contact.link import Link, Transfer, fitted_alike, linked
+from wear.contact.link import Link, fitted_alike, linked
+from wear.contact.transfer import Transfer
 
 RIGID = Material(np.inf, 0.0)
 
