@@ -65,10 +65,10 @@ from sa_solver.lazy import lazy_names
 if TYPE_CHECKING:
     from wear.contact.contacts import Contacts
     from wear.contact.face_loads import CycleLoads
-    from wear.contact.interface import InterfaceContact, InterfaceSettings
+    from wear.contact.interface import InterfaceContact
+    from wear.contact.settings import InterfaceSettings
     from wear.contact.transfer import CellNodes
     from wear.coupled import (
-        ConstantLoads,
         CoupledSettings,
         CoupledState,
         CoupledWear,
@@ -80,6 +80,7 @@ if TYPE_CHECKING:
     from wear.evolution import EnergyTable
     from wear.kinetics import linear_regime
     from wear.laws import ArchardLaw, EnergyAmplitudeLaw, EnergyLaw, EvolvingLaw, WearLaw
+    from wear.load_sources import ConstantLoads
     from wear.steps.implicit import ImplicitStepper, SecondOrderStepper
     from wear.steps.steppers import ErrorControl, ExplicitStepper, HeunStepper
     from wear.steps.stepping import ContactFailure
@@ -120,14 +121,16 @@ __getattr__, __dir__ = lazy_names(
     {
         "contact.contacts": ("Contacts",),
         "coupled": (
-            *("ConstantLoads", "CoupledSettings", "CoupledState"),
-            *("CoupledWear", "JumpSize", "Observer", "Stop"),
+            *("CoupledSettings", "CoupledState", "CoupledWear"),
+            *("JumpSize", "Observer", "Stop"),
         ),
         "evolution": ("EnergyTable",),
         "contact.face_loads": ("CycleLoads",),
         "steps.implicit": ("ImplicitStepper", "SecondOrderStepper"),
-        "contact.interface": ("InterfaceContact", "InterfaceSettings"),
+        "contact.interface": ("InterfaceContact",),
+        "contact.settings": ("InterfaceSettings",),
         "kinetics": ("linear_regime",),
+        "load_sources": ("ConstantLoads",),
         "laws": ("ArchardLaw", "EnergyAmplitudeLaw", "EnergyLaw", "EvolvingLaw", "WearLaw"),
         "cracking.life": ("findley", "ruiz", "smith_watson_topper"),
         "contact.transfer": ("CellNodes",),

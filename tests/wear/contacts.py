@@ -8,7 +8,8 @@ import numpy as np
 
 from sa_solver.types import Array, ElasticPair, Grid, Material
 from wear.contact.drive import Drive
-from wear.contact.interface import InterfaceContact, InterfaceSettings
+from wear.contact.interface import InterfaceContact
+from wear.contact.settings import InterfaceSettings
 from wear.contact.transfer import CellNodes
 from wear.laws import EnergyLaw
 from wear.steps.implicit import ImplicitStepper

@@ -28,11 +28,11 @@ from tests.oracles.worn_shapes import worn_cylinder
 from wear.contact.contacts import Contacts
 from wear.contact.drive import Drive
 from wear.contact.face_loads import CycleLoads
-from wear.contact.interface import InterfaceContact, InterfaceSettings, InterfaceState, MotionError
+from wear.contact.interface import InterfaceContact, InterfaceState, MotionError
+from wear.contact.settings import InterfaceSettings
 from wear.contact.transfer import CellNodes
 from wear.coupled import (
     AT_STOP,
-    ConstantLoads,
     CoupledSettings,
     CoupledState,
     CoupledWear,
@@ -42,6 +42,7 @@ from wear.coupled import (
 )
 from wear.evolution import EnergyTable
 from wear.laws import EnergyLaw, EvolvingLaw
+from wear.load_sources import ConstantLoads
 from wear.steps.full_cycle import CycleStart
 from wear.steps.implicit import ImplicitStepper
 from wear.steps.steppers import ErrorControl

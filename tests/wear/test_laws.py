@@ -8,7 +8,8 @@ import pytest
 from sa_solver.errors import InputError
 from sa_solver.types import Array, ElasticPair, Grid, LoadHistory, Material
 from wear.contact.face_loads import CycleLoads
-from wear.contact.interface import InterfaceContact, InterfaceSettings
+from wear.contact.interface import InterfaceContact
+from wear.contact.settings import InterfaceSettings
 from wear.contact.transfer import CellNodes
 from wear.coupled import CoupledSettings, JumpSize, Stop
 from wear.cracking.life import findley, ruiz

@@ -13,8 +13,9 @@ from sa_solver.types import Array, ElasticPair, Frame, Grid, LoadHistory, Materi
 from tests.oracles.elastic_layer import layer_compliance, press
 from wear.contact.drive import Drive
 from wear.contact.face_loads import CycleLoads
-from wear.contact.interface import FirstContact, InterfaceContact, InterfaceSettings
+from wear.contact.interface import FirstContact, InterfaceContact
 from wear.contact.link import linked
+from wear.contact.settings import InterfaceSettings
 from wear.laws import EnergyLaw
 from wear.steps.implicit import ImplicitStepper
 

@@ -58,5 +58,5 @@ def test_a_changed_function_is_compiled_into_those_that_call_it(tmp_path):
 
 
 def test_kernels_of_joints_are_kept_by_the_version_of_their_package():
-    assert compiled.KEPT.name.endswith(compiled.version_of(Path(compiled.__file__).parent))
-    assert advance_jenkins.stats.cache_path.startswith(str(compiled.KEPT))
+    assert compiled.CACHE_FOLDER.name.endswith(compiled.version_of(Path(compiled.__file__).parent))
+    assert advance_jenkins.stats.cache_path.startswith(str(compiled.CACHE_FOLDER))

@@ -12,8 +12,9 @@ from fe_models.meshes.transfer import FaceTransfer
 from sa_solver.half_space.operator import HalfSpace
 from sa_solver.normal.contact import NormalContact
 from sa_solver.types import Array, ElasticPair, Grid, LoadHistory
-from wear.contact.interface import InterfaceContact, InterfaceSettings, InterfaceState
+from wear.contact.interface import InterfaceContact, InterfaceState
 from wear.contact.link import Link
+from wear.contact.settings import InterfaceSettings
 from wear.contact.tractions import CycleTractions
 from wear.steps.implicit import ImplicitStepper, SecondOrderStepper
 from wear.steps.steppers import ErrorControl, ExplicitStepper, Stepper, step_errors
