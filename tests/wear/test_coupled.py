@@ -1,12 +1,12 @@
-"""The coupled loop, driven by sources of loads that are formulas.
+"""The coupled loop, with sources of loads that are formulas.
 
-**A cylinder** that slides as a whole under a constant load: its worn shape is known
+**A cylinder** that slides as a whole under a constant load has a known worn shape
 (``tests/wear/test_closed_forms.py``).
 
-**A flat patch** of area A, pressed by a load that falls linearly with the mean depth worn off it,
-P = P0 (1 - h/h0) with h = V/A. It slides as a whole, so that the volume per cycle is c P, whatever
-the pressure is like: V' = c P0 (1 - V/(A h0)), V = A h0 (1 - exp(-N/N0)), N0 = A h0/(c P0). Loads
-that stay the same during a jump are Euler's method on that.
+**A flat patch** of area A is pressed by a load that falls linearly with its mean worn depth, P = P0
+(1 - h/h0) with h = V/A. It slides as a whole, so that the volume per cycle is c P whatever the
+pressure distribution: V' = c P0 (1 - V/(A h0)), V = A h0 (1 - exp(-N/N0)), N0 = A h0/(c P0). Loads
+that stay constant during a jump are Euler's method for this equation.
 """
 
 import subprocess
@@ -58,13 +58,13 @@ RADIUS = 10.0
 
 
 def cylinder(**settings) -> InterfaceSettings:
-    """A line contact on 70 strips."""
+    """Return a line contact with 70 cells."""
     grid = Grid.strips(1.4, 70)
     return interface(grid, grid.x**2 / (2.0 * RADIUS), **settings)
 
 
 def patch(**settings) -> InterfaceSettings:
-    """A flat of 1 mm on a step that never touches."""
+    """Return a flat of 1 mm on a step that never touches."""
     grid = Grid.strips(1.2, 24)
     return interface(grid, np.where(np.abs(grid.x) < 0.5, 0.0, 1.0), **settings)
 
@@ -91,7 +91,7 @@ AREA = 1.0  # of the patch, per length
 
 
 class Falling:
-    """Loads of some patches that fall as they wear, each P0 (1 - h/h0), h its mean depth."""
+    """Loads of patches that fall with their mean worn depth h as P0 (1 - h/h0)."""
 
     def __init__(self, loads: tuple[float, ...], depth: float, grid: Grid) -> None:
         self._loads, self._depth, self._grid = loads, depth, grid
@@ -116,7 +116,7 @@ class Falling:
 
 
 def cycle(load: float, grid: Grid) -> CycleLoads:
-    """There and back as a whole, under a load."""
+    """Return a cycle of sliding forward and backward as a whole, under a load."""
     zero = np.zeros(2)
     slip = 0.5 * SLIP * np.array([1.0, -1.0])[:, None, None] * [[[1.0], [0.0]]]
     loads = LoadHistory(zero + load, *(zero,) * 7, sliding=np.ones(2, dtype=bool))
@@ -124,14 +124,14 @@ def cycle(load: float, grid: Grid) -> CycleLoads:
     return CycleLoads(loads, np.broadcast_to(slip, (2, 2, cells)).copy())
 
 
-def to_and_fro(load: float, grid: Grid) -> CycleLoads:
-    """There under a load, and back under less."""
+def forward_and_backward(load: float, grid: Grid) -> CycleLoads:
+    """Return a cycle of sliding forward under a load and backward under a smaller one."""
     there = cycle(load, grid)
     return replace(there, loads=replace(there.loads, P=load * np.array([1.0, 0.4])))
 
 
 def run(settings: CoupledSettings, source: Falling, contacts, *observers) -> list[CoupledState]:
-    """All states of a run, the unworn one first."""
+    """Return all states of a run, the unworn one first."""
     loop = CoupledWear(settings, source, in_turn(contacts), observers)
     state, _ = loop.begin(source.unworn())
     return [state, *loop.march(state)]
@@ -140,7 +140,7 @@ def run(settings: CoupledSettings, source: Falling, contacts, *observers) -> lis
 def run_constant(
     settings: CoupledSettings, load: float, contact: InterfaceSettings
 ) -> CoupledState:
-    """The end of a run of one contact under a constant load."""
+    """Return the end of a run of one contact under a constant load."""
     histories = [cycle(load, contact.grid)]
     loop = CoupledWear(settings, ConstantLoads(histories), in_turn([contact]))
     state, _ = loop.begin(histories)
@@ -156,7 +156,7 @@ def in_turn(contacts: list[InterfaceSettings]) -> Contacts:
 
 
 def test_a_cylinder_wears_to_its_closed_form() -> None:
-    """Under a constant load, in automatic steps of 1 %; α times energy is exact."""
+    """A cylinder in automatic steps meets the closed form to 1 %, and its volume exactly."""
     load, volume = 50.0, 2.0 / 3.0 * 0.5**3 / RADIUS
     contact = cylinder(stepper=ImplicitStepper(ErrorControl(0.01)))
     settings = CoupledSettings(volume / (PER_LOAD * load))
@@ -173,7 +173,7 @@ def test_a_cylinder_wears_to_its_closed_form() -> None:
 
 
 def test_volume_is_coefficient_times_energy() -> None:
-    """Of both bodies, after every jump; energy is µ P s of all cycles so far."""
+    """The volume of both bodies follows from the energy µ P s of all cycles after every jump."""
     load = 50.0
     end = run_constant(CoupledSettings(1e6, JumpSize(2.5e5)), load, cylinder())
     _, _, volume_1, volume_2, energy = end.kinetics[:, 0].T
@@ -194,7 +194,7 @@ def falling(*loads: float) -> Falling:
 
 
 def exact_volume(cycles: float) -> float:
-    """Of the patch, by an integrator of its own."""
+    """Return the volume of the patch by an independent integrator."""
 
     def rate(_: float, volume: Array) -> Array:
         return PER_LOAD * LOAD * (1.0 - volume / (AREA * FALL))
@@ -204,7 +204,7 @@ def exact_volume(cycles: float) -> float:
 
 
 def test_loads_that_fall_with_wear_follow_their_differential_equation() -> None:
-    """Solved again after every jump: Euler's method, exactly, and of first order."""
+    """Loads solved after every jump are exactly Euler's method, and converge in first order."""
     errors = []
     for jumps in (5, 10, 20):
         jump = SCALE / jumps
@@ -222,7 +222,7 @@ def test_loads_that_fall_with_wear_follow_their_differential_equation() -> None:
 
 @pytest.mark.parametrize("drift", [0.02, 0.1, 0.3])
 def test_drift_asks_for_as_many_solutions_as_it_should(drift: float) -> None:
-    """The loads that a run should have had, by the rule alone."""
+    """The number of solutions is that of the drift rule applied to the known loads."""
     jumps, source = 25, falling()
     jump = 2.0 * SCALE / jumps
     settings = CoupledSettings(2.0 * SCALE, JumpSize(jump), drift=drift)
@@ -251,13 +251,13 @@ def test_constant_resultants_are_never_asked_for_again() -> None:
     assert end.volume == pytest.approx(PER_LOAD * LOAD * SCALE, rel=1e-8)
 
 
-def test_a_source_is_told_of_friction_that_changes() -> None:
-    """One coefficient per contact, after what each has dissipated."""
-    told = []
+def test_a_source_receives_changing_friction() -> None:
+    """The source receives one coefficient per contact, by the energy that each has dissipated."""
+    reported = []
 
     class Listening(Falling):
         def worn(self, depths, friction=None):
-            told.append(friction)
+            reported.append(friction)
             return super().worn(depths, friction)
 
     def friction(energy: float) -> float:
@@ -270,7 +270,7 @@ def test_a_source_is_told_of_friction_that_changes() -> None:
     )
     states = run(settings, source, contacts)
     energies = states[-1].kinetics[1:, :, 4]
-    np.testing.assert_allclose(told, FRICTION * (1.0 + energies))
+    np.testing.assert_allclose(reported, FRICTION * (1.0 + energies))
 
 
 # --- stops and sizes of jumps ---------------------------------------------------------------------
@@ -279,7 +279,7 @@ def test_a_source_is_told_of_friction_that_changes() -> None:
 @pytest.mark.parametrize("jump", [None, 0.37 * SCALE])
 @pytest.mark.parametrize("stop", [Stop(volume=4e-4), Stop(depth=3.1e-4)])
 def test_a_stop_is_met_to_a_thousandth(stop: Stop, jump: float | None) -> None:
-    """Whatever the jumps, and although the loads fall on the way."""
+    """The stop is met whatever the jumps, and although the loads fall on the way."""
     contact = patch(stepper=ImplicitStepper(ErrorControl(0.01)))
     settings = CoupledSettings(10.0 * SCALE, JumpSize(jump), stop, "every")
     states = run(settings, falling(), [contact])
@@ -294,7 +294,7 @@ def test_a_stop_is_met_to_a_thousandth(stop: Stop, jump: float | None) -> None:
     ("size", "column"), [(JumpSize(volume=1e-4), slice(2, 4)), (JumpSize(depth=6e-5), slice(0, 1))]
 )
 def test_jumps_may_be_as_long_as_they_wear(size: JumpSize, column: slice) -> None:
-    """Volumes of a jump are known from its rates, depths nearly: pressures even out."""
+    """The volume of a jump follows exactly from its rate, the depth nearly: pressures even out."""
     settings = CoupledSettings(SCALE, size, resultants="constant")
     end = run_constant(settings, LOAD, patch())
     worn = np.diff(end.kinetics[:, 0, column].sum(axis=1))
@@ -314,7 +314,10 @@ def test_jumps_may_be_as_long_as_they_wear(size: JumpSize, column: slice) -> Non
 def test_jumps_that_are_left_are_foreseen(
     jump: JumpSize, tolerance: float | None, left: list[int] | None
 ) -> None:
-    """Of given ones all; where they grow, within a factor of two from the third on."""
+    """The estimate is exact for given jumps, and within a factor of two for growing ones.
+
+    The latter holds from the third jump on.
+    """
     control = None if tolerance is None else ErrorControl(tolerance)
     settings = CoupledSettings(SCALE, jump, resultants="constant")
     histories = [cycle(LOAD, patch().grid)]
@@ -330,7 +333,7 @@ def test_jumps_that_are_left_are_foreseen(
 
 
 def test_jumps_that_grow_are_foreseen_as_they_grow() -> None:
-    """Of 1, 2, 4 and 8 cycles sixteen more come to 2^20 - 1; of equal ones as many as are left."""
+    """After jumps of 1, 2, 4 and 8 cycles sixteen more reach 2^20 - 1; equal ones are counted."""
     settings = CoupledSettings(2.0**20 - 1.0)
     loop = CoupledWear(settings, ConstantLoads([]), in_turn([]))
     steady = SimpleNamespace(half_way=False, depth_rate=0.0, volume_rate=0.0)
@@ -341,13 +344,13 @@ def test_jumps_that_grow_are_foreseen_as_they_grow() -> None:
         assert loop.jumps_left(state) == pytest.approx(left, abs=1)
 
 
-def test_contacts_of_unlike_steps_end_together() -> None:
-    """In no more jumps than they take by themselves, one after the other.
+def test_contacts_with_different_steps_end_together() -> None:
+    """Contacts with different steps need no more jumps together than one after the other.
 
-    Each takes its steps two by two, and not as many of them as the other.
+    Each takes its steps in pairs, and their numbers differ.
     """
     contacts = [cylinder(stepper=ImplicitStepper(ErrorControl(share))) for share in (0.02, 0.01)]
-    histories = [to_and_fro(load, contacts[0].grid) for load in (50.0, 20.0)]
+    histories = [forward_and_backward(load, contacts[0].grid) for load in (50.0, 20.0)]
     settings = CoupledSettings(2.0 / 3.0 * 0.5**3 / RADIUS / (PER_LOAD * 50.0))
 
     def jumps(of: slice) -> int:
@@ -369,7 +372,7 @@ def test_a_jump_has_one_size() -> None:
 
 
 class Diary(Observer):
-    """Writes down all that happens."""
+    """Observer that records all events."""
 
     def __init__(self) -> None:
         self.events: list[tuple] = []
@@ -412,7 +415,7 @@ def test_observers_see_every_state_once_and_in_order() -> None:
 
 
 def test_an_observer_may_be_anything() -> None:
-    """It has methods for all that happens, which do nothing."""
+    """The base class has methods for all events, which do nothing."""
     run(CoupledSettings(SCALE), falling(), [patch()], Observer())
 
 
@@ -420,7 +423,7 @@ def test_an_observer_may_be_anything() -> None:
 
 
 def numbers(state: InterfaceState) -> dict[str, object]:
-    """All that a state is, by name."""
+    """Return all numbers of a state by name."""
     parts: dict[str, object] = {}
     for name, value in vars(state).items():
         if name in ("surfaces", "loads", "link") or isinstance(value, CycleStart):
@@ -436,7 +439,7 @@ def numbers(state: InterfaceState) -> dict[str, object]:
 
 
 def same(one: InterfaceState, other: InterfaceState) -> None:
-    """Bit for bit."""
+    """Return whether two states are identical bit for bit."""
     mine, its = numbers(one), numbers(other)
     assert mine.keys() == its.keys()
     for name, value in mine.items():
@@ -444,8 +447,8 @@ def same(one: InterfaceState, other: InterfaceState) -> None:
 
 
 @pytest.mark.parametrize("method", ["normal", slow("full")])
-def test_going_on_from_any_state_ends_bit_for_bit_alike(method: str) -> None:
-    """Two contacts under loads that drift, with contacts and source made anew."""
+def test_resuming_from_any_state_ends_bit_for_bit_the_same(method: str) -> None:
+    """Two contacts under drifting loads resume bit for bit, with new contacts and a new source."""
     loads, control = (LOAD, 0.6 * LOAD), ErrorControl(0.02)
     motions = np.zeros((2, 6))
     motions[:, 1] = [-0.25 * SLIP, 0.25 * SLIP]
@@ -498,7 +501,7 @@ def test_a_law_that_changes_from_place_to_place_does_not_move() -> None:
 
 @pytest.mark.slow
 def test_it_needs_neither_cases_nor_finite_elements() -> None:
-    """All of this file, imported and a run of it made, in a process of its own."""
+    """Running this file in a process of its own imports neither of them."""
     code = f"""
 import runpy, sys
 scene = runpy.run_path({str(Path(__file__))!r})

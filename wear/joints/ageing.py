@@ -26,11 +26,11 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.polynomial import Chebyshev, chebyshev
-from scipy.optimize import brentq
 
 from sa_solver.errors import ConvergenceError, InputError
 from sa_solver.types import Array
 from wear.joints.evolution import JointEvolution
+from wear.joints.jumps import Jump
 from wear.joints.parameters import UniaxialLaw
 
 DEGREE = 16
@@ -51,7 +51,7 @@ takes one per cycle.
 """
 
 OVERSHOOT = 1.5
-"""Largest energy of a panel over the energy that is left, which the present cycle may determine."""
+"""Largest energy of a panel, over the energy or the energy of the cycles that are left."""
 
 MOST_EVALUATIONS = 2_000_000
 """Limit of evaluated energies of a cycle: a function that is not smooth can only be counted."""
@@ -62,11 +62,8 @@ SMALLEST_TOLERANCE = 1e-12
 ROUNDING = 1e-12
 """Relative accuracy with which the energy at the end of a test is that computed there."""
 
-SMALLEST = 1e-300
-"""Absolute tolerance of an energy: it is solved to its last digit, however small it is."""
-
 EnergyPerCycle = Callable[[float], float]
-"""Function that returns the energy of a cycle [N mm] from the energy dissipated before it [N mm]."""
+"""Function from the energy dissipated so far to the energy of a cycle [N mm]."""
 
 
 class AgeingError(ConvergenceError):
@@ -75,54 +72,6 @@ class AgeingError(ConvergenceError):
 
 class NeverReachedError(AgeingError):
     """The joint stops dissipating before it reaches the energy asked for."""
-
-
-@dataclass(frozen=True)
-class Jump:
-    """A panel of a long test, or a single counted cycle.
-
-    Parameters
-    ----------
-    start, end
-        Energies at its ends [N mm].
-    cycles
-        Cycles before it.
-    count
-        Cycles since its start as a polynomial of the energy; None for a single counted cycle.
-    error
-        Largest error of the cycles anywhere in it.
-    """
-
-    start: float
-    end: float
-    cycles: float
-    count: Chebyshev | None
-    error: float
-
-    @property
-    def length(self) -> float:
-        """Number of its cycles."""
-        return self.since(self.end)
-
-    def since(self, energy: float) -> float:
-        """Return the cycles from its start to an ``energy`` in it [N mm]."""
-        if self.count is None:
-            return (energy - self.start) / (self.end - self.start)
-        return float(self.count(energy))
-
-    def energy_at(self, cycles: float) -> float:
-        """Return the energy [N mm] after ``cycles`` of the test, which lie in this jump."""
-        since = cycles - self.cycles
-        if since <= 0.0:
-            return self.start
-        if since >= self.length:
-            return self.end
-        if self.count is None:
-            return self.start + since * (self.end - self.start)
-        root = brentq(
-            lambda energy: self.since(energy) - since, self.start, self.end, xtol=SMALLEST
-        )
-        return float(root)
 
 
 @dataclass(frozen=True)

@@ -124,8 +124,8 @@ def _neighbours(zone: Mask) -> Mask:
     """Return the cells next to a ``zone`` along either axis."""
     from scipy import ndimage
 
-    beside: Mask = ndimage.binary_dilation(zone) & ~zone
-    return beside
+    neighbours: Mask = ndimage.binary_dilation(zone) & ~zone
+    return neighbours
 
 
 def _excess_width(reserve: Array, before: Mask, stuck: Mask, wears: Mask) -> tuple[float, float]:

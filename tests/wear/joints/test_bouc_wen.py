@@ -1,4 +1,4 @@
-"""Bouc and Wen's joint against closed forms and an independent integration, and what it forgets."""
+"""Bouc-Wen joint against closed forms and an independent integration, and limits of its memory."""
 
 from dataclasses import replace
 
@@ -96,7 +96,7 @@ def test_any_shape_against_an_independent_integration(sigma, exponent):
 
 @pytest.mark.parametrize("share", [0.01, 0.3, 1.0, 3.0, 40.0])
 def test_energy_of_the_settled_loop(share):
-    """ξ + artanh ξ = 2 K A/µN at its ends, energy -(µN)²/K (ξ² + ln(1 - ξ²))."""
+    """At its ends ξ + artanh ξ = 2 K A/µN, and the energy is -(µN)²/K (ξ² + ln(1 - ξ²))."""
     # With y = artanh ξ, 1 - ξ² = 1/cosh² y keeps its digits in full sliding.
     y = brentq(lambda y: y + np.tanh(y) - 2.0 * share, 0.0, 2.0 * share, xtol=1e-15, rtol=1e-14)
     log = -2.0 * (y + np.log1p(np.exp(-2.0 * y)) - np.log(2.0))
@@ -119,7 +119,10 @@ def test_loop_energy_is_that_of_a_marched_loop(sigma, exponent):
 
 @pytest.mark.parametrize(("energy", "lost"), [(1000.0, 1.30), (2800.0, 1.34)])
 def test_worn_loop_of_the_friction_rig(energy, lost):
-    """Fantetti 2019, test 1 at ± 7 µm: energy per cycle [mJ], to two digits, after ``energy`` J."""
+    """Fantetti 2019, test 1 at ± 7 µm, gives the energy per cycle [mJ] after ``energy`` J.
+
+    The paper prints two digits.
+    """
     worn = BoucWen(
         stiffness=27.3e3 * (1.0 + 1.32 * np.exp(-150.0 / energy)),
         friction=0.11 * (1.0 + 0.26 * np.log(1.3e9 * energy + 1.0)),
@@ -130,10 +133,10 @@ def test_worn_loop_of_the_friction_rig(energy, lost):
 
 
 def test_small_loops_under_a_force_do_not_close():
-    """The limit of the law: each ripple of s lets ξ fall by s ξ², so 1/ξ grows by s.
+    """Each ripple of s lowers ξ by s ξ², so that 1/ξ grows by s: this is a limit of the law.
 
-    Of a small ripple back and forth, -s and then ∫(1 - ξ²) ds, the loss ∫ ξ² ds is left. An Iwan
-    joint comes back to where it was.
+    A small ripple back and forth is -s and then ∫(1 - ξ²) ds, so that ∫ ξ² ds is lost. An Iwan
+    joint returns to where it was.
     """
     drifts = []
     for s in (0.02, 0.01):

@@ -1,4 +1,4 @@
-"""Compiled functions that are kept notice what they call."""
+"""Cached compiled functions that depend on functions in other files."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ ASKED = "from kernels.doubled import doubled; print(doubled())"
 
 @pytest.mark.slow
 def test_a_changed_function_is_compiled_into_those_that_call_it(tmp_path):
-    """The file of the caller stays as it is, and numba alone would take what it kept."""
+    """The file of the caller does not change, and numba alone would use its cache."""
     package = tmp_path / "kernels"
     package.mkdir()
     (package / "__init__.py").touch()

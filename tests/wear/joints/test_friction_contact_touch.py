@@ -82,7 +82,7 @@ def test_the_force_is_continuous_where_contact_is_lost_and_found():
 @pytest.mark.parametrize("pull", [0.0, 1e-15, 1e-9, 1e-3, 1.0, 1e4])
 @pytest.mark.parametrize("held", [0.0, 1e-6, 1.0])
 def test_a_limit_that_all_but_vanishes(left, pull, held):
-    """The begin of slip and the end of the path are then one rounding error apart."""
+    """The beginning of slip and the end of the path are then one rounding error apart."""
     state = [0.6 * held * REACH, 0.8 * held * REACH, 0.0]
     for way in ([1.0, 0.0], [-0.6, -0.8]):
         increment = np.array([*(pull * REACH * np.array(way)), -LIFT * (1.0 - left)])

@@ -1,4 +1,4 @@
-"""Iwan's joints against closed forms, Jenkins's sliders and Masing's memory."""
+"""Iwan joints against closed forms, Jenkins sliders and Masing's memory."""
 
 from dataclasses import dataclass, replace
 
@@ -23,7 +23,7 @@ RNG_SEED = 7
 
 @dataclass(frozen=True)
 class MasingJenkins(MasingLaw):
-    """Jenkins's element as a joint without spread sliders."""
+    """Jenkins element as a joint without distributed sliders."""
 
     @property
     def spread(self):
@@ -113,7 +113,7 @@ def test_jenkins_as_a_masing_law():
 
 
 def sliders(law, number):
-    """Jenkins's elements of equal stiffness whose limits are spread as the law's."""
+    """Return Jenkins elements of equal stiffness whose limits are distributed as the law's."""
     middles = (np.arange(number) + 0.5) / number
     if isinstance(law, UniformIwan):
         return np.full(number, STIFFNESS / number), middles * REACH

@@ -1,4 +1,4 @@
-"""Sliders in parallel as one joint: the sum of the sliders, and what each dissipates."""
+"""Parallel sliders as one joint: the sum of the sliders, and the energy of each."""
 
 import numpy as np
 import pytest
@@ -70,5 +70,5 @@ def test_it_slips_where_less_than_half_of_the_stiffness_is_left():
 
 
 def test_more_joints_than_one_are_refused():
-    with pytest.raises(JointError, match="2 joints for the sliders of one"):
+    with pytest.raises(JointError, match="2 joints, the sliders of one"):
         ParallelSliders(SLIDERS).settle(np.repeat(MOTION, 2, axis=0), BASIS, WEIGHTS)
