@@ -10,8 +10,8 @@ its place to half an increment after it (:mod:`sa_solver.cycles.increments`). On
 the grid sees the mean c of body 1's field f along the path, and wear p on the grid is distributed
 over body 1 by the adjoint. The weights are those of overlapping cells, averaged over the path:
 w_k = ∫₀¹ Λ(s_x/dx - k_x) Λ(s_y/dy - k_y) dt with the hat function Λ(u) = max(0, 1 - |u|). They are
-not negative and their sum is 1, so that constants are preserved, no value rises where all wear
-away, and depositing preserves volume. Between the points where the path passes into the next cell
+not negative and their sum is 1, so that constants are preserved, nothing that only wears ever
+rises, and depositing preserves volume. Between the points where the path passes into the next cell
 the integrand is a quadratic of t, which two Gauss points integrate exactly.
 
 The alternative, to let each state act with decreasing weight as far as its neighbouring states,

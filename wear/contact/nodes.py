@@ -21,10 +21,10 @@ from wear.worn import Spent, WearStep, WornState
 class NodalCycle(Protocol):
     """Protocol of a closed cycle at the ``n`` nodes of a contact.
 
-    ``slip`` ``(t, n)`` is the size of the slip in each increment [mm], and ``pressure`` ``(t, n)``
-    the pressure [MPa]. Increments may be replaced by periods of constant pressure that follow each
-    other. ``friction`` is Coulomb's coefficient, ``areas`` ``(n,)`` are those of the nodes [mm²],
-    and ``start`` is a starting point for the solver on surfaces that differ little.
+    Its ``t`` parts are increments, or longer periods of constant pressure. ``slip`` ``(t, n)`` is
+    the size of the slip in each part [mm] and ``pressure`` ``(t, n)`` the pressure [MPa].
+    ``friction`` is Coulomb's coefficient, ``areas`` ``(n,)`` are those of the nodes [mm²], and
+    ``start`` is a starting point for the solver on surfaces that differ little.
     """
 
     @property

@@ -43,7 +43,7 @@ class Transfer(Protocol):
 
     @property
     def places(self) -> Array:
-        """Position of each cell on the face, or beyond its border ``(2, nx, ny)`` [mm]."""
+        """Position of each cell on the face, or of the nearest point of it ``(2, nx, ny)`` [mm]."""
         ...
 
     def spread(self, forces: Array) -> Array:

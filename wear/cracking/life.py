@@ -69,12 +69,12 @@ class Ruiz:
 
     @property
     def friction_parameter(self) -> Array:
-        """F1 = τ δ [N/mm]: a quarter of the work, a cycle sliding four amplitudes δ."""
+        """Friction parameter F1 = τ δ [N/mm]; the work of a cycle is 4 τ δ."""
         return 0.25 * self.work
 
     @property
     def cracking_parameter(self) -> Array:
-        """F2 = κ = σ_T τ δ [N²/mm³]."""
+        """Cracking parameter F2 = κ = σ_T τ δ [N²/mm³]."""
         return self.tension * self.friction_parameter
 
 

@@ -249,7 +249,7 @@ class JointEvolution:
         evolving parameter.
         """
         values = self.values(law, energy)
-        # A law of plain numbers keeps plain numbers.
+        # Parameters that are plain numbers remain plain numbers.
         return replace(law, **{k: v if v.ndim else float(v) for k, v in values.items()})
 
     def values(self, law: object, energy: Array | float) -> dict[str, Array]:

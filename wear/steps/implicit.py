@@ -1,14 +1,14 @@
 """Wear steps that solve a half-space contact within the step: implicit Euler and second order.
 
 Increments that wear one after the other cause most of the error of a step: each finds the surfaces
-worn by those before it, and the last one determines the final shape. Implicit steps therefore go
-over the increments backward for half their length and forward for the other half (Strang splitting,
-1968, doi:10.1137/0705041). This leaves an error of second order from the interaction of increments,
-and one of first order from implicit Euler in each single increment, which is the smaller the more
-increments there are.
+worn by those before it, and the last one determines the final shape. An implicit step therefore
+takes the increments in reverse order over half its length, and in forward order over the other half
+(Strang splitting, 1968, doi:10.1137/0705041). This leaves an error of second order from the
+interaction of increments, and one of first order from implicit Euler in each single increment,
+which is the smaller the more increments there are.
 
 The coarse companion that shows this error takes one step of twice the length in the same time: the
-backward half during one step, the forward half during the next. It costs half as many contact
+reverse half during one step, the forward half during the next. It costs half as many contact
 problems.
 """
 
@@ -231,7 +231,7 @@ def _ratio(size: float, error: float) -> float:
 def _strang_step(
     state: WearState, cycles: float, contact: WearingContact, at: ContactAt
 ) -> tuple[WearStep[WearState], WearingContact]:
-    """Take a step backward and forward over all increments; also return the contact in the middle.
+    """Take a step in reverse and in forward order; also return the contact in the middle.
 
     That contact is another one where slips follow from wear. It is then used for the whole step.
     """
