@@ -146,7 +146,7 @@ def test_pressure_on_a_patch_becomes_uniform_as_its_modes_decay() -> None:
     space = HalfSpace(grid, PAIR)
     units = np.eye(grid.shape[0])[on].reshape(-1, *grid.shape)
     compliance = np.stack([space.normal(unit).ravel()[on] for unit in units], axis=1)
-    # Without force and moment: what a plane can take up.
+    # Remove resultant and moment, which a rigid motion of the patch carries.
     plane = np.stack([np.ones(len(on)), grid.x.ravel()[on]], axis=1)
     free = scipy.linalg.null_space(plane.T)
     lengths, modes = np.linalg.eigh(free.T @ compliance @ free)
@@ -175,7 +175,7 @@ def test_a_cylinder_becomes_conforming(shares: tuple[float, float]) -> None:
     np.testing.assert_allclose(march.pressure[65:75], pressure, rtol=2e-3)
     half = 0.5 * np.count_nonzero(march.depth) * grid.pitch[0]
     assert half == pytest.approx(b, abs=grid.pitch[0])
-    # Each body by its own share.
+    # Each body wears by its own share.
     whole = sum(shares)
     np.testing.assert_allclose(march.surfaces.depth_1, shares[0] / whole * march.depth, atol=1e-15)
 

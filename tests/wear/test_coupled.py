@@ -185,7 +185,7 @@ def test_volume_is_coefficient_times_energy() -> None:
 
 FALL = 1e-3  # h0 [mm]
 LOAD = 80.0
-# Cycles in which the volume comes to within 1/e of its end.
+# Cycles in which the remaining volume falls to 1/e.
 SCALE = AREA * FALL / (PER_LOAD * LOAD)
 
 

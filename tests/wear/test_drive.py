@@ -69,7 +69,7 @@ def test_bodies_that_part_meet_where_their_motion_has_led_them() -> None:
     contact = FrictionalContact(HalfSpace(BALL, PAIR), FRICTION)
     states = march_cycle(contact, SPHERE, loads, drive)
     assert not states[0].shear.any()
-    assert states[1].resultants[1] > 1.0  # body 1 takes body 2 along
+    assert states[1].resultants[1] > 1.0  # body 1 drags body 2 along
     assert not states[2].traction.any()
     assert not states[3].shear.any()
     np.testing.assert_allclose(states[3].pressure, states[0].pressure, rtol=1e-6)
@@ -114,7 +114,7 @@ def test_a_held_approach_wears_until_nothing_is_pressed() -> None:
     np.testing.assert_allclose(state.surfaces.depth, np.maximum(approach - SPHERE, 0.0), atol=2e-6)
     assert np.all(np.diff(carried) < 0.0)
     assert carried[-1] < 2e-3 * carried[0]
-    # The unworn force is Hertz's, to what 20 cells make of it.
+    # The unworn force is Hertz's, within the error of 20 cells.
     hertz = 4.0 / 3.0 * PAIR.contact_modulus * np.sqrt(RADIUS) * approach**1.5
     assert carried[0] == pytest.approx(hertz, rel=0.02)
 

@@ -21,7 +21,7 @@ GAP = (
 )
 FRICTION = 0.4
 P = np.array([8e3, 16e3, 12e3, 8e3, 4e3, 0.0])
-# Slides outwards while the load grows, sticks when it turns, slides back before the end.
+# The flank slides outward while the load grows, sticks when it turns, and slides back at the end.
 SHARE = np.array([-1.0, -1.0, -0.5, 0.3, 1.0, 0.0])
 ENERGY = np.array([2.0, 40.0, 0.1, 0.1, 15.0, 0.0])
 

@@ -12,7 +12,7 @@ from wear.kinetics import LATEST_START, LinearRegime, linear_regime
 
 CYCLES = np.arange(0.0, 11.0) * 1e4
 
-# A crowned pad in the plane that wears to a flat one: all of it slides alike.
+# A two-dimensional crowned pad that wears to a flat one, with the same slip everywhere.
 BODY = Material(120e3, 0.0)
 WIDTH, CROWN, LOAD = 4.0, 1000.0, 100.0  # mm, mm, N/mm
 WEAR = 8e-11  # depth per pressure and cycle [mm/MPa]

@@ -96,7 +96,7 @@ def test_findley_uniaxial(low, high, k):
     amplitude = 0.5 * (high - low)
     expected = 0.5 * (k * high + np.hypot(amplitude, k * high))
     assert parameter.value == pytest.approx(expected, rel=1e-6)
-    # The value is flat at its maximum: angles are found to the square root of its accuracy.
+    # The value is flat at its maximum: angles are accurate to the square root of its accuracy.
     double = np.arctan2(amplitude, k * high)
     assert abs(parameter.normal[0]) == pytest.approx(np.cos(0.5 * double), abs=2e-3)
     assert parameter.amplitude == pytest.approx(0.5 * amplitude * np.sin(double), rel=4e-3)

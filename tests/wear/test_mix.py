@@ -109,8 +109,8 @@ def test_worn_volume_is_coefficient_times_mean_energy(kind: str) -> None:
         assert depth.sum() * GRID.cell_area == pytest.approx(
             law.coefficient * state.energy, rel=1e-12
         )
-    # Loads are centred: a slip linear in x dissipates as its value in the middle, but for the
-    # asymmetry of what it wears.
+    # Loads are centred: a slip linear in x dissipates as much as its value in the middle, apart
+    # from the asymmetry of the worn shape.
     mean = FRICTION * (0.7 * 0.02 * HEAVY[0].P.sum() + 0.3 * 0.05 * LIGHT[0].P.sum())
     assert state.energy == pytest.approx(mean * cycles, rel=1e-3)
 

@@ -21,7 +21,7 @@ OBLIQUE = (-0.31, 0.22), (0.17, -0.29)
 LONG = (-1.03, 0.4), (0.91, 0.4)
 STILL = (0.137, -0.061), (0.137, -0.061)
 WAYS = [STRAIGHT, OBLIQUE, LONG, STILL]
-# Weights are exact but for the rounding of a few dozen additions.
+# Weights are exact except for the rounding of a few dozen additions.
 ROUNDING = 1e-13
 
 
@@ -108,7 +108,7 @@ def test_what_leaves_the_grid_is_refused_with_the_remedy() -> None:
         straight(*LONG).deposit(field)
     with pytest.raises(TravelError, match="along y"):
         straight((0.0, 0.0), (0.0, 0.3)).deposit(field)
-    # Farther than the grid is long.
+    # The motion is longer than the grid.
     with pytest.raises(TravelError, match="along x"):
         straight((0.0, 0.0), (9.0, 0.0)).deposit(field)
     assert not straight((5.0, 0.0), (9.0, 0.0)).carry(field).any()
@@ -154,7 +154,7 @@ def test_a_flat_punch_wears_a_trapezoid_into_the_flat(stroke: float, each_way: i
     borders = np.append(grid.x - 0.5 * grid.pitch[0], grid.x[-1] + 0.5 * grid.pitch[0])
     expected = np.diff(trapezoid_up_to(borders, half_width, stroke)) / grid.pitch[0]
     np.testing.assert_allclose(worn.ravel(), expected, atol=1e-13)
-    # Worn as far as the punch goes, and not beyond.
+    # The flat is worn as far as the punch moves, and not beyond.
     reach = half_width + 0.5 * stroke
     assert not worn.ravel()[np.abs(grid.x.ravel()) > reach + 0.5 * grid.pitch[0]].any()
 

@@ -43,14 +43,14 @@ class Cycle:
 
 
 LAWS = EnergyLaw(4e-8), EnergyLaw(1e-8)
-# Cycles in which what is left of the depth falls to 1/e.
+# Cycles in which the remaining depth falls to 1/e.
 SCALES = AREAS / (STIFFNESS * 5e-8 * FRICTION * SLIP)
 
 
 def springs(state: NodalState, laws=LAWS) -> NodalContact:
     """Return the nodes on springs at the present depth."""
     pressure = STIFFNESS / AREAS * (PUSH - state.surfaces.depth)
-    # Half of the way there, half of it back.
+    # Half of the slip is forward, half of it backward.
     halves = np.array([0.5, 0.5])[:, None]
     return NodalContact(laws, (Cycle(halves * SLIP, np.array([pressure, pressure])),))
 

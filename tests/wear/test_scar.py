@@ -65,7 +65,7 @@ def test_a_tilted_scan_with_missing_points_gives_its_volume(given):
     assert np.all(np.array(got.shift_error) < 0.1 * before.pitch[0])
     assert 0.05 < got.missing < 0.15
     assert got.sure
-    # Two scans of such noise, the first smoothed a little where it was moved.
+    # The residual contains the noise of two scans, the first slightly smoothed by interpolation.
     assert 0.9 < got.noise / (np.sqrt(2.0) * 5e-5) < 1.6
 
 
@@ -114,7 +114,7 @@ def test_scans_of_other_points():
 def test_what_cannot_be_measured_is_refused():
     before, after, _, disk, _ = scans(5)
     with pytest.raises(InputError, match=r"no area is clearly deeper|more than two thirds"):
-        measure_scar(after, before)  # the other way round it has grown
+        measure_scar(after, before)  # in this order the body has grown
     with pytest.raises(InputError, match="points are left around the worn area"):
         measure_scar(before, after, np.ones_like(disk))
     with pytest.raises(InputError, match=r"worn area has \(3, 3\) points"):
@@ -139,7 +139,7 @@ def test_bounds_cover_the_truth(waves):
     shifts = np.array([(scar.shift, scar.shift_error) for scar, _ in found])
     within = np.abs(shifts[:, 0] - [trial[4] for trial in tried]) < shifts[:, 1]
     assert np.all(np.count_nonzero(within, axis=0) >= 90)
-    # The middle of the cap, as any point that is worn: flat, and its truth known.
+    # At the middle of the cap the depth is flat, and its true value is known.
     depths = np.array([np.nanmean(scar.depth[49:52, 49:52]) for scar, _ in found])
     assert np.count_nonzero(np.abs(depths - DEEPEST) < [s.depth_error for s, _ in found]) >= 90
     assert np.mean(bounds) < 1.5 * 1.96 * errors.std()

@@ -20,14 +20,14 @@ from wear.steps.steppers import ErrorControl, step_errors
 
 NODES, FRICTION, SLIP, ALPHA = 40, 0.5, 0.02, 4e-8
 AREAS = np.full(NODES, 0.05)
-# Waves of the surface of number k are pressed away k times as fast: from the longest to the nodes.
+# The wave of number k is pressed away k times as fast as the longest one.
 BASIS = np.linalg.qr(np.cos(np.pi * np.outer(np.arange(NODES) + 0.5, np.arange(NODES)) / NODES))[0]
 ELASTIC = BASIS * (1e4 * np.arange(1.0, NODES + 1.0)) @ BASIS.T
-# Higher at one end.
+# The initial overlap is larger at one end.
 PUSH = 1e-3 * (1.0 + np.linspace(0.0, 1.0, NODES) ** 2)
 WEAR = ALPHA * FRICTION * SLIP
 LAWS = EnergyLaw(0.75 * ALPHA), EnergyLaw(0.25 * ALPHA)
-# In which the longest wave falls to 1/e.
+# Cycles in which the longest wave falls to 1/e.
 SCALE = 1.0 / (WEAR * 1e4)
 
 

@@ -247,7 +247,7 @@ def test_steps_stay_short_enough_to_compare(kind) -> None:
     steps: the estimate would be a tenth of the error.
     """
     cycles = 1000.0 * CONSTANT.stable_cycles(rounded())
-    exact = exact_depth(cycles, 60)  # to 6e-4 of it: a sixth of the error
+    exact = exact_depth(cycles, 60)  # accurate to 6e-4, a sixth of the error
     estimate, error = errors(automatic(kind(ErrorControl(0.01)), cycles).state, exact)
     assert 1e-4 < error < 0.01
     assert error / 3.0 < estimate < 3.0 * error
@@ -287,7 +287,7 @@ def test_an_absolute_tolerance_is_a_depth() -> None:
         automatic(ImplicitStepper(control), cycles)
         for control in (ErrorControl(absolute=allowed), ErrorControl(relative=0.01))
     )
-    # One step of the companion's more or less.
+    # The companion may take one step more or less.
     assert abs(absolute.spent.steps - relative.spent.steps) <= 4
     assert root_mean_square(absolute.state.surfaces.depth - exact, exact) < allowed
 
@@ -376,7 +376,7 @@ def test_steps_grow_where_wear_slows_down() -> None:
     np.testing.assert_allclose(
         fixed.surfaces.depth, np.maximum(1e-3 - unworn.surfaces.gap, 0.0), atol=1e-6
     )
-    # From one end of the hundredfold to the other: 74, 88, 90 and 96 of them.
+    # Over the factors of a hundred the numbers of steps are 74, 88, 90 and 96.
     assert np.diff(taken).max() < 20
     assert taken[0] < 100
 

@@ -41,7 +41,7 @@ def test_what_is_lacking_goes_where_shear_is_below_the_limit() -> None:
     """30 MPa are lacking along y, where the cells can take 0, 15 and 15 MPa more."""
     coarse = nodal([50.0, -20.0, 0.0], [100.0, 80.0, 80.0])
     given = cycle([120.0, 60.0, 30.0], [0.0] * 3, (AREA * (60.0 - 15.0), AREA * 30.0))
-    given.shear[0, 0, 1] = 7.0  # of slip, which the nodes know better
+    given.shear[0, 0, 1] = 7.0  # from slip, but the nodes are more accurate
     known = with_sticking_shear(given, coarse, AREA).shear[0, :, :, 0]
     room = np.array([0.0, 60.0 * FRICTION - 15.0, 30.0 * FRICTION])
     np.testing.assert_allclose(known[1], room)

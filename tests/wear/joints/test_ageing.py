@@ -65,10 +65,10 @@ def iwan_energy(law: UniformIwan, amplitude: float) -> float:
 @pytest.mark.parametrize(
     ("energy_per_cycle", "start", "cycles", "exact"),
     [
-        # (sqrt(E) + 1)² each cycle: from nothing, steep, over twelve decades.
+        # (sqrt(E) + 1)² after each cycle: steep, from 0, over twelve decades.
         (lambda e: 2.0 * sqrt(e) + 1.0, 0.0, 1e6, lambda n: n**2),
         (lambda e: 1e-3 * e, 1.0, 2e4, lambda n: np.exp(n * np.log1p(1e-3))),
-        # Towards 5, where nothing slides any more.
+        # The energy tends to 5, where nothing slides.
         (
             lambda e: 1e-4 * max(5.0 - e, 0.0),
             1.0,
@@ -84,7 +84,7 @@ def test_error_is_below_what_is_stated(energy_per_cycle, start, cycles, exact, t
     number = np.unique(np.round(np.geomspace(1.0, cycles, 300)))
     energy = test.energy_at(number)
     per_cycle = np.array([energy_per_cycle(dissipated) for dissipated in energy.tolist()])
-    # A cycle adds to the energy a number that is rounded to the energy's last digit.
+    # The energy that a cycle adds is rounded to the last digit of the sum.
     rounding = 2.2e-16 * number * energy / per_cycle
     assert np.all(np.abs(energy - exact(number)) / per_cycle <= test.error + rounding)
     assert test.error <= tolerance * cycles
@@ -336,7 +336,7 @@ def test_bolted_joint_counted_to_its_end(bolted) -> None:
         limit = 0.34 * (1.12 - 0.12 * (0.5 * slow + 0.5 * fast)) * preload
         energy += 4.0 * limit * (amplitude - 4.0 * limit / (3.0 * stiffness))
     reached = bolted.cycles_at(np.array(list(marks.values())) - 1e-9)
-    # The sum of a million energies is rounded as often.
+    # The sum of a million energies has as many rounding errors.
     assert np.all(np.abs(reached - np.array(list(marks))) <= bolted.error + 1e-5)
     assert bolted.error < 1e-6 * 1.08e6
     assert iwan_energy(law, amplitude) == pytest.approx(steady_stroke(*TEST_4)(0.0), rel=1e-12)

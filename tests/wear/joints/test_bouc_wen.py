@@ -54,7 +54,7 @@ def test_unloading_branch_is_straight_until_no_force(exponent):
         np.testing.assert_allclose(response.force, exact, atol=1e-12 * LIMIT)
         assert response.tangent[0, 0, 0] == pytest.approx(40e3, rel=1e-12)
         assert response.dissipated[0] == 0.0
-    # Beyond, it loads the other way: for n = 2 as tanh.
+    # Beyond that it loads in the other direction, for n = 2 as tanh.
     if exponent == 2.0:
         beyond = law.respond(loaded.state, np.full((1, 1), -(xi + 0.7) * REACH))
         assert beyond.state[0, 1] == pytest.approx(-np.tanh(0.7), rel=1e-12)
@@ -78,7 +78,7 @@ def test_any_shape_against_an_independent_integration(sigma, exponent):
         def zero(_, y):
             return y[0]
 
-        # Stopped at ξ = 0, where the rate has a corner, and begun anew.
+        # The integration is restarted at ξ = 0, where the rate has a corner.
         zero.terminal = True
         y, s, rest = [xi, 0.0], 0.0, abs(end - start) / REACH
         while s < rest:
@@ -103,7 +103,7 @@ def test_energy_of_the_settled_loop(share):
     exact = -LIMIT * REACH * (np.tanh(y) ** 2 + log)
     scale = LIMIT * REACH
     assert LAW.loop_energy(share * REACH) == pytest.approx(exact, rel=1e-10, abs=1e-14 * scale)
-    # Marched until the loop has closed: a small one takes many cycles.
+    # March until the loop has closed: a small loop takes many cycles.
     history = lead(LAW, np.tile([share, -share], 3000) * REACH)
     assert history.dissipated[-2:].sum() == pytest.approx(exact, rel=1e-4, abs=1e-14 * scale)
 
@@ -147,7 +147,7 @@ def test_small_loops_under_a_force_do_not_close():
         drifts.append(growth / (50 * s))
         assert rippled.force[-1, 0, 0] < loaded.force[-1, 0, 0] - 0.1 * LIMIT
     errors = np.abs(np.array(drifts) - 1.0)
-    # First order in the size of the ripple.
+    # The error is of first order in the size of the ripple.
     assert errors[0] < 0.05
     assert errors[1] == pytest.approx(errors[0] / 2.0, rel=0.2)
     iwan = UniformIwan(40e3, 0.5, 60.0, 900.0)

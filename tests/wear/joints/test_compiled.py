@@ -43,7 +43,7 @@ def test_a_changed_function_is_compiled_into_those_that_call_it(tmp_path):
     for second, value in enumerate((3.0, 3.0, 5.0)):
         slope = package / "slope.py"
         slope.write_text(SLOPE.format(value=value), encoding="utf-8")
-        # Python tells a changed file of the same length by the second that it was written in.
+        # Python recognises a changed file of the same length by the second of its time stamp.
         os.utime(slope, (2 * second, 2 * second))
         ended = subprocess.run(
             [sys.executable, "-c", ASKED],

@@ -44,7 +44,7 @@ def test_forms_are_factors_that_start_at_one(form) -> None:
     energies = np.array([[0.0, 1.5], [1e3, 2.8e6]])
     assert form(energies).shape == (2, 2)
     np.testing.assert_array_equal(form(energies), [[form(e) for e in row] for row in energies])
-    # No energy is too small or too large for a number.
+    # The functions are finite for the smallest and the largest energies.
     assert np.all(np.isfinite(form(np.array([5e-324, 1e-300, 1e12]))))
 
 

@@ -193,7 +193,7 @@ def test_tiny_steps_of_radial_return_converge_to_it(seed):
         off = np.abs(forces - history.force[:, 0, :2]).max()
         errors.append((off, abs(lost - history.dissipated.sum())))
     force_errors, energy_errors = np.array(errors).T
-    # First order: ten times as many steps, a tenth of the error.
+    # The reference is of first order: ten times as many steps have a tenth of the error.
     assert np.all(force_errors[1:] < 0.2 * force_errors[:-1])
     assert np.all(energy_errors[1:] < 0.2 * energy_errors[:-1])
     assert force_errors[-1] < 2e-4 * MU * LOAD
@@ -416,7 +416,7 @@ def test_energy_of_a_force_that_turns_under_a_constant_limit(angle, pull):
     """The energy is R² ln(sin ψ0 / sin ψ1), where tan(ψ/2) falls by exp(-L)."""
     path = ForcePath(2.0 * np.cos(angle), 2.0 * np.sin(angle), 2.0 * pull, 0.0, 2.0, 2.0)
     before = np.tan(0.5 * angle)
-    # Inwards it holds first, until the chord leaves the circle: ψ becomes π - ψ.
+    # Pulled inward the slider holds until the chord leaves the circle: ψ becomes π - ψ.
     held = min(max(-2.0 * np.cos(angle) / pull, 0.0), 1.0)
     if held > 0.0:
         before = 1.0 / before

@@ -78,7 +78,7 @@ def test_clean_loops_give_the_parameters(name, motion):
     measured = loops(name, motion=motion, cycles=3)
     # The windows end at samples, not where sticking does: of Iwan a bit of a parabola is left.
     assert measured.stick_stiffness == pytest.approx(STICK[name], rel=2e-3)
-    # Bouc-Wen's ξ only tends to 1.
+    # ξ of Bouc-Wen only tends to 1.
     assert measured.friction == pytest.approx(FRICTION, rel=2e-3)
     assert measured.residual_stiffness == pytest.approx(RESIDUAL, rel=0.03)
     assert measured.stroke == pytest.approx(2.0 * AMPLITUDE, rel=1e-12)
@@ -260,7 +260,7 @@ def slid(amplitude):
 
 def test_rising_strokes_are_steps_and_the_account_is_whole():
     measured = measure_loops(*strokes(RISING), 60.0)
-    # The twelfth cycle ends amid its way back: it is not closed.
+    # The twelfth cycle ends within its backward branch: it is not closed.
     expected = [amplitude for amplitude in RISING for _ in (0, 1)][:-1]
     assert measured.stroke == pytest.approx(2e-3 * np.array(expected), rel=1e-9)
     assert measured.energy == pytest.approx([slid(a) for a in expected], rel=1e-3)

@@ -185,7 +185,7 @@ def test_balance_of_harmonics_is_the_motion_in_time():
     law = MixedLaw((JointGroup(CONTACT, 1), JointGroup(SLIDER, 1)))
     push, press = unit_force(model, "x") + 0.1 * unit_force(model, "z"), unit_force(model, "z")
     frequency, force = 90.0, 14.0
-    # Joints at rest press each other: the load that balances them.
+    # Joints at rest have a preload, which this load balances.
     static = 15.0 * press
     load = PeriodicLoad({1: -1j * push}, static)
     problem = HarmonicBalance(model, law.march(), load, Resolution(tuple(range(22)), 512))

@@ -26,7 +26,7 @@ LAWS = {
     "bouc-wen, general": BoucWen(*COMMON, sigma=0.7, exponent=2.5),
 }
 EVERY = pytest.mark.parametrize("law", LAWS.values(), ids=LAWS)
-# The general Bouc-Wen law steps: what it makes of a path depends on the division by 2e-9.
+# The general Bouc-Wen law is integrated in steps, so that dividing a path changes it by 2e-9.
 ROUNDING, STEPPING = 1e-11, 4e-9
 # Amplitudes from deep sticking to far sliding, in reaches.
 PATHS = st.lists(st.floats(-4.0, 4.0), min_size=1, max_size=20)

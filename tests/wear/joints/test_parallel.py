@@ -63,7 +63,7 @@ def test_each_slider_travels_beyond_its_own_reach():
 def test_it_slips_where_less_than_half_of_the_stiffness_is_left():
     motion = np.zeros_like(MOTION)
     motion[0, 0, 0] = 0.5 * (REACH[0] + REACH[1])
-    # The stiffest alone slips: 6 of 10 are left.
+    # Only the stiffest slider slips: 6 of 10 are left.
     assert np.all(ParallelSliders(SLIDERS).settle(motion, BASIS, WEIGHTS).states == STICK)
     motion[0, 0, 0] = 2.0 * REACH[-1]
     assert np.any(ParallelSliders(SLIDERS).settle(motion, BASIS, WEIGHTS).states == SLIP)

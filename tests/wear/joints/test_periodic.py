@@ -164,7 +164,7 @@ def test_settled_cycle_is_the_one_that_many_periods_lead_to(name):
     history = march_joints(
         law, law.rest(len(motion)), rest, np.vstack([before[:-1], *[way] * periods])
     )
-    # Bouc-Wen's joint forgets by shares, not at once.
+    # A Bouc-Wen joint forgets gradually, not at once.
     scale = np.abs(history.force).max()
     np.testing.assert_allclose(cycle.samples, history.force[-64:], atol=1e-9 * scale)
     lost = history.dissipated[-64:].sum(axis=0)

@@ -127,7 +127,7 @@ def test_friction_opposes_slip(name):
         assert np.all(np.einsum("td,td->t", moved, middle) > 0.0)
         across = moved[:, 0] * middle[:, 1] - moved[:, 1] * middle[:, 0]
         angle = np.abs(across) / np.hypot(*moved.T) / np.hypot(*middle.T)
-        # Beside a lift-off, where the circle is a point, the force turns within a sample.
+        # Next to a lift-off, where the circle is a point, the force turns within a sample.
         largest.append(np.quantile(angle, 0.95))
     assert largest[1] < 2e-5
     assert largest[1] < 0.07 * largest[0]
@@ -309,7 +309,7 @@ def test_grazing_contact_is_apart_and_its_slopes_are_finite():
     assert cycle.change[0] == 0.0
 
 
-# Switches a sample may see: the states before and after it on its way round, and an orbit.
+# Transitions of a sample: the states before and after it, and an orbit on which they occur.
 SWITCHES = {
     "slip begins": (STICK, SLIP, "a thin ellipse, load varies"),
     "slip begins, then lifts off": (STICK, SLIP, "a figure of eight that lifts off"),
