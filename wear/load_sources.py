@@ -36,7 +36,7 @@ class LoadSource(Protocol):
 
 @dataclass(frozen=True)
 class ConstantLoads:
-    """A source of loads that wear does not change, given as one history per contact.
+    """A source of loads that wear does not change, given as one of ``histories`` per contact.
 
     Examples
     --------

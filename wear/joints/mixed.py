@@ -25,7 +25,7 @@ from wear.joints.periodic.march import PeriodicMarch, SettledCycle
 
 @dataclass(frozen=True)
 class JointGroup:
-    """A number of joints with one law.
+    """A number of ``joints`` with one ``law``.
 
     Examples
     --------
@@ -40,7 +40,7 @@ class JointGroup:
 
 @dataclass(frozen=True)
 class MixedLaw:
-    """The laws of all groups of joints, one group after the other.
+    """The laws of all ``groups`` of joints, one group after the other.
 
     Examples
     --------

@@ -118,7 +118,7 @@ class SettledCycle:
 
 @dataclass(frozen=True)
 class PeriodicMarch:
-    """March of the joints of one law over whole periods.
+    """March of the joints of one ``law`` over whole periods.
 
     ``threads`` is the number of shares of the joints that are marched in parallel.
 
