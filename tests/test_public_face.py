@@ -4,6 +4,7 @@ import ast
 import dataclasses
 import doctest
 import importlib
+import inspect
 import re
 import subprocess
 import sys
@@ -112,27 +113,25 @@ def test_examples_of_functions_and_classes_run(name, monkeypatch):
         assert doctest.DocTestRunner().run(example).failed == 0
 
 
-def text_of(value: object) -> str:
-    """Return the docstrings of a class and of those that it inherits from."""
-    return "\n".join(base.__doc__ or "" for base in type.mro(value))
-
-
-def _in_sections(text: str) -> set[str]:
-    """Return the names that sections of a numpydoc docstring list: ``a, b : type``."""
-    lists = re.findall(r"^ *((?:\w+, )*\w+) : ", text, re.MULTILINE)
-    return {name for names in lists for name in names.split(", ")}
-
-
 @pytest.mark.parametrize("name", FACES)
 def test_texts_of_public_classes_speak_of_every_field(name):
     """The pages show a signature and this text: shapes and units are nowhere else."""
     for public, value in _public_objects(name).items():
         fields = dataclasses.fields(value) if dataclasses.is_dataclass(value) else ()
-        text = text_of(value) if fields else ""
-        quoted = " ".join(text.split("``")[1::2])
-        said = set(re.findall(r"\w+", quoted)) | _in_sections(text)
-        silent = {field.name for field in fields} - said
+        texts = [base.__doc__ or "" for base in value.__mro__] if fields else []
+        silent = {field.name for field in fields}.difference(*map(_documented, texts))
         assert not silent, f"{name}.{public} says nothing of {', '.join(sorted(silent))}"
+
+
+def _documented(text):
+    """Return the names in double backquotes, and those that numpydoc sections list."""
+    section = re.search(
+        r"^(?:Attributes|Parameters)\n-+\n((?:.*\n)*?)(?=\S.*\n-+\n|\Z)",
+        inspect.cleandoc(text) + "\n",
+        re.MULTILINE,
+    )
+    listed = re.findall(r"^\S.*$", section[1], re.MULTILINE) if section else []
+    return set(re.findall(r"\w+", " ".join([*listed, *text.split("``")[1::2]])))
 
 
 @pytest.mark.parametrize("package", ["sa_solver", "wear", "fe_models", "workflow"])

@@ -1,39 +1,40 @@
-"""Wear laws, contacts that wear, the coupled loop, and kinetics.
+"""Wear laws, wearing contacts, the coupled wear loop, and wear kinetics.
 
-How much is worn
+Wear laws
     - ``WearLaw``: the protocol of all laws, the depth that one body loses in a cycle.
     - ``ArchardLaw``: depth from pressure and slip.
     - ``EnergyLaw``: depth from the energy that friction dissipates.
-    - ``EnergyAmplitudeLaw``: the same with a coefficient that grows with the slip amplitude.
-    - ``EvolvingLaw``: any of them, times a factor that changes with the energy dissipated so far.
-    - ``EnergyTable``: such a factor.
+    - ``EnergyAmplitudeLaw``: the energy law with a coefficient that grows with slip amplitude.
+    - ``EvolvingLaw``: any law, times a factor that changes with the energy dissipated so far.
+    - ``EnergyTable``: a table of such a factor against energy.
 
-What is worn, in which steps
+Contacts and wear steps
     - ``InterfaceSettings``: grid, gap, materials and laws of the contact of one interface.
     - ``CellNodes``: the transfer of a face whose nodes are the cells of its grid.
-    - ``InterfaceContact``: such a contact, and how it wears under a cycle.
+    - ``InterfaceContact``: the contact of one interface, and its wear under a cycle.
     - ``ExplicitStepper``, ``ImplicitStepper``: steppers of first order.
-    - ``HeunStepper``, ``SecondOrderStepper``: of second order, at known pressures and at those
-      solved for.
-    - ``ErrorControl``: the error of the depth that chooses their length.
-    - ``ContactFailure``: a contact problem in between did not converge.
+    - ``HeunStepper``, ``SecondOrderStepper``: steppers of second order. The first needs a contact
+      whose pressures are given, the second solves the contact within each step.
+    - ``ErrorControl``: the error of the depth that sets the length of the steps.
+    - ``ContactFailure``: raised where a contact problem within a step does not converge.
 
 The coupled loop
-    - ``CycleLoads``: what a contact carries over a closed cycle.
+    - ``CycleLoads``: the loads and slips of one contact over a closed cycle.
     - ``ConstantLoads``: a source of loads that wear does not change.
-    - ``CoupledSettings``, ``JumpSize``, ``Stop``: how far it goes, and when loads are solved again.
+    - ``CoupledSettings``, ``JumpSize``, ``Stop``: length of a run, length of its jumps, and when
+      the loads are solved again.
     - ``Contacts``: the contacts of all interfaces, which wear one after the other.
-    - ``CoupledWear``: loads, contacts, wear, and worn gaps that change the loads.
-    - ``CoupledState``: all that a run needs to go on.
-    - ``Observer``: what looks on.
+    - ``CoupledWear``: the loop of loads, contacts, wear, and worn gaps that change the loads.
+    - ``CoupledState``: everything that is needed to resume a run.
+    - ``Observer``: the base class of everything that follows a run, such as logs and records.
 
-What follows
+Evaluation
     - ``linear_regime``: the rate after running-in, and how far it can be extrapolated.
-    - ``ruiz``, ``findley``, ``smith_watson_topper``: where cracks start.
+    - ``ruiz``, ``findley``, ``smith_watson_topper``: parameters of crack initiation.
 
 Contacts at nodes are in :mod:`wear.contact.nodes`, joints of vibrating structures in
-:mod:`wear.joints`, wear between two scans in :mod:`wear.scar`. A cylinder of 10 mm that is pressed
-by 50 N/mm and slides 40 µm a cycle:
+:mod:`wear.joints`, and wear between two scans in :mod:`wear.scar`. The example is a cylinder of
+10 mm diameter that is pressed by 50 N/mm and slides 40 µm per cycle:
 
 >>> import numpy as np
 >>> from sa_solver import ElasticPair, Grid, LoadHistory, Material
@@ -64,10 +65,10 @@ from sa_solver.lazy import lazy_names
 if TYPE_CHECKING:
     from wear.contact.contacts import Contacts
     from wear.contact.face_loads import CycleLoads
-    from wear.contact.interface import InterfaceContact, InterfaceSettings
-    from wear.contact.link import CellNodes
+    from wear.contact.interface import InterfaceContact
+    from wear.contact.settings import InterfaceSettings
+    from wear.contact.transfer import CellNodes
     from wear.coupled import (
-        ConstantLoads,
         CoupledSettings,
         CoupledState,
         CoupledWear,
@@ -79,6 +80,7 @@ if TYPE_CHECKING:
     from wear.evolution import EnergyTable
     from wear.kinetics import linear_regime
     from wear.laws import ArchardLaw, EnergyAmplitudeLaw, EnergyLaw, EvolvingLaw, WearLaw
+    from wear.load_sources import ConstantLoads
     from wear.steps.implicit import ImplicitStepper, SecondOrderStepper
     from wear.steps.step_errors import ErrorControl
     from wear.steps.steppers import ExplicitStepper, HeunStepper
@@ -120,17 +122,19 @@ __getattr__, __dir__ = lazy_names(
     {
         "contact.contacts": ("Contacts",),
         "coupled": (
-            *("ConstantLoads", "CoupledSettings", "CoupledState"),
-            *("CoupledWear", "JumpSize", "Observer", "Stop"),
+            *("CoupledSettings", "CoupledState", "CoupledWear"),
+            *("JumpSize", "Observer", "Stop"),
         ),
         "evolution": ("CoulombFriction", "EnergyTable"),
         "contact.face_loads": ("CycleLoads",),
         "steps.implicit": ("ImplicitStepper", "SecondOrderStepper"),
-        "contact.interface": ("InterfaceContact", "InterfaceSettings"),
+        "contact.interface": ("InterfaceContact",),
+        "contact.settings": ("InterfaceSettings",),
         "kinetics": ("linear_regime",),
+        "load_sources": ("ConstantLoads",),
         "laws": ("ArchardLaw", "EnergyAmplitudeLaw", "EnergyLaw", "EvolvingLaw", "WearLaw"),
         "cracking.life": ("findley", "ruiz", "smith_watson_topper"),
-        "contact.link": ("CellNodes",),
+        "contact.transfer": ("CellNodes",),
         "steps.step_errors": ("ErrorControl",),
         "steps.steppers": ("ExplicitStepper", "HeunStepper"),
         "steps.stepping": ("ContactFailure",),

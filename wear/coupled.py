@@ -1,10 +1,10 @@
 """The coupled loop: loads, contacts, wear, and worn gaps that change the loads.
 
-Contacts wear in jumps of many cycles. After each one the source of their loads is asked, by a cheap
-probe, how far wear has moved the resultants since it was last solved; if that is too far, it is
-solved again with the worn gaps. :meth:`CoupledWear.march` yields the state after every jump; a run
-goes on from any of them as if it had never stopped. Whatever else is to happen on the way, such as
-records and progress, is up to :class:`Observer` s.
+Contacts wear in jumps of many cycles. After each jump a cheap probe of the load source tells how
+far wear has changed the resultants since the source was last solved. If the change is too large,
+the source is solved again with the worn gaps. :meth:`CoupledWear.march` yields the state after
+every jump, and a run can be resumed from any of these states with the same results. Records,
+progress and the like are left to :class:`Observer` objects.
 """
 
 from __future__ import annotations
@@ -12,43 +12,53 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext
 from dataclasses import dataclass, replace
-from typing import Literal, Protocol
+from typing import Literal
 
 import numpy as np
 
 from sa_solver import checks
 from sa_solver.errors import InputError
-from sa_solver.ties import first_largest
 from sa_solver.types import Array, resultant_change
 from wear.contact.contacts import KINETICS, Contacts
 from wear.contact.face_loads import FaceLoads
 from wear.contact.interface import FirstContact, InterfaceState
+from wear.load_sources import LoadSource
 from wear.steps.steppers import ROUNDING
 from wear.worn import Spent
 
 AT_STOP = 1e-3
-"""How near to a stop a run must come: a jump that is to reach it is cut short to do so."""
+"""Relative tolerance of a stop. A jump that would pass the stop is shortened to end within it."""
 
 RESPONSE = 0.5
-"""By how much slips and energies change with the share of the load that wear moves over a face: by
-3 % with 7 % of it on the default dovetail in the plane."""
+"""Relative change of slips and energies over the share of the load that wear moves across a face:
+on the default two-dimensional dovetail they change by 3 % where 7 % of the load moves.
+"""
 
 Stage = Literal["contact, first cycle", "wear", "drift probe", "structural friction"]
 
 
-# --- what is given --------------------------------------------------------------------------------
+# --- settings ------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
 class JumpSize:
-    """How far one jump goes: so many ``cycles``, or until so much ``depth`` [mm] or ``volume`` of
-    all bodies [mm³] is worn at the present rates.
+    """Length of one jump, as a number of cycles or as an amount of wear at the present rates.
 
-    One of them at most. Without any, as far as the automatic steps of all contacts would go.
+    Give one size at most. Without any, a jump is as long as the automatic steps of all contacts
+    allow.
+
+    Parameters
+    ----------
+    cycles
+        Number of cycles.
+    depth
+        Largest depth that any body loses in the jump [mm].
+    volume
+        Volume that all bodies together lose in the jump [mm³].
 
     Examples
     --------
-    Jumps until a micrometre is worn; a jump of two sizes has no meaning:
+    A jump lasts until a micrometre is worn; two sizes at once are refused:
 
     >>> from wear import JumpSize
     >>> print(JumpSize(depth=1e-3))
@@ -56,7 +66,7 @@ class JumpSize:
     >>> JumpSize(cycles=1000.0, depth=1e-3)
     Traceback (most recent call last):
         ...
-    sa_solver.errors.InputError: a jump of more than one size: give cycles, depth or volume
+    sa_solver.errors.InputError: a jump has more than one size: give one of cycles, depth and volume
     """
 
     cycles: float | None = None
@@ -65,19 +75,26 @@ class JumpSize:
 
     def __post_init__(self) -> None:
         if sum(size is not None for size in vars(self).values()) > 1:
-            raise InputError("a jump of more than one size: give cycles, depth or volume")
+            raise InputError("a jump has more than one size: give one of cycles, depth and volume")
         checks.numbers(self, "cycles", "depth", "volume", above=0.0)
 
 
 @dataclass(frozen=True)
 class Stop:
-    """Where a run ends before its cycles are over: at the first of these that is reached to 0.1 %.
+    """Wear limits that end a run before its last cycle, each reached to 0.1 %.
 
-    ``depth`` [mm] is the largest of any body, ``volume`` [mm³] that of all bodies together.
+    The run ends at the limit that it reaches first.
+
+    Parameters
+    ----------
+    depth
+        Largest depth of any body [mm].
+    volume
+        Volume of all bodies together [mm³].
 
     Examples
     --------
-    A run of 10⁶ cycles that ends earlier where 20 µm are worn:
+    A run of 10⁶ cycles ends earlier if 20 µm are worn:
 
     >>> from wear import CoupledSettings, Stop
     >>> settings = CoupledSettings(cycles=1e6, stop=Stop(depth=0.02))
@@ -94,17 +111,30 @@ class Stop:
 
 @dataclass(frozen=True)
 class CoupledSettings:
-    """How far a run of so many ``cycles`` goes, in which jumps, and when loads are solved again.
+    """Settings of a coupled run: its cycles, its jumps, and when the loads are solved again.
 
-    ``jump`` bounds how far it goes at once, ``stop`` how far in all.
-    ``resultants`` constant: never; every: after each jump; drift: where the probe has changed by
-    more than the share ``drift`` (:func:`sa_solver.types.resultant_change`), or where as much is to
-    be expected of slips and energies, as wear has moved the load over a face (:data:`RESPONSE`).
-    With ``friction`` evolving the source is told the coefficients that contacts have come to.
+    Parameters
+    ----------
+    cycles
+        Number of cycles of the run.
+    jump
+        Length of one jump.
+    stop
+        Wear limits at which the run ends earlier.
+    resultants
+        When the load source is solved again. "constant": never; "every": after each jump; "drift":
+        where the relative change since the last solution exceeds ``drift``. The change is the
+        larger of that of the probed resultants (:func:`sa_solver.types.resultant_change`) and that
+        expected of slips and energies from the load that wear has moved across a face
+        (:data:`RESPONSE`).
+    drift
+        Largest relative change without a new solution.
+    friction
+        "evolving": the load source is given the present coefficients of friction of the contacts.
 
     Examples
     --------
-    A run of 10⁵ cycles in jumps of 10⁴, whose loads are solved again after each of them:
+    A run of 10⁵ cycles in jumps of 10⁴ solves its loads again after each jump:
 
     >>> from wear import CoupledSettings, JumpSize
     >>> settings = CoupledSettings(cycles=1e5, jump=JumpSize(cycles=1e4), resultants="every")
@@ -125,7 +155,7 @@ class CoupledSettings:
         checks.choice("friction", self.friction, ("constant", "evolving"))
 
     def ended(self, state: CoupledState) -> bool:
-        """Whether a run that has got to ``state`` is over."""
+        """Return whether a run that has reached ``state`` is over."""
         stop, reached = self.stop, 1.0 - AT_STOP
         return bool(
             state.cycles[-1] >= self.cycles * (1.0 - ROUNDING)
@@ -134,69 +164,30 @@ class CoupledSettings:
         )
 
 
-class LoadSource(Protocol):
-    """Loads and slips of every contact over one closed cycle.
-
-    Worn depths are nodal, ``(n,)`` per contact, of both bodies together [mm]. Coefficients of
-    friction are one per contact; those before any wear where they are not given.
-    """
-
-    def worn(
-        self, depths: list[Array], friction: Sequence[float] | None = None
-    ) -> Sequence[FaceLoads]:
-        """The closed cycle with worn faces."""
-        ...
-
-    def probe(self, depths: list[Array], friction: Sequence[float] | None = None) -> Array:
-        """Resultants ``(contacts, 6)`` that wear moves as it moves those of the cycle, but cheap.
-
-        Those at peak load if nothing else is at hand.
-        """
-        ...
-
-
-@dataclass(frozen=True)
-class ConstantLoads:
-    """A source of loads that wear does not change: one of ``histories`` per contact.
-
-    Examples
-    --------
-    What a structure would say of a contact, said once:
-
-    >>> import numpy as np
-    >>> from sa_solver import LoadHistory
-    >>> from wear import ConstantLoads, CycleLoads
-    >>> P, zero = np.array([50.0, 100.0]), np.zeros(2)
-    >>> cycle = CycleLoads(LoadHistory(P, *[zero] * 7, sliding=zero == 0.0), np.zeros((2, 2, 1)))
-    >>> source = ConstantLoads([cycle])
-    >>> print(source.worn([np.full(1, 0.01)])[0] is cycle, source.probe([])[0, 0])
-    True 100.0
-    """
-
-    histories: Sequence[FaceLoads]
-
-    def worn(
-        self, depths: list[Array], friction: Sequence[float] | None = None
-    ) -> Sequence[FaceLoads]:
-        return self.histories
-
-    def probe(self, depths: list[Array], friction: Sequence[float] | None = None) -> Array:
-        """Resultants where each contact is loaded most."""
-        return np.array([h.loads.resultants[first_largest(h.loads.P)] for h in self.histories])
-
-
-# --- what comes out -------------------------------------------------------------------------------
+# --- state and observers --------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
 class CoupledState:
-    """Everything that a run needs to go on.
+    """Everything that is needed to resume a run.
 
-    ``interfaces`` are the states of the contacts; ``cycles`` ``(j,)`` those at the end of every
-    jump so far, the unworn state included; ``kinetics`` ``(j, interfaces, 5)`` has the columns
-    :data:`wear.contact.contacts.KINETICS`; ``solved_resultants`` ``(interfaces, 6)`` is the probe
-    at the last solution of the source; ``drift`` ``(j,)`` the drift found after each jump;
-    ``solutions`` counts the solutions, ``spent`` what the contacts have taken.
+    Parameters
+    ----------
+    interfaces
+        States of the contacts.
+    cycles
+        Cycles at the end of every jump so far, the unworn state included ``(j,)``.
+    kinetics
+        Wear after every jump ``(j, interfaces, 5)``, with the columns
+        :data:`wear.contact.contacts.KINETICS`.
+    drift
+        Drift of the loads found after each jump ``(j,)``.
+    solved_resultants
+        Probed resultants at the last solution of the load source ``(interfaces, 6)``.
+    solutions
+        Number of solutions of the load source.
+    spent
+        Cost of all contact solutions.
     """
 
     interfaces: tuple[InterfaceState, ...]
@@ -223,7 +214,7 @@ class CoupledState:
         return _volume(self.kinetics[-1])
 
     def record(self, cycles: float, contacts: Contacts, drift: float) -> CoupledState:
-        """The state with a row of kinetics added."""
+        """Return the state with a row of kinetics added."""
         return replace(
             self,
             cycles=np.append(self.cycles, cycles),
@@ -233,23 +224,23 @@ class CoupledState:
 
 
 class Observer:
-    """Looks on while a run goes; a subclass has those methods that it needs.
+    """Base class of everything that follows a run; a subclass overrides the methods it needs.
 
-    The example of :class:`CoupledWear` has one; those of ``fretscale`` write log and results.
+    :class:`CoupledWear` has an example; the observers of ``fretscale`` write logs and results.
     """
 
     def stage(self, name: Stage) -> AbstractContextManager[object]:
-        """Entered while the part ``name`` of a run is computed."""
+        """Return a context that is entered while the part ``name`` of a run is computed."""
         return nullcontext()
 
     def begin(self, state: CoupledState) -> None:
-        """The march begins from a state: unworn, or one that an earlier run has got to."""
+        """Handle the start of the run from a state, which is unworn or that of an earlier run."""
 
     def jumping(self, state: CoupledState, cycles: float) -> None:
-        """A jump of so many cycles is to begin; near a stop it may be cut short."""
+        """Handle the start of a jump of ``cycles``, which may be shortened near a stop."""
 
     def jumped(self, before: CoupledState, after: CoupledState) -> None:
-        """A jump is done, and the loads follow it."""
+        """Handle the end of a jump, after the loads have been updated."""
 
 
 # --- the loop -------------------------------------------------------------------------------------
@@ -257,17 +248,29 @@ class Observer:
 
 @dataclass(frozen=True)
 class CoupledWear:
-    """The coupled loop: loads of a ``source`` wear ``contacts`` as ``settings`` say, watched by
-    ``observers``. Its methods raise what source and contacts raise.
+    """The coupled loop of loads, contacts and wear.
+
+    Its methods raise the exceptions of its load source and its contacts.
+
+    Parameters
+    ----------
+    settings
+        Length of the run, its jumps, and when the loads are solved again.
+    source
+        Source of the loads.
+    contacts
+        The wearing contacts.
+    observers
+        Objects that follow the run.
 
     Examples
     --------
-    The loop stops where a micrometre is worn; an observer tells its jumps:
+    The loop stops once a micrometre is worn; an observer prints its jumps:
 
     >>> import numpy as np
     >>> from sa_solver import ElasticPair, Grid, LoadHistory, Material
     >>> from wear import *
-    >>> class Told(Observer):
+    >>> class PrintJumps(Observer):
     ...     def jumped(self, before, after):
     ...         print(f"{after.cycles[-1]:.0f} cycles, {1e3 * after.depth:.3f} um")
     >>> grid, steel, law = Grid.strips(1.4, 70), Material(210e3, 0.3), ArchardLaw(1e-4, 3000.0)
@@ -280,7 +283,7 @@ class CoupledWear:
     >>> slip[:, 0] = 0.04
     >>> loads = [CycleLoads(LoadHistory(zero + 50.0, *[zero] * 7, sliding=zero == 0.0), slip)]
     >>> settings = CoupledSettings(1e5, jump=JumpSize(cycles=2000.0), stop=Stop(depth=1e-3))
-    >>> loop = CoupledWear(settings, ConstantLoads(loads), Contacts([contact]), [Told()])
+    >>> loop = CoupledWear(settings, ConstantLoads(loads), Contacts([contact]), [PrintJumps()])
     >>> unworn, first = loop.begin(loads)
     >>> *_, end = loop.march(unworn)
     1767 cycles, 0.537 um
@@ -295,7 +298,7 @@ class CoupledWear:
     observers: Sequence[Observer] = ()
 
     def begin(self, unworn: Sequence[FaceLoads]) -> tuple[CoupledState, list[FirstContact]]:
-        """The state before the first jump, and the contact of the first cycle.
+        """Return the state before the first jump, and the contact of the first cycle.
 
         ``unworn`` are the loads of all contacts before any wear.
         """
@@ -314,7 +317,7 @@ class CoupledWear:
         return state.record(0.0, self.contacts, 0.0), [first for _, first in begun]
 
     def march(self, state: CoupledState) -> Iterator[CoupledState]:
-        """The states after every jump from ``state``, until cycles are over or a stop is met."""
+        """Yield the state after every jump from ``state``, until the run ends or reaches a stop."""
         for observer in self.observers:
             observer.begin(state)
         while not self.settings.ended(state):
@@ -324,10 +327,11 @@ class CoupledWear:
             yield state
 
     def jumps_left(self, state: CoupledState) -> int:
-        """About how many jumps are left, if their length goes on as it has of late.
+        """Return an estimate of the number of jumps that are left.
 
-        All are as long as the next one, or grow as they have grown over the last half of all jumps;
-        automatic ones are taken to double until two of them are known.
+        All jumps are taken to be as long as the next one, or to go on growing as they have over the
+        last half of all jumps so far. Automatic jumps are taken to double until two of them are
+        known.
         """
         if self.settings.ended(state):
             return 0
@@ -352,7 +356,7 @@ class CoupledWear:
         cycles, spent = self._jump_cycles(state), Spent()
         for observer in self.observers:
             observer.jumping(state, cycles)
-        # The run ends at a stop if it comes to that.
+        # Steppers treat the last cycles of a run differently, and a stop may end it earlier.
         left = max(cycles, min(self._left(state), self._to_stop(state)))
         while True:
             with self._stage("wear"):
@@ -368,7 +372,7 @@ class CoupledWear:
         return state.record(float(state.cycles[-1]) + cycles, self.contacts, drift)
 
     def _jump_cycles(self, state: CoupledState) -> float:
-        """Cycles of the next jump, by the size that is asked for at the present rates."""
+        """Return the cycles of the next jump, from the requested size at the present rates."""
         size, left = self.settings.jump, self._left(state)
         if size.cycles is not None:
             cycles = size.cycles
@@ -380,23 +384,23 @@ class CoupledWear:
         return left if cycles > left * (1.0 - ROUNDING) else float(cycles)
 
     def _begun(self, state: CoupledState, cycles: float) -> Sequence[InterfaceState]:
-        """The contacts as they begin a jump of so many ``cycles``."""
+        """Return the states of the contacts at the beginning of a jump of ``cycles``."""
         automatic = self.settings.jump == JumpSize()
         return _in_phase(state.interfaces, cycles) if automatic else state.interfaces
 
     def _left(self, state: CoupledState) -> float:
-        """Cycles to the end of the run."""
+        """Return the cycles to the end of the run."""
         return self.settings.cycles - float(state.cycles[-1])
 
     def _to_stop(self, state: CoupledState) -> float:
-        """Cycles to the nearest stop at the present rates, one at least."""
+        """Return the cycles to the nearest stop at the present rates, at least one."""
         stop = self.settings.stop
         depth = None if stop.depth is None else stop.depth - state.depth
         volume = None if stop.volume is None else stop.volume - state.volume
         return max(1.0, _cycles_to(depth, volume, state))
 
     def _share_to_stop(self, before: CoupledState, interfaces: Sequence[InterfaceState]) -> float:
-        """Share of a jump at which it came to a stop that it went past; else 1."""
+        """Return the share of a jump at which it passed a stop, or 1 if it passed none."""
         after, stop, share = self.contacts.kinetics(interfaces), self.settings.stop, 1.0
         for limit, then, now in (
             (stop.depth, before.depth, _depth(after)),
@@ -408,7 +412,7 @@ class CoupledWear:
 
     # -- loads -------------------------------------------------------------------------------------
     def _follow_drift(self, state: CoupledState) -> tuple[CoupledState, float]:
-        """Solve the source again where its resultants have drifted too far."""
+        """Solve the loads again if their resultants have drifted too far, and return the drift."""
         settings = self.settings
         if settings.resultants == "constant":
             return state, 0.0
@@ -436,39 +440,41 @@ class CoupledWear:
         return self.source.probe(self.contacts.nodal_depths(interfaces), self._friction(interfaces))
 
     def _friction(self, interfaces: Sequence[InterfaceState]) -> list[float] | None:
-        """Coefficients of friction of the interfaces, where they change."""
+        """Return the coefficients of friction of the interfaces, or None if they are constant."""
         constant = self.settings.friction == "constant"
         return None if constant else self.contacts.friction(interfaces)
 
 
 def _depth(kinetics: Array) -> float:
-    """Largest depth of any body [mm] in a row of kinetics ``(interfaces, 5)``."""
+    """Return the largest depth of any body [mm] in a row of kinetics ``(interfaces, 5)``."""
     return float(kinetics[:, :2].max())
 
 
 def _volume(kinetics: Array) -> float:
-    """Volume of all bodies [mm³] in a row of kinetics ``(interfaces, 5)``."""
+    """Return the volume of all bodies [mm³] in a row of kinetics ``(interfaces, 5)``."""
     return float(kinetics[:, 2:4].sum(axis=1).sum())
 
 
 def _cycles_of_steps(interfaces: Sequence[InterfaceState], left: float) -> float:
-    """Cycles of a jump as long as the contacts' own steps, of the ``left`` ones.
+    """Return the cycles of a jump as long as the contacts' own steps, out of the ``left`` ones.
 
-    Where a contact is half-way through two steps that are judged together, to where it ends them.
+    Where a contact has done one of two steps that are judged together, the jump ends with the
+    second.
     """
     half_way = [interface.next_cycles for interface in interfaces if interface.half_way]
     if half_way:
         return min(max(half_way), left)
-    # The steps that are left, all of one length: none of them is a mere remainder.
+    # The cycles left are divided evenly, so that no jump is a mere remainder.
     proposed = min(interface.next_cycles for interface in interfaces)
     return left / float(max(1.0, np.ceil(left / proposed * (1.0 - ROUNDING))))
 
 
 def _in_phase(interfaces: Sequence[InterfaceState], cycles: float) -> Sequence[InterfaceState]:
-    """The contacts before a jump of so many ``cycles``, all of which end two steps with it.
+    """Return the contacts before a jump of ``cycles``, so that all end a pair of steps with it.
 
-    Where some are half-way, the others take two steps. Out of phase some would always begin the two
-    that make up what is left: jumps would halve for ever, and the run never end.
+    Where some contacts have done one of two steps, the others take two steps in this jump. Out of
+    phase, some contacts would always begin a pair within what is left: jumps would be halved
+    forever, and the run would never end.
     """
     if not any(interface.half_way for interface in interfaces):
         return interfaces
@@ -481,7 +487,10 @@ def _in_phase(interfaces: Sequence[InterfaceState], cycles: float) -> Sequence[I
 
 
 def _cycles_to(depth: float | None, volume: float | None, state: CoupledState) -> float:
-    """Cycles in which the present rates wear so much more [mm, mm³]; infinite where they do not."""
+    """Return the cycles in which the present rates wear so much more, infinite without wear.
+
+    ``depth`` is that of the fastest wearing body [mm], ``volume`` that of all bodies [mm³].
+    """
     limits = (
         (depth, max(interface.depth_rate for interface in state.interfaces)),
         (volume, sum(interface.volume_rate for interface in state.interfaces)),

@@ -1,4 +1,4 @@
-"""How a coefficient changes with the energy that the sliding has dissipated so far."""
+"""Coefficients that change with the energy dissipated by sliding."""
 
 from __future__ import annotations
 
@@ -14,11 +14,22 @@ from sa_solver.types import Array
 
 @dataclass(frozen=True)
 class EnergyTable:
-    """A ``factor`` against cumulative energy: linear between points, constant beyond its ends.
+    """A factor against cumulative energy: linear between points, constant beyond the ends.
 
-    ``energy`` ascends [N mm, or N/mm where it is per area]. Below ``threshold`` the factor is 0:
-    with a constant factor the worn volume is V = α (ΣEd - Ed_th) (Fouvry et al., Wear 255, 2003).
-    Raises InputError for a table of no or unequal columns, or that does not ascend.
+    Parameters
+    ----------
+    energy
+        Energies of the points, ascending [N mm, or N/mm where energy is per area].
+    factor
+        Factors at these energies, equally many.
+    threshold
+        Energy below which the factor is 0. With a constant factor the worn volume is then
+        V = α (ΣEd - Ed_th) (Fouvry et al., Wear 255, 2003).
+
+    Raises
+    ------
+    InputError
+        If the table is empty, its columns differ in length, or its energies do not ascend.
 
     Examples
     --------
@@ -41,21 +52,24 @@ class EnergyTable:
         checks.numbers(self, "threshold")
         if not self.energy or len(self.energy) != len(self.factor):
             raise InputError(
-                f"{len(self.energy)} energies and {len(self.factor)} factors: give one or more, "
-                "as many of both"
+                f"an energy table has {len(self.energy)} energies and {len(self.factor)} factors: "
+                "give equally many of both, at least one"
             )
         if any(after <= before for before, after in pairwise(self.energy)):
-            raise InputError("energies that do not ascend: give each once, the smallest first")
+            raise InputError(
+                "the energies of an energy table must ascend: give each once, the smallest first"
+            )
 
     def at(self, energy: Array | float) -> Array:
-        """Factor at an energy, of its shape."""
+        """Return the factor at an energy, in the shape of the energy."""
         return np.where(np.asarray(energy) >= self.threshold, self._line(energy), 0.0)
 
     def mean(self, before: Array | float, after: Array | float) -> Array:
-        """Mean factor while the energy grows from ``before`` to ``after``, exact.
+        """Return the exact mean of the factor while the energy grows from ``before`` to ``after``.
 
-        Where it does not grow, the factor there. Summed over the segments of the table: a
-        difference of antiderivatives would lose all digits of a small step.
+        Where the energy does not grow, return the factor at that energy. The mean is summed over
+        the segments of the table: a difference of antiderivatives would lose all digits of a small
+        step.
         """
         before, after = np.asarray(before, dtype=float), np.asarray(after, dtype=float)
         total = np.zeros(np.broadcast_shapes(before.shape, after.shape))

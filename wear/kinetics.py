@@ -1,9 +1,10 @@
 """Wear against cycles: the linear regime after running-in, and its extrapolation.
 
-A smooth curve is straight over any short stretch, and steps chosen by an error estimate may be very
-unequal. So a regime must take up the last half of the run at least, and is judged by the mean
-slopes of stretches that none of the jumps is too short for: rounding and solver tolerance do not
-count in a jump of a few cycles, and many short jumps beside a long one do not count as evidence.
+Any smooth curve looks straight over a short stretch, and steps chosen by an error estimate may be
+of very unequal length. A regime must therefore cover at least the last half of the run. It is
+judged by mean slopes over intervals of a minimum length, so that rounding and the solver's
+tolerance in a jump of a few cycles do not count, and many short jumps next to a long one are not
+taken for evidence.
 """
 
 from __future__ import annotations
@@ -16,24 +17,35 @@ from sa_solver import checks
 from sa_solver.errors import InputError
 from sa_solver.types import Array
 
-# Slopes within this share of the mean slope of the regime count as equal.
+# Slopes that differ from the mean slope of the regime by less than this share count as equal.
 SLOPE_SPREAD = 0.02
-# Fewer intervals than this are no regime.
+# A regime has at least this number of intervals.
 FEWEST_INTERVALS = 4
-# Intervals shorter than this share of the regime are joined with what follows. Jumps that double
-# make the fourth last 1/15 of all that follows its beginning: they still give four intervals.
+# Intervals shorter than this share of the regime are merged with the next one. Where every jump is
+# twice as long as the one before, the fourth last jump is 1/15 of the last four together: such runs
+# still give four intervals.
 SHORTEST_INTERVAL = 1.0 / 32.0
-# A regime begins before this share of the computed cycles. Growth N^m then passes for linear only
-# if m is within 0.08 of 1.
+# A regime must begin before this share of the computed cycles. Growth as N^m then passes for linear
+# only if m is within 0.08 of 1.
 LATEST_START = 0.5
 
 
 @dataclass(frozen=True)
 class LinearRegime:
-    """A quantity grows by ``rate`` per cycle from ``start`` cycles on.
+    """A range of cycles over which a quantity grows at a constant rate.
 
-    ``trend`` is the change of the rate per cycle that is left in the regime (least squares over its
-    intervals), ``scatter`` the largest distance of an interval's slope from that line, per cycle.
+    Parameters
+    ----------
+    start
+        Cycles at which the regime begins.
+    rate
+        Growth of the quantity per cycle.
+    last_cycles, last_value
+        Cycles and value at the end of the computation.
+    trend
+        Remaining change of the rate per cycle, by least squares over the intervals of the regime.
+    scatter
+        Largest deviation of an interval's slope from that trend line, per cycle.
     """
 
     start: float
@@ -44,21 +56,20 @@ class LinearRegime:
     scatter: float
 
     def extrapolate(self, cycles: Array) -> Array:
-        """The quantity at ``cycles`` beyond those computed: an extrapolation, not a computation."""
+        """Return the extrapolated quantity at ``cycles`` beyond those computed."""
         return self.last_value + self.rate * (cycles - self.last_cycles)
 
     def uncertainty(self, cycles: Array) -> Array:
-        """How far from ``extrapolate`` the quantity may be at ``cycles``, one-sided.
+        """Return the one-sided bound of the error of :meth:`extrapolate` at ``cycles``.
 
-        With the mean rate holding in the middle N0 of the regime, and the rate going on to change
-        by ``trend`` per cycle::
+        The mean rate is taken to hold in the middle N0 of the regime, and to go on changing by
+        ``trend`` per cycle::
 
             U(N) = |trend| ∫ (N' - N0) dN' + scatter (N - N_last),  N' from N_last to N.
 
-        A bound while the rate drifts no faster than it did in the regime, which is so where
-        running-in dies away; not where something new happens later (the contact reaches an edge, a
-        coating is worn through), and not for errors of grid and wear step, which the computed
-        values share.
+        This is a bound while the rate drifts no faster than it did in the regime, as it does while
+        running-in dies away. It does not cover new events (the contact reaches an edge, a coating
+        is worn through), nor the errors of grid and wear step, which the computed values share.
         """
         ahead = cycles - self.last_cycles
         from_middle = 0.5 * (self.last_cycles - self.start)
@@ -67,10 +78,19 @@ class LinearRegime:
 
 
 def linear_regime(cycles: Array, values: Array) -> LinearRegime | None:
-    """The longest stretch up to the end in which all slopes agree, or None while there is none.
+    """Return the longest stretch up to the end in which all slopes agree, or None if there is none.
 
-    ``cycles`` and ``values`` ``(n,)``, both ascending. Running-in ends where the regime starts.
-    Raises InputError for cycles that do not ascend, or another number of values.
+    Running-in ends where the regime starts.
+
+    Parameters
+    ----------
+    cycles, values
+        Cycles, ascending, and the quantity at these cycles, both ``(n,)``.
+
+    Raises
+    ------
+    InputError
+        If cycles do not ascend, or values are not equally many.
 
     Examples
     --------
@@ -89,7 +109,7 @@ def linear_regime(cycles: Array, values: Array) -> LinearRegime | None:
     cycles = checks.array("cycles", cycles, (None,))
     values = checks.array("values", values, cycles.shape)
     if np.any(np.diff(cycles) <= 0.0):
-        raise InputError("cycles that do not ascend: give each once, the smallest first")
+        raise InputError("cycles must ascend: give each once, the smallest first")
     for first in range(len(cycles) - FEWEST_INTERVALS):
         if cycles[first] > LATEST_START * cycles[-1]:
             return None
@@ -100,7 +120,7 @@ def linear_regime(cycles: Array, values: Array) -> LinearRegime | None:
 
 
 def _regime(cycles: Array, values: Array) -> LinearRegime | None:
-    """The stretch as a regime, None if it is not straight, or not shown to be."""
+    """Return the stretch as a regime, or None if it is not straight or has too few intervals."""
     ends = _interval_ends(cycles)
     lengths = np.diff(cycles[ends])
     length = float(cycles[-1] - cycles[0])
@@ -110,7 +130,8 @@ def _regime(cycles: Array, values: Array) -> LinearRegime | None:
         return None
     if np.abs(slopes - rate).max() > SLOPE_SPREAD * rate:
         return None
-    # Fitted to lengths as weights, the line has the mean rate in the middle of the regime.
+    # Weighted by the lengths of the intervals, the fitted line has the mean rate at the middle of
+    # the regime.
     middles = 0.5 * (cycles[ends][1:] + cycles[ends][:-1]) - 0.5 * (cycles[0] + cycles[-1])
     trend = float(np.sum(lengths * middles * (slopes - rate)) / np.sum(lengths * middles**2))
     scatter = float(np.abs(slopes - rate - trend * middles).max())
@@ -120,13 +141,13 @@ def _regime(cycles: Array, values: Array) -> LinearRegime | None:
 
 
 def _interval_ends(cycles: Array) -> list[int]:
-    """Places of the ends of intervals that are not too short, from 0 to the last."""
+    """Return the indices of the ends of intervals of sufficient length, from 0 to the last."""
     shortest = SHORTEST_INTERVAL * (cycles[-1] - cycles[0])
     ends = [0]
     for place in range(1, len(cycles)):
         if cycles[place] - cycles[ends[-1]] >= shortest:
             ends.append(place)
-    # What is left over at the end belongs to the last interval.
+    # A remainder at the end is merged with the last interval.
     if len(ends) > 1:
         ends.pop()
     return [*ends, len(cycles) - 1]

@@ -1,8 +1,8 @@
-"""Wear laws: the depth one body loses in a cycle, from pressure and slip.
+"""Wear laws: the depth that one body loses in a cycle, from pressure and slip.
 
 Every law here is linear in the pressure once the slips of the cycle are known. A law therefore
-gives the depth per pressure of each increment, which serves the explicit step (depth = Σ w p) and
-the implicit one (w ΔN is a local compliance) alike.
+returns the depth per pressure w of each increment. Explicit steps use it as a rate (depth = Σ w p),
+implicit steps as a local compliance (w ΔN).
 """
 
 from __future__ import annotations
@@ -17,12 +17,19 @@ from wear.evolution import EnergyTable
 
 @dataclass(frozen=True)
 class SlidingConditions:
-    """What one body's wear during a step may depend on.
+    """The quantities on which the wear of one body during a step may depend.
 
-    ``slip`` ``(t, ...)`` is the size of the slip in each increment of the cycle [mm], by cell or
-    node, and ``friction`` Coulomb's coefficient. ``work`` is the energy dissipated per area of this
-    body's surface since it was new, ``(...)`` [N/mm], and ``energy`` that of the whole contact
-    [N mm], each before the step and, as predicted, after it.
+    Parameters
+    ----------
+    slip
+        Size of the slip in each increment of the cycle ``(t, ...)``, by cell or node [mm].
+    friction
+        Coulomb's coefficient of friction.
+    work
+        Energy dissipated per area of this body's surface since it was new, before the step and, as
+        predicted, after it; ``(...)`` each [N/mm].
+    energy
+        Energy dissipated by the whole contact, before the step and, as predicted, after it [N mm].
     """
 
     slip: Array
@@ -32,24 +39,31 @@ class SlidingConditions:
 
 
 class WearLaw(Protocol):
-    """Wear of one body.
+    """Protocol of the wear of one body.
 
-    Laws that have it are :class:`ArchardLaw`, :class:`EnergyLaw`, :class:`EnergyAmplitudeLaw`, and
-    :class:`EvolvingLaw` of one of them; anything with this method is one.
+    :class:`ArchardLaw`, :class:`EnergyLaw`, :class:`EnergyAmplitudeLaw` and :class:`EvolvingLaw`
+    implement it, and so does any class with this method.
     """
 
     def depth_per_pressure(self, sliding: SlidingConditions) -> Array:
-        """Depth per pressure worn in each increment ``(t, ...)`` [mm/MPa per cycle]."""
+        """Return the depth per pressure worn in each increment ``(t, ...)`` [mm/MPa per cycle]."""
         ...
 
 
 @dataclass(frozen=True)
 class ArchardLaw:
-    """V = K s P / H: ``coefficient`` K [1], ``hardness`` H [MPa] (Archard 1953).
+    """Archard's law V = K s P / H (Archard 1953).
+
+    Parameters
+    ----------
+    coefficient
+        Wear coefficient K [1].
+    hardness
+        Hardness H [MPa].
 
     Examples
     --------
-    Worn depth of a place under 200 MPa that slides 0.1 mm a cycle: K s p / H.
+    The worn depth of a point under 200 MPa that slides 0.1 mm per cycle is K s p / H:
 
     >>> import numpy as np
     >>> from wear import ArchardLaw
@@ -75,11 +89,11 @@ class ArchardLaw:
 
 @dataclass(frozen=True)
 class EnergyLaw:
-    """V = α Σ Ed: ``coefficient`` α [1/MPa] (Fouvry; Gallego 2007, eq. 1).
+    """Energy law V = α Σ Ed with ``coefficient`` α [1/MPa] (Fouvry; Gallego 2007, eq. 1).
 
     Examples
     --------
-    Worn depth of a place under 200 MPa that slides 0.1 mm a cycle with µ = 0.5: α µ p s.
+    The worn depth of a point under 200 MPa that slides 0.1 mm per cycle with µ = 0.5 is α µ p s:
 
     >>> import numpy as np
     >>> from wear import EnergyLaw
@@ -105,12 +119,19 @@ class EnergyLaw:
 class EnergyAmplitudeLaw:
     """Energy law whose coefficient grows with the local slip amplitude (Gallego 2007, eq. 3).
 
-    Depth per cycle = α / (4 δ_ref) (Σ|Δs|) (Σ|q·Δs|): ``coefficient`` α [1/MPa] holds at the
-    amplitude ``reference_amplitude`` δ_ref [mm]; one cycle slides four amplitudes.
+    The depth per cycle is α / (4 δ_ref) (Σ|Δs|) (Σ|q·Δs|), where one cycle slides four amplitudes.
+
+    Parameters
+    ----------
+    coefficient
+        Wear coefficient α at the reference amplitude [1/MPa].
+    reference_amplitude
+        Reference amplitude δ_ref [mm].
 
     Examples
     --------
-    It is the energy law at the amplitude that it refers to; twice that wears four times as much:
+    At the reference amplitude the depth is that of the energy law; at twice that
+    amplitude it is four times as much:
 
     >>> import numpy as np
     >>> from wear import EnergyAmplitudeLaw
@@ -140,14 +161,24 @@ class EnergyAmplitudeLaw:
 
 @dataclass(frozen=True)
 class EvolvingLaw:
-    """Any ``law``, times a ``factor`` that changes with cumulative energy.
+    """Any wear law, times a factor that changes with cumulative energy.
 
-    ``scope`` local: with the energy per area of this body's own surface [N/mm]; global: with that
-    of the whole contact [N mm]. During a step it is the exact mean between its two ends.
+    During a step the factor is its exact mean between the energies at both ends of the step.
+
+    Parameters
+    ----------
+    law
+        The wear law that is scaled.
+    factor
+        The factor against energy.
+    scope
+        Energy on which the factor depends. "local": energy per area of this body's own surface
+        [N/mm]; "global": energy of the whole contact [N mm].
 
     Examples
     --------
-    A coefficient that falls to a half while 100 N/mm are dissipated: the mean over a step counts.
+    The coefficient falls to one half while 100 N/mm are dissipated; a step over
+    all of it uses the mean:
 
     >>> import numpy as np
     >>> from wear import EnergyLaw, EnergyTable, EvolvingLaw

@@ -11,10 +11,18 @@ from sa_solver.types import Array
 
 @dataclass(frozen=True)
 class Surfaces:
-    """Unworn gap, and what both bodies have been through, by cell ``(nx, ny)`` or node ``(n,)``.
+    """The unworn gap of an interface, and the depth and friction work of either surface.
 
-    ``depth_1`` and ``depth_2`` are the depths lost [mm], ``work_1`` and ``work_2`` the energies
-    dissipated per area [N/mm], each on the body's own surface.
+    All fields are by cell ``(nx, ny)`` or by node ``(n,)``.
+
+    Parameters
+    ----------
+    initial_gap
+        Gap of the unloaded, unworn bodies [mm].
+    depth_1, depth_2
+        Depth lost by body 1 and body 2, each on the body's own surface [mm].
+    work_1, work_2
+        Energy dissipated per area of the surface of body 1 and body 2 [N/mm].
     """
 
     initial_gap: Array
@@ -25,7 +33,7 @@ class Surfaces:
 
     @classmethod
     def unworn(cls, initial_gap: Array) -> Surfaces:
-        """Surfaces before the first cycle."""
+        """Return the surfaces before the first cycle."""
         return cls(initial_gap, *(np.zeros_like(initial_gap) for _ in range(4)))
 
     @property
@@ -40,7 +48,7 @@ class Surfaces:
 
     @property
     def gap(self) -> Array:
-        """Distance of the unloaded surfaces [mm]."""
+        """Gap of the unloaded bodies [mm]."""
         return self.initial_gap + self.depth_1 + self.depth_2
 
     @property
@@ -55,7 +63,15 @@ class Surfaces:
         work_1: Array | float = 0.0,
         work_2: Array | float = 0.0,
     ) -> Surfaces:
-        """The surfaces after losing these further depths to these further energies."""
+        """Return the surfaces after further wear.
+
+        Parameters
+        ----------
+        depth_1, depth_2
+            Further depth that body 1 and body 2 lose [mm].
+        work_1, work_2
+            Further energy per area dissipated on each surface [N/mm].
+        """
         return replace(
             self,
             depth_1=self.depth_1 + depth_1,

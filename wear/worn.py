@@ -1,4 +1,4 @@
-"""What wears, whatever it is: its surfaces between two steps, a step, and what that takes."""
+"""State of wearing surfaces between two wear steps, and the result and cost of a step."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from wear.surfaces import Surfaces
 
 @dataclass(frozen=True)
 class Spent:
-    """Contact problems of an increment solved, convolutions they took, and wear steps."""
+    """Cost of a computation: solved contact increments, convolutions and wear steps."""
 
     contact_solves: int = 0
     convolutions: int = 0
@@ -29,14 +29,28 @@ class Spent:
 
 @dataclass(frozen=True)
 class WornState:
-    """What wear must remember between two steps.
+    """State of wearing surfaces between two steps.
 
-    ``energy`` is what the contact has dissipated so far [N mm]; ``depth_rate`` the largest depth
-    [mm] and ``volume_rate`` the volume of both bodies [mm³] worn per cycle of the last step;
-    ``next_cycles`` how far a step that chooses its own length would go next. ``coarse`` is the
-    state that steps of twice the length have led to, None before the first one and where none have
-    been taken, and that of one that is half-way where both have begun its step; ``order`` that of
-    the error of all these steps.
+    Steps may be accompanied by a second run whose steps are twice as long, the coarse companion.
+    The difference of both runs estimates the error.
+
+    Parameters
+    ----------
+    surfaces
+        The worn surfaces.
+    energy
+        Energy that the contact has dissipated so far [N mm].
+    depth_rate, volume_rate
+        Largest depth [mm] of any body, and volume of both bodies [mm³], worn per cycle of the last
+        step.
+    next_cycles
+        Length of the next step [cycles], where steps choose their own length.
+    coarse
+        State of the coarse companion. It is None before the first step, and in runs without a
+        companion. A companion that has done the first half of its step stores here the state from
+        which that step began.
+    order
+        Order of the error of the steps.
     """
 
     surfaces: Surfaces
@@ -49,27 +63,32 @@ class WornState:
 
     @classmethod
     def unworn(cls, gap: Array, **further: Any) -> Self:
-        """Before the first cycle, at the ``gap`` of the unloaded bodies, by cell or node [mm].
+        """Return the state before the first cycle.
 
-        ``further`` are the fields that a subclass adds and has no default for.
+        Parameters
+        ----------
+        gap
+            Gap of the unloaded bodies, by cell or node [mm].
+        **further
+            Fields that a subclass adds without a default.
         """
         return cls(Surfaces.unworn(gap), 0.0, 0.0, 0.0, np.inf, **further)
 
     @property
     def companion(self) -> Self:
-        """Where steps of twice the length go on from."""
+        """State from which the coarse companion takes its next step."""
         return self if self.coarse is None else self.coarse
 
     @property
     def half_way(self) -> bool:
-        """Whether steps of twice the length are half-way through one: the next step ends it."""
+        """Whether the coarse companion has done only the first half of its step."""
         return self.companion.coarse is not None
 
     @property
     def errors(self) -> tuple[Array, Array]:
-        """Estimated errors of the depth of body 1 and body 2 [mm], by cell or node: 0 if unknown.
+        """Estimated errors of the depths of body 1 and body 2 [mm], by cell or node; 0 if unknown.
 
-        Those of a run by steps of order p are the difference to steps twice as long, over 2^p - 1.
+        For steps of order p the estimate is the difference to the coarse companion over 2^p - 1.
         """
         fine, coarse, share = self.surfaces, self.companion.surfaces, 1.0 / (2.0**self.order - 1.0)
         error_1, error_2 = (
@@ -84,7 +103,7 @@ State = TypeVar("State", bound=WornState)
 
 @dataclass(frozen=True)
 class WearStep(Generic[State]):
-    """A step, or several one after the other: ``state`` after it, ``cycles``, and what it took."""
+    """Result of one or several steps: the ``state`` after them, their ``cycles`` and their cost."""
 
     state: State
     cycles: float

@@ -1,4 +1,4 @@
-"""Contacts of like bodies that wear by energy: what several tests build, each with settings."""
+"""Contacts of similar bodies that wear by the energy law, as several tests build them."""
 
 from __future__ import annotations
 
@@ -8,8 +8,9 @@ import numpy as np
 
 from sa_solver.types import Array, ElasticPair, Grid, Material
 from wear.contact.drive import Drive
-from wear.contact.interface import InterfaceContact, InterfaceSettings
-from wear.contact.link import CellNodes
+from wear.contact.interface import InterfaceContact
+from wear.contact.settings import InterfaceSettings
+from wear.contact.transfer import CellNodes
 from wear.laws import EnergyLaw
 from wear.steps.implicit import ImplicitStepper
 
@@ -19,7 +20,7 @@ FRICTION, COEFFICIENT = 0.5, 1e-8
 
 
 def interface(grid: Grid, gap: Array, drive: Drive, **settings: Any) -> InterfaceContact:
-    """A contact over a gap that may be the same all along y, driven; the rest by its settings."""
+    """Return a driven contact over a gap, which may be constant along y."""
     usual: dict[str, Any] = {
         "name": "contact",
         "grid": grid,

@@ -7,10 +7,12 @@ import numpy as np
 from sa_solver.types import Array, ElasticPair, Grid, LoadHistory, Material
 from wear.contact.contacts import Contacts
 from wear.contact.face_loads import CycleLoads
-from wear.contact.interface import InterfaceContact, InterfaceSettings
-from wear.contact.link import CellNodes
-from wear.coupled import ConstantLoads, CoupledSettings, CoupledState, CoupledWear
+from wear.contact.interface import InterfaceContact
+from wear.contact.settings import InterfaceSettings
+from wear.contact.transfer import CellNodes
+from wear.coupled import CoupledSettings, CoupledState, CoupledWear
 from wear.laws import EnergyLaw
+from wear.load_sources import ConstantLoads
 from wear.steps.implicit import ImplicitStepper
 
 BODY = Material(115e3, 0.29)
@@ -23,13 +25,13 @@ RADIUS = 10.0
 
 
 def cylinder(**settings) -> InterfaceSettings:
-    """A line contact on 70 strips."""
+    """Return a line contact with 70 cells."""
     grid = Grid.strips(1.4, 70)
     return interface(grid, grid.x**2 / (2.0 * RADIUS), **settings)
 
 
 def patch(**settings) -> InterfaceSettings:
-    """A flat of 1 mm on a step that never touches."""
+    """Return a flat of 1 mm on a step that never touches."""
     grid = Grid.strips(1.2, 24)
     return interface(grid, np.where(np.abs(grid.x) < 0.5, 0.0, 1.0), **settings)
 
@@ -56,7 +58,7 @@ AREA = 1.0  # of the patch, per length
 
 
 class Falling:
-    """Loads of some patches that fall as they wear, each P0 (1 - h/h0), h its mean depth."""
+    """Loads of patches that fall with their mean worn depth h as P0 (1 - h/h0)."""
 
     def __init__(self, loads: tuple[float, ...], depth: float, grid: Grid) -> None:
         self._loads, self._depth, self._grid = loads, depth, grid
@@ -81,7 +83,7 @@ class Falling:
 
 
 def cycle(load: float, grid: Grid) -> CycleLoads:
-    """There and back as a whole, under a load."""
+    """Return a cycle of sliding forward and backward as a whole, under a load."""
     zero = np.zeros(2)
     slip = 0.5 * SLIP * np.array([1.0, -1.0])[:, None, None] * [[[1.0], [0.0]]]
     loads = LoadHistory(zero + load, *(zero,) * 7, sliding=np.ones(2, dtype=bool))
@@ -89,14 +91,14 @@ def cycle(load: float, grid: Grid) -> CycleLoads:
     return CycleLoads(loads, np.broadcast_to(slip, (2, 2, cells)).copy())
 
 
-def to_and_fro(load: float, grid: Grid) -> CycleLoads:
-    """There under a load, and back under less."""
+def forward_and_backward(load: float, grid: Grid) -> CycleLoads:
+    """Return a cycle of sliding forward under a load and backward under a smaller one."""
     there = cycle(load, grid)
     return replace(there, loads=replace(there.loads, P=load * np.array([1.0, 0.4])))
 
 
 def run(settings: CoupledSettings, source: Falling, contacts, *observers) -> list[CoupledState]:
-    """All states of a run, the unworn one first."""
+    """Return all states of a run, the unworn one first."""
     loop = CoupledWear(settings, source, in_turn(contacts), observers)
     state, _ = loop.begin(source.unworn())
     return [state, *loop.march(state)]
@@ -105,7 +107,7 @@ def run(settings: CoupledSettings, source: Falling, contacts, *observers) -> lis
 def run_constant(
     settings: CoupledSettings, load: float, contact: InterfaceSettings
 ) -> CoupledState:
-    """The end of a run of one contact under a constant load."""
+    """Return the end of a run of one contact under a constant load."""
     histories = [cycle(load, contact.grid)]
     loop = CoupledWear(settings, ConstantLoads(histories), in_turn([contact]))
     state, _ = loop.begin(histories)
@@ -119,7 +121,7 @@ def in_turn(contacts: list[InterfaceSettings]) -> Contacts:
 
 FALL = 1e-3  # h0 [mm]
 LOAD = 80.0
-# Cycles in which the volume comes to within 1/e of its end.
+# Cycles in which the remaining volume falls to 1/e.
 SCALE = AREA * FALL / (PER_LOAD * LOAD)
 
 

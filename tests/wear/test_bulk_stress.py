@@ -5,7 +5,7 @@ import pytest
 
 from sa_solver.half_space.operator import HalfSpace
 from sa_solver.types import Array, ElasticPair, Grid, LoadHistory, Material
-from wear.contact.link import CellNodes
+from wear.contact.transfer import CellNodes
 from wear.cracking.bulk_stress import RIGID, SIDE, BodyFace
 
 METAL = Material(115e3, 0.29)
@@ -21,10 +21,10 @@ def loaded(count: int, load: float) -> LoadHistory:
 def rest(
     grid: Grid, body: int, motion: Array, tractions: Array, expansion: Array | None = None
 ) -> tuple[Array, Array]:
-    """Stress below the cells of a body that moves so, beside its half-space's own motion.
+    """Return the stress below the cells of a body whose nodes move so, without the contact's own.
 
-    And the places of the cells; ``tractions`` ``(3, nx, ny)`` are known at the nodes, and maybe an
-    ``expansion`` ``(2, nx, ny)``.
+    Also return the places of the cells. The ``tractions`` ``(3, nx, ny)`` and, if given, the
+    ``expansion`` ``(2, nx, ny)`` are known at the nodes.
     """
     pair = (METAL, RIGID) if body == 1 else (RIGID, METAL)
     own = SIDE[body] * HalfSpace(grid, ElasticPair(*pair)).displacement(tractions)
@@ -40,7 +40,7 @@ def rest(
 
 @pytest.mark.parametrize("body", [1, 2])
 def test_bent_bar_with_a_contact_on_it(body: int) -> None:
-    """σ_xx = a + b z: u = a x + b x z, -ν (a + b z) y, ν b (y² - z²)/2 - ν a z - b x²/2, over E."""
+    """For σ_xx = a + b z, u E is a x + b x z, -ν (a + b z) y, ν b (y² - z²)/2 - ν a z - b x²/2."""
     a, b = 200.0, 70.0
     pressed = np.maximum(0.0, 1.0 - AREA.x**2 - AREA.y**2)
     tractions = np.stack([0.3 * pressed, -0.1 * pressed, pressed]) * 500.0
@@ -55,7 +55,7 @@ def test_bent_bar_with_a_contact_on_it(body: int) -> None:
 
 @pytest.mark.parametrize("body", [1, 2])
 def test_shear_follows_from_tension_that_grows_along_the_face(body: int) -> None:
-    """σ_xx = c x, σ_zx = -c z in plane strain: u_x = (1 - ν²) c x²/2E and u_z = 0 on the face."""
+    """With σ_xx = c x and σ_zx = -c z in plane strain, u_x = (1 - ν²) c x²/2E and u_z = 0 there."""
     c = 150.0
     pressed = 300.0 * np.maximum(0.0, 1.0 - LINE.x**2)
     tractions = np.stack([0.4 * pressed, 0.0 * pressed, pressed])
@@ -93,7 +93,7 @@ def test_free_expansion_stresses_nothing(body: int) -> None:
 
 
 def test_section_that_expands_presses_across_its_plane() -> None:
-    """Free in it, held across: (1 + ν) θ x, and stress -E θ along y alone."""
+    """A section held across its plane moves by (1 + ν) θ x, under -E θ along y alone."""
     motion, nothing = np.zeros((2, 3, *LINE.shape))
     motion[0] = (1.0 + NU) * 1e-3 * LINE.x
     expansion = np.stack([np.full(LINE.shape, 1e-3), np.zeros(LINE.shape)])

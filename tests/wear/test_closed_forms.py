@@ -1,18 +1,19 @@
-"""Worn shapes that are known: a patch, a cylinder and a sphere that slide without end.
+"""Worn shapes with closed forms: a patch, a cylinder and a sphere that slide without end.
 
 Both bodies together lose the depth W = κ p per cycle where they touch. A contact that has worn for
-long no longer depends on how it began, and p follows from how W grows.
+long no longer depends on how it began, and p follows from the growth of W.
 
-**A patch** of fixed outline, pressed flat. The gap stays closed: u + W is a plane, u = K p, so
-K p' + κ p = plane and p tends to the p of a W' that is a plane: uniform, P/A, if it may not tilt or
-is pressed in its middle. What is missing decays with the modes of K between pressures without
-force: exp(-κ N/λ), λ the eigenvalues (Goryacheva 1998, Contact Mechanics in Tribology, ch. 6).
+**A patch** of fixed outline, pressed flat. The gap stays closed: u + W is a plane and u = K p, so
+that K p' + κ p is a plane, and p tends to the pressure at which W' is a plane: it is uniform, P/A,
+if the patch may not tilt or is pressed at its centre. The deviation decays with the modes of K
+between pressures without resultant: exp(-κ N/λ), λ the eigenvalues (Goryacheva 1998, Contact
+Mechanics in Tribology, ch. 6).
 
 **A parabola** x²/2R or (x² + y²)/2R is closed over |x| < b or r < b: W = (b² - x²)/2R - [u(x) -
-u(b)]. Far from the first contact a, wear is much more than elastic deformation and the bodies
-conform, W = (b² - x²)/2R and V = (2/3) b³/R per length, or π b⁴/4R; W' is uniform, hence p = P/2b
-or P/π b². With u of that pressure (Johnson 1985, eqs 2.30b and 3.29), P/πE* = a²/4R and P/E* =
-4 a³/3R, the elastic deformation takes from them, to first order in ε = (a/b)² and (a/b)³,
+u(b)]. For b much larger than the first contact a, wear is much more than elastic deformation and
+the bodies conform, W = (b² - x²)/2R and V = (2/3) b³/R per length, or π b⁴/4R; W' is uniform, hence
+p = P/2b or P/π b². With u of that pressure (Johnson 1985, eqs 2.30b and 3.29), P/πE* = a²/4R and
+P/E* = 4 a³/3R, the elastic deformation reduces them, to first order in ε = (a/b)² and (a/b)³, to
 
     cylinder  V = (2/3) (b³/R) (1 - 3ε/4)        W(0) = (b²/2R) (1 - ε ln 2)
     sphere    V = (π b⁴/4R) (1 - 64 ε/9π²)       W(0) = (b²/2R) (1 - (16/3π)(1 - 2/π) ε)
@@ -47,19 +48,19 @@ KAPPA = COEFFICIENT * FRICTION * 2.0 * STROKE
 
 
 def unworn(grid: Grid, form: Array) -> WearState:
-    """Before the first cycle."""
+    """Return the state before the first cycle."""
     return WearState.unworn(np.ascontiguousarray(np.broadcast_to(form, grid.shape)))
 
 
 def cycle_of(load: float, increments: int) -> LoadHistory:
-    """A cycle of equal increments."""
+    """Return a cycle of equal increments."""
     zero = np.zeros(increments)
     columns = dict.fromkeys(("Qx", "Qy", "Mx", "My", "Mz", "Edx", "Edy"), zero)
     return LoadHistory(P=zero + load, **columns, sliding=np.ones(increments, dtype=bool))
 
 
 class March:
-    """A form that slides as a whole and wears implicitly, the two bodies in given shares."""
+    """A form that slides as a whole and wears implicitly, with given shares of both bodies."""
 
     def __init__(
         self, grid: Grid, form: Array, load: float, shares: tuple[float, float] = (1.0, 1.0)
@@ -74,10 +75,10 @@ class March:
         self._state = self._wearing.implicit_step(self._state, cycles).state
 
     def to_volume(self, volume: float, load: float, steps: int) -> float:
-        """Wear this much of both bodies together, in steps that grow with the contact.
+        """Wear a given volume of both bodies together, in steps that grow with the contact.
 
-        Returns the volume in the middle of the last step: the pressure of an implicit step is the
-        depth it wears, and so that of its middle but for the square of the step.
+        Return the volume in the middle of the last step: the pressure of an implicit step is that
+        of its middle, but for the square of the step.
         """
         cycles = volume / (2.0 * KAPPA * load) * np.linspace(0.0, 1.0, steps + 1) ** 2
         for jump in np.diff(cycles):
@@ -101,7 +102,7 @@ class March:
 
 
 def punch(grid: Grid, half_width: float, half_length: float = np.inf) -> Array:
-    """A flat on a step that never touches."""
+    """Return a flat punch on a step that never touches."""
     return np.where((np.abs(grid.x) < half_width) & (np.abs(grid.y) < half_length), 0.0, 1.0)
 
 
@@ -134,9 +135,9 @@ def test_pressure_on_a_fixed_patch_tends_to_uniform(grid: Grid, form: Array, are
 
 
 def test_pressure_on_a_patch_becomes_uniform_as_its_modes_decay() -> None:
-    """Backward Euler divides each mode by 1 + 2κΔN/λ a step: exact, and first order in ΔN.
+    """Backward Euler divides each mode by 1 + 2κΔN/λ per step: exact, and of first order in ΔN.
 
-    λ from the dense compliance, between pressures that are even in x and carry no force.
+    λ comes from the dense compliance, between pressures that are even in x and have no resultant.
     """
     grid, load, jump = Grid.strips(1.2, 60), 100.0, 1.0
     form = punch(grid, 0.5)
@@ -145,7 +146,7 @@ def test_pressure_on_a_patch_becomes_uniform_as_its_modes_decay() -> None:
     space = HalfSpace(grid, PAIR)
     units = np.eye(grid.shape[0])[on].reshape(-1, *grid.shape)
     compliance = np.stack([space.normal(unit).ravel()[on] for unit in units], axis=1)
-    # Without force and moment: what a plane can take up.
+    # Remove resultant and moment, which a rigid motion of the patch carries.
     plane = np.stack([np.ones(len(on)), grid.x.ravel()[on]], axis=1)
     free = scipy.linalg.null_space(plane.T)
     lengths, modes = np.linalg.eigh(free.T @ compliance @ free)
@@ -163,7 +164,7 @@ def test_pressure_on_a_patch_becomes_uniform_as_its_modes_decay() -> None:
 
 @pytest.mark.parametrize("shares", [(1.0, 1.0), (0.0, 2.0), (1.5, 0.5)])
 def test_a_cylinder_becomes_conforming(shares: tuple[float, float]) -> None:
-    """At a/b = 0.2, whichever body wears: 0.2 % of depth and pressure, a cell of the width."""
+    """At a/b = 0.2 depth and pressure are met to 0.2 %, and the width to a cell, on either body."""
     grid, load, volume = Grid.strips(1.4, 140), 50.0, 2.0 / 3.0 * 0.5**3 / RADIUS
     march = March(grid, grid.x**2 / (2.0 * RADIUS), load, shares)
     middle = march.to_volume(volume, load, 60)
@@ -174,7 +175,7 @@ def test_a_cylinder_becomes_conforming(shares: tuple[float, float]) -> None:
     np.testing.assert_allclose(march.pressure[65:75], pressure, rtol=2e-3)
     half = 0.5 * np.count_nonzero(march.depth) * grid.pitch[0]
     assert half == pytest.approx(b, abs=grid.pitch[0])
-    # Each body by its own share.
+    # Each body wears by its own share.
     whole = sum(shares)
     np.testing.assert_allclose(march.surfaces.depth_1, shares[0] / whole * march.depth, atol=1e-15)
 
@@ -195,7 +196,7 @@ def test_a_sphere_becomes_conforming() -> None:
 
 @pytest.mark.slow
 def test_the_worn_cylinder_converges_with_grid_and_jumps() -> None:
-    """Depth with pitch and steps refined together: first order, to within the (a/b)⁴ left out."""
+    """The depth converges in first order with pitch and steps, to within the (a/b)⁴ neglected."""
     load, volume = 50.0, 2.0 / 3.0 * 0.5**3 / RADIUS
     _, depth, _ = worn_cylinder(load, volume, RADIUS, MODULUS)
     errors = []
@@ -211,8 +212,10 @@ def test_the_worn_cylinder_converges_with_grid_and_jumps() -> None:
 
 
 def test_symmetric_problems_stay_symmetric_over_100_jumps() -> None:
-    """To 1e-8 of the depth, about both axes and both diagonals, from the first contact to one three
-    times as wide."""
+    """Symmetry holds to 1e-8 of the depth while the contact grows to three times its width.
+
+    It is that about both axes and both diagonals.
+    """
     grid, load = Grid.covering((1.0, 1.0), (25, 25)), 20.0
     march = March(grid, (grid.x**2 + grid.y**2) / (2.0 * RADIUS), load)
     march.to_volume(0.25 * np.pi * 0.4**4 / RADIUS, load, 100)
@@ -225,12 +228,12 @@ def test_symmetric_problems_stay_symmetric_over_100_jumps() -> None:
 
 
 class MovingMarch:
-    """As March, over a stroke that is not small: body 1 passes under the grid of body 2."""
+    """March over a stroke that is not small: body 1 passes under the grid of body 2."""
 
     def __init__(
         self, grid: Grid, form: Array, load: float, stroke: float, each_way: int, share: float
     ) -> None:
-        """``share`` of the wear is body 1's."""
+        """Set up the march; ``share`` of the wear is body 1's."""
         out = np.linspace(-0.5 * stroke, 0.5 * stroke, each_way + 1)
         x = np.concatenate([out, out[-2::-1]])
         path = np.stack([x, np.zeros_like(x)], axis=1)
@@ -244,7 +247,7 @@ class MovingMarch:
         self._per_cycle = COEFFICIENT * FRICTION * load * 2.0 * stroke
 
     def to_volume(self, volume: float, steps: int, kind: str = "implicit") -> None:
-        """Wear this much of both bodies together."""
+        """Wear a given volume of both bodies together."""
         cycles = volume / self._per_cycle * np.linspace(0.0, 1.0, steps + 1) ** 2
         for jump in np.diff(cycles):
             step = getattr(self._wearing, f"{kind}_step")
@@ -261,7 +264,7 @@ class MovingMarch:
 
 @pytest.mark.parametrize("stroke", [0.1, slow(2.0)])
 def test_a_flat_that_does_not_wear_stays_out_of_it(stroke: float) -> None:
-    """Only the cylinder wears: its shape is that of small strokes, however far it slides."""
+    """If only the cylinder wears, its shape is that of small strokes, however far it slides."""
     width = 1.4 + stroke
     grid, load = Grid.strips(width, round(width / 0.02)), 50.0
     volume = 2.0 / 3.0 * 0.5**3 / RADIUS
@@ -274,11 +277,11 @@ def test_a_flat_that_does_not_wear_stays_out_of_it(stroke: float) -> None:
 
 @pytest.mark.parametrize("stroke", [1.5, slow(3.0)])
 def test_over_a_long_stroke_the_slider_wears_alone_and_the_flat_evenly(stroke: float) -> None:
-    """The worn flat is flat but at its ends: the cylinder is worn as on a new one, by its own
-    volume, to the half width b; the flat V1/s deep, and as far as the cylinder goes, b + s/2.
+    """The cylinder wears as on a new flat, and the flat evenly except for its ends.
 
-    The ends take 2b of the stroke, where the walls, W(0) 4b/3s high, carry some of the load: the
-    slider is as given but for (b/s)².
+    The cylinder's own volume gives its half width b. The flat is V1/s deep, up to b + s/2. The ends
+    take 2b of the stroke, where the walls, W(0) 4b/3s high, carry some of the load: the slider's
+    form is accurate to (b/s)².
     """
     width, load, volume = stroke + 1.2, 20.0, 2.0 / 3.0 * 0.3**3 / RADIUS
     grid = Grid.strips(width, round(width / 0.02))
@@ -298,9 +301,9 @@ def test_over_a_long_stroke_the_slider_wears_alone_and_the_flat_evenly(stroke: f
 
 @pytest.mark.slow
 def test_neglecting_the_motion_costs_the_square_of_the_stroke() -> None:
-    """The motion counts for less than 1 % at a stroke of a tenth of the contact.
+    """At a stroke of a tenth of the contact the motion matters by less than 1 %.
 
-    :data:`wear.contact.moving.LARGE_STROKE` rests on this.
+    :data:`wear.contact.moving.LARGE_STROKE` relies on this.
     """
     grid, load, volume = Grid.strips(1.6, 80), 50.0, 2.0 / 3.0 * 0.5**3 / RADIUS
     form = grid.x**2 / (2.0 * RADIUS)

@@ -1,12 +1,12 @@
-"""The coupled loop, driven by sources of loads that are formulas.
+"""The coupled loop, with sources of loads that are formulas.
 
-**A cylinder** that slides as a whole under a constant load: its worn shape is known
+**A cylinder** that slides as a whole under a constant load has a known worn shape
 (``tests/wear/test_closed_forms.py``).
 
-**A flat patch** of area A, pressed by a load that falls linearly with the mean depth worn off it,
-P = P0 (1 - h/h0) with h = V/A. It slides as a whole, so that the volume per cycle is c P, whatever
-the pressure is like: V' = c P0 (1 - V/(A h0)), V = A h0 (1 - exp(-N/N0)), N0 = A h0/(c P0). Loads
-that stay the same during a jump are Euler's method on that.
+**A flat patch** of area A is pressed by a load that falls linearly with its mean worn depth, P = P0
+(1 - h/h0) with h = V/A. It slides as a whole, so that the volume per cycle is c P whatever the
+pressure distribution: V' = c P0 (1 - V/(A h0)), V = A h0 (1 - exp(-N/N0)), N0 = A h0/(c P0). Loads
+that stay constant during a jump are Euler's method for this equation.
 """
 
 import subprocess
@@ -54,7 +54,7 @@ from wear.steps.stepping import ContactFailure
 
 
 def test_a_cylinder_wears_to_its_closed_form() -> None:
-    """Under a constant load, in automatic steps of 1 %; α times energy is exact."""
+    """A cylinder in automatic steps meets the closed form to 1 %, and its volume exactly."""
     load, volume = 50.0, 2.0 / 3.0 * 0.5**3 / RADIUS
     contact = cylinder(stepper=ImplicitStepper(ErrorControl(0.01)))
     settings = CoupledSettings(volume / (PER_LOAD * load))
@@ -71,7 +71,7 @@ def test_a_cylinder_wears_to_its_closed_form() -> None:
 
 
 def test_volume_is_coefficient_times_energy() -> None:
-    """Of both bodies, after every jump; energy is µ P s of all cycles so far."""
+    """The volume of both bodies follows from the energy µ P s of all cycles after every jump."""
     load = 50.0
     end = run_constant(CoupledSettings(1e6, JumpSize(2.5e5)), load, cylinder())
     _, _, volume_1, volume_2, energy = end.kinetics[:, 0].T
@@ -82,7 +82,7 @@ def test_volume_is_coefficient_times_energy() -> None:
 
 
 def exact_volume(cycles: float) -> float:
-    """Of the patch, by an integrator of its own."""
+    """Return the volume of the patch by an independent integrator."""
 
     def rate(_: float, volume: Array) -> Array:
         return PER_LOAD * LOAD * (1.0 - volume / (AREA * FALL))
@@ -92,7 +92,7 @@ def exact_volume(cycles: float) -> float:
 
 
 def test_loads_that_fall_with_wear_follow_their_differential_equation() -> None:
-    """Solved again after every jump: Euler's method, exactly, and of first order."""
+    """Loads solved after every jump are exactly Euler's method, and converge in first order."""
     errors = []
     for jumps in (5, 10, 20):
         jump = SCALE / jumps
@@ -110,7 +110,7 @@ def test_loads_that_fall_with_wear_follow_their_differential_equation() -> None:
 
 @pytest.mark.parametrize("drift", [0.02, 0.1, 0.3])
 def test_drift_asks_for_as_many_solutions_as_it_should(drift: float) -> None:
-    """The loads that a run should have had, by the rule alone."""
+    """The number of solutions is that of the drift rule applied to the known loads."""
     jumps, source = 25, falling()
     jump = 2.0 * SCALE / jumps
     settings = CoupledSettings(2.0 * SCALE, JumpSize(jump), drift=drift)
@@ -139,13 +139,13 @@ def test_constant_resultants_are_never_asked_for_again() -> None:
     assert end.volume == pytest.approx(PER_LOAD * LOAD * SCALE, rel=1e-8)
 
 
-def test_a_source_is_told_of_friction_that_changes() -> None:
-    """One coefficient per contact, after what each has dissipated."""
-    told = []
+def test_a_source_receives_changing_friction() -> None:
+    """The source receives one coefficient per contact, by the energy that each has dissipated."""
+    reported = []
 
     class Listening(Falling):
         def worn(self, depths, friction=None):
-            told.append(friction)
+            reported.append(friction)
             return super().worn(depths, friction)
 
     def friction(energy: float) -> float:
@@ -158,14 +158,14 @@ def test_a_source_is_told_of_friction_that_changes() -> None:
     )
     states = run(settings, source, contacts)
     energies = states[-1].kinetics[1:, :, 4]
-    np.testing.assert_allclose(told, FRICTION * (1.0 + energies))
+    np.testing.assert_allclose(reported, FRICTION * (1.0 + energies))
 
 
 # --- observers ------------------------------------------------------------------------------------
 
 
 class Diary(Observer):
-    """Writes down all that happens."""
+    """Observer that records all events."""
 
     def __init__(self) -> None:
         self.events: list[tuple] = []
@@ -208,7 +208,7 @@ def test_observers_see_every_state_once_and_in_order() -> None:
 
 
 def test_an_observer_may_be_anything() -> None:
-    """It has methods for all that happens, which do nothing."""
+    """The base class has methods for all events, which do nothing."""
     run(CoupledSettings(SCALE), falling(), [patch()], Observer())
 
 
@@ -216,7 +216,7 @@ def test_an_observer_may_be_anything() -> None:
 
 
 def numbers(state: InterfaceState) -> dict[str, object]:
-    """All that a state is, by name."""
+    """Return all numbers of a state by name."""
     parts: dict[str, object] = {}
     for name, value in vars(state).items():
         if name in ("surfaces", "loads", "link") or isinstance(value, CycleStart):
@@ -232,7 +232,7 @@ def numbers(state: InterfaceState) -> dict[str, object]:
 
 
 def same(one: InterfaceState, other: InterfaceState) -> None:
-    """Bit for bit."""
+    """Return whether two states are identical bit for bit."""
     mine, its = numbers(one), numbers(other)
     assert mine.keys() == its.keys()
     for name, value in mine.items():
@@ -240,8 +240,8 @@ def same(one: InterfaceState, other: InterfaceState) -> None:
 
 
 @pytest.mark.parametrize("method", ["normal", slow("full")])
-def test_going_on_from_any_state_ends_bit_for_bit_alike(method: str) -> None:
-    """Two contacts under loads that drift, with contacts and source made anew."""
+def test_resuming_from_any_state_ends_bit_for_bit_the_same(method: str) -> None:
+    """Two contacts under drifting loads resume bit for bit, with new contacts and a new source."""
     loads, control = (LOAD, 0.6 * LOAD), ErrorControl(0.02)
     motions = np.zeros((2, 6))
     motions[:, 1] = [-0.25 * SLIP, 0.25 * SLIP]
@@ -294,7 +294,7 @@ def test_a_law_that_changes_from_place_to_place_does_not_move() -> None:
 
 @pytest.mark.slow
 def test_it_needs_neither_cases_nor_finite_elements() -> None:
-    """All of this file, imported and a run of it made, in a process of its own."""
+    """Running this file in a process of its own imports neither of them."""
     code = f"""
 import runpy, sys
 scene = runpy.run_path({str(Path(__file__))!r})

@@ -1,6 +1,4 @@
-"""Contacts driven by forces and motions of a closed cycle: against marches of the same history, and
-limits of wear with closed forms.
-"""
+"""Contacts driven by forces and motions: other marches of a history, and closed forms."""
 
 from dataclasses import replace
 from typing import Any
@@ -25,7 +23,7 @@ SPHERE = (BALL.x**2 + BALL.y**2) / (2.0 * RADIUS)
 
 
 def loads_of(**columns: list[float]) -> LoadHistory:
-    """Forces of a cycle; those that are not named are 0."""
+    """Return the forces of a cycle; those that are not given are 0."""
     count = len(next(iter(columns.values())))
     names = ("P", "Qx", "Qy", "Mx", "My", "Mz", "Edx", "Edy")
     given = {name: np.array(columns.get(name, np.zeros(count)), dtype=float) for name in names}
@@ -33,16 +31,16 @@ def loads_of(**columns: list[float]) -> LoadHistory:
 
 
 def interface(gap: Array, drive: Drive, grid: Grid = BALL, **settings: Any) -> InterfaceContact:
-    """A contact whose motion wears it in place."""
+    """Return a contact whose motion wears it in place."""
     return contacts.interface(grid, gap, drive, follow=False, tolerance=1e-8, **settings)
 
 
 # --- cycles ---------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("other", [BODY, STEEL], ids=["alike", "unlike"])
+@pytest.mark.parametrize("other", [BODY, STEEL], ids=["similar", "dissimilar"])
 def test_forces_and_the_motions_that_they_make_are_one_problem(other: Material) -> None:
-    """P, Q, moments and bulk stress; then the rigid motions they have led to, imposed."""
+    """Imposing the rigid motions that forces and bulk stress have caused gives the same contact."""
     loads = loads_of(
         P=[60.0, 80.0, 60.0, 0.0],
         Qx=[15.0, -20.0, 5.0, 0.0],
@@ -63,7 +61,7 @@ def test_forces_and_the_motions_that_they_make_are_one_problem(other: Material) 
 
 
 def test_bodies_that_part_meet_where_their_motion_has_led_them() -> None:
-    """Moved by 1 mm while apart: no slip, no shear. And back: the same again."""
+    """Bodies moved by 1 mm while apart meet without slip and shear; moved back, as before."""
     loads = loads_of(P=[50.0, 50.0, 0.0, 50.0, 0.0])
     motions = np.zeros((5, 6))
     motions[:, 1] = [0.0, 2e-4, 1.0, 1.0, 0.0]
@@ -71,15 +69,15 @@ def test_bodies_that_part_meet_where_their_motion_has_led_them() -> None:
     contact = FrictionalContact(HalfSpace(BALL, PAIR), FRICTION)
     states = march_cycle(contact, SPHERE, loads, drive)
     assert not states[0].shear.any()
-    assert states[1].resultants[1] > 1.0  # body 1 takes body 2 along
+    assert states[1].resultants[1] > 1.0  # body 1 drags body 2 along
     assert not states[2].traction.any()
     assert not states[3].shear.any()
     np.testing.assert_allclose(states[3].pressure, states[0].pressure, rtol=1e-6)
 
 
-@pytest.mark.parametrize("other", [BODY, STEEL], ids=["alike", "unlike"])
+@pytest.mark.parametrize("other", [BODY, STEEL], ids=["similar", "dissimilar"])
 def test_a_cycle_that_creeps_is_marched_until_it_repeats(other: Material) -> None:
-    """Pressure that swings while shear turns: two passes leave ten times as much."""
+    """With pressure that varies while shear rotates, two passes are not enough."""
     loads = loads_of(
         P=[40.0, 85.0, 55.0, 35.0, 80.0, 60.0],
         Qx=[15.0, -30.0, 20.0, -14.0, 25.0, -10.0],
@@ -99,7 +97,7 @@ def test_a_cycle_that_creeps_is_marched_until_it_repeats(other: Material) -> Non
 
 
 def test_a_held_approach_wears_until_nothing_is_pressed() -> None:
-    """Both surfaces together then miss what interpenetrated: δ - h, and the force is gone."""
+    """Both surfaces together then lack the interpenetration δ - h, and the force is 0."""
     approach, motions = 2e-3, np.zeros((2, 6))
     motions[:, 0], motions[:, 1] = approach, [0.01, -0.01]
     drive = Drive((True, True, True, True, True, True), motions)
@@ -116,17 +114,17 @@ def test_a_held_approach_wears_until_nothing_is_pressed() -> None:
     np.testing.assert_allclose(state.surfaces.depth, np.maximum(approach - SPHERE, 0.0), atol=2e-6)
     assert np.all(np.diff(carried) < 0.0)
     assert carried[-1] < 2e-3 * carried[0]
-    # The unworn force is Hertz's, to what 20 cells make of it.
+    # The unworn force is Hertz's, within the error of 20 cells.
     hertz = 4.0 / 3.0 * PAIR.contact_modulus * np.sqrt(RADIUS) * approach**1.5
     assert carried[0] == pytest.approx(hertz, rel=0.02)
 
 
 def test_partial_slip_wears_a_cylinder_down_to_its_stick_zone() -> None:
-    """Goryacheva, Rajeev and Farris 2001: what slips wears off, and |x| < c carries all of P.
+    """Slipping cells wear off until |x| < c carries all of P (Goryacheva, Rajeev and Farris 2001).
 
-    There the surfaces are as new and touch over a width 2c of their own: p = E*/2R √(c² - x²) +
-    (P - π E* c²/4R) / (π √(c² - x²)), with c/a = √(1 - Q/µP), Cattaneo's, as long as Q stays. Cells
-    of c/16 leave 1.4 %.
+    There the surfaces are unworn and touch over a width 2c of their own: p = E*/2R √(c² - x²) + (P
+    - π E* c²/4R) / (π √(c² - x²)), with Cattaneo's c/a = √(1 - Q/µP) as long as Q is constant. The
+    error with cells of c/16 is 1.4 %.
     """
     load, shear = 400.0, 100.0
     modulus, grid = PAIR.contact_modulus, Grid.strips(0.9, 72)
@@ -149,7 +147,7 @@ def test_partial_slip_wears_a_cylinder_down_to_its_stick_zone() -> None:
 
 
 def test_a_cycle_of_forces_wears_what_its_friction_dissipates() -> None:
-    """V = 2 α E with both bodies, under P that changes and Q that turns."""
+    """Both bodies together lose V = 2 α E under P that changes and Q that rotates."""
     loads = loads_of(P=[40.0, 60.0, 40.0], Qx=[12.0, 0.0, -12.0], Qy=[0.0, 15.0, -5.0])
     contact = interface(SPHERE, Drive.by_forces("held"), method="full")
     state, _ = contact.begin(CycleLoads(loads, np.zeros((3, 2, 400))), 1e4)
@@ -160,7 +158,7 @@ def test_a_cycle_of_forces_wears_what_its_friction_dissipates() -> None:
     assert volume == pytest.approx(2.0 * 1e-8 * state.energy, rel=1e-9)
 
 
-def test_more_shear_than_friction_carries_is_told() -> None:
+def test_more_shear_than_friction_carries_is_reported() -> None:
     loads = loads_of(P=[40.0, 40.0], Qx=[21.0, -21.0])
     contact = interface(SPHERE, Drive.by_forces("held"), method="full")
     history = CycleLoads(loads, np.zeros((2, 2, 400)))

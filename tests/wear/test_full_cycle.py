@@ -1,4 +1,4 @@
-"""A cycle with the half-space's own friction: energies, closure, unlike bodies."""
+"""A cycle with the half-space's own friction: energies, closure, dissimilar bodies."""
 
 import pickle
 from dataclasses import replace
@@ -21,13 +21,13 @@ GAP = (
 )
 FRICTION = 0.4
 P = np.array([8e3, 16e3, 12e3, 8e3, 4e3, 0.0])
-# Slides outwards while the load grows, sticks when it turns, slides back before the end.
+# The flank slides outward while the load grows, sticks when it turns, and slides back at the end.
 SHARE = np.array([-1.0, -1.0, -0.5, 0.3, 1.0, 0.0])
 ENERGY = np.array([2.0, 40.0, 0.1, 0.1, 15.0, 0.0])
 
 
 def mission(last: float = 0.0) -> LoadHistory:
-    """A flank's cycle; ``last`` is the load it ends with."""
+    """Return a flank's cycle; ``last`` is the load it ends with."""
     load = P.copy()
     load[-1] = last
     zero = np.zeros(len(P))
@@ -48,9 +48,9 @@ def contact(pair: ElasticPair) -> FrictionalContact:
     return FrictionalContact(HalfSpace(GRID, pair), FRICTION)
 
 
-@pytest.mark.parametrize("first", [TITANIUM, STEEL], ids=["alike", "unlike"])
+@pytest.mark.parametrize("first", [TITANIUM, STEEL], ids=["similar", "dissimilar"])
 def test_sliding_dissipates_what_the_structure_does(first):
-    """Pressing unlike bodies turns some of the shear of a sliding flank sideways."""
+    """The energies are met, although pressing dissimilar bodies rotates some of the shear."""
     loads = mission()
     states = march_cycle(contact(ElasticPair(first, TITANIUM)), GAP, loads)
     assert [state.sliding for state in states] == loads.sliding.tolist()
@@ -75,7 +75,7 @@ def test_what_sticks_carries_the_given_force():
 
 
 def test_a_cycle_that_ends_loaded_is_closed():
-    """One more increment repeats the first: what a sliding contact forgets, to 1e-3 of µp."""
+    """One more increment repeats the first to 1e-3 of µp, as well as sliding forgets."""
     pair = ElasticPair(TITANIUM, TITANIUM)
     loads = mission(last=4e3)
     states = march_cycle(contact(pair), GAP, loads)
@@ -89,7 +89,7 @@ def test_a_cycle_that_ends_loaded_is_closed():
 
 
 def test_the_next_pass_knows_the_last_one():
-    """Pressures are then found at once."""
+    """With the states of the last pass as start, pressures are found at once."""
     loads, solver = mission(last=4e3), contact(ElasticPair(TITANIUM, TITANIUM))
     loads = replace(loads, Edx=0.0 * ENERGY, sliding=np.zeros(len(P), bool))
     loads = replace(loads, Qx=0.5 * loads.Qx)
@@ -104,9 +104,12 @@ def test_the_next_pass_knows_the_last_one():
     assert sum(passed.convolutions for passed in passes) < 0.75 * convolutions
 
 
-@pytest.mark.parametrize("first", [TITANIUM, STEEL], ids=["alike", "unlike"])
+@pytest.mark.parametrize("first", [TITANIUM, STEEL], ids=["similar", "dissimilar"])
 def test_a_cycle_is_found_again_from_what_is_kept_of_it(first):
-    """The same, at a sixth of the work; on surfaces worn by 10 nm at less than cold."""
+    """A stored start gives the same cycle at a sixth of the cost.
+
+    On surfaces worn by 10 nm it costs less than without a start.
+    """
     loads, solver = mission(), contact(ElasticPair(first, TITANIUM))
     found = march_cycle(solver, GAP, loads)
     pressed = {t: state.pressed for t, state in enumerate(found) if loads.P[t] > 0.0}
@@ -143,20 +146,20 @@ def test_an_increment_that_fails_is_named(monkeypatch):
         march_cycle(failing, GAP, mission())
 
 
-@pytest.mark.parametrize("first", [TITANIUM, STEEL], ids=["alike", "unlike"])
-def test_energy_that_is_not_met_is_told(monkeypatch, first):
-    """One contact problem is too few for the elastic part to be known."""
+@pytest.mark.parametrize("first", [TITANIUM, STEEL], ids=["similar", "dissimilar"])
+def test_energy_that_is_not_met_is_reported(monkeypatch, first):
+    """With a limit of one contact problem the elastic part stays unknown, which is reported."""
     monkeypatch.setattr("sa_solver.tangential.gross_slip.ITERATIONS", 1)
     with pytest.raises(ContactFailure, match=r"increment 1: .*energy off by .*smaller increments"):
         march_cycle(contact(ElasticPair(first, TITANIUM)), GAP, mission())
 
 
-@pytest.mark.parametrize("first", [TITANIUM, STEEL], ids=["alike", "unlike"])
+@pytest.mark.parametrize("first", [TITANIUM, STEEL], ids=["similar", "dissimilar"])
 @pytest.mark.parametrize("column", ["Qy", "My"])
-def test_loads_that_no_contact_carries_are_told(first, column):
-    """Shear that friction cannot carry in an increment that does not slide; moments off the face.
+def test_loads_that_no_contact_carries_are_reported(first, column):
+    """Shear that friction cannot carry without sliding, and moments outside the face, are reported.
 
-    The failure reaches the process that asked for the contact, whole.
+    The failure also reaches the process that asked for the contact, with its message.
     """
     loads = replace(mission(), Edx=np.zeros(len(P)), Qx=0.1 * SHARE * FRICTION * mission().P)
     values = np.where(np.arange(len(P)) == 2, 1e6, 0.0)
@@ -174,10 +177,10 @@ WITHOUT_NU = Material(200e3, 0.0)
 
 
 def to_and_fro_over_a_ridge(grid: Grid, pair: ElasticPair, P: float, each_way: int) -> list[Array]:
-    """Energy of a cycle over a ridge of body 1, and 4µPA less what is lost at the two reversals.
+    """Return the energy of a cycle over a ridge of body 1, and 4µPA less the loss at two reversals.
 
-    Where all slides, shear is µp, which displaces the surfaces by u = K µp. Each place slides by
-    what the bodies move but for the change of u, -2u at a reversal: 4µPA - 2 Σ_ends Σ µp u S.
+    Where all slides, shear is µp, which displaces the surfaces by u = K µp. Each point slides by
+    the motion of the bodies but for the change of u, -2u at a reversal: 4µPA - 2 Σ_ends Σ µp u S.
     """
     t = np.arange(1, each_way + 1) / each_way
     shift = AMPLITUDE * np.concatenate([1.0 - 2.0 * t, 2.0 * t - 1.0])
@@ -204,11 +207,11 @@ def to_and_fro_over_a_ridge(grid: Grid, pair: ElasticPair, P: float, each_way: i
         (LINE, ElasticPair(STEEL, Material(70e3, 0.3)), 18.5),
         (AREA, ElasticPair(WITHOUT_NU, WITHOUT_NU), 4.0),
     ],
-    ids=["line", "unlike", "area"],
+    ids=["line", "dissimilar", "area"],
 )
 @pytest.mark.parametrize("each_way", [4, 8])
 def test_cells_that_part_dissipate_until_they_do(grid, pair, P, each_way):
-    """With their slip left out 2 to 11 % are missing."""
+    """Without the slip of separating cells 2 to 11 % of the energy would be missing."""
     energy, expected = to_and_fro_over_a_ridge(grid, pair, P, each_way)
     assert energy == pytest.approx(expected, rel=2e-3 if each_way == 4 else 1e-3)
 

@@ -1,4 +1,4 @@
-"""How long the jumps of the coupled loop are, where they stop, and how many are foreseen."""
+"""Length of the jumps of the coupled loop, their stops, and the forecast of their number."""
 
 from itertools import islice
 from types import SimpleNamespace
@@ -15,13 +15,14 @@ from tests.wear.formula_loads import (
     cycle,
     cylinder,
     falling,
+    forward_and_backward,
     in_turn,
     patch,
     run,
     run_constant,
-    to_and_fro,
 )
-from wear.coupled import AT_STOP, ConstantLoads, CoupledSettings, CoupledWear, JumpSize, Stop
+from wear.coupled import AT_STOP, CoupledSettings, CoupledWear, JumpSize, Stop
+from wear.load_sources import ConstantLoads
 from wear.steps.implicit import ImplicitStepper
 from wear.steps.step_errors import ErrorControl
 
@@ -29,7 +30,7 @@ from wear.steps.step_errors import ErrorControl
 @pytest.mark.parametrize("jump", [None, 0.37 * SCALE])
 @pytest.mark.parametrize("stop", [Stop(volume=4e-4), Stop(depth=3.1e-4)])
 def test_a_stop_is_met_to_a_thousandth(stop: Stop, jump: float | None) -> None:
-    """Whatever the jumps, and although the loads fall on the way."""
+    """The stop is met whatever the jumps, and although the loads fall on the way."""
     contact = patch(stepper=ImplicitStepper(ErrorControl(0.01)))
     settings = CoupledSettings(10.0 * SCALE, JumpSize(jump), stop, "every")
     states = run(settings, falling(), [contact])
@@ -44,7 +45,7 @@ def test_a_stop_is_met_to_a_thousandth(stop: Stop, jump: float | None) -> None:
     ("size", "column"), [(JumpSize(volume=1e-4), slice(2, 4)), (JumpSize(depth=6e-5), slice(0, 1))]
 )
 def test_jumps_may_be_as_long_as_they_wear(size: JumpSize, column: slice) -> None:
-    """Volumes of a jump are known from its rates, depths nearly: pressures even out."""
+    """The volume of a jump follows exactly from its rate, the depth nearly: pressures even out."""
     settings = CoupledSettings(SCALE, size, resultants="constant")
     end = run_constant(settings, LOAD, patch())
     worn = np.diff(end.kinetics[:, 0, column].sum(axis=1))
@@ -64,7 +65,10 @@ def test_jumps_may_be_as_long_as_they_wear(size: JumpSize, column: slice) -> Non
 def test_jumps_that_are_left_are_foreseen(
     jump: JumpSize, tolerance: float | None, left: list[int] | None
 ) -> None:
-    """Of given ones all; where they grow, within a factor of two from the third on."""
+    """The estimate is exact for given jumps, and within a factor of two for growing ones.
+
+    The latter holds from the third jump on.
+    """
     control = None if tolerance is None else ErrorControl(tolerance)
     settings = CoupledSettings(SCALE, jump, resultants="constant")
     histories = [cycle(LOAD, patch().grid)]
@@ -80,7 +84,7 @@ def test_jumps_that_are_left_are_foreseen(
 
 
 def test_jumps_that_grow_are_foreseen_as_they_grow() -> None:
-    """Of 1, 2, 4 and 8 cycles sixteen more come to 2^20 - 1; of equal ones as many as are left."""
+    """After jumps of 1, 2, 4 and 8 cycles sixteen more reach 2^20 - 1; equal ones are counted."""
     settings = CoupledSettings(2.0**20 - 1.0)
     loop = CoupledWear(settings, ConstantLoads([]), in_turn([]))
     steady = SimpleNamespace(half_way=False, depth_rate=0.0, volume_rate=0.0)
@@ -91,13 +95,13 @@ def test_jumps_that_grow_are_foreseen_as_they_grow() -> None:
         assert loop.jumps_left(state) == pytest.approx(left, abs=1)
 
 
-def test_contacts_of_unlike_steps_end_together() -> None:
-    """In no more jumps than they take by themselves, one after the other.
+def test_contacts_with_different_steps_end_together() -> None:
+    """Contacts with different steps need no more jumps together than one after the other.
 
-    Each takes its steps two by two, and not as many of them as the other.
+    Each takes its steps in pairs, and their numbers differ.
     """
     contacts = [cylinder(stepper=ImplicitStepper(ErrorControl(share))) for share in (0.02, 0.01)]
-    histories = [to_and_fro(load, contacts[0].grid) for load in (50.0, 20.0)]
+    histories = [forward_and_backward(load, contacts[0].grid) for load in (50.0, 20.0)]
     settings = CoupledSettings(2.0 / 3.0 * 0.5**3 / RADIUS / (PER_LOAD * 50.0))
 
     def jumps(of: slice) -> int:

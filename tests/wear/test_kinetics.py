@@ -12,7 +12,7 @@ from wear.kinetics import LATEST_START, LinearRegime, linear_regime
 
 CYCLES = np.arange(0.0, 11.0) * 1e4
 
-# A crowned pad in the plane that wears to a flat one: all of it slides alike.
+# A two-dimensional crowned pad that wears to a flat one, with the same slip everywhere.
 BODY = Material(120e3, 0.0)
 WIDTH, CROWN, LOAD = 4.0, 1000.0, 100.0  # mm, mm, N/mm
 WEAR = 8e-11  # depth per pressure and cycle [mm/MPa]
@@ -20,7 +20,7 @@ GRID = Grid.strips(WIDTH, 48)
 
 
 def depths_of_pad(cycles: Array) -> Array:
-    """Largest depth [mm] at ``cycles``, worn in implicit jumps from each to the next."""
+    """Return the largest depth [mm] at ``cycles``, worn in implicit jumps from each to the next."""
     contact = NormalContact(HalfSpace(GRID, ElasticPair(BODY, BODY)))
     worn, depths, start = np.zeros(GRID.shape), [0.0], None
     for jump in np.diff(cycles):
@@ -40,7 +40,7 @@ def depths_of_pad(cycles: Array) -> Array:
 
 
 def jumps(kind: str, cycles: float) -> Array:
-    """Numbers of cycles from 0 to ``cycles``."""
+    """Return numbers of cycles from 0 to ``cycles``."""
     if kind == "equal":
         return np.linspace(0.0, cycles, 41)
     if kind == "growing":
@@ -67,7 +67,7 @@ def test_line_is_linear_from_the_start() -> None:
 
 @pytest.mark.parametrize("bend", [2, 5])
 def test_regime_begins_at_the_bend(bend: int) -> None:
-    """Fast running-in up to the bend, then a line."""
+    """After fast running-in up to a bend, growth is linear."""
     values = 3e-9 * CYCLES + 5e-9 * np.minimum(CYCLES, CYCLES[bend])
     regime = regime_of(CYCLES, values)
     assert regime.start == CYCLES[bend]
@@ -75,7 +75,7 @@ def test_regime_begins_at_the_bend(bend: int) -> None:
 
 
 def test_regime_begins_where_running_in_has_died_away() -> None:
-    """Depth r N + a N0 (1 - exp(-N/N0)): within 2 % of r once a/r exp(-N/N0) is."""
+    """The rate of r N + a N0 (1 - exp(-N/N0)) is within 2 % of r once a/r exp(-N/N0) is."""
     cycles = np.linspace(0.0, 3e5, 61)
     rate, excess, decay = 1e-9, 2e-9, 1.5e4
     values = rate * cycles + excess * decay * (1.0 - np.exp(-cycles / decay))
@@ -98,13 +98,13 @@ def test_curve_has_no_regime(power: float, kind: str) -> None:
 
 
 def test_a_curve_seen_closely_at_its_end_has_no_regime() -> None:
-    """A stepper that takes many short jumps last: any smooth curve is straight over them."""
+    """Many short jumps at the end do not make a regime: any smooth curve is straight over them."""
     cycles = np.append(jumps("equal", 1e5), np.linspace(1.0001e5, 1.01e5, 20))
     assert linear_regime(cycles, np.sqrt(cycles)) is None
 
 
 def test_one_long_jump_is_no_evidence() -> None:
-    """What happened within it is not known, however many short ones lie beside it."""
+    """The course within a long jump is unknown, however many short jumps lie next to it."""
     cycles = np.append(np.linspace(0.0, 1e3, 11), [9e4, 1e5])
     assert linear_regime(cycles, 3e-9 * cycles) is None
 
@@ -124,7 +124,7 @@ def test_uneven_jumps_count_by_their_slope(kind: str) -> None:
 
 
 def test_noise_of_the_solver_does_not_count_in_a_jump_of_one_cycle() -> None:
-    """Its slope is all noise: 1e-6 of the depth in 1e-5 of the cycles."""
+    """The slope of a jump of one cycle is all noise: 1e-6 of the depth in 1e-5 of the cycles."""
     noise = 3e-4 * 1e-6 * np.random.default_rng(2).standard_normal(13)
     cycles = np.append(CYCLES, [1e5 + 1.0, 1e5 + 2.0])
     regime = regime_of(cycles, 3e-9 * cycles + noise)
@@ -143,7 +143,7 @@ def test_extrapolation_goes_on_from_the_last_value() -> None:
 
 
 def test_bound_of_a_rate_that_drifts_evenly_is_exact() -> None:
-    """Its slope is r + b N: the bound is the whole difference, over any jumps."""
+    """For the slope r + b N the bound is the whole difference, over any jumps."""
     beyond = np.linspace(1e5, 4e5, 7)
     for kind in ("equal", "growing", "random"):
         cycles = jumps(kind, 1e5)
@@ -174,9 +174,10 @@ def test_bound_grows_from_nothing() -> None:
 
 @pytest.mark.parametrize("kind", ["equal", "growing", "random"])
 def test_extrapolation_agrees_with_the_computed_continuation(kind: str) -> None:
-    """A pad run in for 4e6 cycles, then computed to three times that; its rate ends at w P/width.
+    """A pad is run in for 4e6 cycles, then computed to three times that.
 
-    The bound covers the difference everywhere, and is itself within 3 % of the depth.
+    Its rate tends to w P/width. The bound covers the difference everywhere, and is itself within
+    3 % of the depth.
     """
     cycles = jumps(kind, 4e6)
     further = np.linspace(4e6, 12e6, 41)[1:]
@@ -192,7 +193,7 @@ def test_extrapolation_agrees_with_the_computed_continuation(kind: str) -> None:
 
 @pytest.mark.parametrize("kind", ["equal", "growing", "random"])
 def test_pad_that_still_runs_in_has_no_regime(kind: str) -> None:
-    """After 4e5 cycles its depth still grows by over 1.2 times the rate it will end with."""
+    """After 4e5 cycles the depth of a pad still grows by over 1.2 times its final rate."""
     cycles = jumps(kind, 4e5)
     depths = depths_of_pad(cycles)
     assert linear_regime(cycles, depths) is None

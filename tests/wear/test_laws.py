@@ -1,4 +1,4 @@
-"""Wear laws against values worked out by hand, in the units users think in."""
+"""Wear laws against values calculated by hand, in the units that users think in."""
 
 from dataclasses import replace
 
@@ -8,8 +8,9 @@ import pytest
 from sa_solver.errors import InputError
 from sa_solver.types import Array, ElasticPair, Grid, LoadHistory, Material
 from wear.contact.face_loads import CycleLoads
-from wear.contact.interface import InterfaceContact, InterfaceSettings
-from wear.contact.link import CellNodes
+from wear.contact.interface import InterfaceContact
+from wear.contact.settings import InterfaceSettings
+from wear.contact.transfer import CellNodes
 from wear.coupled import CoupledSettings, JumpSize, Stop
 from wear.cracking.life import findley, ruiz
 from wear.evolution import EnergyTable
@@ -23,20 +24,20 @@ FRICTION = 0.4
 
 
 def sliding(slip: Array, friction: float = FRICTION) -> SlidingConditions:
-    """Slip on surfaces that are new and stay so."""
+    """Return slip on surfaces that stay new."""
     unworn = np.zeros(slip.shape[1:])
     return SlidingConditions(slip, friction, (unworn, unworn), (0.0, 0.0))
 
 
 def test_energy_law_by_hand() -> None:
-    """200 MPa at µ 0.4 over 50 um are 4 mJ/mm²; 1e4 um³/J make 0.04 nm of it."""
+    """200 MPa at µ = 0.4 over 50 µm are 4 mJ/mm²; 1e4 µm³/J give 0.04 nm."""
     slip = np.full((1, 1, 1), 0.05)
     depth = EnergyLaw(1e4 * UM3_PER_J).depth_per_pressure(sliding(slip)) * 200.0
     assert depth.item() == pytest.approx(4e-8, rel=1e-12)
 
 
 def test_archard_law_by_hand() -> None:
-    """V = K s P / H: 1e-4 x 0.05 mm x 200 MPa / 3500 MPa, whatever the friction."""
+    """V = K s P / H is 1e-4 x 0.05 mm x 200 MPa / 3500 MPa, whatever the friction."""
     slip = np.full((1, 1, 1), 0.05)
     law = ArchardLaw(coefficient=1e-4, hardness=3500.0)
     for friction in (0.0, FRICTION):
@@ -61,7 +62,7 @@ def test_case_units_reach_the_law(dovetail_path) -> None:
 
 @pytest.mark.parametrize("increments", [1, 7])
 def test_amplitude_law_is_the_energy_law_at_its_reference(increments: int) -> None:
-    """One cycle slides four amplitudes, however many increments it takes."""
+    """One cycle slides four amplitudes, however many increments it has."""
     reference = 0.075
     slip = np.random.default_rng(2).random((increments, 3, 4))
     slip *= 4.0 * reference / slip.sum(axis=0)
@@ -78,7 +79,7 @@ def test_amplitude_law_is_quadratic_in_slip() -> None:
 
 
 def test_amplitude_law_by_hand() -> None:
-    """α / (4 δ_ref) (Σ|Δs|) (Σ|q·Δs|), with pressures of its own in every increment."""
+    """The depth is α / (4 δ_ref) (Σ|Δs|) (Σ|q·Δs|), with another pressure in every increment."""
     slip, pressure = np.array([0.01, 0.0, 0.03]), np.array([100.0, 300.0, 200.0])
     law = EnergyAmplitudeLaw(1e-8, 0.075)
     depth = law.depth_per_pressure(sliding(slip[:, None, None])).ravel() @ pressure
@@ -102,7 +103,7 @@ TABLE = EnergyTable((10.0, 30.0, 40.0), (1.0, 3.0, 0.5))
 
 
 def quadrature(table: EnergyTable, before: float, after: float) -> float:
-    """Mean by Gauss points between the kinks, where the table is a straight line."""
+    """Return the mean by Gauss points between the kinks, where the table is a straight line."""
     kinks = [e for e in (*table.energy, table.threshold) if before < e < after]
     ends = np.array([before, *sorted(kinks), after])
     points = ends[:-1, None] + np.diff(ends)[:, None] * (0.5 + np.array([-0.5, 0.5]) / np.sqrt(3.0))
@@ -119,7 +120,7 @@ def test_mean_of_a_table_is_its_integral(ends: tuple[float, float], threshold: f
 
 
 def test_table_by_hand() -> None:
-    """Constant before 10 and after 40; linear between."""
+    """The table is constant before 10 and after 40, and linear between."""
     np.testing.assert_allclose(
         TABLE.at(np.array([0.0, 10.0, 20.0, 30.0, 35.0, 99.0])), [1.0, 1.0, 2.0, 3.0, 1.75, 0.5]
     )
@@ -130,7 +131,7 @@ def test_table_by_hand() -> None:
 
 
 def test_steps_of_any_length_add_up() -> None:
-    """Exact means: what a step wears does not depend on how it is cut, even into slivers."""
+    """Means are exact: wear does not depend on how a step is divided, however finely."""
     table = replace(TABLE, threshold=7.0)
     cuts = np.sort(np.random.default_rng(5).uniform(0.0, 60.0, 200))
     cuts = np.concatenate([[0.0], cuts, [60.0]])
@@ -140,7 +141,7 @@ def test_steps_of_any_length_add_up() -> None:
 
 @pytest.mark.parametrize("step", [0.0, 1e-12, 1e-6])
 def test_mean_of_a_short_step_is_the_value(step: float) -> None:
-    """Far from 0 a difference of integrals would leave no digit of it."""
+    """The mean keeps its digits far from 0, where a difference of integrals would lose them all."""
     table = EnergyTable((0.0, 2e9), (1.0, 3.0))
     assert float(table.mean(1e9, 1e9 + step)) == pytest.approx(2.0, rel=1e-12)
 
@@ -154,7 +155,7 @@ def test_tables_that_are_none(energy: tuple[float, ...], factor: tuple[float, ..
 
 
 def random_step(seed: int) -> SlidingConditions:
-    """Energies that pass all the kinks of the table somewhere."""
+    """Return energies that pass all kinks of the table somewhere."""
     rng = np.random.default_rng(seed)
     before = rng.uniform(0.0, 50.0, (3, 4))
     work = before, before + rng.uniform(0.0, 20.0, (3, 4))
@@ -175,7 +176,7 @@ def test_evolving_law_is_its_base_times_the_mean_factor(base) -> None:
 
 
 def test_laws_may_be_nested() -> None:
-    """A local factor times a global one."""
+    """A local factor can multiply a global one."""
     step, base = random_step(7), EnergyLaw(1e-8)
     both = EvolvingLaw(EvolvingLaw(base, TABLE, "local"), TABLE, "global").depth_per_pressure(step)
     once = EvolvingLaw(base, TABLE, "local").depth_per_pressure(step)
@@ -183,7 +184,7 @@ def test_laws_may_be_nested() -> None:
 
 
 def test_nothing_wears_below_the_threshold() -> None:
-    """V = α (ΣEd - Ed_th): per area and by place where the threshold is local."""
+    """V = α (ΣEd - Ed_th) holds, per area and at each point if the threshold is local."""
     step = random_step(8)
     law = EvolvingLaw(EnergyLaw(1e-8), EnergyTable(threshold=30.0), "local")
     pressure = (step.work[1] - step.work[0]) / (FRICTION * step.slip.sum(axis=0))
@@ -228,7 +229,7 @@ def test_what_has_no_meaning_is_refused(attempt) -> None:
 
 
 def test_a_gap_may_be_a_list_and_have_holes() -> None:
-    """A cylinder with a slot in its middle loses α µ P s a cycle, and nothing in the slot."""
+    """A cylinder with a slot in its middle loses α µ P s per cycle, and nothing in the slot."""
     grid, steel = Grid.strips(1.4, 70), Material(210e3, 0.3)
     gap, slot = grid.x**2 / 20.0, np.abs(grid.x) < 0.05
     slip = np.zeros((1, 2, 70))

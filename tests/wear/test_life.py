@@ -25,14 +25,14 @@ INDICES = ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (2, 0))
 
 
 def history(**components):
-    """(t, 6) from histories of some components."""
+    """Return the (t, 6) history with the given components."""
     names = ("xx", "yy", "zz", "xy", "yz", "zx")
     count = len(next(iter(components.values())))
     return np.stack([components.get(name, np.zeros(count)) for name in names], axis=1)
 
 
 def as_tensor(stress):
-    """(t, 6) → (t, 3, 3)."""
+    """Convert (t, 6) to (t, 3, 3)."""
     tensor = np.empty((len(stress), 3, 3))
     for component, (i, j) in zip(stress.T, INDICES, strict=True):
         tensor[:, i, j] = tensor[:, j, i] = component
@@ -52,7 +52,7 @@ def rotation(seed):
 
 
 def smallest_by_trial(x, y):
-    """The best of all circles on two or three of the points."""
+    """Return the best of all circles on two or three of the points."""
     points = np.stack([x, y], axis=1)
     centres = [0.5 * (a + b) for a, b in itertools.combinations(points, 2)]
     for a, b, c in itertools.combinations(points, 3):
@@ -64,7 +64,7 @@ def smallest_by_trial(x, y):
 
 @pytest.mark.parametrize("count", [2, 3, 4, 9])
 def test_smallest_circle_is_the_best_of_all(count):
-    """Points at random, on lines, on a lattice and the same."""
+    """Points are random, on lines, on a lattice or identical."""
     rng = np.random.default_rng(count)
     x, y = rng.standard_normal((2, count, 60))
     y[:, :15] = 2.0 * x[:, :15]
@@ -75,7 +75,7 @@ def test_smallest_circle_is_the_best_of_all(count):
 
 
 def test_smallest_circle_of_many_points_on_one():
-    """22 points all on the circle or all on a line, but for 1e-13; one point alone."""
+    """22 points lie all on a circle or all on a line, within 1e-13; a single point has radius 0."""
     angle = 2.0 * np.pi * np.arange(22) / 22
     noise = 1e-13 * np.random.default_rng(0).standard_normal((22, 100))
     circles = smallest_circle(np.cos(angle)[:, None] + noise, np.sin(angle)[:, None] + noise)
@@ -91,12 +91,12 @@ def test_smallest_circle_of_many_points_on_one():
 @pytest.mark.parametrize("k", [0.0, 0.3, 1.0])
 @pytest.mark.parametrize(("low", "high"), [(-200.0, 200.0), (0.0, 300.0), (-300.0, 100.0)])
 def test_findley_uniaxial(low, high, k):
-    """[k σ_max + sqrt(σ_a² + k² σ_max²)] / 2, on planes where tan 2θ = σ_a / k σ_max."""
+    """The value is [k σ_max + sqrt(σ_a² + k² σ_max²)] / 2, where tan 2θ = σ_a / k σ_max."""
     parameter = findley(history(xx=np.array([low, high])), k, FINE)
     amplitude = 0.5 * (high - low)
     expected = 0.5 * (k * high + np.hypot(amplitude, k * high))
     assert parameter.value == pytest.approx(expected, rel=1e-6)
-    # The value is flat at its maximum: angles are found to the square root of its accuracy.
+    # The value is flat at its maximum: angles are accurate to the square root of its accuracy.
     double = np.arctan2(amplitude, k * high)
     assert abs(parameter.normal[0]) == pytest.approx(np.cos(0.5 * double), abs=2e-3)
     assert parameter.amplitude == pytest.approx(0.5 * amplitude * np.sin(double), rel=4e-3)
@@ -107,14 +107,14 @@ def test_findley_uniaxial(low, high, k):
 
 @pytest.mark.parametrize("k", [0.0, 0.3])
 def test_findley_torsion(k):
-    """T sqrt(1 + k²)."""
+    """The value is T sqrt(1 + k²)."""
     parameter = findley(history(xy=np.array([-150.0, 150.0])), k, FINE)
     assert parameter.value == pytest.approx(150.0 * np.sqrt(1.0 + k**2), rel=1e-6)
 
 
 @pytest.mark.parametrize("ratio", [0.2, 0.5, 2.0])
 def test_findley_proportional_tension_torsion(ratio):
-    """Mohr's circle of centre σ/2 and radius r, reversed: k σ/2 + r sqrt(1 + k²)."""
+    """Mohr's circle of centre σ/2 and radius r, reversed, gives k σ/2 + r sqrt(1 + k²)."""
     tension, torsion = 200.0, 200.0 * ratio
     cycle = np.sin(2.0 * np.pi * np.arange(8) / 8)
     parameter = findley(history(xx=tension * cycle, xy=torsion * cycle), SENSITIVITY, FINE)
@@ -124,9 +124,10 @@ def test_findley_proportional_tension_torsion(ratio):
 
 
 def by_brute_force(stress_amplitudes, k):
-    """Findley and SWT of harmonic stress, the real part of amplitudes (3, 3), over planes 1° apart.
+    """Return Findley and SWT of harmonic stress over planes 1° apart.
 
-    On a plane the shear vector goes round an ellipse whose larger semi-axis is the shear amplitude.
+    The stress is the real part of amplitudes (3, 3). On a plane the shear vector describes an
+    ellipse whose larger semi-axis is the shear amplitude.
     """
     theta, phi = np.radians(np.meshgrid(np.arange(91), np.arange(360), indexing="ij"))
     normal = np.stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)])
@@ -143,7 +144,7 @@ def by_brute_force(stress_amplitudes, k):
 @pytest.mark.parametrize("phase", [0.0, 45.0, 90.0])
 @pytest.mark.parametrize("ratio", [0.3, 1.0 / np.sqrt(3.0), 1.0])
 def test_out_of_phase_against_brute_force(phase, ratio):
-    """360 states leave 4e-5 of a harmonic's amplitude, planes 1° apart 2e-4 at most."""
+    """The error of 360 states is 4e-5 of the amplitude, that of planes 1° apart at most 2e-4."""
     angle = 2.0 * np.pi * np.arange(360) / 360
     turn = np.exp(1j * np.radians(phase))
     amplitudes = np.zeros((3, 3), dtype=complex)
@@ -156,9 +157,9 @@ def test_out_of_phase_against_brute_force(phase, ratio):
 
 
 def test_findley_by_dense_planes_on_random_histories():
-    """Another way to the same: projections of tensors, chords, every state against every other.
+    """An independent method agrees: projections of tensors, and chords of every two states.
 
-    The circle is between half the longest chord and 2/sqrt(3) of that (Jung).
+    The radius is between half the longest chord and 2/sqrt(3) of that (Jung).
     """
     stress = np.random.default_rng(4).standard_normal((6, 6, 3))
     parameter = findley(stress, 0.0, FINE)
@@ -176,7 +177,7 @@ def test_findley_by_dense_planes_on_random_histories():
 
 @pytest.mark.parametrize(("low", "high"), [(-200.0, 200.0), (0.0, 300.0), (-300.0, 100.0)])
 def test_swt_uniaxial(low, high):
-    """σ_max σ_a / E on the plane across."""
+    """The value is σ_max σ_a / E on the plane across."""
     parameter = smith_watson_topper(history(xx=np.array([low, high])), STEEL, FINE)
     assert parameter.value == pytest.approx(high * 0.5 * (high - low) / STEEL.young, rel=1e-6)
     assert abs(parameter.normal[0]) == pytest.approx(1.0, abs=1e-5)
@@ -184,13 +185,13 @@ def test_swt_uniaxial(low, high):
 
 
 def test_swt_torsion():
-    """T² (1+ν) / E at 45°."""
+    """The value is T² (1+ν) / E at 45°."""
     parameter = smith_watson_topper(history(xy=np.array([-150.0, 150.0])), STEEL, FINE)
     assert parameter.value == pytest.approx(150.0**2 * 1.3 / STEEL.young, rel=1e-6)
 
 
 def test_swt_proportional_tension_torsion():
-    """σ1 (σ1 - ν σ2) / E of the principal stresses of the reversed state."""
+    """The value is σ1 (σ1 - ν σ2) / E with the principal stresses of the reversed state."""
     parameter = smith_watson_topper(
         history(xx=np.array([-200.0, 200.0]), xy=np.array([-80.0, 80.0])), STEEL, FINE
     )
@@ -199,7 +200,7 @@ def test_swt_proportional_tension_torsion():
 
 
 def test_swt_is_0_where_nothing_is_pulled():
-    """Pressure on all planes; alternating, so that strain does have an amplitude."""
+    """Pressure acts on all planes and alternates, so that the strain does have an amplitude."""
     pressure = -100.0 - 50.0 * np.sin(np.arange(6.0))
     stress = history(xx=pressure, yy=pressure, zz=pressure)
     assert smith_watson_topper(stress, STEEL).value == 0.0
@@ -217,7 +218,7 @@ PARAMETERS = {
 @pytest.mark.parametrize("parameter", PARAMETERS.values(), ids=PARAMETERS)
 @pytest.mark.parametrize("seed", range(3))
 def test_turning_the_body_turns_the_plane(parameter, seed):
-    """Exactly only with all planes: many samples, and what the refinement leaves."""
+    """Invariance is exact only with all planes: it holds within the error of the refinement."""
     stress = 100.0 * np.random.default_rng(seed).standard_normal((7, 6))
     turn = rotation(seed + 10)
     search = PlaneSearch(300, 20)
@@ -248,7 +249,7 @@ def test_order_of_states_does_not_matter(parameter):
 
 @pytest.mark.parametrize("parameter", PARAMETERS.values(), ids=PARAMETERS)
 def test_maps_are_their_points(parameter):
-    """More points than are searched at once, in any shape."""
+    """Maps have the values of their points, in any shape and in more than one chunk."""
     stress = np.random.default_rng(3).standard_normal((3, 6, 70, 61))
     search = PlaneSearch(10, 1)
     maps = parameter(stress, search)
@@ -261,7 +262,7 @@ def test_maps_are_their_points(parameter):
 
 @pytest.mark.parametrize("parameter", [slow(PARAMETERS["findley"]), PARAMETERS["swt"]])
 def test_the_search_loses_what_it_says(parameter):
-    """As PlaneSearch documents, on fewer histories."""
+    """The errors are those that PlaneSearch documents, on fewer histories."""
     stress = np.random.default_rng(5).standard_normal((8, 6, 50))
     best = parameter(stress, PlaneSearch(600, 10)).value
     coarse, fine = (
@@ -278,7 +279,7 @@ def test_the_search_loses_what_it_says(parameter):
 
 
 def test_ruiz_by_hand():
-    """±0.02 mm under 80 MPa: τδ = 1.6 N/mm, work 4 τδ; tension 300 MPa along the flank."""
+    """±0.02 mm under 80 MPa give τδ = 1.6 N/mm and a work of 4 τδ; the tension is 300 MPa."""
     work = np.full((1, 1), 4.0 * 80.0 * 0.02)
     stress = history(xx=np.array([300.0, -200.0]), zz=np.array([-900.0, 0.0]))[..., None, None]
     parameters = ruiz(stress, work)

@@ -1,4 +1,4 @@
-"""What a structure adds to the half-space, against contacts whose solution is known."""
+"""The link of a structure to the half-space, against contacts with known solutions."""
 
 from dataclasses import replace
 
@@ -13,8 +13,9 @@ from sa_solver.types import Array, ElasticPair, Frame, Grid, LoadHistory, Materi
 from tests.oracles.elastic_layer import layer_compliance, press
 from wear.contact.drive import Drive
 from wear.contact.face_loads import CycleLoads
-from wear.contact.interface import FirstContact, InterfaceContact, InterfaceSettings
+from wear.contact.interface import FirstContact, InterfaceContact
 from wear.contact.link import linked
+from wear.contact.settings import InterfaceSettings
 from wear.laws import EnergyLaw
 from wear.steps.implicit import ImplicitStepper
 
@@ -27,7 +28,7 @@ PAIR = ElasticPair(RIGID, BODY)
 
 
 def line_face(nodes: int, width: float = WIDTH) -> Face:
-    """A face of so many nodes along x."""
+    """Return a face with ``count`` nodes along x."""
     x = np.linspace(-0.5 * width, 0.5 * width, nodes)
     coordinates = np.stack([x, np.zeros(nodes)], axis=1)
     segments = np.stack([np.arange(nodes - 1), np.arange(1, nodes)], axis=1)
@@ -49,7 +50,7 @@ def contact(face: Face, grid: Grid = GRID, **settings) -> InterfaceContact:
 
 
 def pressed(face: Face, force: Array, displacement: Array, pressure: float = LOAD) -> CycleLoads:
-    """Pressed, and let go: ``force`` and ``displacement`` ``(n,)`` along z."""
+    """Return a cycle that presses and releases, with fields ``(n,)`` along z."""
     zero = np.zeros(2)
     loads = LoadHistory(np.array([pressure, 0.0]), *(zero,) * 7, sliding=zero > 0.0)
     nodal = np.zeros((2, 2, 3, len(face)))
@@ -58,7 +59,7 @@ def pressed(face: Face, force: Array, displacement: Array, pressure: float = LOA
 
 
 def on_layer(face: Face, depth: float) -> CycleLoads:
-    """The cylinder on a layer, as the nodes of its surface have it."""
+    """Return the cylinder on a layer, as the nodes of its surface see it."""
     x, areas = face.coordinates[:, 0], face.facet_shares
     compliance = layer_compliance(x, x[1] - x[0], PAIR.contact_modulus, depth, hats=True)
     pressure = press(compliance, x**2 / (2.0 * RADIUS), areas, LOAD)
@@ -70,12 +71,12 @@ def first(stage: InterfaceContact, loads: CycleLoads) -> FirstContact:
 
 
 def pressure_of(stage: InterfaceContact, loads: CycleLoads) -> Array:
-    """Pressure across the unworn contact ``(nx,)``."""
+    """Return the pressure across the unworn contact ``(nx,)``."""
     return first(stage, loads).pressure[0, :, 0]
 
 
 def layer_pressure(depth: float) -> Array:
-    """The same on the layer, from its compliance on the cells."""
+    """Return the pressure on the layer, from its compliance on the cells."""
     x = GRID.x.ravel()
     compliance = layer_compliance(x, GRID.pitch[0], PAIR.contact_modulus, depth, hats=False)
     return press(compliance, GAP.ravel(), np.full(len(x), GRID.pitch[0]), LOAD)
@@ -89,10 +90,10 @@ def layer_pressure(depth: float) -> Array:
     [(5.0, 11, 0.01, 1e-3), (5.0, 41, 0.01, 1e-3), (2.0, 21, 0.07, 0.012), (2.0, 41, 0.07, 2e-3)],
 )
 def test_layer_on_a_rigid_base(depth: float, nodes: int, wrong: float, left: float) -> None:
-    """Nodes that know the layer tell it to the half-space, a few of them across the contact.
+    """Nodes of a layer pass its compliance to the half-space, with a few nodes across the contact.
 
-    It is 2.2 to 2.4 mm wide. Without the link the half-space is wrong by more than ``wrong`` of the
-    largest pressure somewhere within it, with it by less than ``left``.
+    The contact is 2.2 to 2.4 mm wide. Without the link the error of the half-space within it is
+    more than ``wrong`` of the largest pressure, with the link less than ``left``.
     """
     face, exact = line_face(nodes), layer_pressure(depth)
     loads, inner = on_layer(face, depth), exact > 0.5 * exact.max()
@@ -102,18 +103,18 @@ def test_layer_on_a_rigid_base(depth: float, nodes: int, wrong: float, left: flo
         assert error < left if wanted else error > wrong
 
 
-def test_error_falls_with_the_mesh_and_is_told() -> None:
-    """A layer thinner than the contact is wide: what the fit leaves is about what is wrong."""
+def test_error_falls_with_the_mesh_and_is_reported() -> None:
+    """For a layer thinner than the width of the contact, the residual is about the error."""
     exact, errors = layer_pressure(1.0), []
     inner = exact > 0.5 * exact.max()
-    for nodes, told in ((21, True), (41, False), (81, False)):
+    for nodes, reported in ((21, True), (41, False), (81, False)):
         face = line_face(nodes)
         result = first(contact(face), on_layer(face, 1.0))
         pressure = result.pressure[0, :, 0]
         errors.append(float(np.abs(pressure - exact)[inner].max() / exact.max()))
         left = float(np.hypot(*result.link.quality[1:]))
         assert 0.5 * left < errors[-1] < 3.0 * left
-        assert result.link.coarse is told
+        assert result.link.coarse is reported
         assert not result.link.grainy
     assert errors[0] < 0.07
     assert errors[1] < 0.3 * errors[0]
@@ -124,7 +125,7 @@ def test_error_falls_with_the_mesh_and_is_told() -> None:
 
 
 def on_half_space(face: Face) -> CycleLoads:
-    """A pressure like that of the cylinder, and what it does to half-planes at the nodes."""
+    """Return a pressure similar to the cylinder's, and its displacement of half-planes."""
     x, areas = face.coordinates[:, 0], face.facet_shares
     pressure = np.sqrt(np.maximum(0.0, 1.0 - (x / 2.4) ** 2))
     force = LOAD * pressure * areas / (pressure @ areas)
@@ -135,7 +136,7 @@ def on_half_space(face: Face) -> CycleLoads:
 
 
 def test_bodies_that_are_half_spaces_add_nothing() -> None:
-    """But for the grid's rounding of the hats, a thousandth of the deflection."""
+    """The link vanishes but for the discrete hats: a thousandth of the deflection."""
     face = line_face(21)
     loads = on_half_space(face)
     corrected, plain = first(contact(face), loads), first(contact(face, link="half_space"), loads)
@@ -157,7 +158,7 @@ def test_rigid_motions_change_nothing_where_forces_are_imposed() -> None:
 
 
 def test_a_tilt_that_is_held_is_that_of_the_structure() -> None:
-    """Bodies that are half-spaces, and that turn by 1e-3 before they are held: as tilted gaps."""
+    """Half-spaces that are turned by 1e-3 before they are held act as tilted gaps."""
     face, tilt = line_face(21), 1e-3
     loads = on_half_space(face)
     turned = replace(loads, displacement=loads.displacement + tilt * face.coordinates[:, 0])
@@ -185,7 +186,7 @@ def test_one_node_says_nothing() -> None:
 
 
 def test_a_round_face_gives_nothing_wild_in_its_corners() -> None:
-    """Nodes of a disk under a square grid: d off the face is that of the node next to it."""
+    """Under a square grid, d beyond a disk of nodes is that of the nearest node."""
     x, y = np.meshgrid(np.linspace(-5.0, 5.0, 21), np.linspace(-5.0, 5.0, 21))
     nodes = np.stack([x.ravel(), y.ravel()], axis=1)
     nodes = nodes[np.hypot(*nodes.T) < 5.1]

@@ -1,4 +1,4 @@
-"""Closed cycles that take turns, each with its share: they wear as one."""
+"""Mixes of closed cycles, each with its share, that wear as one cycle."""
 
 from dataclasses import replace
 
@@ -26,7 +26,7 @@ KINDS = "explicit", "implicit", "second_order"
 
 
 def cycle(*normal: float, slip: float = 0.02) -> tuple[LoadHistory, Array]:
-    """A cycle of centred loads, and a slip that grows along x."""
+    """Return a cycle of centred loads, with a slip that grows along x."""
     zero = np.zeros(len(normal))
     columns = dict.fromkeys(("Qx", "Qy", "Mx", "My", "Mz", "Edx", "Edy"), zero)
     history = LoadHistory(P=np.array(normal), **columns, sliding=zero.astype(bool))
@@ -57,7 +57,7 @@ def march(contact: WearingContact, kind: str, cycles: float, steps: int = 1) -> 
 
 
 def limit(contact: WearingContact) -> float:
-    """Longest stable explicit step."""
+    """Return the longest stable explicit step."""
     return contact.stable_cycles(WearState.unworn(BALL))
 
 
@@ -70,7 +70,7 @@ def assert_same(one: WearState, two: WearState, tolerance: float) -> None:
 
 @pytest.mark.parametrize("share", [0.0, 0.3, 0.5, 1.0])
 def test_equal_cycles_wear_as_the_one(share: float) -> None:
-    """To rounding where all increments see the same surfaces: in explicit steps."""
+    """In explicit steps, where all increments see the same surfaces, they agree to rounding."""
     single = wearing(HEAVY)
     mixed = wearing(HEAVY, HEAVY, shares=(share, 1.0 - share))
     cycles = 2.0 * limit(single)
@@ -101,7 +101,7 @@ def test_a_cycle_that_never_happens_changes_nothing(kind: str) -> None:
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_worn_volume_is_coefficient_times_mean_energy(kind: str) -> None:
-    """And the energy of a sliding cycle is known: µ Σ share P slip, here by its mean slip."""
+    """The energy of a sliding cycle is known: µ Σ share P slip, here by its mean slip."""
     mixed = wearing(HEAVY, LIGHT, shares=(0.7, 0.3))
     cycles = 0.5 * limit(mixed)
     state = march(mixed, kind, cycles, 2)
@@ -109,14 +109,14 @@ def test_worn_volume_is_coefficient_times_mean_energy(kind: str) -> None:
         assert depth.sum() * GRID.cell_area == pytest.approx(
             law.coefficient * state.energy, rel=1e-12
         )
-    # Loads are centred: a slip linear in x dissipates as its value in the middle, but for the
-    # asymmetry of what it wears.
+    # Loads are centred: a slip linear in x dissipates as much as its value in the middle, apart
+    # from the asymmetry of the worn shape.
     mean = FRICTION * (0.7 * 0.02 * HEAVY[0].P.sum() + 0.3 * 0.05 * LIGHT[0].P.sum())
     assert state.energy == pytest.approx(mean * cycles, rel=1e-3)
 
 
 def test_depth_is_the_mean_of_the_cycles_by_their_shares() -> None:
-    """In one explicit step, with laws linear and not in the slip of a cycle."""
+    """The step is a single explicit one, with laws linear and nonlinear in the slip."""
     for law in (EnergyLaw(ALPHA), EnergyAmplitudeLaw(ALPHA, 0.03)):
         laws = law, law
         parts = [wearing(block, laws=laws) for block in (HEAVY, LIGHT)]
@@ -128,7 +128,7 @@ def test_depth_is_the_mean_of_the_cycles_by_their_shares() -> None:
 
 @pytest.mark.slow
 def test_order_of_cycles_matters_to_first_order_in_the_step() -> None:
-    """Swapping two of three cycles: halving the steps halves the difference."""
+    """Swapping two of three cycles makes a difference that halves with the steps."""
     shares = (0.3, 0.5, 0.2)
     one = wearing(LIGHT, MIDDLE, HEAVY, shares=shares)
     two = wearing(MIDDLE, LIGHT, HEAVY, shares=(0.5, 0.3, 0.2))
@@ -145,7 +145,7 @@ def test_order_of_cycles_matters_to_first_order_in_the_step() -> None:
 
 
 def test_evolving_coefficients_follow_the_energy_of_the_mix() -> None:
-    """Explicit steps from known pressures wear ∫ factor dE, exactly, whatever the mix."""
+    """Explicit steps from known pressures wear ∫ factor dE exactly, whatever the mix."""
     table = EnergyTable((0.0, 1e4, 3e4), (1.0, 2.0, 0.5), threshold=2e3)
     laws = (
         EvolvingLaw(EnergyLaw(ALPHA), table, "global"),
@@ -165,7 +165,7 @@ def test_evolving_coefficients_follow_the_energy_of_the_mix() -> None:
 
 
 def sheared(scale: float, last: float) -> LoadHistory:
-    """A cycle in partial slip that ends with the load ``last``."""
+    """Return a cycle in partial slip that ends with the load ``last``."""
     P = scale * np.array([500.0, 1000.0, 1000.0, 1000.0, last])
     zero = np.zeros(len(P))
     Qx = 0.2 * P * np.array([1.0, 1.0, -1.0, 1.0, 0.0])

@@ -21,24 +21,24 @@ OBLIQUE = (-0.31, 0.22), (0.17, -0.29)
 LONG = (-1.03, 0.4), (0.91, 0.4)
 STILL = (0.137, -0.061), (0.137, -0.061)
 WAYS = [STRAIGHT, OBLIQUE, LONG, STILL]
-# Weights are exact but for the rounding of a few dozen additions.
+# Weights are exact except for the rounding of a few dozen additions.
 ROUNDING = 1e-13
 
 
 def scattered(margin: int) -> Array:
-    """A random field, 0 within ``margin`` cells of the border."""
+    """Return a random field, 0 within ``margin`` cells of the border."""
     field = np.random.default_rng(1).random(GRID.shape)
     field[:margin], field[-margin:], field[:, :margin], field[:, -margin:] = 0.0, 0.0, 0.0, 0.0
     return field
 
 
 def straight(start: tuple[float, float], end: tuple[float, float], grid: Grid = GRID) -> Passage:
-    """The way from one offset to another."""
+    """Return the path from one offset to another."""
     return Passage(grid, np.array([start, end]))
 
 
 def reciprocating(stroke: float, each_way: int) -> Array:
-    """Offsets of a cycle along x."""
+    """Return the offsets of a cycle along x."""
     out = np.linspace(-0.5 * stroke, 0.5 * stroke, each_way + 1)
     x = np.concatenate([out, out[-2::-1]])
     return np.stack([x, np.zeros_like(x)], axis=1)
@@ -87,7 +87,7 @@ def test_no_motion_changes_nothing() -> None:
     np.testing.assert_allclose(still.deposit(field), field, rtol=ROUNDING)
 
 
-def test_there_and_back_are_alike() -> None:
+def test_forward_and_backward_paths_are_equal() -> None:
     field = scattered(11)
     there, back = straight(*OBLIQUE), straight(*OBLIQUE[::-1])
     np.testing.assert_allclose(there.carry(field), back.carry(field), atol=ROUNDING)
@@ -102,13 +102,13 @@ def test_a_passage_in_two_halves_is_their_mean() -> None:
 
 
 def test_what_leaves_the_grid_is_refused_with_the_remedy() -> None:
-    """9 cells of 0.1 mm over the end, or 10 with the part of a cell."""
+    """The wear passes the end by 9 cells of 0.1 mm, or by 10 with a partial cell."""
     field = scattered(1)
     with pytest.raises(TravelError, match=r"10 cells beyond .* along x: .* longer by 2 mm"):
         straight(*LONG).deposit(field)
     with pytest.raises(TravelError, match="along y"):
         straight((0.0, 0.0), (0.0, 0.3)).deposit(field)
-    # Farther than the grid is long.
+    # The motion is longer than the grid.
     with pytest.raises(TravelError, match="along x"):
         straight((0.0, 0.0), (9.0, 0.0)).deposit(field)
     assert not straight((5.0, 0.0), (9.0, 0.0)).carry(field).any()
@@ -125,10 +125,10 @@ def test_motion_along_a_line_contact_counts_for_nothing() -> None:
 
 
 def trapezoid_up_to(x: Array, half_width: float, stroke: float) -> Array:
-    """Integral up to ``x`` of a box of ``half_width`` a spread evenly over a ``stroke`` s.
+    """Return the integral up to ``x`` of a box of ``half_width`` a spread over a ``stroke`` s.
 
     The box, 1 high, convolved with the residence 1/s over [-s/2, s/2] is a trapezoid, half as high
-    at ±a, with flanks s wide; its integral is made of second differences of u|u|/2.
+    at ±a, with flanks s wide; its integral consists of second differences of u|u|/2.
     """
     total = np.zeros_like(x)
     for sign_a in (1.0, -1.0):
@@ -141,8 +141,10 @@ def trapezoid_up_to(x: Array, half_width: float, stroke: float) -> Array:
 @pytest.mark.parametrize("stroke", [0.4, 0.37, 1.9])
 @pytest.mark.parametrize("each_way", [1, 3, 8])
 def test_a_flat_punch_wears_a_trapezoid_into_the_flat(stroke: float, each_way: int) -> None:
-    """Exactly: a punch that ends between cells has cells of uniform wear, and cells of body 1 take
-    the mean of the trapezoid over them."""
+    """Cells of body 1 have exactly the mean of the trapezoid over them.
+
+    The cells of the punch, which ends between cells, wear uniformly.
+    """
     grid = Grid.strips(4.0, 80)
     half_width = 10 * grid.pitch[0]
     punch = np.where(np.abs(grid.x) < half_width, 1.0, 0.0)
@@ -152,7 +154,7 @@ def test_a_flat_punch_wears_a_trapezoid_into_the_flat(stroke: float, each_way: i
     borders = np.append(grid.x - 0.5 * grid.pitch[0], grid.x[-1] + 0.5 * grid.pitch[0])
     expected = np.diff(trapezoid_up_to(borders, half_width, stroke)) / grid.pitch[0]
     np.testing.assert_allclose(worn.ravel(), expected, atol=1e-13)
-    # Worn as far as the punch goes, and not beyond.
+    # The flat is worn as far as the punch moves, and not beyond.
     reach = half_width + 0.5 * stroke
     assert not worn.ravel()[np.abs(grid.x.ravel()) > reach + 0.5 * grid.pitch[0]].any()
 
@@ -163,7 +165,7 @@ def bump(x: Array, y: Array) -> Array:
 
 @pytest.mark.parametrize("way", [STRAIGHT, OBLIQUE, LONG])
 def test_carrying_is_second_order_in_the_pitch(way) -> None:
-    """Against the mean of a smooth field over the path by 200 Gauss points."""
+    """The reference is the mean of a smooth field over the path by 200 Gauss points."""
     times, weights = np.polynomial.legendre.leggauss(200)
     start, end = map(np.array, way)
     places = start + 0.5 * (times[:, None] + 1.0) * (end - start)
@@ -182,10 +184,10 @@ def test_carrying_is_second_order_in_the_pitch(way) -> None:
 
 @pytest.mark.parametrize(("pitches", "blur"), [(20.0, 1 / 6), (1.5, 3 / 8 - 9 / 48), (0.5, None)])
 def test_cells_blur_by_what_is_stated(pitches: float, blur: float | None) -> None:
-    """Second moments of the weights over that of the motion: dx²/6, or L dx/4 - L²/12.
+    """The second moment of the weights exceeds that of the motion by dx²/6, or by L dx/4 - L²/12.
 
-    A long path that ends between cells in the middle of either has dx²/6 on average only: taken
-    here where it starts and ends on cells. At 1.5 dx blur and motion are alike.
+    A long path that ends between cells in the middle of either has dx²/6 only on average; the paths
+    here begin and end on cells. At 1.5 dx blur and motion are equal.
     """
     grid = Grid.strips(61.0, 61)
     point = np.zeros(grid.shape)
@@ -202,7 +204,7 @@ def test_cells_blur_by_what_is_stated(pitches: float, blur: float | None) -> Non
 
 
 def test_offsets_are_those_of_the_weighted_slip_about_the_middle() -> None:
-    """The pressed cells slide by 1, 2, -3; what the others do does not count."""
+    """The pressed cells slide by 1, 2, -3; the slip of the others does not count."""
     weight = np.zeros(GRID.shape)
     weight[10:20, 5:9] = 7.0
     slip = np.random.default_rng(2).random((3, 2, *GRID.shape))
@@ -265,7 +267,7 @@ def test_motion_of_a_line_contact_along_itself_does_not_count() -> None:
 
 
 def sliding(*steps: float) -> Array:
-    """Slip of increments along x that all cells share."""
+    """Return slip of increments along x that all cells share."""
     slip = np.zeros((len(steps), 2, *GRID.shape))
     slip[:, 0] = np.array(steps)[:, None, None]
     return slip
@@ -283,7 +285,7 @@ def test_passages_follow_the_offsets() -> None:
 
 
 def test_a_path_is_its_legs_by_their_lengths() -> None:
-    """There and half way back: the middle of the way is passed twice."""
+    """On a path forward and half-way back the middle is passed twice."""
     field = np.exp(-((GRID.x - 0.1) ** 2 + GRID.y**2) / 0.3)
     bent = Passage(GRID, np.array([(0.0, 0.0), (0.8, 0.2), (0.4, 0.1)]))
     there, back = straight((0.0, 0.0), (0.8, 0.2)), straight((0.8, 0.2), (0.4, 0.1))
@@ -299,7 +301,7 @@ def test_small_strokes_are_not_followed_unless_forced() -> None:
 
 
 def test_each_block_of_a_mix_closes_by_itself() -> None:
-    """Where one counts all are followed, each about its own middle."""
+    """If the motion of one cycle matters all are followed, each about its own middle."""
     slip = sliding(0.02, -0.02, 0.4, -0.4)
     places = followed(GRID, slip, PRESSURE, [slice(0, 2), slice(2, 4)])
     np.testing.assert_allclose(places[:, 1, 0], [0.01, -0.01, 0.2, -0.2], atol=1e-14)

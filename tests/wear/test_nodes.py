@@ -1,7 +1,7 @@
-"""Wear of nodes: laws by hand, and steppers on equations whose solution is known.
+"""Wear of nodes: laws by hand, and steppers on equations with known solutions.
 
-Nodes of area A on springs k, pushed together by δ: p = (k/A) (δ - h) at the worn depth h, at a slip
-s a cycle. Depth decays to δ as exp(-N/N0), N0 = A/(k α µ s), each node for itself.
+Nodes of area A on springs k, pushed together by δ, have p = (k/A) (δ - h) at the worn depth h, with
+a slip s per cycle. The depth tends to δ as exp(-N/N0), N0 = A/(k α µ s), each node for itself.
 """
 
 import re
@@ -26,7 +26,7 @@ STIFFNESS, PUSH = 1e3, np.array([1e-3, 2e-3, 3e-3])
 
 @dataclass(frozen=True)
 class Cycle:
-    """A cycle as it is given."""
+    """A cycle with given fields."""
 
     slip: Array
     pressure: Array
@@ -38,20 +38,20 @@ class Cycle:
         return AREAS
 
     def stable_cycles(self, depth_per_pressure: Array) -> float:
-        """Of springs: an error of the depth is multiplied by 1 - (k/A) w ΔN."""
+        """Return the limit of springs: an error of the depth is multiplied by 1 - (k/A) w ΔN."""
         fastest = float((STIFFNESS / AREAS * depth_per_pressure).max())
         return 2.0 / fastest if fastest > 0.0 else np.inf
 
 
 LAWS = EnergyLaw(4e-8), EnergyLaw(1e-8)
-# Cycles in which what is left of the depth falls to 1/e.
+# Cycles in which the remaining depth falls to 1/e.
 SCALES = AREAS / (STIFFNESS * 5e-8 * FRICTION * SLIP)
 
 
 def springs(state: NodalState, laws=LAWS) -> NodalContact:
-    """The nodes as worn as they are."""
+    """Return the nodes on springs at the present depth."""
     pressure = STIFFNESS / AREAS * (PUSH - state.surfaces.depth)
-    # Half of the way there, half of it back.
+    # Half of the slip is forward, half of it backward.
     halves = np.array([0.5, 0.5])[:, None]
     return NodalContact(laws, (Cycle(halves * SLIP, np.array([pressure, pressure])),))
 
@@ -84,7 +84,7 @@ SLID = (PATHS * PRESSURE).sum(axis=0)
     ],
 )
 def test_a_law_takes_off_what_it_says(law, expected) -> None:
-    """Per cycle, of one body; the other, with none, keeps its depth."""
+    """One body wears by its law per cycle; the other, without wear, keeps its depth."""
     contact = NodalContact((law, EnergyLaw(0.0)), (Cycle(PATHS, PRESSURE),))
     first, second = contact.wear(unworn())
     np.testing.assert_allclose(first, expected, rtol=1e-14)
@@ -104,7 +104,7 @@ def test_energy_is_that_of_all_nodes() -> None:
 
 @pytest.mark.parametrize("scope", ["local", "global"])
 def test_a_coefficient_may_change_during_a_step(scope) -> None:
-    """By its exact mean over the energies between the ends."""
+    """The step uses the exact mean over the energies between its ends."""
     cycles, table = 10.0, EnergyTable((0.0, 20.0), (1.0, 5.0))
     law = EvolvingLaw(EnergyLaw(2e-8), table, scope)
     contact = NodalContact((law, law), (Cycle(PATHS, PRESSURE),))
@@ -116,7 +116,7 @@ def test_a_coefficient_may_change_during_a_step(scope) -> None:
 
 
 def test_the_mean_of_two_cycles_is_that_of_what_they_take_off() -> None:
-    """Not that of one cycle twice as long, which an amplitude would count twice."""
+    """It is not one cycle twice as long, in which an amplitude would count twice."""
     laws = EnergyAmplitudeLaw(2e-8, 0.075), ArchardLaw(1e-4, 3500.0)
     one, other = (NodalContact(laws, (Cycle(k * PATHS, PRESSURE),)) for k in (1.0, 3.0))
     both = one.averaged(other)
@@ -162,12 +162,12 @@ def test_heuns_steps_keep_to_tolerance_and_limit_and_say_what_they_leave(life) -
         assert max(step.cycles for step in taken) <= 0.75 * limit * (1.0 + 1e-12)
         assert sum(step.cycles for step in taken) == pytest.approx(cycles)
         wanted, state = exact(cycles), taken[-1].state
-        wrong, told = state.surfaces.depth - wanted, step_errors(state, AREAS)
+        wrong, estimate = state.surfaces.depth - wanted, step_errors(state, AREAS)
         assert np.abs(wrong).max() < 0.2 * tolerance * wanted.max()
         true = np.linalg.norm(wrong) / np.linalg.norm(wanted)
-        assert true / 3.0 < told["depth"] < 3.0 * true
+        assert true / 3.0 < estimate["depth"] < 3.0 * true
         true = abs(float(AREAS @ wrong)) / float(AREAS @ wanted)
-        assert true / 3.0 < told["volume"] < 3.0 * true
+        assert true / 3.0 < estimate["volume"] < 3.0 * true
         assert all(step.spent.steps == 2 for step in taken)
         assert all(step.spent.contact_solves % 6 == 0 for step in taken)
         counts.append(len(taken))
@@ -191,7 +191,7 @@ def test_given_steps_beyond_the_limit_are_refused() -> None:
 
 @pytest.mark.parametrize("stepper", [ExplicitStepper(0.2), HeunStepper(0.05)])
 def test_an_energy_threshold_is_passed_without_an_error(stepper) -> None:
-    """V = α (ΣEd - Ed_th), exactly; before, any step is stable."""
+    """V = α (ΣEd - Ed_th) holds exactly; below the threshold any step is stable."""
     threshold = 0.02
     laws = tuple(EvolvingLaw(law, EnergyTable(threshold=threshold), "global") for law in LAWS)
 
@@ -207,7 +207,7 @@ def test_an_energy_threshold_is_passed_without_an_error(stepper) -> None:
 
 
 def test_stretches_ask_before_each_of_them() -> None:
-    """Steps within a stretch go on as if it were the whole, and count."""
+    """Steps within a stretch are as in the whole, and are counted."""
     asked = []
 
     def longest(state: NodalState, most: float) -> float:

@@ -1,7 +1,7 @@
-"""Steps of many stages: their polynomials, and nodes on an elastic body whose wear is known.
+"""Steps of many stages: their polynomials, and nodes on an elastic body with known wear.
 
-Pressures p = S (δ - h) at the worn depth h, with S like a half-space's, wear by dh/dN = w p: the
-depth is δ - exp(-w S N) δ, by the eigenvectors of S.
+Pressures p = S (δ - h) at the worn depth h, with S similar to a half-space's, wear by dh/dN = w p:
+the depth is δ - exp(-w S N) δ, by the eigenvectors of S.
 """
 
 from dataclasses import dataclass
@@ -20,14 +20,14 @@ from wear.steps.step_errors import ErrorControl, step_errors
 
 NODES, FRICTION, SLIP, ALPHA = 40, 0.5, 0.02, 4e-8
 AREAS = np.full(NODES, 0.05)
-# Waves of the surface of number k are pressed away k times as fast: from the longest to the nodes.
+# The wave of number k is pressed away k times as fast as the longest one.
 BASIS = np.linalg.qr(np.cos(np.pi * np.outer(np.arange(NODES) + 0.5, np.arange(NODES)) / NODES))[0]
 ELASTIC = BASIS * (1e4 * np.arange(1.0, NODES + 1.0)) @ BASIS.T
-# Higher at one end.
+# The initial overlap is larger at one end.
 PUSH = 1e-3 * (1.0 + np.linspace(0.0, 1.0, NODES) ** 2)
 WEAR = ALPHA * FRICTION * SLIP
 LAWS = EnergyLaw(0.75 * ALPHA), EnergyLaw(0.25 * ALPHA)
-# In which the longest wave falls to 1/e.
+# Cycles in which the longest wave falls to 1/e.
 SCALE = 1.0 / (WEAR * 1e4)
 
 
@@ -62,7 +62,7 @@ def exact(cycles: float) -> Array:
 
 @pytest.mark.parametrize("stages", [2, 3, 5, 9, 30])
 def test_stages_are_stable_as_far_as_they_say_and_of_second_order(stages: int) -> None:
-    """On y' = z y: |R| <= 1, and damped but for the longest waves; R = 1 + z + z²/2 + O(z³)."""
+    """On y' = z y, |R| <= 1, damped except for the longest waves, and R = 1 + z + z²/2 + O(z³)."""
     reach = 2.0 / 3.0 * (stages**2 - 1.0) * (1.0 - 2.0 * DAMPING / 15.0)
     assert stages_for(reach * (1.0 - 1e-9)) == stages
     assert stages_for(reach * 1.001) == stages + 1
@@ -79,7 +79,7 @@ def test_stages_are_stable_as_far_as_they_say_and_of_second_order(stages: int) -
 
 
 def test_steps_of_any_length_are_of_second_order() -> None:
-    """Steps of two to five stages, in a time in which the shortest wave decays by e^-40."""
+    """Steps have two to five stages, in a time in which the shortest wave decays by e^-40."""
     counts, errors = (2, 16, 32), []
     for count in counts:
         state = NodalState.unworn(np.zeros(NODES))
@@ -91,21 +91,21 @@ def test_steps_of_any_length_are_of_second_order() -> None:
     assert np.log2(errors[1] / errors[2]) == pytest.approx(2.0, abs=0.1)
 
 
-def test_the_error_is_what_was_asked_for_and_what_is_told() -> None:
+def test_the_error_is_within_the_tolerance_and_as_estimated() -> None:
     state = NodalState.unworn(np.zeros(NODES))
     state = advance_cycles(
         StabilisedStepper(ErrorControl(0.01)), state, SCALE, SCALE, pressed
     ).state
     known = exact(SCALE)
     true = np.linalg.norm(state.surfaces.depth - known) / np.linalg.norm(known)
-    told = step_errors(state)
-    assert told is not None
+    estimate = step_errors(state)
+    assert estimate is not None
     assert true < 0.01
-    assert told["depth"] / 3.0 < true < 3.0 * told["depth"]
+    assert estimate["depth"] / 3.0 < true < 3.0 * estimate["depth"]
 
 
 def test_volume_is_energy_times_the_coefficient() -> None:
-    """To rounding, however long the step."""
+    """The volume is exact to rounding, however long the step."""
     state = NodalState.unworn(np.zeros(NODES))
     state = StabilisedStepper().step(state, 0.3 * SCALE, np.inf, pressed).state
     volume = float(state.surfaces.depth @ AREAS)

@@ -1,4 +1,4 @@
-"""Length of wear steps: rates of convergence, error control, what a run of steps adds up to."""
+"""Length of wear steps: rates of convergence, error control, and sums over a run."""
 
 from dataclasses import replace
 from functools import cache
@@ -35,7 +35,7 @@ def history(P: Array, My: Array) -> LoadHistory:
 
 
 def cycle(scale: Array | float = 1.0) -> SlidingCycle:
-    """Three loads off centre and unlike slips, ``scale`` ``(nx, 1)`` of them."""
+    """Return three loads off centre with dissimilar slips, scaled by ``scale`` ``(nx, 1)``."""
     P = MEAN * 8.0 * np.array([0.7, 1.0, 0.85])
     slip = [0.02 * (1.0 + 0.4 * np.sin(k + X)) * scale for k in (0.0, 2.0, 4.0)]
     return SlidingCycle(history(P, P * [0.2, -0.1, 0.05]), np.stack(slip))
@@ -46,14 +46,14 @@ def wearing(scale: Array | float = 1.0) -> WearingContact:
 
 
 def waved() -> WearState:
-    """A flat that has worn to uniform pressure, with a long wave on it: everything touches."""
+    """Return a flat worn to uniform pressure with a long wave on it: everything touches."""
     dished = -HALF_SPACE.normal(np.full(GRID.shape, 0.85 * MEAN))
     gap = dished + 1e-4 * np.cos(2.0 * X)
     return WearState.unworn(gap)
 
 
 def rounded() -> WearState:
-    """A flat with rounded edges: the contact grows as it wears."""
+    """Return a flat with rounded edges: the contact grows as it wears."""
     gap = np.maximum(np.abs(GRID.x) - 2.0, 0.0) ** 2 / 60.0
     return WearState.unworn(gap)
 
@@ -63,7 +63,7 @@ def unchanging(state: WearState) -> WearingContact:
 
 
 def evolving(state: WearState) -> WearingContact:
-    """Slip that grows with what has worn: as that of the half-space, it belongs to a state."""
+    """Return the contact of a state whose slip grows with wear, as that of the half-space does."""
     return wearing(1.0 + state.surfaces.depth / 4e-3)
 
 
@@ -86,7 +86,7 @@ LIMIT = CONSTANT.stable_cycles(waved())
     ],
 )
 def test_order_of_convergence(stepper, order, fewest, contact_at) -> None:
-    """Depth anywhere converges at the order of the method, with slips that wear changes too."""
+    """The depth converges everywhere at the order of the method, also with slips that change."""
     cycles = 6.0 * LIMIT
     jumps = fewest, 2 * fewest, 4 * fewest
     coarse, middle, fine = (
@@ -120,7 +120,7 @@ def advance_in(
 
 
 def automatic(stepper, cycles: float) -> WearStep:
-    """A run whose steps choose their own length."""
+    """Return a run whose steps choose their own length."""
     state = rounded()
     first = CONSTANT.cycle(state, CONSTANT.dissipating)
     starts = {t: solved.start for t, solved in first.states.items()}
@@ -132,7 +132,7 @@ def automatic(stepper, cycles: float) -> WearStep:
 
 @cache
 def exact_depth(cycles: float, steps: int = 100) -> Array:
-    """Depth at the end of a run, by short steps of second order: to 2e-5 of it."""
+    """Return the depth at the end of a run by short steps of second order, accurate to 2e-5."""
     state = rounded()
     for _ in range(steps):
         state = CONSTANT.second_order_step(state, cycles / steps).state
@@ -140,31 +140,31 @@ def exact_depth(cycles: float, steps: int = 100) -> Array:
 
 
 def errors(state: WearState, exact: Array) -> tuple[float, float]:
-    """What the state says of its error of the depth, and what it is: shares of it."""
+    """Return the estimated and the true relative error of the depth."""
     size = root_mean_square(exact, exact)
-    told = root_mean_square(np.add(*state.errors), exact)
-    return told / size, root_mean_square(state.surfaces.depth - exact, exact) / size
+    estimate = root_mean_square(np.add(*state.errors), exact)
+    return estimate / size, root_mean_square(state.surfaces.depth - exact, exact) / size
 
 
 @pytest.mark.parametrize("kind", [slow(ImplicitStepper), SecondOrderStepper])
 def test_automatic_steps_meet_their_tolerance_and_grow_fewer_with_it(kind) -> None:
-    """And say within a factor of three how large their error is."""
+    """The estimated error is within a factor of three of the true one."""
     cycles = 100.0 * CONSTANT.stable_cycles(rounded())
     exact = exact_depth(cycles)
     steps = []
     for tolerance in (0.02, 1e-3, 2e-4):
         end = automatic(kind(ErrorControl(tolerance)), cycles)
-        told, error = errors(end.state, exact)
-        assert told < tolerance
+        estimate, error = errors(end.state, exact)
+        assert estimate < tolerance
         assert error < 1.1 * tolerance
-        assert error / 3.0 < told < 3.0 * error
+        assert error / 3.0 < estimate < 3.0 * error
         assert end.state.surfaces.depth.max() == pytest.approx(exact.max(), rel=tolerance)
         steps.append(end.spent.steps)
     assert steps == sorted(set(steps))
 
 
-def to_and_fro(state: WearState, cycles: float, contact_at) -> WearState:
-    """Over all increments and back; slips half-way hold for all of it."""
+def strang_step(state: WearState, cycles: float, contact_at) -> WearState:
+    """Take a step over all increments and back, with the slips half-way for all of it."""
     out = contact_at(state).implicit_step(state, 0.5 * cycles, back=True)
     middle = contact_at(out.state)
     out = middle.implicit_step(state, 0.5 * cycles, back=True)
@@ -174,18 +174,18 @@ def to_and_fro(state: WearState, cycles: float, contact_at) -> WearState:
 @pytest.mark.parametrize("contact_at", [unchanging, evolving])
 @pytest.mark.parametrize("lengths", [(1.0, 1.0, 2.0, 2.0), (1.0, 1.5, 2.0, 0.5), (2.0, 0.1, 1.0)])
 def test_the_companion_takes_steps_of_twice_the_length(lengths, contact_at) -> None:
-    """Out in one step, back in the next, whose length may differ; V = α E for both.
+    """The companion goes out in one step and back in the next; V = α E holds for both runs.
 
-    It guesses the slips half-way of two equal steps from those of the other, whose error of a
-    hundredth is all that comes in by that.
+    The two steps may differ in length. Of two equal steps, the slips half-way are estimated from
+    the other run: the error of a hundredth is due to that alone.
     """
     unit, state, alone, coarse = 0.4 * LIMIT, waved(), waved(), waved()
     for cycles in lengths:
         state = ImplicitStepper().step(state, cycles * unit, 100.0 * unit, contact_at).state
-        alone = to_and_fro(alone, cycles * unit, contact_at)
+        alone = strang_step(alone, cycles * unit, contact_at)
     pairs = [sum(lengths)] if len(lengths) == 3 else [sum(lengths[:2]), sum(lengths[2:])]
     for pair in pairs:
-        coarse = to_and_fro(coarse, pair * unit, contact_at)
+        coarse = strang_step(coarse, pair * unit, contact_at)
     np.testing.assert_allclose(state.surfaces.depths, alone.surfaces.depths, rtol=1e-7)
     missed = np.subtract(state.companion.surfaces.depths, state.surfaces.depths)
     guessed = contact_at is evolving and lengths[0] == lengths[1]
@@ -202,19 +202,19 @@ def test_the_companion_takes_steps_of_twice_the_length(lengths, contact_at) -> N
 
 
 def test_the_last_of_an_odd_number_of_steps_is_two() -> None:
-    """So that it is compared as well, with one of its length."""
+    """The last step is compared as well, with one of its length."""
     state, cycles = waved(), 0.4 * LIMIT
     step = ImplicitStepper().step(state, cycles, cycles, unchanging)
-    fine = to_and_fro(to_and_fro(state, 0.5 * cycles, unchanging), 0.5 * cycles, unchanging)
-    whole = to_and_fro(state, cycles, unchanging)
+    fine = strang_step(strang_step(state, 0.5 * cycles, unchanging), 0.5 * cycles, unchanging)
+    whole = strang_step(state, cycles, unchanging)
     np.testing.assert_allclose(step.state.surfaces.depths, fine.surfaces.depths, rtol=1e-7)
     np.testing.assert_allclose(
         step.state.companion.surfaces.depths, whole.surfaces.depths, rtol=1e-7
     )
 
 
-def test_a_companion_half_way_goes_on_where_increments_come_to_be_alike() -> None:
-    """It has worn as many cycles as the others, out only, and takes steps of its own from there."""
+def test_a_companion_half_way_goes_on_where_increments_become_equal() -> None:
+    """The companion has worn as many cycles as the others, and takes its own steps from there."""
     cycles = 0.4 * LIMIT
     same = history(8.0 * MEAN * np.ones(3), np.zeros(3))
     alike = replace(CONSTANT, sliding=SlidingCycle(same, np.full((3, *GRID.shape), 0.02)))
@@ -242,19 +242,19 @@ def test_steps_that_go_alone_are_the_same_without_their_companion() -> None:
 
 @pytest.mark.parametrize("kind", [ImplicitStepper, slow(SecondOrderStepper)])
 def test_steps_stay_short_enough_to_compare(kind) -> None:
-    """Ten times as long as it takes to press away all that three unlike loads can.
+    """The run is ten times as long as three dissimilar loads need to press all waves away.
 
-    Longer and longer steps would come to the same surfaces, whatever their length, and these are
-    not those of short steps: told were a tenth of the error.
+    Ever longer steps would reach the same surfaces, whatever their length, and not those of short
+    steps: the estimate would be a tenth of the error.
     """
     cycles = 1000.0 * CONSTANT.stable_cycles(rounded())
-    exact = exact_depth(cycles, 60)  # to 6e-4 of it: a sixth of the error
-    told, error = errors(automatic(kind(ErrorControl(0.01)), cycles).state, exact)
+    exact = exact_depth(cycles, 60)  # accurate to 6e-4, a sixth of the error
+    estimate, error = errors(automatic(kind(ErrorControl(0.01)), cycles).state, exact)
     assert 1e-4 < error < 0.01
-    assert error / 3.0 < told < 3.0 * error
+    assert error / 3.0 < estimate < 3.0 * error
 
 
-def test_steps_under_loads_that_are_all_alike_may_be_of_any_length() -> None:
+def test_steps_under_equal_loads_may_have_any_length() -> None:
     loads, slip = history(np.full(2, MEAN), np.zeros(2)), np.full((2, *GRID.shape), 0.01)
     alike = replace(CONSTANT, sliding=SlidingCycle(loads, slip))
     assert alike.comparable_cycles(rounded()) == np.inf
@@ -265,9 +265,9 @@ def test_steps_under_loads_that_are_all_alike_may_be_of_any_length() -> None:
 
 
 def test_automatic_steps_take_a_sixth_of_the_explicit_ones() -> None:
-    """One per cent of depth and volume, against explicit steps at their limit.
+    """One per cent of depth and volume costs a sixth of explicit steps at their limit.
 
-    A third of it is what their companion takes.
+    The companion takes a third of that.
     """
     cycles = 150.0 * CONSTANT.stable_cycles(rounded())
     explicit = automatic(ExplicitStepper(fraction=1.0), cycles)
@@ -279,7 +279,7 @@ def test_automatic_steps_take_a_sixth_of_the_explicit_ones() -> None:
 
 
 def test_an_absolute_tolerance_is_a_depth() -> None:
-    """The error of a step in mm, whatever the depth at the end."""
+    """The error of a step is bounded in mm, whatever the depth at the end."""
     cycles = 100.0 * CONSTANT.stable_cycles(rounded())
     exact = exact_depth(cycles)
     worn = exact > 0.0
@@ -288,7 +288,7 @@ def test_an_absolute_tolerance_is_a_depth() -> None:
         automatic(ImplicitStepper(control), cycles)
         for control in (ErrorControl(absolute=allowed), ErrorControl(relative=0.01))
     )
-    # One step of the companion's more or less.
+    # The companion may take one step more or less.
     assert abs(absolute.spent.steps - relative.spent.steps) <= 4
     assert root_mean_square(absolute.state.surfaces.depth - exact, exact) < allowed
 
@@ -321,7 +321,7 @@ def test_explicit_steps_keep_to_their_share_of_the_limit() -> None:
     ],
 )
 def test_steps_add_up_to_the_cycles_asked_for(stepper) -> None:
-    """Energy of gross sliding is that of so many cycles: µ Σ p s over them."""
+    """The energy of gross sliding is µ Σ p s over exactly these cycles."""
     cycles = 3.3 * LIMIT
     state = advance_cycles(stepper, waved(), cycles, 10.0 * cycles, unchanging).state
     volume = state.surfaces.depth.sum() * GRID.cell_area
@@ -334,7 +334,7 @@ def test_steps_add_up_to_the_cycles_asked_for(stepper) -> None:
 
 @pytest.mark.parametrize("kind", [ImplicitStepper, slow(SecondOrderStepper)])
 def test_the_volume_has_an_error_of_its_own(kind) -> None:
-    """Slip that grows with wear: no pressure corrects the volume, and the estimate says so."""
+    """Pressure does not correct the volume where slip grows with wear; the estimate shows it."""
     cycles, control = 6.0 * LIMIT, ErrorControl(0.02)
     reference = advance_in(SecondOrderStepper(), waved(), cycles, 12, evolving)
     state = advance_cycles(kind(control), waved(), cycles, cycles, evolving).state
@@ -356,7 +356,7 @@ def held() -> WearingContact:
 
 
 def test_steps_grow_where_wear_slows_down() -> None:
-    """As many more for each factor of the cycles, and as right as very many at any of them."""
+    """Each factor of the cycles takes equally many steps, and the depth is right at any time."""
     contact, unworn = held(), WearState.unworn(GRID.x**2 / 2e4)
     first = contact.cycle(unworn, contact.dissipating)
     starts = {t: solved.start for t, solved in first.states.items()}
@@ -377,13 +377,13 @@ def test_steps_grow_where_wear_slows_down() -> None:
     np.testing.assert_allclose(
         fixed.surfaces.depth, np.maximum(1e-3 - unworn.surfaces.gap, 0.0), atol=1e-6
     )
-    # From one end of the hundredfold to the other: 74, 88, 90 and 96 of them.
+    # Over the factors of a hundred the numbers of steps are 74, 88, 90 and 96.
     assert np.diff(taken).max() < 20
     assert taken[0] < 100
 
 
 def test_what_is_to_come_is_bounded_by_a_rate_that_falls() -> None:
-    """Of r exp(-n d) a step: 1 + 1/d steps at least, and no more than are left."""
+    """A rate of r exp(-n d) gives at least 1 + 1/d steps, and no more than are left."""
     before, after = (replace(rounded(), volume_rate=rate) for rate in (1.0, np.exp(-0.25)))
     assert steps_to_come(before, after, 10.0, 1e6) == pytest.approx(5.0)
     assert steps_to_come(before, after, 10.0, 30.0) == 3.0

@@ -1,6 +1,6 @@
-"""Cycle-jumped wear of one interface: conservation, stability, convergence.
+"""Wear steps of one interface: conservation, stability, convergence.
 
-A ball on a small grid under one or several loads, sliding as a whole unless said otherwise.
+A ball on a small grid has one or several loads, and slides as a whole unless stated otherwise.
 """
 
 from dataclasses import replace
@@ -29,7 +29,7 @@ EQUAL: tuple[WearLaw, WearLaw] = (EnergyLaw(1e-8), EnergyLaw(1e-8))
 
 
 def loads(*normal: float) -> LoadHistory:
-    """A cycle of centred normal loads."""
+    """Return a cycle of centred normal loads."""
     zero = np.zeros(len(normal))
     columns = dict.fromkeys(("Qx", "Qy", "Mx", "My", "Mz", "Edx", "Edy"), zero)
     return LoadHistory(P=np.array(normal), **columns, sliding=zero.astype(bool))
@@ -55,7 +55,7 @@ def step(contact: WearingContact, kind: str, state: WearState, cycles: float) ->
 
 
 def march(contact: WearingContact, kind: str, cycles: float, jumps: int) -> WearState:
-    """State after ``cycles`` in so many equal jumps."""
+    """Return the state after ``cycles`` in equal jumps."""
     state = unworn()
     for _ in range(jumps):
         state = step(contact, kind, state, cycles / jumps).state
@@ -67,7 +67,7 @@ def march(contact: WearingContact, kind: str, cycles: float, jumps: int) -> Wear
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_worn_volume_is_coefficient_times_energy(kind: str) -> None:
-    """V = α E for each body by its own α, over a cycle of unequal loads and uneven slips."""
+    """V = α E holds for each body with its own α, over unequal loads and uneven slips."""
     laws = EnergyLaw(1e-8), EnergyLaw(3.7e-8)
     history = loads(500.0, 2000.0, 1200.0)
     slip = SLIP * np.random.default_rng(0).random((3, *GRID.shape))
@@ -97,7 +97,7 @@ def test_energy_of_a_sliding_cycle_is_friction_times_load_times_slip(kind: str) 
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_mixed_laws_wear_each_body_by_its_own(kind: str) -> None:
-    """Archard on body 1, energy on body 2; only their shares of the pressure differ."""
+    """With Archard's law on body 1 and the energy law on body 2, only their shares differ."""
     laws = ArchardLaw(1e-4, 3500.0), EnergyLaw(1e-8)
     state = step(wearing(laws), kind, unworn(), 1000.0).state
     surfaces, share = state.surfaces, 1e-4 / 3500.0 / (1e-8 * FRICTION)
@@ -110,7 +110,7 @@ def test_mixed_laws_wear_each_body_by_its_own(kind: str) -> None:
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_an_increment_that_happens_twice_wears_as_two(kind: str) -> None:
-    """A share of 2 is the same increment twice; only the order of a step's parts differs."""
+    """A share of 2 is the same increment twice; only the order of the parts of a step differs."""
     once = loads(LOAD)
     twice = wearing(history=replace(once, share=np.array([2.0]), block=once.block))
     state = step(twice, kind, unworn(), 500.0).state
@@ -160,7 +160,7 @@ def test_working_increments_end_with_the_heaviest() -> None:
 
 @pytest.mark.parametrize("off", [-1e-9, 1e-9])
 def test_of_loads_that_are_held_the_first_is_the_heaviest(off: float) -> None:
-    """Wherever the solver of the structure left the larger residual."""
+    """The first of equal loads counts as the largest, whatever the structure's residuals."""
     history = loads(100.0, 500.0, 500.0 * (1.0 + off), 300.0)
     slip = np.full((4, *GRID.shape), SLIP)
     assert wearing(history=history, slip=slip).dissipating == [2, 3, 0, 1]
@@ -219,7 +219,7 @@ def test_nothing_wears_where_nothing_slips(kind: str) -> None:
 
 @pytest.mark.parametrize("laws", [EQUAL, slow((EnergyAmplitudeLaw(4e-8, 0.02),) * 2)])
 def test_explicit_and_implicit_meet_at_first_order(laws: tuple[WearLaw, WearLaw]) -> None:
-    """Their difference halves as jumps double, and both extrapolate to one depth."""
+    """Their difference is proportional to the jumps, and both extrapolate to one depth."""
     contact = wearing(laws, loads(1000.0, LOAD))
     cycles = 3.0 * contact.stable_cycles(unworn())
     depth = {

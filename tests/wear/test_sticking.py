@@ -1,4 +1,4 @@
-"""Shear where a contact sticks, from nodes that know it: by hand, and its balance."""
+"""Shear where a contact sticks, from nodal tractions: by hand, and its balance."""
 
 import numpy as np
 
@@ -10,7 +10,7 @@ AREA, FRICTION = 0.25, 0.5
 
 
 def cycle(pressure: list[float], shear: list[float], loads: tuple[float, float]) -> CycleTractions:
-    """One increment on a row of cells, sheared along x, in which half of the load sticks."""
+    """Return one increment on a row of cells, sheared along x, in which half of the load sticks."""
     p = np.array(pressure)[None, :, None]
     q = np.zeros((1, 2, len(pressure), 1))
     q[0, 0, :, 0] = shear
@@ -29,7 +29,7 @@ def nodal(shear: list[float], pressure: list[float]) -> Array:
 
 
 def test_shear_is_to_pressure_as_at_the_nodes() -> None:
-    """At the limit, half of it the other way, and where nodes carry nothing as slip has it."""
+    """Shear is at the limit, half of it the other way, or that of slip at unloaded nodes."""
     coarse = nodal([50.0, -20.0, 0.0], [100.0, 80.0, 0.0])
     given = cycle([120.0, 60.0, 10.0], [0.0, 0.0, 5.0], (AREA * (60.0 - 15.0 + 5.0), 0.0))
     known = with_sticking_shear(given, coarse, AREA)
@@ -38,10 +38,10 @@ def test_shear_is_to_pressure_as_at_the_nodes() -> None:
 
 
 def test_what_is_lacking_goes_where_shear_is_below_the_limit() -> None:
-    """30 MPa are lacking along y, and there is room for 0, 15 and 15."""
+    """30 MPa are lacking along y, where the cells can take 0, 15 and 15 MPa more."""
     coarse = nodal([50.0, -20.0, 0.0], [100.0, 80.0, 80.0])
     given = cycle([120.0, 60.0, 30.0], [0.0] * 3, (AREA * (60.0 - 15.0), AREA * 30.0))
-    given.shear[0, 0, 1] = 7.0  # of slip, which the nodes know better
+    given.shear[0, 0, 1] = 7.0  # from slip, but the nodes are more accurate
     known = with_sticking_shear(given, coarse, AREA).shear[0, :, :, 0]
     room = np.array([0.0, 60.0 * FRICTION - 15.0, 30.0 * FRICTION])
     np.testing.assert_allclose(known[1], room)

@@ -1,4 +1,4 @@
-"""Contacts whose tilt is held: moments that hold it, worn shapes, an independent model."""
+"""Contacts with a held tilt: moments that hold it, worn shapes, an independent model."""
 
 from functools import cache
 from typing import Any
@@ -33,7 +33,7 @@ def interface(grid: Grid, gap: Array, tilt: Tilt, **settings: Any) -> InterfaceC
 def reciprocating(
     grid: Grid, P: float, stroke: float, each_way: int, angle: float = 0.0
 ) -> CycleLoads:
-    """To and fro in equal steps, under no moments."""
+    """Return motion forward and backward in equal steps, without moments."""
     step = stroke / each_way * np.array([np.cos(angle), np.sin(angle)])
     motion = np.concatenate([np.tile(step, (each_way, 1)), np.tile(-step, (each_way, 1))])
     zero = np.zeros(len(motion))
@@ -43,7 +43,7 @@ def reciprocating(
 
 
 def moved(history: CycleLoads, tilt: Tilt) -> Drive:
-    """The motion of a cycle imposed, the bodies meeting in the middle of it."""
+    """Return the imposed motion of a cycle in whose middle the bodies meet."""
     motion = history.slip.mean(axis=2)
     path = np.concatenate([np.zeros((1, 2)), np.cumsum(motion, axis=0)])
     motions = np.zeros((len(motion), 6))
@@ -55,7 +55,7 @@ def moved(history: CycleLoads, tilt: Tilt) -> Drive:
 def worn(
     contact: InterfaceContact, history: CycleLoads, cycles: float, jumps: int
 ) -> tuple[WearState, float]:
-    """The state after so many cycles in equal jumps, and the energy that has worn it."""
+    """Return the state after ``cycles`` in equal jumps, and the energy dissipated."""
     state, _ = contact.begin(history, cycles)
     for jump in range(jumps):
         state, _ = contact.jump(state, cycles / jumps, cycles * (1.0 - jump / jumps))
@@ -66,7 +66,7 @@ def worn(
 
 
 def test_an_inclined_punch_is_held_by_the_moment_of_its_closed_form() -> None:
-    """A full contact of half-width a, inclined by α: M = π a² E* α/4, and none where it is free.
+    """A full contact of half-width a, inclined by α, needs M = π a² E* α/4, and none if it is free.
 
     On a half-plane the pressure E* α x/2√(a² - x²) displaces by αx; ∫ x p dx is its moment.
     """
@@ -87,9 +87,9 @@ def test_an_inclined_punch_is_held_by_the_moment_of_its_closed_form() -> None:
 
 
 @pytest.mark.parametrize("method", ["normal", "full"])
-@pytest.mark.parametrize("other", [BODY, STEEL], ids=["alike", "unlike"])
+@pytest.mark.parametrize("other", [BODY, STEEL], ids=["similar", "dissimilar"])
 def test_the_moments_that_hold_a_tilt_leave_none_when_they_are_imposed(method, other) -> None:
-    """In 3-D about both axes, over an oblique stroke on a groove: one problem, both ways."""
+    """In 3-D about both axes, over an oblique stroke on a groove, both ways are one problem."""
     grid = Grid.covering((1.0, 1.0), (20, 20))
     groove = 1e-3 * np.exp(-((grid.x - 0.04) ** 2 + (grid.y + 0.06) ** 2) / 0.02)
     gap = (grid.x**2 + grid.y**2) / (2.0 * RADIUS) - groove
@@ -119,7 +119,7 @@ def test_the_moments_that_hold_a_tilt_leave_none_when_they_are_imposed(method, o
 
 
 def test_a_groove_holds_in_mirrored_places_by_opposite_moments() -> None:
-    """Off centre by the same to either side; none in the middle."""
+    """Off centre by the same distance on either side the moments are opposite, in the middle 0."""
     grid = Grid.strips(1.0, 100)
     groove = 2e-4 * np.exp(-((grid.x / 0.05) ** 2))
     contact = NormalContact(HalfSpace(grid, PAIR))
@@ -153,7 +153,7 @@ def test_partial_slip_of_a_held_tilt() -> None:
 
 @pytest.mark.parametrize("tilt", ["held", "free"])
 def test_an_inclined_strip_wears_off_its_slope_where_it_is_held(tilt: Tilt) -> None:
-    """Worn for long it is pressed uniformly: W is then odd in x by the slope, or not at all.
+    """After long wear the pressure is uniform: W is odd in x by the slope if held, or even if free.
 
     W = δ - h - u with u of a uniform pressure, which is even.
     """
@@ -171,10 +171,10 @@ def test_an_inclined_strip_wears_off_its_slope_where_it_is_held(tilt: Tilt) -> N
 
 @cache
 def in_a_model_of_its_own(
-    strips: int, load: float, each_way: int, cells: int, cycles: float, steps: int
+    cells_across: int, load: float, each_way: int, cells: int, cycles: float, steps: int
 ) -> tuple[Array, Array]:
-    """Depths of flat and cylinder on so many strips of 10 µm, by the oracle's explicit steps."""
-    form = (Grid.strips(0.01 * strips, strips).x ** 2 / (2.0 * RADIUS)).ravel()
+    """Return the depths of flat and cylinder on cells of 10 µm, by the oracle's explicit steps."""
+    form = (Grid.strips(0.01 * cells_across, cells_across).x ** 2 / (2.0 * RADIUS)).ravel()
     rate = COEFFICIENT * FRICTION * cells * 0.01 * cycles / steps
     return wear_without_tilt(form, 0.01, PAIR.contact_modulus, load, each_way, cells, rate, steps)
 
@@ -188,9 +188,10 @@ STEPPERS = {
 
 @pytest.mark.parametrize(("stepper", "jumps"), STEPPERS.values(), ids=STEPPERS)
 def test_a_sliding_cylinder_wears_as_in_a_model_of_its_own(stepper, jumps: int) -> None:
-    """Depths of both bodies over a stroke of 120 µm, a third of the scar, to what the steps leave.
+    """The depths of both bodies agree within the error of the steps.
 
-    Free to tilt, the flat wears 8.5 % deeper and the cylinder 3.5 % less; volumes are exact anyhow.
+    The stroke of 120 µm is a third of the scar. Free to tilt, the flat wears 8.5 % deeper and the
+    cylinder 3.5 % less; volumes are exact in any case.
     """
     grid, load, each_way, cells, cycles = Grid.strips(0.6, 60), 18.5, 2, 6, 4e3
     stroke, form = each_way * cells * 0.01, (grid.x**2 / (2.0 * RADIUS)).ravel()
@@ -205,7 +206,7 @@ def test_a_sliding_cylinder_wears_as_in_a_model_of_its_own(stepper, jumps: int) 
 
 @pytest.mark.parametrize("kind", [ImplicitStepper, SecondOrderStepper])
 def test_steps_of_moving_surfaces_say_what_they_leave(kind) -> None:
-    """Of the depth of either body, within a factor of three, and close to what was asked for."""
+    """The estimated error of either depth is within a factor of three, and near the tolerance."""
     grid, load, each_way, cells, cycles = Grid.strips(0.72, 72), 18.5, 2, 6, 1e4
     stroke, form = each_way * cells * 0.01, (grid.x**2 / (2.0 * RADIUS)).ravel()
     expected = in_a_model_of_its_own(72, load, each_way, cells, cycles, 400)
@@ -214,15 +215,15 @@ def test_steps_of_moving_surfaces_say_what_they_leave(kind) -> None:
     state, _ = contact.jump(state, cycles, cycles)
     for depth, error, own in zip(state.surfaces.depths, state.errors, expected, strict=True):
         scale = root_mean_square(own, own)
-        told = root_mean_square(error, own) / scale
+        reported = root_mean_square(error, own) / scale
         true = root_mean_square(depth.ravel() - own, own) / scale
-        assert max(told, true) < 0.013
-        assert true / 3.0 < told < 3.0 * true
+        assert max(reported, true) < 0.013
+        assert true / 3.0 < reported < 3.0 * true
 
 
-@pytest.mark.parametrize("other", [BODY, STEEL], ids=["alike", "unlike"])
-def test_friction_of_the_half_space_wears_a_held_cylinder_alike(other) -> None:
-    """As given slips do, but for the elastic part of the stroke: 1 to 3 % of the energy.
+@pytest.mark.parametrize("other", [BODY, STEEL], ids=["similar", "dissimilar"])
+def test_friction_of_the_half_space_wears_a_held_cylinder_equally(other) -> None:
+    """Given slips wear the same but for the elastic part of the stroke, 1 to 3 % of the energy.
 
     Free to tilt, the flat wears 7 to 9 % deeper by either method.
     """
@@ -241,7 +242,7 @@ def test_friction_of_the_half_space_wears_a_held_cylinder_alike(other) -> None:
 
 
 def test_what_is_symmetric_does_not_care() -> None:
-    """A cylinder whose motion does not count, held and free: to the solver's tolerance."""
+    """A cylinder with small motion wears the same held and free, within the solver's tolerance."""
     grid = Grid.strips(0.72, 72)
     history = reciprocating(grid, 18.5, 0.01, 2)
     held, free = (

@@ -84,7 +84,7 @@ def test_files_mixed_up_are_told(pair):
     """The other way round the body has grown, which no clear area says."""
     ended = command("scar", pair[1], pair[0])
     assert ended.exit_code == 2
-    assert "no area clearly deeper than noise" in ended.stderr
+    assert "no area is clearly deeper than the noise" in ended.stderr
     given = command("scar", pair[1], pair[0], "--worn", "-0.33,0.33,-0.33,0.33")
     assert "doubt: no volume that differs from none; are the files in order?" in given.stdout
 

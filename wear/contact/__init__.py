@@ -1,1 +1,1 @@
-"""Contacts that wear: their loads, tractions and link to a structure."""
+"""Contacts that wear: their loads, their tractions and their link to a structure."""

@@ -1,4 +1,4 @@
-"""The contacts of all interfaces of a structure, as the coupled loop asks them."""
+"""The contacts of all interfaces of a structure, as the coupled loop uses them."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ Same = TypeVar("Same")
 class Contacts:
     """The contacts of all interfaces, which wear one after the other in this process.
 
-    See :class:`wear.contact.interface.InterfaceContact` for what each method does to one of them.
-    Those of a subclass may wear side by side: it answers :meth:`call`.
+    :class:`wear.contact.interface.InterfaceContact` documents the methods, which are called here
+    for every contact. A subclass that overrides :meth:`call` may run the contacts in parallel.
     """
 
     def __init__(self, contacts: Sequence[InterfaceContact]) -> None:
@@ -38,7 +38,7 @@ class Contacts:
         return answers
 
     def each(self, same: Same) -> list[Same]:
-        """The same for every contact."""
+        """Return a list with the same value for every contact."""
         return [same] * len(self.contacts)
 
     def begin(
@@ -65,7 +65,7 @@ class Contacts:
         return [contact.settings.friction(state.energy) for contact, state in pairs]
 
     def kinetics(self, states: Sequence[InterfaceState]) -> Array:
-        """A row of :data:`KINETICS` of every interface ``(interfaces, 5)``."""
+        """Return a row of :data:`KINETICS` for every interface ``(interfaces, 5)``."""
         rows = []
         for contact, state in zip(self.contacts, states, strict=True):
             depths = state.surfaces.depths

@@ -1,8 +1,8 @@
-"""How the bodies of a contact are driven through a closed cycle: by forces, or by their motions.
+"""Forces and motions that drive the bodies of a contact through a closed cycle.
 
-A structure presses and shears its contacts by forces, whatever they do. In a rig actuators may
-impose motions as well: those of body 1 relative to body 2 far from the contact, counted from where
-the bodies met. What they take is then for the contact to find.
+A structure presses and shears its contacts by forces. In a rig, actuators may impose motions
+instead: motions of body 1 relative to body 2 far from the contact, measured from where the bodies
+first met. The contact then determines the forces.
 """
 
 from __future__ import annotations
@@ -19,18 +19,25 @@ from sa_solver.types import Array, LoadHistory, Tilt
 
 FORCES = (False,) * 6
 TILTS = NORMAL[1:]
-# Of forces and motions that press, in the same order, as the normal contact takes them.
+# Names of the normal forces and of the normal motions, in the same order, as keyword arguments of
+# the normal contact.
 PRESSING = ("P", "Mx", "My"), ("approach", "tilt_x", "tilt_y")
 
 
 @dataclass(frozen=True)
 class Drive:
-    """What is imposed on a contact over a cycle beside, or in the place of, its loads.
+    """Motions that are imposed on a contact over a cycle in place of forces, and its bulk strain.
 
-    ``motion`` (6,) says of which of (P, Qx, Qy, Mx, My, Mz) the motion is imposed and not the
-    force: (δz, δx, δy, φx, φy, φz), ``motions`` ``(t, 6)`` [mm, rad] at the ends of the increments;
-    None: 0 throughout. ``strain`` ``(t,)`` is the mismatch ε_2 - ε_1 along x that bulk stress makes
-    of the unloaded surfaces; None: none.
+    Parameters
+    ----------
+    motion
+        For each of (P, Qx, Qy, Mx, My, Mz), whether the motion (δz, δx, δy, φx, φy, φz) is imposed
+        instead of the force.
+    motions
+        Motions at the ends of the increments ``(t, 6)`` [mm, rad]; None: 0 throughout.
+    strain
+        Mismatch strain ε_2 - ε_1 of the unloaded surfaces along x due to bulk stress ``(t,)``;
+        None: none.
     """
 
     motion: tuple[bool, ...] = FORCES
@@ -39,27 +46,27 @@ class Drive:
 
     @classmethod
     def by_forces(cls, tilt: Tilt = "free") -> Self:
-        """All by the forces of the loads, but for a ``tilt`` that is held."""
+        """Return a drive by the forces of the loads alone, with the ``tilt`` free or held."""
         return cls(tuple(tilt == "held" and k in TILTS for k in range(6)))
 
     @property
     def tilt(self) -> Tilt:
-        """Free where the bodies turn as imposed moments make them about both axes."""
+        """Free if the imposed moments determine the tilt about both axes, else held."""
         return "held" if any(self.motion[k] for k in TILTS) else "free"
 
     @property
     def presses(self) -> bool:
-        """Whether a motion across the face is imposed: an approach or a tilt."""
+        """Whether a normal motion is imposed: an approach or a tilt."""
         return any(self.motion[k] for k in NORMAL)
 
     def values(self, loads: LoadHistory) -> Array:
-        """Force or motion imposed at the ends of the increments ``(t, 6)``."""
+        """Return the imposed force or motion at the ends of the increments ``(t, 6)``."""
         motions = np.zeros((len(loads), 6)) if self.motions is None else self.motions
         values: Array = np.where(self.motion, motions, loads.resultants)
         return values
 
     def pressing(self, loads: LoadHistory, increment: int) -> dict[str, float]:
-        """What presses the bodies in an increment, as the normal contact takes it."""
+        """Return the normal forces and motions of an increment, as normal contact arguments."""
         values = self.values(loads)[increment]
         forces, motions = PRESSING
         return {
@@ -68,7 +75,7 @@ class Drive:
         }
 
     def increments(self, loads: LoadHistory) -> list[ContactLoad]:
-        """What is imposed at the end of each increment; energies are those of the loads."""
+        """Return the imposed load of each increment, with the friction energies of the loads."""
         moved = any(self.motion[k] for k in (1, 2, 5))
         energy = None if moved else np.stack([loads.Edx, loads.Edy], axis=1)
         path = ContactLoadPath(self.values(loads), self.motion, self.strain, energy)

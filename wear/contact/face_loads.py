@@ -1,4 +1,4 @@
-"""What one contact face carries over a closed cycle, whoever knows it."""
+"""Loads and slips of one contact face over a closed cycle."""
 
 from __future__ import annotations
 
@@ -12,10 +12,11 @@ from sa_solver.types import Array, LoadHistory
 
 
 class FaceLoads(Protocol):
-    """What one face carries over a cycle: ``slip`` ``(t, 2, n)`` [mm] is that of its nodes.
+    """Protocol of the loads and slips of one face over a cycle, by its nodes.
 
-    So are ``force`` ``(t, 3, n)`` on body 2 [N] and ``displacement`` ``(t, 3, n)`` [mm] of body 2
-    relative to body 1 since both were unloaded, None where nobody knows them.
+    ``slip`` is ``(t, 2, n)`` [mm], ``force`` on body 2 ``(t, 3, n)`` [N], and ``displacement``
+    ``(t, 3, n)`` [mm] that of body 2 relative to body 1 since both were unloaded. Force and
+    displacement are None where they are unknown.
     """
 
     @property
@@ -30,15 +31,23 @@ class FaceLoads(Protocol):
 
 @dataclass(frozen=True)
 class CycleLoads:
-    """What one contact face of ``n`` nodes carries over the ``t`` increments of a closed cycle.
+    """Loads and slips of one contact face of ``n`` nodes over ``t`` increments of a closed cycle.
 
-    ``loads`` are its resultants, ``slip`` ``(t, 2, n)`` [mm] that of its nodes in each increment;
-    where they are known ``force`` ``(t, 3, n)`` [N] on body 2 and ``displacement`` ``(t, 3, n)``
-    [mm] of body 2 relative to body 1 since both were unloaded.
+    Parameters
+    ----------
+    loads
+        Resultants of the face.
+    slip
+        Slip of the nodes in each increment ``(t, 2, n)`` [mm].
+    force
+        Nodal forces on body 2 ``(t, 3, n)`` [N], if known.
+    displacement
+        Displacement of body 2 relative to body 1 since both were unloaded ``(t, 3, n)`` [mm], if
+        known.
 
     Examples
     --------
-    A cell under 100 N that slides to and fro by 0.05 mm:
+    A cell under 100 N slides forward and backward by 0.05 mm:
 
     >>> import numpy as np
     >>> from sa_solver import LoadHistory

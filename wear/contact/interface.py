@@ -1,37 +1,36 @@
-"""The contact of one interface: its grid, its loads and slips, and how it wears.
+"""Contact of one interface: its grid, its loads and slips, and its wear.
 
-Loads and slips come from outside, over one closed cycle (:class:`FaceLoads`). Slips are those of
-the structure's nodes, or the half-space's own under the same loads (wear methods 1 and 2 of Gallego
-2007); these are found anew on every worn surface. What an interface is lies in
-:class:`InterfaceSettings`, all that it remembers in :class:`InterfaceState`.
+Loads and slips come from outside, over one closed cycle (:class:`FaceLoads`). Slips are either
+those of the structure's nodes, or those that the half-space computes itself under the same loads
+(wear methods 1 and 2 of Gallego 2007); the latter are computed again on every worn surface.
+:class:`InterfaceSettings` describes an interface, :class:`InterfaceState` is its state between two
+jumps.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
-from typing import Literal
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from sa_solver import checks
 from sa_solver.contact import FrictionalContact
 from sa_solver.contact_state import ContactState
 from sa_solver.errors import InputError
 from sa_solver.half_space.operator import HalfSpace
-from sa_solver.normal.contact import NormalContact, checked_heights
+from sa_solver.normal.contact import NormalContact
 from sa_solver.rigid_modes import NORMAL
 from sa_solver.ties import first_largest
-from sa_solver.types import Array, ElasticPair, Grid, LoadHistory, Mask
-from wear.contact.drive import Drive
+from sa_solver.types import Array, LoadHistory, Mask
 from wear.contact.face_loads import FaceLoads
-from wear.contact.link import Link, Transfer, linked
+from wear.contact.link import Link, linked
 from wear.contact.moving import followed, passages
+from wear.contact.settings import InterfaceSettings
 from wear.contact.tractions import ContactFields, CycleTractions, acting_slip
-from wear.laws import EvolvingLaw, WearLaw
+from wear.laws import EvolvingLaw
 from wear.steps.full_cycle import CycleStart, march_cycle, slip_known, starts_near
 from wear.steps.marching import advance_cycles
-from wear.steps.steppers import Stepper, first_cycles
+from wear.steps.steppers import first_cycles
 from wear.steps.stepping import (
     CycleResult,
     SlidingCycle,
@@ -44,78 +43,29 @@ from wear.worn import Spent
 
 
 class MotionError(InputError):
-    """Surfaces that move over each other, under a law that no wear step follows then."""
+    """Surfaces move over each other under a wear law that no wear step can follow then."""
 
 
-# --- what an interface is -------------------------------------------------------------------------
-
-
-@dataclass(frozen=True)
-class InterfaceSettings:
-    """One interface and how it wears.
-
-    It is called ``name``, of an elastic ``pair`` of bodies, and computed on ``grid``; ``transfer``
-    leads from the nodes of the loads there (:class:`wear.CellNodes` where these are the cells), and
-    ``stepper`` says in which steps it wears.
-
-    ``gap`` ``(nx, ny)`` [mm] is that of the unloaded, unworn bodies, infinite or masked where one
-    of them has no surface, ``laws`` those of body 1 and
-    body 2, and ``friction`` gives Coulomb's coefficient after so much dissipated energy [N mm].
-    Slips are those of the loads, or with ``method`` full the half-space's own; there ``gross_slip``
-    says in which direction it slides as a whole. A ``drive`` may impose motions of the bodies in
-    the place of the loads' forces (:class:`wear.contact.drive.Drive`). ``follow`` says
-    whether surfaces that move over each other are followed; None: where that counts
-    (:func:`wear.contact.moving.moves`). The ``link`` to the structure of the loads is corrected for
-    what its bodies do beyond half-spaces (:mod:`wear.contact.link`), where they say it at their
-    nodes, or they are taken for half-spaces. ``tolerance`` is the contact solver's.
-
-    Examples
-    --------
-    A steel cylinder on steel whose bodies wear by Archard's law:
-
-    >>> from sa_solver import ElasticPair, Grid, Material
-    >>> from wear import ArchardLaw, CellNodes, ImplicitStepper, InterfaceSettings
-    >>> grid, steel, law = Grid.strips(1.4, 70), Material(210e3, 0.3), ArchardLaw(1e-4, 3000.0)
-    >>> settings = InterfaceSettings(
-    ...     name="cylinder", grid=grid, gap=grid.x**2 / 20.0, transfer=CellNodes(grid),
-    ...     pair=ElasticPair(steel, steel), laws=(law, law),
-    ...     friction=lambda energy: 0.5, stepper=ImplicitStepper(),
-    ... )
-    >>> print(settings.method, settings.friction(0.0))
-    normal 0.5
-    """
-
-    name: str
-    grid: Grid
-    gap: Array
-    transfer: Transfer
-    pair: ElasticPair
-    laws: tuple[WearLaw, WearLaw]
-    friction: Callable[[float], float]
-    stepper: Stepper[WearState, WearingContact]
-    method: Literal["normal", "full"] = "normal"
-    gross_slip: Literal["force", "energies"] = "force"
-    drive: Drive = field(default_factory=Drive)
-    follow: bool | None = None
-    link: Literal["corrected", "half_space"] = "corrected"
-    tolerance: float = 1e-8
-
-    def __post_init__(self) -> None:
-        checks.settle(self, gap=checked_heights(self.gap, self.grid))
-        checks.choice("method", self.method, ("normal", "full"))
-        checks.choice("link", self.link, ("corrected", "half_space"))
+# --- state ----------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True, kw_only=True)
 class InterfaceState(WearState):
-    """What an interface must remember between two jumps.
+    """State of an interface between two jumps.
 
-    ``loads``, nodal ``slip`` ``(t, 2, n)`` and ``link`` are those of the last solution of the
-    source, ``pressed`` ``(n,)`` how the largest of ``loads`` was shared out over the nodes then,
-    none where the source does not know its nodes; ``paths`` ``(t, 3, 2)`` [mm] lead body 2 round
-    its place in each state, none where its motion is too little to follow
-    (:func:`wear.contact.moving.followed`); ``start`` is a :class:`wear.steps.full_cycle.CycleStart`
-    where the half-space has a cycle of its own (method full).
+    Parameters
+    ----------
+    loads, slip, link
+        Loads, nodal slip ``(t, 2, n)`` [mm] and link of the last solution of the load source.
+    pressed
+        Distribution of the largest load over the nodes at that solution ``(n,)``, as shares; empty
+        where the source does not know its nodes.
+    paths
+        Paths of body 2 about its position in each increment ``(t, 3, 2)`` [mm]; empty where its
+        motion is too small to follow (:func:`wear.contact.moving.followed`).
+    start
+        A :class:`wear.steps.full_cycle.CycleStart` where the half-space computes its own cycle
+        (method full).
     """
 
     loads: LoadHistory
@@ -125,16 +75,32 @@ class InterfaceState(WearState):
     paths: Array
 
 
-# --- what it says of itself -----------------------------------------------------------------------
+# --- result of the first cycle --------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
 class FirstContact:
-    """What the contact of the unworn cycle says: see :class:`wear.steps.stepping.CycleResult`.
+    """Result of the contact over the unworn cycle.
 
-    ``energy`` ``(t,)`` [N mm]; ``pressure`` ``(t, nx, ny)`` [MPa]; ``stable_cycles`` the longest
-    stable explicit step; ``link`` is that to the unworn structure; ``cycle`` the states at its
-    increments where the half-space has its own friction (method full), else empty.
+    Parameters
+    ----------
+    energy
+        Energy dissipated in each increment ``(t,)`` [N mm].
+    pressure
+        Pressure of each increment ``(t, nx, ny)`` [MPa].
+    touches_border
+        Whether the contact reaches the border of the grid in any increment.
+    largest_residual
+        Largest residual of the contact solver.
+    spent
+        Cost of the solution.
+    stable_cycles
+        Longest stable explicit wear step [cycles].
+    link
+        Link to the unworn structure.
+    cycle
+        Contact states of the increments where the half-space has its own friction (method full),
+        else empty.
     """
 
     energy: Array
@@ -152,8 +118,10 @@ class FirstContact:
 
 @dataclass(frozen=True)
 class _Loaded:
-    """A contact under its loads, ``slip`` ``(t, 2, nx, ny)`` [mm], and the cycle of the half-space
-    that it comes from (empty: from the loads).
+    """A contact under its loads, with the slip that it wears by.
+
+    ``slip`` is ``(t, 2, nx, ny)`` [mm]; ``cycle`` the cycle of the half-space that gave it, or
+    empty if it is that of the loads.
     """
 
     contact: WearingContact
@@ -162,15 +130,15 @@ class _Loaded:
 
 
 class InterfaceContact:
-    """One interface on its grid.
+    """Contact of one interface on its grid.
 
-    All of its methods raise :class:`~wear.steps.stepping.ContactFailure` where a contact problem
-    does not converge.
+    All methods raise :class:`~wear.steps.stepping.ContactFailure` where a contact problem does not
+    converge.
 
     Examples
     --------
-    How much a sliding cylinder wears in its first cycle, by Archard's K s P / H, and how long steps
-    may be:
+    The wear of a sliding cylinder in its first cycle by Archard's K s P / H, and the longest stable
+    explicit step:
 
     >>> import numpy as np
     >>> from sa_solver import ElasticPair, Grid, LoadHistory, Material
@@ -196,16 +164,17 @@ class InterfaceContact:
         self.grid, self.transfer, self.pair = settings.grid, settings.transfer, settings.pair
         self._contact = NormalContact(HalfSpace(settings.grid, settings.pair))
         self._frictional: FrictionalContact | None = None
-        self._spent = self._told = Spent()
+        self._spent = self._reported = Spent()
         self._current: tuple[tuple[Array, ...], _Loaded] | None = None
-        # Called after each increment of a cycle of the half-space with its own friction.
+        # Progress callback, called after each increment of a half-space cycle with friction.
         self.solved: Callable[[], None] = lambda: None
 
     # -- wear ------------------------------------------------------------------------------------
     def begin(self, history: FaceLoads, cycles: float) -> tuple[InterfaceState, FirstContact]:
-        """The unworn state of a run of so many ``cycles``, and the contact of its first cycle.
+        """Return the unworn state of a run of ``cycles``, and the contact of its first cycle.
 
-        At every loaded increment. Raises :class:`MotionError`.
+        The contact is solved in every loaded increment. Raise :class:`MotionError` where the
+        surfaces move over each other under a law that cannot follow.
         """
         state = InterfaceState.unworn(
             self.settings.gap,
@@ -217,7 +186,8 @@ class InterfaceContact:
         )
         loaded = self._loaded(state)
         if self.pair.similar:
-            # Unlike bodies are pressed otherwise while friction holds them.
+            # Friction changes the pressure of dissimilar bodies, so that only the states of
+            # similar bodies are solutions of the normal contact.
             solved = {increment: end.pressed for increment, end in enumerate(loaded.cycle)}
             state = replace(state, starts=solved)
         result = loaded.contact.cycle(state, np.flatnonzero(history.loads.P > 0.0).tolist())
@@ -248,7 +218,10 @@ class InterfaceContact:
         )
 
     def follow(self, state: InterfaceState, history: FaceLoads) -> tuple[InterfaceState, Spent]:
-        """The state under the loads of a new solution, and what it took. Raises MotionError."""
+        """Return the state under the loads of a new solution, and the cost.
+
+        Raise :class:`MotionError` as :meth:`begin` does.
+        """
         return self._followed(state, history, self._link(history)), self._newly_spent()
 
     def _followed(self, state: InterfaceState, history: FaceLoads, link: Link) -> InterfaceState:
@@ -264,49 +237,52 @@ class InterfaceContact:
             starts=starts,
         )
         if self.settings.method == "full":
-            return state  # body 2 goes on as the half-space's own slip has it
+            return state  # The half-space's own slip determines the motion of body 2.
         paths = self._paths(self.transfer.to_cells(history.slip), starts, history.loads)
         return replace(state, paths=paths)
 
     def jump(
         self, state: InterfaceState, cycles: float, left: float
     ) -> tuple[InterfaceState, Spent]:
-        """Wear ``cycles`` of the ``left`` cycles of the run; also what it took."""
+        """Wear ``cycles`` of the ``left`` cycles of the run, and return the state and the cost."""
         result = advance_cycles(self.settings.stepper, state, cycles, left, self.wearing)
         assert isinstance(result.state, InterfaceState)
         return result.state, result.spent + self._newly_spent()
 
     def stable_cycles(self, state: InterfaceState) -> float:
-        """Longest explicit step that is stable."""
+        """Return the longest stable explicit step [cycles]."""
         return self._loaded(state).contact.stable_cycles(state)
 
     def on_grid(self, state: InterfaceState) -> Surfaces:
-        """The surfaces on the cells of the grid."""
+        """Return the surfaces of a state on the cells of the grid."""
         return state.surfaces
 
     @property
     def areas(self) -> Array | float:
-        """Of what the surfaces of states consist of: cells, or nodes ``(n,)`` [mm²]."""
+        """Area of each cell, or of each node ``(n,)``, of the worn surfaces [mm²]."""
         return self.grid.cell_area
 
     def volume(self, depth: Array) -> float:
-        """Volume of a worn ``depth``, as the surfaces of states have it [mm³]."""
+        """Return the volume of a worn ``depth`` [mm³], by cell or node as the surfaces are."""
         return float(depth.sum()) * self.grid.cell_area
 
     def moved(self, state: InterfaceState) -> float:
-        """Share of the load that wear has moved since the last solution; 0 without known nodes."""
+        """Return the share of the load that wear has moved since the loads were last solved.
+
+        It is 0 where the source does not know its nodes.
+        """
         if not state.pressed.size:
             return 0.0
         now = self._shared_out(state.starts, state.loads)
         return 0.5 * float(np.abs(now - state.pressed).sum())
 
     def nodal_depth(self, state: InterfaceState) -> Array:
-        """Worn depth of both bodies together at the nodes of the face ``(n,)`` [mm]."""
+        """Return the worn depth of both bodies together at the nodes of the face ``(n,)`` [mm]."""
         return self.transfer.to_nodes(state.surfaces.depth)
 
     # -- tractions ---------------------------------------------------------------------------------
     def fields(self, state: InterfaceState, increment: int) -> ContactFields:
-        """Tractions and slip of an increment on the present surfaces."""
+        """Return tractions and slip of an increment on the present surfaces."""
         loaded = self._loaded(state)
         if loaded.cycle:
             solved = loaded.cycle[increment]
@@ -316,7 +292,7 @@ class InterfaceContact:
         return ContactFields(pressure, self._sliding_shear(pressure, slip, state.energy), slip)
 
     def tractions(self, state: InterfaceState) -> CycleTractions:
-        """Tractions of a cycle on the present surfaces."""
+        """Return the tractions of a cycle on the present surfaces."""
         loaded = self._loaded(state)
         if loaded.cycle:
             return self._half_space_tractions(state.loads, loaded.cycle, state.energy)
@@ -324,7 +300,7 @@ class InterfaceContact:
         return self._given_tractions(state, self._pressure(result), state.energy)
 
     def unworn_tractions(self, history: FaceLoads, first: FirstContact) -> CycleTractions:
-        """Tractions of the first cycle, solved already."""
+        """Return the tractions of the first cycle, which is solved already."""
         return self._unworn_tractions(history, first.pressure, first.cycle)
 
     def _unworn_tractions(
@@ -335,7 +311,10 @@ class InterfaceContact:
         return self._given_tractions(history, pressure, 0.0)
 
     def carried(self, loads: LoadHistory, pressure: Array) -> LoadHistory:
-        """``loads``, with what ``pressure`` ``(t, nx, ny)`` [MPa] carries where motions press."""
+        """Return ``loads`` with the resultants of ``pressure`` where normal motions are imposed.
+
+        ``pressure`` is ``(t, nx, ny)`` [MPa].
+        """
         force, grid = pressure * self.grid.cell_area, self.grid
         arms = {"P": np.ones(1), "Mx": grid.y, "My": -grid.x}
         imposed = zip(arms.items(), NORMAL, strict=True)
@@ -346,7 +325,7 @@ class InterfaceContact:
         return replace(loads, **found)
 
     def frictional(self, energy: float) -> FrictionalContact:
-        """The contact with the half-space's own friction, after so much ``energy`` [N mm]."""
+        """Return the half-space contact with friction after ``energy`` [N mm] is dissipated."""
         friction = self.settings.friction(energy)
         if self._frictional is None or self._frictional.friction != friction:
             self._frictional = FrictionalContact(
@@ -358,13 +337,13 @@ class InterfaceContact:
         return self._frictional
 
     def _newly_spent(self) -> Spent:
-        """What cycles of the half-space and links have taken since this was asked for last."""
-        spent, self._told = self._spent - self._told, self._spent
+        """Return the cost of half-space cycles and links since the last call."""
+        spent, self._reported = self._spent - self._reported, self._spent
         return spent
 
     # -- loads -------------------------------------------------------------------------------------
     def _link(self, history: FaceLoads) -> Link:
-        """What the structure of the loads adds to the half-space."""
+        """Return the link that corrects the half-space for the structure of the loads."""
         settings, force, displacement = self.settings, history.force, history.displacement
         if settings.link == "half_space" or force is None or displacement is None:
             return Link.none()
@@ -375,21 +354,21 @@ class InterfaceContact:
         return link.level() if settings.drive.tilt == "free" else link
 
     def wearing(self, state: WearState) -> WearingContact:
-        """Return what wears under the loads and slips of a state."""
+        """Return the contact that wears under the loads and slips of a state."""
         assert isinstance(state, InterfaceState)
         return self._loaded(state).contact
 
     def _loaded(self, state: InterfaceState) -> _Loaded:
-        """The contact under the state's loads and slips, kept until these change.
+        """Return the contact under the loads and slips of a state, cached until they change.
 
-        Slips of the loads change with these, those of the half-space with wear.
+        Slips of the loads change with a new solution, slips of the half-space with wear.
         """
         settings, friction = self.settings, self.settings.friction(state.energy)
         columns = np.array([*vars(state.loads).values()], dtype=float)
         key: tuple[Array, ...] = columns, state.slip, state.paths, np.array([friction])
         key = *key, state.link.coefficients, state.link.region
         if settings.method == "full":
-            # What it starts from leaves its rounding, which a run that goes on must find again.
+            # The start values affect the result by rounding, which a resumed run must reproduce.
             starts = [start.pressure for start in state.starts.values()]
             key = *key, state.surfaces.gap, state.surfaces.depth_1, np.array([*state.starts])
             key = *key, *starts, *(vars(state.start).values() if state.start else ())
@@ -419,7 +398,10 @@ class InterfaceContact:
     def _half_space_cycle(
         self, state: InterfaceState, sliding: SlidingCycle, moved: Array | None
     ) -> tuple[ContactState, ...]:
-        """The closed cycle with its own friction, on surfaces ``moved`` ``(t, 3, nx, ny)`` [mm]."""
+        """Return the closed cycle with the half-space's own friction.
+
+        ``moved`` ``(t, 3, nx, ny)`` [mm] is the displacement of the surfaces by the link, if any.
+        """
         gaps = np.stack([sliding.gap(state.surfaces, t) for t in range(len(state.loads))])
         contact = self.frictional(state.energy)
         known = state.start if isinstance(state.start, CycleStart) else None
@@ -431,24 +413,24 @@ class InterfaceContact:
     def _paths(
         self, slip: Array, starts: Starts, loads: LoadHistory, known: Mask | None = None
     ) -> Array:
-        """The ways of body 2 over which the states act, if its motion is to be followed."""
+        """Return the paths of body 2 over which the states act, empty if it is not followed."""
         pressure = sum((start.pressure for start in starts.values()), np.zeros(self.grid.shape))
         law, forced = self.settings.laws[0], self.settings.follow
         paths = followed(self.grid, slip, pressure, loads.missions, forced, known)
         if len(paths) and isinstance(law, EvolvingLaw) and law.scope == "local":
             raise MotionError(
-                "the surfaces move over each other, and that of body 1 changes from place to "
-                "place, which no wear step follows: neglect the motion, or let the law change with "
-                "the energy of the whole contact"
+                "the surfaces move over each other, and the wear law of body 1 changes with the "
+                "local energy, which wear steps cannot follow: neglect the motion, or let the law "
+                "change with the energy of the whole contact"
             )
         return paths
 
     def _pressed(self, starts: Starts, history: FaceLoads) -> Array:
-        """See :class:`InterfaceState`."""
+        """Return the distribution of the largest load, as in :class:`InterfaceState`."""
         return np.empty(0) if history.force is None else self._shared_out(starts, history.loads)
 
     def _shared_out(self, starts: Starts, loads: LoadHistory) -> Array:
-        """Share of the largest of ``loads`` on every node ``(n,)``; 0 without load."""
+        """Return the share of the largest of ``loads`` on every node ``(n,)``, 0 without load."""
         start = starts.get(first_largest(loads.P))
         if start is None:
             return np.zeros(len(self.transfer.areas))
@@ -458,7 +440,7 @@ class InterfaceContact:
 
     # -- tractions of given slips ------------------------------------------------------------------
     def _pressure(self, result: CycleResult) -> Array:
-        """Pressure of every increment of a cycle ``(t, nx, ny)``."""
+        """Return the pressure of every increment of a cycle ``(t, nx, ny)`` [MPa]."""
         pressure = np.zeros((len(result.energy), *self.grid.shape))
         for t, state in result.states.items():
             pressure[t] = state.pressure
@@ -467,7 +449,7 @@ class InterfaceContact:
     def _given_tractions(
         self, loads: FaceLoads | InterfaceState, pressure: Array, energy: float
     ) -> CycleTractions:
-        """Those where slip is the loads', once so much ``energy`` [N mm] is dissipated."""
+        """Return the tractions under the slip of the loads, after a dissipated ``energy``."""
         slip = self.transfer.to_cells(loads.slip)
         stuck = ~slip.any(axis=1)
         force = pressure.sum(axis=(1, 2))
@@ -480,7 +462,7 @@ class InterfaceContact:
     def _half_space_tractions(
         self, loads: LoadHistory, cycle: tuple[ContactState, ...], energy: float
     ) -> CycleTractions:
-        """Tractions where the half-space has its own friction: known everywhere."""
+        """Return the tractions of a half-space cycle with its own friction."""
         pressure, shear, slip = (
             np.stack([getattr(increment, name) for increment in cycle])
             for name in ("pressure", "shear", "slip")
@@ -489,7 +471,7 @@ class InterfaceContact:
         return CycleTractions(loads, friction, pressure, shear, slip, np.zeros(len(cycle)))
 
     def _sliding_shear(self, pressure: Array, slip: Array, energy: float) -> Array:
-        """µp against ``slip`` ``(..., 2, nx, ny)``; 0 where nothing slips."""
+        """Return the shear µp against ``slip`` ``(..., 2, nx, ny)``, 0 where nothing slips."""
         size = np.hypot(slip[..., 0, :, :], slip[..., 1, :, :])[..., None, :, :]
         opposing = np.divide(-slip, size, out=np.zeros_like(slip), where=size > 0.0)
         shear: Array = self.settings.friction(energy) * pressure[..., None, :, :] * opposing

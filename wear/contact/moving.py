@@ -1,28 +1,29 @@
 """Surfaces that move over each other within a cycle.
 
-The grid goes with body 2, which carries the form of the contact. With body 2 at an offset s from
+The grid moves with body 2, which carries the form of the contact. With body 2 at an offset s from
 its mean position, the cell at x of the grid lies over the point x + s of body 1, whose surface is
-kept in the frame of that mean position. Each state of a cycle acts from half an increment before
-its place to half an increment after it (:mod:`sa_solver.cycles.increments`). On such a way,
+stored in the frame of that mean position. Each state of a cycle acts from half an increment before
+its place to half an increment after it (:mod:`sa_solver.cycles.increments`). On such a path,
 
     carried  c_i = Σ_k w_k f_{i+k}          deposited  d_{i+k} = Σ_i w_k p_i
 
-the grid sees the mean c of body 1's field f along the path, and what wears at p on the grid is
-spread over body 1 by the adjoint. The weights are those of cells that overlap, averaged over the
-path: w_k = ∫₀¹ Λ(s_x/dx - k_x) Λ(s_y/dy - k_y) dt with the hat Λ(u) = max(0, 1 - |u|). They are 0
-or more and their sum is 1, so that constants stay, nothing rises that only falls, and depositing
-keeps volume. Between the places where the path passes into the next cell the integrand is a
-quadratic of t, which two Gauss points integrate exactly.
+the grid sees the mean c of body 1's field f along the path, and wear p on the grid is distributed
+over body 1 by the adjoint. The weights are those of overlapping cells, averaged over the path:
+w_k = ∫₀¹ Λ(s_x/dx - k_x) Λ(s_y/dy - k_y) dt with the hat function Λ(u) = max(0, 1 - |u|). They are
+not negative and their sum is 1, so that constants are preserved, nothing that only wears ever
+rises, and depositing preserves volume. Between the points where the path passes into the next cell
+the integrand is a quadratic of t, which two Gauss points integrate exactly.
 
-To let each state act, ever less, as far as the states next to it would pass pressure on evenly, but
-blurs twice as much: of a cylinder over 50 µm of a scar of 0.17 mm, 1, 2, 4 and 8 increments each
-way leave 1.2, 0.7, 0.2 and 0.06 % of the depth of the flat, and would leave 3, 1.5, 0.5 and 0.13 %.
-Its worn peak pressure needs more of them: 162, 121, 92 and 84 MPa with 2, 4, 8 and 16.
+The alternative, to let each state act with decreasing weight as far as its neighbouring states,
+would pass on pressure evenly but blur twice as much. For a cylinder that moves over 50 µm across a
+scar of 0.17 mm, the error of the depth of the flat is 1.2, 0.7, 0.2 and 0.06 % with 1, 2, 4 and 8
+increments each way, and would be 3, 1.5, 0.5 and 0.13 %. The worn peak pressure needs more
+increments: it is 162, 121, 92 and 84 MPa with 2, 4, 8 and 16.
 
-Cells blur what they carry. Against the motion they stand for, the second moment of the weights is
-too large by dx²/6 for a long path, and for one of length L < 2 dx about its middle by L dx/4 -
-L²/12: the blur is then more than the motion itself, L²/12, unless L > 3 dx/2. A shorter stroke is
-therefore better taken for none (``LEAST_RESOLVED``).
+The cells blur the fields that they carry. Compared with the exact motion, the second moment of the
+weights is too large by dx²/6 for a long path, and by L dx/4 - L²/12 for a path of length L < 2 dx
+about its middle. This blur exceeds the motion itself, L²/12, unless L > 3 dx/2. It is therefore
+better to neglect a shorter stroke (``LEAST_RESOLVED``).
 """
 
 from __future__ import annotations
@@ -42,27 +43,28 @@ LEAST_RESOLVED = 1.5
 """Strokes, in pitches, below which moving cells blur a surface more than the motion does."""
 
 LARGE_STROKE = 0.1
-"""Strokes, in widths of the contact, above which the motion counts: what neglecting it costs grows
-with their square. Depth and volume (the sum of what is too much or too little) of either body of a
-cylinder, worn from 0.2 to 1 mm of width by 8 increments a cycle, were wrong by 0.2 % to 0.9 % at
-0.1, and by 0.5 % to 1.8 % at 0.15, with a quarter, half or three quarters of the wear on body 1;
-those of a sphere, half and half, by 0.6 % to 0.8 %, by 1.3 % to 1.5 % and, at 0.2, by 2.2 % to
-2.5 %. Where only one body wears it is less: nothing where that is body 2."""
+"""Strokes, in widths of the contact, above which the motion is followed. The error of neglecting it
+grows with the square of the stroke. Errors of depth and volume (the integral of the absolute error)
+of either body of a cylinder, worn from 0.2 to 1 mm of width in 8 increments per cycle, were 0.2 %
+to 0.9 % at 0.1 and 0.5 % to 1.8 % at 0.15, with a quarter, half or three quarters of the wear on
+body 1. Those of a sphere, half on each body, were 0.6 % to 0.8 % at 0.1, 1.3 % to 1.5 % at 0.15 and
+2.2 % to 2.5 % at 0.2. Where only one body wears they are smaller, and 0 if that is body 2.
+"""
 
 GAUSS = 0.5 - 0.5 / np.sqrt(3.0), 0.5 + 0.5 / np.sqrt(3.0)
-"""Gauss points of the unit interval, of weight one half."""
+"""Gauss points of the unit interval, with a weight of one half each."""
 
 
 class TravelError(InputError):
-    """What wears is carried beyond the grid."""
+    """Wear is carried beyond the grid."""
 
 
 @dataclass(frozen=True)
 class Passage:
-    """Body 2 on its way along ``path`` ``(k, 2)`` [mm], straight from one offset to the next.
+    """Motion of body 2 along ``path`` ``(k, 2)`` [mm], straight from one offset to the next.
 
-    Offsets (x, y) are those from its mean place. In a line contact motion along y changes nothing
-    and is left out.
+    Offsets (x, y) are relative to its mean position. In a line contact motion along y has no effect
+    and is ignored.
     """
 
     grid: Grid
@@ -70,9 +72,9 @@ class Passage:
 
     @cached_property
     def _weights(self) -> Array:
-        """Weight w_k of each shift k in cells ``(2 m + 1, 2 n + 1)``, no shift in the middle.
+        """Weight w_k of each shift k in cells ``(2 m + 1, 2 n + 1)``, with no shift in the middle.
 
-        The mean over the path, by the length of its legs.
+        The weights are averages over the path, by the length of its legs.
         """
         path = self.path / self.grid.pitch
         if self.grid.line:
@@ -86,16 +88,16 @@ class Passage:
         return weights
 
     def carry(self, field: Array) -> Array:
-        """Body 1's ``field`` ``(nx, ny)`` as the grid sees it, the mean over the path.
+        """Return the mean over the path of body 1's ``field`` ``(nx, ny)`` as the grid sees it.
 
-        Beyond the grid it is taken for 0: nothing wears there.
+        Beyond the grid the field is taken to be 0: nothing wears there.
         """
         return _weighted(field, self._weights)
 
     def deposit(self, field: Array) -> Array:
-        """What lies on the grid, ``(nx, ny)``, spread over body 1: the adjoint of ``carry``.
+        """Distribute a field on the grid ``(nx, ny)`` over body 1: the adjoint of :meth:`carry`.
 
-        Raises TravelError where some of it would leave the grid.
+        Raise TravelError if part of it would leave the grid.
         """
         self._check_room(field)
         return _weighted(field, self._weights[::-1, ::-1])
@@ -123,7 +125,7 @@ def _add_leg(weights: Array, share: float, start: Array, end: Array) -> None:
     for begin, length in zip(times[:-1], np.diff(times), strict=True):
         for point in GAUSS:
             shift = start + (begin + point * length) * (end - start)
-            # It lies over two cells along either axis, with these shares.
+            # A shifted cell overlaps two cells along either axis, with these shares.
             cell = np.floor(shift).astype(int)
             (u, v), (i, j) = shift - cell, reach + cell
             shares = np.outer([1.0 - u, u], [1.0 - v, v])
@@ -131,7 +133,7 @@ def _add_leg(weights: Array, share: float, start: Array, end: Array) -> None:
 
 
 def _weighted(field: Array, weights: Array) -> Array:
-    """Sum of the ``field`` from as many cells away as each of ``weights`` is from their middle."""
+    """Return the sum of shifted copies of ``field``, by their offset in the array ``weights``."""
     nx, ny = field.shape
     padded = np.pad(field, [(count // 2, count // 2) for count in weights.shape])
     total = np.zeros_like(field)
@@ -141,7 +143,7 @@ def _weighted(field: Array, weights: Array) -> Array:
 
 
 def _crossings(start: Array, end: Array) -> Array:
-    """Times from 0 to 1 at which a path passes into another cell, ends included."""
+    """Return the times from 0 to 1 at which a path passes into another cell, ends included."""
     times = [0.0, 1.0]
     for begin, stop in zip(start, end, strict=True):
         low, high = min(begin, stop), max(begin, stop)
@@ -151,12 +153,14 @@ def _crossings(start: Array, end: Array) -> Array:
 
 
 def offsets(slip: Array, weight: Array) -> Array:
-    """Offsets ``(t + 1, 2)`` [mm] of body 2 before the first and after each increment of a cycle.
+    """Return the offsets ``(t + 1, 2)`` [mm] of body 2 at the ends of the increments of a cycle.
 
-    The motion is the mean of ``slip`` ``(t, 2, nx, ny)`` [mm] weighted by ``weight`` ``(nx, ny)``,
-    such as the pressure of the cycle, or ``(t, nx, ny)`` where slip is not known of all cells in
-    each increment, and counts from the middle between its extremes. A closed cycle comes back to
-    where it began; what is missing is spread evenly over its increments.
+    The first offset is that before the first increment. Offsets count from the middle between their
+    extremes. A closed cycle returns to its beginning; a remaining difference is distributed evenly
+    over its increments.
+
+    ``slip`` ``(t, 2, nx, ny)`` [mm] is averaged with ``weight`` ``(nx, ny)``, such as the pressure
+    of the cycle, or ``(t, nx, ny)`` where the slip of some cells is unknown in some increments.
     """
     weight = np.broadcast_to(weight, (len(slip), *slip.shape[2:]))
     total = weight.sum(axis=(1, 2))[:, None]
@@ -168,9 +172,10 @@ def offsets(slip: Array, weight: Array) -> Array:
 
 
 def moves(path: Array, pressed: Mask, grid: Grid) -> bool:
-    """Whether the motion along ``path`` ``(t + 1, 2)`` [mm] counts, and the grid can follow it.
+    """Return whether the motion along ``path`` matters and the grid can resolve it.
 
-    The stroke is held against the extent of the cells ``pressed`` ``(nx, ny)`` along it.
+    ``path`` is ``(t + 1, 2)`` [mm]. Its stroke is compared with the extent of the ``pressed`` cells
+    ``(nx, ny)`` along it.
     """
     if grid.line:
         path = path * [1.0, 0.0]
@@ -191,14 +196,26 @@ def followed(
     forced: bool | None = None,
     known: Mask | None = None,
 ) -> Array:
-    """Paths of body 2 over which each state of a cycle acts ``(t, 3, 2)`` [mm], if they count.
+    """Return the paths of body 2 over which the states of a cycle act ``(t, 3, 2)`` [mm].
 
-    From half way before its offset over that to half way after; ``(0, 3, 2)`` where the motion does
-    not count. ``slip`` ``(t, 2, nx, ny)`` [mm] is that of the increments and ``pressure``
-    ``(nx, ny)`` that of the whole cycle, see :func:`offsets`; ``missions`` are the increments of
-    each closed cycle of a mix. Motion that counts in one (:func:`moves`) is followed in all;
-    ``forced`` says instead whether to follow it. ``known`` ``(t, nx, ny)`` are the cells whose slip
-    each increment knows; None: all.
+    Each path leads from half an increment before the state to half an increment after it. If the
+    motion is not followed, the result is empty, ``(0, 3, 2)``.
+
+    Parameters
+    ----------
+    grid
+        Grid of the contact.
+    slip
+        Slip of the increments ``(t, 2, nx, ny)`` [mm].
+    pressure
+        Pressure of the whole cycle ``(nx, ny)``, the weight of :func:`offsets`.
+    missions
+        Increments of each closed cycle of a mix. Motion that matters in one (:func:`moves`) is
+        followed in all of them.
+    forced
+        Whether to follow the motion; None: where it matters.
+    known
+        Cells whose slip is known in each increment ``(t, nx, ny)``; None: all.
     """
     weight = np.broadcast_to(pressure, (len(slip), *pressure.shape))
     if known is not None:
@@ -212,23 +229,27 @@ def followed(
 
 
 def ways_of_states(path: Array) -> Array:
-    """Ways over which the states at the offsets of a closed ``path`` ``(t + 1, 2)`` [mm] act.
+    """Return the paths over which the states of a closed cycle act ``(t, 3, 2)`` [mm].
 
-    ``(t, 3, 2)``: from half way before each over it to half way after it.
+    Each leads from half an increment before the state to half an increment after it. ``path``
+    ``(t + 1, 2)`` [mm] are the offsets of the cycle.
     """
     middles = 0.5 * (path[1:] + path[:-1])
     return np.stack([middles, path[1:], np.roll(middles, -1, axis=0)], axis=1)
 
 
 def passages(grid: Grid, paths: Array) -> tuple[Passage, ...] | None:
-    """The passages along ``paths`` ``(t, k, 2)`` [mm]; None where there are none."""
+    """Return the passages along ``paths`` ``(t, k, 2)`` [mm], or None if there are no paths."""
     if not len(paths):
         return None
     return tuple(Passage(grid, path) for path in paths)
 
 
 def stroke_of(path: Array) -> tuple[float, Array]:
-    """Longest distance of two offsets of ``path`` ``(t + 1, 2)`` [mm], and its direction (2,)."""
+    """Return the longest distance of two offsets of ``path`` and its direction ``(2,)``.
+
+    ``path`` is ``(t + 1, 2)`` [mm].
+    """
     apart = path[:, None] - path[None]
     lengths = np.hypot(apart[..., 0], apart[..., 1])
     longest = np.unravel_index(int(lengths.argmax()), lengths.shape)

@@ -1,9 +1,9 @@
-"""Wear of contacts at nodes, whose cycle is known at once: what each node is pressed and slips by.
+"""Wear of contacts at nodes, whose pressures and slips are known for a whole cycle at once.
 
-A reduced structure finds the pressures and slips of a whole cycle on given surfaces, and no solver
-can be asked on the way: nodes wear by explicit steps, at the mean of two cycles (Heun), or by steps
-of many stages (:mod:`wear.steps.stabilised`). Laws are those of :mod:`wear.laws`, with nodes in the
-place of cells.
+A reduced structure finds the pressures and slips of a whole cycle on given surfaces, and its
+increments cannot be solved one by one within a wear step. Nodes therefore wear by explicit steps,
+at the mean of two cycles (Heun), or by steps of many stages (:mod:`wear.steps.stabilised`). The
+laws are those of :mod:`wear.laws`, with nodes instead of cells.
 """
 
 from __future__ import annotations
@@ -19,12 +19,12 @@ from wear.worn import Spent, WearStep, WornState
 
 
 class NodalCycle(Protocol):
-    """What a closed cycle does to ``n`` nodes of a contact.
+    """Protocol of a closed cycle at the ``n`` nodes of a contact.
 
-    ``slip`` ``(t, n)`` is the size of the slip in each increment [mm], or in stretches of constant
-    ``pressure`` ``(t, n)`` [MPa] which lie against each other; ``friction`` Coulomb's coefficient;
-    ``areas`` ``(n,)`` those of the nodes [mm²]; ``start`` what a solver may begin from on surfaces
-    that are little different.
+    Its ``t`` parts are increments, or longer periods of constant pressure. ``slip`` ``(t, n)`` is
+    the size of the slip in each part [mm] and ``pressure`` ``(t, n)`` the pressure [MPa].
+    ``friction`` is Coulomb's coefficient, ``areas`` ``(n,)`` are those of the nodes [mm²], and
+    ``start`` is a starting point for the solver on surfaces that differ little.
     """
 
     @property
@@ -39,7 +39,7 @@ class NodalCycle(Protocol):
     def start(self) -> object: ...
 
     def stable_cycles(self, depth_per_pressure: Array) -> float:
-        """Longest explicit step in which no error of shape grows.
+        """Return the longest explicit step in which no error of shape grows [cycles].
 
         ``depth_per_pressure`` ``(n,)`` is that of both bodies in a cycle [mm/MPa].
         """
@@ -48,20 +48,23 @@ class NodalCycle(Protocol):
 
 @dataclass(frozen=True)
 class NodalState(WornState):
-    """What the wear of nodes must remember: ``start`` is that of the cycle that led to it."""
+    """State of wearing nodes; ``start`` is the solver's starting point from the last cycle."""
 
     start: object = None
 
 
 @dataclass(frozen=True)
 class NodalContact:
-    """Nodes that wear under a cycle, or the mean of several; ``laws`` are those of both bodies."""
+    """Nodes that wear under a cycle, or under the mean of several.
+
+    ``laws`` are those of body 1 and body 2.
+    """
 
     laws: tuple[WearLaw, WearLaw]
     cycles: tuple[NodalCycle, ...]
 
     def averaged(self, other: NodalContact) -> NodalContact:
-        """The contact that takes off the mean of what both do."""
+        """Return the contact whose wear is the mean of this one's and the other one's."""
         return NodalContact(self.laws, self.cycles + other.cycles)
 
     @property
@@ -71,11 +74,11 @@ class NodalContact:
 
     @property
     def areas(self) -> Array:
-        """Of the nodes ``(n,)`` [mm²]."""
+        """Areas of the nodes ``(n,)`` [mm²]."""
         return self.cycles[0].areas
 
     def wear(self, state: NodalState, cycles: float = 0.0) -> tuple[Array, Array]:
-        """Depths that body 1 and body 2 lose per cycle in a step of so many, ``(n,)`` each [mm]."""
+        """Return the depths lost per cycle by both bodies ``(n,)`` [mm] in a step of ``cycles``."""
         lost: tuple[list[Array], list[Array]] = [], []
         for cycle in self.cycles:
             for body, depth in zip(lost, self._per_pressure(cycle, state, cycles), strict=True):
@@ -83,7 +86,10 @@ class NodalContact:
         return _mean(lost[0]), _mean(lost[1])
 
     def stable_cycles(self, state: NodalState, cycles: float = 0.0) -> float:
-        """Longest explicit step in which no error grows, by the laws of a step of ``cycles``."""
+        """Return the longest explicit step in which no error grows [cycles].
+
+        Laws that change with energy are those of a step of ``cycles``.
+        """
         limits = []
         for cycle in self.cycles:
             wear_1, wear_2 = self._per_pressure(cycle, state, cycles)
@@ -91,15 +97,15 @@ class NodalContact:
         return min(limits)
 
     def comparable_cycles(self, state: NodalState) -> float:
-        """Any step: all increments wear together (:mod:`wear.steps.stepping` has them in turn)."""
+        """Return infinity: all increments wear together, so that steps of any length compare."""
         return np.inf
 
     def rates(self, state: NodalState, cycles: float = 0.0) -> Array:
-        """What a cycle of a step takes ``(3, n)``: depths of both bodies [mm], energy per area."""
+        """Return the wear per cycle ``(3, n)``: both depths [mm] and the energy per area [N/mm]."""
         return np.stack([*self.wear(state, cycles), self.work])
 
     def worn(self, state: NodalState, lost: Array, cycles: float) -> NodalState:
-        """The state in which nodes have lost so much ``(3, n)``, as :meth:`rates` has it."""
+        """Return the state after further wear ``lost`` ``(3, n)``, in the rows of :meth:`rates`."""
         depth_1, depth_2, work = lost
         return replace(
             state,
@@ -111,17 +117,18 @@ class NodalContact:
         )
 
     def explicit_step(self, state: NodalState, cycles: float) -> WearStep[NodalState]:
-        """Wear ``cycles`` cycles at these pressures and slips."""
+        """Wear ``cycles`` cycles at the present pressures and slips."""
         after = self.worn(state, cycles * self.rates(state, cycles), cycles)
-        # One cycle has been solved for it: of a mean, the other one was before.
+        # The step cost one solved cycle: the other cycle of a mean is counted by its own step.
         return WearStep(after, cycles, Spent(1, 0, 1))
 
     def _per_pressure(
         self, cycle: NodalCycle, state: NodalState, cycles: float
     ) -> tuple[Array, Array]:
-        """Depth per pressure of both bodies in each increment, ``(t, n)`` each [mm/MPa].
+        """Return the depth per pressure of both bodies in each increment, ``(t, n)`` each [mm/MPa].
 
-        Laws that change with energy are told that of the state, and what a step will have added.
+        Laws that change with energy receive the energy of the state and that expected after the
+        step.
         """
         further = cycles * self.work
         energies = state.energy, state.energy + float(further @ self.areas)

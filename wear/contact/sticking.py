@@ -1,7 +1,7 @@
-"""Shear where a contact sticks, from nodes of a structure that know it.
+"""Shear of a contact where it sticks, from the nodal tractions of a structure.
 
-Where slip is given (wear method 1), shear is µp against it, and nothing is told of what sticks. A
-structure knows at its nodes which share of Coulomb's limit shear is, and in which direction.
+Where slip is given (wear method 1), shear is µp against the slip, and unknown where the contact
+sticks. A structure knows at its nodes the ratio of shear to Coulomb's limit, and its direction.
 """
 
 from __future__ import annotations
@@ -15,10 +15,11 @@ from wear.contact.tractions import CycleTractions
 
 
 def with_sticking_shear(cycle: CycleTractions, nodal: Array, cell_area: float) -> CycleTractions:
-    """The same tractions, with shear known in the increments in which the contact sticks too.
+    """Return the tractions with shear also in the increments in which the contact sticks.
 
-    There it is to pressure as in the ``nodal`` tractions ``(t, 3, nx, ny)`` on the grid [MPa]. What
-    that lacks of the loads' Qx and Qy goes where shear is below µp, as far below as it is.
+    In these the ratio of shear to pressure is that of the ``nodal`` tractions ``(t, 3, nx, ny)`` on
+    the grid [MPa]. The difference to the resultants Qx and Qy is distributed over cells with shear
+    below µp in proportion to the remaining friction capacity.
     """
     shear = cycle.shear.copy()
     for t in np.flatnonzero(cycle.unknown > 0.0):

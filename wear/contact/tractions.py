@@ -18,7 +18,7 @@ from sa_solver.types import Array, LoadHistory
 
 
 def acting_slip(slip: Array, loads: LoadHistory) -> Array:
-    """Size of the slip over which each state of a cycle acts ``(t, ...)`` [mm].
+    """Return the size of the slip over which each state of a cycle acts ``(t, ...)`` [mm].
 
     ``slip`` ``(t, 2, ...)`` [mm] is that of the increments; see :mod:`sa_solver.cycles.increments`.
     """
@@ -28,9 +28,10 @@ def acting_slip(slip: Array, loads: LoadHistory) -> Array:
 
 @dataclass(frozen=True)
 class ContactFields:
-    """One increment: ``pressure`` ``(nx, ny)``, ``shear`` on body 2 and ``slip`` ``(2, nx, ny)``.
+    """Tractions and slip of a contact in one increment.
 
-    In MPa and mm.
+    ``pressure`` is ``(nx, ny)`` [MPa], ``shear`` on body 2 ``(2, nx, ny)`` [MPa] and ``slip``
+    ``(2, nx, ny)`` [mm].
     """
 
     pressure: Array
@@ -42,10 +43,21 @@ class ContactFields:
 class CycleTractions:
     """Tractions and slip of one contact over the increments of a closed cycle.
 
-    ``pressure`` ``(t, nx, ny)`` and ``shear`` ``(t, 2, nx, ny)`` on body 2 [MPa] are those at the
-    end of an increment, ``slip`` ``(t, 2, nx, ny)`` [mm] that during it. Where slip is that of the
-    loads (method normal), shear is µp against it and, unknown where nothing slips, 0 there:
-    ``unknown`` ``(t,)`` is the share of the normal force on such cells. ``friction`` is µ.
+    Parameters
+    ----------
+    loads
+        Resultants of the cycle.
+    friction
+        Coefficient of friction µ.
+    pressure
+        Pressure at the end of each increment ``(t, nx, ny)`` [MPa].
+    shear
+        Shear on body 2 at the end of each increment ``(t, 2, nx, ny)`` [MPa]. Where slip is that of
+        the loads (method normal), it is µp against the slip, and set to 0 where nothing slips.
+    slip
+        Slip during each increment ``(t, 2, nx, ny)`` [mm].
+    unknown
+        Share of the normal force on cells whose shear is unknown ``(t,)``.
     """
 
     loads: LoadHistory
@@ -63,14 +75,14 @@ class CycleTractions:
 
     @property
     def rubbed(self) -> Array:
-        """What a mean cycle rubs off the places of the grid, per area ``(nx, ny)`` [N/mm]."""
+        """Friction work per area of a mean cycle on the cells of the grid ``(nx, ny)`` [N/mm]."""
         return np.asarray(np.sum(self.loads.share[:, None, None] * self.work, axis=0))
 
     @property
     def increments_left(self) -> tuple[Array, Array] | None:
-        """What a cycle rubs off the places of the grid, and what its increments leave of that.
+        """Friction work per area of a cycle, and its error due to the increments.
 
-        Per area ``(nx, ny)`` [N/mm]; None where nothing is rubbed, or nobody knows.
+        Each is ``(nx, ny)`` [N/mm]. It is None without friction work, or if the error is unknown.
         """
         loads, rubbed = self.loads, self.rubbed
         often = loads.share[:, None, None]
@@ -80,11 +92,11 @@ class CycleTractions:
 
 
 def increments_error(cycles: Iterable[CycleTractions]) -> dict[str, float] | None:
-    """What increments leave of ``depth`` (root mean square) and ``energy`` of cycles, relative.
+    """Return the relative errors of ``depth`` and ``energy`` of cycles due to their increments.
 
-    The energy is too large by that. The depth is that of what all of them rub: errors that change
-    their sign from cycle to cycle cancel, as they do in wear. None where nothing is rubbed, or
-    nobody knows.
+    The energy is too large by its error. The error of the depth is a root mean square, of the work
+    of all cycles together: errors that change sign from cycle to cycle cancel, as they do in wear.
+    Return None without friction work, or if the errors are unknown.
     """
     known = [left for left in (cycle.increments_left for cycle in cycles) if left is not None]
     if not known:
@@ -96,9 +108,10 @@ def increments_error(cycles: Iterable[CycleTractions]) -> dict[str, float] | Non
 def increments_change(
     cycles: Iterable[CycleTractions], halves: Iterable[CycleTractions]
 ) -> dict[str, float] | None:
-    """The same by ``halves``, these cycles in twice as many increments: twice what those change.
+    """Return the same relative errors from ``halves``, the cycles in twice as many increments.
 
-    Friction marched by Backward Euler is of first order in its increments.
+    Friction marched by Backward Euler is of first order in the increments, so that the error is
+    twice the change.
     """
     rubbed, finer = (np.sum([cycle.rubbed for cycle in all_], axis=0) for all_ in (cycles, halves))
     return _relative(2.0 * (rubbed - finer), rubbed) if rubbed.any() else None

@@ -1,1 +1,1 @@
-"""Where fretting cracks start: life parameters and the stresses they need."""
+"""Crack initiation in fretting: life parameters and the stresses that they need."""

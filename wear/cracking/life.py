@@ -1,16 +1,16 @@
-"""Where fretting cracks start: parameters of one closed cycle, mapped over points.
+"""Parameters of fretting crack initiation from one closed cycle, mapped over points.
 
-Ruiz's parameters weigh friction work with the tension along the surface. Critical-plane parameters
-ask, at every point, for the plane that fares worst:
+Ruiz's parameters combine friction work with the tension along the surface. Critical-plane
+parameters are the largest value over all planes through a point:
 
     Findley                 max over planes of  τ_a + k σ_n,max
     Smith, Watson, Topper   max over planes of  σ_n,max ε_a      (σ_n,max > 0)
 
 with the shear amplitude τ_a, the largest normal stress σ_n,max and the amplitude ε_a of the normal
-strain. τ_a is the radius of the smallest circle round the path of the shear stress vector on the
-plane: unlike components' ranges it does not depend on axes within the plane, and half the longest
-chord, the common substitute, is up to 13 % less where the path is a triangle (Jung's theorem) and
-the same where it is a line or an ellipse.
+strain. τ_a is the radius of the smallest circle around the path of the shear stress vector on the
+plane. Unlike the ranges of components it does not depend on axes within the plane. Half the longest
+chord, the common substitute, is up to 13 % smaller where the path is a triangle (Jung's theorem),
+and the same where it is a line or an ellipse.
 
 Stress histories ``(t, 6, ...)`` hold the states of one closed cycle, in any order, with the
 components xx, yy, zz, xy, yz, zx, tension positive [MPa].
@@ -35,23 +35,25 @@ from sa_solver.types import Array, Material
 from wear.cracking.smallest_circle import smallest_circle
 
 CHUNK = 4096
-"""Points searched at once: a history of theirs stays in the cache."""
+"""Number of points searched at once, so that their stress histories stay in the cache."""
 
 GOLDEN_ANGLE = np.pi * (3.0 - np.sqrt(5.0))
-"""Turn from one sample of a sphere to the next that spreads them evenly (Fibonacci lattice)."""
+"""Rotation from one sample of a sphere to the next that distributes samples evenly (Fibonacci
+lattice).
+"""
 
 DIRECTIONS = 6
-"""Neighbours of a plane that a refinement tries, all round."""
+"""Number of neighbours around a plane that a refinement tries."""
 
 FIRST_STEP = 0.6
-"""First step of a refinement over the spacing of the samples: a little less than their reach."""
+"""First step of a refinement, over the spacing of the samples."""
 
 AWAY = np.radians(30.0)
-"""Angle from the best plane beyond which another is a rival, not its neighbour."""
+"""Angle from the best plane beyond which another plane is a rival and not a neighbour."""
 
 
 class StressHistoryError(InputError):
-    """A stress history, or a parameter of fatigue, that has no meaning."""
+    """A stress history, or a parameter of fatigue, is invalid."""
 
 
 @dataclass(frozen=True)
@@ -67,25 +69,30 @@ class Ruiz:
 
     @property
     def friction_parameter(self) -> Array:
-        """F1 = τ δ [N/mm]: a quarter of the work, a cycle sliding four amplitudes δ."""
+        """Friction parameter F1 = τ δ [N/mm]; the work of a cycle is 4 τ δ."""
         return 0.25 * self.work
 
     @property
     def cracking_parameter(self) -> Array:
-        """F2 = κ = σ_T τ δ [N²/mm³]."""
+        """Cracking parameter F2 = κ = σ_T τ δ [N²/mm³]."""
         return self.tension * self.friction_parameter
 
 
 def ruiz(stress: Array, work: Array) -> Ruiz:
-    """Ruiz's parameters from what happens at the surface.
+    """Return Ruiz's parameters of a surface.
 
-    ``stress`` ``(t, 6, nx, ny)`` is that of one body at its surface, bulk stress included [MPa];
-    ``work`` ``(nx, ny)`` that of friction per area in a mean cycle [N/mm]. The tension is the
-    largest principal stress in the plane of the surface.
+    The tension is the largest principal stress in the plane of the surface.
+
+    Parameters
+    ----------
+    stress
+        Stress history at the surface of one body, bulk stress included ``(t, 6, nx, ny)`` [MPa].
+    work
+        Friction work per area in a mean cycle ``(nx, ny)`` [N/mm].
 
     Examples
     --------
-    A place pulled by 200 MPa where friction works 0.4 N/mm a cycle:
+    A point under a tension of 200 MPa where friction dissipates 0.4 N/mm per cycle:
 
     >>> import numpy as np
     >>> from wear import ruiz
@@ -102,20 +109,22 @@ def ruiz(stress: Array, work: Array) -> Ruiz:
 
 
 def tension_along(xx: Array, yy: Array, xy: Array) -> Array:
-    """Largest principal stress in the plane of the surface."""
+    """Return the largest principal stress in the plane of the surface."""
     principal: Array = 0.5 * (xx + yy) + np.hypot(0.5 * (xx - yy), xy)
     return principal
 
 
 @dataclass(frozen=True)
 class PlaneSearch:
-    """How the worst plane is looked for.
+    """Settings of the search for the critical plane.
 
-    ``planes`` normals sample half the sphere evenly (Fibonacci lattice). Round the best of them,
-    and round the best of those 30° or more away from what that leads to, ``refinements`` rounds try
-    six neighbours, first 0.6 of the spacing away and at half the step where none was better. On
-    1500 histories of 8 random states, against 3000 planes or more with 12 refinements, parameters
-    came out too small by, on average, in the worst hundredth and at most:
+    ``planes`` normals sample half the sphere evenly (Fibonacci lattice). Each of the
+    ``refinements`` tries six neighbours of the best plane, first at 0.6 of the spacing and at half
+    the step where no neighbour was better. The same is done around the best plane that is 30° or
+    more away from the result of the first search. Use the defaults unless an error of 2 % matters.
+    Parameters were too small by the following amounts on average, in the worst hundredth, and at
+    most, on 1500 histories of 8 random states, compared with at least 3000 planes and 12
+    refinements:
 
         planes, refinements    Findley, k = 0.3         Smith, Watson, Topper
         100, 0                 1.0 %, 2.9 %, 4.1 %      2.8 %, 7.5 %, 9.9 %
@@ -123,8 +132,9 @@ class PlaneSearch:
         100, 6                 0.02 %, 0.3 %, 1.9 %     0.04 %, 0.3 %, 1.9 %
         200, 6                 0.01 %, 0.06 %, 0.7 %    0.02 %, 0.09 %, 1.4 %
 
-    On 1500 random proportional histories about a random mean, the most was 1.4 % and 0.5 % with
-    100, 6; at the surface of a sphere sheared in partial slip, 0.4 % (Findley).
+    On 1500 random proportional histories about a random mean the largest errors were 1.4 % and
+    0.5 % with 100, 6; at the surface of a sphere sheared in partial slip the largest error was
+    0.4 % (Findley).
     """
 
     planes: int = 100
@@ -133,7 +143,8 @@ class PlaneSearch:
     def __post_init__(self) -> None:
         if self.planes < 1 or self.refinements < 0:
             raise StressHistoryError(
-                f"{self.planes} planes and {self.refinements} refinements: give at least 1 and 0"
+                f"a search has {self.planes} planes and {self.refinements} refinements: give at "
+                "least 1 and 0"
             )
 
     @property
@@ -146,17 +157,25 @@ class PlaneSearch:
 
     @property
     def spacing(self) -> float:
-        """Angle between neighbours [rad]."""
+        """Angle between neighbouring normals [rad]."""
         return float(np.sqrt(2.0 * np.pi / self.planes))
 
 
 @dataclass(frozen=True)
 class CriticalPlane:
-    """The worst plane at every point.
+    """The critical plane at every point.
 
-    ``value`` of the parameter ``(...)`` [MPa], unit ``normal`` ``(3, ...)``, and on that plane the
-    ``amplitude`` ``(...)`` of shear stress [MPa] (Findley) or of normal strain (Smith, Watson and
-    Topper) and the largest ``normal_stress`` ``(...)`` [MPa].
+    Parameters
+    ----------
+    value
+        Value of the parameter ``(...)`` [MPa].
+    normal
+        Unit normal ``(3, ...)``.
+    amplitude
+        Amplitude on that plane ``(...)``: of shear stress [MPa] (Findley), or of normal strain
+        (Smith, Watson and Topper).
+    normal_stress
+        Largest normal stress on that plane ``(...)`` [MPa].
     """
 
     value: Array
@@ -171,20 +190,33 @@ Tried = tuple[Array, Array, Array]
 """Value, amplitude and normal stress of a plane at each point, each ``(n,)``."""
 
 PlaneParameter = Callable[[Array, Array, Array], Tried]
-"""From stress ``(6, t, n)``, normals ``(3,)`` or ``(3, n)`` and the value to beat ``(n,)``; planes
-that cannot beat it may come back as -inf."""
+"""Function of stress ``(6, t, n)``, normals ``(3,)`` or ``(3, n)``, and the values to exceed
+``(n,)``. Planes that cannot exceed them may have the value -inf.
+"""
 
 
 def findley(
     stress: Array, sensitivity: float, search: PlaneSearch = DEFAULT_SEARCH
 ) -> CriticalPlane:
-    """Findley's parameter of ``stress`` ``(t, 6, ...)`` with ``sensitivity`` k to normal stress.
+    """Return Findley's parameter at every point.
 
-    Raises StressHistoryError for a k below 0 or a history of another shape.
+    Parameters
+    ----------
+    stress
+        Stress history ``(t, 6, ...)`` [MPa].
+    sensitivity
+        Sensitivity k to normal stress, 0 or more.
+    search
+        Settings of the search for the critical plane.
+
+    Raises
+    ------
+    InputError
+        If k is negative, or the stress history has another shape.
 
     Examples
     --------
-    Pulled to and fro with 100 MPa: σ (k + √(1 + k²)) / 2 on the worst plane.
+    Alternating tension of 100 MPa gives σ (k + √(1 + k²)) / 2 on the critical plane:
 
     >>> import numpy as np
     >>> from wear import findley
@@ -195,12 +227,12 @@ def findley(
     67.2 MPa of 67.2
     """
     if not 0.0 <= sensitivity < np.inf:
-        raise StressHistoryError(f"sensitivity k = {sensitivity:g}: must be 0 or more")
+        raise StressHistoryError(f"the sensitivity k is {sensitivity:g}: it must be 0 or more")
 
     def parameter(stress: Array, normal: Array, to_beat: Array) -> Tried:
         first, second = (_resolved(stress, normal, tangent) for tangent in _tangents(normal))
         peak = _resolved(stress, normal, normal).max(axis=0)
-        # A circle round the middle of both ranges is too large if anything.
+        # A circle around the middle of both ranges is an upper bound of the smallest circle.
         bound = np.hypot(first - _middle(first), second - _middle(second)).max(axis=0)
         worth = np.flatnonzero(bound + sensitivity * peak > to_beat)
         amplitude, value = np.zeros_like(peak), np.full_like(peak, -np.inf)
@@ -214,13 +246,27 @@ def findley(
 def smith_watson_topper(
     stress: Array, material: Material, search: PlaneSearch = DEFAULT_SEARCH
 ) -> CriticalPlane:
-    """Smith, Watson and Topper's parameter of ``stress`` ``(t, 6, ...)``, strains being elastic.
+    """Return the parameter of Smith, Watson and Topper at every point, with elastic strains.
 
-    0 where no plane is ever pulled. Raises StressHistoryError for a history of another shape.
+    It is 0 where no plane is ever under tension.
+
+    Parameters
+    ----------
+    stress
+        Stress history ``(t, 6, ...)`` [MPa].
+    material
+        Elastic constants.
+    search
+        Settings of the search for the critical plane.
+
+    Raises
+    ------
+    InputError
+        If the stress history has another shape.
 
     Examples
     --------
-    Pulled to and fro with 100 MPa: σ² / E on the plane across.
+    Alternating tension of 100 MPa gives σ² / E on the plane across it:
 
     >>> import numpy as np
     >>> from sa_solver import Material
@@ -242,15 +288,15 @@ def smith_watson_topper(
 
 
 def _checked(stress: Array) -> Array:
-    """Stress as all parameters take it."""
+    """Return the stress as a checked array."""
     shape = np.shape(stress)
     if len(shape) < 2 or shape[1] != 6 or shape[0] == 0:
-        raise StressHistoryError(f"stress of shape {shape}: must be (t, 6, ...)")
+        raise StressHistoryError(f"the stress history has the shape {shape}: give (t, 6, ...)")
     return checks.array("stresses", stress, shape, error=StressHistoryError, order="K")
 
 
 def _search(stress: Array, parameter: PlaneParameter, search: PlaneSearch) -> CriticalPlane:
-    """The plane with the largest value of ``parameter``, at every point."""
+    """Return the plane with the largest value of ``parameter`` at every point."""
     stress = _checked(stress)
     shape = stress.shape[2:]
     points = np.moveaxis(stress.reshape(len(stress), 6, -1), 0, 1)
@@ -263,10 +309,10 @@ def _search(stress: Array, parameter: PlaneParameter, search: PlaneSearch) -> Cr
 
 
 def _search_part(stress: Array, parameter: PlaneParameter, search: PlaneSearch) -> Array:
-    """Value, amplitude, normal stress and normal ``(6, n)`` at the points of ``(6, t, n)``.
+    """Return value, amplitude, normal stress and normal ``(6, n)`` at the points of ``(6, t, n)``.
 
-    Samples are apart, so that one beside the worst plane may be beaten by one beside another that
-    is nearly as bad: the best away from the first found is refined too.
+    A sample next to the critical plane may have a smaller value than a sample next to another plane
+    that is nearly as bad. The best plane away from the first one found is therefore refined too.
     """
     best = _climb(_Planes(stress, parameter), search, None)
     rival = _climb(_Planes(stress, parameter), search, best[3:])
@@ -274,7 +320,10 @@ def _search_part(stress: Array, parameter: PlaneParameter, search: PlaneSearch) 
 
 
 def _climb(planes: _Planes, search: PlaneSearch, away_from: Array | None) -> Array:
-    """The best sample, then neighbours of the best, nearer wherever none of them was better."""
+    """Return the best sample after refinements.
+
+    The step of a refinement is halved wherever no neighbour was better.
+    """
     for normal in search.normals:
         planes.attempt(normal, away_from)
     step = np.full(planes.best.shape[1], FIRST_STEP * search.spacing)
@@ -300,7 +349,10 @@ class _Planes:
         self._stress, self._parameter = stress, parameter
 
     def attempt(self, normal: Array, away_from: Array | None = None) -> None:
-        """Try a plane ``(3,)``, or one per point ``(3, n)``; none near ``away_from`` ``(3, n)``."""
+        """Try a plane ``(3,)``, or one per point ``(3, n)``.
+
+        Planes near ``away_from`` ``(3, n)`` are skipped.
+        """
         to_beat = self.best[0]
         if away_from is not None:
             near = np.abs(np.tensordot(normal, away_from, 1)) > np.cos(AWAY)
@@ -312,9 +364,10 @@ class _Planes:
 
 
 def _resolved(stress: Array, normal: Array, direction: Array) -> Array:
-    """Component along ``direction`` of the stress vector on a plane, ``(t, n)``.
+    """Return the component along ``direction`` of the stress vector on a plane ``(t, n)``.
 
-    ``stress`` ``(6, t, n)``; ``normal`` and ``direction`` ``(3,)`` or, one per point, ``(3, n)``.
+    ``stress`` is ``(6, t, n)``; ``normal`` and ``direction`` are ``(3,)`` or, one per point, ``(3,
+    n)``.
     """
     (a, b, c), (d, e, f) = normal, direction
     weights = np.stack([a * d, b * e, c * f, a * e + b * d, b * f + c * e, c * d + a * f])
@@ -325,7 +378,7 @@ def _resolved(stress: Array, normal: Array, direction: Array) -> Array:
 
 
 def _tangents(normal: Array) -> tuple[Array, Array]:
-    """Two unit vectors that make a frame with ``normal``, all ``(3, ...)``.
+    """Return two unit vectors that form a frame with ``normal``, all ``(3, ...)``.
 
     Source: Duff et al. 2017, J. Comput. Graph. Tech. 6 (1), 1.
     """
@@ -338,6 +391,6 @@ def _tangents(normal: Array) -> tuple[Array, Array]:
 
 
 def _middle(path: Array) -> Array:
-    """The middle between the extremes of a path ``(t, n)``."""
+    """Return the middle between the extremes of a path ``(t, n)``."""
     middle: Array = 0.5 * (path.max(axis=0) + path.min(axis=0))
     return middle

@@ -1,4 +1,4 @@
-"""The smallest circles round many paths in the plane at once."""
+"""The smallest circles around many paths in the plane at once."""
 
 from __future__ import annotations
 
@@ -13,27 +13,28 @@ from sa_solver.types import Array
 Places = NDArray[np.intp]
 
 OUTSIDE = 1e-10
-"""Relative distance beyond the circle at which a point counts as outside: above rounding."""
+"""Relative distance beyond the circle at which a point counts as outside, above rounding."""
 
 ROUNDING = 1e-14
-"""The same over the largest coordinate, for paths that hardly move."""
+"""The same tolerance relative to the largest coordinate, for paths that hardly move."""
 
 MAX_ROUNDS = 100
-"""Rounds allowed: 20 000 random paths of 22 points took 5 at most."""
+"""Limit of iterations: 20 000 random paths of 22 points took 5 at most."""
 
 SUPPORTS = ((0, 3, 3), (1, 3, 3), (2, 3, 3), (0, 1, 3), (0, 2, 3), (1, 2, 3))
-"""What may hold the circle round three points and a fourth that was outside theirs."""
+"""Points that may determine the circle around three points and a fourth outside their circle."""
 
 
 _taken = partial(np.take_along_axis, axis=0)  # values (t, n) at places (k, n)
 
 
 def smallest_circle(x: Array, y: Array) -> Array:
-    """Radius ``(n,)`` of the smallest circle round points ``x``, ``y`` ``(t, n)``, for each n.
+    """Return the radius ``(n,)`` of the smallest circle around the points ``x``, ``y`` ``(t, n)``.
 
-    Two or three points hold a circle; as long as some lie outside, the farthest enters and the
-    smallest circle round the four takes over. Its radius grows each time, so this ends, exactly.
-    Raises ConvergenceError if it has not in 100 rounds.
+    Two or three points determine a circle. As long as points lie outside, the farthest enters and
+    the smallest circle around the four takes over. The radius grows each time, so that the
+    iteration ends with the exact result. Raise ConvergenceError if it has not ended after 100
+    iterations.
 
     Source: Elzinga & Hearn 1972, Transp. Sci. 6, 379, doi:10.1287/trsc.6.4.379.
     """
@@ -51,11 +52,13 @@ def smallest_circle(x: Array, y: Array) -> Array:
         left, x, y, slack = left[outside], x[:, outside], y[:, outside], slack[outside]
         four = np.concatenate([held, farthest])[:, outside]
         held, circle = _round_four(four, _taken(x, four), _taken(y, four))
-    raise ConvergenceError(f"{len(left)} smallest circles not found in {MAX_ROUNDS} rounds")
+    raise ConvergenceError(
+        f"{len(left)} smallest circles were not found in {MAX_ROUNDS} iterations"
+    )
 
 
 def _start(x: Array, y: Array) -> tuple[Places, Array]:
-    """Circles on two points far apart: the three that hold them ``(3, n)``, ``(x, y, r)``."""
+    """Return circles ``(x, y, r)`` on two distant points, and the indices of their points."""
     first = np.hypot(x - x.mean(axis=0), y - y.mean(axis=0)).argmax(axis=0)[None]
     second = np.hypot(x - _taken(x, first), y - _taken(y, first)).argmax(axis=0)[None]
     held = np.concatenate([first, second, second])
@@ -63,7 +66,10 @@ def _start(x: Array, y: Array) -> tuple[Places, Array]:
 
 
 def _round_four(four: Places, x: Array, y: Array) -> tuple[Places, Array]:
-    """The smallest circle round four points ``x``, ``y`` ``(4, n)`` that the fourth helps hold."""
+    """Return the smallest circle around four points, determined by the fourth and others.
+
+    ``x`` and ``y`` are ``(4, n)``.
+    """
     circles = []
     for support in SUPPORTS:
         centre_x, centre_y, _ = _circle(x[list(support)], y[list(support)])
@@ -76,8 +82,9 @@ def _round_four(four: Places, x: Array, y: Array) -> tuple[Places, Array]:
 
 
 def _circle(x: Array, y: Array) -> tuple[Array, Array, Array]:
-    """Centre and radius of the circle through three points ``(3, n)``, on the first and last of
-    which it stands where they are on a line.
+    """Return centre and radius of the circle through three points ``(3, n)``.
+
+    Points on a line give the circle on the first and last of them as a diameter.
     """
     ax, ay, bx, by = x[0] - x[2], y[0] - y[2], x[1] - x[2], y[1] - y[2]
     twice = 2.0 * (ax * by - ay * bx)

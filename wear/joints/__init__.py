@@ -1,31 +1,31 @@
-"""Joint laws: what a contact transmits when it is one spring of a vibrating structure.
+"""Joint laws: the force of a contact that is one spring of a vibrating structure.
 
-The laws, all of :mod:`wear.joints.law`'s one interface
+Laws, all with the interface of :mod:`wear.joints.law`
     - ``JointLaw``: that interface, force and tangent from a displacement and a state.
     - ``Jenkins``: a spring in series with a Coulomb slider.
-    - ``BoucWen``: a smooth way from sticking to sliding.
+    - ``BoucWen``: a smooth transition from sticking to sliding.
     - ``UniformIwan``, ``FourParameterIwan``: sliders in parallel, by Masing's rule.
-    - ``FrictionContact``: a point in three dimensions, which may separate.
-    - ``PolynomialSpring``, ``ElasticStop``: without friction, nonlinear by themselves or by a gap.
+    - ``FrictionContact``: a contact point in three dimensions, which may separate.
+    - ``PolynomialSpring``, ``ElasticStop``: nonlinear springs without friction.
     - ``MixedLaw``, ``JointGroup``: joints of several laws in one structure.
-    - ``JointError``: parameters that a joint cannot have.
+    - ``JointError``: raised for parameters that a joint cannot have.
 
-Their marches
-    - ``march_joints``: through any displacements.
+Marches
+    - ``march_joints``: through any sequence of displacements.
     - ``PeriodicMarch``: over a period until the forces repeat, with their derivative.
-    - ``ParallelSliders``: sliders side by side as one joint of such a march.
+    - ``ParallelSliders``: sliders in parallel as one joint of such a march.
 
-How they wear
+Wear of joints
     - ``JointEvolution``: which parameter follows which function of the dissipated energy.
     - ``LogarithmicEvolution``, ``ArrheniusEvolution``, ``LinearEvolution``,
       ``ExponentialEvolution``, ``TabulatedEvolution``: those functions.
-    - ``long_test``: cycles against energy of a long test, by jumps.
+    - ``long_test``: energy against cycles of a long test, by jumps.
     - ``steady_stroke``: the energy of its cycles at a prescribed stroke.
 
-What is measured
+Measurements
     - ``measure_loops``: friction, stiffness and energy of recorded hysteresis loops.
 
-A slider pulled beyond its limit of 50 N and pushed back:
+A slider is pulled beyond its limit of 50 N and pushed back:
 
 >>> import numpy as np
 >>> from wear.joints import Jenkins, march_joints

@@ -1,6 +1,6 @@
 """Long tests by jumps in energy: how many cycles a joint takes to dissipate a given energy.
 
-The parameters of a joint change at the end of a cycle only, so its cumulative energy obeys
+The parameters of a joint change only at the end of a cycle, so that its cumulative energy obeys
 
     E(N + 1) = E(N) + e(E(N))
 
@@ -9,13 +9,13 @@ panel of energy, in which the smooth curve through these points has
 
     dN/dE = 1/e + e'/(2 e) - (e'' + e'²/e)/12 + ...
 
-(put it into N(E + e) = N(E) + 1 and compare powers of e). The second term is the half cycle by
-which counting differs from integrating; the third is left out and counts as an error. The first
-two are integrated over the panel by Chebyshev polynomials, whose last coefficients estimate the
-quadrature's error. Because e depends on E alone, an error of N made once is carried on unchanged:
-those of the panels add up, and their sum is stated. Where a panel as good as the tolerance asks for
-would hold a few cycles only, these are counted instead, without error: so begin tests whose
-friction rises within tens of cycles, and so are kinks passed.
+(insert it into N(E + e) = N(E) + 1 and compare powers of e). The second term is the half cycle by
+which counting differs from integrating. The third is omitted and counts as an error. The first two
+are integrated over the panel by Chebyshev polynomials, whose last coefficients estimate the error
+of the quadrature. Because e depends on E alone, an error in N is carried on unchanged: the errors
+of the panels add up, and their sum is reported. Where a panel within the tolerance would hold only
+a few cycles, these are counted instead, without error. Tests whose friction rises within tens of
+cycles begin in this way, and kinks are passed in this way.
 """
 
 from __future__ import annotations
@@ -26,100 +26,68 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.polynomial import Chebyshev, chebyshev
-from scipy.optimize import brentq
 
 from sa_solver.errors import ConvergenceError, InputError
 from sa_solver.types import Array
 from wear.joints.evolution import JointEvolution
+from wear.joints.jumps import Jump
 from wear.joints.parameters import UniaxialLaw
 
 DEGREE = 16
-"""Of the polynomials of a panel: friction that rises as ln E is then met to 1e-8 in panels whose
-ends are as 1 to 4."""
+"""Degree of the polynomials of a panel. Friction that rises as ln E is then accurate to 1e-8 in
+panels whose ends have a ratio of 1 to 4.
+"""
 
-TAIL = 3
-"""Last coefficients that estimate the error: of a kink, every second may vanish."""
+LAST_COEFFICIENTS = 3
+"""Number of last coefficients that estimate the error: for a kink every second one may vanish."""
 
 GROWTH, SHRINKAGE = 4.0, 0.5
-"""Of a panel after one that was good enough, or was not."""
+"""Factors of the length of the next panel after one that was accepted, or rejected."""
 
-FEWEST = 8
-"""Cycles of the smallest panel, and those counted instead of a smaller one, twice as many each time
-that no panel is good enough: trying one takes 17 energies of a cycle, counting one for each."""
+FEWEST_CYCLES = 8
+"""Cycles of the smallest panel, and number of cycles counted instead of a smaller one. The number
+doubles each time that no panel is accepted: trying a panel takes 17 energies of a cycle, counting
+takes one per cycle.
+"""
 
-REACH = 1.5
-"""Most energy of a panel, over that which is left, if need be at the present energy per cycle."""
+OVERSHOOT = 1.5
+"""Largest energy of a panel, over the energy or the energy of the cycles that are left."""
 
 MOST_EVALUATIONS = 2_000_000
-"""Energies of a cycle evaluated before giving up: what is not smooth can only be counted."""
+"""Limit of evaluated energies of a cycle: a function that is not smooth can only be counted."""
 
 SMALLEST_TOLERANCE = 1e-12
-"""Rounding of a panel's polynomials is a hundredth of it."""
+"""Smallest tolerance; the rounding of a panel's polynomials is a hundredth of it."""
 
 ROUNDING = 1e-12
-"""Relative, of an energy: to this accuracy the end of a test has the energy computed there."""
-
-SMALLEST = 1e-300
-"""Absolute tolerance of an energy: it is solved for to its last digit, however small it is."""
+"""Relative accuracy with which the energy at the end of a test is that computed there."""
 
 EnergyPerCycle = Callable[[float], float]
-"""Energy of a cycle [N mm] as a function of the energy dissipated before it [N mm]."""
+"""Function from the energy dissipated so far to the energy of a cycle [N mm]."""
 
 
 class AgeingError(ConvergenceError):
-    """The energy per cycle makes no sense, or is not smooth enough to be jumped."""
+    """The energy per cycle is invalid, or not smooth enough for jumps."""
 
 
 class NeverReachedError(AgeingError):
-    """The joint dissipates nothing any more before it has come to the energy asked for."""
-
-
-@dataclass(frozen=True)
-class Jump:
-    """A stretch of a long test.
-
-    It goes from ``start`` to ``end`` [N mm] and begins after ``cycles``; ``count`` are the cycles
-    since, a polynomial of the energy, and ``error`` how many they may be wrong anywhere in it. With
-    no polynomial it is a single cycle, counted.
-    """
-
-    start: float
-    end: float
-    cycles: float
-    count: Chebyshev | None
-    error: float
-
-    @property
-    def length(self) -> float:
-        """Its cycles."""
-        return self.since(self.end)
-
-    def since(self, energy: float) -> float:
-        """Cycles from its start to an ``energy`` in it [N mm]."""
-        if self.count is None:
-            return (energy - self.start) / (self.end - self.start)
-        return float(self.count(energy))
-
-    def energy_at(self, cycles: float) -> float:
-        """Energy after ``cycles`` of the test, which lie in this jump [N mm]."""
-        since = cycles - self.cycles
-        if since <= 0.0:
-            return self.start
-        if since >= self.length:
-            return self.end
-        if self.count is None:
-            return self.start + since * (self.end - self.start)
-        root = brentq(
-            lambda energy: self.since(energy) - since, self.start, self.end, xtol=SMALLEST
-        )
-        return float(root)
+    """The joint stops dissipating before it reaches the energy asked for."""
 
 
 @dataclass(frozen=True)
 class LongTest:
-    """Energy against cycles of a long test, from ``energy_before`` [N mm] on, as its ``jumps``.
+    """Energy against cycles of a long test.
 
-    It lasted ``total_cycles``. ``evaluations`` are the energies of a cycle that it took.
+    Parameters
+    ----------
+    energy_before
+        Energy dissipated before the test [N mm].
+    total_cycles
+        Cycles of the test.
+    jumps
+        Jumps of which it consists.
+    evaluations
+        Number of evaluated energies of a cycle.
     """
 
     energy_before: float
@@ -129,44 +97,49 @@ class LongTest:
 
     @property
     def cycles(self) -> Array:
-        """At the ends of all jumps, from 0 to the end of the test ``(k,)``."""
+        """Cycles at the ends of all jumps, from 0 to the end of the test ``(k,)``."""
         inner = [jump.cycles for jump in self.jumps if 0.0 < jump.cycles < self.total_cycles]
         return np.array([0.0, *inner, self.total_cycles])
 
     @property
     def energy(self) -> Array:
-        """Dissipated by then ``(k,)`` [N mm]."""
+        """Energy dissipated at the ends of all jumps ``(k,)`` [N mm]."""
         return self.energy_at(self.cycles)
 
     @property
     def error(self) -> float:
-        """Cycles by which :meth:`cycles_at` may be wrong at the end: the sum over all jumps."""
+        """Largest error of :meth:`cycles_at` at the end, in cycles: the sum over all jumps."""
         return sum(jump.error for jump in self.jumps)
 
     @property
     def final_energy(self) -> float:
-        """At the end of the test [N mm]."""
+        """Energy at the end of the test [N mm]."""
         return float(self.energy_at(self.total_cycles))
 
     def energy_at(self, cycles: Array | float) -> Array:
-        """Energy after ``cycles``, of their shape [N mm].
+        """Return the energy after ``cycles``, in their shape [N mm].
 
-        Raises InputError for cycles that the test does not have.
+        Raise InputError for cycles outside the test.
         """
         cycles = np.asarray(cycles, dtype=np.float64)
         if np.any((cycles < 0.0) | (cycles > self.total_cycles)):
-            raise InputError(f"cycles outside a test of {self.total_cycles:g}; allowed: within it")
+            raise InputError(
+                f"the test has {self.total_cycles:g} cycles, not all of those given; allowed: from "
+                "0 to its end"
+            )
         return np.asarray(np.vectorize(self._energy, otypes=[float])(cycles))
 
     def cycles_at(self, energy: Array | float) -> Array:
-        """Cycles after which the joint has dissipated ``energy`` [N mm], of its shape.
+        """Return the cycles after which the joint has dissipated ``energy`` [N mm], in its shape.
 
-        NaN where it has not by the end of the test. Raises InputError below the energy before it.
+        They are NaN for energies not reached in the test. Raise InputError for energies below that
+        before the test.
         """
         energy = np.asarray(energy, dtype=np.float64)
         if np.any(energy < self.energy_before):
             raise InputError(
-                f"energies below {self.energy_before:g} N mm, which were there before the test"
+                f"an energy is below the {self.energy_before:g} N mm dissipated before the test; "
+                "allowed: that energy or more"
             )
         return np.asarray(np.vectorize(self._cycles, otypes=[float])(energy))
 
@@ -185,7 +158,7 @@ class LongTest:
         return min(jump.cycles + jump.since(energy), self.total_cycles)
 
 
-# --- jumping ------------------------------------------------------------------------------------
+# --- long tests ---------------------------------------------------------------------------------
 
 
 def long_test(
@@ -197,19 +170,44 @@ def long_test(
     tolerance: float = 1e-6,
     breaks: Sequence[float] = (),
 ) -> LongTest:
-    """Run ``cycles`` of a joint that has dissipated ``start`` [N mm] before.
+    """Compute the energy of a joint against cycles, by jumps.
 
-    With ``until`` it ends where the joint has dissipated that energy [N mm], if that comes earlier.
-    ``tolerance`` is the error allowed in the number of cycles after which any energy is reached,
-    relative to it. ``breaks`` [N mm] are energies at which ``energy_per_cycle`` has a kink
-    (:attr:`~wear.joints.evolution.JointEvolution.breaks`): cycles across it are counted. Where a
-    cycle dissipates nothing the energy stays for good. Raises InputError for cycles, energies or a
-    tolerance that make no sense, AgeingError for an energy per cycle that is negative, not finite
-    or too rough to be jumped, NeverReachedError for an energy never reached, cycles not limited.
+    Where a cycle dissipates nothing the energy stays constant for good.
+
+    Parameters
+    ----------
+    energy_per_cycle
+        Energy of a cycle as a function of the energy dissipated before it [N mm].
+    cycles
+        Number of cycles.
+    until
+        Energy at which the test ends if it comes earlier [N mm].
+    start
+        Energy dissipated before the test [N mm].
+    tolerance
+        Allowed relative error of the number of cycles after which any energy is reached.
+    breaks
+        Energies at which ``energy_per_cycle`` has a kink
+        (:attr:`~wear.joints.evolution.JointEvolution.breaks`) [N mm]: the cycles across it are
+        counted.
+
+    Returns
+    -------
+    LongTest
+        Energy against cycles, with its error.
+
+    Raises
+    ------
+    InputError
+        If cycles, energies or the tolerance are invalid.
+    wear.joints.ageing.AgeingError
+        If an energy per cycle is negative, not finite or too rough for jumps.
+    wear.joints.ageing.NeverReachedError
+        If the energy is never reached and the cycles are not limited.
 
     Examples
     --------
-    Where a cycle dissipates c (1 + E/E0), the energy comes to E0 ((1 + c/E0)^N - 1) in N cycles:
+    Where a cycle dissipates c (1 + E/E0), the energy is E0 ((1 + c/E0)^N - 1) after N cycles:
 
     >>> from wear.joints import long_test
     >>> test = long_test(lambda energy: 0.01 * (1.0 + energy / 1e3), cycles=1e5)
@@ -219,21 +217,26 @@ def long_test(
     144 cycles were computed
     """
     if not cycles > 0.0:
-        raise InputError(f"{cycles:g} cycles; allowed: more than 0")
+        raise InputError(f"a test has {cycles:g} cycles; allowed: more than 0")
     if not 0.0 <= start < np.inf:
-        raise InputError(f"{start:g} N mm dissipated before; allowed: 0 or more")
+        raise InputError(f"{start:g} N mm are dissipated before the test; allowed: 0 or more")
     if not until > start:
-        raise InputError(f"until {until:g} N mm; allowed: above {start:g}, there before the test")
+        raise InputError(
+            f"the test ends at {until:g} N mm; allowed: above the {start:g} N mm dissipated before "
+            "it"
+        )
     if cycles == until == np.inf:
-        raise InputError("a test without end; allowed: a number of cycles or an energy that end it")
+        raise InputError("the test has no end; allowed: a number of cycles or a final energy")
     if not SMALLEST_TOLERANCE <= tolerance < 1.0:
-        raise InputError(f"tolerance {tolerance:g}; allowed: {SMALLEST_TOLERANCE:g} to 1")
-    return _Jumper(energy_per_cycle, cycles, until, tolerance, sorted(breaks)).run(start)
+        raise InputError(
+            f"the tolerance is {tolerance:g}; allowed: from {SMALLEST_TOLERANCE:g} to below 1"
+        )
+    return _TestInProgress(energy_per_cycle, cycles, until, tolerance, sorted(breaks)).run(start)
 
 
 @dataclass
-class _Jumper:
-    """A long test under way, to a ``total`` of cycles or ``until`` an energy."""
+class _TestInProgress:
+    """A long test in progress, to ``total`` cycles or ``until`` an energy."""
 
     energy_per_cycle: EnergyPerCycle
     total: float
@@ -245,39 +248,40 @@ class _Jumper:
     evaluations: int = 0
 
     def run(self, start: float) -> LongTest:
-        """From ``start`` to the last cycle."""
-        energy, width, block = start, 0.0, FEWEST
+        """Run the test from the energy ``start`` to its end."""
+        energy, width, block = start, 0.0, FEWEST_CYCLES
         while self.cycles < self.total and energy < self.until:
             rate = self._rate(energy)
-            # Too little for the sum to change is nothing.
+            # An energy too small to change the sum counts as none.
             if energy + rate == energy:
                 break
             to_break = self._to_break(energy)
-            width = min(max(width, 2 * FEWEST * rate), self._left(energy, rate), to_break)
-            jump = self._panel(energy, width, FEWEST * rate)
+            width = min(max(width, 2 * FEWEST_CYCLES * rate), self._left(energy, rate), to_break)
+            jump = self._panel(energy, width, FEWEST_CYCLES * rate)
             if jump is None:
-                energy = self._count(self._last_whole(energy), block)
+                energy = self._count(self._end_of_cycle(energy), block)
                 width, block = 0.0, 2 * block
                 continue
             self._add(jump)
-            energy, width, block = jump.end, GROWTH * (jump.end - jump.start), FEWEST
+            energy, width, block = jump.end, GROWTH * (jump.end - jump.start), FEWEST_CYCLES
             if jump.end - jump.start == to_break:
-                energy = self._count(self._last_whole(energy), FEWEST)
+                energy = self._count(self._end_of_cycle(energy), FEWEST_CYCLES)
         return LongTest(start, self._end(energy), tuple(self.jumps), self.evaluations)
 
     def _left(self, energy: float, rate: float) -> float:
-        """Energy that a panel may have at most."""
-        return REACH * min((self.total - self.cycles) * rate, self.until - energy)
+        """Return the largest energy that a panel may have."""
+        return OVERSHOOT * min((self.total - self.cycles) * rate, self.until - energy)
 
     def _end(self, energy: float) -> float:
-        """Cycles of the whole test, which has come to ``energy``."""
+        """Return the cycles of the whole test, which has reached ``energy``."""
         if energy >= self.until:
             jump = next(jump for jump in reversed(self.jumps) if jump.start < self.until)
             return min(self.total, jump.cycles + jump.since(self.until))
         if self.total == np.inf:
             raise NeverReachedError(
                 f"{self.until:g} N mm are never reached: after {self.cycles:.6g} cycles and "
-                f"{energy:g} N mm a cycle dissipates nothing any more"
+                f"{energy:g} N mm a cycle dissipates nothing; give a smaller energy or a number of "
+                "cycles"
             )
         return self.total
 
@@ -285,10 +289,11 @@ class _Jumper:
         self.jumps.append(jump)
         self.cycles += jump.length
 
-    def _last_whole(self, energy: float) -> float:
-        """Go back from ``energy`` to the end of a cycle; the energy there.
+    def _end_of_cycle(self, energy: float) -> float:
+        """Go back from ``energy`` to the end of a cycle, and return the energy there.
 
-        Which energies are ends of cycles matters at a kink, and counting is exact from them only.
+        Which energies are ends of cycles matters at a kink, and counting is only exact from such an
+        energy.
         """
         whole = float(np.floor(self.cycles))
         if whole == self.cycles:
@@ -299,7 +304,7 @@ class _Jumper:
         return self.jumps[-1].end
 
     def _panel(self, energy: float, width: float, least: float) -> Jump | None:
-        """The longest good panel from ``energy`` on, none if shorter than ``least`` [N mm]."""
+        """Return the longest accepted panel from ``energy`` on, or None if below ``least``."""
         while width >= least:
             jump = self._attempt(energy, energy + width)
             if jump is not None and jump.error <= self.tolerance * jump.length:
@@ -308,7 +313,7 @@ class _Jumper:
         return None
 
     def _attempt(self, start: float, end: float) -> Jump | None:
-        """The panel from ``start`` to ``end``; none if a cycle dissipates nothing in it."""
+        """Return the panel from ``start`` to ``end``, or None if one of its cycles has no loss."""
         nodes = chebyshev.chebpts1(DEGREE + 1)
         energies = start + 0.5 * (end - start) * (nodes + 1.0)
         rates = np.array([self._rate(float(energy)) for energy in energies])
@@ -317,13 +322,13 @@ class _Jumper:
         fitted = _through(rates, (start, end))
         slopes, curvatures = fitted.deriv(1)(energies), fitted.deriv(2)(energies)
         density = _through((1.0 + 0.5 * slopes) / rates, (start, end))
-        quadrature = float(np.abs(density.coef[-TAIL:]).max())
+        quadrature = float(np.abs(density.coef[-LAST_COEFFICIENTS:]).max())
         counting = float(np.mean(np.abs(curvatures + slopes**2 / rates))) / 12.0
         error = (quadrature + counting) * (end - start)
         return Jump(start, end, self.cycles, density.integ(lbnd=start), error)
 
     def _count(self, energy: float, cycles: int) -> float:
-        """Count ``cycles``, no more than are left; the energy after them."""
+        """Count ``cycles``, no more than are left, and return the energy after them."""
         for _ in range(cycles):
             after = energy + self._rate(energy)
             if after == energy or self.cycles >= self.total:
@@ -336,14 +341,15 @@ class _Jumper:
         self.evaluations += 1
         if self.evaluations > MOST_EVALUATIONS:
             raise AgeingError(
-                f"{self.cycles:.6g} of {self.total:.6g} cycles after {MOST_EVALUATIONS} energies "
-                "of a cycle: they are not smooth to the tolerance; allow a larger one, or name "
-                "the energies at which they have kinks"
+                f"only {self.cycles:.6g} of {self.total:.6g} cycles are done after "
+                f"{MOST_EVALUATIONS} evaluated energies of a cycle, which are not smooth within "
+                "the tolerance; allow a larger one, or give the energies at which they have kinks"
             )
         rate = float(self.energy_per_cycle(energy))
         if not 0.0 <= rate < np.inf:
             raise AgeingError(
-                f"a cycle dissipates {rate:g} N mm where {energy:g} were before; allowed: 0 or more"
+                f"a cycle dissipates {rate:g} N mm after {energy:g} N mm; allowed: 0 or more, and "
+                "finite"
             )
         return rate
 
@@ -352,7 +358,7 @@ class _Jumper:
 
 
 def _through(values: Array, domain: tuple[float, float]) -> Chebyshev:
-    """The polynomial through ``values`` at the Chebyshev points of the ``domain``."""
+    """Return the polynomial through ``values`` at the Chebyshev points of the ``domain``."""
     count = len(values)
     matrix = chebyshev.chebvander(chebyshev.chebpts1(count), count - 1)
     coefficients = matrix.T @ values * (2.0 / count)
@@ -364,11 +370,20 @@ def _through(values: Array, domain: tuple[float, float]) -> Chebyshev:
 
 
 def steady_stroke(law: UniaxialLaw, evolution: JointEvolution, amplitude: float) -> EnergyPerCycle:
-    """Energy per cycle of one joint to and fro by ``amplitude`` [mm], in closed form.
+    """Return the energy per cycle of one joint at a stroke of ± ``amplitude``, in closed form.
+
+    Parameters
+    ----------
+    law
+        Law of the joint with its initial parameters.
+    evolution
+        Evolution of the parameters with the energy.
+    amplitude
+        Half of the stroke [mm].
 
     Examples
     --------
-    A Jenkins element whose friction stays dissipates 4 µN (A - µN/kt) in every cycle:
+    A Jenkins element with constant friction dissipates 4 µN (A - µN/kt) in every cycle:
 
     >>> from wear.joints import Jenkins, JointEvolution, long_test, steady_stroke
     >>> law = Jenkins(stiffness=1e4, friction=0.5, normal_load=100.0)
@@ -388,11 +403,12 @@ def steady_stroke(law: UniaxialLaw, evolution: JointEvolution, amplitude: float)
 def marched_stroke(
     law: UniaxialLaw, evolution: JointEvolution, amplitude: float, start: float = 0.0
 ) -> EnergyPerCycle:
-    """The same, marched: cycle after cycle with the memory of the ones before.
+    """Return the energy per cycle of :func:`steady_stroke`, marched with the memory of the joint.
 
     One joint goes from +``amplitude`` [mm] to -``amplitude`` and back, with the parameters that
-    belong to the energy at the cycle's begin: laws are exact along a straight path. It is brought
-    to +``amplitude`` without counting what that takes, with the parameters of ``start`` [N mm].
+    belong to the energy at the beginning of the cycle: laws are exact along a straight path. The
+    way to the first +``amplitude`` has the parameters of ``start`` [N mm], and its energy does not
+    count.
     """
     begun = evolution.at(law, start)
     state = begun.respond(begun.rest(1), np.array([[amplitude]])).state
@@ -408,16 +424,23 @@ def marched_stroke(
     return energy_per_cycle
 
 
-# --- checking -----------------------------------------------------------------------------------
+# --- verification -------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
 class IntegratedCycles:
-    """Cycles of a long test integrated one after the other.
+    """Cycles of a long test that were integrated one after the other.
 
-    ``energy`` ``(k + 1,)`` [N mm] is that of ``k`` cycles and ``jumped`` that of the test after the
-    same cycles; ``difference`` is that of their last, in cycles, and ``stated`` the one that the
-    test allows for.
+    Parameters
+    ----------
+    energy
+        Energy before the first and after each of ``k`` cycles ``(k + 1,)`` [N mm].
+    jumped
+        Energy of the test after the same cycles ``(k + 1,)`` [N mm].
+    difference
+        Difference of the last energies, in cycles.
+    stated
+        Largest difference according to the error of the test, in cycles.
     """
 
     energy: Array
@@ -429,13 +452,27 @@ class IntegratedCycles:
 def integrate_cycles(
     test: LongTest, energy_per_cycle: EnergyPerCycle, first: float, cycles: int
 ) -> IntegratedCycles:
-    """Integrate ``cycles`` of a long test directly, from cycle ``first`` on, and compare.
+    """Integrate some cycles of a long test directly, and compare.
 
-    ``energy_per_cycle`` is called once for every cycle, in order: it may be that of the test or an
-    independent one with a memory of its own. Raises InputError for cycles the test does not have.
+    Parameters
+    ----------
+    test
+        The long test.
+    energy_per_cycle
+        Energy of a cycle, called once for every cycle, in order. It may be that of the test, or an
+        independent one with a memory of its own.
+    first
+        Number of the first cycle.
+    cycles
+        Number of cycles.
+
+    Raises
+    ------
+    InputError
+        If the test does not have these cycles.
     """
     if cycles < 1:
-        raise InputError(f"{cycles} cycles; allowed: one or more")
+        raise InputError(f"{cycles} cycles are to be integrated; allowed: one or more")
     numbers = np.arange(cycles + 1, dtype=np.float64) + first
     jumped = test.energy_at(numbers)
     energy = np.empty(cycles + 1)
@@ -449,6 +486,6 @@ def integrate_cycles(
         for jump in test.jumps
         if jump.cycles <= numbers[-1] and jump.cycles + jump.length >= numbers[0]
     ]
-    # A jump errs by this at either end of these cycles.
+    # A jump may have its error at either end of these cycles.
     stated = 2.0 * sum(jump.error for jump in touched)
     return IntegratedCycles(energy, jumped, difference, stated)

@@ -1,4 +1,4 @@
-"""Bouc and Wen's joint, normalised: a smooth way from sticking to sliding, without turning points.
+"""Bouc-Wen joint, normalised: a smooth transition from sticking to sliding, without turning points.
 
     F = kp x + µN ξ,   ξ' = K/(µN) (1 - (σ sgn(x' ξ) + 1 - σ) |ξ|^n) x',   K = kt - kp
 
@@ -6,14 +6,14 @@
 
     dη/ds = 1 - η^n   where η > 0 (loading),   1 + (2σ - 1) |η|^n   where η < 0 (unloading),
 
-solved in closed form for n = 1 and 2, and for σ = 1/2 on every unloading branch, which is then
-straight; otherwise by the classical fourth-order rule in short steps. The energy that ξ holds is
-(µN ξ)²/2K; what else the force works is lost, (µN)²/K ∫ η (1 - dη/ds) ds, never negative as
-σ >= 1/2 (the limit of Erlicher and Point, C. R. Mécanique 332, 2004).
+which is solved in closed form for n = 1 and 2, and for σ = 1/2 on every unloading branch, which is
+then straight; otherwise by the classical fourth-order Runge-Kutta method in short steps. The energy
+stored by ξ is (µN ξ)²/2K. The rest of the work is lost, (µN)²/K ∫ η (1 - dη/ds) ds, which is never
+negative as σ >= 1/2 (the limit of Erlicher and Point, C. R. Mécanique 332, 2004).
 
-One number ξ cannot remember open loops. Unloaded and loaded again by a little, the joint takes
-another way than it came: small loops do not close, and under a steady force with small ripples
-it creeps without end. Where partial unloading matters, take an Iwan joint.
+The single number ξ cannot remember open loops. Unloaded and loaded again by a little, the joint
+takes another way back: small loops do not close, and under a steady force with small ripples it
+creeps without end. Where partial unloading matters, use an Iwan joint.
 """
 
 from __future__ import annotations
@@ -36,27 +36,27 @@ from wear.joints.parameters import (
     require,
 )
 
-# Largest step n s of the fourth-order rule, and the largest as a share of |ξ| or, by ξ = 0, at all:
-# there |ξ|^n has few derivatives. ξ and the loss of a branch are then within 2e-9 of the solution.
+# Largest step n s of the Runge-Kutta method, the largest as a share of |ξ|, and the largest next to
+# ξ = 0, where |ξ|^n has few derivatives. ξ and the loss of a branch are then accurate to 2e-9.
 SUBSTEP, GRADING, FIRST_SUBSTEP = 0.02, 0.25, 1e-5
-# The rule stops here, at full sliding, and there, at ξ = 0: both are rounding.
-SATURATED, NOUGHT = 1.0 - 1e-14, 1e-14
-# Reach µN/K over increment below which there is no friction: its inverse is still finite.
+# Values of |ξ| at which the method stops, at full sliding and at ξ = 0: the rest is rounding.
+SATURATED, NEAR_ZERO = 1.0 - 1e-14, 1e-14
+# Ratio of the reach µN/K to the increment below which there is no friction; its inverse is finite.
 NO_FRICTION = 1e-300
-# Below it z²/2 - z + ln(1 + z) is summed as a series, which then is good to 1e-10 of itself.
+# Below this z, z²/2 - z + ln(1 + z) is summed as a series, with a relative error below 1e-10.
 SERIES_BELOW = 1e-2
 
 
 @compiled()
 def xi_rate(eta: float, exponent: float, gain: float) -> float:
-    """dη/ds."""
+    """Return dη/ds."""
     power: float = abs(eta) ** exponent
     return 1.0 - power if eta > 0.0 else 1.0 + gain * power
 
 
 @compiled()
 def _load(eta: float, s: float, exponent: float) -> tuple[float, float]:
-    """From η >= 0 over s, for n = 1 or 2: η there, and the loss over (µN)²/K."""
+    """Load from η >= 0 over s, for n = 1 or 2: return η there, and the loss over (µN)²/K."""
     if exponent == 1.0:
         end = eta - (1.0 - eta) * expm1(-s)
         work = s + (1.0 - eta) * expm1(-s)
@@ -69,7 +69,7 @@ def _load(eta: float, s: float, exponent: float) -> tuple[float, float]:
 
 @compiled()
 def _excess(z: float) -> float:
-    """z²/2 - z + ln(1 + z)."""
+    """Return z²/2 - z + ln(1 + z)."""
     if z < SERIES_BELOW:
         return z**3 * (1.0 / 3.0 - z * (0.25 - z * (0.2 - z * (1.0 / 6.0 - z / 7.0))))
     return 0.5 * z * z - z + log1p(z)
@@ -77,7 +77,10 @@ def _excess(z: float) -> float:
 
 @compiled()
 def _unload(u: float, s: float, exponent: float, gain: float) -> tuple[float, float, float]:
-    """From η = -u over s or until ξ = 0, for n = 1 or 2 or no gain: u, rest of s, loss."""
+    """Unload from η = -u over s, or to ξ = 0: return u, the rest of s and the loss.
+
+    The closed forms hold for n = 1 and 2, and without gain.
+    """
     if gain == 0.0:
         return max(u - s, 0.0), max(s - u, 0.0), 0.0
     if exponent == 1.0:
@@ -118,20 +121,20 @@ def longest_step(eta: float, exponent: float, gain: float) -> float:
 
 @compiled()
 def _step_finely(eta: float, s: float, exponent: float, gain: float) -> tuple[float, float]:
-    """From η over s by the fourth-order rule: η there, and the loss."""
+    """Go from η over s by the Runge-Kutta method: return η there, and the loss."""
     lost = 0.0
     while s > 0.0 and eta < SATURATED:
         step = min(s, longest_step(eta, exponent, gain))
         eta, more = rule_step(eta, step, exponent, gain)
         lost += more
         s -= step
-        eta = 0.0 if -NOUGHT < eta < 0.0 else eta
+        eta = 0.0 if -NEAR_ZERO < eta < 0.0 else eta
     return eta, lost + max(s, 0.0)
 
 
 @compiled()
 def travel(eta: float, s: float, exponent: float, gain: float) -> tuple[float, float]:
-    """From η over s >= 0 in the direction of motion: η there, and the loss over (µN)²/K."""
+    """Go from η over s >= 0 in the direction of motion: return η, and the loss over (µN)²/K."""
     lost = 0.0
     closed = exponent == 1.0 or exponent == 2.0
     if eta < 0.0 and (closed or gain == 0.0):
@@ -173,7 +176,7 @@ def advance_bouc_wen(
     xi: float,
     increment: float,
 ) -> tuple[float, float, float, float, float]:
-    """One joint by one increment: force, tangent, displacement, ξ and energy lost."""
+    """Advance one joint by one increment: force, tangent, displacement, ξ and energy lost."""
     spring = stiffness - residual
     displacement += increment
     if limit <= NO_FRICTION * spring * abs(increment):
@@ -218,7 +221,8 @@ def _loop_energy(
     spring = stiffness - residual
     if limit <= NO_FRICTION * spring * amplitude:
         return 0.0
-    # The settled loop goes from -ξ to ξ; what half of it makes of -ξ less ξ falls as ξ grows.
+    # The settled loop goes from -ξ to ξ. The end of its half that begins at -ξ, less ξ, falls as ξ
+    # grows, so that bisection finds ξ.
     distance = 2.0 * spring * amplitude / limit
     least, most = 0.0, 1.0
     while True:
@@ -233,19 +237,37 @@ def _loop_energy(
 
 @dataclass(frozen=True)
 class BoucWen(UniaxialLaw):
-    """Bouc and Wen's joint with a macroslip slope.
+    """Bouc-Wen joint with a macroslip slope.
 
-    ``stiffness`` kt [N/mm], the whole initial slope, ``friction`` µ and ``normal_load`` N [N],
-    ``residual_stiffness`` kp [N/mm] < kt, ``sigma`` σ from 1/2 to 1 and ``exponent`` n >= 1: all
-    numbers or ``(n,)``. Raises :class:`wear.joints.parameters.JointError`.
+    All parameters are numbers or ``(n,)``.
 
-    A state's columns are displacement [mm] and ξ; with other parameters the force becomes theirs at
-    the same ξ, and what that releases is not counted as dissipated. An increment of nothing gives
-    the mean of the tangents forwards and backwards.
+    The columns of a state are the displacement [mm] and ξ. If parameters change, the force follows
+    at the same ξ, and the energy that this releases is not counted as dissipated. An increment of
+    zero has the mean of the tangents forward and backward.
+
+    Parameters
+    ----------
+    stiffness
+        Total initial stiffness kt [N/mm].
+    friction
+        Coefficient of friction µ.
+    normal_load
+        Normal load N [N].
+    residual_stiffness
+        Macroslip slope kp < kt [N/mm].
+    sigma
+        Shape σ of unloading, from 1/2 to 1.
+    exponent
+        Exponent n >= 1.
+
+    Raises
+    ------
+    JointError
+        If a parameter is not in its range.
 
     Examples
     --------
-    With σ = 1/2 and n = 2 it is first loaded as µN tanh(kt x / µN):
+    With σ = 1/2 and n = 2 the force on first loading is µN tanh(kt x / µN):
 
     >>> import numpy as np
     >>> from wear.joints import BoucWen, march_joints
@@ -284,7 +306,7 @@ class BoucWen(UniaxialLaw):
         return parameter_columns(*self._constants)
 
     def loop_energy(self, amplitude: Parameter) -> Array:
-        """Energy lost in a settled cycle between ± ``amplitude`` [mm], in [N mm].
+        """Return the energy of a settled cycle between ± ``amplitude`` [mm] in N mm.
 
         For n = 2 and σ = 1/2 it is -(µN)²/K (ξ² + ln(1 - ξ²)), where ξ + artanh ξ = 2 K A/µN.
         """

@@ -22,8 +22,8 @@ import numpy as np
 
 from sa_solver.types import Array
 from wear.joints.bouc_wen import (
+    NEAR_ZERO,
     NO_FRICTION,
-    NOUGHT,
     SATURATED,
     BoucWen,
     advance_bouc_wen,
@@ -55,7 +55,7 @@ def _march(exponent: float, gain: float) -> Array:
     while eta < SATURATED:
         step = longest_step(eta, exponent, gain)
         eta, more = rule_step(eta, step, exponent, gain)
-        eta = 0.0 if -NOUGHT < eta < 0.0 else eta
+        eta = 0.0 if -NEAR_ZERO < eta < 0.0 else eta
         s += step
         lost += more
         points.append((s, eta, lost))

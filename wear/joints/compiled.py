@@ -1,8 +1,8 @@
-"""Compiled functions of joints, kept from one run to the next.
+"""Compiled functions of joints, cached between runs.
 
-numba keeps a compiled function as long as the file that it is in stays as it is, also where one
-that it calls has changed in another file: a later run would then compute what the old one did. So
-they are kept in a folder for each version of all files of this package.
+numba caches a compiled function as long as the file that contains it is unchanged, even if a
+function that it calls has changed in another file: a later run would then use the old code. The
+cache therefore has a folder for each version of all files of this package.
 """
 
 from __future__ import annotations
@@ -15,32 +15,32 @@ from typing import Any, TypeVar
 import numba
 
 Function = TypeVar("Function", bound=Callable[..., Any])
-# Its attributes are set when numba is loaded.
+# The attributes of numba's configuration are set at run time, which type checkers cannot see.
 config: Any = numba.config
 
 PACKAGE = Path(__file__).parent
 
 
 def version_of(package: Path) -> str:
-    """What tells versions of a package's files apart."""
+    """Return a digest of all files of a package."""
     digest = hashlib.sha256()
     for file in sorted(package.rglob("*.py")):
         digest.update(file.read_bytes())
     return digest.hexdigest()[:16]
 
 
-KEPT = Path(config.CACHE_DIR or PACKAGE / "__pycache__") / f"numba-{version_of(PACKAGE)}"
+CACHE_FOLDER = Path(config.CACHE_DIR or PACKAGE / "__pycache__") / f"numba-{version_of(PACKAGE)}"
 
 
 def compiled(**options: Any) -> Callable[[Function], Function]:
-    """``numba.njit`` with these options for a function of this package, kept in ``KEPT``."""
+    """Return a decorator that applies ``numba.njit`` with these options and caches the result."""
 
     def compile_function(function: Function) -> Function:
-        elsewhere, config.CACHE_DIR = config.CACHE_DIR, str(KEPT)
+        previous, config.CACHE_DIR = config.CACHE_DIR, str(CACHE_FOLDER)
         try:
             dispatcher: Function = numba.njit(cache=True, **options)(function)
             return dispatcher
         finally:
-            config.CACHE_DIR = elsewhere
+            config.CACHE_DIR = previous
 
     return compile_function

@@ -1,6 +1,6 @@
-"""Elastic joints along one direction: a spring whose force is a polynomial, and a stop at a gap.
+"""Elastic joints along one direction: a polynomial spring, and a stop with a gap.
 
-They store all they take and remember nothing: a state is the displacement alone.
+They dissipate no energy, and their state is the displacement alone.
 """
 
 from __future__ import annotations
@@ -25,16 +25,17 @@ from wear.joints.parameters import (
 from wear.joints.periodic.sliders import DrivenJoints, Period
 
 POLYNOMIAL, STOP = 0.0, 1.0
-"""First parameter of a joint: the coefficients of u, u², ... u⁵ follow; or stiffness, gap and how
-many sides."""
+"""First parameter of a joint. For a polynomial the coefficients of u, u², ... u⁵ follow; for a stop
+its stiffness, its gap and the number of its sides.
+"""
 POWERS = 5
-# State of a stop at a sample, as those of contacts: pressed, or apart.
+# States of a stop at a sample, with the numbers of a contact's sticking and separated states.
 PRESSED, APART = 0, 2
 
 
 @compiled(nogil=True, error_model="numpy")
 def elastic_force(joint: Array, displacement: float) -> tuple[float, float, int]:
-    """Force, its derivative, and state of a joint with such a row of parameters."""
+    """Return force, derivative and state of a joint with this row of parameters."""
     if joint[0] == POLYNOMIAL:
         force, slope = 0.0, 0.0
         for power in range(POWERS, 0, -1):
@@ -51,7 +52,7 @@ def elastic_force(joint: Array, displacement: float) -> tuple[float, float, int]
 
 @compiled(nogil=True, error_model="numpy")
 def settle_elastic(period: Period, joints: DrivenJoints) -> None:
-    """Forces and states of elastic joints in a period, and the derivative: nothing to settle."""
+    """Write forces, states and derivatives of elastic joints, which need no settling."""
     basis, weights = period.basis, period.weights
     slopes = np.empty(basis.shape)
     for j in range(len(joints.parameters)):
@@ -60,7 +61,7 @@ def settle_elastic(period: Period, joints: DrivenJoints) -> None:
             joints.force[j, t], joints.states[j, t] = force, state
             for c in range(basis.shape[1]):
                 slopes[t, c] = slope * basis[t, c]
-        # As a whole it would take far longer to compile.
+        # The assignment of a whole array would take far longer to compile.
         jacobian = np.dot(weights, slopes)
         for row in range(len(jacobian)):
             for c in range(len(jacobian)):
@@ -82,7 +83,7 @@ def _respond(
 
 
 class ElasticLaw(CompiledLaw):
-    """A joint along one direction that stores all it takes."""
+    """Base class of joints along one direction that dissipate nothing."""
 
     directions = columns = 1
     kernel = staticmethod(_respond)
@@ -90,16 +91,26 @@ class ElasticLaw(CompiledLaw):
 
 @dataclass(frozen=True)
 class PolynomialSpring(ElasticLaw):
-    """A spring of the force k1 u + k2 u² + k3 u³ + k4 u⁴ + k5 u⁵.
+    """Spring with the force k1 u + k2 u² + k3 u³ + k4 u⁴ + k5 u⁵.
 
-    ``stiffness`` k1 [N/mm], ``quadratic`` k2 [N/mm²], ``cubic`` k3 [N/mm³], ``quartic`` k4 and
-    ``quintic`` k5, of either sign: all numbers or ``(n,)``. Raises
-    :class:`wear.joints.parameters.JointError`. Terms of even power move the mean of a vibration:
-    harmonic balance then needs harmonic 0.
+    All coefficients are numbers or ``(n,)``, of either sign. Terms of even power shift the mean of
+    a vibration: harmonic balance then needs harmonic 0.
+
+    Parameters
+    ----------
+    stiffness
+        Coefficient k1 [N/mm].
+    quadratic, cubic, quartic, quintic
+        Coefficients k2 [N/mm²], k3 [N/mm³], k4 [N/mm⁴] and k5 [N/mm⁵].
+
+    Raises
+    ------
+    JointError
+        If a coefficient is not finite.
 
     Examples
     --------
-    A spring that hardens, of Duffing's kind:
+    A hardening spring of Duffing's kind:
 
     >>> import numpy as np
     >>> from wear.joints import PolynomialSpring, march_joints
@@ -131,15 +142,28 @@ class PolynomialSpring(ElasticLaw):
 
 @dataclass(frozen=True)
 class ElasticStop(ElasticLaw):
-    """A spring that is met where a gap is closed: its force is k (u - gap) beyond it.
+    """Spring behind a gap: its force is k (u - gap) beyond the gap.
 
-    ``stiffness`` k [N/mm] and ``gap`` [mm], numbers or ``(n,)``; with ``two_sided`` there is
-    another one at -gap. Raises :class:`wear.joints.parameters.JointError`. One alone moves the mean
-    of a vibration: harmonic balance then needs harmonic 0.
+    Parameters are numbers or ``(n,)``. A one-sided stop shifts the mean of a vibration: harmonic
+    balance then needs harmonic 0.
+
+    Parameters
+    ----------
+    stiffness
+        Stiffness k [N/mm].
+    gap
+        Gap [mm].
+    two_sided
+        Whether there is another stop at -gap.
+
+    Raises
+    ------
+    JointError
+        If a parameter is not in its range.
 
     Examples
     --------
-    Met 0.02 mm before the end of its way, on one side only:
+    A one-sided stop is reached 0.02 mm before the end of the motion:
 
     >>> import numpy as np
     >>> from wear.joints import ElasticStop, march_joints
@@ -163,5 +187,5 @@ class ElasticStop(ElasticLaw):
     @cached_property
     def parameters(self) -> Array:
         sides = 2.0 if self.two_sided else 1.0
-        # As wide as a row of the polynomial spring: one compiled march for both.
+        # The rows are as wide as those of the polynomial spring, so that both share one march.
         return parameter_columns(STOP, self.stiffness, self.gap, sides, 0.0, 0.0)

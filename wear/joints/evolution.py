@@ -1,23 +1,23 @@
-"""How the parameters of a joint law follow the energy that the joint has dissipated so far.
+"""Evolution of the parameters of a joint law with the energy that the joint has dissipated.
 
-The forms are those of two papers; E is the cumulative energy in N mm (1 J = 1e3, 1 kJ = 1e6 N mm),
-and all but tables are factors of the initial value:
+The functions come from two papers. E is the cumulative energy in N mm (1 J = 1e3 N mm,
+1 kJ = 1e6 N mm), and all functions but tables are factors of the initial value:
 
 - Fantetti et al. 2019, Tribology International 138, 111, doi:10.1016/j.triboint.2019.05.023, table
   4.2: :class:`LogarithmicEvolution` of friction, :class:`ArrheniusEvolution` of the contact
   stiffness, :class:`LinearEvolution` of the macroslip slope;
-- Li et al. 2020, table 3: :class:`ExponentialEvolution`, a single one for the bolt's preload;
-- :class:`TabulatedEvolution`: values themselves, measured or of a wear computation.
+- Li et al. 2020, table 3: :class:`ExponentialEvolution`; a single one for the bolt's preload;
+- :class:`TabulatedEvolution`: values of the parameter itself, measured or from a wear computation.
 
-Misprints, and what holds here:
+Misprints in the papers, and the values used here:
 
-- Fantetti's E is in J, but the macroslip slope, 0.88 N/µm (1 + 0.24 E), would then pass the contact
-  stiffness at 210 J of a test of 2800 J. Its 0.24 is taken per kJ, 2.4e-7 per N mm; friction
-  (b = 1.3e9 per J) and stiffness (b = 150 J) do give the measured curves in J. Their "log" is the
-  natural one.
-- Li's curve of first loading is printed with sliding from 2 µN / (kt + kr) on, where it would jump;
-  without a jump it slides from 2 µN / kt on, and so does :mod:`wear.joints.iwan`. Their c and d are
-  per kJ. The residual stiffness does not evolve.
+- Fantetti's E is in J, but the macroslip slope, 0.88 N/µm (1 + 0.24 E), would then exceed the
+  contact stiffness after 210 J of a test of 2800 J. Its 0.24 is taken per kJ, 2.4e-7 per N mm.
+  Friction (b = 1.3e9 per J) and stiffness (b = 150 J) do give the measured curves in J. Their "log"
+  is the natural logarithm.
+- Li's curve of first loading is printed with sliding from 2 µN / (kt + kr) on, where it would jump.
+  Without a jump it slides from 2 µN / kt on, as in :mod:`wear.joints.iwan`. Their c and d are per
+  kJ. The residual stiffness does not evolve.
 """
 
 from __future__ import annotations
@@ -39,20 +39,20 @@ if TYPE_CHECKING:
 
 
 class WearFunction(Protocol):
-    """A factor, or for a :class:`TabulatedEvolution` a value, against cumulative energy."""
+    """Protocol of a factor of a parameter, or its tabulated value, against cumulative energy."""
 
     def __call__(self, energy: Array | float) -> Array:
-        """At an ``energy`` >= 0 [N mm] of any shape."""
+        """Return the factor or value at an ``energy`` >= 0 [N mm] of any shape."""
         ...
 
 
 @dataclass(frozen=True)
 class LogarithmicEvolution:
-    """1 + a ln(1 + b E): ``change`` a, ``rate`` b [1/(N mm)], not negative.
+    """The factor 1 + a ln(1 + b E), with ``change`` a and ``rate`` b >= 0 [1/(N mm)].
 
     Examples
     --------
-    Friction that rises by 10 % for each factor e of energy, once beyond 1/b:
+    Beyond an energy of 1/b the friction grows by 10 % with each factor e of energy:
 
     >>> import numpy as np
     >>> from wear.joints import LogarithmicEvolution
@@ -66,7 +66,7 @@ class LogarithmicEvolution:
 
     def __post_init__(self) -> None:
         if not self.rate >= 0.0:
-            raise InputError(f"rate = {self.rate:g}: a logarithm of energies needs 0 or more")
+            raise InputError(f"the rate is {self.rate:g}: it must be 0 or more")
 
     def __call__(self, energy: Array | float) -> Array:
         return np.asarray(1.0 + self.change * np.log1p(self.rate * np.asarray(energy)))
@@ -74,11 +74,13 @@ class LogarithmicEvolution:
 
 @dataclass(frozen=True)
 class ArrheniusEvolution:
-    """1 + a exp(-b / E): ``change`` a, reached late; ``scale`` b [N mm], above 0. 1 for E = 0.
+    """The factor 1 + a exp(-b / E), with final ``change`` a and energy ``scale`` b > 0 [N mm].
+
+    It is 1 for E = 0.
 
     Examples
     --------
-    A stiffness that falls by 30 % in the end, and by 1/e of that while ``scale`` is dissipated:
+    A stiffness falls by 30 % in the end, and by 1/e of that once ``scale`` is dissipated:
 
     >>> import numpy as np
     >>> from wear.joints import ArrheniusEvolution
@@ -92,12 +94,12 @@ class ArrheniusEvolution:
 
     def __post_init__(self) -> None:
         if not self.scale > 0.0:
-            raise InputError(f"scale = {self.scale:g}: an energy scale is above 0")
+            raise InputError(f"the energy scale is {self.scale:g}: it must be above 0")
 
     def __call__(self, energy: Array | float) -> Array:
         energy = np.asarray(energy, dtype=np.float64)
         ratio = np.full_like(energy, np.inf)
-        # A quotient too large for a float says the same as infinity: nothing has changed yet.
+        # An overflow to infinity is correct here: nothing has changed yet at such a low energy.
         with np.errstate(over="ignore"):
             np.divide(self.scale, energy, out=ratio, where=energy > 0.0)
         return np.asarray(1.0 + self.change * np.exp(-ratio))
@@ -105,11 +107,11 @@ class ArrheniusEvolution:
 
 @dataclass(frozen=True)
 class LinearEvolution:
-    """1 + a E: ``slope`` a [1/(N mm)].
+    """The factor 1 + a E, with ``slope`` a [1/(N mm)].
 
     Examples
     --------
-    Fantetti's macroslip slope after a kilojoule, 1e6 N mm:
+    Fantetti's macroslip slope after 1 kJ, which is 1e6 N mm:
 
     >>> from wear.joints import LinearEvolution
     >>> print(LinearEvolution(slope=2.4e-7)(1e6))
@@ -124,14 +126,22 @@ class LinearEvolution:
 
 @dataclass(frozen=True)
 class ExponentialEvolution:
-    """a + (1 - a) [b exp(c E) + (1 - b) exp(d E)], from 1 to ``final`` a.
+    """The factor a + (1 - a) [b exp(c E) + (1 - b) exp(d E)].
 
-    ``share`` b is that of the ``rate`` c [1/(N mm)], the rest that of ``second_rate`` d; with all
-    of it, as by default, it is a single exponential. Rates are not above 0.
+    Parameters
+    ----------
+    final
+        Final factor a.
+    rate
+        Rate c <= 0 of the first exponential [1/(N mm)].
+    share
+        Share b of the first exponential; by default it is the only one.
+    second_rate
+        Rate d <= 0 of the second exponential [1/(N mm)].
 
     Examples
     --------
-    A bolt that keeps 40 % of its preload, and of the rest 1/e once a kilojoule is dissipated:
+    A bolt keeps 40 % of its preload, and 1/e of the rest once 1 kJ is dissipated:
 
     >>> import numpy as np
     >>> from wear.joints import ExponentialEvolution
@@ -148,7 +158,7 @@ class ExponentialEvolution:
     def __post_init__(self) -> None:
         for name in ("rate", "second_rate"):
             if not getattr(self, name) <= 0.0:
-                raise InputError(f"{name} = {getattr(self, name):g}: wear dies out at 0 or below")
+                raise InputError(f"the {name} is {getattr(self, name):g}: it must be 0 or below")
 
     def __call__(self, energy: Array | float) -> Array:
         energy = np.asarray(energy)
@@ -159,14 +169,26 @@ class ExponentialEvolution:
 
 @dataclass(frozen=True)
 class TabulatedEvolution:
-    """``values`` of a parameter at ``energies`` [N mm], which ascend.
+    """Values of a parameter at given energies.
 
-    Linear between them, hence as monotone as they are, and constant beyond both ends. Raises
-    InputError for no or unequal columns or energies that do not ascend.
+    Values are linear between the energies, hence as monotone as the table, and constant beyond its
+    ends.
+
+    Parameters
+    ----------
+    energies
+        Energies, ascending [N mm].
+    values
+        Values of the parameter at these energies, equally many.
+
+    Raises
+    ------
+    InputError
+        If the table is empty, its columns differ in length, or its energies do not ascend.
 
     Examples
     --------
-    Values measured three times during a test, linear between them:
+    Values were measured three times during a test:
 
     >>> from wear.joints import TabulatedEvolution
     >>> friction = TabulatedEvolution(energies=(0.0, 1e5, 1e6), values=(0.2, 0.6, 0.7))
@@ -178,7 +200,7 @@ class TabulatedEvolution:
     values: tuple[float, ...]
 
     def __post_init__(self) -> None:
-        EnergyTable(self.energies, self.values)  # refuses what is no table
+        EnergyTable(self.energies, self.values)  # Raises an error if the table is invalid.
 
     def __call__(self, energy: Array | float) -> Array:
         return np.asarray(np.interp(energy, self.energies, self.values))
@@ -186,16 +208,20 @@ class TabulatedEvolution:
 
 @dataclass(frozen=True)
 class JointEvolution:
-    """Which parameters of a joint law follow which function of the joint's energy.
+    """Evolution of the parameters of a joint law with the joint's energy.
 
-    Functions of ``stiffness``, ``residual_stiffness``, ``friction`` and ``normal_load`` take the
-    energy dissipated so far [N mm]. A function multiplies the initial value; a table replaces it.
-    Those of None stay. No parameter
-    falls below 0: what is worn to nothing stays so.
+    Each field is a function of the energy dissipated so far [N mm], or None for a constant
+    parameter. A function multiplies the initial value; a table replaces it. No parameter falls
+    below 0.
+
+    Parameters
+    ----------
+    stiffness, residual_stiffness, friction, normal_load
+        Function of the parameter of that name.
 
     Examples
     --------
-    A joint whose friction rises as ln E, and whose bolt loses preload:
+    The friction of a joint grows as ln E, and its bolt loses preload:
 
     >>> import numpy as np
     >>> from wear.joints import ExponentialEvolution, Jenkins, JointEvolution, LogarithmicEvolution
@@ -217,29 +243,32 @@ class JointEvolution:
     normal_load: WearFunction | None = None
 
     def at(self, law: Law, energy: Array | float) -> Law:
-        """The ``law``, whose parameters are the initial ones, after an ``energy`` [N mm].
+        """Return the ``law`` after an ``energy`` [N mm]; its parameters given are the initial ones.
 
-        ``energy`` is one of all joints, or ``(n,)``, one of each. Raises InputError for a law
-        without a parameter that is to evolve.
+        ``energy`` is a number for all joints, or ``(n,)``. Raise InputError for a law that lacks an
+        evolving parameter.
         """
         values = self.values(law, energy)
-        # A law of plain numbers keeps plain numbers.
+        # Parameters that are plain numbers remain plain numbers.
         return replace(law, **{k: v if v.ndim else float(v) for k, v in values.items()})
 
     def values(self, law: object, energy: Array | float) -> dict[str, Array]:
-        """Evolving parameters by name, of ``energy`` broadcast with the initial ones."""
+        """Return the evolving parameters by name, with ``energy`` broadcast to the initial ones."""
         values = {}
         for name, function in self._functions():
             initial = getattr(law, name, None)
             if initial is None:
-                raise InputError(f"{type(law).__name__} has no {name} that could evolve")
+                raise InputError(
+                    f"{type(law).__name__} has no {name} that could evolve: name one of its "
+                    "parameters"
+                )
             scale = np.ones_like(initial) if isinstance(function, TabulatedEvolution) else initial
             values[name] = np.asarray(np.maximum(function(energy) * scale, 0.0))
         return values
 
     @property
     def breaks(self) -> tuple[float, ...]:
-        """Energies at which a parameter has a kink: those of the tables, ascending [N mm]."""
+        """Energies at which a parameter has a kink, those of the tables, ascending [N mm]."""
         tables = [function for _, function in self._functions()]
         energies = [t.energies for t in tables if isinstance(t, TabulatedEvolution)]
         return tuple(sorted(set().union(*energies)))

@@ -1,4 +1,4 @@
-"""Iwan's joints: sliders in parallel, their limits spread continuously, that obey Masing's rule."""
+"""Iwan joints: parallel sliders with continuously distributed limits, by Masing's rule."""
 
 from __future__ import annotations
 
@@ -12,15 +12,25 @@ from wear.joints.parameters import Parameter, require, require_not_negative
 
 @dataclass(frozen=True)
 class UniformIwan(MasingLaw):
-    """Limits spread evenly from nothing (Iwan 1966; Li 2020).
+    """Iwan joint whose slider limits are uniformly distributed from 0 (Iwan 1966; Li 2020).
 
-    ``stiffness`` K [N/mm], ``friction`` µ, ``normal_load`` N [N], ``residual_stiffness`` kr [N/mm].
-    First loaded, T = (K + kr) d - (K d)² / (4 µN) up to d = 2 µN/K, where the last slider slips,
+    On first loading T = (K + kr) d - (K d)² / (4 µN) up to d = 2 µN/K, where the last slider slips,
     and µN + kr d beyond. (Li prints 2 µN/(K + kr), at which the curve would jump.)
+
+    Parameters
+    ----------
+    stiffness
+        Stiffness K of the sliders [N/mm].
+    friction
+        Coefficient of friction µ.
+    normal_load
+        Normal load N [N].
+    residual_stiffness
+        Residual stiffness kr [N/mm].
 
     Examples
     --------
-    It is first loaded as K d - (K d)² / (4 µN):
+    On first loading the force is K d - (K d)² / (4 µN):
 
     >>> import numpy as np
     >>> from wear.joints import UniformIwan, march_joints
@@ -37,17 +47,30 @@ class UniformIwan(MasingLaw):
 
 @dataclass(frozen=True)
 class FourParameterIwan(MasingLaw):
-    """Limits spread by a power law, and a rest that slips at once (Segalman 2005).
+    """Iwan joint with a power-law distribution of limits (Segalman 2005).
 
-    ``stiffness`` K [N/mm], ``friction`` µ, ``normal_load`` N [N], ``residual_stiffness`` kr [N/mm].
-    ``chi`` χ > -1: the loop of a small amplitude A loses energy as A^(χ+3). ``beta`` β >= 0:
-    stiffness of the sliders that slip together, last of all, over that of the others. Segalman's
-    F_S is µN and his K_T is ``stiffness``; the last slip at φ = µN (1 + β) / (K (β + (χ+1)/(χ+2))).
-    DOI 10.1115/1.1989354.
+    The last sliders slip at once. Segalman's F_S is µN and his K_T is ``stiffness``; the last
+    sliders slip at φ = µN (1 + β) / (K (β + (χ+1)/(χ+2))). DOI 10.1115/1.1989354.
+
+    Parameters
+    ----------
+    stiffness
+        Stiffness K of the sliders [N/mm].
+    friction
+        Coefficient of friction µ.
+    normal_load
+        Normal load N [N].
+    residual_stiffness
+        Residual stiffness kr [N/mm].
+    chi
+        Exponent χ > -1: the loop of a small amplitude A dissipates energy as A^(χ+3).
+    beta
+        Ratio β >= 0 of the stiffness of the sliders that slip together, last of all, to that of the
+        others.
 
     Examples
     --------
-    A small loop loses energy as its amplitude to the power χ + 3:
+    A small loop dissipates energy as its amplitude to the power χ + 3:
 
     >>> from wear.joints import FourParameterIwan
     >>> law = FourParameterIwan(stiffness=1e4, friction=0.5, normal_load=100.0, chi=-0.5)

@@ -1,4 +1,4 @@
-"""Jenkins's element: a spring in series with a Coulomb slider, and a residual slope beside both."""
+"""Jenkins element: a spring in series with a Coulomb slider, in parallel with a residual spring."""
 
 from __future__ import annotations
 
@@ -23,11 +23,11 @@ def advance_jenkins(
     stretch: float,
     increment: float,
 ) -> tuple[float, float, float, float, float]:
-    """One joint by one increment: force, tangent, displacement, stretch and energy lost."""
+    """Advance one joint by one increment: force, tangent, displacement, stretch and energy lost."""
     reach = limit / stiffness
     lost = 0.0
     if abs(stretch) > reach:
-        # The limit has shrunk since: the slider slips, and what the spring held beyond is lost.
+        # The limit has fallen since: the slider slips, and the excess energy of the spring is lost.
         lost = 0.5 * stiffness * (stretch * stretch - reach * reach)
         stretch = copysign(reach, stretch)
     displacement += increment
@@ -58,20 +58,34 @@ def _respond(
 
 @dataclass(frozen=True)
 class Jenkins(UniaxialLaw):
-    """Jenkins's element.
+    """Jenkins element.
 
-    ``stiffness`` kt [N/mm] of the spring, ``friction`` µ and ``normal_load`` N [N], whose product
-    is the slider's limit, and ``residual_stiffness`` kr [N/mm], which is left when it slides: all
-    numbers or ``(n,)``. Raises :class:`wear.joints.parameters.JointError`.
+    All parameters are numbers or ``(n,)``.
 
-    A state's columns are displacement and stretch of the spring [mm], displacement less the
-    position of the slider. Both outlive a change of the parameters: with a smaller limit the slider
-    slips at the beginning of the next increment, and the energy that frees is dissipated in it.
-    At the limit the tangent is that of sliding on.
+    The columns of a state are the displacement and the stretch of the spring [mm], which is the
+    displacement less the position of the slider. Both remain when the parameters change: with a
+    smaller limit the slider slips at the beginning of the next increment, and the energy released
+    is dissipated in it. At the limit the tangent is that of further sliding.
+
+    Parameters
+    ----------
+    stiffness
+        Stiffness kt of the spring [N/mm].
+    friction
+        Coefficient of friction µ.
+    normal_load
+        Normal load N [N]; µN is the limit of the slider.
+    residual_stiffness
+        Stiffness kr that remains when the slider slides [N/mm].
+
+    Raises
+    ------
+    JointError
+        If a parameter is not in its range.
 
     Examples
     --------
-    Once to and fro the closed form of its loop is what a march dissipates:
+    One cycle of a march dissipates the energy of the closed form:
 
     >>> import numpy as np
     >>> from wear.joints import Jenkins, march_joints
@@ -90,13 +104,16 @@ class Jenkins(UniaxialLaw):
         return parameter_columns(self.stiffness, self.residual_stiffness, self.limit)
 
     def loop_energy(self, amplitude: Parameter) -> Array:
-        """Energy lost in a cycle between ± ``amplitude`` [mm]: 4 µN (A - µN/kt) [N mm] or 0."""
+        """Return the energy of a cycle between ± ``amplitude`` [mm]: 4 µN (A - µN/kt) or 0.
+
+        It is in N mm.
+        """
         limit = self.limit
         energy: Array = 4.0 * limit * np.maximum(np.subtract(amplitude, limit / self.stiffness), 0)
         return energy
 
     def first_harmonic(self, amplitude: Parameter) -> tuple[Array, Array]:
-        """Force of the settled cycle A cos θ, to first order: a cos θ + b sin θ [N].
+        """Return the first harmonic of the force in a settled cycle A cos θ: a cos θ + b sin θ [N].
 
         With cos θs = 1 - 2 µN/(kt A) where the slider slips, a = A kr + A kt (θs - sin θs cos θs)/π
         and b = -4 µN (1 - µN/(kt A))/π, which is minus the energy of the loop over π A.

@@ -1,12 +1,12 @@
-"""The one interface of all joint laws.
+"""The common interface of all joint laws.
 
-A joint connects two points, or a point and the ground; its displacement is that of the second
-relative to the first, and its force is the one that resists: the joint pushes the second point with
-``-force``. Work of the force on the displacement is what the joint stores and dissipates.
+A joint connects two points, or a point and the ground. Its displacement is that of the second point
+relative to the first. Its force resists this: the joint pushes the second point with ``-force``.
+The work of the force on the displacement is stored and dissipated by the joint.
 
-A law holds the parameters of ``n`` joints, as numbers or ``(n,)`` arrays, and no state. What it
-remembers is a :data:`JointState`, an array ``(n, k)`` with one row per joint, whose columns the
-law defines; a state is never changed, a new one is returned.
+A law holds the parameters of ``n`` joints, as numbers or ``(n,)`` arrays, and no state. The memory
+of joints is a :data:`JointState`, an array ``(n, k)`` with one row per joint, whose columns the law
+defines. A state is never changed in place; a new one is returned.
 """
 
 from __future__ import annotations
@@ -25,9 +25,16 @@ JointState = Array
 class JointResponse:
     """Response of ``n`` joints of ``d`` directions to an increment of displacement.
 
-    ``force`` ``(n, d)`` [N] at its end, ``tangent`` ``(n, d, d)`` [N/mm] its derivative with
-    respect to the displacement there, ``state`` ``(n, k)`` at its end, and ``dissipated`` ``(n,)``
-    [N mm], never negative, the energy lost on the way.
+    Parameters
+    ----------
+    force
+        Force at the end of the increment ``(n, d)`` [N].
+    tangent
+        Derivative of that force with respect to the displacement ``(n, d, d)`` [N/mm].
+    state
+        State at the end of the increment ``(n, k)``.
+    dissipated
+        Energy lost in the increment ``(n,)`` [N mm], never negative.
     """
 
     force: Array
@@ -37,12 +44,12 @@ class JointResponse:
 
 
 class JointLaw(Protocol):
-    """A joint law with its parameters.
+    """Protocol of a joint law with its parameters.
 
     Examples
     --------
-    Laws that have it are ``Jenkins``, ``BoucWen``, ``UniformIwan``, ``FourParameterIwan`` and
-    ``FrictionContact``. One of one's own, a spring:
+    ``Jenkins``, ``BoucWen``, ``UniformIwan``, ``FourParameterIwan`` and
+    ``FrictionContact`` implement it. A user's own law, here a spring, needs no more than this:
 
     >>> import numpy as np
     >>> from wear.joints import march_joints
@@ -63,24 +70,24 @@ class JointLaw(Protocol):
 
     @property
     def directions(self) -> int:
-        """Components of a joint's displacement: 1, or 3 (x, y tangential, z normal)."""
+        """Number of components of a joint's displacement: 1, or 3 (x, y tangential, z normal)."""
         ...
 
     def rest(self, joints: int) -> JointState:
-        """State of ``joints`` joints that have never moved."""
+        """Return the state of ``joints`` joints that have never moved."""
         ...
 
     def respond(self, state: JointState, increment: Array) -> JointResponse:
-        """Response to an increment of displacement ``(n, d)`` [mm] along a straight path."""
+        """Return the response to a straight increment of displacement ``(n, d)`` [mm]."""
         ...
 
 
 @dataclass(frozen=True)
 class JointHistory:
-    """A march of ``n`` joints through ``t`` displacements.
+    """Result of a march of ``n`` joints through ``t`` displacements.
 
-    ``force`` ``(t, n, d)`` [N] and ``dissipated`` ``(t, n)`` [N mm] of each increment; ``state`` at
-    the end.
+    ``force`` ``(t, n, d)`` [N] and ``dissipated`` ``(t, n)`` [N mm] are those of each increment;
+    ``state`` is that at the end.
     """
 
     force: Array
@@ -91,11 +98,22 @@ class JointHistory:
 def march_joints(
     law: JointLaw, state: JointState, start: Array, displacement: Array
 ) -> JointHistory:
-    """March joints through ``displacement`` ``(t, n, d)`` [mm], from ``start`` ``(n, d)``.
+    """March joints through a sequence of displacements.
+
+    Parameters
+    ----------
+    law
+        Law of the joints.
+    state
+        State of the joints at the start.
+    start
+        Displacements at the start ``(n, d)`` [mm].
+    displacement
+        Displacements to go through ``(t, n, d)`` [mm].
 
     Examples
     --------
-    Two joints to and fro, of which the second only sticks: it dissipates nothing.
+    Two joints go through one cycle; the second only sticks and dissipates nothing:
 
     >>> import numpy as np
     >>> from wear.joints import Jenkins, march_joints

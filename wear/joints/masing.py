@@ -1,24 +1,24 @@
-"""Masing's rule on the curve of spread sliders: loops with memory, without the sliders.
+"""Masing's rule for distributed sliders: loops with memory, without the individual sliders.
 
-A joint of sliders whose limits are spread (Iwan 1966) follows a curve T(d) when it is first loaded,
-d being the distance from rest. After a reversal at d1 with the force F1 it follows the same curve
-doubled, F = F1 ∓ 2 T(|d - d1|/2); an inner loop that closes is forgotten, and the curve it left
-goes on as if it had not been (Masing 1926; for sliders Iwan, J. Appl. Mech. 33, 1966, 893). So the
-turning points of the loops still open are all the memory there is.
+A joint of sliders with distributed limits (Iwan 1966) follows a curve T(d) on first loading, where
+d is the distance from rest. After a reversal at d1 with the force F1 it follows the same curve
+doubled, F = F1 ∓ 2 T(|d - d1|/2). An inner loop that closes is forgotten, and the curve that it
+left continues as if the loop had not occurred (Masing 1926; for sliders Iwan, J. Appl. Mech. 33,
+1966, 893). The turning points of the loops still open are therefore all the memory of the joint.
 
 The energy lost is exact too. A loop of amplitude d encloses 8 W - 4 d T, with W = ∫ T. A slider
-that slips by s on the first way slips by 2 s on each of the two ways of the loop: on the first
+that slips by s on first loading slips by 2 s on each of the two branches of the loop. On the first
 curve the loss is a quarter of the loop's, L(d) = 2 W - d T, and on a doubled one 2 L(|d - d1|/2).
 
-Here T is that of sliders spread by a power law, up to a largest of reach φ where all that are left
-slip at once; with x = d/φ < 1
+Here T is that of sliders distributed by a power law up to a largest reach φ, at which all remaining
+sliders slip at once; with x = d/φ < 1
 
     T = K φ (x - c x^m / m),   φ = limit / (K (1 - c/m)),
     L = K φ² c x^(m+1) (m - 1) / (m (m + 1)),
 
-and T = limit, L = L(φ) + limit (d - φ) beyond. K is the stiffness when all stick, c the share of
-it that the spread sliders have, m > 1 how they are spread. c = 1, m = 2 is the uniform Iwan joint,
-c = 0 Jenkins's element.
+and T = limit, L = L(φ) + limit (d - φ) beyond. K is the stiffness when all sliders stick, c the
+share of it that the distributed sliders have, and m > 1 the exponent of their distribution. c = 1,
+m = 2 is the uniform Iwan joint, c = 0 the Jenkins element.
 """
 
 from __future__ import annotations
@@ -37,24 +37,24 @@ from wear.joints.law import JointState
 from wear.joints.parameters import Parameter, UniaxialLaw, parameter_columns
 
 SliderCurve = tuple[float, float, float, float]
-"""K, limit, c, m."""
+"""Parameters K, limit, c and m of the curve."""
 
-# Columns of a state: displacement; number of turning points; the curve (K, limit, c, m) that the
-# forces below belong to; then displacement and force of each turning point.
+# Columns of a state: displacement; number of turning points; the curve (K, limit, c, m) to which
+# the forces of the turning points belong; then displacement and force of each turning point.
 DISPLACEMENT, DEPTH, CURVE, POINTS = 0, 1, 2, 6
-# A state begins with room for this many turning points: a steady cycle needs two.
+# Number of turning points for which a state at rest has room; a steady cycle needs two.
 FEWEST_POINTS = 4
 
 
 @compiled()
 def first_curve(curve: SliderCurve, distance: float) -> tuple[float, float, float]:
-    """T, T' and L at ``distance`` >= 0 of the curve (K, limit, c, m)."""
+    """Return T, T' and L at ``distance`` >= 0 on the curve (K, limit, c, m)."""
     stiffness, limit, share, exponent = curve
     reach = limit / (stiffness * (1.0 - share / exponent))
     x, beyond = 1.0, distance - reach
     if beyond < 0.0:
         x, beyond = distance / reach, 0.0
-    # A power takes longer than all the rest, and the uniform joint needs none.
+    # A power takes longer than everything else, and the uniform joint does not need one.
     power = share * (x if exponent == 2.0 else x ** (exponent - 1.0))
     lost = (
         stiffness * reach * reach * power * x * x * (exponent - 1.0) / (exponent * (exponent + 1.0))
@@ -68,7 +68,7 @@ def first_curve(curve: SliderCurve, distance: float) -> tuple[float, float, floa
 def _on_curve(
     curve: SliderCurve, memory: Array, depth: int, displacement: float
 ) -> tuple[float, float, float]:
-    """Force, slope and energy lost since the last of ``depth`` turning points, or since rest."""
+    """Return force, slope and energy lost since the last of ``depth`` turning points, or rest."""
     if depth == 0:
         force, slope, lost = first_curve(curve, abs(displacement))
         return copysign(force, displacement), slope, lost
@@ -79,8 +79,8 @@ def _on_curve(
 
 
 @compiled()
-def _renew(curve: SliderCurve, memory: Array) -> None:
-    """Compute the forces at the turning points anew where they belong to other parameters."""
+def _refresh_forces(curve: SliderCurve, memory: Array) -> None:
+    """Compute the forces at the turning points again if they belong to other parameters."""
     if (memory[CURVE], memory[CURVE + 1], memory[CURVE + 2], memory[CURVE + 3]) == curve:
         return
     for depth in range(int(memory[DEPTH])):
@@ -92,7 +92,7 @@ def _renew(curve: SliderCurve, memory: Array) -> None:
 
 @compiled()
 def turns(memory: Array, depth: int, end: float) -> bool:
-    """Whether going to ``end`` leaves the present curve backwards."""
+    """Return whether a motion to ``end`` reverses on the present curve."""
     start: float = memory[DISPLACEMENT]
     origin: float = 0.0 if depth == 0 else memory[POINTS + 2 * (depth - 1)]
     return start != origin and (end > start) != (start > origin)
@@ -100,7 +100,7 @@ def turns(memory: Array, depth: int, end: float) -> bool:
 
 @compiled()
 def _closing(memory: Array, depth: int) -> float:
-    """Where the present curve, the last of ``depth``, joins the one that it will go on as."""
+    """Return where the present loop, the last of ``depth``, closes and the outer curve resumes."""
     closing: float = -memory[POINTS] if depth == 1 else memory[POINTS + 2 * (depth - 2)]
     return closing
 
@@ -109,12 +109,13 @@ def _closing(memory: Array, depth: int) -> float:
 def advance_masing(
     curve: SliderCurve, residual: float, memory: Array, increment: float
 ) -> tuple[float, float, float]:
-    """One joint by one increment, its ``memory`` changed in place: force, tangent, energy lost.
+    """Advance one joint by one increment, and change its ``memory`` in place.
 
-    ``memory`` is the row of a state and must have room for one more turning point. Each increment
-    adds at most one, and each is taken away once: the effort per increment is constant on average.
+    Return force, tangent and energy lost. ``memory`` is the row of a state and must have room for
+    one more turning point. Each increment adds at most one turning point, and each is removed once:
+    the effort per increment is constant on average.
     """
-    _renew(curve, memory)
+    _refresh_forces(curve, memory)
     here, depth, lost = memory[DISPLACEMENT], int(memory[DEPTH]), 0.0
     end = here + increment
     if end == here:
@@ -136,13 +137,16 @@ def advance_masing(
     force, slope, since = _on_curve(curve, memory, depth, end)
     lost += since - _on_curve(curve, memory, depth, here)[2]
     memory[DISPLACEMENT], memory[DEPTH] = end, depth
-    # A sum of differences of an increasing function: below zero by rounding alone.
+    # The loss is a sum of differences of an increasing function: only rounding makes it negative.
     return force + residual * end, slope + residual, max(lost, 0.0)
 
 
 @compiled()
 def _columns_for(state: JointState) -> int:
-    """Columns with room for a turning point more: doubled when full, halved when mostly empty."""
+    """Return the number of columns with room for one more turning point.
+
+    It is doubled when full, and halved when mostly empty.
+    """
     needed = 0
     for j in range(len(state)):
         needed = max(needed, POINTS + 2 * (int(state[j, DEPTH]) + 1))
@@ -181,15 +185,25 @@ def _loop_energy(
 
 @dataclass(frozen=True)
 class MasingLaw(UniaxialLaw):
-    """A joint of spread sliders, whichever way they are spread.
+    """Base class of joints with distributed sliders.
 
-    ``stiffness`` K [N/mm] when all of them stick, ``friction`` µ and ``normal_load`` N [N], whose
-    product is the force when all of them slide, and ``residual_stiffness`` kr [N/mm], added
-    throughout: all numbers or ``(n,)``. Raises :class:`wear.joints.parameters.JointError`.
+    All parameters are numbers or ``(n,)``. Raises :class:`wear.joints.parameters.JointError` if one
+    is out of range.
 
-    A state remembers displacements. With other parameters its forces become those of a joint that
-    had them all along; what the change itself releases is not counted as dissipated. Any number of
-    open loops is remembered: each costs a call the copying of 16 bytes, and nothing else.
+    A state stores displacements. If parameters change, its forces become those of a joint that has
+    always had the new ones; the energy that the change releases is not counted as dissipated. Any
+    number of open loops is remembered, at the cost of copying 16 bytes each per call.
+
+    Parameters
+    ----------
+    stiffness
+        Stiffness K when all sliders stick [N/mm].
+    friction
+        Coefficient of friction µ.
+    normal_load
+        Normal load N [N]; µN is the force when all sliders slide.
+    residual_stiffness
+        Stiffness kr in parallel with the sliders [N/mm].
     """
 
     columns = POINTS + 2 * FEWEST_POINTS
@@ -198,13 +212,13 @@ class MasingLaw(UniaxialLaw):
     @property
     @abstractmethod
     def spread(self) -> tuple[Parameter, Parameter]:
-        """Share c of the spread sliders in the stiffness, and exponent m of their spread."""
+        """Share c of the stiffness, and exponent m of the distribution, of distributed sliders."""
 
     @cached_property
     def parameters(self) -> Array:
         return parameter_columns(self.stiffness, self.residual_stiffness, self.limit, *self.spread)
 
     def loop_energy(self, amplitude: Parameter) -> Array:
-        """Energy lost in a cycle between ± ``amplitude`` [mm]: 4 L(A) [N mm]."""
+        """Return the energy of a cycle between ± ``amplitude`` [mm]: 4 L(A) [N mm]."""
         energy: Array = _loop_energy(amplitude, self.stiffness, self.limit, *self.spread)
         return energy

@@ -1,8 +1,7 @@
 """Joints of several laws in one structure.
 
-A structure has joints of as many directions each. Those of laws along one direction have it as the
-first of three where others are contacts: along the two others, in which nothing moves them, they
-have no force.
+All joints of a structure have the same number of directions. Where some are contacts, laws along
+one direction use the first of three, and have no force along the other two.
 """
 
 from __future__ import annotations
@@ -26,7 +25,7 @@ from wear.joints.periodic.march import PeriodicMarch, SettledCycle
 
 @dataclass(frozen=True)
 class JointGroup:
-    """So many ``joints`` of a ``law``.
+    """A number of ``joints`` with one ``law``.
 
     Examples
     --------
@@ -41,11 +40,11 @@ class JointGroup:
 
 @dataclass(frozen=True)
 class MixedLaw:
-    """The law of the joints of all ``groups``, one group after the other.
+    """The laws of all ``groups`` of joints, one group after the other.
 
     Examples
     --------
-    A slider and a contact, which is pressed by 10 N and has not moved:
+    A slider, and a contact that is pressed by 10 N and has not moved:
 
     >>> import numpy as np
     >>> from wear.joints import FrictionContact, Jenkins, JointGroup, MixedLaw
@@ -62,19 +61,20 @@ class MixedLaw:
 
     @property
     def directions(self) -> int:
-        """Of the group that has most."""
+        """Largest number of directions of any group."""
         return max(group.law.directions for group in self.groups)
 
     def rest(self, joints: int) -> JointState:
-        """State of all joints before they have moved; of laws that know less, with zeros behind.
+        """Return the state of all joints before they have moved.
 
-        Raises :class:`JointError` for another number of joints than the groups have.
+        Rows of laws with fewer columns are padded with zeros. Raise :class:`JointError` for another
+        number of joints than the groups have.
         """
         self._require(joints)
         return _stacked([group.law.rest(group.joints) for group in self.groups])
 
     def respond(self, state: JointState, increment: Array) -> JointResponse:
-        """As :meth:`wear.joints.law.JointLaw.respond`."""
+        """Return the response, as :meth:`wear.joints.law.JointLaw.respond`."""
         self._require(len(state))
         count, d = len(state), self.directions
         force, tangent, lost = np.zeros((count, d)), np.zeros((count, d, d)), np.zeros(count)
@@ -88,11 +88,11 @@ class MixedLaw:
         return JointResponse(force, tangent, _stacked(states), lost)
 
     def march(self, threads: int = 1) -> MixedMarch:
-        """The joints over whole periods, ``threads`` shares of a group at once."""
+        """Return the march over whole periods, with ``threads`` shares of a group at once."""
         return MixedMarch(self, tuple(PeriodicMarch(g.law, threads) for g in self.groups))
 
     def rows(self) -> Iterator[tuple[JointGroup, slice]]:
-        """The groups, and where their joints are among all."""
+        """Yield the groups and the rows of their joints."""
         end = 0
         for group in self.groups:
             begin, end = end, end + group.joints
@@ -101,7 +101,7 @@ class MixedLaw:
     def _require(self, joints: int) -> None:
         known = sum(group.joints for group in self.groups)
         if joints != known:
-            raise JointError(f"{joints} joints of groups that have {known}: give as many")
+            raise JointError(f"{joints} joints are given for groups of {known}: give as many")
 
 
 @dataclass(frozen=True)
@@ -110,7 +110,8 @@ class MixedMarch:
 
     Examples
     --------
-    Two sliders of their own laws, driven as 0.01 cos θ, have the energies of the closed form:
+    Two sliders with laws of their own, driven as 0.01 cos θ, dissipate the
+    energies of the closed form:
 
     >>> import numpy as np
     >>> from wear.joints import Jenkins, JointGroup, MixedLaw
@@ -133,7 +134,7 @@ class MixedMarch:
     def settle(
         self, coefficients: Array, basis: Array, weights: Array, lead: Array | None = None
     ) -> SettledCycle:
-        """The settled period, as :meth:`PeriodicMarch.settle`."""
+        """Return the settled period, as :meth:`PeriodicMarch.settle`."""
         joints, size, d = coefficients.shape
         parts = list(self._parts(coefficients))
         cycles = [march.settle(own, basis, weights, lead) for march, _, _, own in parts]
@@ -159,13 +160,13 @@ class MixedMarch:
     def linearise(
         self, coefficients: Array, basis: Array, lead: Array, memory: int = 0
     ) -> LinearisedMarch:
-        """What small deviations do, as :meth:`PeriodicMarch.linearise`."""
+        """Return the linearised increments, as :meth:`PeriodicMarch.linearise`."""
         joints, _, directions = coefficients.shape
         parts = list(self._parts(coefficients))
         marches = [march.linearise(own, basis, lead, memory) for march, _, _, own in parts]
         memory = max(march.kept.shape[2] for march in marches)
         for place, (of_group, _, _, own) in enumerate(parts):
-            # Those whose memory depends on the motion have room for as much in all motions.
+            # Memory of distributed sliders depends on the motion: give them all of the room.
             if isinstance(of_group.law, MasingLaw) and marches[place].kept.shape[2] < memory:
                 marches[place] = of_group.linearise(own, basis, lead, memory)
         maps = Maps.room(len(basis), joints, memory, directions)
@@ -183,14 +184,14 @@ class MixedMarch:
         return LinearisedMarch(*maps, remembered)
 
     def _parts(self, coefficients: Array) -> Iterator[tuple[PeriodicMarch, slice, slice, Array]]:
-        """Each group's march, where its joints and directions are, and its own coefficients."""
+        """Yield each group's march, the rows and directions of its joints, and its coefficients."""
         for march, (_, rows) in zip(self.marches, self.law.rows(), strict=True):
             own = slice(march.directions)
             yield march, rows, own, np.ascontiguousarray(coefficients[rows, :, own])
 
 
 def _stacked(states: Sequence[JointState]) -> JointState:
-    """States of all groups, as wide as the widest."""
+    """Return the states of all groups, padded to the width of the widest."""
     widest = max(state.shape[1] for state in states)
     return np.concatenate(
         [np.pad(state, ((0, 0), (0, widest - state.shape[1]))) for state in states]

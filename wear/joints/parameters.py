@@ -1,8 +1,8 @@
-"""What the joint laws share: checked parameters, and a compiled kernel's response.
+"""Checked parameters of joint laws, and the response of a compiled kernel.
 
-A kernel takes the parameters of ``n`` joints as one array ``(m, p)``, a row per joint or a single
-row for all of them, and loops over the joints: a call for a few of them then costs microseconds,
-most of it in making the arrays it returns.
+A kernel takes the parameters of ``n`` joints as one array ``(m, p)``, with a row per joint or a
+single row for all of them, and loops over the joints. A call for a few joints costs microseconds,
+most of it for the arrays that it returns.
 """
 
 from __future__ import annotations
@@ -21,24 +21,24 @@ Parameter = float | Array
 
 
 class JointError(InputError):
-    """Parameters that a joint law cannot have, or arrays that do not fit its joints."""
+    """Parameters of a joint law are out of range, or arrays do not fit its joints."""
 
 
 def require(name: str, value: Parameter, proper: np.ndarray, range_text: str) -> None:
-    """Raise :class:`JointError` unless a parameter is ``proper`` throughout."""
+    """Raise :class:`JointError` unless a parameter is ``proper`` for every joint."""
     if not np.all(proper):
         raise JointError(f"{name} of a joint is {value}: it must be {range_text}")
 
 
 def require_positive(**values: Parameter) -> None:
-    """Raise :class:`JointError` naming the first of ``values`` that is not above 0 throughout."""
+    """Raise :class:`JointError` with the name of the first of ``values`` that is not positive."""
     for name, value in values.items():
         given = np.asarray(value)
         require(name, value, (given > 0.0) & (given < np.inf), "finite and above 0")
 
 
 def require_not_negative(**values: Parameter) -> None:
-    """Raise :class:`JointError` naming the first of ``values`` that is somewhere below 0."""
+    """Raise :class:`JointError` with the name of the first of ``values`` that is negative."""
     for name, value in values.items():
         given = np.asarray(value)
         require(name, value, (given >= 0.0) & (given < np.inf), "finite and 0 or more")
@@ -55,7 +55,7 @@ def require_one_each(*values: Parameter) -> None:
 
 
 def parameter_columns(*values: Parameter) -> Array:
-    """Parameters, numbers or ``(n,)``, as columns ``(m, p)``; one row where all are numbers."""
+    """Return parameters, numbers or ``(n,)``, as columns ``(m, p)``; one row if all are numbers."""
     columns = np.empty((max(np.size(value) for value in values), len(values)))
     for place, value in enumerate(values):
         columns[:, place] = value
@@ -63,9 +63,9 @@ def parameter_columns(*values: Parameter) -> Array:
 
 
 class CompiledLaw(ABC):
-    """A law whose response is that of a compiled loop over its joints.
+    """Base class of laws whose response is a compiled loop over joints.
 
-    A state at rest has so many ``columns``.
+    ``columns`` is the number of columns of a state at rest.
     """
 
     directions: ClassVar[int]
@@ -76,21 +76,21 @@ class CompiledLaw(ABC):
     def kernel(
         parameters: Array, state: Array, increment: Array
     ) -> tuple[Array, Array, Array, Array]:
-        """The loop: all that :class:`JointResponse` holds."""
+        """Advance all joints in a compiled loop; return the fields of :class:`JointResponse`."""
 
     @property
     @abstractmethod
     def parameters(self) -> Array:
-        """What compiled loops take, ``(n, p)``, or ``(1, p)`` where all are numbers."""
+        """Parameters for compiled loops ``(n, p)``, or ``(1, p)`` if all are numbers."""
 
     def rest(self, joints: int) -> JointState:
-        """State of ``joints`` joints that have never moved."""
+        """Return the state of ``joints`` joints that have never moved."""
         return np.zeros((joints, self.columns))
 
     def respond(self, state: JointState, increment: Array) -> JointResponse:
         """Advance the joints of ``state`` by ``increment`` ``(n, d)`` [mm].
 
-        Raises :class:`JointError` where shapes differ: the kernel itself checks no bounds.
+        Raise :class:`JointError` if shapes differ: the kernel itself checks no bounds.
         """
         return JointResponse(*self.kernel(self.parameters, state, self.fitting(state, increment)))
 
@@ -103,17 +103,29 @@ class CompiledLaw(ABC):
         if increment.shape != shape:
             raise JointError(f"the increment has shape {increment.shape}: it must be {shape}")
         if laws not in (1, len(state)):
-            raise JointError(f"the law is that of {laws} joints, the state of {len(state)}")
+            raise JointError(
+                f"the law has parameters of {laws} joints, the state is of {len(state)}: give as "
+                "many of both, or numbers as parameters"
+            )
         return np.ascontiguousarray(increment, float)
 
 
 @dataclass(frozen=True)
 class UniaxialLaw(CompiledLaw):
-    """What the laws along one direction have in common: parameters, as numbers or ``(n,)``.
+    """Base class of laws along one direction with friction.
 
-    ``stiffness`` [N/mm] of the stuck joint, ``friction`` µ, ``normal_load`` N [N] and
-    ``residual_stiffness`` [N/mm], what is left of the slope when all of it slides. Raises
-    :class:`JointError` for what they cannot be.
+    All parameters are numbers or ``(n,)``. Raises :class:`JointError` if one is out of range.
+
+    Parameters
+    ----------
+    stiffness
+        Stiffness of the sticking joint [N/mm].
+    friction
+        Coefficient of friction µ.
+    normal_load
+        Normal load N [N].
+    residual_stiffness
+        Stiffness that remains when all of the joint slides [N/mm].
     """
 
     directions = 1
@@ -134,9 +146,9 @@ class UniaxialLaw(CompiledLaw):
 
     @abstractmethod
     def loop_energy(self, amplitude: Parameter) -> Array:
-        """Energy lost in a settled cycle between ± ``amplitude`` [mm], in [N mm]."""
+        """Return the energy of a settled cycle between ± ``amplitude`` [mm] in N mm."""
 
     @property
     def limit(self) -> Array:
-        """µN [N], the force when all of it slides."""
+        """Force µN when all of the joint slides [N]."""
         return np.multiply(self.friction, self.normal_load)

@@ -1,8 +1,8 @@
-"""A cycle whose shear and slip come from the half-space itself (wear method 2 of Gallego 2007).
+"""A cycle with the half-space's own shear and slip (wear method 2 of Gallego 2007).
 
-The resultants of each increment are those of the structure; where these let the contact slide as a
-whole, the energies dissipated there say how far. Bodies without a structure may have their motions
-imposed instead (:mod:`wear.contact.drive`).
+The resultants of each increment are those of the structure. Where they make the contact slide as a
+whole, the energies dissipated in the structure determine how far. Bodies without a structure may
+have their motions imposed instead (:mod:`wear.contact.drive`).
 """
 
 from __future__ import annotations
@@ -22,20 +22,23 @@ from wear.contact.drive import Drive
 from wear.steps.stepping import ContactFailure
 
 CLOSED = 2e-3
-"""A cycle repeats where its shear ends as it began, to this share of the largest µp."""
+"""A cycle repeats if its shear ends as it began, up to this share of the largest µp."""
 
 MOST_PASSES = 12
-"""Under loads that turn and let it creep, a contact takes 3 to 12; most take 2."""
+"""Limit of passes. Most cycles take 2, and 3 to 12 where rotating loads make the contact creep."""
 
 NEARLY_CLOSED = 2e-2
-"""What is left of that after so many passes is more than this only where the cycle drifts."""
+"""Acceptable change of shear, over the largest µp, in the last pass allowed. It is exceeded only
+where the cycle drifts.
+"""
 
 
 @dataclass(frozen=True)
 class CycleStart:
-    """What a cycle near this one may begin from: its shear, where it slips and how it moves.
+    """Starting point for the solution of a similar cycle.
 
-    ``shear`` ``(t, 2, nx, ny)`` [MPa], ``slipping`` ``(t, nx, ny)``, ``motion`` ``(t, 2)`` [mm].
+    ``shear`` is ``(t, 2, nx, ny)`` [MPa], ``slipping`` the slipping cells ``(t, nx, ny)``, and
+    ``motion`` the rigid motion along x and y ``(t, 2)`` [mm].
     """
 
     shear: Array
@@ -44,7 +47,7 @@ class CycleStart:
 
     @classmethod
     def of(cls, cycle: Sequence[ContactState]) -> CycleStart:
-        """That of a cycle found."""
+        """Return the starting point that a solved cycle gives."""
         return cls(
             shear=np.stack([state.shear for state in cycle]),
             slipping=np.stack([state.slipping for state in cycle]),
@@ -55,9 +58,10 @@ class CycleStart:
 def starts_near(
     known: CycleStart | None, pressed: Mapping[int, NormalStart], count: int
 ) -> list[ContactStart]:
-    """Where ``count`` increments may begin: from those of a cycle, and what has ``pressed`` some.
+    """Return starting points of ``count`` increments from a similar cycle and normal states.
 
-    Their numbers are those of the increments; the pressures may be newer than the cycle.
+    ``known`` is the starting point of a similar cycle, if any. ``pressed`` holds normal contact
+    states by increment, whose pressures may be newer than the cycle.
     """
     if known is None:
         return [ContactStart(pressed.get(t)) for t in range(count)]
@@ -70,9 +74,9 @@ def starts_near(
 
 
 def slip_known(cycle: Sequence[ContactState], loads: LoadHistory) -> Mask | None:
-    """Cells ``(t, nx, ny)`` whose slip a cycle of the half-space knows: pressed at either end.
+    """Return the cells ``(t, nx, ny)`` whose slip the cycle determines: pressed at either end.
 
-    None where there is no such cycle.
+    Return None without a cycle of the half-space.
     """
     if not cycle:
         return None
@@ -89,19 +93,37 @@ def march_cycle(
     starts: Sequence[ContactStart] | None = None,
     solved: Callable[[], None] = lambda: None,
 ) -> list[ContactState]:
-    """States at the ends of the increments of one closed cycle, on surfaces that do not change.
+    """Solve the increments of one closed cycle on surfaces that do not change.
 
-    ``height`` ``(nx, ny)`` [mm] is the gap of the unloaded bodies, or ``(t, nx, ny)`` that at the
-    place of each increment. A cycle that ends with the bodies apart is closed; any other is marched
-    until it repeats, twice at least, and the last pass counts. In a mix every mission is such a
-    cycle of its own, begun with the bodies apart. A ``drive`` may impose motions in the place of
-    forces; without one all is forces. What the bodies' own deformation has ``moved``
-    ``(t, 3, nx, ny)`` [mm] at the end of an increment lies along the surfaces in its first two
-    components; the third is part of ``height``. ``starts`` are near the states of all increments.
-    ``solved`` is called after every increment, in every pass.
+    Return the states at the ends of the increments. A cycle that ends with the bodies apart is
+    closed. Any other is repeated at least once, until it closes, and the last pass counts. In a mix
+    every mission is such a cycle of its own that begins with the bodies apart.
 
-    Raises :class:`ContactFailure` where an increment does not converge, its load is more than the
-    contact can carry, or the cycle does not repeat.
+    Parameters
+    ----------
+    contact
+        Contact with its own friction.
+    height
+        Gap of the unloaded bodies ``(nx, ny)`` [mm], or ``(t, nx, ny)`` at the place of each
+        increment.
+    loads
+        Resultants of the cycle.
+    drive
+        Motions imposed in place of forces, if any.
+    moved
+        Displacement of the surfaces by the deformation of the bodies at the end of each increment
+        ``(t, 3, nx, ny)`` [mm]. Only the tangential components are used: the normal one is part of
+        ``height``.
+    starts
+        Starting points near the states of all increments.
+    solved
+        Callback after every increment, in every pass.
+
+    Raises
+    ------
+    ContactFailure
+        If an increment does not converge, a load is more than the contact can carry, or the cycle
+        does not close.
     """
     states: list[ContactState] = []
     heights = np.broadcast_to(height, (len(loads), *contact.grid.shape))
@@ -125,8 +147,8 @@ def _closed_cycle(
     first: int,
     solved: Callable[[], None],
 ) -> list[ContactState]:
-    """States of one closed cycle, whose first increment is number ``first`` of all."""
-    # Bodies apart at the end are so at the beginning: what their surfaces have moved is the same.
+    """Return the states of one closed cycle, whose first increment has the number ``first``."""
+    # Bodies that are apart at the end are apart at the beginning, with the same surface motion.
     last, apart = loads[-1], _lifted(loads[-1])
     state = contact.apart(heights[-1], last.along)
     if apart:
@@ -140,8 +162,8 @@ def _closed_cycle(
             state = _advance(contact, state, height, load, start, t)
             states.append(state)
             solved()
-        # Not shear: where bodies stick it would keep what the last search left of slip, which a
-        # pass from the increment before does not.
+        # Shear is not reused: where bodies stick, it would retain the error in slip of the last
+        # solution, which a solution from the increment before does not have.
         starts = [replace(ended.as_start, shear=None) for ended in states]
         limit = contact.friction * max(float(s.pressure.max()) for s in states)
         change = float(np.abs(state.shear - begun.shear).max())
@@ -156,12 +178,15 @@ def _closed_cycle(
 
 
 def _lifted(load: ContactLoad) -> bool:
-    """Whether nothing presses the bodies together: an imposed approach may still."""
+    """Return whether no force presses the bodies together; an imposed approach may still do so."""
     return not load.motion[0] and float(load.values[0]) <= 0.0
 
 
 def _apart(contact: FrictionalContact, height: Array, load: ContactLoad) -> ContactState:
-    """The bodies apart, but where motions and bulk stress have them: they may meet elsewhere."""
+    """Return the state of separated bodies under imposed motions and bulk strain.
+
+    The bodies may then meet elsewhere.
+    """
     rigid = np.where(load.motion, load.values, 0.0)
     return replace(contact.apart(height, load.along), rigid=rigid, strain=load.strain)
 

@@ -1,13 +1,15 @@
-"""Wear steps that solve a half-space contact on the way: implicit Euler, and of second order.
+"""Wear steps that solve a half-space contact within the step: implicit Euler and second order.
 
-Increments that wear one after the other leave most of what a step misses: each finds the surfaces
-that the ones before it have worn, and the last one decides what they look like. So implicit steps
-go over them in reverse order for half their length and back for the other half, which leaves only
-what is of second order in it (Strang 1968, doi:10.1137/0705041), and of first order what implicit
-Euler misses of each increment by itself, the less the more of them there are.
+Increments that wear one after the other cause most of the error of a step: each finds the surfaces
+worn by those before it, and the last one determines the final shape. An implicit step therefore
+takes the increments in reverse order over half its length, and in forward order over the other half
+(Strang splitting, 1968, doi:10.1137/0705041). This leaves an error of second order from the
+interaction of increments, and one of first order from implicit Euler in each single increment,
+which is the smaller the more increments there are.
 
-The companion that tells their error takes one step of twice the length meanwhile: the way out in
-one step, the way back in the next one, at the price of half as many contact problems.
+The coarse companion that shows this error takes one step of twice the length in the same time: the
+reverse half during one step, the forward half during the next. It costs half as many contact
+problems.
 """
 
 from __future__ import annotations
@@ -17,43 +19,54 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from wear.steps.step_errors import EARLY, SAFETY, ErrorControl, root_mean_square, steps_to_come
+from wear.steps.step_errors import (
+    EARLY_SHARE,
+    SAFETY,
+    ErrorControl,
+    root_mean_square,
+    steps_to_come,
+)
 from wear.steps.steppers import ROUNDING, ComparingStepper, in_pairs
 from wear.steps.stepping import WearingContact, WearState
 from wear.worn import Spent, WearStep
 
 ContactAt = Callable[[WearState], WearingContact]
 
-TO_AND_FRO = 1.25
-"""What the order of implicit steps over unlike increments comes to: between the second of what
-these leave together and the first of each by itself."""
+STRANG_ORDER = 1.25
+"""Effective order of implicit steps over dissimilar increments: between second order of their
+interaction and first order of each increment by itself.
+"""
 
-FOLLOWING = 1.75
-"""The same where slips follow from wear: what steps leave of these is of second order."""
+FOLLOWING_ORDER = 1.75
+"""Effective order where slips follow from wear: the error of the slips is of second order."""
 
-MOVING = 1.5
-"""What the order of steps of second order comes to where surfaces move over each other: between the
-second that they have at rest and the first of very short ones (:mod:`wear.steps.stepping`)."""
+MOVING_ORDER = 1.5
+"""Effective order of second-order steps where surfaces move over each other: between the second
+order at rest and the first order of very short steps (:mod:`wear.steps.stepping`).
+"""
 
 PAIRED_GROWTH, PAIRED_SHRINKAGE = 4.0, 0.5
-"""Bounds of the change of length from one step of the companion's to the next. Steps that were too
-long are not taken again: after steps much shorter their error would still be there, until what
-follows has pressed it away."""
+"""Bounds of the change of length from one step of the companion to the next. Steps that were too
+long are not repeated, and a sudden change to much shorter steps would not help: the error would
+remain until later wear presses it away.
+"""
 
-SHORT = 0.25
-"""A step that is shorter than so much of the one before it is none that the companion turns back
-for: the two together would tell nothing of the longer one's error."""
+SHORT_STEP = 0.25
+"""A step shorter than this share of the one before does not complete a step of the companion. Two
+such unequal steps would not show the error of the longer one.
+"""
 
 
 @dataclass(frozen=True)
 class ImplicitStepper(ComparingStepper[WearState, WearingContact]):
-    """Implicit Euler to and fro, in steps that ``control`` chooses, or as long as asked for.
+    """Implicit Euler with Strang splitting, in steps of chosen or given length.
 
-    These may go ``alone``: no companion tells their error then. The last step of an odd number is
-    two of half the length. Increments that are all alike wear in turn only, and so do those of
-    surfaces that move over each other. There the last step is of second order: long ones of first
-    order wear edges at which pressure peaks, up to twice as high as what is left of it by short
-    ones.
+    The steps have the length that ``control`` chooses, or that the caller asks for. With ``alone``
+    there is no coarse companion, so that the error is unknown. The last step of an odd number is
+    taken as two of half the length. Increments that are all the same, and those of surfaces that
+    move over each other, wear in forward order only. On surfaces that move over each other the last
+    step is of second order: long steps of first order wear edges at which the pressure peaks, up to
+    twice as high as the peaks that short steps leave.
     """
 
     def _advance(
@@ -66,15 +79,15 @@ class ImplicitStepper(ComparingStepper[WearState, WearingContact]):
     def _order(self, contact: WearingContact) -> float:
         return 1.0
 
-    def _share(self, most: float, longest: float) -> float:
-        """Steps of one length: the companion turns back after as many cycles as it has gone."""
+    def _length(self, most: float, longest: float) -> float:
+        """Return equal lengths: the companion's two halves have the same number of cycles."""
         return most / max(1.0, float(np.ceil(most / longest * (1.0 - ROUNDING))))
 
-    def _following(
+    def _next_length(
         self, contact: WearingContact, after: WearState, proposed: float, left: float
     ) -> float:
-        """An even number of them: the last of an odd one costs as much as two."""
-        if after.half_way or not left > 0.0 or _in_turn(contact, after):
+        """Return a length that gives an even number of steps; an odd last one costs double."""
+        if after.half_way or not left > 0.0 or _forward_only(contact, after):
             return proposed
         return in_pairs(proposed, left)
 
@@ -86,38 +99,38 @@ class ImplicitStepper(ComparingStepper[WearState, WearingContact]):
         at: ContactAt,
         last: bool,
     ) -> WearStep[WearState]:
-        contact, with_companion = contacts
+        contact, companion_contact = contacts
         companion = state.companion
-        if _in_turn(contact, state):
+        if _forward_only(contact, state):
             if state.half_way:
-                # It has worn as long as the others, and goes on from where it is.
+                # The half done is a complete step in forward order: continue from its state.
                 state = replace(state, coarse=replace(companion, coarse=None))
             return super()._compared(state, cycles, contacts, at, last)
         if self.alone:
-            return _to_and_fro(state, cycles, contact, at)[0]
+            return _strang_step(state, cycles, contact, at)[0]
         length = cycles
         if last and companion.coarse is None:
             length = 0.5 * cycles
-            begun, middle = _to_and_fro(state, length, contact, at)
-            done, _ = _to_and_fro(begun.state, length, at(begun.state), at)
-            whole, _ = _to_and_fro(companion, cycles, contact, at)
+            begun, middle = _strang_step(state, length, contact, at)
+            done, _ = _strang_step(begun.state, length, at(begun.state), at)
+            whole, _ = _strang_step(companion, cycles, contact, at)
             done = replace(done, spent=begun.spent + done.spent)
         else:
-            done, middle = _to_and_fro(state, cycles, contact, at)
+            done, middle = _strang_step(state, cycles, contact, at)
             if companion.coarse is None:
-                whole = _out(companion, cycles, contact, begun=state)
+                whole = _first_half(companion, cycles, contact, begun=state)
             else:
-                half_way = with_companion()
-                whole = _back(companion, cycles, half_way, at, half_way is not contact, last)
+                half_way = companion_contact()
+                whole = _second_half(companion, cycles, half_way, at, half_way is not contact, last)
         follows = middle is not contact
-        order = FOLLOWING if follows else 1.0
+        order = FOLLOWING_ORDER if follows else 1.0
         if whole.state.coarse is None:
-            order = _order_of(length, contact.comparable_cycles(state), follows)
+            order = _apparent_order(length, contact.comparable_cycles(state), follows)
         after = replace(done.state, order=order, coarse=whole.state)
         spent = replace(done.spent + whole.spent, steps=done.spent.steps)
         return WearStep(after, cycles, spent)
 
-    def _judged(
+    def _assess(
         self,
         contact: WearingContact,
         control: ErrorControl,
@@ -126,70 +139,77 @@ class ImplicitStepper(ComparingStepper[WearState, WearingContact]):
         left: float,
     ) -> tuple[bool, float]:
         before, after = ends
-        if _in_turn(contact, before):
-            return super()._judged(contact, control, ends, cycles, left)
+        if _forward_only(contact, before):
+            return super()._assess(contact, control, ends, cycles, left)
         to_go, begun = steps_to_come(before, after, cycles, left), before.companion.coarse
         if after.half_way:
-            room = _room_half_way(control, before, after, to_go)
+            room = _error_margin_half_way(control, before, after, to_go)
             if room < 1.0:
                 return False, SAFETY * room
             return True, after.companion.next_cycles / cycles
-        room = _room(control, before, after, to_go)
-        change = (SAFETY * room) ** (1.0 / TO_AND_FRO)
+        room = _error_margin(control, before, after, to_go)
+        change = (SAFETY * room) ** (1.0 / STRANG_ORDER)
         if begun is None:
             return room >= 1.0, change
-        # The two steps that have made the companion's are not taken again.
-        least = 1.0 if _less_wrong(begun, after) else PAIRED_SHRINKAGE
+        # The two steps that make up the companion's step are not repeated.
+        least = 1.0 if _error_fell(begun, after) else PAIRED_SHRINKAGE
         whole = before.companion.next_cycles + cycles
         return True, 0.5 * whole / cycles * min(max(change, least), PAIRED_GROWTH)
 
 
-def _in_turn(contact: WearingContact, state: WearState) -> bool:
-    """Whether increments wear in turn only: on surfaces that move over each other, or all alike."""
+def _forward_only(contact: WearingContact, state: WearState) -> bool:
+    """Return whether increments wear in forward order only.
+
+    They do on surfaces that move over each other, and where all increments are the same.
+    """
     alike = not np.isfinite(contact.comparable_cycles(state))
     return alike or contact.sliding.passages is not None
 
 
-def _order_of(cycles: float, comparable: float, follows: bool) -> float:
-    """Of the error of steps of so many ``cycles``, as those of twice the length tell it.
+def _apparent_order(cycles: float, comparable: float, follows: bool) -> float:
+    """Return the apparent order of the error of steps of ``cycles``, as the companion shows it.
 
-    That of steps of w ΔN = x λ is about (x/(1 + x))^p (``comparable_cycles``): p = log2 of what it
-    grows by falls as they get long.
+    The error of steps with w ΔN = x λ is about (x/(1 + x))^p (``comparable_cycles``). The log2 of
+    its growth over a doubled step is the apparent order, which falls as steps get long.
     """
     x = cycles / comparable
-    order = FOLLOWING if follows else TO_AND_FRO
+    order = FOLLOWING_ORDER if follows else STRANG_ORDER
     return order * float(np.log2(2.0 * (1.0 + x) / (1.0 + 2.0 * x)))
 
 
-def _less_wrong(before: WearState, after: WearState) -> bool:
-    """Whether what wear has pressed away of errors is more than what has come to them."""
+def _error_fell(before: WearState, after: WearState) -> bool:
+    """Return whether wear has pressed away more of the errors than the step has added."""
     sizes = ([root_mean_square(e, e) for e in state.errors] for state in (before, after))
     return all(now <= then for then, now in zip(*sizes, strict=True))
 
 
-def _room(control: ErrorControl, before: WearState, after: WearState, to_go: float) -> float:
-    """How many times its error a state may have: of depth :data:`EARLY` more than its share.
+def _error_margin(
+    control: ErrorControl, before: WearState, after: WearState, to_go: float
+) -> float:
+    """Return the allowed error of a state over its estimated error.
 
-    ``to_go`` are the steps like this one that are to come, this one included.
+    Of the depth's error the share :data:`EARLY_SHARE` is allowed at once, the rest as the depth
+    grows; ``to_go`` is the number of such steps that are left, this one included.
     """
     room = np.inf
     columns = (after.surfaces.depths, before.surfaces.depths, after.errors)
     for depth, depth_before, error in zip(*columns, strict=True):
         expected = depth + (depth - depth_before) * (to_go - 1.0)
         ahead, so_far, left = (root_mean_square(field, depth) for field in (expected, depth, error))
-        most, volume = EARLY * ahead + (1.0 - EARLY) * so_far, float(depth.sum())
+        most, volume = EARLY_SHARE * ahead + (1.0 - EARLY_SHARE) * so_far, float(depth.sum())
         tolerance = control.tolerance(depth, expected)
         room = min(room, tolerance * _ratio(most, left), tolerance * _ratio(volume, error.sum()))
     return room
 
 
-def _room_half_way(
+def _error_margin_half_way(
     control: ErrorControl, before: WearState, after: WearState, to_go: float
 ) -> float:
-    """The same after a step whose companion has gone but one way, of what that step adds to it.
+    """Return the allowed over the added error of a step after which the companion is half-way.
 
-    That may be the tolerance: of what increments miss each by itself it is half of that when the
-    companion is back, and of what they miss together several times as much.
+    The error that the step adds may be the whole tolerance. For the error of single increments, the
+    estimate at this point is half of that after the companion's complete step; for the error of
+    their interaction it is several times that.
     """
     room = np.inf
     columns = (after.surfaces.depths, before.surfaces.depths, after.errors, before.errors)
@@ -206,12 +226,12 @@ def _ratio(size: float, error: float) -> float:
     return size / abs(error) if error else np.inf
 
 
-def _to_and_fro(
+def _strang_step(
     state: WearState, cycles: float, contact: WearingContact, at: ContactAt
 ) -> tuple[WearStep[WearState], WearingContact]:
-    """A step over all increments and back, and the contact half-way.
+    """Take a step in reverse and in forward order; also return the contact in the middle.
 
-    It is another one where slips follow from what wears, and holds for all of the step then.
+    That contact is another one where slips follow from wear. It is then used for the whole step.
     """
     half = 0.5 * cycles
     out = contact.implicit_step(state, half, back=True)
@@ -223,13 +243,13 @@ def _to_and_fro(
     return WearStep(back.state, cycles, replace(spent + back.spent, steps=2)), middle
 
 
-def _out(
+def _first_half(
     companion: WearState, cycles: float, contact: WearingContact, begun: WearState
 ) -> WearStep[WearState]:
-    """The way out of a step of the companion's, over as many ``cycles``.
+    """Take the first half of a step of the companion, over ``cycles``.
 
-    It remembers the state that both have ``begun`` from, with its companion, as its own ``coarse``,
-    and how far it has gone, as ``next_cycles``.
+    The result stores in ``coarse`` the state from which both have ``begun``, with its companion,
+    and in ``next_cycles`` its own length.
     """
     out = contact.implicit_step(companion, cycles, back=True)
     from_there = replace(begun, starts={})
@@ -238,7 +258,7 @@ def _out(
     return replace(out, state=replace(out.state, coarse=from_there, next_cycles=cycles))
 
 
-def _back(
+def _second_half(
     companion: WearState,
     cycles: float,
     contact: WearingContact,
@@ -246,19 +266,19 @@ def _back(
     follows: bool,
     last: bool,
 ) -> WearStep[WearState]:
-    """The way back of such a step, ``contact`` being that where the way out has ended.
+    """Take the second half of such a step; ``contact`` is that at the end of the first half.
 
-    The way out is gone again with the slips found there if these follow from what wears, and where
-    that was not half of the way.
+    The first half is repeated with the slips found there if these follow from wear, and with
+    another length if both halves were unequal.
     """
     both, gone = companion.coarse, companion.next_cycles
     assert both is not None
     begun = replace(both.companion, starts=companion.starts, coarse=None)
-    if cycles < SHORT * gone and not last:
-        return _out(begun, gone + cycles, contact, both)
+    if cycles < SHORT_STEP * gone and not last:
+        return _first_half(begun, gone + cycles, contact, both)
     unequal, half, spent = abs(cycles - gone) > ROUNDING * gone, 0.5 * (gone + cycles), Spent()
     if unequal and follows:
-        return _to_and_fro(begun, gone + cycles, at(begun), at)[0]
+        return _strang_step(begun, gone + cycles, at(begun), at)[0]
     if unequal or follows:
         out = contact.implicit_step(begun, half, back=True)
         companion, spent = out.state, out.spent
@@ -268,32 +288,33 @@ def _back(
 
 @dataclass(frozen=True)
 class SecondOrderStepper(ComparingStepper[WearState, WearingContact]):
-    """Second order, also where slip changes with wear; fields as in :class:`ImplicitStepper`.
+    """Steps of second order, also where slip changes with wear.
 
-    Where increments are all alike, on surfaces at rest, the last step is implicit Euler. The first
-    stage of one of second order wears a contact that has hardly grown, and leaves a rim to the
-    second at which pressure peaks, on a cylinder worn to conformity up to twice as high as it is.
-    One step of first order leaves an error of second order in all.
+    The fields are those of :class:`ImplicitStepper`. Where increments are all the same, on surfaces
+    at rest, the last step is implicit Euler. The first stage of a second-order step wears a contact
+    that has hardly grown, and leaves to the second stage a rim at which the pressure peaks: on a
+    cylinder worn to conformity up to twice as high as it should be. A single step of first order
+    adds an error of second order to the run.
     """
 
     def _advance(
         self, state: WearState, cycles: float, contact: WearingContact, at: ContactAt, last: bool
     ) -> WearStep[WearState]:
-        if last and contact.sliding.passages is None and _in_turn(contact, state):
+        if last and contact.sliding.passages is None and _forward_only(contact, state):
             return contact.implicit_step(state, cycles)
         return _second_order(state, cycles, contact, at)
 
     def _order(self, contact: WearingContact) -> float:
-        return 2.0 if contact.sliding.passages is None else MOVING
+        return 2.0 if contact.sliding.passages is None else MOVING_ORDER
 
 
 def _second_order(
     state: WearState, cycles: float, contact: WearingContact, contact_at: ContactAt
 ) -> WearStep[WearState]:
-    """So many cycles by a step of second order, also where slip changes with wear.
+    """Take a step of second order, also where slip changes with wear.
 
-    A contact whose slips come from the half-space is worn once with those of the start, and again
-    with the mean of those and the ones at its end.
+    A contact whose slips come from the half-space is worn once with the slips at the start, and
+    again with their mean with the slips at the end.
     """
     step = contact.second_order_step(state, cycles)
     following = contact_at(step.state)

@@ -1,4 +1,4 @@
-"""Many wear steps, one after the other: of a jump, or of a run."""
+"""Sequences of wear steps: those of a jump, or of a whole run."""
 
 from __future__ import annotations
 
@@ -13,9 +13,10 @@ from wear.worn import Spent, State, WearStep
 
 @dataclass(frozen=True)
 class SubcyclingStepper(Generic[State, Contact]):
-    """Several steps of a ``stepper`` taken as one, as long as ``longest`` says of a state.
+    """A stepper that takes several steps of another stepper as one.
 
-    It is told the most cycles that they may have together.
+    ``longest`` returns the length of the joint step [cycles], from a state and the most cycles
+    allowed.
     """
 
     stepper: Stepper[State, Contact]
@@ -36,9 +37,10 @@ def steps(
     left: float,
     contact_at: Callable[[State], Contact],
 ) -> Iterator[WearStep[State]]:
-    """Steps of a run that has ``left`` cycles, until nothing is ``to_go``.
+    """Yield the wear steps of a run of ``left`` cycles, until no cycles are left to do.
 
-    That is told a state and the cycles done so far, and gives the most that the next step may have.
+    ``to_go`` returns the greatest length of the next step, from a state and the cycles done so far,
+    and 0 at the end.
     """
     done = 0.0
     while (most := to_go(state, done)) > 0.0:
@@ -48,7 +50,7 @@ def steps(
 
 
 def rest(cycles: float, done: float) -> float:
-    """What is to go of so many ``cycles``; nothing where it is but rounding."""
+    """Return the remaining part of ``cycles``, or 0 if it is only rounding."""
     return cycles - done if cycles - done > ROUNDING * cycles else 0.0
 
 
@@ -61,9 +63,22 @@ def advance_cycles(
     marched_by: Steps = COMPUTED,
     reached: Callable[[float], None] = lambda cycles: None,
 ) -> WearStep[State]:
-    """Wear ``cycles`` cycles of the ``left`` ones of the run, in as many steps as it takes.
+    """Wear ``cycles`` of the ``left`` cycles of the run, in as many steps as needed.
 
-    ``reached`` is told, after each of them, how many cycles are done.
+    Parameters
+    ----------
+    stepper
+        Method and length of the steps.
+    state
+        State before the first step.
+    cycles, left
+        Cycles to wear, and cycles left in the whole run.
+    contact_at
+        Function that returns the contact that belongs to a state.
+    marched_by
+        Source of the steps: computed, or recorded earlier.
+    reached
+        Callback after each step, with the number of cycles done.
     """
 
     def further(worn: WearStep[State]) -> WearStep[State] | None:

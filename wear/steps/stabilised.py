@@ -1,10 +1,10 @@
-"""Long explicit steps of contacts at nodes: Runge-Kutta-Chebyshev.
+"""Long explicit steps of contacts at nodes by the Runge-Kutta-Chebyshev method.
 
-Wear presses short waves of the surfaces away at once: dh/dN = F(h) is stiff, its Jacobian like that
-of diffusion, with real negative eigenvalues -λ. An explicit step of s stages of the method of
-Sommeijer, Shampine and Verwer (1997, doi:10.1016/S0377-0427(97)00219-7) is of second order and
-stable for cycles up to 2/3 (s² - 1) (1 - 2ε/15) / λ: one twice as long asks for √2 times the cycles
-of a structure, and nobody for a derivative of F.
+Wear presses short waves of the surfaces away at once: dh/dN = F(h) is stiff. Its Jacobian resembles
+that of diffusion, with real negative eigenvalues -λ. An explicit step of s stages of the method of
+Sommeijer, Shampine and Verwer (1997, doi:10.1016/S0377-0427(97)00219-7) is of second order, and
+stable for up to 2/3 (s² - 1) (1 - 2ε/15) / λ cycles. A step twice as long needs √2 times as many
+solved cycles of a structure, and no derivative of F.
 """
 
 from __future__ import annotations
@@ -23,10 +23,10 @@ from wear.steps.steppers import ComparingStepper
 from wear.worn import Spent, WearStep
 
 DAMPING = 2.0 / 13.0
-"""ε: stiff waves are left at most 1 - ε/3 of their size by a step, at 2 % of the stable length."""
+"""Damping ε: beyond 2 % of the stable length, a step leaves at most 1 - ε/3 of stiff waves."""
 
 MARGIN = 1.1
-"""λ may grow by so much within a step, where slip does."""
+"""Allowance for the growth of λ within a step as slip grows."""
 
 
 ContactAt = Callable[[NodalState], NodalContact]
@@ -34,7 +34,7 @@ ContactAt = Callable[[NodalState], NodalContact]
 
 @dataclass(frozen=True)
 class StabilisedStepper(ComparingStepper[NodalState, NodalContact]):
-    """Steps of as many stages as their length asks for."""
+    """Stepper whose number of stages follows from the length of the step."""
 
     def _advance(
         self, state: NodalState, cycles: float, contact: NodalContact, at: ContactAt, last: bool
@@ -53,17 +53,26 @@ class StabilisedStepper(ComparingStepper[NodalState, NodalContact]):
 
 
 def stages_for(decay: float) -> int:
-    """Stages of a stable step in which the stiffest wave decays by λ times so many cycles."""
+    """Return the number of stages of a stable step, where ``decay`` is λ times its cycles."""
     return max(2, ceil(sqrt(1.0 + 1.5 * decay / (1.0 - 2.0 * DAMPING / 15.0))))
 
 
 def chebyshev_step(
     rate: Callable[[Array], Array], first: Array, cycles: float, stages: int
 ) -> Array:
-    """What is lost in a step of so many ``cycles`` and ``stages``, two at least.
+    """Return the wear in a step of ``cycles`` in at least two ``stages``.
 
-    ``rate`` gives that of what has been lost since the beginning, in any shape; ``first`` is it
-    there.
+    Parameters
+    ----------
+    rate
+        Function that returns the rate of wear from the wear since the beginning of the step, in any
+        shape.
+    first
+        Rate at the beginning.
+    cycles
+        Length of the step.
+    stages
+        Number of stages, two at least.
     """
     start, mixes = _coefficients(stages)
     before, now = np.zeros_like(first), start * cycles * first
@@ -75,9 +84,10 @@ def chebyshev_step(
 
 @cache
 def _coefficients(stages: int) -> tuple[float, tuple[tuple[float, float, float, float], ...]]:
-    """The share of the first stage, and of every further one those of (2.4) in the paper.
+    """Return the coefficient of the first stage, and those of every further stage.
 
-    μ, ν, and of the rates at the last stage and at the beginning.
+    The latter are μ, ν, and the factors of the rates at the last stage and at the beginning, as in
+    (2.4) of the paper.
     """
     w0 = 1.0 + DAMPING / stages**2
     unit = np.eye(stages + 1)

@@ -1,14 +1,15 @@
 """Errors of wear steps: their estimate, their bound, and the length of a step that meets it.
 
-The error of a run is told by a companion: the same run, under the same loads, by steps of twice the
-length. It goes its own way from the first cycle to the last, so that whatever wear does to an
-error, pressing it away or letting it grow, it does to the difference of the two: global
-extrapolation (Shampine & Watts 1976, doi:10.1145/355666.355671). Of steps of order p that is
-2^p - 1 times the error of the shorter ones. It takes half as many contact problems again.
+The error of wear steps is estimated by a coarse companion: the same run, under the same loads, by
+steps of twice the length. It is continued separately from the first cycle to the last. Wear may
+press an error away or let it grow; it does the same to the difference of both runs: global
+extrapolation (Shampine & Watts 1976, doi:10.1145/355666.355671). For steps of order p the
+difference is 2^p - 1 times the error of the shorter steps. The companion takes half as many contact
+problems again.
 
-Errors count by their root mean square over the worn cells: the few at a moving contact edge are
-worn by jumps however short the steps, and say little about depth or volume. The volume counts for
-itself: where slip follows from wear, as in partial slip, no pressure corrects it.
+Errors count by their root mean square over the worn cells: the few cells at a moving contact edge
+wear abruptly however short the steps are, and say little about depth or volume. The volume counts
+separately: where slip follows from wear, as in partial slip, pressure does not correct its error.
 """
 
 from __future__ import annotations
@@ -22,23 +23,27 @@ from sa_solver.types import Array
 from wear.worn import WornState
 
 GROWTH, SHRINKAGE, SAFETY = 8.0, 0.2, 0.8
-"""Bounds of one change of an automatic step, and the share of its room that it aims at."""
+"""Bounds of one change of the length of an automatic step, and the share of the allowed error that
+it aims at.
+"""
 
-EARLY = 0.3
-"""Share of the error at the end of a run that it may have at once: much of what the first steps
-miss, while the contact grows fastest, is pressed away later."""
+EARLY_SHARE = 0.3
+"""Share of the error allowed at the end of a run that may be used at once. Much of the error of the
+first steps, while the contact grows fastest, is pressed away later.
+"""
 
 
 @dataclass(frozen=True)
 class ErrorControl:
-    """What error the depth may have: the smaller of those given.
+    """Allowed error of the worn depth: the smaller of the bounds given.
 
-    ``relative`` is a share of the depth at the end of the run, ``absolute`` a depth [mm]; both
+    ``relative`` is a share of the depth at the end of the run, ``absolute`` a depth [mm]. Both
     bound the root mean square over the worn cells of either body.
 
     Examples
     --------
-    1 % of the depth at the end, but 0.1 µm at most: where 20 µm are to come, the latter is 0.5 %.
+    The bound is 1 % of the final depth, but 0.1 µm at most; at a final depth of
+    20 µm that is 0.5 %:
 
     >>> import numpy as np
     >>> from wear import ErrorControl
@@ -54,7 +59,7 @@ class ErrorControl:
         checks.numbers(self, "relative", "absolute", above=0.0)
 
     def tolerance(self, depth: Array, expected: Array) -> float:
-        """The bound for a body worn to ``depth``, as a share of the one ``expected`` to come."""
+        """Return the bound for a body worn to ``depth`` as a share of the ``expected`` depth."""
         scale = root_mean_square(expected, depth)
         bounds = [np.inf if self.relative is None else self.relative]
         if self.absolute is not None and scale > 0.0:
@@ -63,16 +68,16 @@ class ErrorControl:
 
 
 def root_mean_square(field: Array, depth: Array) -> float:
-    """Of a ``field`` over the cells that have lost some ``depth``, both ``(nx, ny)``."""
+    """Return the root mean square of ``field`` over the cells that have lost any ``depth``."""
     worn = max(int(np.count_nonzero(depth)), 1)
     return float(np.sqrt(np.vdot(field, field) / worn))
 
 
 def step_errors(state: WornState, areas: Array | float = 1.0) -> dict[str, float] | None:
-    """What wear steps leave of ``depth`` (root mean square) and ``volume``, relative.
+    """Return the relative errors of ``depth`` (root mean square) and ``volume`` due to wear steps.
 
-    Those of the body with the larger error; None where nothing has worn or they are not known.
-    ``areas`` are those of cells or nodes, if they differ.
+    They are those of the body with the larger error, or None where nothing has worn or they are
+    unknown. ``areas`` are those of cells or nodes, if they differ.
     """
     bodies = [
         (error, depth)
@@ -88,10 +93,10 @@ def step_errors(state: WornState, areas: Array | float = 1.0) -> dict[str, float
 
 
 def steps_to_come(before: WornState, after: WornState, cycles: float, left: float) -> float:
-    """Return how many steps like one of so many ``cycles`` wear as much as the ``left`` ones will.
+    """Return how many steps of this kind wear as much as the ``left`` cycles will.
 
-    That step is included, which has led from the state ``before`` to the one ``after``. A rate that
-    falls, as where what slips wears off, falls on as an exponential, which bounds what is to come.
+    The step of ``cycles`` from ``before`` to ``after`` is included. A falling wear rate, as where
+    slipping cells wear off, is taken to go on falling exponentially, which bounds the wear to come.
     """
     count = max(left / cycles, 1.0)
     if not 0.0 < after.volume_rate < before.volume_rate:
@@ -99,15 +104,16 @@ def steps_to_come(before: WornState, after: WornState, cycles: float, left: floa
     return min(count, 1.0 + 1.0 / float(np.log(before.volume_rate / after.volume_rate)))
 
 
-def judged(
+def assess(
     control: ErrorControl, before: WornState, after: WornState, to_go: float
 ) -> tuple[bool, float]:
-    """Return whether the error after a step will do, and the change of length that fills its room.
+    """Return whether the error after a step is acceptable, and the factor of the next length.
 
-    ``to_go`` are the steps like this one that are to come, this one included. Of the tolerance the
-    error of a body's depth may have the share :data:`EARLY` at once and the rest by and by, as the
-    depth grows; that of its volume, which no pressure presses away, grows with it. Where a step
-    wears little of what has worn so far it may be long: the error counts at the end of the run.
+    ``to_go`` is the number of such steps that are left, this one included. The error of a body's
+    depth may use the share :data:`EARLY_SHARE` of the tolerance at once, and the rest as the depth
+    grows. The error of the volume, which no pressure corrects, may only grow with the volume. A
+    step that wears little compared with the depth so far may be long: the error counts at the end
+    of the run.
     """
     fits, changes, order = True, [GROWTH], after.order
     columns = (after.surfaces.depths, before.surfaces.depths, after.errors, before.errors)
@@ -120,14 +126,14 @@ def judged(
         ahead, so_far, lost, total, added = (
             root_mean_square(field, depth) for field in (expected, depth, worn, error, missed)
         )
-        share = (1.0 - EARLY) * tolerance
-        room = EARLY * tolerance * ahead + share * so_far - total
+        share = (1.0 - EARLY_SHARE) * tolerance
+        room = EARLY_SHARE * tolerance * ahead + share * so_far - total
         volume, volume_share = abs(float(missed.sum())), tolerance * float(worn.sum())
         volume_room = share * float(depth.sum()) - abs(float(error.sum()))
         fits = fits and (room >= 0.0 or added <= share * lost)
         fits = fits and (volume_room >= 0.0 or volume <= volume_share)
         if added > 0.0:
-            # A share of the step shrinks with it; what is left of the whole does not.
+            # The error allowed per step shrinks with the step, the remaining total does not.
             filling = (SAFETY * max(room, 0.0) / added) ** (1.0 / (order + 1.0))
             changes.append(max(filling, (SAFETY * share * lost / added) ** (1.0 / order)))
         if volume > 0.0:

@@ -1,12 +1,12 @@
-"""How long a wear step may be, and what to do when it was too long.
+"""Length of wear steps, and what to do with a step that was too long.
 
-A stepper advances what wears by at most so many cycles, given the contact that belongs to any state
-of it. Explicit steps and Heun's keep below their stability limit, and need to know of a contact
-only what a cycle takes off: cells of a half-space or nodes of a structure
-(:mod:`wear.contact.nodes`). Implicit steps and those of second order solve a half-space contact on
-the way, and are as long as the caller says or as an error estimate allows.
+A stepper advances a wearing contact by at most a given number of cycles, given a function that
+returns the contact of any state. Explicit steps and Heun's stay below their stability limit. They
+only need the wear of a cycle, and serve cells of a half-space and nodes of a structure
+(:mod:`wear.contact.nodes`) alike. Implicit and second-order steps solve a half-space contact within
+the step, and are as long as the caller asks for or as an error estimate allows.
 
-The errors of steps and their bounds are those of :mod:`wear.steps.step_errors`.
+Errors of steps and their bounds are those of :mod:`wear.steps.step_errors`.
 """
 
 from __future__ import annotations
@@ -20,86 +20,85 @@ from typing import Any, Generic, Protocol, Self, TypeVar
 import numpy as np
 
 from sa_solver.errors import InputError
+from wear.steps.attempts import Trial, accepted_step, shortest_step
 from wear.steps.step_errors import (
     GROWTH,
     SAFETY,
     SHRINKAGE,
     ErrorControl,
-    judged,
+    assess,
     root_mean_square,
     steps_to_come,
 )
-from wear.worn import Spent, State, WearStep
+from wear.worn import State, WearStep
 
-LAST = 0.5
-"""Length of the last pair of steps over that of the pairs before it. What those miss is pressed
-away by what follows; the pressure at the end shows what the last ones miss."""
+LAST_PAIR = 0.5
+"""Length of the last pair of steps over that of the pairs before. Later wear presses away the
+errors of earlier pairs, while the pressure at the end shows the error of the last ones.
+"""
 
-FIRST_STEP, FIRST_SHARE = 24.0, 0.5 / (1.0 + LAST)
-"""First automatic step over the explicit limit, and its largest share of the run: short enough to
-be accepted at 1 %, if not always, and steps may grow eightfold from one to the next."""
-
-SHORTEST = 0.01
-"""Steps so short, over the explicit limit, are not tried again: something other than their length
-is wrong."""
+FIRST_STEP, FIRST_SHARE = 24.0, 0.5 / (1.0 + LAST_PAIR)
+"""First automatic step over the explicit limit, and its largest share of the run. It is short
+enough to be accepted in most runs with a tolerance of 1 %; later steps may grow eightfold each.
+"""
 
 ROUNDING = 1e-9
-"""Steps that add up to the cycles asked for but for this share leave none over."""
+"""Relative difference up to which steps add up to the cycles asked for."""
 
 Contact = TypeVar("Contact", contravariant=True)
 Worn = TypeVar("Worn", contravariant=True)
 
 
 class StabilityError(InputError):
-    """Steps of a given length would be unstable; the message says which length is not."""
+    """Steps of a given length would be unstable; the message says which length is stable."""
 
 
 class Stepper(Protocol[State, Contact]):
-    """A way to advance the surfaces of one interface."""
+    """Protocol of a method that advances the surfaces of one interface."""
 
     def step(
         self, state: State, most: float, left: float, contact_at: Callable[[State], Contact]
     ) -> WearStep[State]:
         """Wear at most ``most`` cycles of the ``left`` ones of the whole run.
 
-        ``contact_at`` gives the contact with the pressures or slips that belong to a state.
+        ``contact_at`` returns the contact with the pressures or slips that belong to a state.
         """
         ...
 
 
-# --- steps at what a contact is ------------------------------------------------------------------
+# --- explicit steps ------------------------------------------------------------------------------
 
 
 class ExplicitContact(Protocol[State]):
-    """A contact that can wear at the pressures and slips that it has."""
+    """Protocol of a contact that can wear at its present pressures and slips."""
 
     def explicit_step(self, state: State, cycles: float) -> WearStep[State]:
-        """Wear ``cycles`` cycles at what the contact is on the surfaces of ``state``."""
+        """Wear ``cycles`` cycles at the pressures and slips on the surfaces of ``state``."""
         ...
 
     def stable_cycles(self, state: State, cycles: float = 0.0) -> float:
-        """Longest explicit step in which no error grows, by the laws of a step of ``cycles``."""
+        """Return the longest stable explicit step, by the laws of a step of ``cycles``."""
         ...
 
 
 class AveragedContact(ExplicitContact[State], Protocol[State]):
-    """Such a contact whose pressures are known, and can be averaged with those of another."""
+    """Protocol of such a contact whose pressures can be averaged with those of another."""
 
     def averaged(self, other: Self) -> Self:
-        """The contact that takes off the mean of what both do."""
+        """Return the contact whose wear is the mean of this one's and the other one's."""
         ...
 
 
 @dataclass(frozen=True)
 class ExplicitStepper:
-    """Explicit Euler: steps of ``fraction`` times the stability limit, of so many ``cycles``, or as
-    long as may be.
+    """Explicit Euler, in steps relative to the stability limit or of given length.
 
-    Steps of given cycles raise :class:`StabilityError` beyond the limit.
+    Steps have ``fraction`` times the stability limit, or the given ``cycles``, or are as long as
+    the caller asks for. Steps of given cycles raise :class:`StabilityError` beyond the limit.
 
     Examples
     --------
-    Steps of 0.9 of the limit beyond which roughness would grow:
+    The steps have 0.9 of the limit beyond which roughness would grow:
 
     >>> import numpy as np
     >>> from sa_solver import ElasticPair, Grid, LoadHistory, Material
@@ -140,7 +139,7 @@ class ExplicitStepper:
             limit = contact.stable_cycles(state, self.cycles)
             if self.cycles > limit:
                 raise StabilityError(
-                    f"steps of {self.cycles:g} cycles: take at most {limit:.4g} cycles"
+                    f"steps of {self.cycles:g} cycles are unstable: take at most {limit:.4g} cycles"
                 )
             cycles = min(most, self.cycles)
         return contact.explicit_step(state, cycles)
@@ -148,18 +147,18 @@ class ExplicitStepper:
 
 @dataclass(frozen=True)
 class HeunStepper:
-    """Heun's method, of second order: at the mean of the contact before and after an explicit step.
+    """Heun's method, of second order, which averages the contact before and after an Euler step.
 
-    Each is taken in two halves, and as a whole by the companion of the state. Halves are at most a
-    ``share`` of the stability limit, so that the companion presses errors away as well, and such
-    that the explicit step differs by no more than ``tolerance`` of what they wear, in root mean
-    square. Those much shorter than the limit are not tried again: something other than their length
-    is wrong.
+    Each step is taken in two halves, and as a whole by the coarse companion. Halves are at most
+    ``share`` times the stability limit, so that the companion presses errors away as well, and
+    short enough that the explicit Euler step differs by no more than ``tolerance`` times its wear,
+    in root mean square. Steps much shorter than the limit are not repeated: their error then has
+    another cause than their length.
 
     Examples
     --------
-    A node of area A on a spring k, pushed by δ: its depth comes to δ as exp(-N / N0), with
-    N0 = A / k α µ s cycles.
+    The depth of a node of area A on a spring k, pushed by δ, approaches δ as exp(-N / N0), with
+    N0 = A / k α µ s cycles:
 
     >>> import numpy as np
     >>> from types import SimpleNamespace
@@ -193,41 +192,43 @@ class HeunStepper:
         contact_at: Callable[[State], AveragedContact[State]],
     ) -> WearStep[State]:
         contact, companion = contact_at(state), state.companion
-        with_companion = contact if companion is state else contact_at(companion)
+        companion_contact = contact if companion is state else contact_at(companion)
         first = 2.0 * _stable(contact, state, 0.5 * min(most, state.next_cycles), self.share)
 
-        def trial(cycles: float) -> _Trial[State]:
+        def trial(cycles: float) -> Trial[State]:
             half = 0.5 * cycles
-            begun, error_1, end_1 = _heuns(state, half, contact, contact_at)
-            done, error_2, end_2 = _heuns(begun.state, half, contact_at(begun.state), contact_at)
-            whole, _, _ = _heuns(companion, cycles, with_companion, contact_at)
+            begun, error_1, end_1 = _heun_step(state, half, contact, contact_at)
+            done, error_2, end_2 = _heun_step(
+                begun.state, half, contact_at(begun.state), contact_at
+            )
+            whole, _, _ = _heun_step(companion, cycles, companion_contact, contact_at)
             error, change = max(error_1, error_2), GROWTH
             if error > 0.0:
                 change = float(np.clip(SAFETY * self.tolerance / error, SHRINKAGE, GROWTH))
             further = cycles * change
             if cycles == first < state.next_cycles:
-                # It was cut short, by the end or by stability, not by its error.
+                # The end or the stability limit has shortened the step, not its error.
                 further = max(further, state.next_cycles)
             after = replace(done.state, next_cycles=further, coarse=whole.state, order=2.0)
             spent = replace(begun.spent + done.spent + whole.spent, steps=2)
-            shortest = _shortest(self.share * min(contact.stable_cycles(state), end_1, end_2))
-            return _Trial(
+            shortest = shortest_step(self.share * min(contact.stable_cycles(state), end_1, end_2))
+            return Trial(
                 WearStep(after, cycles, spent),
                 fits=error <= self.tolerance,
                 shorter=cycles * change,
                 shortest=2.0 * shortest,
             )
 
-        return _accepted(trial, first)
+        return accepted_step(trial, first)
 
 
-def _heuns(
+def _heun_step(
     state: State,
     cycles: float,
     contact: AveragedContact[State],
     contact_at: Callable[[State], AveragedContact[State]],
 ) -> tuple[WearStep[State], float, float]:
-    """A step of Heun's method, what the explicit one misses of it, and its limit at the end."""
+    """Take a Heun step; also return the error of its Euler step and the limit of stability then."""
     predicted = contact.explicit_step(state, cycles)
     following = contact_at(predicted.state)
     step = contact.averaged(following).explicit_step(state, cycles)
@@ -240,53 +241,18 @@ def _heuns(
 
 
 def _stable(contact: ExplicitContact[State], state: State, most: float, fraction: float) -> float:
-    """Cycles of a step, at most ``most``, of this fraction of its stability limit or less."""
+    """Return the cycles of a step, at most ``most``, within a fraction of its stability limit."""
     cycles = min(most, fraction * contact.stable_cycles(state))
     while cycles > fraction * contact.stable_cycles(state, cycles):
         cycles *= 0.5
     return cycles
 
 
-# --- attempts -------------------------------------------------------------------------------------
-
-
-@dataclass(frozen=True)
-class _Trial(Generic[State]):
-    """A step that was tried, and whether its error ``fits``.
-
-    If not it is to be ``shorter``; steps of the ``shortest`` length are taken as they are [cycles].
-    """
-
-    step: WearStep[State]
-    fits: bool
-    shorter: float
-    shortest: float
-
-
-def _accepted(attempt: Callable[[float], _Trial[State]], cycles: float) -> WearStep[State]:
-    """A step whose error fits, begun with so many cycles; what all attempts have taken is its."""
-    spent = Spent()
-    while True:
-        trial = attempt(cycles)
-        spent += trial.step.spent
-        if trial.fits or cycles <= trial.shortest:
-            return replace(trial.step, spent=replace(spent, steps=trial.step.spent.steps))
-        cycles = max(trial.shorter, trial.shortest)
-
-
-def _shortest(stable: float) -> float:
-    """Cycles of a step that is not tried again.
-
-    Nothing wears, and any length is stable, until an energy threshold is passed.
-    """
-    return SHORTEST * stable if np.isfinite(stable) else 0.0
-
-
-# --- steps held against others of twice the length ------------------------------------------------
+# --- steps compared with others of twice the length -----------------------------------------------
 
 
 class ComparedContact(Protocol[Worn]):
-    """What limits steps: see :class:`wear.steps.stepping.WearingContact`."""
+    """Protocol of the limits of steps, as in :class:`wear.steps.stepping.WearingContact`."""
 
     def stable_cycles(self, state: Worn) -> float: ...
     def comparable_cycles(self, state: Worn) -> float: ...
@@ -298,9 +264,10 @@ At = Callable[[State], Compared]
 
 @dataclass(frozen=True)
 class ComparingStepper(ABC, Generic[State, Compared]):
-    """Steps, as long as asked for or as ``control`` lets them be, and their companion's.
+    """Base class of steppers with a coarse companion.
 
-    Those of given length may go ``alone``: nothing tells their error then.
+    Steps are as long as the caller asks for, or as ``control`` allows. Steps of given length may go
+    ``alone``, without a companion: their error is then unknown.
     """
 
     control: ErrorControl | None = None
@@ -310,52 +277,54 @@ class ComparingStepper(ABC, Generic[State, Compared]):
     def _advance(
         self, state: State, cycles: float, contact: Compared, at: At[State, Compared], last: bool
     ) -> WearStep[State]:
-        """So many cycles at once from ``state``, whose contact is given; to the end if ``last``."""
+        """Wear ``cycles`` cycles in one step from ``state``; ``last`` says that it ends the run."""
 
     @abstractmethod
     def _order(self, contact: Compared) -> float:
-        """Of the error in the length of the steps."""
+        """Return the order of the error in the length of the steps."""
 
     def _longest(self, contact: Compared, state: State) -> float:
-        """How long a step may be to be compared."""
+        """Return the longest step whose error can be estimated [cycles]."""
         return 2.0 / self._order(contact) * contact.comparable_cycles(state)
 
-    def _share(self, most: float, longest: float) -> float:
-        """Cycles of a step of ``most`` cycles to come that may have the ``longest``."""
+    def _length(self, most: float, longest: float) -> float:
+        """Return the length of the next step of ``most`` cycles, at most ``longest``."""
         return min(most, longest)
 
-    def _following(self, contact: Compared, after: State, proposed: float, left: float) -> float:
-        """Cycles of the step that follows, of the ``left`` ones, if so many are ``proposed``."""
+    def _next_length(self, contact: Compared, after: State, proposed: float, left: float) -> float:
+        """Return the length of the following step, of ``left`` cycles, by the ``proposed`` one."""
         return proposed
 
     def step(
         self, state: State, most: float, left: float, contact_at: At[State, Compared]
     ) -> WearStep[State]:
-        """A step, tried again until ``control`` agrees with its error."""
+        """Take a step, repeated until ``control`` accepts its error."""
         contact, control = contact_at(state), self.control
 
         @cache
-        def with_companion() -> Compared:
+        def companion_contact() -> Compared:
             companion = state.companion
             return contact if companion is state else contact_at(companion)
 
-        def trial(cycles: float) -> _Trial[State]:
+        def trial(cycles: float) -> Trial[State]:
             last = cycles >= left * (1.0 - ROUNDING)
-            step = self._compared(state, cycles, (contact, with_companion), contact_at, last)
+            step = self._compared(state, cycles, (contact, companion_contact), contact_at, last)
             after = step.state
-            shortest = 2.0 * _shortest(min(contact.stable_cycles(end) for end in (state, after)))
+            shortest = 2.0 * shortest_step(
+                min(contact.stable_cycles(end) for end in (state, after))
+            )
             fits, proposed = True, cycles
             if control is not None:
-                fits, change = self._judged(contact, control, (state, after), cycles, left)
+                fits, change = self._assess(contact, control, (state, after), cycles, left)
                 proposed = max(cycles * float(np.clip(change, SHRINKAGE, GROWTH)), shortest)
-            following = self._following(contact, after, proposed, left - cycles)
+            following = self._next_length(contact, after, proposed, left - cycles)
             step = replace(step, state=replace(after, next_cycles=following))
-            return _Trial(step, fits, self._share(most, min(proposed, 0.5 * cycles)), shortest)
+            return Trial(step, fits, self._length(most, min(proposed, 0.5 * cycles)), shortest)
 
         longest = self._longest(contact, state)
         if control is not None:
             longest = min(longest, state.next_cycles)
-        return _accepted(trial, self._share(most, longest))
+        return accepted_step(trial, self._length(most, longest))
 
     def _compared(
         self,
@@ -365,21 +334,21 @@ class ComparingStepper(ABC, Generic[State, Compared]):
         at: At[State, Compared],
         last: bool,
     ) -> WearStep[State]:
-        """Two steps of half the length and the companion's whole one, unless they go alone.
+        """Take two steps of half the length and the companion's step, unless steps go alone.
 
-        ``contacts`` are that of the state and, to be asked for, that of its companion.
+        ``contacts`` are the contact of the state and a function that returns that of its companion.
         """
-        half, (contact, with_companion) = 0.5 * cycles, contacts
+        half, (contact, companion_contact) = 0.5 * cycles, contacts
         first = self._advance(state, half, contact, at, last)
         second = self._advance(first.state, half, at(first.state), at, last)
         after, spent = second.state, first.spent + second.spent
         if not self.alone:
-            whole = self._advance(state.companion, cycles, with_companion(), at, last)
+            whole = self._advance(state.companion, cycles, companion_contact(), at, last)
             after, spent = replace(after, coarse=whole.state), spent + whole.spent
         after = replace(after, order=self._order(contact))
         return WearStep(after, cycles, replace(spent, steps=2))
 
-    def _judged(
+    def _assess(
         self,
         contact: Compared,
         control: ErrorControl,
@@ -387,23 +356,25 @@ class ComparingStepper(ABC, Generic[State, Compared]):
         cycles: float,
         left: float,
     ) -> tuple[bool, float]:
-        """Whether the error after a step will do, and the change of length that fills what it may.
+        """Return whether the error after a step is acceptable, and the factor of the next length.
 
-        ``ends`` are the states before and after its ``cycles`` of the ``left`` ones.
+        ``ends`` are the states before and after its ``cycles`` of the ``left`` ones. With that
+        factor the next step uses the allowed error.
         """
-        return judged(control, *ends, steps_to_come(*ends, cycles, left))
+        return assess(control, *ends, steps_to_come(*ends, cycles, left))
 
 
 def first_cycles(contact: ComparedContact[Worn], state: Worn, total: float) -> float:
-    """How far the first automatic step of a run of ``total`` cycles goes."""
+    """Return the length of the first automatic step of a run of ``total`` cycles."""
     return in_pairs(min(FIRST_STEP * contact.stable_cycles(state), FIRST_SHARE * total), total)
 
 
 def in_pairs(longest: float, total: float) -> float:
-    """Cycles of the next of the fewest pairs of steps that make the ``total``, ``longest`` at most.
+    """Return the length of the next step if ``total`` is covered by the fewest pairs of steps.
 
-    All are alike but the last pair, which is shorter where that takes no more of them: its steps
-    are :data:`LAST` times as long then, or what is left.
+    Steps are at most ``longest``. All pairs are equal but the last, which is shorter where that
+    takes no further pair: its steps then have :data:`LAST_PAIR` times the length of the others, or
+    what remains.
     """
     before = float(np.ceil(0.5 * total / longest * (1.0 - ROUNDING))) - 1.0
-    return min(longest, 0.5 * total / (before + LAST)) if before else 0.5 * total
+    return min(longest, 0.5 * total / (before + LAST_PAIR)) if before else 0.5 * total

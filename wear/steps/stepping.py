@@ -1,23 +1,25 @@
-"""Cycle-jumped wear of one interface: pressures of a cycle, and the depth of many alike.
+"""Wear steps of one interface: pressures of a cycle, and the depth worn in many equal cycles.
 
 Pressure comes from the half-space solver under the resultants of each increment. Slip is given: by
 the structure (wear method 1 of Gallego 2007) or by the half-space (method 2, see
-:mod:`wear.steps.full_cycle`), and does not change during a step. Where it slips, q = µ p.
+:mod:`wear.steps.full_cycle`), and does not change during a step. Where the contact slips, q = µ p.
 
 With w_t the depth per pressure and cycle of increment t (:mod:`wear.laws`) and p_t(h) its pressure
-on the worn gap h, wear is dh/dN = Σ_t w_t p_t(h): stiff, since short waves of h are pressed away at
-once. Three steps are offered here; :mod:`wear.steps.steppers` chooses their length.
+on the worn gap h, wear is dh/dN = Σ_t w_t p_t(h). This equation is stiff, since short waves of h
+are pressed away at once. There are three kinds of steps; :mod:`wear.steps.steppers` chooses their
+length.
 
-- explicit Euler, at the pressures of the surfaces before the step; stable below a limit only;
-- implicit Euler, increment after increment, each at the pressure it ends with: the depth of an
-  increment enters its contact problem as the local compliance w_t ΔN. Stable at any length;
-- second order: all increments over half the step and back in reverse order over the other half
+- Explicit Euler uses the pressures of the surfaces before the step. It is stable below a limit.
+- Implicit Euler takes the increments one after the other, each at the pressure at its end: the
+  depth of an increment enters its contact problem as the local compliance w_t ΔN. It is stable at
+  any length.
+- Second order takes all increments over half the step and back in reverse order over the other half
   (Strang 1968, doi:10.1137/0705041), each by the two implicit stages of Alexander's method
-  (1977, doi:10.1137/0714068; L-stable). Both stages weigh in with their own positive share, so that
-  nothing ever grows back and energies add up to the volume.
+  (1977, doi:10.1137/0714068; L-stable). Both stages have positive weights, so that nothing ever
+  grows back and energies add up to the volume.
 
-Where the surfaces move over each other, body 1 wears where it passes, and its local compliance only
-stands for that: then no step is better than first order.
+Where the surfaces move over each other, body 1 wears along its path, and the local compliance is
+only an approximation: no step is then better than first order.
 """
 
 from __future__ import annotations
@@ -42,19 +44,19 @@ from wear.surfaces import Surfaces
 from wear.worn import Spent, WearStep, WornState
 
 GAMMA = 1.0 - np.sqrt(0.5)
-"""Share of the second stage of Alexander's method, and the reach of either."""
+"""Weight of the second stage of Alexander's method, and the length of each stage over the step."""
 
 States = dict[int, NormalState]
 Starts = dict[int, NormalStart]
 
 
 class ContactFailure(ConvergenceError):
-    """The half-space solver did not converge; the message is its own."""
+    """A contact problem did not converge; the message is that of the half-space solver."""
 
 
 @contextmanager
 def failures_of(name: str) -> Iterator[None]:
-    """Let a :class:`ContactFailure` say of which interface it is."""
+    """Prefix the message of any :class:`ContactFailure` with the name of the interface."""
     try:
         yield
     except ContactFailure as error:
@@ -63,12 +65,20 @@ def failures_of(name: str) -> Iterator[None]:
 
 @dataclass(frozen=True)
 class SlidingCycle:
-    """One closed cycle as the wear of a contact feels it.
+    """One closed cycle of loads and slips that wears a contact.
 
-    ``slip`` ``(t, nx, ny)`` is the size of the slip in each increment [mm]; ``uplift``
-    ``(t, nx, ny)`` [mm] the normal displacement under its shear, None for similar bodies;
-    ``passages`` how body 2 moves over body 1 in each, None where that is too little to matter.
-    A ``drive`` may impose motions in the place of the loads' forces.
+    Parameters
+    ----------
+    loads
+        Resultants of the cycle.
+    slip
+        Size of the slip in each increment ``(t, nx, ny)`` [mm].
+    uplift
+        Normal displacement due to shear and to the structure ``(t, nx, ny)`` [mm]; None: none.
+    passages
+        Motion of body 2 over body 1 in each increment; None where it is too small to matter.
+    drive
+        Motions imposed in place of the forces of the loads.
     """
 
     loads: LoadHistory
@@ -78,7 +88,7 @@ class SlidingCycle:
     drive: Drive = field(default_factory=Drive)
 
     def gap(self, surfaces: Surfaces, increment: int) -> Array:
-        """Gap before loading ``(nx, ny)`` [mm] where an increment has body 2, lifted by shear."""
+        """Return the gap before loading ``(nx, ny)`` [mm] at an increment's position of body 2."""
         gap = surfaces.gap
         if self.passages is not None:
             seen = self.passages[increment].carry(surfaces.depth_1)
@@ -86,7 +96,7 @@ class SlidingCycle:
         return gap if self.uplift is None else gap + self.uplift[increment]
 
     def midway(self, other: SlidingCycle) -> SlidingCycle:
-        """The mean of two cycles with the same loads and passages."""
+        """Return the mean of two cycles with the same loads and passages."""
         uplift = None
         if self.uplift is not None and other.uplift is not None:
             uplift = 0.5 * (self.uplift + other.uplift)
@@ -95,10 +105,16 @@ class SlidingCycle:
 
 @dataclass(frozen=True)
 class CycleResult:
-    """A cycle on given surfaces.
+    """Solution of a cycle on given surfaces.
 
-    ``states`` by increment; ``energy`` ``(t,)`` dissipated by each increment of a mean cycle
-    [N mm]; ``depth_1`` and ``depth_2`` ``(nx, ny)`` worn per mean cycle [mm].
+    Parameters
+    ----------
+    states
+        Contact states by increment.
+    energy
+        Energy dissipated by each increment of a mean cycle ``(t,)`` [N mm].
+    depth_1, depth_2
+        Depths worn per mean cycle ``(nx, ny)`` [mm].
     """
 
     states: States
@@ -107,22 +123,22 @@ class CycleResult:
     depth_2: Array
 
     def per_cycle(self, cell_area: float) -> tuple[float, float]:
-        """Largest depth [mm] and volume of both bodies [mm³] worn per cycle."""
+        """Return the largest depth [mm] and the volume of both bodies [mm³] worn per cycle."""
         depth = max(self.depth_1.max(), self.depth_2.max())
         return float(depth), float((self.depth_1 + self.depth_2).sum() * cell_area)
 
     @property
     def convolutions(self) -> int:
-        """Convolutions spent."""
+        """Number of convolutions that the solution took."""
         return sum(state.convolutions for state in self.states.values())
 
 
 @dataclass(frozen=True)
 class WearState(WornState):
-    """What the wear of a half-space contact must remember between two steps.
+    """State of a wearing half-space contact between two steps.
 
-    Fields are ``(nx, ny)``, one value per cell; ``starts`` are the contact solver's, by increment,
-    and ``start`` is that of whoever found the cycle that led to it.
+    Fields are ``(nx, ny)``, one value per cell. ``starts`` are starting points of the contact
+    solver by increment, and ``start`` is that of the half-space's own cycle.
     """
 
     starts: Starts = field(default_factory=dict)
@@ -131,9 +147,22 @@ class WearState(WornState):
 
 @dataclass(frozen=True, eq=False)
 class WearingContact:
-    """One interface under a ``sliding`` cycle; ``laws`` are those of body 1 and body 2.
+    """One interface that wears under a ``sliding`` cycle.
 
-    ``start`` is what the cycle of surfaces that are little different may be found from.
+    Parameters
+    ----------
+    contact
+        Normal contact on the grid.
+    laws
+        Wear laws of body 1 and body 2.
+    friction
+        Coulomb's coefficient of friction.
+    sliding
+        Loads and slips of the cycle.
+    tolerance
+        Relative tolerance of the contact solver.
+    start
+        Starting point for the cycle of surfaces that differ little.
     """
 
     contact: NormalContact
@@ -148,17 +177,13 @@ class WearingContact:
         return self.contact.grid
 
     def midway(self, other: WearingContact) -> WearingContact:
-        """The contact under the mean of both cycles."""
+        """Return the contact under the mean of both cycles."""
         friction = 0.5 * (self.friction + other.friction)
         return replace(self, friction=friction, sliding=self.sliding.midway(other.sliding))
 
     @cached_property
     def dissipating(self) -> list[int]:
-        """Increments that dissipate, loaded and with slip somewhere, the heaviest load last.
-
-        Over thousands of cycles it does not matter where a cycle begins. A step that ends with the
-        widest contact leaves no unworn rim for the next one.
-        """
+        """Increments with load and slip, in cyclic order; the largest load comes last."""
         loads = self.sliding.loads
         works = (loads.P > 0.0) & (loads.share > 0.0) & self.sliding.slip.any(axis=(1, 2))
         count, heaviest = len(loads), first_largest(loads.P)
@@ -167,10 +192,10 @@ class WearingContact:
 
     # -- rates --------------------------------------------------------------------------------
     def depth_per_pressure(self, state: WearState, cycles: float = 0.0) -> tuple[Array, Array]:
-        """Depth per pressure of both bodies over a step from ``state``, each ``(t, nx, ny)``.
+        """Return the depth per pressure of both bodies over a step, ``(t, nx, ny)`` each.
 
-        In mm/MPa and mean cycle. Laws that change with energy take that of the state and that
-        expected after so many cycles at its pressures.
+        In mm/MPa per mean cycle. Laws that change with energy receive the energy of the state and
+        that expected after ``cycles`` at its pressures.
         """
         surfaces, (law_1, law_2) = state.surfaces, self.laws
         work_1, work_2 = (cycles * work for work in self._work(state.starts))
@@ -185,7 +210,7 @@ class WearingContact:
     def _by_mission(
         self, law: WearLaw, work: tuple[Array, Array], energies: tuple[float, float]
     ) -> Array:
-        """Depth per pressure of one body: each mission of a mix for itself, by its share."""
+        """Return the depth per pressure of one body, each mission separately and by its share."""
         loads, slip = self.sliding.loads, self.sliding.slip
         parts = [
             law.depth_per_pressure(SlidingConditions(slip[mission], self.friction, work, energies))
@@ -195,12 +220,12 @@ class WearingContact:
         return depth
 
     def stable_cycles(self, state: WearState, cycles: float = 0.0) -> float:
-        """Longest explicit step that does not make a roughness of the grid's shortest waves grow.
+        """Return the longest explicit step in which the shortest waves of the grid do not grow.
 
-        A mode of compliance λ is multiplied by 1 - w ΔN/λ per step, w being the depth of both
-        bodies per pressure and cycle over all increments that press there; the limit is
-        w ΔN = 2 λ_min. Where the last pressures are unknown all increments count. Laws that change
-        with energy are those of a step of ``cycles``.
+        A mode of compliance λ is multiplied by 1 - w ΔN/λ per step, where w is the depth of both
+        bodies per pressure and cycle over all increments that press there. The limit is w ΔN = 2
+        λ_min. Where the last pressures are unknown all increments count. Laws that change with
+        energy are those of a step of ``cycles``.
         """
         per_pressure = np.add(*self.depth_per_pressure(state, cycles))
         for t, start in state.starts.items():
@@ -210,16 +235,17 @@ class WearingContact:
         return 2.0 * softest / fastest if fastest > 0.0 else np.inf
 
     def comparable_cycles(self, state: WearState) -> float:
-        """How long a step of second order may be for two halves of it to tell its error.
+        """Return the longest second-order step whose halves still show its error [cycles].
 
-        One of first order may be twice as long.
+        A step of first order may be twice as long. The result is infinite if all increments are the
+        same: these may wear together.
 
-        Increments wear one after the other. A step in which one of them presses away waves as long
-        as the contact leaves the surfaces to the last one, whatever its length: with the compliance
-        λ = L/π E* of a wave of the contact's length L and w of one increment, a step of w ΔN = x λ
-        has an error of order p of about (x/(1 + x))^p. What two halves of it differ from the whole
-        by is then 0.42 times what they say (p = 2, x = 1), or 0.33 times (p = 1, x = 2), and falls
-        beyond. Increments that are all alike may wear together.
+        Increments wear one after the other. In a step in which one of them presses away waves as
+        long as the contact, the last one determines the surfaces whatever the length of the step.
+        With the compliance λ = L/π E* of a wave of the contact's length L, and w of one increment,
+        a step with w ΔN = x λ has an error of order p of about (x/(1 + x))^p. The difference
+        between the step and its two halves is then 0.42 times the value expected from the order (p
+        = 2, x = 1), or 0.33 times (p = 1, x = 2), and falls beyond.
         """
         working, sliding = self.dissipating, self.sliding
         wear = np.add(*self.depth_per_pressure(state))
@@ -270,10 +296,10 @@ class WearingContact:
     def implicit_step(
         self, state: WearState, cycles: float, back: bool = False
     ) -> WearStep[WearState]:
-        """Wear ``cycles`` cycles, first order in them, each increment at the pressure it ends with.
+        """Wear ``cycles`` cycles by implicit Euler, each increment at the pressure at its end.
 
-        Increments wear in turn, or in reverse order if ``back``. Stable at any length, at given
-        slips.
+        Increments wear one after the other, in reverse order if ``back``. At given slips the step
+        is stable at any length.
         """
         march = _March(self, state, cycles)
         for t in reversed(self.dissipating) if back else self.dissipating:
@@ -281,7 +307,7 @@ class WearingContact:
         return march.step()
 
     def second_order_step(self, state: WearState, cycles: float) -> WearStep[WearState]:
-        """Wear ``cycles`` cycles, second order in them and stable at any length, at given slips."""
+        """Wear ``cycles`` cycles by a step of second order, stable at any length at given slips."""
         march = _March(self, state, cycles)
         half = 0.5 * cycles
         for t in reversed(self.dissipating):
@@ -298,7 +324,10 @@ class WearingContact:
         start: NormalStart | None,
         compliance: Array | None = None,
     ) -> NormalState:
-        """Contact state of one increment; ``compliance`` ``(nx, ny)`` [mm/MPa] is wear."""
+        """Return the contact state of one increment, with wear as a ``compliance`` if given.
+
+        ``compliance`` is ``(nx, ny)`` [mm/MPa].
+        """
         state = self.contact.solve(
             self.sliding.gap(surfaces, increment),
             **self.sliding.drive.pressing(self.sliding.loads, increment),
@@ -317,7 +346,7 @@ class WearingContact:
         pressure_cycles: Array,
         per_pressure: tuple[Array, Array],
     ) -> Surfaces:
-        """The surfaces after the pressure times cycles [MPa] of an increment."""
+        """Return the surfaces after wear by the pressure times cycles [MPa] of an increment."""
         wear_1, wear_2 = (body[increment] * pressure_cycles for body in per_pressure)
         work = self._dissipated(increment, pressure_cycles)
         return surfaces.worn(
@@ -325,7 +354,7 @@ class WearingContact:
         )
 
     def _on_body_1(self, increment: int, field: Array) -> Array:
-        """What the contact leaves behind on body 1's own surface, passing over it."""
+        """Return a field of the contact as distributed over the passing surface of body 1."""
         passages = self.sliding.passages
         if passages is None:
             return field
@@ -335,13 +364,13 @@ class WearingContact:
             raise ContactFailure(f"increment {increment + 1}: {error}") from error
 
     def _dissipated(self, increment: int, pressure: Array) -> Array:
-        """Energy per area ``(nx, ny)`` [N/mm] of an increment of a mean cycle."""
+        """Return the energy per area ``(nx, ny)`` [N/mm] of an increment of a mean cycle."""
         share = float(self.sliding.loads.share[increment])
         work: Array = share * self.friction * self.sliding.slip[increment] * pressure
         return work
 
     def _work(self, starts: Starts) -> tuple[Array, Array]:
-        """Energy per area of both bodies' surfaces and mean cycle, at the given pressures."""
+        """Return the energy per area of both surfaces in a mean cycle, at the given pressures."""
         work_1 = work_2 = np.zeros(self.grid.shape)
         for t, start in starts.items():
             work = self._dissipated(t, start.pressure)
@@ -350,7 +379,7 @@ class WearingContact:
 
 
 class _March:
-    """A step under way: surfaces, starts and what it has taken so far."""
+    """A wear step in progress: its surfaces, starting points and cost so far."""
 
     def __init__(self, contact: WearingContact, state: WearState, cycles: float) -> None:
         self.surfaces = state.surfaces
@@ -360,7 +389,7 @@ class _March:
         self._spent = Spent(steps=1)
 
     def solve(self, increment: int, cycles: float) -> NormalState:
-        """Contact whose wear over ``cycles`` is part of its gap."""
+        """Return the contact state whose wear over ``cycles`` is part of its gap."""
         wear_1, wear_2 = (body[increment] for body in self._per_pressure)
         state = self._contact.solve(
             self.surfaces, increment, self._starts.get(increment), (wear_1 + wear_2) * cycles
@@ -377,13 +406,13 @@ class _March:
         )
 
     def two_stages(self, increment: int, cycles: float) -> None:
-        """Alexander's method on one increment."""
+        """Take Alexander's method on one increment."""
         stage = GAMMA * cycles
         self.wear(increment, self.solve(increment, stage), cycles - stage)
         self.wear(increment, self.solve(increment, stage), stage)
 
     def step(self) -> WearStep[WearState]:
-        """The step taken."""
+        """Return the completed step."""
         before, after = self._before.surfaces, self.surfaces
         lost = after.depth_1 - before.depth_1, after.depth_2 - before.depth_2
         area = self._contact.grid.cell_area

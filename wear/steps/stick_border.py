@@ -1,20 +1,20 @@
-"""What whole cells leave of wear in partial slip: the place of the border of the stick zone.
+"""Error of wear in partial slip due to whole cells: the position of the border of the stick zone.
 
-Where a contact slips it wears until nothing presses there any more; where it sticks it never wears
-(Popov 2014, doi:10.1038/srep03749; Dimaki et al. 2014, Int. J. Solids Struct. 51, 4215). In the end
-the zone that always sticks carries all the load, as a punch with a singular pressure at its border,
-and its width decides on the wear around it. Slip close to the border is small, so that this counts
-only once the cells there have lost their pressure. On a grid the zone consists of whole cells, and
-presses as one with another border, for two reasons:
+Where a contact slips it wears until it carries no pressure; where it sticks it never wears (Popov
+2014, doi:10.1038/srep03749; Dimaki et al. 2014, Int. J. Solids Struct. 51, 4215). In the end the
+zone that always sticks carries all the load, as a punch with a singular pressure at its border, and
+its width determines the wear around it. Slip close to the border is small, so that this error only
+matters once the cells there have lost their pressure. On a grid the zone consists of whole cells,
+and acts as one with another border, for two reasons:
 
-- Cells stick or slip as a whole. Where the border is that they stand for is told by the reserve
-  µp - |q| of the unworn contact, whose square falls to zero linearly there (Cattaneo and Mindlin).
-  Where wear moves the border it does so cell by cell, until those left stick.
-- A punch of whole cells presses as a narrower one (:data:`EDGE`). That only matters where the
-  border is still the unworn one: one that has moved is where such a punch sticks.
+- Cells stick or slip as a whole. The true border follows from the reserve µp - |q| of the unworn
+  contact, whose square falls to zero linearly there (Cattaneo and Mindlin). Where wear moves the
+  border, it does so cell by cell, until those left stick.
+- A punch of whole cells acts as a narrower one (:data:`EDGE`). This only matters where the border
+  is still the unworn one: one that has moved is where such a punch sticks.
 
-How much wear depends on the border is found by two short lives at the last slips: one in which the
-zone sticks, and one in which the cells next to it stick as well.
+The sensitivity of wear to the border is found by two probe runs at the last slips: in one the zone
+sticks, in the other the cells next to it stick as well.
 """
 
 from __future__ import annotations
@@ -31,25 +31,29 @@ from wear.steps.stepping import WearingContact, WearState
 from wear.surfaces import Surfaces
 
 EDGE = 0.1746
-"""By how much of a cell a flat punch of cells is narrower than these at either side: the limit of
-many cells in the plane, from the force at a given indentation. Crossings of both axes counted, it
-holds for a circle too (0.11 of a cell by them, 0.12 found)."""
+"""Width, in cells, by which a flat punch of whole cells acts narrower on either side. It is the
+limit of many cells in two dimensions, from the force at a given indentation. For a circle, counted
+along both axes, it predicts 0.11 of a cell where 0.12 was found.
+"""
 
-PLACED = 0.04
-"""How well the border is known, in cells: root mean square over 18 spheres and cylinders of 5 to 27
-cells from the middle of the zone to its border."""
+BORDER_ERROR = 0.04
+"""Uncertainty of an unworn border, in cells: root mean square over 18 spheres and cylinders with 5
+to 27 cells from the middle of the zone to its border.
+"""
 
-ROUNDED, ALIKE = 12.0**-0.5, 8
-"""How well that is known of a border that wear has moved, by one cell after the other until those
-left stick: root mean square of a place somewhere in a cell. So many of the zone's borders are at
-the same place by symmetry."""
+MOVED_BORDER_ERROR, SYMMETRIC_BORDERS = 12.0**-0.5, 8
+"""Uncertainty of a border that wear has moved cell by cell, in cells: the root mean square of a
+position anywhere in a cell. By symmetry up to this number of the zone's borders share their error.
+"""
 
 STICKING = 1e-6
-"""A cell that slips has no reserve but for rounding, in shares of the largest µp."""
+"""Reserve, over the largest µp, up to which a cell slips: it is 0 but for rounding."""
 
-FITTED, LEAST = 8, 3
-"""Cells inward of the border that tell where it is, the outermost left out, and the fewest of them.
-Its own reserve is that of no place in particular, since shear and pressure are singular there."""
+FITTED_CELLS, FEWEST_CELLS = 8, 3
+"""Number of cells inside the border from which its position is fitted, and the fewest of them. The
+outermost cell is left out: shear and pressure are singular there, so that its reserve belongs to no
+definite position.
+"""
 
 
 def border_errors(
@@ -58,7 +62,9 @@ def border_errors(
     cycles: tuple[CycleTractions, CycleTractions],
     worn: float,
 ) -> dict[str, float]:
-    """Return by how much the largest ``depth`` and the ``volume`` are too large, relative.
+    """Return the relative errors of the largest ``depth`` and of the ``volume`` due to the border.
+
+    Positive errors mean too much wear.
 
     Parameters
     ----------
@@ -67,35 +73,35 @@ def border_errors(
     cycles
         Its tractions before and after wear.
     worn
-        How many cycles it has worn.
+        Number of cycles that it has worn.
 
     Returns
     -------
     dict
-        The sign is that of what the border's place is found to make; the size has besides what that
-        is uncertain by. 0 where no zone sticks all the time beside places that wear.
+        The sign is that of the estimated error. The size also contains its uncertainty. It is 0
+        where no zone that always sticks lies next to worn cells.
 
     Raises
     ------
     ContactFailure
-        If one of the short lives does not converge.
+        If one of the probe runs does not converge.
     """
     none = {"depth": 0.0, "volume": 0.0}
     if not state.surfaces.depth.any():
         return none
     (before, reserve), (stuck, _) = map(_always_stuck, cycles)
     wears = ~stuck & (state.surfaces.depth > 0.0)
-    ring = _next_to(stuck) & wears
+    ring = _neighbours(stuck) & wears
     if not ring.any():
         return none
     slip = _slip_everywhere(cycles)
-    few, _ = _lived(contact, state, np.where(stuck, 0.0, slip), worn)
-    more, held = _lived(contact, state, np.where(stuck | ring, 0.0, slip), worn)
+    few, _ = _probe_run(contact, state, np.where(stuck, 0.0, slip), worn)
+    more, held = _probe_run(contact, state, np.where(stuck | ring, 0.0, slip), worn)
     now, most = (sum(float(p[t][ring].sum()) for t in held) for p in (cycles[1].pressure, held))
     gone = float(np.clip(1.0 - now / most, 0.0, 1.0)) if most > 0.0 else 1.0
-    axes = [_too_wide(reserve, before, stuck, wears)]
+    axes = [_excess_width(reserve, before, stuck, wears)]
     if not contact.grid.line:
-        axes.append(_too_wide(reserve.T, before.T, stuck.T, wears.T))
+        axes.append(_excess_width(reserve.T, before.T, stuck.T, wears.T))
     wide, uncertain = np.mean(axes, axis=0)
     size = gone * float(np.hypot(wide, uncertain))
     share = float(np.copysign(size, wide)) / np.count_nonzero(ring)
@@ -106,7 +112,7 @@ def border_errors(
 
 
 def _always_stuck(cycle: CycleTractions) -> tuple[Mask, Array]:
-    """Cells that stick in every increment that presses, and their least reserve [MPa]."""
+    """Return the cells that stick in every loaded increment, and their least reserve [MPa]."""
     pressing = cycle.loads.P > 0.0
     limit = cycle.friction * cycle.pressure[pressing]
     shear = np.hypot(*cycle.shear[pressing].swapaxes(0, 1))
@@ -114,35 +120,35 @@ def _always_stuck(cycle: CycleTractions) -> tuple[Mask, Array]:
     return reserve > STICKING * limit.max(), reserve
 
 
-def _next_to(zone: Mask) -> Mask:
-    """Cells beside those of a ``zone``, along either axis."""
+def _neighbours(zone: Mask) -> Mask:
+    """Return the cells next to a ``zone`` along either axis."""
     from scipy import ndimage
 
-    beside: Mask = ndimage.binary_dilation(zone) & ~zone
-    return beside
+    neighbours: Mask = ndimage.binary_dilation(zone) & ~zone
+    return neighbours
 
 
-def _too_wide(reserve: Array, before: Mask, stuck: Mask, wears: Mask) -> tuple[float, float]:
-    """By how many cells the zone that ``stuck`` presses as one too wide, and how uncertain that is.
+def _excess_width(reserve: Array, before: Mask, stuck: Mask, wears: Mask) -> tuple[float, float]:
+    """Return by how many cells the ``stuck`` zone acts too wide, and the uncertainty.
 
-    By its borders across the first axis, beside cells that wear. ``reserve`` is that of the unworn
-    cycle, and tells where borders are that are still where they were ``before``.
+    Only borders across the first axis next to worn cells count. ``reserve``, that of the unworn
+    cycle, gives the position of borders that are still where they were ``before``.
     """
     wide, still, moved = 0.0, 0, 0
-    for cells, beyond in _ends(stuck):
+    for cells, beyond in _borders(stuck):
         if not wears[beyond]:
             continue
         if before[beyond] or not before[cells[0], beyond[1]]:
             moved += 1
             continue
-        wide -= EDGE + _beyond(reserve[cells[1 : 1 + FITTED], beyond[1]] ** 2)
+        wide -= EDGE + _border_offset(reserve[cells[1 : 1 + FITTED_CELLS], beyond[1]] ** 2)
         still += 1
-    rounded = ROUNDED * float(np.sqrt(moved * min(moved, ALIKE)))
-    return wide, float(np.hypot(PLACED * still, rounded))
+    rounded = MOVED_BORDER_ERROR * float(np.sqrt(moved * min(moved, SYMMETRIC_BORDERS)))
+    return wide, float(np.hypot(BORDER_ERROR * still, rounded))
 
 
-def _ends(stuck: Mask) -> Iterator[tuple[NDArray[np.intp], tuple[int, int]]]:
-    """Cells of every run along the first axis from either end of it, and the cell beyond that."""
+def _borders(stuck: Mask) -> Iterator[tuple[NDArray[np.intp], tuple[int, int]]]:
+    """Yield the cells of every run along the first axis from either end, and the cell beyond it."""
     count = len(stuck)
     for line in np.flatnonzero(stuck.any(axis=0)):
         cells = np.flatnonzero(stuck[:, line])
@@ -152,12 +158,13 @@ def _ends(stuck: Mask) -> Iterator[tuple[NDArray[np.intp], tuple[int, int]]]:
                     yield inward, (int(beyond), int(line))
 
 
-def _beyond(squares: Array) -> float:
-    """How many cells beyond the border of the zone ``squares`` are 0, of cells inward from it.
+def _border_offset(squares: Array) -> float:
+    """Return how many cells beyond the border of the zone the reserve vanishes, from -1 to 1.
 
-    The first is that of the second cell; -1 to 1, and 0 where these are too few to tell.
+    ``squares`` are the squared reserves of cells inward from the second one. The result is 0 if
+    there are too few of them.
     """
-    if len(squares) < LEAST:
+    if len(squares) < FEWEST_CELLS:
         return 0.0
     inward = np.arange(len(squares)) + 1.5
     zeros = np.roots(np.polyfit(-inward, squares, 2))
@@ -166,10 +173,10 @@ def _beyond(squares: Array) -> float:
 
 
 def _slip_everywhere(cycles: tuple[CycleTractions, CycleTractions]) -> Array:
-    """Slip of either cycle ``(t, nx, ny)`` [mm], and where neither has any the largest.
+    """Return the larger slip of both cycles ``(t, nx, ny)`` [mm], without gaps.
 
-    Surfaces that wear has parted have none in the last cycle, nor those that have yet to meet in
-    the first.
+    Cells without slip in either cycle get the largest slip: surfaces that wear has parted do not
+    slip in the last cycle, and those that have yet to meet do not slip in the first.
     """
     slip = np.maximum(*(acting_slip(cycle.slip, cycle.loads) for cycle in cycles))
     path = slip.sum(axis=0)
@@ -178,12 +185,12 @@ def _slip_everywhere(cycles: tuple[CycleTractions, CycleTractions]) -> Array:
     return everywhere
 
 
-def _lived(
+def _probe_run(
     contact: WearingContact, state: WearState, slip: Array, cycles: float
 ) -> tuple[Array, dict[int, Array]]:
-    """Worn depth ``(nx, ny)`` [mm] after one implicit step over all ``cycles`` at given slips.
+    """Run a probe: one implicit step over all ``cycles`` from the unworn surfaces at given slips.
 
-    And the pressures of its increments [MPa].
+    Return the worn depth ``(nx, ny)`` [mm] and the pressures of the increments [MPa].
     """
     unworn = Surfaces.unworn(state.surfaces.initial_gap)
     begun = replace(state, surfaces=unworn, starts={}, coarse=None)

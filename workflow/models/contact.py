@@ -14,8 +14,9 @@ from sa_solver import checks
 from sa_solver.half_space.operator import HalfSpace
 from sa_solver.normal.contact import NormalContact
 from sa_solver.types import Array, ElasticPair, Grid, LoadHistory, Material
-from wear.contact.interface import InterfaceContact, InterfaceSettings, InterfaceState
+from wear.contact.interface import InterfaceContact, InterfaceState
 from wear.contact.link import Link
+from wear.contact.settings import InterfaceSettings
 from wear.contact.tractions import CycleTractions
 from wear.coupled import CoupledSettings, JumpSize, Stop
 from wear.evolution import CoulombFriction

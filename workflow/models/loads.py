@@ -11,7 +11,7 @@ import numpy as np
 
 from fe_models.meshes.structure_mesh import Face
 from sa_solver.types import Array, Frame, Grid, Indices
-from wear import coupled
+from wear import load_sources
 from wear.contact.drive import Drive
 from wear.contact.face_loads import CycleLoads, FaceLoads
 
@@ -96,7 +96,7 @@ class UserFace:
     points: Array | None = None
 
 
-class LoadSource(coupled.LoadSource, Protocol):
+class LoadSource(load_sources.LoadSource, Protocol):
     """A source of loads for the coupled loop, with what a run asks of it beside that."""
 
     @property

@@ -1,4 +1,4 @@
-"""A friction contact that its tests lead along paths, and what answers beside it."""
+"""Paths of a friction contact in tests, and independent solutions for them."""
 
 from __future__ import annotations
 
@@ -16,20 +16,20 @@ LIFT = LOAD / KN  # lift at which the preload is gone
 
 
 def one(law, state, increment):
-    """Force, state, energy and tangent of a single joint."""
+    """Return force, state, energy and tangent of a single joint."""
     answer = law.respond(np.atleast_2d(state), np.atleast_2d(np.asarray(increment, float)))
     return answer.force[0], answer.state[0], answer.dissipated[0], answer.tangent[0]
 
 
 def derivative(law, state, increment):
-    """Force and its derivative with respect to state and increment, from the scalar kernel."""
+    """Return force and its derivative by state and increment, from the scalar kernel."""
     force, end, jacobian = np.empty(3), np.empty(3), np.empty((3, 6))
     advance_contact(law.parameters[0], np.asarray(state, float), increment, force, end, jacobian)
     return force, jacobian
 
 
 def central(law, state, increment, step=1e-6 * REACH):
-    """The same derivative by central differences."""
+    """Return the same derivative by central differences."""
     at = np.concatenate([state, increment])
     columns = []
     for change in step * np.eye(6):
@@ -40,7 +40,7 @@ def central(law, state, increment, step=1e-6 * REACH):
 
 
 def random_path(seed, points, size=3.0 * REACH, lift=1.6 * LIFT):
-    """Points ``(points, 3)`` of a random polygon that sticks, slips, lifts off and touches."""
+    """Return a random polygon ``(points, 3)`` that sticks, slips, lifts off and touches."""
     rng = np.random.default_rng(seed)
     return rng.uniform(-1.0, 1.0, (points, 3)) * [size, size, lift]
 
@@ -52,14 +52,14 @@ def lead(law, path, state=None, start=(0.0, 0.0, 0.0)):
 
 
 def split(path, parts):
-    """A polygon from the origin with every side cut into equal parts."""
+    """Return a polygon from the origin with every side cut into equal parts."""
     share = np.arange(1, parts + 1)[:, None] / parts
     corners = np.vstack([np.zeros(3), path])
     return np.vstack([a + share * (b - a) for a, b in pairwise(corners)])
 
 
 def brute_force(path, steps):
-    """Radial return in ``steps`` tiny steps per side: tangential force at every corner, energy."""
+    """Return the tangential force at every corner and the energy, by tiny radial returns."""
     x = y = lost = 0.0
     forces = []
     for a, b in pairwise(np.vstack([np.zeros(3), path])):

@@ -1,4 +1,4 @@
-"""Wear functions and joints of the two papers, in N mm and N/mm; what they state is in J and kJ."""
+"""Wear functions and joints of the two papers, in N mm and N/mm; the papers use J and kJ."""
 
 from wear.joints.bouc_wen import BoucWen
 from wear.joints.evolution import (
@@ -23,7 +23,7 @@ RIG_AMPLITUDE = 7e-3
 
 
 def bolted(a1: float, a2: float, a3: float, b1: float, b2: float) -> JointEvolution:
-    """Li 2020, table 3 with the coefficients of table A2."""
+    """Return Li 2020, table 3 with the coefficients of table A2."""
     slow, fast = -0.3 / KJ, -5.0 / KJ
     return JointEvolution(
         stiffness=ExponentialEvolution(a2, slow, b1, fast),

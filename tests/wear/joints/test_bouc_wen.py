@@ -1,4 +1,4 @@
-"""Bouc and Wen's joint against closed forms and an independent integration, and what it forgets."""
+"""Bouc-Wen joint against closed forms and an independent integration, and limits of its memory."""
 
 from dataclasses import replace
 
@@ -56,7 +56,7 @@ def test_unloading_branch_is_straight_until_no_force(exponent):
         np.testing.assert_allclose(response.force, exact, atol=1e-12 * LIMIT)
         assert response.tangent[0, 0, 0] == pytest.approx(40e3, rel=1e-12)
         assert response.dissipated[0] == 0.0
-    # Beyond, it loads the other way: for n = 2 as tanh.
+    # Beyond that it loads in the other direction, for n = 2 as tanh.
     if exponent == 2.0:
         beyond = law.respond(loaded.state, np.full((1, 1), -(xi + 0.7) * REACH))
         assert beyond.state[0, 1] == pytest.approx(-np.tanh(0.7), rel=1e-12)
@@ -81,7 +81,7 @@ def test_any_shape_against_an_independent_integration(sigma, exponent, kind):
         def zero(_, y):
             return y[0]
 
-        # Stopped at ξ = 0, where the rate has a corner, and begun anew.
+        # The integration is restarted at ξ = 0, where the rate has a corner.
         zero.terminal = True
         y, s, rest = [xi, 0.0], 0.0, abs(end - start) / REACH
         while s < rest:
@@ -99,14 +99,14 @@ def test_any_shape_against_an_independent_integration(sigma, exponent, kind):
 
 @pytest.mark.parametrize("share", [0.01, 0.3, 1.0, 3.0, 40.0])
 def test_energy_of_the_settled_loop(share):
-    """ξ + artanh ξ = 2 K A/µN at its ends, energy -(µN)²/K (ξ² + ln(1 - ξ²))."""
+    """At its ends ξ + artanh ξ = 2 K A/µN, and the energy is -(µN)²/K (ξ² + ln(1 - ξ²))."""
     # With y = artanh ξ, 1 - ξ² = 1/cosh² y keeps its digits in full sliding.
     y = brentq(lambda y: y + np.tanh(y) - 2.0 * share, 0.0, 2.0 * share, xtol=1e-15, rtol=1e-14)
     log = -2.0 * (y + np.log1p(np.exp(-2.0 * y)) - np.log(2.0))
     exact = -LIMIT * REACH * (np.tanh(y) ** 2 + log)
     scale = LIMIT * REACH
     assert LAW.loop_energy(share * REACH) == pytest.approx(exact, rel=1e-10, abs=1e-14 * scale)
-    # Marched until the loop has closed: a small one takes many cycles.
+    # March until the loop has closed: a small loop takes many cycles.
     history = lead(LAW, np.tile([share, -share], 3000) * REACH)
     assert history.dissipated[-2:].sum() == pytest.approx(exact, rel=1e-4, abs=1e-14 * scale)
 
@@ -122,7 +122,10 @@ def test_loop_energy_is_that_of_a_marched_loop(sigma, exponent):
 
 @pytest.mark.parametrize(("energy", "lost"), [(1000.0, 1.30), (2800.0, 1.34)])
 def test_worn_loop_of_the_friction_rig(energy, lost):
-    """Fantetti 2019, test 1 at ± 7 µm: energy per cycle [mJ], to two digits, after ``energy`` J."""
+    """Fantetti 2019, test 1 at ± 7 µm, gives the energy per cycle [mJ] after ``energy`` J.
+
+    The paper prints two digits.
+    """
     worn = BoucWen(
         stiffness=27.3e3 * (1.0 + 1.32 * np.exp(-150.0 / energy)),
         friction=0.11 * (1.0 + 0.26 * np.log(1.3e9 * energy + 1.0)),
@@ -133,10 +136,10 @@ def test_worn_loop_of_the_friction_rig(energy, lost):
 
 
 def test_small_loops_under_a_force_do_not_close():
-    """The limit of the law: each ripple of s lets ξ fall by s ξ², so 1/ξ grows by s.
+    """Each ripple of s lowers ξ by s ξ², so that 1/ξ grows by s: this is a limit of the law.
 
-    Of a small ripple back and forth, -s and then ∫(1 - ξ²) ds, the loss ∫ ξ² ds is left. An Iwan
-    joint comes back to where it was.
+    A small ripple back and forth is -s and then ∫(1 - ξ²) ds, so that ∫ ξ² ds is lost. An Iwan
+    joint returns to where it was.
     """
     drifts = []
     for s in (0.02, 0.01):
@@ -147,7 +150,7 @@ def test_small_loops_under_a_force_do_not_close():
         drifts.append(growth / (50 * s))
         assert rippled.force[-1, 0, 0] < loaded.force[-1, 0, 0] - 0.1 * LIMIT
     errors = np.abs(np.array(drifts) - 1.0)
-    # First order in the size of the ripple.
+    # The error is of first order in the size of the ripple.
     assert errors[0] < 0.05
     assert errors[1] == pytest.approx(errors[0] / 2.0, rel=0.2)
     iwan = UniformIwan(40e3, 0.5, 60.0, 900.0)

@@ -1,4 +1,4 @@
-"""Compiled functions that are kept notice what they call."""
+"""Cached compiled functions that depend on functions in other files."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ ASKED = "from kernels.doubled import doubled; print(doubled())"
 
 @pytest.mark.slow
 def test_a_changed_function_is_compiled_into_those_that_call_it(tmp_path):
-    """The file of the caller stays as it is, and numba alone would take what it kept."""
+    """The file of the caller does not change, and numba alone would use its cache."""
     package = tmp_path / "kernels"
     package.mkdir()
     (package / "__init__.py").touch()
@@ -43,7 +43,7 @@ def test_a_changed_function_is_compiled_into_those_that_call_it(tmp_path):
     for second, value in enumerate((3.0, 3.0, 5.0)):
         slope = package / "slope.py"
         slope.write_text(SLOPE.format(value=value), encoding="utf-8")
-        # Python tells a changed file of the same length by the second that it was written in.
+        # Python recognises a changed file of the same length by the second of its time stamp.
         os.utime(slope, (2 * second, 2 * second))
         ended = subprocess.run(
             [sys.executable, "-c", ASKED],
@@ -58,5 +58,5 @@ def test_a_changed_function_is_compiled_into_those_that_call_it(tmp_path):
 
 
 def test_kernels_of_joints_are_kept_by_the_version_of_their_package():
-    assert compiled.KEPT.name.endswith(compiled.version_of(Path(compiled.__file__).parent))
-    assert advance_jenkins.stats.cache_path.startswith(str(compiled.KEPT))
+    assert compiled.CACHE_FOLDER.name.endswith(compiled.version_of(Path(compiled.__file__).parent))
+    assert advance_jenkins.stats.cache_path.startswith(str(compiled.CACHE_FOLDER))

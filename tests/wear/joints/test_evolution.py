@@ -1,4 +1,4 @@
-"""Wear functions of energy: their forms, the papers' values, and what they do to a law."""
+"""Wear functions of energy: their forms, the papers' values, and their effect on a law."""
 
 from dataclasses import dataclass, replace
 
@@ -28,7 +28,7 @@ TABLE = TabulatedEvolution((1e3, 3e3, 4e3), (10.0, 30.0, 5.0))
 
 @dataclass(frozen=True)
 class Law:
-    """Any law."""
+    """A law with some parameters."""
 
     stiffness: float | Array = 100.0
     friction: float | Array = 0.5
@@ -44,7 +44,7 @@ def test_forms_are_factors_that_start_at_one(form) -> None:
     energies = np.array([[0.0, 1.5], [1e3, 2.8e6]])
     assert form(energies).shape == (2, 2)
     np.testing.assert_array_equal(form(energies), [[form(e) for e in row] for row in energies])
-    # No energy is too small or too large for a number.
+    # The functions are finite for the smallest and the largest energies.
     assert np.all(np.isfinite(form(np.array([5e-324, 1e-300, 1e12]))))
 
 
@@ -68,12 +68,12 @@ def test_forms_end_where_they_must() -> None:
 @pytest.mark.parametrize(
     ("make", "complaint"),
     [
-        (lambda: LogarithmicEvolution(0.2, -1.0), "rate = -1"),
-        (lambda: ArrheniusEvolution(0.2, 0.0), "scale = 0"),
-        (lambda: ExponentialEvolution(0.7, 0.3), "rate = 0.3"),
-        (lambda: ExponentialEvolution(0.7, -0.3, 0.5, 5.0), "second_rate = 5"),
+        (lambda: LogarithmicEvolution(0.2, -1.0), "rate is -1"),
+        (lambda: ArrheniusEvolution(0.2, 0.0), "scale is 0"),
+        (lambda: ExponentialEvolution(0.7, 0.3), "rate is 0.3"),
+        (lambda: ExponentialEvolution(0.7, -0.3, 0.5, 5.0), "second_rate is 5"),
         (lambda: TabulatedEvolution((), ()), "0 energies and 0 factors"),
-        (lambda: TabulatedEvolution((1.0, 1.0), (1.0, 2.0)), "do not ascend"),
+        (lambda: TabulatedEvolution((1.0, 1.0), (1.0, 2.0)), "must ascend"),
     ],
 )
 def test_what_makes_no_sense_is_refused(make, complaint) -> None:
@@ -134,7 +134,7 @@ def test_kinks_are_those_of_the_tables() -> None:
 
 
 def test_rig_as_printed() -> None:
-    """Fantetti: µ(2800 J) 0.937, kt(2800 J) 61.5 N/µm; one cycle of 1.5 mJ gives µ 0.52."""
+    """Fantetti has µ(2800 J) = 0.937, kt(2800 J) = 61.5 N/µm, and µ = 0.52 after 1.5 mJ."""
     new, worn = (RIG_EVOLUTION.at(RIG, energy) for energy in (0.0, 2800.0 * J))
     assert new == RIG
     assert worn.friction == pytest.approx(0.937, abs=5e-4)
@@ -144,7 +144,7 @@ def test_rig_as_printed() -> None:
 
 
 def test_macroslip_slope_per_joule_would_pass_the_stiffness() -> None:
-    """The misprint: as printed, 2800 J are impossible; per kJ the slope grows to 1.47 N/µm."""
+    """As printed, 2800 J are impossible (a misprint); per kJ the slope grows to 1.47 N/µm."""
     assert RIG_EVOLUTION.at(RIG, 2800.0 * J).residual_stiffness == pytest.approx(1471.0, abs=1.0)
     printed = replace(RIG_EVOLUTION, residual_stiffness=LinearEvolution(0.24 / J))
     values = printed.values(RIG, np.array([200.0, 220.0, 2800.0]) * J)
@@ -156,7 +156,7 @@ def test_macroslip_slope_per_joule_would_pass_the_stiffness() -> None:
     ("test", "final"), [("test2", (0.72, 1.71, 1.16)), ("test4", (0.72, 1.31, 1.12))]
 )
 def test_bolted_joint_between_its_first_and_last_values(test, final) -> None:
-    """Li: preload falls, stiffness and friction rise, all monotonically, to final times initial."""
+    """In Li's joint preload falls, stiffness and friction rise, monotonically to final values."""
     law, evolution, _ = BOLTED[test]
     energies = np.concatenate([[0.0], np.geomspace(J, 100.0 * KJ, 200)])
     values = evolution.values(law, energies)
@@ -169,7 +169,7 @@ def test_bolted_joint_between_its_first_and_last_values(test, final) -> None:
 
 
 def test_bolted_joint_of_test_4_after_2_kj() -> None:
-    """By hand: e^-0.6 = 0.548812, e^-10 = 4.54e-5."""
+    """By hand e^-0.6 = 0.548812 and e^-10 = 4.54e-5."""
     law, evolution, _ = BOLTED["test4"]
     worn = evolution.at(law, 2.0 * KJ)
     assert worn.normal_load == pytest.approx(745.0 * (0.72 + 0.28 * 0.548812), rel=1e-6)

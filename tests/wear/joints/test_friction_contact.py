@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 from numba import njit
 from scipy.integrate import quad, solve_ivp
-
-from tests.wear.joints.friction_paths import (
+from tests.wear.joints.periodic.friction_paths import (
     KN,
     KT,
     LAW,
@@ -26,10 +25,11 @@ from tests.wear.joints.friction_paths import (
     random_path,
     split,
 )
+
 from wear.joints.friction_contact import FrictionContact, advance_contact
-from wear.joints.friction_path import ForcePath
-from wear.joints.friction_path import energy_lost as lost_on_path
 from wear.joints.parameters import JointError
+from wear.joints.periodic.friction_path import ForcePath
+from wear.joints.periodic.friction_path import energy_lost as lost_on_path
 
 # --- what it reduces to -----------------------------------------------------------------------
 
@@ -68,7 +68,7 @@ def test_a_growing_load_catches_the_slider_and_a_falling_one_lets_it_go():
 
 
 def slide(angle, pull, limits):
-    """End of a slip that begins on the circle, at an angle from the pull, by its equation."""
+    """Return the end of a slip that begins on the circle, by integration of its angle."""
     first, last = limits
     change = last - first
 
@@ -193,7 +193,7 @@ def test_tiny_steps_of_radial_return_converge_to_it(seed):
         off = np.abs(forces - history.force[:, 0, :2]).max()
         errors.append((off, abs(lost - history.dissipated.sum())))
     force_errors, energy_errors = np.array(errors).T
-    # First order: ten times as many steps, a tenth of the error.
+    # The reference is of first order: ten times as many steps have a tenth of the error.
     assert np.all(force_errors[1:] < 0.2 * force_errors[:-1])
     assert np.all(energy_errors[1:] < 0.2 * energy_errors[:-1])
     assert force_errors[-1] < 2e-4 * MU * LOAD
@@ -201,7 +201,7 @@ def test_tiny_steps_of_radial_return_converge_to_it(seed):
 
 
 def orbit(steps):
-    """A smooth closed path that sticks, slips, lifts off and touches, in equal times."""
+    """Return a smooth closed path that sticks, slips, lifts off and touches, in equal times."""
     t = 2.0 * np.pi * np.arange(steps + 1) / steps
     x, y = 2.0 * REACH * np.sin(t), 1.5 * REACH * np.sin(2.0 * t + 0.4)
     z = 1.2 * LIFT * np.sin(t + 1.0)
@@ -226,7 +226,7 @@ def test_a_smooth_orbit_converges_with_the_square_of_the_step():
 
 
 def kinks(state, increment):
-    """Where on a path the force may have a kink: touch, lift-off, begin of slip."""
+    """Return where on a path the force may have a kink: touch, lift-off, beginning of slip."""
     pull, limit = KT * increment[:2], MU * np.array([KN * increment[2], LOAD + KN * state[2]])
     stuck = sum(np.polymul([k, t], [k, t]) for k, t in zip(pull, KT * state[:2], strict=True))
     roots = np.append(np.roots(limit), np.roots(np.polysub(stuck, np.polymul(limit, limit))))
@@ -291,7 +291,7 @@ SITUATIONS = {
 
 
 @pytest.mark.parametrize("name", SITUATIONS)
-def test_derivatives_in_every_state_and_beside_every_switch(name):
+def test_derivatives_in_every_state_and_next_to_every_transition(name):
     state, increment = (np.array(part) * [REACH, REACH, LIFT] for part in SITUATIONS[name])
     force, jacobian = derivative(LAW, state, increment)
     np.testing.assert_array_equal(force, one(LAW, state, increment)[0])
@@ -313,7 +313,7 @@ def test_derivatives_of_random_increments():
 
 
 def test_derivative_of_a_whole_march():
-    """The chain of the kernel's derivatives is that of all forces by all displacements."""
+    """Chaining the kernel's derivatives gives that of all forces by all displacements."""
     path, shift = orbit(24), 1e-7 * REACH
     start = np.array([0.0, 0.0, path[0, 2]])
     rng = np.random.default_rng(3)
@@ -362,7 +362,7 @@ def test_many_joints_answer_as_each_alone():
 
 @njit
 def compiled_march(parameters, state, increments, forces):
-    """A march in one compiled loop, the state advanced in place."""
+    """March in one compiled loop that advances the state in place."""
     lost, jacobian = 0.0, np.empty((3, 6))
     for step in range(len(increments)):
         lost += advance_contact(parameters, state, increments[step], forces[step], state, jacobian)
@@ -413,10 +413,10 @@ def test_parameters_that_cannot_be_are_refused():
 @pytest.mark.parametrize("angle", [1e-6, 0.01, 0.5, 0.7, 1.5, 3.0, 3.14159])
 @pytest.mark.parametrize("pull", [1e-3, 0.3, 1.0, 5.0, 80.0])
 def test_energy_of_a_force_that_turns_under_a_constant_limit(angle, pull):
-    """R² ln(sin ψ0 / sin ψ1), where tan(ψ/2) falls by exp(-L)."""
+    """The energy is R² ln(sin ψ0 / sin ψ1), where tan(ψ/2) falls by exp(-L)."""
     path = ForcePath(2.0 * np.cos(angle), 2.0 * np.sin(angle), 2.0 * pull, 0.0, 2.0, 2.0)
     before = np.tan(0.5 * angle)
-    # Inwards it holds first, until the chord leaves the circle: ψ becomes π - ψ.
+    # Pulled inward the slider holds until the chord leaves the circle: ψ becomes π - ψ.
     held = min(max(-2.0 * np.cos(angle) / pull, 0.0), 1.0)
     if held > 0.0:
         before = 1.0 / before

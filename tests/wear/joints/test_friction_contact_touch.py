@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-
-from tests.wear.joints.friction_paths import (
+from tests.wear.joints.periodic.friction_paths import (
     KN,
     KT,
     LAW,
@@ -18,6 +17,7 @@ from tests.wear.joints.friction_paths import (
     one,
     random_path,
 )
+
 from wear.joints.friction_contact import FrictionContact
 
 
@@ -82,7 +82,7 @@ def test_the_force_is_continuous_where_contact_is_lost_and_found():
 @pytest.mark.parametrize("pull", [0.0, 1e-15, 1e-9, 1e-3, 1.0, 1e4])
 @pytest.mark.parametrize("held", [0.0, 1e-6, 1.0])
 def test_a_limit_that_all_but_vanishes(left, pull, held):
-    """The begin of slip and the end of the path are then one rounding error apart."""
+    """The beginning of slip and the end of the path are then one rounding error apart."""
     state = [0.6 * held * REACH, 0.8 * held * REACH, 0.0]
     for way in ([1.0, 0.0], [-0.6, -0.8]):
         increment = np.array([*(pull * REACH * np.array(way)), -LIFT * (1.0 - left)])

@@ -1,4 +1,4 @@
-"""Iwan's joints against closed forms, Jenkins's sliders and Masing's memory."""
+"""Iwan joints against closed forms, Jenkins sliders and Masing's memory."""
 
 from dataclasses import dataclass, replace
 
@@ -23,7 +23,7 @@ RNG_SEED = 7
 
 @dataclass(frozen=True)
 class MasingJenkins(MasingLaw):
-    """Jenkins's element as a joint without spread sliders."""
+    """Jenkins element as a joint without distributed sliders."""
 
     @property
     def spread(self):
@@ -71,7 +71,7 @@ def test_energy_of_the_uniform_loop(share):
         exact = 4.0 * LIMIT * (amplitude - 2.0 * REACH / 3.0)
     lost = lead(UNIFORM, [amplitude, -amplitude, amplitude]).dissipated
     assert lost[1:].sum() == pytest.approx(exact, rel=1e-12)
-    # The first loading loses a quarter of a loop.
+    # First loading dissipates a quarter of a loop.
     assert lost[0, 0] == pytest.approx(exact / 4.0, rel=1e-12)
     assert UNIFORM.loop_energy(amplitude) == pytest.approx(exact, rel=1e-12)
 
@@ -113,7 +113,7 @@ def test_jenkins_as_a_masing_law():
 
 
 def sliders(law, number):
-    """Jenkins's elements of equal stiffness whose limits are spread as the law's."""
+    """Return Jenkins elements of equal stiffness whose limits are distributed as the law's."""
     middles = (np.arange(number) + 0.5) / number
     if isinstance(law, UniformIwan):
         return np.full(number, STIFFNESS / number), middles * REACH
@@ -152,7 +152,7 @@ def test_many_sliders_approach_the_law_at_second_order(law):
 @pytest.mark.parametrize("law", LAWS.values(), ids=LAWS)
 def test_closed_loops_are_forgotten(law):
     a = REACH * np.array([0.9, -0.6, 0.5, -0.2, 0.3, 0.0])
-    # Through the nested loops and out of all of them again, past the first turning point.
+    # Go through the nested loops and out of all of them again, past the first turning point.
     inner = lead(law, [*a, a[4], a[2], a[0], 1.1 * REACH])
     outer = lead(law, [1.1 * REACH])
     np.testing.assert_allclose(inner.force[-1], outer.force[-1], rtol=1e-13)

@@ -1,4 +1,4 @@
-"""Jenkins's element against its closed forms."""
+"""Jenkins element against its closed forms."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""Deviations of joints, increment by increment: they make up the derivative of the whole period."""
+"""Linearised increments of joints, which make up the derivative of the whole period."""
 
 import numpy as np
 import pytest
@@ -28,14 +28,14 @@ LAWS = {
 
 
 def motion(directions, seed):
-    """Coefficients of two joints that move to and fro, with small loops on the way."""
+    """Return coefficients of two joints that move forward and backward, with small loops."""
     sizes = np.array([1e-3, *(1e-2,) * 2, *(4e-3,) * 2, *(3e-3,) * 2])
     random = np.random.default_rng(seed)
     return sizes[None, :, None] * random.standard_normal((2, RESOLUTION.size, directions))
 
 
 def derivative(march, basis, joint):
-    """∂F/∂c ``(t, d, m d)`` of a joint's forces: deviations carried round, so that they repeat."""
+    """Return ∂F/∂c ``(t, d, m d)`` of a joint's forces, from deviations that repeat."""
     times, directions = len(basis), march.tangent.shape[2]
     moved = np.einsum("tm,de->tdme", basis, np.eye(directions)).reshape(times, directions, -1)
     whole, memory = np.eye(march.kept.shape[2]), np.zeros((march.kept.shape[2], moved.shape[2]))
@@ -69,7 +69,7 @@ def test_deviations_make_up_the_derivative_of_the_period(law):
             np.testing.assert_allclose(found, wanted, atol=EXACT * np.abs(wanted).max())
 
 
-def test_what_a_joint_does_is_told_where_it_changes():
+def test_the_regime_of_a_joint_is_reported_where_it_changes():
     joints, basis = PeriodicMarch(LAWS["jenkins"]), RESOLUTION.basis
     coefficients = motion(1, 0)
     cycle = joints.settle(coefficients, basis, RESOLUTION.weights, RESOLUTION.lead)
@@ -81,7 +81,7 @@ def test_what_a_joint_does_is_told_where_it_changes():
 
 @pytest.mark.parametrize("name", ["polynomial", "stop", "stops"])
 def test_elastic_joints_give_back_what_they_take(name):
-    """Along any path to and fro the work is nothing; the tangent is the slope of the force."""
+    """The work along any closed path is 0; the tangent is the slope of the force."""
     law = LAWS[name]
     path = np.array([0.004, -0.02, 0.013, 0.0])[:, None, None]
     fine = np.linspace(0.0, 1.0, 4001)[1:]

@@ -1,6 +1,6 @@
-"""Loops of known laws, synthesised with noise, give their parameters back.
+"""Parameters recovered from loops of known laws, synthesised with noise.
 
-Noise, in standard deviations over the range, is on displacement and force alike.
+Noise, as a standard deviation over the range, is added to displacement and force.
 """
 
 from functools import cache
@@ -34,7 +34,7 @@ NOISE = 0.005
 
 
 def harmonic(amplitude, samples, cycles):
-    """From amid a branch, so that first loading and a part of a cycle at the end are there too."""
+    """Return a harmonic motion from within a branch, with a partial cycle at either end."""
     return amplitude * np.sin(2.0 * np.pi * np.arange(int((cycles + 0.9) * samples)) / samples)
 
 
@@ -78,7 +78,7 @@ def test_clean_loops_give_the_parameters(name, motion):
     measured = loops(name, motion=motion, cycles=3)
     # The windows end at samples, not where sticking does: of Iwan a bit of a parabola is left.
     assert measured.stick_stiffness == pytest.approx(STICK[name], rel=2e-3)
-    # Bouc-Wen's ξ only tends to 1.
+    # ξ of Bouc-Wen only tends to 1.
     assert measured.friction == pytest.approx(FRICTION, rel=2e-3)
     assert measured.residual_stiffness == pytest.approx(RESIDUAL, rel=0.03)
     assert measured.stroke == pytest.approx(2.0 * AMPLITUDE, rel=1e-12)
@@ -144,7 +144,7 @@ def test_contact_stiffness_of_parallel_laws_is_without_the_residual_one():
 
 
 def test_tangent_of_spheres():
-    """Mindlin's loop is no parabola; the tangent misses the 0.4 % that is stated."""
+    """Mindlin's loop is no parabola; the tangent has the stated error of 0.4 %."""
     body = Material(115e3, 0.3)
     sphere = ShearedSphere(400.0, 10.0, body, body, 0.7)
     fall = np.linspace(0.0, 0.95 * sphere.sliding_force, 4000)
@@ -161,7 +161,7 @@ def test_tangent_of_spheres():
 
 
 def test_stuck_and_partly_slipping_loops_say_so():
-    """Up to 2 µN/kt, where the last slider of Iwan's goes, friction is only bounded."""
+    """Up to 2 µN/kt, where the last slider of an Iwan joint slips, friction is only bounded."""
     for share in (0.3, 0.6, 0.9, 1.0):
         amplitude = share * 2.0 * LIMIT / STIFFNESS
         for seed in (None, 0):
@@ -190,7 +190,7 @@ def test_normal_load_is_the_mean_of_each_cycle():
     assert np.diff(measured.normal_load) == pytest.approx(0.1 * LOAD, rel=1e-9)
     assert measured.friction * measured.normal_load == pytest.approx(LIMIT, rel=1e-6)
     assert np.isnan(measure_loops(displacement, force).normal_load).all()
-    with pytest.raises(MeasuredLoopError, match="needs the normal load"):
+    with pytest.raises(MeasuredLoopError, match="has no normal load"):
         _ = measure_loops(displacement, force).friction
 
 
@@ -231,7 +231,7 @@ def test_uneven_times_are_evened():
 
 
 def test_displacement_may_drift():
-    """A vibrometer's displacement, an integral, drifts: half a stroke over the record."""
+    """The displacement of a vibrometer, an integral, drifts by half a stroke over the record."""
     displacement, force = clean("jenkins", harmonic, AMPLITUDE, 400, 30)
     drift = AMPLITUDE * np.linspace(0.0, 1.0, len(force))
     measured = measure_loops(displacement + drift, force, LOAD)
@@ -247,20 +247,20 @@ RISING = (2.0, 4.0, 6.0, 8.0, 10.0, 12.0)
 
 
 def strokes(amplitudes, samples=200):
-    """Two cycles of each amplitude [µm] of a slider of 30 N on 20 N/µm, from rest."""
+    """Return two cycles of each amplitude [µm] of a slider of 30 N on 20 N/µm, from rest."""
     wave = np.sin(2.0 * np.pi * np.arange(2 * samples) / samples)
     motion = 1e-3 * np.concatenate([*(a * wave for a in amplitudes), [0.0]])
     return motion, forces(Jenkins(KT, 0.5, 60.0), motion)
 
 
 def slid(amplitude):
-    """Energy of a loop [N mm] of an amplitude [µm]."""
+    """Return the energy of a loop [N mm] of an amplitude [µm]."""
     return 4.0 * SLIP * max(1e-3 * amplitude - SLIP / KT, 0.0)
 
 
 def test_rising_strokes_are_steps_and_the_account_is_whole():
     measured = measure_loops(*strokes(RISING), 60.0)
-    # The twelfth cycle ends amid its way back: it is not closed.
+    # The twelfth cycle ends within its backward branch: it is not closed.
     expected = [amplitude for amplitude in RISING for _ in (0, 1)][:-1]
     assert measured.stroke == pytest.approx(2e-3 * np.array(expected), rel=1e-9)
     assert measured.energy == pytest.approx([slid(a) for a in expected], rel=1e-3)
@@ -268,7 +268,7 @@ def test_rising_strokes_are_steps_and_the_account_is_whole():
     for step in measured.steps:
         assert step.stick_estimate.value == pytest.approx(KT, rel=1e-6)
         assert step.friction == pytest.approx(0.5, rel=1e-9)
-    with pytest.raises(MeasuredLoopError, match="have no mean"):
+    with pytest.raises(MeasuredLoopError, match="no common mean"):
         _ = measured.stick_estimate
     # First loading: 30²/2kt and 0.5 µm of slip; 2 µm of slip from one stroke to the next; at the
     # end 21 and 9 µm of slip.
@@ -281,7 +281,7 @@ def test_rising_strokes_are_steps_and_the_account_is_whole():
 
 
 def test_one_cycle_of_each_rising_stroke_closes_on_the_way_to_the_next():
-    """Triangles, whose corners smoothing would round: slopes and strokes are exact."""
+    """Slopes and strokes of triangles, whose corners smoothing would round, are exact."""
     turns = 1e-3 * np.array([0.0, 2.0, -2.0, 4.0, -4.0, 6.0, -6.0, 8.0, -8.0, 0.0])
     motion = np.interp(np.arange(361) / 40.0, np.arange(10), turns)
     measured = measure_loops(motion, forces(Jenkins(KT, 0.5, 60.0), motion), 60.0)
@@ -300,14 +300,14 @@ def test_small_strokes_are_found_in_noise():
     )
 
 
-def test_falling_strokes_close_a_loop_each_and_the_rest_is_told():
+def test_falling_strokes_close_a_loop_each_and_the_rest_is_reported():
     measured = measure_loops(*strokes(RISING[::-1]), 60.0)
     assert measured.energy == pytest.approx([slid(a) for a in RISING[::-1]], rel=1e-3)
     assert measured.energy.sum() + sum(measured.left_out) == pytest.approx(measured.work[-1])
 
 
 def test_a_loop_within_another_is_taken_out():
-    """Of a slider neither changes the other: both have the energies of their own strokes."""
+    """The two loops of a slider do not affect each other: both have their own energies."""
     turns = 1e-3 * np.array([0.0, 10.0, 0.0, 4.0, -10.0, 10.0, -10.0, 0.0])
     motion = np.unique(np.arange(len(turns) - 1)[:, None] + np.linspace(0.0, 1.0, 201))
     motion = np.interp(motion, np.arange(len(turns)), turns)
@@ -327,7 +327,7 @@ def test_a_dwell_and_a_stuck_contact_change_nothing():
 
 
 def test_friction_that_grows_makes_steps():
-    """Loops of one stroke are not alike where the joint wears."""
+    """Loops of one stroke are not similar if the joint wears."""
     motion = harmonic(AMPLITUDE, 400, 20)
     force = forces(LAWS["jenkins"], motion) * np.linspace(1.0, 1.5, len(motion))
     steps = measure_loops(motion, force, LOAD).steps
@@ -361,7 +361,7 @@ def test_records_without_loops_are_refused():
 
 
 def test_a_motion_that_is_not_harmonic_is_not_smoothed_away() -> None:
-    """A joint that sticks for 4 % of the cycle, in a rig whose 25th harmonic answers too."""
+    """A joint sticks for 4 % of the cycle, in a rig whose 25th harmonic responds too."""
     law = Jenkins(stiffness=3e4, friction=0.1, normal_load=60.0)
     angle = np.linspace(0.0, 6.0 * np.pi, 3001)
     moved = 0.012 * (np.cos(angle) + 0.003 * np.cos(25.0 * angle))

@@ -1,4 +1,4 @@
-"""Joints of several laws in one structure, against each law by itself and against time."""
+"""Joints of several laws in one structure, against each law alone and against time integration."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ ALL = MixedLaw((JointGroup(IWAN, 2), JointGroup(CONTACT, 1), JointGroup(SLIDER, 
 
 
 def path(steps=40, directions=3):
-    """Displacements of four joints, of which the ones along a line move in x alone."""
+    """Return displacements of four joints, of which those along a line move in x alone."""
     rng = np.random.default_rng(5)
     moved = np.cumsum(0.004 * rng.standard_normal((steps, 4, directions)), axis=0)
     moved[:, [0, 1, 3], 1:] = 0.0
@@ -39,7 +39,7 @@ def path(steps=40, directions=3):
 
 
 def test_each_group_does_what_it_does_alone():
-    """Through many turning points, which Iwan joints must remember."""
+    """The path has many turning points, which Iwan joints must remember."""
     moved = path()
     together = march_joints(ALL, ALL.rest(4), np.zeros((4, 3)), moved)
     for group, rows in ALL.rows():
@@ -73,7 +73,7 @@ def test_periods_of_groups_and_their_derivatives():
 
 
 def test_deviations_of_groups_are_those_of_each_alone():
-    """What a group does not remember stays as it is, and moves nothing."""
+    """Memory that a group does not have stays as it is, and has no effect."""
     law = MixedLaw((*ALL.groups, JointGroup(ElasticStop(1e3, 0.005), 1)))
     resolution = Resolution((0, 1, 3), 128)
     coefficients = 0.02 * np.random.default_rng(2).standard_normal((5, resolution.size, 3))
@@ -104,7 +104,7 @@ PULLS = {"slips": 9.0, "sticks": 0.4, "hardens": 3.0, "contact": 9.0}
 
 
 def masses(names):
-    """Each on its springs and its joint, with the force that shakes it."""
+    """Return masses, each on its springs and its joint, with the force that excites it."""
     moving = [f"{name} {axis}" for name in names for axis in axes(name)]
     stiff = {"x": 500.0, "y": 700.0, "z": 300.0}
     nowhere = Link(None)
@@ -134,20 +134,20 @@ def stability(names, march):
 
 
 def test_stability_of_what_does_not_meet_is_that_of_each_alone():
-    """Multipliers of all are those of each; a slider that sticks is neutral, and counted once."""
+    """The multipliers are those of each; a sticking slider is neutral, and counted once."""
     each = [stability((name,), PeriodicMarch(law)) for name, law in ALONE.items()]
     groups = tuple(JointGroup(law, 1) for law in ALONE.values())
     together = stability(tuple(ALONE), MixedLaw(groups).march())
     alone = np.sort(np.concatenate([np.abs(of.multipliers) for of in each]))[::-1]
-    told = np.abs(together.multipliers)
-    np.testing.assert_allclose(told, alone[: len(told)], atol=2e-4)
+    reported = np.abs(together.multipliers)
+    np.testing.assert_allclose(reported, alone[: len(reported)], atol=2e-4)
     assert [of.neutral for of in each] == [0, 1, 0, 0]
     assert together.neutral == 1
     assert together.verdict == "stable"
 
 
 def test_stability_of_spread_sliders_is_that_of_many():
-    """Iwan's joint beside a spring, against sixty sliders; turning points come and go."""
+    """An Iwan joint next to a spring agrees with sixty sliders; turning points come and go."""
     count = 60
     limits = 8.0 * (np.arange(count) + 0.5) / count**2 * 2.0
     many = Jenkins(2e3 / count, 1.0, limits)
@@ -155,27 +155,27 @@ def test_stability_of_spread_sliders_is_that_of_many():
     rows = model.connection
     together = replace(model, connection=np.vstack([np.repeat(rows[:1], count, axis=0), rows[1:]]))
     spring = JointGroup(HARDENS, 1)
-    resolution, told = Resolution((0, 1, 2, 3, 5), 256), []
+    resolution, reported = Resolution((0, 1, 2, 3, 5), 256), []
     for structure, joints in ((model, JointGroup(IWAN, 1)), (together, JointGroup(many, count))):
         march = MixedLaw((joints, spring)).march()
         problem = HarmonicBalance(structure, march, load, resolution)
         floquet = Floquet(problem)
-        told.append([])
+        reported.append([])
         for frequency in (30.0, 60.0, 165.0):
             motion = problem.solve(frequency, 1.0)
             assert motion.converged
-            told[-1].append(np.abs(floquet.stability(motion).multipliers[:2]))
-    np.testing.assert_allclose(told[0], told[1], atol=5e-3)
+            reported[-1].append(np.abs(floquet.stability(motion).multipliers[:2]))
+    np.testing.assert_allclose(reported[0], reported[1], atol=5e-3)
 
 
 def test_a_line_of_sliders_stays_one():
-    """Groups along one direction have one."""
+    """Groups along one direction give a law of one direction."""
     law = MixedLaw((JointGroup(SLIDER, 1), JointGroup(BoucWen(1e3, 0.5, 10.0), 1)))
     assert law.directions == 1
 
 
 def test_balance_of_harmonics_is_the_motion_in_time():
-    """A contact and a slider on one mass, pressed and shaken until it repeats itself."""
+    """A contact and a slider on one mass are pressed and shaken until the motion repeats."""
     model = lumped_rig(
         {"x": 2e-3, "y": 2e-3, "z": 2e-3},
         {Link("x"): 500.0, Link("y"): 700.0, Link("z"): 300.0},
@@ -186,7 +186,7 @@ def test_balance_of_harmonics_is_the_motion_in_time():
     law = MixedLaw((JointGroup(CONTACT, 1), JointGroup(SLIDER, 1)))
     push, press = unit_force(model, "x") + 0.1 * unit_force(model, "z"), unit_force(model, "z")
     frequency, force = 90.0, 14.0
-    # Joints at rest press each other: the load that balances them.
+    # Joints at rest have a preload, which this load balances.
     static = 15.0 * press
     load = PeriodicLoad({1: -1j * push}, static)
     problem = HarmonicBalance(model, law.march(), load, Resolution(tuple(range(22)), 512))
@@ -202,5 +202,5 @@ def test_balance_of_harmonics_is_the_motion_in_time():
 
 
 def test_numbers_of_joints_must_fit():
-    with pytest.raises(JointError, match="5 joints of groups that have 4"):
+    with pytest.raises(JointError, match="5 joints are given for groups of 4"):
         ALL.rest(5)

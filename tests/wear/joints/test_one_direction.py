@@ -1,4 +1,4 @@
-"""What every law of one direction obeys: tangent, energy, any division of a straight path."""
+"""Properties of every law of one direction: tangent, energy, any division of a straight path."""
 
 from dataclasses import replace
 
@@ -26,7 +26,7 @@ LAWS = {
     "bouc-wen, general": BoucWen(*COMMON, sigma=0.7, exponent=2.5),
 }
 EVERY = pytest.mark.parametrize("law", LAWS.values(), ids=LAWS)
-# The general Bouc-Wen law steps: what it makes of a path depends on the division by 2e-9.
+# The general Bouc-Wen law is integrated in steps, so that dividing a path changes it by 2e-9.
 ROUNDING, STEPPING = 1e-11, 4e-9
 # Amplitudes from deep sticking to far sliding, in reaches.
 PATHS = st.lists(st.floats(-4.0, 4.0), min_size=1, max_size=20)
@@ -54,7 +54,7 @@ def force_after(law, state, increment):
     ids=str,
 )
 def test_tangent_is_the_slope_of_the_force(law, history):
-    """All along the way from a state, both ways, and close by either side of every switch."""
+    """The path leads from a state both ways, and next to every transition."""
     state = lead(law, np.array(history) * REACH).state
     start = history[-1] * REACH
     # Loops close where they turned or opposite the first turn; sliders slip, and ξ passes 0,
@@ -78,7 +78,7 @@ def test_tangent_is_the_slope_of_the_force(law, history):
 
 @EVERY
 def test_tangent_after_a_step_too_small_to_see(law):
-    """Right after a reversal all sticks again; going on, the slope is the one before."""
+    """Right after a reversal everything sticks again; continued, the slope is the one before."""
     state = lead(law, [0.5 * REACH]).state
     on = law.respond(state, np.full((1, 1), 1e-12 * REACH)).tangent[0, 0, 0]
     back = law.respond(state, np.full((1, 1), -1e-12 * REACH)).tangent[0, 0, 0]
@@ -118,7 +118,7 @@ def test_a_straight_path_may_be_divided(law, path, shares):
 @EVERY
 @pytest.mark.parametrize("amplitude", [0.4, 0.9, 3.0])
 def test_energy_lost_in_a_loop_is_its_area(law, amplitude):
-    """Area by Gauss's rule on pieces between the corners of the loop, at no grid of increments."""
+    """The area is integrated between the corners of the loop, independently of increments."""
     amplitude = amplitude * REACH
     settled = lead(law, np.tile([-amplitude, amplitude], 60))
     points, weights = np.polynomial.legendre.leggauss(40)
@@ -139,7 +139,7 @@ def test_energy_lost_in_a_loop_is_its_area(law, amplitude):
 
 
 def corners_from(law, state):
-    """Distances from a reversal at which the curve of the force may have a corner, and its ends."""
+    """Return distances from a reversal at which the force may have a corner, and its ends."""
     if isinstance(law, Jenkins):
         corner = 2.0 * LIMIT / law.stiffness
     elif isinstance(law, BoucWen):
@@ -166,7 +166,7 @@ def zero_of_xi(law, state):
 
 @EVERY
 def test_joints_side_by_side_are_joints_alone(law):
-    """Parameters per joint, states of unlike depth, and a layout that is not contiguous."""
+    """Joints have their own parameters, states of different depth, and a non-contiguous layout."""
     loads, frictions = np.array([20.0, 60.0, 0.0, 500.0]), np.array([0.2, 0.5, 0.5, 1.0])
     several = replace(law, normal_load=loads, friction=frictions)
     scales = np.array([0.1, 1.0, 3.0, 0.0])
@@ -249,7 +249,7 @@ def test_arrays_that_do_not_fit(law):
     with pytest.raises(JointError, match=r"must be \(2, 1\)"):
         law.respond(law.rest(2), np.zeros(2))
     of_three = replace(law, normal_load=np.ones(3))
-    with pytest.raises(JointError, match="that of 3 joints, the state of 2"):
+    with pytest.raises(JointError, match="parameters of 3 joints, the state is of 2"):
         of_three.respond(of_three.rest(2), np.zeros((2, 1)))
     with pytest.raises(JointError, match="a number or one per joint"):
         replace(law, normal_load=np.ones(3), friction=np.ones(2))

@@ -1,4 +1,4 @@
-"""Sliders in parallel as one joint: the sum of the sliders, and what each dissipates."""
+"""Parallel sliders as one joint: the sum of the sliders, and the energy of each."""
 
 import numpy as np
 import pytest
@@ -63,12 +63,12 @@ def test_each_slider_travels_beyond_its_own_reach():
 def test_it_slips_where_less_than_half_of_the_stiffness_is_left():
     motion = np.zeros_like(MOTION)
     motion[0, 0, 0] = 0.5 * (REACH[0] + REACH[1])
-    # The stiffest alone slips: 6 of 10 are left.
+    # Only the stiffest slider slips: 6 of 10 are left.
     assert np.all(ParallelSliders(SLIDERS).settle(motion, BASIS, WEIGHTS).states == STICK)
     motion[0, 0, 0] = 2.0 * REACH[-1]
     assert np.any(ParallelSliders(SLIDERS).settle(motion, BASIS, WEIGHTS).states == SLIP)
 
 
 def test_more_joints_than_one_are_refused():
-    with pytest.raises(JointError, match="2 joints for the sliders of one"):
+    with pytest.raises(JointError, match="2 joints, the sliders of one"):
         ParallelSliders(SLIDERS).settle(np.repeat(MOTION, 2, axis=0), BASIS, WEIGHTS)

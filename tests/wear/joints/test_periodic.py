@@ -1,4 +1,4 @@
-"""Joints led round a period: exact derivatives, settled cycles, closed forms."""
+"""Joints over a period: exact derivatives, settled cycles, closed forms."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ FINE_STEPS = 2e-5  # where the law itself is integrated, with errors of 2e-9 ove
 
 
 def fourier(harmonics, samples):
-    """Basis, weights and lead of a Fourier series."""
+    """Return basis, weights and lead of a Fourier series."""
     turns = 2.0 * np.pi * np.arange(samples) / samples
     columns, weights = [], []
     for k in harmonics:
@@ -55,7 +55,7 @@ def fourier(harmonics, samples):
 
 
 def central(law, coefficients, *functions):
-    """The derivative by central differences."""
+    """Return the derivative by central differences."""
     settle = PeriodicMarch(law).settle
     answer = np.empty(coefficients.shape + coefficients.shape[1:])
     for m, d in np.ndindex(*coefficients.shape[1:]):
@@ -80,7 +80,7 @@ def check_derivative(law, coefficients, *functions):
 
 
 def random_motion(seed, joints, harmonics, directions, size):
-    """Coefficients that fall with the harmonic."""
+    """Return coefficients that fall with the harmonic."""
     rng = np.random.default_rng(seed)
     functions = fourier(harmonics, 64)
     motion = rng.standard_normal((joints, functions[0].shape[1], directions))
@@ -100,7 +100,7 @@ def test_derivative_along_one_direction(name, size):
 @pytest.mark.parametrize("size", [0.02, 0.3, 3.0])
 @pytest.mark.parametrize("name", CONTACTS)
 def test_derivative_in_three_dimensions(name, size):
-    """In every state: held, slipping, separated and closed again, with and without preload."""
+    """All states occur: sticking, slipping, apart and closed again, with and without preload."""
     motion, functions = random_motion(2, 8, (0, 1, 2, 3, 5), 3, size * REACH * 2.0)
     if name == "with a gap":
         motion[:4, 0, 2] += 0.1
@@ -110,7 +110,7 @@ def test_derivative_in_three_dimensions(name, size):
 
 
 def bisected(seen, inside, outside):
-    """Where ``seen`` ceases to be true, to rounding, from both sides."""
+    """Return where ``seen`` ceases to be true, to rounding, from both sides."""
     for _ in range(60):
         middle = 0.5 * (inside + outside)
         if middle in (inside, outside):
@@ -124,7 +124,7 @@ def bisected(seen, inside, outside):
 
 @pytest.mark.parametrize("switch", ["slip", "lift off", "touch"])
 def test_derivative_on_each_side_of_a_switch(switch):
-    """Just before and just after a state appears, differences taken on one side alone agree."""
+    """Just before and after a state appears, one-sided differences agree."""
     law = CONTACTS["with a gap" if switch == "touch" else "preloaded"]
     functions = fourier((0, 1, 3), 48)
     shape = np.zeros((1, 5, 3))
@@ -164,7 +164,7 @@ def test_settled_cycle_is_the_one_that_many_periods_lead_to(name):
     history = march_joints(
         law, law.rest(len(motion)), rest, np.vstack([before[:-1], *[way] * periods])
     )
-    # Bouc-Wen's joint forgets by shares, not at once.
+    # A Bouc-Wen joint forgets gradually, not at once.
     scale = np.abs(history.force).max()
     np.testing.assert_allclose(cycle.samples, history.force[-64:], atol=1e-9 * scale)
     lost = history.dissipated[-64:].sum(axis=0)
@@ -176,7 +176,7 @@ def test_settled_cycle_is_the_one_that_many_periods_lead_to(name):
 
 
 def test_first_harmonic_of_jenkins_and_its_rate():
-    """The closed form to 1e-8 with many samples; the error falls with their square."""
+    """The closed form is met to 1e-8 with many samples; the error falls with their square."""
     law, amplitude = ONE_DIRECTION["jenkins"], 3.3 * REACH
     wanted = np.ravel(law.first_harmonic(amplitude))
     errors = []
@@ -189,9 +189,9 @@ def test_first_harmonic_of_jenkins_and_its_rate():
 
 
 def test_sliding_round_a_circle():
-    """Led round a circle of radius A, the force leads by acos(r/A), r being the spring's reach.
+    """On a circle of radius A the force leads by acos(r/A), where r is the spring's reach.
 
-    The slider follows on the circle of radius sqrt(A² - r²), on which it loses 2π µN of it.
+    The slider follows on a circle of radius sqrt(A² - r²), on which it dissipates 2π µN times that.
     """
     law, amplitude = CONTACTS["constant load"], 2.5 * REACH
     errors = []
@@ -209,7 +209,7 @@ def test_sliding_round_a_circle():
 
 
 def test_a_stuck_contact_is_its_springs():
-    """Whatever the phase; without lead the slider is where the joint was at rest."""
+    """The phase has no effect; without lead the slider is where the joint was at rest."""
     law = CONTACTS["heavily loaded"]
     motion, (basis, weights, lead) = random_motion(4, 3, (0, 1, 2), 3, 0.1 * REACH)
     cycle = PeriodicMarch(law).settle(motion, basis, weights, lead)
@@ -234,7 +234,7 @@ def test_an_open_contact_is_nothing():
 
 
 def test_slow_forgetting_is_not_waited_for():
-    """A contact that slips by a hair a period settles as if led round a hundred thousand times."""
+    """A contact that hardly slips in a period settles as after a hundred thousand periods."""
     law = CONTACTS["constant load"]
     basis, weights, lead = fourier((0, 1), 32)
     motion = np.zeros((1, 3, 3))
@@ -276,5 +276,5 @@ def test_shapes_that_do_not_fit_are_refused():
         PeriodicMarch(CONTACTS["touching"]).settle(motion, basis, weights, lead)
     with pytest.raises(JointError, match="they must be"):
         joints.settle(motion, basis[:, :2], weights, lead)
-    with pytest.raises(JointError, match="law is that of 3 joints"):
+    with pytest.raises(JointError, match="parameters of 3 joints"):
         PeriodicMarch(Jenkins(np.ones(3), MU, LOAD)).settle(motion, basis, weights, lead)

@@ -1,6 +1,6 @@
-"""The contact in three dimensions round a period: its cone, its separation, its order, its slopes.
+"""Periodic contact in three dimensions: its cone, its separation, its order, its derivatives.
 
-Motions are made of the functions 1, cos θ, sin θ, cos 2θ, sin 2θ; θ = 0 .. 2π is the period.
+Motions consist of the functions 1, cos θ, sin θ, cos 2θ, sin 2θ; θ = 0 .. 2π is the period.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ SIZE = 5
 
 
 def functions(samples):
-    """Basis, weights and lead."""
+    """Return basis, weights and lead."""
     angle = 2.0 * np.pi * np.arange(samples) / samples
     waves = [wave for k in (1, 2) for wave in (np.cos(k * angle), np.sin(k * angle))]
     basis = np.column_stack([np.ones(samples), *waves])
@@ -40,12 +40,12 @@ def settle(law, motion, samples=256):
 
 
 def way(motion, samples=256):
-    """Displacement ``(t, 3)`` of the first joint."""
+    """Return the displacement ``(t, 3)`` of the first joint."""
     return functions(samples)[0] @ motion[0]
 
 
 def motion_of(x=(), y=(), z=()):
-    """Coefficients ``(1, 5, 3)`` from those of each direction; missing ones are 0."""
+    """Return coefficients ``(1, 5, 3)`` from those of each direction; missing ones are 0."""
     motion = np.zeros((1, SIZE, 3))
     for direction, given in enumerate((x, y, z)):
         motion[0, : len(given), direction] = given
@@ -53,7 +53,7 @@ def motion_of(x=(), y=(), z=()):
 
 
 def limits(law, cycle):
-    """µ f ``(t,)`` and the tangential force ``(t,)``."""
+    """Return µ f ``(t,)`` and the tangential force ``(t,)``."""
     return law.friction * cycle.samples[:, 0, 2], np.hypot(*cycle.samples[:, 0, :2].T)
 
 
@@ -83,9 +83,9 @@ EVERY_ORBIT = pytest.mark.parametrize("name", ORBITS)
 
 @EVERY_ORBIT
 def test_the_resultant_stays_within_the_cone(name):
-    """Not each of its two parts within a square, on whose corner it would be 1.41 times as large.
+    """The resultant, not each component, is limited: a square would allow 1.41 times as much.
 
-    On the circle it is where it slips, and inside where it sticks.
+    It is on the circle where the contact slips, and inside where it sticks.
     """
     cycle = settle(PRESSED, ORBITS[name])
     limit, force = limits(PRESSED, cycle)
@@ -99,7 +99,7 @@ def test_the_resultant_stays_within_the_cone(name):
 
 @EVERY_ORBIT
 def test_the_cone_has_no_preferred_direction(name):
-    """A motion turned about z is answered by forces, and their derivative, turned as well."""
+    """Rotating the motion about z rotates the forces and their derivative."""
     turn = np.eye(3)
     turn[:2, :2] = [[np.cos(0.7), -np.sin(0.7)], [np.sin(0.7), np.cos(0.7)]]
     here = settle(PRESSED, ORBITS[name])
@@ -127,7 +127,7 @@ def test_friction_opposes_slip(name):
         assert np.all(np.einsum("td,td->t", moved, middle) > 0.0)
         across = moved[:, 0] * middle[:, 1] - moved[:, 1] * middle[:, 0]
         angle = np.abs(across) / np.hypot(*moved.T) / np.hypot(*middle.T)
-        # Beside a lift-off, where the circle is a point, the force turns within a sample.
+        # Next to a lift-off, where the circle is a point, the force turns within a sample.
         largest.append(np.quantile(angle, 0.95))
     assert largest[1] < 2e-5
     assert largest[1] < 0.07 * largest[0]
@@ -135,7 +135,7 @@ def test_friction_opposes_slip(name):
 
 @EVERY_ORBIT
 def test_energy_lost_is_that_of_the_slider(name):
-    """∮ t · du, which no spring keeps over a period, by the trapezium rule of second order."""
+    """The energy is ∮ t · du, by the trapezium rule of second order: no spring keeps any of it."""
     errors = []
     for samples in (1024, 4096):
         cycle = settle(PRESSED, ORBITS[name], samples)
@@ -150,7 +150,7 @@ def test_energy_lost_is_that_of_the_slider(name):
 
 
 def test_there_is_no_friction_without_contact():
-    """Exactly none while apart, and on the way in not more than was travelled since the touch."""
+    """Friction is exactly 0 while apart, and on touching limited by the travel since then."""
     motion = ORBITS["a figure of eight that lifts off"]
     cycle = settle(PRESSED, motion, 2048)
     force, place = cycle.samples[:, 0], way(motion, 2048)
@@ -182,7 +182,7 @@ def test_forces_are_continuous(name, law):
 
 
 def test_a_gap_without_preload_is_a_preload_below_zero():
-    """f = kn (A cos θ - g) while above zero: closed forms of its mean and its first harmonics."""
+    """The force kn (A cos θ - g), where positive, has closed forms of its first harmonics."""
     amplitude, gap = 0.2, 0.05
     law = replace(APART, gap=gap)
     half = np.arccos(gap / amplitude)
@@ -203,9 +203,10 @@ def test_a_gap_without_preload_is_a_preload_below_zero():
 
 
 def test_a_load_that_varies_gives_friction_a_mean():
-    """Far slip along x = A cos θ under N0 + n sin θ: µ (N0 + n sin θ) against -sin θ, mean -2 µn/π.
+    """Full slip along x = A cos θ under N0 + n sin θ has a mean friction of -2 µn/π.
 
-    A constant load gives none. What the spring of the slider takes away is of the order reach/A.
+    The friction is µ (N0 + n sin θ) against -sin θ; a constant load gives no mean. The effect of
+    the slider's spring is of the order reach/A.
     """
     swing = 0.6 * LOAD
     missing = []
@@ -224,7 +225,7 @@ def test_a_load_that_varies_gives_friction_a_mean():
 
 @EVERY_ORBIT
 def test_slip_is_of_second_order_in_the_samples(name):
-    """Coefficients of the force, energy and derivative against 16 times as many samples."""
+    """Force coefficients, energy and derivative are compared with 16 times as many samples."""
     counts = np.array([128, 256, 512, 1024, 2048])
     fine = settle(PRESSED, ORBITS[name], 32768)
     errors = []
@@ -300,7 +301,7 @@ def test_derivative_in_every_state(name):
 
 
 def test_grazing_contact_is_apart_and_its_slopes_are_finite():
-    """It touches at one sample with no pressure at all."""
+    """The contact touches at one sample without any pressure."""
     cycle = settle(APART, motion_of((0.0, REACH), z=(0.0, 0.05)), 64)
     assert np.all(cycle.states == SEPARATED)
     np.testing.assert_array_equal(cycle.samples, 0.0)
@@ -308,7 +309,7 @@ def test_grazing_contact_is_apart_and_its_slopes_are_finite():
     assert cycle.change[0] == 0.0
 
 
-# Switches a sample may see: the states before and after it on its way round, and an orbit.
+# Transitions of a sample: the states before and after it, and an orbit on which they occur.
 SWITCHES = {
     "slip begins": (STICK, SLIP, "a thin ellipse, load varies"),
     "slip begins, then lifts off": (STICK, SLIP, "a figure of eight that lifts off"),
@@ -323,7 +324,7 @@ BESIDE = 2e-5
 
 
 def family(orbit, share):
-    """Orbits that grow, shift in time, move aside and are pressed with a parameter."""
+    """Return orbits that grow, shift in time, move aside and are pressed with a parameter."""
     path = ORBITS.get(orbit, SHORT)
     turned = path[:, [0, 2, 1, 4, 3]] * [[0.0], [-1.0], [1.0], [-2.0], [2.0]]
     aside = motion_of((0.3 * REACH,), z=(0.2 * LIFT,))
@@ -331,7 +332,7 @@ def family(orbit, share):
 
 
 def switching(before, after, orbit):
-    """Parameters on both sides of where a sample goes from one state to the other: four at most."""
+    """Return up to four parameters on both sides of a change of state at a sample."""
 
     def states(share):
         return settle(PRESSED, family(orbit, share), 48).states[:, 0]
@@ -365,7 +366,7 @@ def bisected(state_at, low, high):
 
 @pytest.mark.parametrize("name", SWITCHES)
 def test_derivative_on_each_side_of_every_switch(name):
-    """Both sides have their own, and the force passes from one to the other without a jump."""
+    """Each side has its own derivative, and the force is continuous at the transition."""
     orbit = SWITCHES[name][2]
     switches = switching(*SWITCHES[name])
     assert switches

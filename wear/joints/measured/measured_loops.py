@@ -1,17 +1,17 @@
 """Friction, stiffness and energy of hysteresis loops, measured or computed.
 
-Each loop that closes in a record gives its stick slope and, where it slides, residual stiffness and
+Each closed loop of a record gives its stick slope and, where it slides, residual stiffness and
 friction (:mod:`wear.joints.measured.loop_shape`); its energy, ∮ T dδ by trapezoids (the shoelace
-formula), and its stroke.
+formula); and its stroke.
 
-Loops are averaged only with loops that are like them: a step is made of loops that close one after
-the other and have the same stroke, range of force, energy and normal load, within :data:`ALIKE` and
-the noise. Whether and how far loops slide, and how their stick branches bend, is found step by
-step. A mean position that drifts makes no other step: nothing here depends on it.
+Only similar loops are averaged. A step consists of consecutive loops with the same stroke, range of
+force, energy and normal load, within :data:`ALIKE` and the noise. Whether and how far loops slide,
+and how their stick branches bend, is determined for each step. A drifting mean position does not
+begin a new step: no result depends on it.
 
-The stick slope is what the loop shows, residual stiffness included, as measured stiffnesses are
-printed; laws with the residual spring in parallel (Jenkins, Iwan) need it without, which is
-:attr:`MeasuredLoops.contact_stiffness`; Bouc-Wen takes the whole one.
+The stick slope is that of the loop, residual stiffness included, as measured stiffnesses are
+published. Bouc-Wen takes this total. Laws with the residual spring in parallel (Jenkins, Iwan) need
+it without, which is :attr:`MeasuredLoops.contact_stiffness`.
 """
 
 from __future__ import annotations
@@ -43,22 +43,24 @@ from wear.joints.measured.loop_shape import (
 )
 
 FEWEST_SAMPLES = 8
-"""Of a branch: with fewer neither sticking nor sliding shows."""
+"""Least number of samples of a branch: with fewer neither sticking nor sliding is visible."""
 
 ALIKE = 0.02
 """Loops of one step differ by less than this share of stroke, force and load, ..."""
 
 ALIKE_NOISE = 4.0
-"""... or by less than this many standard deviations that noise makes of it."""
+"""... or by less than this number of standard deviations due to noise."""
 
 RANGE_NOISE = 4.0
-"""Standard deviations by which noise makes half of a range larger, at most."""
+"""Standard deviations by which noise may increase half of a range."""
 
-GIVING = 0.01
-"""Loops give energy, by a wrong sign, if they give more than this share of force times stroke."""
+GENERATING = 0.01
+"""Loops generate energy, due to a wrong sign, if they give more than this share of force times
+stroke.
+"""
 
-NOUGHT = 1e-12
-"""Share of force times stroke that is an energy of rounding."""
+NEAR_ZERO = 1e-12
+"""Share of force times stroke below which an energy is rounding."""
 
 
 @dataclass(frozen=True)
@@ -70,7 +72,7 @@ class MeanEstimate:
 
 
 def mean_estimate(values: Array) -> MeanEstimate:
-    """Mean of the cycles' ``values`` ``(c,)``."""
+    """Return the mean of ``values`` ``(c,)`` of cycles."""
     count = len(values)
     error = float(np.std(values, ddof=1)) / np.sqrt(count) if count > 1 else np.nan
     return MeanEstimate(float(np.mean(values)), float(error))
@@ -78,17 +80,36 @@ def mean_estimate(values: Array) -> MeanEstimate:
 
 @dataclass(frozen=True)
 class MeasuredLoops:
-    """What the ``c`` loops of a record say, in the order in which they close.
+    """Results of the ``c`` closed loops of a record, in the order in which they close.
 
-    Each ``(c,)``: ``stroke`` [mm] peak to peak, ``energy`` [N mm] of a loop, ``stick_stiffness``
-    [N/mm] the slope after a reversal, NaN where there are too few samples (``bend_spread`` is the
-    relative standard error that a step has in common, that of the branches' bend),
-    ``residual_stiffness`` [N/mm] and ``friction_force`` [N], half the height between the sliding
-    branches, both NaN where they do not slide; ``force`` [N] half the range of the force;
-    ``normal_load`` [N] its mean, NaN if not given. ``sliding`` is the share of the stroke taken to
-    slide, 0 where none does. ``step`` counts the steps of like loops from 0 on. ``branches`` are
-    the two branches of each loop in the ``record``. Reversals closer to each other than
-    ``resolution`` [mm] were taken for noise.
+    Parameters
+    ----------
+    stroke
+        Stroke from peak to peak ``(c,)`` [mm].
+    energy
+        Energy of a loop ``(c,)`` [N mm].
+    stick_stiffness
+        Slope after a reversal ``(c,)`` [N/mm], NaN if there are too few samples.
+    bend_spread
+        Relative standard error that the slopes of a step share, that of the bend ``(c,)``.
+    residual_stiffness
+        Slope of the sliding branches ``(c,)`` [N/mm], NaN without sliding.
+    friction_force
+        Half the distance of the sliding branches ``(c,)`` [N], NaN without sliding.
+    force
+        Half the range of the force ``(c,)`` [N].
+    normal_load
+        Mean normal load ``(c,)`` [N], NaN if unknown.
+    sliding
+        Share of the stroke taken to slide ``(c,)``, 0 without sliding.
+    step
+        Number of the step of similar loops, from 0 ``(c,)``.
+    branches
+        Both branches of each loop in the ``record``.
+    record
+        The record.
+    resolution
+        Distance of reversals below which they were taken for noise [mm].
     """
 
     stroke: Array
@@ -107,11 +128,11 @@ class MeasuredLoops:
 
     @property
     def steps(self) -> tuple[MeasuredLoops, ...]:
-        """The loops step by step: those of one are alike, and may be averaged."""
+        """The loops by steps; those of one step are similar, and may be averaged."""
         return tuple(self._of(self.step == number) for number in np.unique(self.step))
 
     def _of(self, chosen: Mask) -> MeasuredLoops:
-        """Some of the loops."""
+        """Return the chosen loops."""
         values: dict[str, Any] = {
             name: value[chosen]
             for name, value in vars(self).items()
@@ -122,22 +143,22 @@ class MeasuredLoops:
 
     @property
     def widest(self) -> MeasuredLoops:
-        """The step of the largest stroke."""
+        """The step with the largest stroke."""
         return self._of(self.step == self.step[np.argmax(self.stroke)])
 
     @property
     def reversals(self) -> Indices:
-        """Samples of ``record`` at which loops begin, turn and end, ``(c, 3)``."""
+        """Samples of ``record`` at which loops begin, turn and end ``(c, 3)``."""
         return np.array([(out.begin, out.end, back.end) for out, back in self.branches])
 
     @property
     def slides(self) -> bool:
-        """True where the branches of all loops end in sliding."""
+        """Whether the branches of all loops end in sliding."""
         return bool((self.sliding > 0.0).all())
 
     @property
     def stick_estimate(self) -> MeanEstimate:
-        """Stick stiffness of loops that are alike [N/mm]: that of their mean compliance.
+        """Stick stiffness of similar loops, from their mean compliance [N/mm].
 
         Raises MeasuredLoopError for loops of several steps.
         """
@@ -148,25 +169,25 @@ class MeasuredLoops:
         return MeanEstimate(value, float(np.hypot(compliance.error * value, spread)) * value)
 
     def require_alike(self) -> None:
-        """Raise MeasuredLoopError unless the loops are all of one step."""
+        """Raise MeasuredLoopError unless all loops belong to one step."""
         if (self.step != self.step[0]).any():
             raise MeasuredLoopError(
-                f"the loops are of {len(np.unique(self.step))} steps, strokes of "
-                f"{self.stroke.min():.4g} to {self.stroke.max():.4g} mm, and have no mean; "
-                "allowed: one of their steps"
+                f"the loops are of {len(np.unique(self.step))} steps, with strokes of "
+                f"{self.stroke.min():.4g} to {self.stroke.max():.4g} mm, and have no common mean; "
+                "allowed: the loops of one step"
             )
 
     @property
     def contact_stiffness(self) -> Array:
-        """Stick slope without the residual stiffness, ``(c,)`` [N/mm]: kt of Jenkins and Iwan."""
+        """Stick slope less the residual stiffness ``(c,)`` [N/mm]: kt of Jenkins and Iwan."""
         return self.stick_stiffness - self.residual_stiffness
 
     @property
     def friction(self) -> Array:
-        """Friction coefficient ΔT / 2N, ``(c,)``, NaN of loops that do not slide.
+        """Friction coefficient ΔT / 2N ``(c,)``, NaN for loops that do not slide.
 
-        Raises MeasuredLoopError where none slides (:attr:`mobilised` is a lower bound then) and
-        without a normal load.
+        Raises MeasuredLoopError without a normal load, or if no loop slides; :attr:`mobilised` is
+        then a lower bound.
         """
         if not self.sliding.any():
             bound = "" if np.isnan(self.normal_load).any() else f" of {np.max(self.mobilised):.4g}"
@@ -178,28 +199,31 @@ class MeasuredLoops:
 
     @property
     def mobilised(self) -> Array:
-        """Half the range of the force over the normal load, ``(c,)``.
+        """Half the range of the force over the normal load ``(c,)``.
 
-        A lower bound of the friction coefficient where nothing slides, a residual stiffness apart.
-        Raises MeasuredLoopError without a normal load.
+        It is a lower bound of the friction coefficient where nothing slides, apart from the
+        residual stiffness. Raises MeasuredLoopError without a normal load.
         """
         return self.force / self._loads()
 
     def _loads(self) -> Array:
         if np.isnan(self.normal_load).any():
-            raise MeasuredLoopError("a friction coefficient needs the normal load of the record")
+            raise MeasuredLoopError(
+                "the record has no normal load, which a friction coefficient needs; give "
+                "normal_load"
+            )
         return self.normal_load
 
     @property
     def work(self) -> Array:
-        """Work of the force since the record began, at each of its samples ``(t,)`` [N mm]."""
+        """Work of the force since the beginning of the record, at each sample ``(t,)`` [N mm]."""
         motion, force = self.record.displacement, self.record.force
         steps = 0.5 * (force[1:] + force[:-1]) * np.diff(motion)
         return np.append(0.0, np.cumsum(steps))
 
     @property
     def left_out(self) -> tuple[float, float, float]:
-        """Work of a record that is in none of its loops, before, between and after them [N mm]."""
+        """Work of the record before, between and after its loops [N mm]."""
         work, reversals = self.work, self.reversals
         begin, end = work[reversals.min()], work[reversals.max()]
         between = float(end - begin - self.energy.sum())
@@ -214,15 +238,33 @@ def measure_loops(
 ) -> MeasuredLoops:
     """Measure the closed loops of a record of ``t`` samples.
 
-    ``displacement`` [mm] and the resisting ``force`` [N] are ``(t,)``, in the order of time;
-    ``normal_load`` [N] is a number or ``(t,)``; ``time`` ``(t,)``, in any unit, is needed where the
-    samples are not evenly spaced. Strokes may change: :attr:`MeasuredLoops.steps` has like loops
-    together. Raises MeasuredLoopError for a record without a closed loop, with too few samples to
-    tell anything but energies, or whose loops give energy instead of taking it.
+    The stroke may change within the record: :attr:`MeasuredLoops.steps` groups similar loops.
+
+    Parameters
+    ----------
+    displacement
+        Displacement in the order of time ``(t,)`` [mm].
+    force
+        Resisting force ``(t,)`` [N].
+    normal_load
+        Normal load [N], a number or ``(t,)``, if known.
+    time
+        Times of the samples ``(t,)`` in any unit, needed if these are not evenly spaced.
+
+    Returns
+    -------
+    MeasuredLoops
+        Stiffness, friction and energy of each loop.
+
+    Raises
+    ------
+    wear.joints.measured.loop_record.MeasuredLoopError
+        If no loop closes, there are too few samples for anything but energies, or loops generate
+        energy.
 
     Examples
     --------
-    Two cycles of a joint of known friction and stiffness:
+    Two cycles of a joint with known friction and stiffness:
 
     >>> import numpy as np
     >>> from wear.joints import Jenkins, march_joints, measure_loops
@@ -237,22 +279,22 @@ def measure_loops(
     """
     record, pairs = closed_loops(loop_record(displacement, force, normal_load, time))
     energy = np.array([_energy(record, pair) for pair in pairs])
-    sizes = np.array([_of_pair(record, pair) for pair in pairs])
+    sizes = np.array([_pair_means(record, pair) for pair in pairs])
     box = 2.0 * sizes[:, 0] * sizes[:, 1]
-    if (box <= 0.0).all() or energy.sum() < -GIVING * np.abs(box).sum():
+    if (box <= 0.0).all() or energy.sum() < -GENERATING * np.abs(box).sum():
         raise MeasuredLoopError(
-            "the loops give energy; allowed: the force that resists the displacement "
-            "(change the sign of one of them)"
+            "the loops give energy instead of dissipating it; allowed: the force that resists the "
+            "displacement (change the sign of one of them)"
         )
-    energy = np.where(np.abs(energy) > NOUGHT * np.abs(box), energy, 0.0)
-    # Of a few points the outermost may lie on either branch, at any force: then the range counts.
+    energy = np.where(np.abs(energy) > NEAR_ZERO * np.abs(box), energy, 0.0)
+    # With a few samples per loop the outermost may lie on either branch: use the range of forces.
     noise = noise_along(record, [branch for pair in pairs for branch in pair])
     ranges = np.array([0.5 * np.ptp(record.force[_samples(pair)]) for pair in pairs])
     sizes[:, 1] = np.maximum(sizes[:, 1], ranges - RANGE_NOISE * noise[1])
     loads = np.array([record.normal_load[_samples(pair)].mean() for pair in pairs])
-    step = _steps(record, pairs, sizes, energy, loads, noise)
+    step = _assign_steps(record, pairs, sizes, energy, loads, noise)
     measured = [
-        _measured(record, [pairs[k] for k in np.flatnonzero(step == number)])
+        _measure_step(record, [pairs[k] for k in np.flatnonzero(step == number)])
         for number in range(step[-1] + 1)
     ]
     stick, spread, residual, friction, sliding, stroke = map(
@@ -282,17 +324,17 @@ def measure_loops(
 
 
 def _samples(pair: LoopPair) -> Indices:
-    """All samples of a loop."""
+    """Return all samples of a loop."""
     return np.concatenate([pair[0].samples, pair[1].samples[1:]])
 
 
-def _of_pair(record: LoopRecord, pair: LoopPair) -> tuple[float, float]:
-    """Means of the two branches: displacement that they cover, and half of what the force gains."""
+def _pair_means(record: LoopRecord, pair: LoopPair) -> tuple[float, float]:
+    """Return the displacement and half the rise of the force that both branches have on average."""
     travel = float(np.mean([record.travel(branch) for branch in pair]))
     return travel, 0.5 * float(np.mean([record.rise(branch) for branch in pair]))
 
 
-def _steps(
+def _assign_steps(
     record: LoopRecord,
     pairs: Sequence[LoopPair],
     sizes: Array,
@@ -300,16 +342,19 @@ def _steps(
     loads: Array,
     noise: tuple[float, float],
 ) -> Indices:
-    """The step ``(c,)`` that each loop is of: a new one where it is unlike the mean of the last."""
+    """Return the step ``(c,)`` of each loop.
+
+    A new step begins where a loop differs from the mean of the last step.
+    """
     motion, force = noise
     stroke, half = np.maximum(np.abs(sizes), np.finfo(float).tiny).T
     counts = np.array([len(_samples(pair)) for pair in pairs])
-    # Reversals lie between samples: what these are apart there.
+    # Reversals lie between samples, so that the distance of samples there is uncertain.
     gaps = np.array([_gaps(record, pair) for pair in pairs])
-    # Noise of the energy: that of the force on the increments of the motion, and the reverse.
+    # Noise of the energy comes from that of the force on the motion, and the other way around.
     uncertain = np.pi * np.hypot(force * stroke, 2.0 * motion * half) / np.sqrt(counts)
     features = [
-        # Values, what they are measured by, and what may be wrong with them.
+        # Each row has the values, their scale and their uncertainty.
         (sizes[:, 0], stroke, ALIKE_NOISE * 2.0 * motion + gaps[:, 0]),
         (sizes[:, 1], half, ALIKE_NOISE * force + gaps[:, 1]),
         (energy, 2.0 * stroke * half, ALIKE_NOISE * uncertain + 4.0 * half * gaps[:, 0]),
@@ -329,17 +374,17 @@ def _steps(
 
 
 def _gaps(record: LoopRecord, pair: LoopPair) -> tuple[float, float]:
-    """Largest distances of samples beside the reversals of a loop, in displacement and force."""
-    beside = np.concatenate([branch.samples[[0, 1, -2, -1]] for branch in pair]).reshape(-1, 2)
-    motion, force = (np.abs(np.diff(record[k][beside], axis=1)).max() for k in (0, 1))
+    """Return the largest distances of samples next to reversals, in displacement and force."""
+    next_to = np.concatenate([branch.samples[[0, 1, -2, -1]] for branch in pair]).reshape(-1, 2)
+    motion, force = (np.abs(np.diff(record[k][next_to], axis=1)).max() for k in (0, 1))
     return float(motion), float(force)
 
 
-def _measured(record: LoopRecord, pairs: Sequence[LoopPair]) -> tuple[Array, ...]:
-    """What the loops of one step say, each ``(c,)``.
+def _measure_step(record: LoopRecord, pairs: Sequence[LoopPair]) -> tuple[Array, ...]:
+    """Return the results of the loops of one step ``(c,)`` each.
 
-    Stick stiffness and the standard error common to all, residual stiffness, friction force, share
-    that slides, and stroke.
+    These are the stick stiffness and the standard error common to all, residual stiffness, friction
+    force, share of sliding, and stroke.
     """
     branches = [branch for pair in pairs for branch in pair]
     record = record._replace(displacement=smoothed(record.displacement, branches))
@@ -351,7 +396,7 @@ def _measured(record: LoopRecord, pairs: Sequence[LoopPair]) -> tuple[Array, ...
     if sliding > 0.0:
         lines = np.array([sliding_lines(record, pair, sliding) for pair in pairs])
     if (lines[:, 1] <= 0.0).any():
-        # Of a few points: the branches lie the wrong way about each other.
+        # With a few samples the branches may lie in the wrong order: this is no sliding.
         lines, sliding = np.full((len(pairs), 2), np.nan), 0.0
     if sliding > 0.0:
         heights = np.repeat(2.0 * lines[:, 1], 2)
@@ -363,12 +408,12 @@ def _measured(record: LoopRecord, pairs: Sequence[LoopPair]) -> tuple[Array, ...
 
 
 def _of_cycles(values: Sequence[float] | Array) -> Array:
-    """Means of the two branches of each cycle, ``(c,)``."""
+    """Return the means of the two branches of each cycle ``(c,)``."""
     return np.asarray(np.reshape(values, (-1, 2)).mean(axis=1))
 
 
 def _energy(record: LoopRecord, pair: LoopPair) -> float:
-    """∮ T dδ of the closed polygon [N mm]."""
+    """Return ∮ T dδ of the closed polygon [N mm]."""
     here = _samples(pair)
     motion, force = record.displacement[here], record.force[here]
     return float(0.5 * np.sum((force + np.roll(force, -1)) * (np.roll(motion, -1) - motion)))

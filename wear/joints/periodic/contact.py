@@ -1,18 +1,18 @@
 """Compiled march of contacts in three dimensions over a period.
 
-See :mod:`wear.joints.periodic.march` for what calls it.
+:mod:`wear.joints.periodic.march` calls it.
 
-What a contact remembers is the stretch s of its tangential spring, two numbers. Where periods go on
-to change the stretch, they will by (1 - A)⁻¹ times the change of one, with A, the derivative of the
-stretch after a period with respect to that before: Newton's step, of which few are needed where
-slip is so little that the contact would take thousands of periods.
+The memory of a contact is the stretch s of its tangential spring, two numbers. If further periods
+go on changing the stretch, the total change is (1 - A)⁻¹ times that of one period, where A is the
+derivative of the stretch after a period by that before. This is Newton's step. Few are needed where
+the slip is so small that the contact would take thousands of periods.
 
-The derivative S of s with respect to the coefficients comes after that, along the period that
-repeats and only if it is asked for: what a period makes of 0, and (1 - A)⁻¹ of that at its
-beginning. So does the energy.
+The derivative S of s with respect to the coefficients is computed afterwards, along the repeating
+period and only if it is asked for: it is the change over a period that begins with S = 0, and
+(1 - A)⁻¹ times that at its beginning. So is the energy.
 
-Increments take and give numbers: rows of arrays, handed to functions, take four times as long.
-Arrays are written number by number, as in :mod:`wear.joints.periodic.sliders`.
+Increments take and return numbers: passing rows of arrays takes four times as long. Arrays are
+written element by element, as in :mod:`wear.joints.periodic.sliders`.
 """
 
 from __future__ import annotations
@@ -23,7 +23,13 @@ import numpy as np
 
 from sa_solver.types import Array
 from wear.joints.compiled import compiled
-from wear.joints.friction_path import (
+from wear.joints.periodic.contact_slopes import (
+    copy_gradient,
+    project,
+    project_normal,
+    project_stuck,
+)
+from wear.joints.periodic.friction_path import (
     Contact,
     ForcePath,
     ForceSlopes,
@@ -33,12 +39,6 @@ from wear.joints.friction_path import (
     energy_lost,
     path_of,
     pressing,
-)
-from wear.joints.periodic.contact_slopes import (
-    copy_gradient,
-    project,
-    project_normal,
-    project_stuck,
 )
 from wear.joints.periodic.sliders import (
     FORGETTING,
@@ -52,23 +52,23 @@ from wear.joints.periodic.sliders import (
     rows_from_rest,
 )
 
-# A force below the circle by no more than this share of it slips: rounding.
+# A force below the circle by no more than this share of it counts as slipping: it is rounding.
 ON_CIRCLE = 1e-12
-# What is left of a stretch, as a share, when it is forgotten: rounding of what came since.
+# Remaining share of a stretch at which it is forgotten, far below the rounding of later ones.
 FORGOTTEN = 1e-18
-# What a contact does in its period; the first two as :func:`_state_of`.
+# Behaviour of a contact over its period, which is either the same state throughout, or marched.
 STUCK, MARCHED, APART = 0.0, 1.0, 2.0
 
 
 class Stretch(NamedTuple):
-    """That of the tangential spring [mm]."""
+    """Stretch of the tangential spring [mm]."""
 
     x: float
     y: float
 
 
-class Kept(NamedTuple):
-    """A, ``(2, 2)`` by rows: what a march makes of a small stretch."""
+class Transition(NamedTuple):
+    """A ``(2, 2)`` by rows: the derivative of the stretch after a march by that before."""
 
     xx: float
     xy: float
@@ -77,25 +77,25 @@ class Kept(NamedTuple):
 
 
 class ContactRecord(NamedTuple):
-    """What is written of a contact in a period: ``force`` ``(t, 3)`` and ``states`` ``(t,)``."""
+    """Arrays written for a contact in a period: ``force`` ``(t, 3)`` and ``states`` ``(t,)``."""
 
     force: Array
     states: np.ndarray
 
 
 @compiled(nogil=True, error_model="numpy")
-def _left_to_change(a: Kept) -> float:
-    """Determinant of 1 - A; 0 where a period forgets nothing."""
+def _determinant(a: Transition) -> float:
+    """Return the determinant of 1 - A; 0 where a period forgets nothing."""
     return (1.0 - a.xx) * (1.0 - a.yy) - a.xy * a.yx
 
 
 @compiled(nogil=True, error_model="numpy")
-def _to_the_limit(a: Kept) -> Kept:
-    """1 + A + A² + ... = (1 - A)⁻¹; 1 where a period forgets nothing."""
-    determinant = _left_to_change(a)
+def _geometric_sum(a: Transition) -> Transition:
+    """Return 1 + A + A² + ... = (1 - A)⁻¹; 1 where a period forgets nothing."""
+    determinant = _determinant(a)
     if determinant < FORGETTING:
-        return Kept(1.0, 0.0, 0.0, 1.0)
-    return Kept(
+        return Transition(1.0, 0.0, 0.0, 1.0)
+    return Transition(
         (1.0 - a.yy) / determinant,
         a.xy / determinant,
         a.yx / determinant,
@@ -105,15 +105,15 @@ def _to_the_limit(a: Kept) -> Kept:
 
 @compiled(nogil=True, error_model="numpy")
 def sticks_throughout(of_x: ForceSlopes, of_y: ForceSlopes) -> bool:
-    """Whether a contact keeps its stretch, and what is added to it."""
+    """Return whether a contact sticks for all of an increment, so that it keeps its stretch."""
     off = of_x.force_y != 0.0 or of_y.force_x != 0.0
     return of_x.force_x == 1.0 and of_y.force_y == 1.0 and not off
 
 
 @compiled(nogil=True, error_model="numpy")
-def _chain(of_x: ForceSlopes, of_y: ForceSlopes, a: Kept) -> Kept:
-    """A of a march and one increment more."""
-    return Kept(
+def _chain(of_x: ForceSlopes, of_y: ForceSlopes, a: Transition) -> Transition:
+    """Return A of a march and one further increment."""
+    return Transition(
         of_x.force_x * a.xx + of_x.force_y * a.yx,
         of_x.force_x * a.xy + of_x.force_y * a.yy,
         of_y.force_x * a.xx + of_y.force_y * a.yx,
@@ -123,7 +123,7 @@ def _chain(of_x: ForceSlopes, of_y: ForceSlopes, a: Kept) -> Kept:
 
 @compiled(nogil=True, error_model="numpy")
 def _state_of(contact: Contact, x: float, y: float, normal: float) -> int:
-    """0 stick, 1 slip, 2 separated."""
+    """Return 0 for stick, 1 for slip and 2 for separation."""
     if normal <= 0.0:
         return 2
     limit = contact.friction * normal * (1.0 - ON_CIRCLE)
@@ -134,7 +134,7 @@ def _state_of(contact: Contact, x: float, y: float, normal: float) -> int:
 def increment_of(
     contact: Contact, stretch: Stretch, path: Array, start: int, end: int
 ) -> ForcePath:
-    """The straight path between two points of a path ``(t, 3)``."""
+    """Return the straight path between two points of a path ``(t, 3)``."""
     return path_of(
         contact,
         stretch.x,
@@ -147,8 +147,8 @@ def increment_of(
 
 
 @compiled(nogil=True, error_model="numpy")
-def led_in(contact: Contact, before: Array) -> Stretch:
-    """Stretch at the first sample, to which a contact is driven from rest."""
+def lead_in(contact: Contact, before: Array) -> Stretch:
+    """Return the stretch at the first sample, to which a contact is driven from rest."""
     stretch, points = Stretch(0.0, 0.0), rows_from_rest(before)
     for i in range(len(before)):
         x, y = advance_force(increment_of(contact, stretch, points, i, i + 1))
@@ -157,13 +157,13 @@ def led_in(contact: Contact, before: Array) -> Stretch:
 
 
 @compiled(nogil=True, error_model="numpy")
-def _plain_round(
+def _one_period(
     contact: Contact, stretch: Stretch, path: Array, record: ContactRecord, ended: Stretch
 ) -> Stretch:
-    """One period: forces and states are written.
+    """March one period, write forces and states, and return the stretch at its end.
 
-    A contact that does bit for bit what is written of the period before, which ``ended`` there,
-    goes on as it did. Before the first period that is nothing: not a number.
+    A contact whose force at a sample is bit for bit that of the period before, which ended with
+    ``ended``, continues as it did then. Before the first period the forces are NaN.
     """
     samples, force, states = len(path), record.force, record.states
     for step in range(1, samples + 1):
@@ -179,9 +179,9 @@ def _plain_round(
 
 
 @compiled(nogil=True, error_model="numpy")
-def _chained_round(contact: Contact, stretch: Stretch, path: Array) -> Kept:
-    """A of one period."""
-    samples, kept = len(path), Kept(1.0, 0.0, 0.0, 1.0)
+def _period_transition(contact: Contact, stretch: Stretch, path: Array) -> Transition:
+    """Return A of one period."""
+    samples, kept = len(path), Transition(1.0, 0.0, 0.0, 1.0)
     for step in range(1, samples + 1):
         at = step if step < samples else 0
         x, y, of_x, of_y = advance_slopes(increment_of(contact, stretch, path, step - 1, at))
@@ -193,10 +193,10 @@ def _chained_round(contact: Contact, stretch: Stretch, path: Array) -> Kept:
 
 @compiled(nogil=True, error_model="numpy")
 def _unchanging(contact: Contact, stretch: Stretch, path: Array) -> int:
-    """State in which a contact is all period long, 0 or 2 as :func:`_state_of`; -1 where it slips
-    or changes it.
+    """Return the state that a contact keeps over the whole period, 0 or 2 as :func:`_state_of`.
 
-    Between samples that hold it holds: the force goes straight, within a limit that is linear.
+    It is -1 if the contact slips or changes its state. A contact that sticks at two samples also
+    sticks between them: the force moves on a straight line, and the limit is linear.
     """
     stiffness = contact.stiffness
     state = 0 if pressing(contact, path[0, 2]) > 0.0 else 2
@@ -217,7 +217,7 @@ def _unchanging(contact: Contact, stretch: Stretch, path: Array) -> int:
 def _write_unchanging(
     contact: Contact, stretch: Stretch, path: Array, state: int, record: ContactRecord
 ) -> None:
-    """What a contact does that sticks or is apart all period long."""
+    """Write forces and states of a contact that sticks or is apart over the whole period."""
     record.states[:] = state
     if state == 2:
         record.force[:] = 0.0
@@ -232,16 +232,17 @@ def _write_unchanging(
 def _settle_contact(
     contact: Contact, stretch: Stretch, path: Array, settled: Array, record: ContactRecord
 ) -> float:
-    """March until the stretch repeats: change of force.
+    """March until the stretch repeats, and return the last change of force.
 
-    ``settled`` becomes the stretch ``(2,)`` at the start of the last period, and the number of it.
+    The stretch ``(2,)`` at the start of the last period and the number of periods are written to
+    ``settled``.
     """
     span = max(largest(path[:, 0]), largest(path[:, 1]))
     change, end = 0.0, stretch
     record.force[:] = np.nan
     for number in range(MAX_PERIODS):
         settled[0], settled[1], settled[2] = stretch.x, stretch.y, number + 1.0
-        end = _plain_round(contact, stretch, path, record, end)
+        end = _one_period(contact, stretch, path, record, end)
         x, y = end.x - stretch.x, end.y - stretch.y
         change = max(abs(x), abs(y))
         if change <= REPEATED * span:
@@ -249,7 +250,7 @@ def _settle_contact(
         if number < PLAIN_PERIODS:
             stretch = end
             continue
-        share = _to_the_limit(_chained_round(contact, stretch, path))
+        share = _geometric_sum(_period_transition(contact, stretch, path))
         stretch = Stretch(
             stretch.x + share.xx * x + share.xy * y, stretch.y + share.yx * x + share.yy * y
         )
@@ -260,9 +261,9 @@ def _settle_contact(
 class Derivatives(NamedTuple):
     """Derivatives of the stretch of a contact on its way through ``n`` points.
 
-    ``functions`` ``(n, m)`` of time there, and their ``steps`` ``(n - 1, m)``; written are the
-    ``gradient`` ``(n, 2, 3, m)``, from that at the first point on, and what the way to each point
-    makes of a stretch at the first, ``kept`` ``(n, 4)`` as :class:`Kept`.
+    ``functions`` ``(n, m)`` are those of time at the points, and ``steps`` ``(n - 1, m)`` their
+    differences. Written are the ``gradient`` ``(n, 2, 3, m)``, from that at the first point on, and
+    ``kept`` ``(n, 4)``, A from the first point to each point as in :class:`Transition`.
     """
 
     functions: Array
@@ -272,8 +273,8 @@ class Derivatives(NamedTuple):
 
 
 @compiled(nogil=True, error_model="numpy")
-def _along(functions: Array) -> Derivatives:
-    """Room for derivatives through points with these functions of time."""
+def _derivatives_for(functions: Array) -> Derivatives:
+    """Return room for derivatives through points with these functions of time."""
     points, size = functions.shape
     steps = np.empty((points - 1, size))
     for t in range(points - 1):
@@ -284,7 +285,7 @@ def _along(functions: Array) -> Derivatives:
 
 @compiled(nogil=True, error_model="numpy")
 def _round_trip(points: Array) -> Array:
-    """Samples ``(t, n)`` and the first of them again."""
+    """Return samples ``(t, n)`` with the first of them again at the end."""
     samples, size = points.shape
     closed = np.empty((samples + 1, size))
     for t in range(samples + 1):
@@ -297,9 +298,9 @@ def _round_trip(points: Array) -> Array:
 def _carry(
     of_x: ForceSlopes, of_y: ForceSlopes, limit_slope: float, derivatives: Derivatives, to: int
 ) -> None:
-    """Carry the gradient along one increment, to a point from the one before.
+    """Carry the gradient along one increment to point ``to``.
 
-    ``limit_slope`` is µ kn/kt. An approach before the increment moves both limits.
+    ``limit_slope`` is µ kn/kt. An approach before the increment changes both limits.
     """
     functions, steps, gradient, _ = derivatives
     x_by_start, y_by_start = of_x.start + of_x.end, of_y.start + of_y.end
@@ -320,11 +321,11 @@ def _carry(
 
 
 @compiled(nogil=True, error_model="numpy")
-def _carried(
+def _carry_through(
     contact: Contact, stretch: Stretch, points: Array, derivatives: Derivatives
 ) -> tuple[Stretch, bool]:
-    """Drive a contact through points with the derivatives carried along; whether it sticks."""
-    sticks, kept = True, Kept(1.0, 0.0, 0.0, 1.0)
+    """Drive a contact through points and carry the derivatives; also return whether it sticks."""
+    sticks, kept = True, Transition(1.0, 0.0, 0.0, 1.0)
     limit_slope = contact.friction * contact.normal_stiffness / contact.stiffness
     for to in range(1, len(points)):
         x, y, of_x, of_y = advance_slopes(increment_of(contact, stretch, points, to - 1, to))
@@ -339,14 +340,17 @@ def _carried(
 
 
 @compiled(nogil=True, error_model="numpy")
-def _repeat(derivatives: Derivatives) -> bool:
-    """Make the gradient of 0 that of a period that repeats; whether it forgets enough for that."""
+def _make_periodic(derivatives: Derivatives) -> bool:
+    """Turn the gradient of a period from 0 into that of a repeating period.
+
+    Return whether the period forgets enough for that.
+    """
     gradient, kept = derivatives.gradient, derivatives.kept
     xx, xy, yx, yy = kept[-1, 0], kept[-1, 1], kept[-1, 2], kept[-1, 3]
-    a = Kept(xx, xy, yx, yy)
-    if _left_to_change(a) < FORGETTING:
+    a = Transition(xx, xy, yx, yy)
+    if _determinant(a) < FORGETTING:
         return False
-    share, first, last = _to_the_limit(a), gradient[0], gradient[-1]
+    share, first, last = _geometric_sum(a), gradient[0], gradient[-1]
     for direction in range(3):
         for c in range(first.shape[2]):
             x, y = last[0, direction, c], last[1, direction, c]
@@ -368,32 +372,34 @@ def _repeat(derivatives: Derivatives) -> bool:
 def _differentiate(
     contact: Contact,
     driven: tuple[Array, Array, Array],
-    way_in: Derivatives,
+    lead_derivatives: Derivatives,
     derivatives: Derivatives,
 ) -> bool:
-    """Gradient of the stretch in the period that repeats: whether it sticks throughout.
+    """Write the gradient of the stretch in the repeating period; return whether it sticks.
 
-    ``driven`` are path, way to it, and where it has settled. A contact that forgets too little of
-    how it began carries the derivative from there.
+    ``driven`` are the path, the way to it, and the settled data. The derivative of a contact that
+    forgets too little of its beginning is carried on from there.
     """
     path, before, settled = driven
     points, gradient = _round_trip(path), derivatives.gradient
     gradient[0] = 0.0
-    _, sticks = _carried(contact, Stretch(settled[0], settled[1]), points, derivatives)
-    if _repeat(derivatives):
+    _, sticks = _carry_through(contact, Stretch(settled[0], settled[1]), points, derivatives)
+    if _make_periodic(derivatives):
         return sticks
-    stretch, _ = _carried(contact, Stretch(0.0, 0.0), rows_from_rest(before), way_in)
-    copy_gradient(way_in.gradient[-1], gradient[-1])
+    stretch, _ = _carry_through(
+        contact, Stretch(0.0, 0.0), rows_from_rest(before), lead_derivatives
+    )
+    copy_gradient(lead_derivatives.gradient[-1], gradient[-1])
     for _ in range(int(settled[2])):
         copy_gradient(gradient[-1], gradient[0])
-        stretch, sticks = _carried(contact, stretch, points, derivatives)
+        stretch, sticks = _carry_through(contact, stretch, points, derivatives)
     copy_gradient(gradient[-1], gradient[0])
     return sticks
 
 
 @compiled(nogil=True, error_model="numpy")
 def _largest_of(force: Array) -> float:
-    """The largest component of forces ``(t, 3)``."""
+    """Return the largest component of forces ``(t, 3)``."""
     return max(largest(force[:, 0]), largest(force[:, 1]), largest(force[:, 2]))
 
 
@@ -401,14 +407,14 @@ def _largest_of(force: Array) -> float:
 def settle_contacts(period: Period, joints: DrivenJoints) -> None:
     """Settle contacts; parameters are those of the law.
 
-    Neither derivatives nor energies are written. ``settled`` is what is needed for these: stretch
-    at the first sample, number of periods, and what the contact does in them.
+    Neither derivatives nor energies are written. ``settled`` holds the data for them: the stretch
+    at the first sample, the number of periods, and the behaviour of the contact.
     """
     for j in range(len(joints.parameters)):
         contact, path, settled = contact_of(joints.parameters[j]), joints.path[j], joints.settled[j]
         record = ContactRecord(joints.force[j], joints.states[j])
-        stretch = led_in(contact, joints.before[j])
-        # Most contacts of a pad: in closed form.
+        stretch = lead_in(contact, joints.before[j])
+        # Most contacts of a pad keep their state, which has a closed form.
         state = _unchanging(contact, stretch, path)
         missing = 0.0
         if state >= 0:
@@ -422,9 +428,12 @@ def settle_contacts(period: Period, joints: DrivenJoints) -> None:
 
 @compiled(nogil=True, error_model="numpy")
 def differentiate_contacts(period: Period, joints: DrivenJoints) -> None:
-    """Write the derivatives of contacts that have settled."""
+    """Write the derivatives of settled contacts."""
     shares = np.dot(period.weights, period.basis)
-    way_in, derivatives = _along(rows_from_rest(period.lead)), _along(_round_trip(period.basis))
+    lead_derivatives, derivatives = (
+        _derivatives_for(rows_from_rest(period.lead)),
+        _derivatives_for(_round_trip(period.basis)),
+    )
     for j in range(len(joints.parameters)):
         contact, settled = contact_of(joints.parameters[j]), joints.settled[j]
         jacobian = joints.jacobian[j]
@@ -433,11 +442,11 @@ def differentiate_contacts(period: Period, joints: DrivenJoints) -> None:
             continue
         before, first, sticks = joints.before[j], derivatives.gradient[0], True
         if settled[3] == STUCK:
-            _carried(contact, Stretch(0.0, 0.0), rows_from_rest(before), way_in)
-            copy_gradient(way_in.gradient[-1], first)
+            _carry_through(contact, Stretch(0.0, 0.0), rows_from_rest(before), lead_derivatives)
+            copy_gradient(lead_derivatives.gradient[-1], first)
         else:
             driven = joints.path[j], before, settled
-            sticks = _differentiate(contact, driven, way_in, derivatives)
+            sticks = _differentiate(contact, driven, lead_derivatives, derivatives)
         if sticks:
             project_stuck(contact.stiffness, period, shares, first, jacobian)
         else:
@@ -447,7 +456,7 @@ def differentiate_contacts(period: Period, joints: DrivenJoints) -> None:
 
 @compiled(nogil=True, error_model="numpy")
 def energies_of_contacts(period: Period, joints: DrivenJoints) -> None:
-    """Write the energies that contacts dissipate which have settled."""
+    """Write the energies that settled contacts dissipate."""
     for j in range(len(joints.parameters)):
         contact, path, settled = contact_of(joints.parameters[j]), joints.path[j], joints.settled[j]
         lost, stretch = 0.0, Stretch(settled[0], settled[1])

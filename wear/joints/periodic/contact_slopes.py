@@ -1,6 +1,6 @@
-"""Derivatives of the forces of contacts from those of their stretch, over a settled period.
+"""Derivatives of contact forces from those of the stretch, over a settled period.
 
-See :mod:`wear.joints.periodic.contact`. Gradients are those of the stretch ``(t + 1, 2, 3, m)``:
+See :mod:`wear.joints.periodic.contact`. Gradients are those of the stretch ``(t + 1, 2, 3, m)``: of
 its two components, by the coefficients of three directions and ``m`` functions of time.
 """
 
@@ -15,7 +15,7 @@ from wear.joints.periodic.sliders import Period
 
 @compiled(nogil=True, error_model="numpy")
 def copy_gradient(gradient: Array, to: Array) -> None:
-    """One gradient ``(2, 3, m)`` is written as another."""
+    """Copy one gradient ``(2, 3, m)`` to another."""
     for memory in range(2):
         for direction in range(3):
             for c in range(gradient.shape[2]):
@@ -26,10 +26,10 @@ def copy_gradient(gradient: Array, to: Array) -> None:
 def project_stuck(
     stiffness: float, period: Period, shares: Array, first: Array, jacobian: Array
 ) -> None:
-    """Tangential part of the derivative where all samples stick.
+    """Write the tangential part of the derivative where all samples stick.
 
-    The stretch at a sample is that at the first one and the displacement since; ``first``
-    ``(2, 3, m)`` is its derivative there.
+    The stretch at a sample is that at the first one plus the displacement since; ``first`` ``(2, 3,
+    m)`` is the derivative of the former.
     """
     basis, weights = period.basis, period.weights
     size = basis.shape[1]
@@ -46,7 +46,7 @@ def project_stuck(
 
 @compiled(nogil=True, error_model="numpy")
 def project(stiffness: float, weights: Array, gradient: Array, jacobian: Array) -> None:
-    """Tangential part of the derivative."""
+    """Write the tangential part of the derivative."""
     size, samples = weights.shape
     copy_gradient(gradient[-1], gradient[0])
     slopes = np.dot(weights, gradient[:-1].reshape(samples, 6 * size))
@@ -62,7 +62,7 @@ def project(stiffness: float, weights: Array, gradient: Array, jacobian: Array) 
 def project_normal(
     stiffness: float, period: Period, shares: Array, states: Array, jacobian: Array
 ) -> None:
-    """Normal part of the derivative: kn as long as there is contact."""
+    """Write the normal part of the derivative: kn while there is contact."""
     basis, pressed, apart = period.basis, shares, False
     for state in states:
         apart = apart or state == 2

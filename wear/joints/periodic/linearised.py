@@ -1,17 +1,17 @@
-"""What small deviations from a periodic motion do to joints, increment by increment.
+"""Linearised increments of joints around a periodic motion.
 
-A joint remembers numbers s ``(p,)``. Along an increment of a known motion small deviations of what
-it remembers, δs, and of its displacement at the beginning and the end, δu, go on linearly,
+A joint has a memory s ``(p,)``. In an increment of a known motion, small deviations δs of the
+memory and δu of its displacement at the beginning and the end evolve linearly,
 
     δs_end = A δs + E δu + D δu_end,        δF_end = S δs_end + T δu_end,
 
-exactly, with whatever happens within the increment. From these maps whoever integrates the
-structure knows whether deviations grow: the memory is part of the state, of which a slider that
-slips keeps nothing, and one that sticks everything.
+exactly, whatever happens within the increment. From these matrices a time integration of the
+structure determines whether deviations grow. The memory is part of the state: a slipping slider
+forgets all of it, a sticking one keeps it.
 
-What is remembered is the stretch of the spring, of sliders and contacts; of joints of spread
-sliders the force, and displacement and force of each turning point that is open; of elastic joints
-nothing.
+The memory of sliders and contacts is the stretch of the spring. That of joints of distributed
+sliders is the force, and displacement and force of each open turning point. Elastic joints have
+none.
 """
 
 from __future__ import annotations
@@ -25,15 +25,15 @@ import numpy as np
 from sa_solver.types import Array, Indices
 from wear.joints.compiled import compiled
 from wear.joints.elastic import STOP, elastic_force
-from wear.joints.friction_path import advance_slopes, contact_of, pressing
 from wear.joints.masing import DEPTH, DISPLACEMENT, POINTS, advance_masing, turns
 from wear.joints.periodic.contact import (
     MARCHED,
     Stretch,
     increment_of,
-    led_in,
+    lead_in,
     sticks_throughout,
 )
+from wear.joints.periodic.friction_path import advance_slopes, contact_of, pressing
 from wear.joints.periodic.sliders import (
     CURVE_PERIODS,
     JENKINS,
@@ -42,21 +42,35 @@ from wear.joints.periodic.sliders import (
     slider_of,
 )
 
-# What a joint does in an increment; where it changes, so does what follows from a deviation.
+# Regimes of a joint in an increment. Where the regime changes, the matrices are discontinuous.
 STICKS, SLIPS, SLIPS_BACK, IS_APART, TOUCHES = 0, 1, 2, 3, 4
 
 
 @dataclass(frozen=True)
 class LinearisedMarch:
-    """The maps of ``t`` increments of ``j`` joints of ``d`` directions that remember ``p`` numbers.
+    """Matrices of ``t`` increments of ``j`` joints of ``d`` directions with memory of size ``p``.
 
-    The first increment leads from the first sample to the second, the last to the first again.
-    ``kept`` A ``(t, j, p, p)``, ``by_start`` E and ``by_end`` D ``(t, j, p, d)``, ``pull`` S
-    ``(j, d, p)`` and ``tangent`` T ``(t, j, d, d)`` as in the module; ``regimes`` ``(t, j)`` are
-    whole numbers that change from an increment to the next where the joint does something else.
-    ``force`` ``(t, j, d)`` [N] is that of the motion itself, at each sample.
-    A joint that remembers less than others has ``remembered`` ``(j,)`` numbers: the further ones
-    have no part in it, and stay as they are.
+    The first increment leads from the first sample to the second, the last one back to the first.
+    The matrices are those of the module.
+
+    Parameters
+    ----------
+    kept
+        A ``(t, j, p, p)``.
+    by_start, by_end
+        E and D ``(t, j, p, d)``.
+    pull
+        S ``(j, d, p)``.
+    tangent
+        T ``(t, j, d, d)``.
+    regimes
+        Whole numbers ``(t, j)`` that change from one increment to the next where the joint changes
+        its regime.
+    force
+        Force of the motion itself at each sample ``(t, j, d)`` [N].
+    remembered
+        Size of the memory of each joint ``(j,)``. Numbers beyond it have no effect and do not
+        change.
     """
 
     kept: Array
@@ -70,13 +84,13 @@ class LinearisedMarch:
 
     @classmethod
     def of(cls, maps: Maps) -> LinearisedMarch:
-        """Of joints that remember equally many numbers."""
+        """Return the matrices of joints that all have the same size of memory."""
         joints, _, memory = maps.pull.shape
         return cls(*maps, np.full(joints, memory))
 
 
 class Maps(NamedTuple):
-    """:class:`LinearisedMarch` as compiled functions write it."""
+    """Fields of :class:`LinearisedMarch` as compiled functions write them."""
 
     kept: Array
     by_start: Array
@@ -88,7 +102,7 @@ class Maps(NamedTuple):
 
     @classmethod
     def room(cls, samples: int, joints: int, memory: int, directions: int) -> Maps:
-        """Zeros for so many increments, joints, numbers of memory and directions."""
+        """Return zeros for so many increments, joints, numbers of memory and directions."""
         of_memory = (samples, joints, memory)
         return cls(
             np.zeros((*of_memory, memory)),
@@ -103,7 +117,7 @@ class Maps(NamedTuple):
 
 @compiled(nogil=True, error_model="numpy")
 def linearise_sliders(joints: DrivenJoints, maps: Maps) -> None:
-    """Of Jenkins's and Bouc-Wen's joints that have settled."""
+    """Write the matrices of settled Jenkins and Bouc-Wen joints."""
     for j in range(len(joints.parameters)):
         joint, path = joints.parameters[j], joints.path[j]
         slider, stretch = slider_of(joint), joints.settled[j, 0]
@@ -123,7 +137,7 @@ def linearise_sliders(joints: DrivenJoints, maps: Maps) -> None:
 
 @compiled(nogil=True, error_model="numpy")
 def linearise_elastic(joints: DrivenJoints, maps: Maps) -> None:
-    """Of joints that remember nothing."""
+    """Write the matrices of elastic joints, which have no memory."""
     for j in range(len(joints.parameters)):
         joint, path = joints.parameters[j], joints.path[j]
         for step in range(len(path)):
@@ -131,19 +145,19 @@ def linearise_elastic(joints: DrivenJoints, maps: Maps) -> None:
             at = path[after]
             force, slope, state = elastic_force(joint, at)
             maps.force[after, j, 0], maps.tangent[step, j, 0, 0] = force, slope
-            # Of a stop, which of two sides is pressed counts too.
+            # The two sides of a stop are different regimes.
             if joint[0] == STOP:
                 maps.regimes[step, j] = IS_APART if state else int(copysign(1.0, at))
 
 
 @compiled(nogil=True, error_model="numpy")
 def linearise_contacts(joints: DrivenJoints, maps: Maps) -> None:
-    """Of contacts that have settled."""
+    """Write the matrices of settled contacts."""
     for j in range(len(joints.parameters)):
         contact, path = contact_of(joints.parameters[j]), joints.path[j]
         stretch = Stretch(joints.settled[j, 0], joints.settled[j, 1])
         if joints.settled[j, 3] != MARCHED:
-            stretch = led_in(contact, joints.before[j])
+            stretch = lead_in(contact, joints.before[j])
         limit_slope = contact.friction * contact.normal_stiffness / contact.stiffness
         maps.pull[j, 0, 0] = maps.pull[j, 1, 1] = contact.stiffness
         for step in range(len(path)):
@@ -172,9 +186,11 @@ def linearise_contacts(joints: DrivenJoints, maps: Maps) -> None:
 
 @compiled(nogil=True, error_model="numpy")
 def linearise_curves(lead: int, joints: DrivenJoints, maps: Maps) -> int:
-    """Of joints of spread sliders, led in through so many points: turning points open at once.
+    """Write the matrices of joints of distributed sliders, and return the open turning points.
 
-    With room for fewer turning points than that nothing else is written.
+    The return value is the largest number of turning points that are open at once. ``lead`` is the
+    number of points before the period. If there is room for fewer turning points, the matrices are
+    incomplete.
     """
     samples = joints.path.shape[1]
     memory = np.empty(POINTS + 2 * (lead + 2 * samples))
@@ -209,8 +225,11 @@ def linearise_curves(lead: int, joints: DrivenJoints, maps: Maps) -> int:
 
 @compiled(nogil=True, error_model="numpy")
 def _write_curve(maps: Maps, step: int, j: int, change: tuple[int, int, float]) -> None:
-    """One increment, in which a turning point of this number is added (-1: none), so many are left
-    and the slope is this. The force is the first of what is remembered."""
+    """Write one increment of a joint of distributed sliders.
+
+    ``change`` holds the number of the turning point that is added (-1: none), the number of turning
+    points left, and the slope. The force is the first number of the memory.
+    """
     added, left, slope = change
     kept, by_start = maps.kept[step, j], maps.by_start[step, j]
     for point in range(left):

@@ -1,18 +1,18 @@
-"""Joints driven through a given period until their forces repeat, and these forces' derivative.
+"""Joints driven through a given period until their forces repeat, and the forces' derivative.
 
 The displacement of a joint is a combination of functions of time, sampled over one period: u = Φ c
 with the basis Φ ``(t, m)`` and coefficients c ``(m, d)``. The joint is driven along straight paths
-from sample to sample, period after period, until its state is the same after one as before. Its
-forces are then projected, F = W f with the weights W ``(m, t)``, and so is their exact derivative
-with respect to c, which passes through everything the joint remembers: where its slider is, where
-it turned round, when it touched. The caller chooses the functions.
+from sample to sample, period after period, until its state at the end of a period is that at its
+beginning. Its forces are then projected, F = W f with the weights W ``(m, t)``, and so is their
+exact derivative with respect to c. The derivative includes all of the joint's memory: where its
+slider is, where it turned, when it touched. The caller chooses the functions.
 
-A joint is driven into the period from rest, through the points Φ_lead c: the rows ``lead``
-``(p, m)``, of which the last is the first sample. This decides between the many periodic forces of
-a joint that does not slip fully; where it does, it makes no difference.
+A joint is driven into the period from rest, through the points Φ_lead c with the rows ``lead``
+``(p, m)``, the last of which is the first sample. This selects one of the many periodic forces that
+a joint without full slip may have; with full slip it has no effect.
 
 Derivatives are those of the forces on these paths, so that a Newton iteration on the coefficients
-converges as fast as it can. On a switch between two states they are those of one side.
+converges as fast as it can. At a transition between two states they are those of one side.
 """
 
 from __future__ import annotations
@@ -56,17 +56,21 @@ from wear.joints.periodic.sliders import (
 )
 
 STICK, SLIP, SEPARATED = 0, 1, 2
-"""States of a joint at a sample. A spread or smooth joint slips where less than half of the
-stiffness that it may lose is left."""
+"""States of a joint at a sample. A joint of distributed sliders or of Bouc and Wen slips where less
+than half of the stiffness that it can lose is left.
+"""
 
 SettlingKernel = Callable[[Period, DrivenJoints], None]
-# Numbers that joints of so many directions remember, and the march that says what becomes of them.
+# Size of the memory of joints by their number of directions, and their linearised march.
 MEMORY = {1: (1, linearise_sliders), 3: (2, linearise_contacts)}
 
 
 class Kernels(NamedTuple):
-    """Compiled marches of a law: until it repeats, for derivatives and energies, None where these
-    come with the first."""
+    """Compiled marches of a law.
+
+    ``settle`` marches until the forces repeat. ``differentiate`` and ``dissipate`` write
+    derivatives and energies, and are None where ``settle`` writes them.
+    """
 
     settle: SettlingKernel
     differentiate: SettlingKernel | None
@@ -75,16 +79,25 @@ class Kernels(NamedTuple):
 
 @dataclass(frozen=True)
 class SettledCycle:
-    """What ``j`` joints of ``d`` directions do in a period of ``t`` samples that repeats.
+    """Periodic forces of ``j`` joints of ``d`` directions in a period of ``t`` samples.
 
-    ``force`` ``(j, m, d)`` is W f [N], ``jacobian`` ``(j, m, d, m, d)`` its derivative with respect
-    to the coefficients; ``samples`` ``(t, j, d)`` [N] are the forces, ``states`` ``(t, j)`` one of
-    ``STICK``, ``SLIP`` and ``SEPARATED`` each, ``dissipated`` ``(j,)`` [N mm] is lost per period.
-    ``change`` ``(j,)`` is by how much the force at the first sample still differed after the last
-    period, over the largest force.
+    The derivative and the energies are expensive, and computed when they are first used.
 
-    What is dear is found when it is asked for: ``differentiate`` and ``dissipate`` tell the
-    derivative and the energies.
+    Parameters
+    ----------
+    force
+        W f ``(j, m, d)`` [N].
+    samples
+        Forces at the samples ``(t, j, d)`` [N].
+    states
+        ``STICK``, ``SLIP`` or ``SEPARATED`` ``(t, j)``.
+    change
+        Change of the force at the first sample in the last period, over the largest force ``(j,)``.
+    differentiate
+        Function that returns the derivative of ``force`` with respect to the coefficients
+        ``(j, m, d, m, d)``.
+    dissipate
+        Function that returns the energy lost per period ``(j,)`` [N mm].
     """
 
     force: Array
@@ -105,14 +118,14 @@ class SettledCycle:
 
 @dataclass(frozen=True)
 class PeriodicMarch:
-    """A joint ``law`` over whole periods.
+    """March of the joints of one ``law`` over whole periods.
 
-    ``threads`` march that many shares of the joints at once.
+    ``threads`` is the number of shares of the joints that are marched in parallel.
 
     Examples
     --------
-    A joint driven as 0.01 cos θ has the energy of the closed form, and its harmonics but for the 64
-    samples:
+    A joint driven as 0.01 cos θ has the energy of the closed form, and its
+    harmonics within the error of 64 samples:
 
     >>> import numpy as np
     >>> from wear.joints import Jenkins, PeriodicMarch
@@ -136,11 +149,24 @@ class PeriodicMarch:
     def settle(
         self, coefficients: Array, basis: Array, weights: Array, lead: Array | None = None
     ) -> SettledCycle:
-        """The settled period of joints with the ``coefficients`` ``(j, m, d)`` [mm].
+        """Return the settled period of joints.
 
-        ``basis`` ``(t, m)``, ``weights`` ``(m, t)`` and ``lead`` ``(p, m)`` as in the module;
-        without ``lead`` joints are driven from rest straight to the first sample. Raises
-        :class:`JointError` for shapes that do not fit.
+        Parameters
+        ----------
+        coefficients
+            Coefficients c of the joints ``(j, m, d)`` [mm].
+        basis
+            Functions of time Φ at the samples ``(t, m)``.
+        weights
+            Weights W of the projection ``(m, t)``.
+        lead
+            Functions of time at the points on the way from rest ``(p, m)``. Without them joints are
+            driven straight to the first sample.
+
+        Raises
+        ------
+        JointError
+            If the shapes do not fit.
         """
         lead = basis[:1] if lead is None else lead
         self._require(coefficients, basis, weights, lead)
@@ -169,11 +195,16 @@ class PeriodicMarch:
     def linearise(
         self, coefficients: Array, basis: Array, lead: Array, memory: int = 0
     ) -> LinearisedMarch:
-        """What small deviations from the settled period do, increment by increment.
+        """Return the linearised increments of the settled period.
 
-        Arguments as those of :meth:`settle`; the times of ``basis``, which ascend from the
-        beginning of the period, need not be equally far apart. Joints of spread sliders have room
-        for at least ``memory`` numbers, so that motions with fewer turning points are like others.
+        Parameters
+        ----------
+        coefficients, basis, lead
+            As in :meth:`settle`. The times of ``basis`` ascend from the beginning of the period and
+            need not be evenly spaced.
+        memory
+            Least size of the memory of joints of distributed sliders, so that motions with fewer
+            turning points have arrays of the same shape.
         """
         joints, _, directions = coefficients.shape
         self._require(coefficients, basis, basis.T, lead)
@@ -197,7 +228,7 @@ class PeriodicMarch:
     def _driven(
         self, coefficients: Array, basis: Array, lead: Array, functions: int
     ) -> DrivenJoints:
-        """Joints to be marched, with room for derivatives by so many functions of time."""
+        """Return joints to be marched, with room for derivatives by ``functions`` functions."""
         joints, _, directions = coefficients.shape
         parameters = self._kernels[1]
         if len(parameters) < joints:
@@ -219,7 +250,7 @@ class PeriodicMarch:
 
     @cached_property
     def _kernels(self) -> tuple[Kernels, Array]:
-        """The compiled marches of the law, and its parameters ``(1 or j, p)``."""
+        """Compiled marches of the law, and its parameters ``(1 or j, p)``."""
         law = self.law
         if isinstance(law, FrictionContact):
             contacts = Kernels(settle_contacts, differentiate_contacts, energies_of_contacts)
@@ -232,12 +263,12 @@ class PeriodicMarch:
         if isinstance(law, Jenkins):
             return sliders, np.insert(law.parameters, 0, JENKINS, axis=1)
         parameters = np.insert(law.parameters, 0, BOUC_WEN, axis=1)
-        # Of its stiffness the spring has what is not residual.
+        # The spring has the stiffness less the residual one.
         parameters[:, 1] -= parameters[:, 2]
         return sliders, parameters
 
     def _march(self, kernel: SettlingKernel, period: Period, driven: DrivenJoints) -> None:
-        """March all joints, in a share per thread."""
+        """March all joints, one share of them per thread."""
         joints = len(driven.change)
         shares = min(self.threads, joints)
         if shares <= 1:
@@ -255,7 +286,8 @@ class PeriodicMarch:
         joints, size, directions = coefficients.shape
         if directions != self.directions:
             raise JointError(
-                f"coefficients of {directions} directions for joints of {self.directions}"
+                f"the coefficients have {directions} directions, the joints {self.directions}: "
+                "give as many"
             )
         if basis.shape[1] != size or weights.shape != basis.T.shape or lead.shape[1] != size:
             raise JointError(
@@ -264,4 +296,7 @@ class PeriodicMarch:
             )
         laws = len(self._kernels[1])
         if laws not in (1, joints):
-            raise JointError(f"the law is that of {laws} joints, the coefficients of {joints}")
+            raise JointError(
+                f"the law has parameters of {laws} joints, the coefficients are of {joints}: give "
+                "as many of both, or numbers as parameters"
+            )

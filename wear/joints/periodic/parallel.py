@@ -1,7 +1,7 @@
-"""Sliders side by side on one displacement, as one joint, marched over a period.
+"""Parallel sliders with one displacement, as one joint, marched over a period.
 
-Sliders in parallel make up the joints of Masing and Iwan: together they follow any curve that bends
-one way. To a structure they are a single joint, whose force is their sum; each keeps its own
+The joints of Masing and Iwan consist of parallel sliders, which together follow any concave curve.
+For a structure they are a single joint, whose force is their sum; each slider has its own
 dissipated energy.
 """
 
@@ -19,7 +19,7 @@ from wear.joints.periodic.march import SLIP, STICK, PeriodicMarch, SettledCycle
 
 @dataclass(frozen=True)
 class SlidersCycle(SettledCycle):
-    """The period of the joint.
+    """Settled period of the joint.
 
     ``by_slider`` ``(n,)`` is the energy that each slider dissipates in it [N mm].
     """
@@ -29,13 +29,13 @@ class SlidersCycle(SettledCycle):
 
 @dataclass(frozen=True)
 class ParallelSliders:
-    """One joint of the sliders of a ``law`` with ``(n,)`` parameters.
+    """One joint of parallel sliders, which have the ``(n,)`` parameters of a ``law``.
 
-    It slips where less than half of their stiffness is left.
+    The joint slips where less than half of its stiffness is left.
 
     Examples
     --------
-    Two sliders on one displacement of ±0.02 mm: each dissipates what it would alone.
+    Two sliders with one displacement of ±0.02 mm each dissipate what they would alone:
 
     >>> import numpy as np
     >>> from wear.joints import Jenkins, ParallelSliders
@@ -56,13 +56,16 @@ class ParallelSliders:
     def settle(
         self, coefficients: Array, basis: Array, weights: Array, lead: Array | None = None
     ) -> SlidersCycle:
-        """The settled period of the joint with the ``coefficients`` ``(1, m, 1)`` [mm].
+        """Return the settled period of the joint with the ``coefficients`` ``(1, m, 1)`` [mm].
 
-        As :meth:`wear.joints.periodic.march.PeriodicMarch.settle`; raises :class:`JointError` for
-        more joints than one.
+        The arguments are those of :meth:`wear.joints.periodic.march.PeriodicMarch.settle`. Raise
+        :class:`JointError` for more than one joint.
         """
         if len(coefficients) != 1:
-            raise JointError(f"coefficients of {len(coefficients)} joints for the sliders of one")
+            raise JointError(
+                f"the coefficients are of {len(coefficients)} joints, the sliders of one: give the "
+                "coefficients of one joint"
+            )
         stiffness = np.atleast_1d(self.law.stiffness)
         shared = np.repeat(coefficients, len(stiffness), axis=0)
         cycle = PeriodicMarch(self.law).settle(shared, basis, weights, lead)

@@ -1,15 +1,15 @@
 """Compiled marches of joints along one direction over a period.
 
-See :mod:`wear.joints.periodic.march` for what calls them.
+:mod:`wear.joints.periodic.march` calls them.
 
-Jenkins's and Bouc-Wen's joints remember one number, here the stretch z of a spring that gives the
-force K z + kr u. Its derivative comes after that, along the period that repeats and only if it is
-asked for, as that of contacts does. A joint of spread sliders remembers turning points, which are
-samples: the derivatives of displacement and force there are kept in a stack beside the one of the
-law itself.
+Jenkins and Bouc-Wen joints have a memory of one number, here the stretch z of a spring with the
+force K z + kr u. Its derivative is computed afterwards, along the repeating period, and only if it
+is asked for; the same holds for contacts. A joint of distributed sliders remembers turning points,
+which are samples: the derivatives of displacement and force there are kept in a stack parallel to
+the memory of the law.
 
-Arrays are written number by number: a row or a sum of arrays that is assigned as a whole takes
-hundreds of times as long to compile as the loop, and a first march takes seconds by that.
+Arrays are written element by element: assigning a row or a sum of arrays as a whole takes hundreds
+of times as long to compile as the loop, so that the first march would take seconds.
 """
 
 from __future__ import annotations
@@ -26,25 +26,26 @@ from wear.joints.jenkins import advance_jenkins
 from wear.joints.masing import DEPTH, DISPLACEMENT, POINTS, advance_masing, turns
 
 JENKINS, BOUC_WEN = 0.0, 1.0
-"""First parameter of a joint with one number of memory; K, kr, µN follow, of the latter n and
-2 σ - 1."""
+"""First parameter of a joint with a memory of one number. K, kr and µN follow, for Bouc-Wen also n
+and 2 σ - 1.
+"""
 
-# Periods after which a joint that still changes is given up. Newton's steps on the memory double
-# its digits in each: more mean that it has no attractor.
+# Limit of periods. Each Newton step on the memory doubles its correct digits: a joint that still
+# changes has no attractor.
 MAX_PERIODS = 40
-# Memory repeats when it changes in a period by less than this share of the largest it can be: ten
-# to a thousand times what rounding leaves of some thousand samples.
+# Memory repeats if it changes in a period by less than this share of its largest value: ten to a
+# thousand times the rounding error of some thousand samples.
 REPEATED = 1e-13
-# Periods before the first Newton step: a joint that slips on its way in, and never again, stays
-# where that has brought it.
+# Periods before the first Newton step: a joint that slips on its way into the period, and never
+# again, must keep the position that it has then.
 PLAIN_PERIODS = 2
-# Share of its memory that a period must forget for Newton's step to be more than rounding.
+# Least share of the memory that a period must forget for a Newton step to be meaningful.
 FORGETTING = 1e-9
-# dη/ds below which sliding is complete: there the memory decays as exp(-n s).
+# Value of dη/ds below which sliding is complete, where the memory decays as exp(-n s).
 COMPLETE = 1e-12
 # A joint slips where less than this share of its stiffness K is left.
 LEFT_IN_SLIP = 0.5
-# Periods of a joint of spread sliders: its largest displacement wipes out what was before it.
+# Periods of a joint of distributed sliders: its largest displacement erases all earlier memory.
 CURVE_PERIODS = 2
 
 
@@ -57,17 +58,18 @@ class Period(NamedTuple):
 
     @classmethod
     def of(cls, basis: Array, weights: Array, lead: Array) -> Period:
-        """In rows, for which all is compiled."""
+        """Return the period with contiguous rows, for which the functions are compiled."""
         return cls(*map(np.ascontiguousarray, (basis, weights, lead)))
 
 
 class DrivenJoints(NamedTuple):
-    """Joints driven through a period; the last two axes only where they have three directions.
+    """Joints driven through a period.
 
-    ``parameters`` ``(j, k)`` of the law, displacements ``path`` ``(j, t, d)`` in the period and
-    ``before`` ``(j, p, d)`` on the way to it [mm], the last of which is the first of ``path``.
-    The others are written: see :class:`wear.joints.periodic.march.SettledCycle`; ``settled`` ``(j,
-    4)`` is what derivatives and energies need to go on.
+    The axes of directions ``d`` only exist for joints of three directions. ``parameters`` ``(j,
+    k)`` are those of the law. ``path`` ``(j, t, d)`` are the displacements in the period and
+    ``before`` ``(j, p, d)`` those on the way to it [mm], the last of which is the first of
+    ``path``. The other arrays are written: see :class:`wear.joints.periodic.march.SettledCycle`;
+    ``settled`` ``(j, 4)`` is the data from which derivatives and energies are computed.
     """
 
     parameters: Array
@@ -83,7 +85,7 @@ class DrivenJoints(NamedTuple):
 
 @compiled(nogil=True, error_model="numpy")
 def largest(values: Array) -> float:
-    """The largest magnitude of some numbers ``(n,)``."""
+    """Return the largest magnitude of numbers ``(n,)``."""
     found = 0.0
     for value in values:
         found = max(found, abs(value))
@@ -92,7 +94,7 @@ def largest(values: Array) -> float:
 
 @compiled(nogil=True, error_model="numpy")
 def rows_from_rest(rows: Array) -> Array:
-    """Rows ``(n, m)`` with one of zeros before them."""
+    """Return rows ``(n, m)`` with a row of zeros before them."""
     points = np.zeros((len(rows) + 1, rows.shape[1]))
     for i in range(len(rows)):
         _copy(rows[i], points[i + 1])
@@ -106,7 +108,7 @@ def _copy(row: Array, to: Array) -> None:
 
 
 class Slider(NamedTuple):
-    """A row of parameters without its residual stiffness."""
+    """Row of parameters without its residual stiffness."""
 
     kind: float
     spring: float
@@ -117,7 +119,7 @@ class Slider(NamedTuple):
 
 @compiled(nogil=True, error_model="numpy")
 def slider_of(joint: Array) -> Slider:
-    """The joint of a row of parameters, without its residual stiffness."""
+    """Return the slider of a row of parameters, without its residual stiffness."""
     exponent, gain = (0.0, 0.0) if joint[0] == JENKINS else (joint[4], joint[5])
     return Slider(joint[0], joint[1], joint[3], exponent, gain)
 
@@ -126,7 +128,11 @@ def slider_of(joint: Array) -> Slider:
 def move_slider(
     joint: Slider, stretch: float, increment: float
 ) -> tuple[float, float, float, float]:
-    """One increment: stretch at its end, derivatives by stretch and increment, energy lost."""
+    """Move a slider by one increment.
+
+    Return the stretch at its end, the derivatives by the stretch before and by the increment, and
+    the energy lost.
+    """
     spring, limit = joint.spring, joint.limit
     if joint.kind == JENKINS:
         _, slope, _, end, lost = advance_jenkins(spring, 0.0, limit, 0.0, stretch, increment)
@@ -141,7 +147,7 @@ def move_slider(
     )
     kept = 1.0
     if increment != 0.0:
-        # dη/ds does not contain s: two paths keep their distance in s.
+        # dη/ds does not depend on s: two paths keep their distance in s.
         rate = xi_rate(copysign(xi, xi * increment), exponent, gain)
         kept = slope / (spring * rate) if rate > COMPLETE else exp(-exponent * pull / limit)
     return end * limit / spring, kept, slope / spring, lost
@@ -149,7 +155,7 @@ def move_slider(
 
 @compiled(nogil=True, error_model="numpy")
 def _lead_in(joint: Slider, before: Array) -> float:
-    """Stretch at the first sample, to which it is driven from rest."""
+    """Return the stretch at the first sample, to which the slider is driven from rest."""
     stretch, here = 0.0, 0.0
     for there in before:
         stretch, _, _, _ = move_slider(joint, stretch, there - here)
@@ -158,12 +164,13 @@ def _lead_in(joint: Slider, before: Array) -> float:
 
 
 @compiled(nogil=True, error_model="numpy")
-def _round(
+def _one_period(
     joint: Slider, stretch: float, path: Array, force: Array, states: np.ndarray
 ) -> tuple[float, float, float]:
-    """One period: stretch at its end, its derivative by that at the start, energy lost.
+    """March one period, and write K z to ``force``.
 
-    Forces that are written are K z.
+    Return the stretch at its end, the derivative of this by the stretch at the start, and the
+    energy lost.
     """
     samples, total, lost = len(path), 1.0, 0.0
     for step in range(1, samples + 1):
@@ -180,13 +187,16 @@ def _round(
 def _settle_slider(
     joint: Slider, stretch: float, path: Array, force: Array, states: np.ndarray
 ) -> tuple[float, int, float, float]:
-    """March until the stretch repeats: that at the start of the last period, the number of it,
-    energy lost, and last change of the stretch."""
+    """March until the stretch repeats.
+
+    Return the stretch at the start of the last period, the number of periods, the energy lost, and
+    the last change of the stretch.
+    """
     repeated = REPEATED * min(joint.limit / joint.spring, largest(path))
     start, period, lost, change = stretch, 0, 0.0, 0.0
     while period < MAX_PERIODS:
         start, period = stretch, period + 1
-        end, total, lost = _round(joint, stretch, path, force, states)
+        end, total, lost = _one_period(joint, stretch, path, force, states)
         change = end - start
         if abs(change) <= repeated:
             break
@@ -199,16 +209,16 @@ def _settle_slider(
 
 @compiled(nogil=True, error_model="numpy")
 def relative_change(change: float, largest_force: float) -> float:
-    """A change of force over the largest force."""
+    """Return a change of force over the largest force."""
     return abs(change) / largest_force if largest_force > 0.0 else 0.0
 
 
 @compiled(nogil=True, error_model="numpy")
 def settle_sliders(period: Period, joints: DrivenJoints) -> None:
-    """Settle Jenkins's and Bouc-Wen's joints; parameters begin with their kind.
+    """Settle Jenkins and Bouc-Wen joints; parameters begin with their kind.
 
-    Derivatives are not written. ``settled`` is what is needed for these: stretch at the first
-    sample and number of periods.
+    Derivatives are not written. ``settled`` holds the data for them: the stretch at the first
+    sample and the number of periods.
     """
     for j in range(len(joints.parameters)):
         slider, path, force = slider_of(joints.parameters[j]), joints.path[j], joints.force[j]
@@ -223,14 +233,15 @@ def settle_sliders(period: Period, joints: DrivenJoints) -> None:
 
 
 @compiled(nogil=True, error_model="numpy")
-def _carried(
+def _carry_gradient(
     joint: Slider, stretch: float, path: Array, functions: Array, gradient: Array, kept: Array
 ) -> float:
-    """Drive a slider through ``n`` points: its stretch at the last.
+    """Drive a slider through ``n`` points, and return its stretch at the last.
 
-    The ``gradient`` ``(n, m)`` of the stretch is written from that at the first point on, and
-    ``kept`` ``(n,)``, its derivative by the stretch there. ``functions`` of time are given for all
-    points, as the path is, or for all but the last, which then is the first again.
+    The ``gradient`` ``(n, m)`` of the stretch is written, from that at the first point on, and so
+    is ``kept`` ``(n,)``, the derivative of the stretch by that at the first point. ``functions`` of
+    time are given for all points, as the path is, or for all but the last, which is then the first
+    again.
     """
     kept[0] = 1.0
     for to in range(1, len(gradient)):
@@ -245,7 +256,7 @@ def _carried(
 
 @compiled(nogil=True, error_model="numpy")
 def _from_rest(numbers: Array) -> Array:
-    """Numbers ``(n,)`` with 0 before them."""
+    """Return numbers ``(n,)`` with 0 before them."""
     points = np.zeros(len(numbers) + 1)
     for i in range(len(numbers)):
         points[i + 1] = numbers[i]
@@ -253,8 +264,11 @@ def _from_rest(numbers: Array) -> Array:
 
 
 @compiled(nogil=True, error_model="numpy")
-def _repeat(gradient: Array, kept: Array) -> bool:
-    """Make the gradient of 0 that of a period that repeats; whether it forgets enough for that."""
+def _make_periodic(gradient: Array, kept: Array) -> bool:
+    """Turn the gradient of a period from 0 into that of a repeating period.
+
+    Return whether the period forgets enough for that.
+    """
     if 1.0 - kept[-1] <= FORGETTING:
         return False
     first = np.empty(gradient.shape[1])
@@ -269,11 +283,12 @@ def _repeat(gradient: Array, kept: Array) -> bool:
 
 
 @compiled(nogil=True, error_model="numpy")
-def _move_up(gradient: Array, weights: Array, taken: Array) -> int:
-    """Move rows of a gradient ``(n, m)`` that are not 0 to its beginning: how many there are.
+def _nonzero_rows(gradient: Array, weights: Array, taken: Array) -> int:
+    """Move the nonzero rows of a gradient ``(n, m)`` to its beginning, and return their number.
 
-    Their ``weights``, columns of ``(m, n)``, are ``taken`` ``(n, m)``. A joint that slips follows
-    nothing: of one that slides most of the time little is left to be summed.
+    Their ``weights``, columns of ``(m, n)``, are copied to ``taken`` ``(n, m)``. The stretch of a
+    slipping joint does not follow the displacement, so that for a joint that mostly slides little
+    is left to be summed.
     """
     count = 0
     for t in range(len(gradient)):
@@ -288,42 +303,44 @@ def _move_up(gradient: Array, weights: Array, taken: Array) -> int:
 
 @compiled(nogil=True, error_model="numpy")
 def differentiate_sliders(period: Period, joints: DrivenJoints) -> None:
-    """Write the derivatives of joints that have settled.
+    """Write the derivatives of settled joints.
 
-    A joint that forgets too little of how it began carries the derivative from there.
+    The derivative of a joint that forgets too little of its beginning is carried on from there.
     """
     samples, size = period.basis.shape
-    way_in = rows_from_rest(period.lead)
+    lead_rows = rows_from_rest(period.lead)
     gradient, kept = np.empty((samples + 1, size)), np.empty(samples + 1)
-    entering, forgotten = np.zeros((len(way_in), size)), np.empty(len(way_in))
+    entering, forgotten = np.zeros((len(lead_rows), size)), np.empty(len(lead_rows))
     weights = np.empty((samples, size))
-    # Needed for residual stiffness only: for one joint as much work as all the rest.
-    beside = largest(joints.parameters[:, 2]) > 0.0
-    shares = np.dot(period.weights, period.basis) if beside else np.zeros((size, size))
+    # This is only needed for a residual stiffness, and costs as much as the rest of one joint.
+    has_residual = largest(joints.parameters[:, 2]) > 0.0
+    shares = np.dot(period.weights, period.basis) if has_residual else np.zeros((size, size))
     for j in range(len(joints.parameters)):
         joint, slider, path = joints.parameters[j], slider_of(joints.parameters[j]), joints.path[j]
         gradient[0] = 0.0
-        _carried(slider, joints.settled[j, 0], path, period.basis, gradient, kept)
-        if not _repeat(gradient, kept):
+        _carry_gradient(slider, joints.settled[j, 0], path, period.basis, gradient, kept)
+        if not _make_periodic(gradient, kept):
             before = _from_rest(joints.before[j])
-            stretch = _carried(slider, 0.0, before, way_in, entering, forgotten)
+            stretch = _carry_gradient(slider, 0.0, before, lead_rows, entering, forgotten)
             _copy(entering[-1], gradient[-1])
             for _ in range(int(joints.settled[j, 1])):
                 _copy(gradient[-1], gradient[0])
-                stretch = _carried(slider, stretch, path, period.basis, gradient, kept)
+                stretch = _carry_gradient(slider, stretch, path, period.basis, gradient, kept)
         _copy(gradient[-1], gradient[0])
-        following = _move_up(gradient[:-1], period.weights, weights)
+        following = _nonzero_rows(gradient[:-1], period.weights, weights)
         slopes = np.dot(weights[:following].T, gradient[:following])
         for row in range(size):
             for c in range(size):
                 joints.jacobian[j, row, c] = slider.spring * slopes[row, c]
-                if beside:
+                if has_residual:
                     joints.jacobian[j, row, c] += joint[2] * shares[row, c]
 
 
 class OpenLoops(NamedTuple):
-    """The ``memory`` of a law, and the derivatives ``(depth, m)`` of displacement, ``places``, and
-    ``forces`` at its turning points."""
+    """Memory of a law, with the derivatives at its turning points.
+
+    ``places`` and ``forces`` ``(depth, m)`` are the derivatives of displacement and force there.
+    """
 
     memory: Array
     places: Array
@@ -334,10 +351,11 @@ class OpenLoops(NamedTuple):
 def _follow_curve(
     joint: Array, loops: OpenLoops, here: Array, there: Array, end: float, gradient: Array
 ) -> tuple[float, float, float]:
-    """Drive a joint of spread sliders to ``end``: force, share of stiffness left, energy lost.
+    """Drive a joint of distributed sliders to ``end``.
 
-    ``here`` and ``there`` ``(m,)`` are the derivatives of displacement at both ends; ``gradient``
-    that of the force, read and written.
+    Return the force, the share of stiffness left and the energy lost. ``here`` and ``there``
+    ``(m,)`` are the derivatives of the displacement at both ends; ``gradient`` is that of the
+    force, and is updated.
     """
     memory, places, forces = loops
     increment = end - memory[DISPLACEMENT]
@@ -348,7 +366,7 @@ def _follow_curve(
     force, slope, lost = advance_masing(
         (joint[0], joint[2], joint[3], joint[4]), 0.0, memory, increment
     )
-    # Set anew: sums of increments round, and a period must return to the same numbers.
+    # Sums of increments have rounding errors, but a period must return to identical numbers.
     memory[DISPLACEMENT] = end
     depth = int(memory[DEPTH])
     for c in range(there.size):
@@ -360,11 +378,10 @@ def _follow_curve(
 
 @compiled(nogil=True, error_model="numpy")
 def settle_curves(period: Period, joints: DrivenJoints) -> None:
-    """Settle joints of spread sliders; parameters are K, kr, µN, c and m."""
+    """Settle joints of distributed sliders; parameters are K, kr, µN, c and m."""
     basis, lead = period.basis, period.lead
     samples, size = basis.shape
-    # Turning points that may be open at once: those of the way in, and of a period and its first
-    # samples again.
+    # Largest number of open turning points: those of the way in and of two periods.
     depth = len(lead) + 2 * samples
     memory = np.empty(POINTS + 2 * depth)
     loops = OpenLoops(memory, np.empty((depth, size)), np.empty((depth, size)))

@@ -1,6 +1,6 @@
-"""One increment of a friction contact, compiled: forces, derivatives and energy.
+"""One compiled increment of a friction contact: forces, derivatives and energy.
 
-What is solved here, and how, is in :mod:`wear.joints.friction_contact`.
+:mod:`wear.joints.friction_contact` describes the problem and its solution.
 """
 
 from __future__ import annotations
@@ -13,19 +13,19 @@ import numpy as np
 from sa_solver.types import Array
 from wear.joints.compiled import compiled
 
-LONGEST = 300.0  # L: nothing is left of the angle long before, and exp(-2 L) is still a number
-LAST = 1e-9  # of the limit at which a lift-off is taken to be over: its square is below rounding
-CLOSE = 0.03  # of (b - a)/(b + a): below it the logarithmic mean is a series
-TERMS = 5  # of this series: CLOSE**(2 TERMS) is below rounding
+LONGEST = 300.0  # Largest L: the angle has vanished long before, and exp(-2 L) does not underflow.
+LAST = 1e-9  # Share of the limit at which a lift-off is over: its square is below rounding.
+CLOSE = 0.03  # Value of (b - a)/(b + a) below which the logarithmic mean is summed as a series.
+TERMS = 5  # Terms of this series: CLOSE**(2 TERMS) is below rounding.
 MEAN_SERIES = tuple(1.0 / (2 * j + 1) for j in range(TERMS, -1, -1))
 SLOPE_SERIES = tuple(2 * j / (2 * j + 1) for j in range(TERMS, 0, -1))
-NEGLIGIBLE = 1e-16  # of an energy: rounding
-FADING = 1.0  # exponent from which on powers of exp(-2 L η) are not lost in their difference
-TURNED = 0.1  # tan²(ψ/2) below which 1 - cos ψ is a series of its powers
-POWERS, POWER_BELOW = 16, 1e-16  # of them, at most, and the one that is rounding
-ROUNDING = 1e-16  # of a fraction of an increment
-PANEL = 0.8  # of the exponent per panel: six points leave 1e-14 of tanh there
-PANELS = 1000  # more than any finite path asks for: a diverged one must still come to an end
+NEGLIGIBLE = 1e-16  # Share of an energy that is rounding.
+FADING = 1.0  # Exponent above which powers of exp(-2 L η) do not cancel in their difference.
+TURNED = 0.1  # Value of tan²(ψ/2) below which 1 - cos ψ is summed as a series of its powers.
+POWERS, POWER_BELOW = 16, 1e-16  # Most powers of this series, and the power that is rounding.
+ROUNDING = 1e-16  # Fraction of an increment that is rounding.
+PANEL = 0.8  # Exponent per panel of the quadrature: the error of six points is then 1e-14.
+PANELS = 1000  # More panels than any finite path needs, so that a diverged path ends too.
 NODES, WEIGHTS = (0.5 * rule for rule in np.polynomial.legendre.leggauss(6))
 NODES = NODES + 0.5
 
@@ -33,8 +33,9 @@ NODES = NODES + 0.5
 class ForcePath(NamedTuple):
     """A straight path in contact, in terms of forces [N].
 
-    Force of the tangential spring at its start (within the circle there), ``pull`` that the path
-    would add if the slider held, and the limit µ f at its two ends.
+    ``force_x`` and ``force_y`` are the force of the tangential spring at its start, within the
+    circle there. ``pull_x`` and ``pull_y`` are the force that the path would add if the slider
+    held. ``start`` and ``end`` are the limit µ f at both ends.
     """
 
     force_x: float
@@ -46,7 +47,7 @@ class ForcePath(NamedTuple):
 
 
 class ForceSlopes(NamedTuple):
-    """Derivative of a force or an angle at the end of a path with respect to the path's numbers."""
+    """Derivatives of a force or an angle at the end of a path with respect to the path's fields."""
 
     force_x: float
     force_y: float
@@ -56,18 +57,19 @@ class ForceSlopes(NamedTuple):
     end: float
 
 
-# A slider that holds, by both components, and a contact that is apart.
+# Derivatives of both components for a slider that holds, and for a separated contact.
 HELD_X = ForceSlopes(1.0, 0.0, 1.0, 0.0, 0.0, 0.0)
 HELD_Y = ForceSlopes(0.0, 1.0, 0.0, 1.0, 0.0, 0.0)
-GONE = ForceSlopes(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+SEPARATED = ForceSlopes(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 class Slip(NamedTuple):
     """The part of a path on which the slider slips, after the fraction ``held``.
 
-    ``limit`` and direction of the force where slip begins, size and direction of the pull;
-    ``toward`` 1 + cos ψ, ``away`` 1 - cos ψ and ``sine`` sin ψ of the angle from pull to force
-    there; ``rate`` dL/d|k|, ``length`` L over the slip and ``decay`` exp(-L).
+    ``limit`` and ``force_x``, ``force_y`` are the limit and the direction of the force where slip
+    begins, ``pull`` and ``pull_x``, ``pull_y`` the size and direction of the pull. With ψ the angle
+    from pull to force there, ``toward`` is 1 + cos ψ, ``away`` 1 - cos ψ and ``sine`` sin ψ.
+    ``rate`` is dL/d|k|, ``length`` is L over the slip and ``decay`` exp(-L).
     """
 
     held: float
@@ -87,36 +89,43 @@ class Slip(NamedTuple):
 
 @compiled(error_model="numpy")
 def _length(x: float, y: float) -> float:
-    """Of a vector; hypot takes several times as long, for numbers whose squares are none."""
+    """Return the length of a vector.
+
+    hypot takes several times as long, and only differs for numbers whose squares overflow or
+    underflow.
+    """
     return sqrt(x * x + y * y)
 
 
 @compiled(error_model="numpy")
 def _held(path: ForcePath) -> float:
-    """Fraction of a path on which the slider holds: first root of |t0 + k s| = R(s), or 1."""
+    """Return the fraction of a path on which the slider holds: the first root of |t0 + k s| = R(s).
+
+    It is 1 if there is no such root on the path.
+    """
     (x, y), (px, py), limit = path[:2], path[2:4], path.start
     if (x + px) ** 2 + (y + py) ** 2 < path.end * path.end:
-        return 1.0  # by far the most frequent case: a chord within a cone stays there
+        return 1.0  # By far the most frequent case: a chord within a cone stays there.
     change = path.end - limit
     pull, force = _length(px, py), _length(x, y)
     square = (pull - change) * (pull + change)
     half_slope = x * px + y * py - limit * change
     constant = min((force - limit) * (force + limit), 0.0)
     if -constant < ROUNDING * half_slope:
-        return 0.0  # it slips already
-    # half_slope² - square constant, without the products that cancel when the limit vanishes
+        return 0.0  # The slider slips already.
+    # The discriminant half_slope² - square constant, without products that cancel at a small limit.
     drift, cross = _length(limit * px - change * x, limit * py - change * y), abs(x * py - y * px)
     root = sqrt(max((drift - cross) * (drift + cross), 0.0))
     if half_slope > 0.0:
         return min(-constant / (half_slope + root), 1.0)
     if square > 0.0:
         return min((root - half_slope) / square, 1.0)
-    return 1.0  # the circle grows at least as fast as the force
+    return 1.0  # The circle grows at least as fast as the force.
 
 
 @compiled(error_model="numpy")
 def _inverse_mean(a: float, b: float) -> float:
-    """ln(b/a)/(b - a): the mean of 1/R over a limit that changes linearly from a to b."""
+    """Return ln(b/a)/(b - a): the mean of 1/R over a limit that changes linearly from a to b."""
     x = (b - a) / (a + b)
     if abs(x) > CLOSE:
         return log(b / a) / (b - a)
@@ -128,7 +137,7 @@ def _inverse_mean(a: float, b: float) -> float:
 
 @compiled(error_model="numpy")
 def _inverse_mean_slopes(a: float, b: float) -> tuple[float, float]:
-    """Derivatives of :func:`_inverse_mean` with respect to a and b."""
+    """Return the derivatives of :func:`_inverse_mean` with respect to a and b."""
     x, mean = (b - a) / (a + b), _inverse_mean(a, b)
     if abs(x) > CLOSE:
         return (mean - 1.0 / a) / (b - a), (1.0 / b - mean) / (b - a)
@@ -141,15 +150,15 @@ def _inverse_mean_slopes(a: float, b: float) -> tuple[float, float]:
 
 @compiled(error_model="numpy")
 def _slip(path: ForcePath, held: float) -> Slip:
-    """Slip that begins at the fraction ``held`` of a path and lasts to its end."""
+    """Return the slip that begins at the fraction ``held`` of a path and lasts to its end."""
     limit = path.start + held * (path.end - path.start)
     x, y = path.force_x + held * path.pull_x, path.force_y + held * path.pull_y
     force, pull = _length(x, y), _length(path.pull_x, path.pull_y)
-    # Without a pull the force keeps its direction; without a force it takes that of the pull.
+    # Without a pull the force keeps its direction; without a force it takes the pull's direction.
     px, py = (path.pull_x / pull, path.pull_y / pull) if pull > 0.0 else (x / force, y / force)
     ex, ey = (x / force, y / force) if limit > 0.0 and force > 0.0 else (px, py)
     cosine, sine = ex * px + ey * py, px * ey - py * ex
-    # From the sine where the cosine cancels: a force against the pull turns by this remainder.
+    # Use the sine where the cosine cancels: it decides how a force against the pull turns.
     if cosine > 0.0:
         toward = 1.0 + cosine
         away = sine * sine / toward
@@ -166,7 +175,7 @@ def _slip(path: ForcePath, held: float) -> Slip:
 
 @compiled(error_model="numpy")
 def _direction(slip: Slip) -> tuple[float, float]:
-    """Direction of the force at the end of a slip."""
+    """Return the direction of the force at the end of a slip."""
     away = slip.away * slip.decay * slip.decay
     cosine = (slip.toward - away) / (slip.toward + away)
     sine = 2.0 * slip.sine * slip.decay / (slip.toward + away)
@@ -177,14 +186,14 @@ def _direction(slip: Slip) -> tuple[float, float]:
 
 @compiled(error_model="numpy")
 def _turning(path: ForcePath, slip: Slip) -> ForceSlopes:
-    """Derivative of the angle of the force at the end of a slip.
+    """Return the derivatives of the angle of the force at the end of a slip.
 
     With ψ' ~ sin ψ, ∂ψ1/∂ψ0 = sin ψ1/sin ψ0 and ∂ψ1/∂L = -sin ψ1.
     """
     decay = slip.decay
     over = slip.toward + slip.away * decay * decay
     memory, sine = 2.0 * decay / over, 2.0 * slip.sine * decay / over
-    # 1 - memory, per |k|: how far the force follows when the pull turns
+    # The angle by which the force follows when the pull turns, 1 - memory, per |k|.
     following = -expm1(-slip.length) / slip.pull if slip.pull > 0.0 else slip.rate
     following *= (slip.toward - slip.away * decay) / over
     along = sine * slip.rate
@@ -207,10 +216,10 @@ def _turning(path: ForcePath, slip: Slip) -> ForceSlopes:
 
 @compiled(error_model="numpy")
 def _lost_in_slip(path: ForcePath, slip: Slip) -> float:
-    """kt times the energy lost in a slip, ∫ R (k·e - R') ds [N²].
+    """Return kt times the energy lost in a slip, ∫ R (k·e - R') ds [N²].
 
-    As if the force had the direction of the pull, less ∫ R |k| (1 - cos ψ) ds, over the share η of
-    L: then R = R0 (R1/R0)^η, and 1 - cos ψ is rational in exp(-2 L η).
+    It is the loss of a force along the pull, less ∫ R |k| (1 - cos ψ) ds. The latter is integrated
+    over the share η of L: then R = R0 (R1/R0)^η, and 1 - cos ψ is rational in exp(-2 L η).
     """
     left = 1.0 - slip.held
     straight = 0.5 * (slip.limit + path.end) * (slip.pull - path.end + path.start) * left
@@ -220,21 +229,24 @@ def _lost_in_slip(path: ForcePath, slip: Slip) -> float:
     if square * ratio <= NEGLIGIBLE * straight:
         return straight
     growth, decay = 2.0 * log(path.end / slip.limit), 2.0 * slip.length
-    # While the force turns, by a rule; then by the powers of exp(-2 L η).
+    # Integrate by quadrature while the force turns, then by the powers of exp(-2 L η).
     turning = 1.0
     if decay - growth > FADING:
         turning = min(max(log(ratio / TURNED) / decay, 0.0), 1.0)
     turned = 0.0
     if turning > 0.0:
-        turned = _turned_by_rule(slip, growth, decay, turning)
+        turned = _turning_by_rule(slip, growth, decay, turning)
     if turning < 1.0:
-        turned += _turned_by_powers(ratio, growth, decay, turning)
+        turned += _turning_by_powers(ratio, growth, decay, turning)
     return max(straight - turned * slip.length * square, 0.0)
 
 
 @compiled(error_model="numpy")
-def _turned_by_rule(slip: Slip, growth: float, decay: float, share: float) -> float:
-    """∫ exp(growth η) (1 - cos ψ) dη from 0 to a share, where tan²(ψ/2) decays by exp(-decay η)."""
+def _turning_by_rule(slip: Slip, growth: float, decay: float, share: float) -> float:
+    """Return ∫ exp(growth η) (1 - cos ψ) dη from 0 to a share, by Gauss's rule.
+
+    tan²(ψ/2) decays by exp(-decay η).
+    """
     asked = share * max(abs(growth), decay) / PANEL
     panels = ceil(asked) if asked < PANELS else PANELS
     width, turned = share / panels, 0.0
@@ -247,8 +259,11 @@ def _turned_by_rule(slip: Slip, growth: float, decay: float, share: float) -> fl
 
 
 @compiled(error_model="numpy")
-def _turned_by_powers(ratio: float, growth: float, decay: float, share: float) -> float:
-    """The same from a share to 1, where tan²(ψ/2), at first ``ratio``, is below ``TURNED``."""
+def _turning_by_powers(ratio: float, growth: float, decay: float, share: float) -> float:
+    """Return the same integral from a share to 1, where tan²(ψ/2) is below ``TURNED``.
+
+    ``ratio`` is tan²(ψ/2) at the beginning.
+    """
     start, end = exp(growth * share), exp(growth)
     power_start, power_end = ratio * exp(-decay * share), ratio * exp(-decay)
     step_start, step_end = power_start, power_end
@@ -263,7 +278,7 @@ def _turned_by_powers(ratio: float, growth: float, decay: float, share: float) -
 
 @compiled(error_model="numpy")
 def _lost_in_lift_off(path: ForcePath, contact: float) -> float:
-    """kt times the energy lost on a path that lifts off after the fraction ``contact``."""
+    """Return kt times the energy lost on a path that lifts off after the fraction ``contact``."""
     share = contact * (1.0 - LAST)
     last = ForcePath(
         path.force_x,
@@ -278,8 +293,8 @@ def _lost_in_lift_off(path: ForcePath, contact: float) -> float:
 
 
 @compiled(error_model="numpy")
-def _followed(path: ForcePath) -> tuple[float, float, ForceSlopes, ForceSlopes]:
-    """Tangential force at the end of a path in contact, and the derivatives of its components."""
+def _force_in_contact(path: ForcePath) -> tuple[float, float, ForceSlopes, ForceSlopes]:
+    """Return the tangential force at the end of a path in contact, and its derivatives."""
     held = _held(path)
     if held == 1.0:
         x, y = path.force_x + path.pull_x, path.force_y + path.pull_y
@@ -293,7 +308,7 @@ def _followed(path: ForcePath) -> tuple[float, float, ForceSlopes, ForceSlopes]:
 
 @compiled(error_model="numpy")
 def _scaled(slopes: ForceSlopes, factor: float, added: float) -> ForceSlopes:
-    """Slopes times a factor, with something added for the limit at the end."""
+    """Return slopes times a factor, with ``added`` for the limit at the end."""
     return ForceSlopes(
         factor * slopes.force_x,
         factor * slopes.force_y,
@@ -305,8 +320,8 @@ def _scaled(slopes: ForceSlopes, factor: float, added: float) -> ForceSlopes:
 
 
 @compiled(error_model="numpy")
-def _pulled_back(x: float, y: float, limit: float, slopes: ForceSlopes) -> ForceSlopes:
-    """Chain the derivative with that of the return of a force (x, y) onto the circle."""
+def _chain_return(x: float, y: float, limit: float, slopes: ForceSlopes) -> ForceSlopes:
+    """Chain the derivatives with those of the return of a force (x, y) onto the circle."""
     force = _length(x, y)
     x, y, shrink = x / force, y / force, limit / force
     radial = slopes.force_x * x + slopes.force_y * y
@@ -317,10 +332,10 @@ def _pulled_back(x: float, y: float, limit: float, slopes: ForceSlopes) -> Force
 
 
 @compiled(error_model="numpy")
-def _touching(path: ForcePath, slopes: ForceSlopes) -> ForceSlopes:
-    """Chain the derivative with that of the touch on a path whose limit is negative at its start.
+def _chain_touch(path: ForcePath, slopes: ForceSlopes) -> ForceSlopes:
+    """Chain the derivatives with those of the touch on a path whose limit is negative at its start.
 
-    The force forgets what it was before.
+    The force forgets its earlier value.
     """
     change = path.end - path.start
     entry = path.start / (path.start - path.end)
@@ -337,11 +352,11 @@ def _touching(path: ForcePath, slopes: ForceSlopes) -> ForceSlopes:
 
 
 @compiled(error_model="numpy")
-def _touched(path: ForcePath) -> ForcePath:
-    """The part of a path that is in contact at its end, from a force within the circle.
+def _part_in_contact(path: ForcePath) -> ForcePath:
+    """Return the part of a path that is in contact at its end, from a force within the circle.
 
     The limit may be negative at its start: no contact there. A force outside the circle (the limit
-    has shrunk since) slips back onto it.
+    has fallen since) slips back onto it.
     """
     start, x, y = max(path.start, 0.0), path.force_x, path.force_y
     force = _length(x, y)
@@ -354,10 +369,10 @@ def _touched(path: ForcePath) -> ForcePath:
 
 @compiled(error_model="numpy")
 def advance_force(path: ForcePath) -> tuple[float, float]:
-    """Tangential force at the end of an increment: of :func:`advance_contact` the cheapest part."""
+    """Return the tangential force at the end of an increment, without derivatives or energy."""
     if path.end <= 0.0:
         return 0.0, 0.0
-    contact = _touched(path)
+    contact = _part_in_contact(path)
     held = _held(contact)
     if held == 1.0:
         return contact.force_x + contact.pull_x, contact.force_y + contact.pull_y
@@ -367,36 +382,36 @@ def advance_force(path: ForcePath) -> tuple[float, float]:
 
 @compiled(error_model="numpy")
 def advance_slopes(path: ForcePath) -> tuple[float, float, ForceSlopes, ForceSlopes]:
-    """:func:`advance_force` with the derivatives of its two components."""
+    """Return the force of :func:`advance_force` with the derivatives of its two components."""
     if path.end <= 0.0:
-        return 0.0, 0.0, GONE, GONE
-    x, y, of_x, of_y = _followed(_touched(path))
+        return 0.0, 0.0, SEPARATED, SEPARATED
+    x, y, of_x, of_y = _force_in_contact(_part_in_contact(path))
     if path.start <= 0.0:
-        return x, y, _touching(path, of_x), _touching(path, of_y)
+        return x, y, _chain_touch(path, of_x), _chain_touch(path, of_y)
     before_x, before_y, start = path.force_x, path.force_y, path.start
     if _length(before_x, before_y) > start:
-        of_x = _pulled_back(before_x, before_y, start, of_x)
-        of_y = _pulled_back(before_x, before_y, start, of_y)
+        of_x = _chain_return(before_x, before_y, start, of_x)
+        of_y = _chain_return(before_x, before_y, start, of_y)
     return x, y, of_x, of_y
 
 
 @compiled(error_model="numpy")
 def energy_lost(path: ForcePath) -> float:
-    """kt times the energy lost in an increment; limits may be negative: no contact."""
+    """Return kt times the energy lost in an increment; limits may be negative: no contact."""
     start = max(path.start, 0.0)
     force = _length(path.force_x, path.force_y)
     lost = 0.5 * (force - start) * (force + start) if force > start else 0.0
     if path.end <= 0.0:
         if start > 0.0:
-            lost += _lost_in_lift_off(_touched(path), start / (start - path.end))
+            lost += _lost_in_lift_off(_part_in_contact(path), start / (start - path.end))
         return lost
-    contact = _touched(path)
+    contact = _part_in_contact(path)
     held = _held(contact)
     return lost + _lost_in_slip(contact, _slip(contact, held)) if held < 1.0 else lost
 
 
 class Contact(NamedTuple):
-    """A row of the parameters of :class:`wear.joints.friction_contact.FrictionContact`."""
+    """The parameters of one joint of :class:`wear.joints.friction_contact.FrictionContact`."""
 
     stiffness: float
     normal_stiffness: float
@@ -407,13 +422,13 @@ class Contact(NamedTuple):
 
 @compiled(error_model="numpy")
 def contact_of(parameters: Array) -> Contact:
-    """The contact of a row of parameters ``(5,)``."""
+    """Return the contact of a row of parameters ``(5,)``."""
     return Contact(parameters[0], parameters[1], parameters[2], parameters[3], parameters[4])
 
 
 @compiled(error_model="numpy")
 def pressing(contact: Contact, approach: float) -> float:
-    """Normal force, negative where the contact is apart."""
+    """Return the normal force, which is negative where the contact is apart."""
     return contact.preload + contact.normal_stiffness * (approach - contact.gap)
 
 
@@ -421,7 +436,7 @@ def pressing(contact: Contact, approach: float) -> float:
 def path_of(
     contact: Contact, x: float, y: float, step_x: float, step_y: float, start: float, end: float
 ) -> ForcePath:
-    """The path of a contact of the stretch (x, y) [mm] between two approaches."""
+    """Return the path of a contact with the stretch (x, y) [mm] between two approaches."""
     stiffness, friction = contact.stiffness, contact.friction
     return ForcePath(
         stiffness * x,
@@ -439,12 +454,24 @@ def advance_contact(
 ) -> float:
     """Advance one joint by an increment of displacement ``(3,)``; return the energy it loses.
 
-    For compiled loops: allocates nothing. ``parameters`` ``(5,)`` is a row of those of
-    :class:`wear.joints.friction_contact.FrictionContact`, ``start`` ``(3,)`` a state. Written are
-    the ``force`` ``(3,)`` and state ``end`` ``(3,)``, which may be ``start``, at the end of the
-    increment, and ``jacobian`` ``(3, 6)``, the derivative of that force with respect to the state
-    at the start (the first three columns) and to the increment (the others). The state follows the
-    force: its derivative is that of the tangential force divided by kt, and of z + dz.
+    It is made for compiled loops and allocates nothing.
+
+    Parameters
+    ----------
+    parameters
+        A row of those of :class:`wear.joints.friction_contact.FrictionContact` ``(5,)``.
+    start
+        State at the beginning ``(3,)``.
+    increment
+        Increment of displacement ``(3,)`` [mm].
+    force
+        Written: force at the end of the increment ``(3,)``.
+    end
+        Written: state at the end of the increment ``(3,)``; may be ``start``.
+    jacobian
+        Written: derivative of the force with respect to the state at the start (first three
+        columns) and the increment (the others) ``(3, 6)``. The state follows the force: its
+        derivatives are those of the tangential force divided by kt, and of z + dz.
     """
     contact = contact_of(parameters)
     approach = start[2] + increment[2]
@@ -464,7 +491,7 @@ def advance_contact(
 
 @compiled(error_model="numpy")
 def _in_displacements(contact: Contact, slopes: ForceSlopes, row: Array) -> None:
-    """Write the derivative ``(6,)`` by stretch, approach and increment."""
+    """Write the derivatives ``(6,)`` by stretch, approach and increment."""
     limit_slope = contact.friction * contact.normal_stiffness
     row[0], row[1] = contact.stiffness * slopes.force_x, contact.stiffness * slopes.force_y
     row[3], row[4] = contact.stiffness * slopes.pull_x, contact.stiffness * slopes.pull_y
