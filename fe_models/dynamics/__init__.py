@@ -14,8 +14,8 @@ M x'' + C x' + K x = f(t) - Bᵀ F(B x), with joint laws F that are handed over,
 - ``motions_at``: all motions of a branch at a frequency
 - ``along_phase_resonance``: the backbone of a resonance
 - ``along_nonlinear_mode``, ``LinearMode``: frequency and damping of a mode against its amplitude
-- ``HarmonicBalance.of_sector``, with :mod:`fe_models.dynamics.rings.sector`: one sector of a ring
-  in a wave that travels round
+- ``HarmonicBalance.of_sector``, with :mod:`fe_models.dynamics.rings.sector`: one sector of a ring in a
+  wave that travels round
 - ``Floquet``: whether motions are stable
 - ``ContinuationControl``, ``Accuracy``: the steps along a branch, how fine its motions are
 - ``frequency_response``, ``ring_down``: what a hammer's blow shows
@@ -39,7 +39,7 @@ from typing import TYPE_CHECKING
 from sa_solver.lazy import lazy_names
 
 if TYPE_CHECKING:
-    from fe_models.dynamics.curves.continuation import ContinuationControl
+    from fe_models.dynamics.curves.control import ContinuationControl
     from fe_models.dynamics.curves.crossings import motions_at
     from fe_models.dynamics.curves.forced_response import Accuracy, along_force, along_frequency
     from fe_models.dynamics.curves.nonlinear_mode import LinearMode, along_nonlinear_mode
@@ -53,8 +53,9 @@ if TYPE_CHECKING:
         RecordedForce,
     )
     from fe_models.dynamics.model import DynamicModel
-    from fe_models.dynamics.periodic.harmonic_balance import HarmonicBalance, PeriodicLoad
+    from fe_models.dynamics.periodic.harmonic_balance import HarmonicBalance
     from fe_models.dynamics.periodic.harmonics import Resolution
+    from fe_models.dynamics.periodic.load import PeriodicLoad
     from fe_models.dynamics.rig import (
         Link,
         lumped_rig,
@@ -101,7 +102,7 @@ __all__ = [
 __getattr__, __dir__ = lazy_names(
     __name__,
     {
-        "curves.continuation": ("ContinuationControl",),
+        "curves.control": ("ContinuationControl",),
         "curves.crossings": ("motions_at",),
         "damping": ("damped",),
         "excitation": (
@@ -118,10 +119,7 @@ __getattr__, __dir__ = lazy_names(
             "along_frequency",
         ),
         "transient.free_decay": ("ring_down",),
-        "periodic.harmonic_balance": (
-            "HarmonicBalance",
-            "PeriodicLoad",
-        ),
+        "periodic.harmonic_balance": ("HarmonicBalance",),
         "periodic.harmonics": ("Resolution",),
         "transient.impact_hammer": ("frequency_response",),
         "model": ("DynamicModel",),
@@ -133,6 +131,7 @@ __getattr__, __dir__ = lazy_names(
             "LinearMode",
             "along_nonlinear_mode",
         ),
+        "periodic.load": ("PeriodicLoad",),
         "curves.phase_resonance": ("along_phase_resonance",),
         "rig": (
             "Link",

@@ -11,8 +11,9 @@ from fe_models.dynamics.curves import continuation, newton
 from fe_models.dynamics.curves.forced_response import along_frequency
 from fe_models.dynamics.excitation import HarmonicForce
 from fe_models.dynamics.motion import Start
-from fe_models.dynamics.periodic.harmonic_balance import HarmonicBalance, PeriodicLoad
+from fe_models.dynamics.periodic.harmonic_balance import HarmonicBalance
 from fe_models.dynamics.periodic.harmonics import Resolution
+from fe_models.dynamics.periodic.load import PeriodicLoad
 from fe_models.dynamics.rig import unit_force
 from fe_models.dynamics.transient.newmark import TimeStepControl, integrate
 from tests.limits.contact_rigs import KT, MU, SOLVED, body

@@ -7,8 +7,9 @@ import pytest
 
 from fe_models.dynamics.curves.forced_response import Accuracy, along_force, along_frequency
 from fe_models.dynamics.excitation import HarmonicForce
-from fe_models.dynamics.periodic.harmonic_balance import HarmonicBalance, PeriodicLoad
+from fe_models.dynamics.periodic.harmonic_balance import HarmonicBalance
 from fe_models.dynamics.periodic.harmonics import HarmonicBalanceError, Resolution
+from fe_models.dynamics.periodic.load import PeriodicLoad
 from fe_models.dynamics.periodic.resolution_error import resolution_error
 from fe_models.dynamics.rig import Link, lumped_rig, natural_frequencies, unit_force
 from tests.limits.contact_rigs import KN, KT, MU, SOLVED, balance, body, contact, linear, rig

@@ -69,8 +69,7 @@ class AlternatingContact:
         tolerance: float = TOLERANCE,
         max_rounds: int = ROUNDS,
     ) -> AlternatingState:
-        """Solve one increment, given as to
-        :meth:`~sa_solver.dissimilar.contact.CoupledContact.solve`.
+        """One increment, with the arguments of :meth:`~sa_solver.dissimilar.contact.CoupledContact.solve`.
 
         Raises what the normal and the tangential solver raise.
         """

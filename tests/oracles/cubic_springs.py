@@ -11,10 +11,7 @@ from sa_solver.types import Array
 
 @dataclass(frozen=True)
 class CubicCycle:
-    """A cycle of springs, which have no states and lose nothing.
-
-    See :class:`wear.joints.periodic.march.PeriodicMarch`.
-    """
+    """What :class:`wear.joints.periodic.march.PeriodicMarch` gives, of springs: no states, no losses."""
 
     force: Array
     jacobian: Array

@@ -298,10 +298,7 @@ def test_over_a_long_stroke_the_slider_wears_alone_and_the_flat_evenly(stroke: f
 
 @pytest.mark.slow
 def test_neglecting_the_motion_costs_the_square_of_the_stroke() -> None:
-    """The motion counts for less than 1 % at a stroke of a tenth of the contact.
-
-    :data:`wear.contact.moving.LARGE_STROKE` rests on this.
-    """
+    """What :data:`wear.contact.moving.LARGE_STROKE` rests on: less than 1 % at a tenth of the contact."""
     grid, load, volume = Grid.strips(1.6, 80), 50.0, 2.0 / 3.0 * 0.5**3 / RADIUS
     form = grid.x**2 / (2.0 * RADIUS)
     still = March(grid, form, load)

@@ -12,9 +12,10 @@ import h5py
 import numpy as np
 import pytest
 
-from fe_models.dynamics.curves.continuation import ContinuationControl
-from fe_models.dynamics.periodic.harmonic_balance import HarmonicBalance, PeriodicLoad
+from fe_models.dynamics.curves.control import ContinuationControl
+from fe_models.dynamics.periodic.harmonic_balance import HarmonicBalance
 from fe_models.dynamics.periodic.harmonics import Resolution
+from fe_models.dynamics.periodic.load import PeriodicLoad
 from fe_models.dynamics.rig import Link, lumped_rig, unit_force
 from tests.workflow.commands import invoke, runs_here
 from wear.joints.elastic import PolynomialSpring

@@ -13,8 +13,9 @@ from numpy.polynomial import Chebyshev
 from scipy.integrate import solve_ivp
 
 from fe_models.dynamics.periodic.cycle_energy import energy_lost, work_done
-from fe_models.dynamics.periodic.harmonic_balance import HarmonicBalance, PeriodicLoad
+from fe_models.dynamics.periodic.harmonic_balance import HarmonicBalance
 from fe_models.dynamics.periodic.harmonics import Resolution
+from fe_models.dynamics.periodic.load import PeriodicLoad
 from fe_models.dynamics.rig import Link, lumped_rig, unit_force
 from fe_models.joints.reduction import save_reduced
 from fe_models.matrices import on_all, own_matrices

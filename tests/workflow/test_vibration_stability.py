@@ -8,8 +8,9 @@ import h5py
 import numpy as np
 import pytest
 
-from fe_models.dynamics.periodic.harmonic_balance import HarmonicBalance, PeriodicLoad
+from fe_models.dynamics.periodic.harmonic_balance import HarmonicBalance
 from fe_models.dynamics.periodic.harmonics import Resolution
+from fe_models.dynamics.periodic.load import PeriodicLoad
 from fe_models.dynamics.stability.floquet import Floquet
 from tests.workflow.conftest import invoke
 from tests.workflow.vibration_pad import block

@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 import pyvista
 
-from fe_models.dynamics.periodic.harmonic_balance import HarmonicBalance, PeriodicLoad
+from fe_models.dynamics.periodic.harmonic_balance import HarmonicBalance
 from fe_models.dynamics.periodic.harmonics import Resolution
+from fe_models.dynamics.periodic.load import PeriodicLoad
 from tests.workflow.conftest import invoke
 from tests.workflow.scenes import RIG_OF_THESIS
 from tests.workflow.shown_files import check_arrays, check_scene, total

@@ -28,6 +28,7 @@ import numpy as np
 from numpy.polynomial import Chebyshev, chebyshev
 from scipy.optimize import brentq
 
+from sa_solver import checks
 from sa_solver.errors import ConvergenceError, InputError
 from sa_solver.types import Array
 from wear.joints.evolution import JointEvolution
@@ -153,7 +154,7 @@ class LongTest:
 
         Raises InputError for cycles that the test does not have.
         """
-        cycles = np.asarray(cycles, dtype=np.float64)
+        cycles = checks.array("cycles", cycles, None)
         if np.any((cycles < 0.0) | (cycles > self.total_cycles)):
             raise InputError(f"cycles outside a test of {self.total_cycles:g}; allowed: within it")
         return np.asarray(np.vectorize(self._energy, otypes=[float])(cycles))
@@ -163,7 +164,7 @@ class LongTest:
 
         NaN where it has not by the end of the test. Raises InputError below the energy before it.
         """
-        energy = np.asarray(energy, dtype=np.float64)
+        energy = checks.array("energies", energy, None)
         if np.any(energy < self.energy_before):
             raise InputError(
                 f"energies below {self.energy_before:g} N mm, which were there before the test"
@@ -218,17 +219,15 @@ def long_test(
     >>> print(f"{test.evaluations} cycles were computed")
     144 cycles were computed
     """
-    if not cycles > 0.0:
-        raise InputError(f"{cycles:g} cycles; allowed: more than 0")
-    if not 0.0 <= start < np.inf:
-        raise InputError(f"{start:g} N mm dissipated before; allowed: 0 or more")
-    if not until > start:
-        raise InputError(f"until {until:g} N mm; allowed: above {start:g}, there before the test")
+    cycles = checks.number("cycles", cycles, above=0.0, infinite=True)
+    start = checks.number("start", start, least=0.0)
+    until = checks.number("until", until, above=start, infinite=True)
     if cycles == until == np.inf:
         raise InputError("a test without end; allowed: a number of cycles or an energy that end it")
-    if not SMALLEST_TOLERANCE <= tolerance < 1.0:
+    if not SMALLEST_TOLERANCE <= checks.number("tolerance", tolerance) < 1.0:
         raise InputError(f"tolerance {tolerance:g}; allowed: {SMALLEST_TOLERANCE:g} to 1")
-    return _Jumper(energy_per_cycle, cycles, until, tolerance, sorted(breaks)).run(start)
+    kinks = sorted(checks.array("breaks", breaks, (None,)).tolist())
+    return _Jumper(energy_per_cycle, cycles, until, tolerance, kinks).run(start)
 
 
 @dataclass
@@ -378,6 +377,8 @@ def steady_stroke(law: UniaxialLaw, evolution: JointEvolution, amplitude: float)
     >>> print(f"{long_test(steady, cycles=1e6).final_energy:.0f} N mm")
     1000000 N mm
     """
+
+    amplitude = checks.number("amplitude", amplitude, least=0.0)
 
     def energy_per_cycle(energy: float) -> float:
         return float(evolution.at(law, energy).loop_energy(amplitude))

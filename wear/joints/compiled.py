@@ -24,7 +24,7 @@ PACKAGE = Path(__file__).parent
 def version_of(package: Path) -> str:
     """What tells versions of a package's files apart."""
     digest = hashlib.sha256()
-    for file in sorted(package.rglob("*.py")):
+    for file in sorted(package.glob("*.py")):
         digest.update(file.read_bytes())
     return digest.hexdigest()[:16]
 

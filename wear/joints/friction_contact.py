@@ -34,7 +34,7 @@ leaves while the force turns is integrated by Gauss's rule to 1e-13.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 
 import numpy as np
@@ -46,9 +46,12 @@ from wear.joints.parameters import (
     CompiledLaw,
     JointError,
     Parameter,
+    joint_values,
     parameter_columns,
+    require,
     require_not_negative,
     require_positive,
+    settle_parameters,
 )
 
 
@@ -107,6 +110,7 @@ class FrictionContact(CompiledLaw):
     gap: Parameter = 0.0
 
     def __post_init__(self) -> None:
+        settle_parameters(self, [parameter.name for parameter in fields(self)])
         require_positive(stiffness=self.stiffness)
         require_not_negative(
             normal_stiffness=self.normal_stiffness,
@@ -152,6 +156,7 @@ class FrictionContact(CompiledLaw):
         """
         if np.any(np.asarray(self.normal_stiffness) == 0.0):
             raise JointError("a normal stiffness of 0 keeps its load whatever is worn: give more")
-        apart = self.clearance + depth
+        apart = self.clearance + joint_values("depth", depth)
+        require("clearance", apart, np.isfinite(apart), "finite")
         load = self.normal_stiffness * np.maximum(-apart, 0.0)
         return replace(self, normal_load=load, gap=np.maximum(apart, 0.0))

@@ -16,13 +16,14 @@ of kt R where they are stiff.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
 from fe_models.dynamics.curves.bordered import LinearMap
-from fe_models.dynamics.curves.continuation import ContinuationControl, first_point, follow
+from fe_models.dynamics.curves.continuation import first_point, follow
+from fe_models.dynamics.curves.control import ContinuationControl
 from fe_models.dynamics.curves.newton import NewtonControl, NewtonSolution, solve
 from fe_models.dynamics.curves.sizes import norm, relative_norm
 from fe_models.dynamics.joint_rest import Rest
@@ -35,9 +36,11 @@ from fe_models.dynamics.periodic.harmonics import (
     Resolution,
 )
 from fe_models.dynamics.periodic.joints import Cycle, CycleRecord, PeriodicJoints
+from fe_models.dynamics.periodic.load import PeriodicLoad
 from fe_models.dynamics.periodic.receptance import Receptance, SteadyMotion
 from fe_models.dynamics.rings.sector import CyclicSector
 from fe_models.dynamics.rings.travelling_wave import WaveReceptance
+from sa_solver import checks
 from sa_solver.types import Array
 
 # Unknowns up to which a matrix is assembled and factorised; beyond, products with it are cheaper,
@@ -51,52 +54,6 @@ SAMPLES_PER_PERIOD = 8
 EPSILON = float(np.finfo(float).eps)
 # A vibration below this share of what balances in the mean is rounding: there is none.
 NO_VIBRATION = 1e-12
-
-
-@dataclass(frozen=True)
-class PeriodicLoad:
-    """Forces on the structure [N].
-
-    ``waves`` gives the complex amplitudes ``(n,)`` of its harmonics, for a force of 1: with w the
-    force is Re w exp(ikωt), so that -1j makes a sine. ``static`` ``(n,)`` does not grow with the
-    force. ``inertial`` gives amplitudes ``(n,)`` [N s²] by harmonic that are multiplied by the
-    square of its angular frequency: those of a ground that moves by a given way X along a rigid
-    translation r are M r X, of displacements relative to the ground.
-
-    Examples
-    --------
-    A sine of twice the frequency, and a force that stays: it moves the mass by F / k, as a joint
-    without friction holds nothing.
-
-    >>> import numpy as np
-    >>> from fe_models.dynamics import *
-    >>> from wear.joints import Jenkins, PeriodicMarch
-    >>> rig = lumped_rig({"m": 1e-3}, {Link("m"): 1e3}, [[Link("m")]], damping_ratio=0.02)
-    >>> point = unit_force(rig, "m")
-    >>> load = PeriodicLoad({2: -1j * point}, static=5.0 * point)
-    >>> free = PeriodicMarch(Jenkins(stiffness=1e3, friction=0.0, normal_load=10.0))
-    >>> problem = HarmonicBalance(rig, free, load, Resolution((0, 1, 2), 64))
-    >>> motion = problem.solve(frequency=20.0, force=1.0)
-    >>> print(f"{motion.amplitude(0, harmonic=0).real:.4f} mm of {5.0 / 1e3:.4f}")
-    0.0050 mm of 0.0050
-    """
-
-    waves: Mapping[int, ComplexArray]
-    static: Array | None = None
-    inertial: Mapping[int, ComplexArray] = field(default_factory=dict)
-
-    @property
-    def harmonics(self) -> set[int]:
-        """Those of the force."""
-        return {*self.waves, *self.inertial}
-
-    def amplitude(self, harmonic: int, angular: float, force: float) -> ComplexArray:
-        """Return the load ``(n,)`` of a harmonic at a frequency [rad/s], under a force."""
-        nothing = np.zeros(1)
-        growing = self.waves.get(harmonic, nothing)
-        growing = growing + angular**2 * self.inertial.get(harmonic, nothing)
-        constant = nothing if harmonic or self.static is None else self.static
-        return np.asarray(force * growing + constant, dtype=complex)
 
 
 @dataclass(frozen=True)
@@ -184,11 +141,7 @@ class HarmonicBalance:
             raise HarmonicBalanceError(
                 f"the load has harmonics {missing or [0]} that the motion has not: add them"
             )
-        forces = [*load.waves.values(), *load.inertial.values()]
-        if load.static is not None:
-            forces.append(load.static)
-        if not all(np.isfinite(force).all() for force in forces):
-            raise HarmonicBalanceError("a force of the load is not a number: give finite ones")
+        load.require(len(model.mass))
         self.model, self.joints, self.load, self.resolution = model, joints, load, resolution
         self.receptance = receptance or Receptance(model)
         self.transfer = _transfer(resolution, self.receptance, joints.directions)
@@ -283,11 +236,8 @@ class HarmonicBalance:
         solution are those with the frequency as parameter. Raises :class:`HarmonicBalanceError` for
         a frequency that is not above zero, and for numbers that are not finite.
         """
-        if not (0.0 < frequency < np.inf and np.isfinite(force)):
-            raise HarmonicBalanceError(
-                f"frequency {frequency:g} Hz, force {force:g}: give a frequency above 0, and both "
-                "finite"
-            )
+        checks.number("frequency", frequency, above=0.0, error=HarmonicBalanceError)
+        checks.number("force", force, error=HarmonicBalanceError)
         control = replace(control or ContinuationControl(), watch=lambda parameter: None)
         newton = NewtonControl(control.tolerance)
         direct = solve(self.by_frequency(force), unknowns, frequency, newton)

@@ -28,9 +28,7 @@ class Cycle(Protocol):
 
 
 class Deviations(Protocol):
-    """March of small deviations through the joints over one period.
-
-    :class:`wear.joints.periodic.linearised.LinearisedMarch` is one.
+    """What joints make of small deviations: :class:`wear.joints.periodic.linearised.LinearisedMarch` is one.
 
     From each of ``t`` times of a period to the next, deviations of what ``j`` joints remember
     ``(p,)`` and of their displacements ``(d,)`` go on as δs_end = A δs + E δu + D δu_end, and their
@@ -73,9 +71,7 @@ class DeviatingJoints(Protocol):
 
 
 class PeriodicJoints(Protocol):
-    """Joints that are marched through a period.
-
-    :class:`wear.joints.periodic.march.PeriodicMarch` is one.
+    """Joints that are marched through a period: :class:`wear.joints.periodic.march.PeriodicMarch` is one.
 
     The displacement of joint j at sample t is ``basis[t] @ coefficients[j]``, from ``basis``
     ``(t, m)`` and ``coefficients`` ``(j, m, d)`` [mm]; ``lead`` ``(p, m)`` gives the points through

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from fe_models.dynamics.periodic.harmonic_balance import HarmonicBalance, PeriodicLoad
+from fe_models.dynamics.periodic.harmonic_balance import HarmonicBalance
 from fe_models.dynamics.periodic.harmonics import Resolution
+from fe_models.dynamics.periodic.load import PeriodicLoad
 from fe_models.dynamics.rig import Link, lumped_rig, unit_force
 from tests.oracles.two_mass_rig import two_mass_rig
 from wear.joints.jenkins import Jenkins

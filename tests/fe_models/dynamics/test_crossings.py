@@ -6,8 +6,9 @@ import pytest
 from fe_models.dynamics.curves.crossings import motions_at
 from fe_models.dynamics.curves.followed_curve import Chord
 from fe_models.dynamics.curves.forced_response import along_frequency
-from fe_models.dynamics.periodic.harmonic_balance import HarmonicBalance, PeriodicLoad
+from fe_models.dynamics.periodic.harmonic_balance import HarmonicBalance
 from fe_models.dynamics.periodic.harmonics import Resolution
+from fe_models.dynamics.periodic.load import PeriodicLoad
 from fe_models.dynamics.rig import Link, lumped_rig, unit_force
 from tests.oracles.cubic_springs import CubicSprings
 

@@ -9,8 +9,9 @@ import scipy.linalg as sl
 from fe_models.dynamics.curves.phase_resonance import along_phase_resonance
 from fe_models.dynamics.damping import damped, rayleigh_factors
 from fe_models.dynamics.periodic.cycle_energy import damping_ratio, energy_lost
-from fe_models.dynamics.periodic.harmonic_balance import HarmonicBalance, PeriodicLoad
+from fe_models.dynamics.periodic.harmonic_balance import HarmonicBalance
 from fe_models.dynamics.periodic.harmonics import Resolution
+from fe_models.dynamics.periodic.load import PeriodicLoad
 from fe_models.dynamics.periodic.modal_inverse import MixedModes, ModesWithDashpots
 from fe_models.dynamics.periodic.receptance import Receptance
 from fe_models.dynamics.rig import Link, RigError, lumped_rig, natural_frequencies, unit_force

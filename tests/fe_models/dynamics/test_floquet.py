@@ -8,14 +8,15 @@ from scipy.integrate import solve_ivp
 from scipy.special import mathieu_a, mathieu_b
 
 from fe_models.dynamics.curves.bifurcations import find_bifurcations
-from fe_models.dynamics.curves.continuation import ContinuationControl
+from fe_models.dynamics.curves.control import ContinuationControl
 from fe_models.dynamics.curves.followed_curve import curve_by_force, curve_by_frequency
 from fe_models.dynamics.curves.forced_response import along_force, along_frequency
 from fe_models.dynamics.curves.further_branches import further_branches, vibrating_starts
 from fe_models.dynamics.excitation import CombinedForces, ConstantForce, HarmonicForce
 from fe_models.dynamics.motion import Start
-from fe_models.dynamics.periodic.harmonic_balance import HarmonicBalance, PeriodicLoad
+from fe_models.dynamics.periodic.harmonic_balance import HarmonicBalance
 from fe_models.dynamics.periodic.harmonics import Resolution
+from fe_models.dynamics.periodic.load import PeriodicLoad
 from fe_models.dynamics.rig import Link, lumped_rig, unit_force
 from fe_models.dynamics.stability import floquet
 from fe_models.dynamics.stability.floquet import Floquet

@@ -6,8 +6,9 @@ import pytest
 from fe_models.dynamics.curves.phase_resonance import along_phase_resonance
 from fe_models.dynamics.friction_rig import ground_inertia
 from fe_models.dynamics.ground_motion import translation_of
-from fe_models.dynamics.periodic.harmonic_balance import HarmonicBalance, PeriodicLoad
+from fe_models.dynamics.periodic.harmonic_balance import HarmonicBalance
 from fe_models.dynamics.periodic.harmonics import HarmonicBalanceError, Resolution
+from fe_models.dynamics.periodic.load import PeriodicLoad
 from fe_models.dynamics.rig import Link, RigError, lumped_rig
 from fe_models.joints.reduction import ReducedModel
 from wear.joints.jenkins import Jenkins

@@ -12,9 +12,9 @@ from fe_models.dynamics.curves.forced_response import Accuracy, along_force, alo
 from fe_models.dynamics.excitation import HarmonicForce
 from fe_models.dynamics.periodic import harmonic_balance, harmonic_jacobian, modal_inverse
 from fe_models.dynamics.periodic.cycle_energy import energy_lost
-from fe_models.dynamics.periodic.harmonic_balance import PeriodicLoad
 from fe_models.dynamics.periodic.harmonic_jacobian import HarmonicJacobian
 from fe_models.dynamics.periodic.harmonics import HarmonicBalanceError, Resolution
+from fe_models.dynamics.periodic.load import PeriodicLoad
 from fe_models.dynamics.periodic.receptance import Receptance, ReceptanceError
 from fe_models.dynamics.periodic.resolution_error import resolution_error
 from fe_models.dynamics.periodic.static_residual import AT_REST, ResidualReceptance, modes_that_move

@@ -9,7 +9,7 @@ import pytest
 
 from fe_models.dynamics.curves.forced_response import along_force
 from fe_models.dynamics.model import DynamicModel
-from fe_models.dynamics.periodic.harmonic_balance import PeriodicLoad
+from fe_models.dynamics.periodic.load import PeriodicLoad
 from fe_models.dynamics.rig import unit_force
 from tests.fe_models.dynamics.harmonic_rigs import EXACT, balance, contact_rig, pressed, rig
 from wear.joints.friction_contact import FrictionContact

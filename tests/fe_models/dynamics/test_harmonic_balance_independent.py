@@ -13,8 +13,9 @@ import pytest
 
 from fe_models.dynamics.excitation import CombinedForces, HarmonicForce, RecordedForce
 from fe_models.dynamics.motion import Start
-from fe_models.dynamics.periodic.harmonic_balance import HarmonicBalance, PeriodicLoad
+from fe_models.dynamics.periodic.harmonic_balance import HarmonicBalance
 from fe_models.dynamics.periodic.harmonics import Resolution
+from fe_models.dynamics.periodic.load import PeriodicLoad
 from fe_models.dynamics.rig import Link, lumped_rig, unit_force
 from fe_models.dynamics.transient.newmark import TimeStepControl, integrate
 from tests.marks import slow

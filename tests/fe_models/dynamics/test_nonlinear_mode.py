@@ -8,14 +8,15 @@ import numpy as np
 import pytest
 from scipy.special import ellipk
 
-from fe_models.dynamics.curves.continuation import ContinuationControl
+from fe_models.dynamics.curves.control import ContinuationControl
 from fe_models.dynamics.curves.forced_response import along_frequency
 from fe_models.dynamics.curves.nonlinear_mode import LinearMode, NonlinearMode, along_nonlinear_mode
 from fe_models.dynamics.curves.phase_resonance import along_phase_resonance
 from fe_models.dynamics.motion import Start
 from fe_models.dynamics.periodic.cycle_energy import energy_lost
-from fe_models.dynamics.periodic.harmonic_balance import HarmonicBalance, PeriodicLoad
+from fe_models.dynamics.periodic.harmonic_balance import HarmonicBalance
 from fe_models.dynamics.periodic.harmonics import HarmonicBalanceError, Resolution
+from fe_models.dynamics.periodic.load import PeriodicLoad
 from fe_models.dynamics.rig import Link, lumped_rig, unit_force
 from tests.fe_models.dynamics.harmonic_rigs import KT, LOAD, MU, REACH, balance, rig
 from tests.fe_models.dynamics.test_phase_resonance import block_problem

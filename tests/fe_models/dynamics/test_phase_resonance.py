@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from fe_models.dynamics.curves.continuation import ContinuationControl
+from fe_models.dynamics.curves.control import ContinuationControl
 from fe_models.dynamics.curves.forced_response import Accuracy, along_frequency
 from fe_models.dynamics.curves.phase_resonance import PhaseResonance, along_phase_resonance
 from fe_models.dynamics.excitation import HarmonicForce
@@ -18,8 +18,9 @@ from fe_models.dynamics.periodic.cycle_energy import (
     energy_lost,
     largest_kinetic_energy,
 )
-from fe_models.dynamics.periodic.harmonic_balance import HarmonicBalance, PeriodicLoad
+from fe_models.dynamics.periodic.harmonic_balance import HarmonicBalance
 from fe_models.dynamics.periodic.harmonics import HarmonicBalanceError, Resolution
+from fe_models.dynamics.periodic.load import PeriodicLoad
 from fe_models.dynamics.rig import Link, lumped_rig, natural_frequencies, unit_force
 from tests.marks import slow
 from tests.oracles.cubic_springs import CubicSprings

@@ -10,8 +10,9 @@ from fe_models.dynamics.curves.phase_resonance import PhaseResonance, along_phas
 from fe_models.dynamics.damping import damped
 from fe_models.dynamics.model import DynamicModel
 from fe_models.dynamics.periodic.cycle_energy import energy_lost
-from fe_models.dynamics.periodic.harmonic_balance import HarmonicBalance, PeriodicLoad
+from fe_models.dynamics.periodic.harmonic_balance import HarmonicBalance
 from fe_models.dynamics.periodic.harmonics import HarmonicBalanceError, Resolution
+from fe_models.dynamics.periodic.load import PeriodicLoad
 from fe_models.dynamics.periodic.resolution_error import resolution_error
 from fe_models.dynamics.rig import Link, RigError, lumped_rig, natural_frequencies
 from fe_models.dynamics.rings.sector import Ring, lumped_sector, reduced_sector

@@ -181,11 +181,11 @@ def test_kinks_that_are_named_cost_nothing() -> None:
 @pytest.mark.parametrize(
     ("changes", "complaint"),
     [
-        ({"cycles": 0.0}, "0 cycles"),
-        ({"cycles": np.nan}, "nan cycles"),
+        ({"cycles": 0.0}, "cycles = 0"),
+        ({"cycles": np.nan}, "cycles = nan"),
         ({"cycles": np.inf}, "without end"),
-        ({"start": -1.0}, "-1 N mm"),
-        ({"start": 3.0, "until": 3.0}, "until 3 N mm; allowed: above 3"),
+        ({"start": -1.0}, "start = -1"),
+        ({"start": 3.0, "until": 3.0}, "until = 3.*above 3"),
         ({"tolerance": 0.0}, "tolerance 0"),
     ],
 )

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from fe_models.dynamics.excitation import CombinedForces, ConstantForce, HarmonicForce
-from fe_models.dynamics.periodic.harmonic_balance import HarmonicBalance, PeriodicLoad
+from fe_models.dynamics.periodic.harmonic_balance import HarmonicBalance
 from fe_models.dynamics.periodic.harmonics import Resolution
+from fe_models.dynamics.periodic.load import PeriodicLoad
 from fe_models.dynamics.rig import Link, lumped_rig, unit_force
 from fe_models.dynamics.stability.floquet import Floquet
 from fe_models.dynamics.transient.newmark import TimeStepControl, integrate

@@ -1,6 +1,4 @@
-"""Compiled march of contacts in three dimensions over a period.
-
-See :mod:`wear.joints.periodic.march` for what calls it.
+"""Compiled march of contacts in three dimensions over a period; see :mod:`wear.joints.periodic.march`.
 
 What a contact remembers is the stretch s of its tangential spring, two numbers. Where periods go on
 to change the stretch, they will by (1 - A)⁻¹ times the change of one, with A, the derivative of the

@@ -25,6 +25,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from sa_solver import checks
 from sa_solver.types import Array
 from wear.joints.bouc_wen import BoucWen
 from wear.joints.elastic import ElasticLaw, settle_elastic
@@ -103,6 +104,27 @@ class SettledCycle:
         return self.dissipate()
 
 
+def driven_by(coefficients: object) -> Array:
+    """Return coefficients ``(j, m, d)`` of joints.
+
+    Raises :class:`JointError`. Iterations may come to ones that are not finite, and find that out
+    by themselves.
+    """
+    shape = (None, None, None)
+    return checks.array("coefficients", coefficients, shape, error=JointError, finite=False)
+
+
+def _sampled(functions: object) -> Array:
+    """Return functions of time at samples, or the weights of these. Raises :class:`JointError`.
+
+    An iteration gives the same ones each time: whether they are finite its forces tell.
+    """
+    shape = (None, None)
+    return checks.array(
+        "functions at samples", functions, shape, error=JointError, finite=False, order="K"
+    )
+
+
 @dataclass(frozen=True)
 class PeriodicMarch:
     """A joint ``law`` over whole periods.
@@ -129,6 +151,9 @@ class PeriodicMarch:
     law: Jenkins | BoucWen | MasingLaw | FrictionContact | ElasticLaw
     threads: int = 1
 
+    def __post_init__(self) -> None:
+        checks.whole("threads", self.threads, JointError)
+
     @property
     def directions(self) -> int:
         return self.law.directions
@@ -142,7 +167,8 @@ class PeriodicMarch:
         without ``lead`` joints are driven from rest straight to the first sample. Raises
         :class:`JointError` for shapes that do not fit.
         """
-        lead = basis[:1] if lead is None else lead
+        coefficients, basis, weights = driven_by(coefficients), *map(_sampled, (basis, weights))
+        lead = basis[:1] if lead is None else _sampled(lead)
         self._require(coefficients, basis, weights, lead)
         joints, size, directions = coefficients.shape
         kernels = self._kernels[0]
@@ -175,6 +201,7 @@ class PeriodicMarch:
         beginning of the period, need not be equally far apart. Joints of spread sliders have room
         for at least ``memory`` numbers, so that motions with fewer turning points are like others.
         """
+        coefficients, basis, lead = driven_by(coefficients), _sampled(basis), _sampled(lead)
         joints, _, directions = coefficients.shape
         self._require(coefficients, basis, basis.T, lead)
         driven = self._driven(coefficients, basis, lead, 0)

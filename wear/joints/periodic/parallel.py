@@ -14,7 +14,7 @@ import numpy as np
 from sa_solver.types import Array
 from wear.joints.jenkins import Jenkins
 from wear.joints.parameters import JointError
-from wear.joints.periodic.march import SLIP, STICK, PeriodicMarch, SettledCycle
+from wear.joints.periodic.march import SLIP, STICK, PeriodicMarch, SettledCycle, driven_by
 
 
 @dataclass(frozen=True)
@@ -61,9 +61,10 @@ class ParallelSliders:
         As :meth:`wear.joints.periodic.march.PeriodicMarch.settle`; raises :class:`JointError` for
         more joints than one.
         """
+        coefficients = driven_by(coefficients)
         if len(coefficients) != 1:
             raise JointError(f"coefficients of {len(coefficients)} joints for the sliders of one")
-        stiffness = np.atleast_1d(self.law.stiffness)
+        stiffness = np.broadcast_to(self.law.stiffness, len(self.law.parameters))
         shared = np.repeat(coefficients, len(stiffness), axis=0)
         cycle = PeriodicMarch(self.law).settle(shared, basis, weights, lead)
         held = np.where(cycle.states == STICK, stiffness, 0.0).sum(axis=1)

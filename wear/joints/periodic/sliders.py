@@ -1,6 +1,4 @@
-"""Compiled marches of joints along one direction over a period.
-
-See :mod:`wear.joints.periodic.march` for what calls them.
+"""Compiled marches of joints along one direction over a period; see :mod:`wear.joints.periodic.march`.
 
 Jenkins's and Bouc-Wen's joints remember one number, here the stretch z of a spring that gives the
 force K z + kr u. Its derivative comes after that, along the period that repeats and only if it is

@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fe_models.dynamics.periodic.harmonic_balance import PeriodicLoad
 from fe_models.dynamics.periodic.harmonic_solution import HarmonicSolution
 from fe_models.dynamics.periodic.harmonics import ComplexArray
+from fe_models.dynamics.periodic.load import PeriodicLoad
 from fe_models.dynamics.rig import unit_force
 from sa_solver.types import Array
 from workflow.analyses.rig.places import Moved

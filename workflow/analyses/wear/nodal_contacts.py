@@ -41,9 +41,7 @@ KEPT = 4
 
 @dataclass(frozen=True)
 class StructureCycle:
-    """A closed cycle at the nodes of all interfaces.
-
-    It is a :class:`wear.contact.nodes.NodalCycle`.
+    """A closed cycle as the nodes of all interfaces feel it: see :class:`wear.contact.nodes.NodalCycle`.
 
     ``stiffness`` [MPa/mm] is the most that the pressure of a node answers to its gap.
     """
