@@ -25,7 +25,7 @@ Shape = Sequence[int | None]
 def array(
     name: str,
     values: object,
-    shape: Shape,
+    shape: Shape | None,
     *,
     error: type[FretscaleError] = InputError,
     masked: float | None = None,
@@ -42,7 +42,8 @@ def array(
     values
         An array or nested lists of real numbers.
     shape
-        The shape that they must have, None where any length will do.
+        The shape that they must have, with None for each length that may be any; None alone: any
+        shape.
     error
         What is raised.
     masked
@@ -58,14 +59,29 @@ def array(
     if plain.dtype.kind not in REAL:
         raise error(f"{name} are of the type {plain.dtype}: give real numbers")
     found: NDArray[np.float64] = np.asarray(plain, dtype=np.float64, order=order)
-    pairs = zip(shape, found.shape, strict=False)
-    same = found.ndim == len(shape) and all(wanted in (None, n) for wanted, n in pairs)
-    if not same:
+    if shape is not None and not _fits(shape, found.shape):
         raise error(f"{name} have shape {found.shape}: give {_shown(shape, found.shape)}")
     if finite and not np.all(np.isfinite(found) | (infinite & (found == np.inf))):
         bad = "NaN or -infinity" if infinite else "NaN or infinity"
         raise error(f"{name} hold {bad}: give finite numbers, or fill or crop what is missing")
     return found
+
+
+def complex_array(
+    name: str,
+    values: object,
+    shape: Shape | None,
+    *,
+    error: type[FretscaleError] = InputError,
+    finite: bool = True,
+) -> NDArray[Any]:
+    """Return ``values``, real or complex, as an array of ``shape``; what :func:`array` refuses."""
+    plain = _without_mask(name, values, None, error)
+    if plain.dtype.kind != "c":
+        return array(name, plain, shape, error=error, finite=finite, order="K")
+    for part in (plain.real, plain.imag):
+        array(name, part, shape, error=error, finite=finite)
+    return np.asarray(plain, dtype=np.complex128)
 
 
 def number(
@@ -102,11 +118,13 @@ def numbers(holder: object, *names: str, **bounds: Any) -> None:
 
 
 def whole(name: str, value: Any, error: type[FretscaleError] = InputError) -> int:
-    """Return ``value`` as a whole number."""
+    """Return ``value`` as a whole number, which a truth value is none of."""
     try:
-        return index(value)
-    except TypeError as problem:
-        raise error(f"{name} is {value!r}: give a whole number") from problem
+        if not isinstance(value, bool):
+            return index(value)
+    except TypeError:
+        pass
+    raise error(f"{name} is {value!r}: give a whole number")
 
 
 def places(
@@ -151,6 +169,12 @@ def _without_mask(
             "leave these places out"
         )
     return np.asarray(found.astype(np.float64).filled(masked))
+
+
+def _fits(shape: Shape, given: tuple[int, ...]) -> bool:
+    """Return whether the ``given`` shape is the one asked for."""
+    pairs = zip(shape, given, strict=False)
+    return len(given) == len(shape) and all(wanted in (None, n) for wanted, n in pairs)
 
 
 def _shown(shape: Shape, given: tuple[int, ...]) -> str:

@@ -39,7 +39,7 @@ from typing import TYPE_CHECKING
 from sa_solver.lazy import lazy_names
 
 if TYPE_CHECKING:
-    from fe_models.dynamics.curves.continuation import ContinuationControl
+    from fe_models.dynamics.curves.control import ContinuationControl
     from fe_models.dynamics.curves.crossings import motions_at
     from fe_models.dynamics.curves.forced_response import Accuracy, along_force, along_frequency
     from fe_models.dynamics.curves.nonlinear_mode import LinearMode, along_nonlinear_mode
@@ -102,7 +102,7 @@ __all__ = [
 __getattr__, __dir__ = lazy_names(
     __name__,
     {
-        "curves.continuation": ("ContinuationControl",),
+        "curves.control": ("ContinuationControl",),
         "curves.crossings": ("motions_at",),
         "damping": ("damped",),
         "excitation": (

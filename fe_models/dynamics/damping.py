@@ -16,6 +16,7 @@ import numpy as np
 
 from fe_models.dynamics.model import DynamicModel
 from fe_models.dynamics.rig import Link, RigError, stretch_of
+from sa_solver import checks
 from sa_solver.types import Array
 
 
@@ -48,6 +49,8 @@ def damped(
     0.0400 mm of 0.0400
     """
     dashpots = dashpots or {}
+    for value in (mass_factor, stiffness_factor, loss_factor, *dashpots.values()):
+        checks.number("a damping", value, error=RigError)
     if min(mass_factor, stiffness_factor, loss_factor, *dashpots.values(), 0.0) < 0.0:
         raise RigError("damping below zero, which feeds vibrations: give 0 or more")
     damping = model.damping + mass_factor * model.mass + stiffness_factor * model.stiffness
@@ -67,7 +70,7 @@ def rayleigh_factors(frequencies: Array, ratios: Array) -> tuple[float, float]:
     """α [1/s] and β [s] by which modes of two ``frequencies`` [Hz] have two damping ``ratios``.
 
     2 ζ = α / ω + β ω. One of them is below zero where the ratios differ by more than their
-    frequencies do.
+    frequencies do. Raises :class:`RigError` for frequencies that are equal or not above zero.
 
     Examples
     --------
@@ -79,8 +82,9 @@ def rayleigh_factors(frequencies: Array, ratios: Array) -> tuple[float, float]:
     >>> print(f"{alpha:.9f} {2.0 * 0.01 / (100.0 * np.pi) / beta:.9f}")
     0.000000000 1.000000000
     """
-    angular = 2.0 * np.pi * np.asarray(frequencies)
-    alpha, beta = np.linalg.solve(
-        np.stack([1.0 / angular, angular], axis=1), 2.0 * np.asarray(ratios)
-    )
+    angular = 2.0 * np.pi * checks.array("frequencies", frequencies, (2,), error=RigError)
+    given = checks.array("damping ratios", ratios, (2,), error=RigError)
+    if angular.min() <= 0.0 or angular[0] == angular[1]:
+        raise RigError("frequencies that are equal or not above 0: give two that differ")
+    alpha, beta = np.linalg.solve(np.stack([1.0 / angular, angular], axis=1), 2.0 * given)
     return float(alpha), float(beta)

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from sa_solver import checks
 from sa_solver.errors import InputError
 from sa_solver.types import Array
 
@@ -24,8 +25,13 @@ class ExcitationForce(ABC):
 
     shape: Array
 
+    def __post_init__(self) -> None:
+        shape = checks.array("forces of a shape", self.shape, (None,), error=ExcitationError)
+        checks.settle(self, shape=shape)
+
     def __call__(self, times: Array) -> Array:
-        return np.multiply.outer(self.value(np.asarray(times, dtype=float)), self.shape)
+        times = checks.array("times", times, None, error=ExcitationError)
+        return np.multiply.outer(self.value(times), self.shape)
 
     @abstractmethod
     def value(self, times: Array) -> Array:
@@ -75,6 +81,9 @@ class HarmonicForce(ExcitationForce):
     ramp: float = 0.0
 
     def __post_init__(self) -> None:
+        super().__post_init__()
+        names = ("amplitude", "frequency", "phase", "ramp")
+        checks.numbers(self, *names, error=ExcitationError)
         if not (self.frequency > 0.0 and self.ramp >= 0.0):
             raise ExcitationError(
                 f"frequency {self.frequency:g} Hz, ramp {self.ramp:g} s: give a frequency above 0 "
@@ -112,6 +121,8 @@ class HammerBlow(ExcitationForce):
     start: float = 0.0
 
     def __post_init__(self) -> None:
+        super().__post_init__()
+        checks.numbers(self, "peak", "duration", "start", error=ExcitationError)
         if not self.duration > 0.0:
             raise ExcitationError(f"a blow of {self.duration:g} s: give a duration above 0")
 
@@ -144,6 +155,18 @@ class RecordedForce(ExcitationForce):
     force: Array
 
     def __post_init__(self) -> None:
+        super().__post_init__()
+        columns = {
+            name: checks.array(
+                f"values of {name}",
+                getattr(self, name),
+                (None,),
+                error=ExcitationError,
+                finite=False,
+            )
+            for name in ("times", "force")
+        }
+        checks.settle(self, **columns)
         if not 0 < len(self.times) == len(self.force):
             raise ExcitationError(
                 f"{len(self.times)} times and {len(self.force)} forces: give one or more, as many "
@@ -177,5 +200,12 @@ class CombinedForces:
 
     forces: tuple[ExcitationForce, ...]
 
+    def __post_init__(self) -> None:
+        if not self.forces or not all(callable(force) for force in self.forces):
+            raise ExcitationError(f"forces are {self.forces!r}: give one or more")
+
     def __call__(self, times: Array) -> Array:
-        return np.asarray(sum(force(times) for force in self.forces))
+        parts = [force(times) for force in self.forces]
+        if len({part.shape for part in parts}) > 1:
+            raise ExcitationError("forces on structures of different sizes: give all of one")
+        return np.asarray(sum(parts))

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Protocol
 
+from sa_solver import checks
 from sa_solver.types import Array
 
 
@@ -17,7 +18,8 @@ class DynamicModel:
     degrees of freedom. ``structural`` ``(n, n)`` D [N/mm], None for none, is damping in phase with
     the velocity that does not grow with it: in steady vibration the stiffness is K + iD. There is
     none in time. ``dashpots`` ``(r, n)`` G tells what part of ``damping`` a few dashpots are, GᵀG:
-    steady vibration is found the sooner.
+    steady vibration is found the sooner. Raises InputError for other shapes, and for numbers that
+    are masked or not finite.
 
     Examples
     --------
@@ -38,6 +40,15 @@ class DynamicModel:
     names: tuple[str, ...]
     structural: Array | None = None
     dashpots: Array | None = None
+
+    def __post_init__(self) -> None:
+        size, found = len(self.names), {}
+        for name in ("mass", "damping", "stiffness", "structural", "connection", "dashpots"):
+            if (matrix := getattr(self, name)) is not None:
+                rows = None if name in ("connection", "dashpots") else size
+                what = f"values of {name} of a model of {size} names"
+                found[name] = checks.complex_array(what, matrix, (rows, size))
+        checks.settle(self, **found)
 
 
 class IncrementResponse(Protocol):

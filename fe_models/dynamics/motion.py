@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fe_models.dynamics.model import DynamicModel
+from sa_solver import checks
 from sa_solver.types import Array
 
 
@@ -26,10 +27,15 @@ class Start:
     companion: Start | None = None
 
     def motion(self, size: int) -> Array:
-        """Displacements, then velocities ``(2 n,)``."""
-        given = (self.displacement, self.velocity)
+        """Displacements, then velocities ``(2 n,)``. Raises InputError for others than ``(n,)``."""
+        given = {"displacements": self.displacement, "velocities": self.velocity}
         return np.concatenate(
-            [np.zeros(size) if part is None else np.asarray(part, dtype=float) for part in given]
+            [
+                np.zeros(size)
+                if part is None
+                else checks.array(f"{name} of a start", part, (size,))
+                for name, part in given.items()
+            ]
         )
 
 

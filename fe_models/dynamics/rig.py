@@ -15,6 +15,7 @@ import scipy.linalg as sl
 from fe_models.dynamics.model import DynamicModel
 from fe_models.dynamics.periodic.receptance import RIGID
 from fe_models.joints.reduction import ReducedModel
+from sa_solver import checks
 from sa_solver.errors import InputError
 from sa_solver.types import Array
 
@@ -111,6 +112,8 @@ def reduced_rig(
     >>> print(f"{lowest:.2f} rad/s of {2e3 * np.sin(np.pi / 22.0):.2f}")
     284.63 rad/s of 284.63
     """
+    if not isinstance(reduced, ReducedModel):
+        raise RigError(f"a {type(reduced).__name__} in place of a reduced body: give one")
     if reduced.mass is None:
         raise RigError("the reduced model has no mass: reduce the body with its mass matrix")
     if len(names) != len(reduced.kept):
@@ -160,9 +163,11 @@ def undamped_rig(
     added = len(names) - len(mass)
     mass, stiffness = (np.pad(matrix, (0, added)) for matrix in (mass, stiffness))
     for name, value in masses.items():
+        checks.number(f"mass of {name}", value, error=RigError)
         place = _place(names, name)
         mass[place, place] += value
     for link, value in springs.items():
+        checks.number(f"spring of {link}", value, error=RigError)
         stretch = stretch_of(names, link)
         stiffness += value * np.outer(stretch, stretch)
     return DynamicModel(
@@ -181,9 +186,9 @@ def modal_damping(mass: Array, stiffness: Array, ratio: float | Array) -> Array:
     (ω = 0) are modes too, and are not damped. Raises :class:`RigError` if the mass is not positive
     definite, or a ratio is below zero, or there are more of them than modes.
     """
-    if np.any(np.asarray(ratio) < 0.0):
-        raise RigError(f"damping ratio {np.min(ratio):g}: give 0 or more")
-    given = np.atleast_1d(ratio)
+    given = np.atleast_1d(checks.array("damping ratios", ratio, None, error=RigError))
+    if given.ndim > 1 or np.any(given < 0.0):
+        raise RigError(f"damping ratio {given.min(initial=0.0):g}: give one or (n,), 0 or more")
     if not 0 < len(given) <= len(mass):
         raise RigError(f"{len(given)} damping ratios for {len(mass)} modes: give one for each")
     try:
@@ -214,7 +219,13 @@ def natural_frequencies(model: DynamicModel, joint_stiffness: float | Array = 0.
     2.000000
     """
     stretch = model.connection
-    held = np.asarray(joint_stiffness, dtype=float)
+    held = checks.array("joint stiffnesses", joint_stiffness, None, error=RigError)
+    size = len(held) * held.shape[1] if held.ndim == 3 else held.size if held.ndim else len(stretch)
+    if held.ndim == 2 or size != len(stretch):
+        raise RigError(
+            f"joint stiffnesses of shape {held.shape} for {len(stretch)} rows of the connection: "
+            "give one, one for each row, or the tangents of the joints"
+        )
     if held.ndim == 3:
         springs = sl.block_diag(*held)
     else:

@@ -8,11 +8,12 @@ a symmetric load gives a symmetric answer to rounding.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from typing import Any, Literal
 
 import numpy as np
 
+from fe_models.geometry.places import places
 from fe_models.meshes.gmsh_session import gmsh_model, grow_from
 from fe_models.meshes.structure_mesh import (
     AXES,
@@ -23,6 +24,7 @@ from fe_models.meshes.structure_mesh import (
     named_mesh,
 )
 from fe_models.readers.gmsh_file import EntityGroup, generated_body
+from sa_solver import checks
 from sa_solver.surfaces.shapes import rounded_edge
 from sa_solver.types import Array, Frame
 
@@ -90,6 +92,13 @@ class Dovetail:
     end_radius: float | None = None
     end_width: float | None = None
 
+    def __post_init__(self) -> None:
+        for parameter in fields(self):
+            if parameter.name != "blades":
+                checks.numbers(self, parameter.name, error=MeshError)
+        if checks.whole("blades", self.blades, MeshError) < 2:
+            raise MeshError(f"{self.blades} blades: give 2 or more")
+
     @property
     def flank_width(self) -> float:
         """Flat and both rounded edges, along the flank [mm]."""
@@ -114,6 +123,8 @@ class Dovetail:
 
     def flank_frame(self, side: int) -> Frame:
         """Frame of the flank at X > 0 (``side`` 1) or X < 0 (``side`` -1)."""
+        if side not in (1, -1):
+            raise MeshError(f"side {side!r} of a dovetail: give 1 or -1")
         top, bottom = self.flank_ends()
         middle = 0.5 * (top + bottom)
         uphill = self._uphill(side)
@@ -143,6 +154,7 @@ class Dovetail:
 
         Zero on the flat, circular arcs on the rounded edges and ends, a slope beyond them.
         """
+        x, y = places(x, y)
         frame = self.flank_frame(side)
         up = frame.components(self._uphill(side))
         # Oblique coordinates: along the section and along the slot.
@@ -203,6 +215,12 @@ class Dovetail:
         ``root_bottom``, ``shank_top`` of the blade.
         """
         self.check()
+        nodes = checks.array("nodes of a flank", flank_nodes, (2,), error=MeshError)
+        if nodes.min() < 2.0 or (nodes % 1.0).any():
+            raise MeshError(f"flank_nodes {tuple(flank_nodes)}: give two whole numbers, 2 or more")
+        checks.number("size", size, above=0.0, error=MeshError)
+        if checks.whole("notch", notch, MeshError) < 1 or dimension not in (2, 3):
+            raise MeshError(f"notch {notch}, dimension {dimension!r}: give 1 or more, and 2 or 3")
         if dimension == 2 and self.skew != 0.0:
             raise MeshError("a skewed slot is not the same all along: model it in 3 dimensions")
         sections = {

@@ -28,6 +28,7 @@ from fe_models.readers.scene import Scene
 from fe_models.readers.set_faces import faces_of_sets
 from fe_models.readers.text_files import open_text
 from fe_models.readers.unv import read_unv
+from sa_solver import checks
 from sa_solver.types import Array, Indices
 
 # A mesh is plane when it is thinner than this share of its size.
@@ -147,6 +148,8 @@ def read_bodies(path: Path, size: float | None = None, unit: str | None = None) 
     2 triangles, [3.] mm of side
     """
     path = Path(path)
+    if size is not None:
+        checks.number("size", size, error=MeshError)
     with reading(path):
         grouped = _grouped(path, size, unit)
         try:
@@ -157,6 +160,8 @@ def read_bodies(path: Path, size: float | None = None, unit: str | None = None) 
 
 def _grouped(path: Path, size: float | None, unit: str | None) -> GroupedMesh:
     suffix = path.suffix.lower()
+    if unit is not None:
+        checks.choice("unit", unit, list(SIZES), MeshError)
     given = LengthUnit() if unit is None else LengthUnit(unit, SIZES[unit], GIVEN)
     if not path.is_file():
         raise MeshError(f"{path}: {'not a file' if path.exists() else 'no such file'}")

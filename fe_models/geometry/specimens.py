@@ -23,6 +23,7 @@ from typing import Any
 
 import numpy as np
 
+from fe_models.geometry.places import places
 from fe_models.meshes.gmsh_session import gmsh_model, grow_from
 from fe_models.meshes.structure_mesh import (
     Body,
@@ -32,6 +33,7 @@ from fe_models.meshes.structure_mesh import (
     named_mesh,
 )
 from fe_models.readers.gmsh_file import EntityGroup, generated_body
+from sa_solver import checks
 from sa_solver.types import Array, Frame, Indices
 
 # Name of the interface, and of the boundary of both bodies that it joins.
@@ -78,6 +80,15 @@ class Specimen:
     pad_elements: int = 10
     radii: tuple[float, float] | None = None
 
+    def __post_init__(self) -> None:
+        lengths = ("diameter", "length", "strip_width", "chamfer_depth", "ring_distance")
+        checks.numbers(self, *lengths, error=MeshError)
+        for name in ("ring_nodes", "pad_elements"):
+            checks.whole(name, getattr(self, name), MeshError)
+        if self.radii is not None:
+            along, across = checks.array("radii", self.radii, (2,), error=MeshError).tolist()
+            checks.settle(self, radii=(along, across))
+
     def check(self) -> None:
         """Raise :class:`MeshError` if the specimen cannot be drawn or meshed."""
         if not 0.0 < self.strip_width < self.diameter / np.sqrt(2.0):
@@ -101,10 +112,14 @@ class Specimen:
         """Distance of the unloaded faces at points of the contact plane [mm].
 
         Body 1's strip lies along x, body 2's along y: with radii R_1 along and R_2 across the
-        crossed strips touch like spheres, at the relative radius R_1 R_2/(R_1 + R_2).
+        crossed strips touch like spheres, at the relative radius R_1 R_2/(R_1 + R_2). Raises
+        :class:`MeshError` for points beyond a radius, where there is no face.
         """
-        gap = np.zeros(np.broadcast(x, y).shape)
+        x, y = places(x, y)
+        gap = np.zeros(x.shape)
         for radius in self.radii or ():
+            if max(np.abs(x).max(initial=0.0), np.abs(y).max(initial=0.0)) > radius:
+                raise MeshError(f"places beyond the radius of {radius:g} mm: give nearer ones")
             gap += _sagitta(x, radius) + _sagitta(y, radius)
         return gap
 
@@ -115,6 +130,8 @@ class Specimen:
         side from there to the ring). The interface is ``contact``.
         """
         self.check()
+        for name, value in (("size", size), ("growth", growth)):
+            checks.number(name, value, above=0.0, error=MeshError)
         body_1 = Body("specimen_1", self._mesh(size, growth))
         turned = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])
         body_2 = Body("specimen_2", replace(body_1.mesh, doflocs=turned @ body_1.mesh.p))

@@ -10,7 +10,9 @@ import numpy as np
 import scipy.io
 
 from fe_models.joints.reduction import ReducedModel
-from fe_models.matrices.unknowns import MODAL, Unknown, unknown_of
+from fe_models.matrices.reduction import require_names
+from fe_models.matrices.unknowns import MODAL, MatrixError, Unknown, unknown_of
+from sa_solver import checks
 from sa_solver.types import Array
 
 # Digits that leave nothing of a number out.
@@ -23,7 +25,8 @@ def write_matrices(model: ReducedModel, folder: Path, stem: str, formats: tuple[
 
     The first two hold ``stiffness``, ``mass``, ``loads`` and where there is one ``damping`` on kept
     displacements, then modes; ``names`` of all of them, and ``places`` of the kept ones. ``mtx`` is
-    a file of each matrix in the Matrix Market format, and one of the unknowns in CSV.
+    a file of each matrix in the Matrix Market format, and one of the unknowns in CSV. Raises
+    :class:`MatrixError` for a model without names, and for another format.
 
     Examples
     --------
@@ -48,8 +51,11 @@ def write_matrices(model: ReducedModel, folder: Path, stem: str, formats: tuple[
         MAT: _write_mat,
         MTX: _write_mtx,
     }
+    require_names(model)
     for each in formats:
-        writers[each](model, folder, stem)
+        checks.choice("format", each, list(writers), MatrixError)
+    for each in formats:
+        writers[each](model, Path(folder), stem)
 
 
 def _matrices(model: ReducedModel) -> dict[str, Array]:
@@ -60,7 +66,7 @@ def _matrices(model: ReducedModel) -> dict[str, Array]:
 
 
 def _unknowns(model: ReducedModel) -> list[Unknown]:
-    assert model.names is not None
+    assert model.names is not None  # asked for before
     modes = range(1, len(model.frequencies) + 1)
     return [*map(unknown_of, model.names), *(Unknown(f"mode {mode}", MODAL) for mode in modes)]
 

@@ -14,6 +14,7 @@ from fe_models.matrices.arrays import read_hdf5, read_mat, read_npz
 from fe_models.matrices.nastran import read_op4, read_punch
 from fe_models.matrices.text import read_mtx
 from fe_models.matrices.unknowns import MatrixError, MatrixFile, Unknown, Values
+from sa_solver import checks
 
 AnyRead = TypeVar("AnyRead")
 
@@ -87,6 +88,7 @@ def read_matrix_file(path: Path) -> MatrixFile:
     [[ 2000. -1000.]
      [-1000.  1000.]]
     """
+    path = Path(path)
     reader = READERS.get(path.suffix.lower())
     if reader is None:
         raise MatrixError(f"{path}: no file of matrices; allowed: {', '.join(READERS)}")
@@ -107,7 +109,8 @@ def found(
     files: dict[Path, MatrixFile] = {}
     parts = {}
     for part in PARTS:
-        path, name = sources.get(part, (file, ""))
+        given, name = sources.get(part, (file, ""))
+        path = None if given is None else Path(given)
         if path is None:
             if part in NEEDED:
                 raise MatrixError("missing; allowed: a file of its own, or one of all", part)
@@ -231,6 +234,29 @@ def _checked(part: Part) -> Part:
 def shape_of(values: Values) -> str:
     """Rows and columns, as they are told."""
     return " x ".join(map(str, values.shape))
+
+
+def symmetric_matrix(name: str, values: object, size: int) -> sp.csr_matrix:
+    """Return a symmetric matrix of ``size`` rows, given as a sparse or dense one, by its rows.
+
+    Raises :class:`MatrixError` for other shapes, numbers that are not finite, and a matrix that is
+    not symmetric.
+    """
+    if sp.issparse(values):
+        rows: sp.csr_matrix = sp.csr_matrix(values)
+        data = checks.array(f"numbers of {name}", rows.data, (None,), error=MatrixError)
+        matrix = sp.csr_matrix((data, rows.indices, rows.indptr), shape=rows.shape)
+    else:
+        dense = checks.array(f"values of {name}", values, (None, None), error=MatrixError)
+        matrix = sp.csr_matrix(dense)
+    if matrix.shape != (size, size):
+        raise MatrixError(
+            f"{name}: {shape_of(matrix)}; allowed: {size} rows, as the unknowns", name
+        )
+    apart = abs(matrix - matrix.T)
+    if apart.nnz and apart.max() > SYMMETRIC * abs(matrix).max():
+        raise MatrixError(f"{name}: not symmetric; allowed: a symmetric matrix", name)
+    return matrix
 
 
 def symmetric(part: Part, matrix: sp.csr_matrix, unknowns: Sequence[Unknown]) -> sp.csr_matrix:

@@ -12,6 +12,7 @@ from fe_models.joints.reduction import ReducedModel, free_frequencies, reduce_bo
 from fe_models.matrices.structure import OwnMatrices
 from fe_models.matrices.unknowns import MODAL, ROTATIONS, MatrixError, Unknown
 from fe_models.solvers.linear_solver import FactorMemoryError, SolverError
+from sa_solver import checks
 from sa_solver.types import Array, Indices
 
 # Masses that are nothing, over the largest of their kind (displacements, rotations, modes).
@@ -96,7 +97,13 @@ def on_retained(
     ('0 x', '10 x') [ 100. -100.] [49.795]
     """
     unknowns = matrices.unknowns
-    wanted = set(points)
+    wanted = {points} if isinstance(points, str) else set(points)
+    if missing := sorted(wanted - {unknown.point for unknown in unknowns}):
+        raise MatrixError(
+            f"{listed_names(missing)}: no points of the matrices; allowed: those", "retained"
+        )
+    if checks.whole("modes", modes, MatrixError) < 0:
+        raise MatrixError(f"{modes} modes; allowed: 0 or more", "modes")
     kept: Indices = np.flatnonzero([u.point in wanted and u.direction != MODAL for u in unknowns])
     moving = int((matrices.mass.diagonal() > 0.0).sum()) - int(
         (matrices.mass.diagonal()[kept] > 0.0).sum()
@@ -132,6 +139,14 @@ def on_retained(
     )
 
 
+def require_names(model: ReducedModel) -> None:
+    """Raise :class:`MatrixError` unless a model has mass, and a name for each kept displacement."""
+    if model.mass is None:
+        raise MatrixError("a model without mass; allowed: one reduced with its mass", "mass")
+    if model.names is None or len(model.names) != len(model.kept):
+        raise MatrixError("a model whose displacements have no names; allowed: a name for each")
+
+
 def without_massless(
     model: ReducedModel, laden: Sequence[str] = ()
 ) -> tuple[ReducedModel, tuple[str, ...]]:
@@ -155,6 +170,7 @@ def without_massless(
     >>> print(model.stiffness, model.names, dropped)
     [[500.]] ('end x',) ('between x',)
     """
+    require_names(model)
     assert model.mass is not None
     assert model.names is not None
     count, names = len(model.kept), model.names
@@ -245,7 +261,9 @@ def with_light_motions(
     >>> print(light, np.linalg.eigvalsh(model.mass).round(9))
     ('a x',) [7.6e-07 5.0e-04]
     """
+    require_names(model)
     assert model.mass is not None
+    checks.number("frequency", frequency, above=0.0, error=MatrixError)
     diagonal = np.diag(model.mass)
     scale = 1.0 / np.sqrt(np.where(diagonal > 0.0, diagonal, np.inf))
     # What has no mass at all is scaled by its stiffness: it is in the null space alone.
@@ -294,7 +312,10 @@ def check_definite(model: ReducedModel, laden: Mapping[str, float] = NOTHING) ->
     >>> check_definite(on_all(OwnMatrices(K, sp.identity(2), None, np.zeros((2, 0)), names)))
     1
     """
+    require_names(model)
     assert model.mass is not None
+    for name, value in laden.items():
+        checks.number(f"mass added to {name}", value, error=MatrixError)
     names = _all_names(model)
     added = np.diag([laden.get(name, 0.0) for name in names])
     lowest, values = _lowest(model.mass + added, names, "mass")
@@ -335,6 +356,8 @@ def lowest_frequencies(matrices: OwnMatrices, count: int) -> Array:
     >>> print((2.0 * np.pi * lowest_frequencies(pair, 3)).round(2))
     [   0.   1414.21]
     """
+    if checks.whole("count", count, MatrixError) < 1:
+        raise MatrixError(f"{count} frequencies; allowed: 1 or more")
     if len(matrices.unknowns) <= DENSE:
         model, _ = without_massless(on_all(matrices))
         check_definite(model)

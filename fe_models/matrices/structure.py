@@ -20,13 +20,16 @@ from fe_models.matrices.parts import (
     DAMPING,
     LOADS,
     MASS,
+    PARTS,
     STIFFNESS,
     Part,
     found,
     shape_of,
     symmetric,
+    symmetric_matrix,
 )
 from fe_models.matrices.unknowns import DIRECTIONS, MODAL, TRANSLATIONS, MatrixError, Unknown, once
+from sa_solver import checks
 from sa_solver.types import Array, Indices
 
 
@@ -50,6 +53,8 @@ class FileUnits:
     mass: float = 0.0
 
     def __post_init__(self) -> None:
+        checks.numbers(self, "length", "force", above=0.0, error=MatrixError)
+        checks.numbers(self, "mass", least=0.0, error=MatrixError)
         if not self.mass:
             object.__setattr__(self, "mass", self.force / self.length)
 
@@ -94,6 +99,20 @@ class OwnMatrices:
     left: tuple[str, ...] = ()
     offered: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
+    def __post_init__(self) -> None:
+        unknowns = once("unknowns", self.unknowns)
+        size = len(unknowns)
+        found = {
+            name: symmetric_matrix(name, getattr(self, name), size)
+            for name in (STIFFNESS, MASS, DAMPING)
+            if name != DAMPING or self.damping is not None
+        }
+        loads = checks.array("values of loads", self.loads, (size, None), error=MatrixError)
+        checks.settle(self, unknowns=unknowns, loads=loads, **found)
+        if self.places is not None:
+            places = checks.array("places", self.places, (size, 3), error=MatrixError, finite=False)
+            checks.settle(self, places=places)
+
     def moved_mass(self) -> dict[str, float]:
         """Mass [t] along x, y and z of what moves as one with all points: of a free body, all."""
         shares = {}
@@ -123,6 +142,14 @@ class GivenUnknowns:
     rows: tuple[Unknown, ...] | None = None
     nodes: Mapping[str, str] | None = None
     places: Array | Mapping[str, Array] | None = None
+
+    def __post_init__(self) -> None:
+        given = self.places
+        if given is None or isinstance(given, Mapping):
+            return
+        rows = None if self.rows is None else len(self.rows)
+        places = checks.array("places", given, (rows, 3), error=MatrixError, finite=False)
+        checks.settle(self, places=places)
 
 
 def own_matrices(
@@ -155,7 +182,9 @@ def own_matrices(
     [[ 2000. -1000.]
      [-1000.  1000.]] {'x': 0.003} {'stiffness': 'K', 'mass': 'M'}
     """
-    parts, left, offered = found(sources, file)
+    for part in sources:
+        checks.choice("part of the sources", part, PARTS, MatrixError)
+    parts, left, offered = found(sources, None if file is None else Path(file))
     unknowns, places = _unknowns(parts, given or GivenUnknowns())
     held = {unknown for part in parts.values() for unknown in part.file.held}
     size = len(unknowns)

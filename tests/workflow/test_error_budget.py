@@ -14,7 +14,7 @@ import pytest
 from fe_models.meshes.structure_mesh import MeshError
 from tests.workflow.commands import invoke
 from tests.workflow.mesh_scenes import settings
-from workflow.analyses.wear import run
+from workflow.analyses.wear import run, run_errors
 from workflow.analyses.wear.budget import companions as lives_of
 from workflow.analyses.wear.budget import finding, lives
 from workflow.analyses.wear.budget.companions import Companions
@@ -173,6 +173,77 @@ def test_advice_on_steps_of_given_accuracy_helps(tmp_path) -> None:
         abs(run["interface"]["peak_pressure"]["worn"] / CONFORMING - 1.0) for run in (first, second)
     ]
     assert errors[1] < 0.6 * errors[0]
+
+
+# --- advice on link, mesh and coupling ------------------------------------------------------------
+
+COARSE = ("mesh.flank_nodes=[12, 12]", "mesh.size=8 mm", "mesh.order=1", "contact.grid=[64, 64]")
+FINE = ("mesh.flank_nodes=[47, 47]", "mesh.size=2 mm", "mesh.order=2", "contact.grid=[64, 64]")
+BUDGET_KNOWN = ("error_budget=known", "stress.life.parameter=none", "output.report=false")
+
+
+@pytest.fixture(scope="module")
+def dovetail(tmp_path_factory):
+    """Depth of a run of the section, and what is advised on each part, by its settings."""
+    runs: dict[tuple[str, ...], tuple[float, dict[str, str]]] = {}
+
+    def worn(*asked: str) -> tuple[float, dict[str, str]]:
+        if asked not in runs:
+            with pytest.MonkeyPatch.context() as patch:
+                advised: dict[str, str] = {}
+                patch.setattr(run_errors, "warning_of", lambda *told: advised.update(told[3]))
+                folder = tmp_path_factory.mktemp("run") / "out"
+                summary = _summary(folder, *BUDGET_KNOWN, *asked)
+            runs[asked] = summary["intrados"]["depth_1"], advised
+        return runs[asked]
+
+    return worn
+
+
+def _taken(advice: str) -> tuple[str, ...]:
+    """Settings that an advice names, as ``--set`` takes them."""
+    return tuple(setting.replace(": ", "=", 1) for setting in advice.split(" and "))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("part", "own"),
+    [
+        ("mesh", ()),
+        ("mesh", ("mesh.order=2",)),
+        ("link", ()),
+        ("link", ("contact.link=half_space",)),
+    ],
+)
+def test_advice_on_mesh_and_link_helps(part, own, dovetail) -> None:
+    """Against a mesh so fine that what it leaves does not count, linked to its nodes."""
+    true, _ = dovetail(*FINE)
+    before, advised = dovetail(*COARSE, *own)
+    taken = _taken(advised[part])
+    assert not set(taken) & {*COARSE, *own}
+    after, _ = dovetail(*COARSE, *own, *taken)
+    assert abs(after - true) < 0.8 * abs(before - true)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "own",
+    [
+        ("coupling.resultants=constant",),
+        ("coupling.drift=20 %",),  # which is never reached
+        (),
+        ("coupling.resultants=every", "wear.step.cycles=200000"),
+    ],
+)
+def test_advice_on_loads_that_follow_helps(own, dovetail) -> None:
+    """Against loads that follow after every jump, of which there are many."""
+    many = "coupling.resultants=every", "wear.step.cycles=20000"
+    true, _ = dovetail(*COARSE, *many)
+    before, advised = dovetail(*COARSE, *own)
+    taken = _taken(advised["coupling"])
+    assert not set(taken) & set(own)
+    after, _ = dovetail(*COARSE, *own, *taken)
+    assert abs(after - true) < 0.8 * abs(before - true)
 
 
 # --- lives ----------------------------------------------------------------------------------------

@@ -1,12 +1,18 @@
 """How long a run will take: told after its first steps, and by a check before it begins."""
 
+import json
 import re
+from math import ceil
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from tests.marks import slow
 from tests.workflow.commands import command
+from workflow.analyses.wear.run_time import Steps, steps_of
+from workflow.analyses.wear.structures import structure_of
+from workflow.interface.cases import check
 from workflow.kinds import analysis_of, load_case
 from workflow.shell.forecast import FEW, Forecast, about, in_words
 from workflow.shell.reporter import Reporter
@@ -232,6 +238,76 @@ def test_more_work_takes_longer(name: str, finer: str) -> None:
     case, more = load_case(path), load_case(path, [finer])
     times = [analysis_of(each).run_time(each).seconds for each in (case, more)]
     assert times[1] > 2.0 * times[0]
+
+
+NO_PICTURES = "output={figures: false, paraview: false, report: false}"
+
+
+def steps_expected(case: Any) -> Steps:
+    return steps_of(case, structure_of(case).extent(case))
+
+
+@pytest.mark.parametrize(("cycles", "tolerance"), [(1e5, "1 %"), (1e5, "0.1 %"), (1e7, "1 %")])
+def test_jumps_on_given_slips_are_counted(cycles: float, tolerance: str, tmp_path: Path) -> None:
+    """Automatic ones of the sliding cylinder, as many as its run makes within a factor of three."""
+    path, out = CASES / "cylinder_wear.yaml", tmp_path / "out"
+    changes = ["wear.step={kind: implicit}", f"wear.cycles={cycles}", f"wear.tolerance={tolerance}"]
+    expected = steps_expected(load_case(path, changes))
+    changes += [NO_PICTURES, "error_budget=known"]
+    done = command("run", path, "--out", out, overrides=changes)
+    assert done.exit_code == 0, done.stderr
+    jumps = json.loads((out / "summary.json").read_text("utf-8"))["jumps"]
+    assert not expected.unknown
+    assert jumps / 3.0 < expected.jumps < 3.0 * jumps
+
+
+@pytest.mark.parametrize(
+    ("settings", "jumps"),
+    [
+        (["wear.step.cycles=500", "wear.cycles=1e5"], 200),
+        (["wear.step={kind: implicit, depth: 2 um}", "wear.stop.depth=0.1 mm"], 50),
+        (["wear.step={kind: implicit, volume: 1 mm^3}", "wear.stop.volume=8 mm^3"], 8),
+    ],
+)
+def test_jumps_that_settings_tell_are_counted(settings: list[str], jumps: int) -> None:
+    expected = steps_expected(load_case(CASES / "cylinder_wear.yaml", settings))
+    assert (expected.jumps, expected.unknown) == (jumps, "")
+
+
+@pytest.mark.parametrize(
+    ("name", "settings"),
+    [
+        ("specimens_wear", []),
+        ("cylinder_wear", ["wear.step={kind: implicit}", "contact.method=full"]),
+        ("cylinder_wear", ["wear.step={kind: implicit, depth: 2 um}"]),
+        ("cylinder_wear", ["wear.step={kind: implicit, depth: 2 um}", "wear.stop.volume=8 mm^3"]),
+    ],
+)
+def test_jumps_that_nobody_can_count_are_said_to_be_unknown(name: str, settings: list[str]) -> None:
+    """The time is that of a number of jumps, which is told with it."""
+    path = CASES / f"{name}.yaml"
+    case = load_case(path, settings)
+    expected = steps_expected(case)
+    assert expected.unknown
+    told = analysis_of(case).run_time(case)
+    assert told.unknown == expected.unknown
+    assert str(ceil(expected.jumps)) in told.assumed
+    printed = str(check(path, **dict(s.replace(".", "__").split("=", 1) for s in settings)))
+    for lines in (command("check", path, overrides=settings).stdout, printed):
+        (line,) = re.findall(r"^  time +(.*)$", lines, re.MULTILINE)
+        assert line == told.text
+        assert told.assumed in line
+        assert told.unknown in line
+
+
+def test_a_rig_does_not_know_more_than_the_wear_that_it_waits_for() -> None:
+    rig, specimens = (
+        load_case(CASES / f"{n}.yaml") for n in ("rig_computed_wear", "specimens_wear")
+    )
+    waits, waited = (analysis_of(case).run_time(case) for case in (rig, specimens))
+    assert waited.unknown
+    assert (waits.assumed, waits.unknown) == (waited.assumed, waited.unknown)
+    assert waits.before >= waited.seconds
 
 
 def test_check_says_how_long() -> None:

@@ -14,9 +14,11 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import chdtrc, fdtrc
 
+from sa_solver import checks
 from sa_solver.types import Array, Indices
 from wear.fitting.estimates import RANK
 from wear.fitting.least_squares import Fit, is_exact
+from wear.fitting.problem import FitError
 
 
 @dataclass(frozen=True)
@@ -54,7 +56,7 @@ def common_over(fit: Fit, tests: Indices) -> list[Common]:
     """What single tests say of each parameter that the data determine.
 
     ``tests`` ``(n,)`` is the number of the test that each datum is of. Logarithms are compared
-    where these are fitted.
+    where these are fitted. Raises FitError for tests that are not whole numbers, one per datum.
 
     Examples
     --------
@@ -71,6 +73,11 @@ def common_over(fit: Fit, tests: Indices) -> list[Common]:
     """
     slopes = fit.slopes(fit.problem.predict) / fit.deviations[:, None]
     residuals = fit.residuals / fit.deviations
+    tests = checks.places("tests", tests, np.iinfo(np.int64).max, FitError)
+    if tests.shape != residuals.shape:
+        raise FitError(
+            f"tests of shape {tests.shape}; allowed: one of each of {residuals.size} data"
+        )
     numbers = np.unique(tests)
     return [
         _common(fit, place, slopes, residuals, tests, numbers)

@@ -12,8 +12,10 @@ from functools import cache
 import numpy as np
 from scipy.special import chdtri, fdtrc, ndtri, stdtrit
 
+from sa_solver import checks
 from sa_solver.types import Array, Indices, Mask
 from wear.fitting.least_squares import Fit
+from wear.fitting.problem import FitError
 
 ALARM = 1e-3
 """Of good data, fits in which a test speaks up."""
@@ -45,7 +47,7 @@ def diagnose(fit: Fit, order: Array, files: Indices | None = None) -> list[Doubt
     """What residuals say against a fit.
 
     ``order`` ``(n,)`` is what the data of each series are sorted by, such as their energy, and
-    ``files`` ``(n,)`` the number of the file that each is of.
+    ``files`` ``(n,)`` the number of the file that each is of. Raises FitError for other shapes.
 
     Examples
     --------
@@ -63,6 +65,11 @@ def diagnose(fit: Fit, order: Array, files: Indices | None = None) -> list[Doubt
     """
     doubts = []
     residuals = fit.standardised
+    order = checks.array("order of the data", order, residuals.shape, error=FitError)
+    if files is not None:
+        files = checks.places("files", files, np.iinfo(np.int64).max, FitError)
+        if files.shape != residuals.shape:
+            raise FitError(f"files of shape {files.shape}; allowed: one of each datum")
     for place, series in enumerate(fit.problem.series):
         here = np.flatnonzero(fit.problem.places == place)
         if len(here) < FEWEST or fit.freedoms[place] < FEWEST // 2 or _is_exact(fit, here):

@@ -14,8 +14,16 @@ from itertools import product
 
 import numpy as np
 
+from sa_solver import checks
 from sa_solver.types import Array
-from wear.fitting.problem import FitError, FitProblem, Series, Unknown
+from wear.fitting.problem import (
+    FitError,
+    FitProblem,
+    Series,
+    Unknown,
+    require_unlike,
+    settle_columns,
+)
 from wear.joints.evolution import (
     ArrheniusEvolution,
     ExponentialEvolution,
@@ -180,6 +188,20 @@ class EvolutionData:
     held: Mapping[str, float] = field(default_factory=dict)
     deviations: Array | None = None
 
+    def __post_init__(self) -> None:
+        settle_columns(self, self.name, ("energy", "values"), ("deviations",))
+        if len(self.energy) != len(self.values):
+            raise FitError(
+                f"{self.name}: {len(self.energy)} energies and {len(self.values)} values; allowed: "
+                "as many of both"
+            )
+        checks.choice(f"form of {self.name}", self.form, list(FORMS), FitError)
+        for name, value in self.held.items():
+            checks.choice(
+                f"held of {self.name}", name, (INITIAL, *FORMS[self.form].names), FitError
+            )
+            checks.number(f"{self.name}.{name}", value, error=FitError)
+
     @property
     def shape(self) -> EvolutionForm:
         """The function, with as many terms as are free."""
@@ -244,6 +266,7 @@ def evolution_problem(data: Sequence[EvolutionData], shared: Sequence[str] = ())
     """
     for one in data:
         _check(one)
+    require_unlike([one.name for one in data])
     names, unknowns = _unknowns(data, shared)
     series = tuple(Series(one.name, one.values, one.deviations) for one in data)
 

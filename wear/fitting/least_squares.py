@@ -23,6 +23,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import ndtri, stdtrit
 
+from sa_solver import checks
 from sa_solver.errors import ConvergenceError
 from sa_solver.types import Array, Mask
 from wear.fitting.estimates import RANK, Estimate, estimate_at, inverse_of, led_astray
@@ -208,6 +209,7 @@ def fit(problem: FitProblem) -> Fit:
     1.940, 1.550 to 2.330
     """
     _check(problem)
+    _check_model(problem)
     best, reached = _best(problem)
     deviations, inner, jacobian = _weighted(problem, best)
     fitted = problem.predict(problem.outer(inner))
@@ -292,6 +294,14 @@ def _check(problem: FitProblem) -> None:
             f"{len(data)} values for {free} free parameters; allowed: more values, or fewer "
             "parameters that are free"
         )
+
+
+def _check_model(problem: FitProblem) -> None:
+    """Raise FitError unless the model predicts a number for each datum."""
+    for start in problem.starts[:1]:
+        predicted = problem.predict(start)
+        shape = problem.data.shape
+        checks.array("predictions", predicted, shape, error=FitError, finite=False)
 
 
 # --- solving ------------------------------------------------------------------------------------

@@ -18,6 +18,7 @@ from typing import Any
 
 import numpy as np
 
+from sa_solver import checks
 from sa_solver.types import Array, Indices
 from wear.fitting.problem import FitError, FitProblem, Series, Unknown
 from wear.joints.bouc_wen_curve import TabulatedBoucWen
@@ -155,6 +156,8 @@ def loop_data(name: str, measured: MeasuredLoops, most: int = MOST_LOOPS) -> Loo
 
     >>> from wear.fitting import loop_data
     """
+    if checks.whole("most", most, FitError) < 1:
+        raise FitError(f"{most} loops at most; allowed: 1 or more")
     measured.require_alike()
     record, count = measured.record, len(measured.branches)
     places = np.linspace(0, count - 1, min(count, most)).round().astype(int)
@@ -274,7 +277,13 @@ def loop_problem(data: Sequence[LoopData], law: str, held: Mapping[str, float]) 
     >>> print(f"{friction.value:.3f}, {stiffness.value:.0f} N/mm")
     0.500, 10000 N/mm
     """
+    checks.choice("law", law, list(LAWS), FitError)
     known = LAWS[law]
+    for name, value in held.items():
+        checks.choice("held", name, (*COMMON, *known.shape), FitError)
+        checks.array(f"values of {name}", value, (), error=FitError, finite=False)
+    if not data:
+        raise FitError("no loops; allowed: those of one record or more")
     for one in data:
         if np.isnan(held.get("normal_load", 0.0)) and np.isnan(one.normal_load):
             raise FitError(

@@ -8,12 +8,46 @@ from functools import cached_property
 
 import numpy as np
 
+from sa_solver import checks
 from sa_solver.errors import InputError
 from sa_solver.types import Array, Indices, Mask
 
 
 class FitError(InputError):
     """Data or parameters that no fit can be made of."""
+
+
+def settle_columns(
+    data: object, whose: str, given: Sequence[str], optional: Sequence[str] = ()
+) -> None:
+    """Make columns of ``data`` arrays ``(n,)`` of one length, while it is made.
+
+    Those that are ``optional`` may be None. Whether those ``given`` are finite, and of one length,
+    is looked at where a problem is made of them. Raises :class:`FitError`.
+    """
+    found = {name: column(whose, name, getattr(data, name)) for name in given}
+    length = len(found[given[-1]])
+    for name in optional:
+        if (values := getattr(data, name)) is not None:
+            found[name] = column(whose, name, values, length, finite=True)
+    checks.settle(data, **found)
+
+
+def column(
+    whose: str, name: str, values: object, length: int | None = None, *, finite: bool = False
+) -> Array:
+    """Return a column ``(n,)`` of data, of any length unless one is given.
+
+    Raises :class:`FitError`.
+    """
+    what = f"{whose}: values of {name}"
+    return checks.array(what, values, (length,), error=FitError, finite=finite)
+
+
+def require_unlike(names: Sequence[str]) -> None:
+    """Raise :class:`FitError` for no data, or for two that have one name."""
+    if not names or len(set(names)) < len(names):
+        raise FitError(f"data named {', '.join(names) or 'nothing'}; allowed: a name for each")
 
 
 @dataclass(frozen=True)
@@ -39,6 +73,19 @@ class Unknown:
     logarithmic: bool = False
     nuisance: bool = False
 
+    def __post_init__(self) -> None:
+        lower, upper = (
+            float(checks.array(f"bounds of {self.name}", end, (), error=FitError, finite=False))
+            for end in (self.lower, self.upper)
+        )
+        if not lower <= upper or (self.logarithmic and lower < 0.0):
+            raise FitError(
+                f"{self.name} from {lower:g} to {upper:g}; allowed: a lower bound below the upper "
+                "one, and above 0 where the logarithm is fitted"
+            )
+        checks.settle(self, lower=lower, upper=upper)
+        checks.number(f"size of {self.name}", self.size, least=0.0, infinite=True, error=FitError)
+
 
 @dataclass(frozen=True)
 class Series:
@@ -58,6 +105,9 @@ class Series:
     values: Array
     deviations: Array | None = None
     shares: Array | None = None
+
+    def __post_init__(self) -> None:
+        settle_columns(self, self.name, ("values",), ("deviations", "shares"))
 
     def scattered(self, deviation: float) -> Array:
         """Deviations ``(n,)`` that are shares of one."""
@@ -92,6 +142,11 @@ class FitProblem:
     series: tuple[Series, ...]
     predict: Callable[[Array], Array]
     starts: Sequence[Array]
+
+    def __post_init__(self) -> None:
+        count = len(self.unknowns)
+        starts = [checks.array("starts", one, (count,), error=FitError) for one in self.starts]
+        checks.settle(self, starts=starts)
 
     @cached_property
     def data(self) -> Array:

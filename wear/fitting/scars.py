@@ -26,10 +26,11 @@ import numpy as np
 from scipy.integrate import trapezoid
 from scipy.interpolate import PchipInterpolator
 
+from sa_solver import checks
 from sa_solver.types import Array
 from wear.fitting.estimates import inverse_of
 from wear.fitting.least_squares import Fit
-from wear.fitting.problem import FitError, FitProblem, Series, Unknown
+from wear.fitting.problem import FitError, FitProblem, Series, Unknown, column, settle_columns
 
 COEFFICIENT, THRESHOLD = "coefficient", "threshold"
 SHIFT, HEIGHT, TILT = "shift", "height", "tilt"
@@ -82,6 +83,9 @@ class ComputedScars:
     depth: Array
 
     def __post_init__(self) -> None:
+        settle_columns(self, "runs", ("coefficients", "x"))
+        depth = checks.array("depths", self.depth, (None, None), error=FitError, finite=False)
+        checks.settle(self, depth=depth)
         if self.depth.shape != (len(self.coefficients), len(self.x)) or len(self.x) < 2:
             raise FitError(
                 f"depths of shape {self.depth.shape}; allowed: ({len(self.coefficients)} runs, "
@@ -111,6 +115,8 @@ class ComputedScars:
 
     def depth_at(self, x: Array, coefficient: float) -> Array:
         """Depth ``(n,)`` [mm] at places ``(n,)`` [mm] for a coefficient [1/MPa]."""
+        x = column("runs", "x", x, finite=True)
+        checks.number("coefficient", coefficient, above=0.0, error=FitError)
         areas, middles, widths = self._measures
         known = np.log(self.coefficients)
         room = np.log(BEYOND)
@@ -172,6 +178,12 @@ class ScarData:
     body: str = "both"
     held: float = 0.0
     energy: float | None = None
+
+    def __post_init__(self) -> None:
+        settle_columns(self, self.name, ("x", "depth"), ("deviations",))
+        checks.choice(f"body of {self.name}", self.body, ("body_1", "body_2", "both"), FitError)
+        checks.numbers(self, "held", least=0.0, error=FitError)
+        checks.numbers(self, "energy", above=0.0, error=FitError)
 
     @property
     def alignment(self) -> Array:

@@ -11,12 +11,20 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 
+from sa_solver import checks
 from sa_solver.types import Array
-from wear.fitting.problem import FitError, FitProblem, Series, Unknown
+from wear.fitting.problem import (
+    FitError,
+    FitProblem,
+    Series,
+    Unknown,
+    require_unlike,
+    settle_columns,
+)
 
 Offset = Literal["none", "threshold", "intercept"]
 COEFFICIENT, THRESHOLD, INTERCEPT, EXPONENT = "coefficient", "threshold", "intercept", "exponent"
@@ -57,6 +65,14 @@ class VolumeData:
     amplitude: Array | None = None
     deviations: Array | None = None
 
+    def __post_init__(self) -> None:
+        settle_columns(self, self.name, ("energy", "volume"), ("amplitude", "deviations"))
+        if len(self.energy) != len(self.volume):
+            raise FitError(
+                f"{self.name}: {len(self.energy)} energies and {len(self.volume)} volumes; "
+                "allowed: as many of both"
+            )
+
 
 @dataclass(frozen=True)
 class VolumeLaw:
@@ -80,6 +96,11 @@ class VolumeLaw:
     exponent: float | None = 0.0
     reference: float = 1.0
 
+    def __post_init__(self) -> None:
+        checks.choice("offset", self.offset, get_args(Offset), FitError)
+        checks.numbers(self, "exponent", error=FitError)
+        checks.numbers(self, "reference", above=0.0, error=FitError)
+
     @property
     def uses_amplitude(self) -> bool:
         """Whether the amplitude of the tests counts."""
@@ -87,6 +108,9 @@ class VolumeLaw:
 
     def volume(self, energy: Array, amplitude: Array | None, values: Mapping[str, float]) -> Array:
         """Volume ``(n,)`` [mm^3] at an energy and amplitude, with the parameters by name."""
+        energy = checks.array("energies", energy, None, error=FitError)
+        if amplitude is not None:
+            amplitude = checks.array("amplitudes", amplitude, energy.shape, error=FitError)
         beyond = np.maximum(energy - values.get(THRESHOLD, 0.0), 0.0)
         rise = values[COEFFICIENT] * beyond + values.get(INTERCEPT, 0.0)
         if not self.uses_amplitude or amplitude is None:
@@ -142,10 +166,9 @@ def volume_problem(data: Sequence[VolumeData], law: VolumeLaw) -> VolumeFit:
     >>> print(f"{1e12 * coefficient.value:.0f} um^3/J, ± {1e12 * coefficient.deviation:.0f}")
     1422 um^3/J, ± 110
     """
-    if law.exponent is not None and not np.isfinite(law.exponent):
-        raise FitError("the exponent of the amplitude is not finite; allowed: a number")
     for one in data:
         _check(one, law)
+    require_unlike([one.name for one in data])
     names: dict[tuple[str, str], int] = {}
     unknowns: list[Unknown] = []
     for one in data:

@@ -27,6 +27,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.polynomial import Chebyshev, chebyshev
 
+from sa_solver import checks
 from sa_solver.errors import ConvergenceError, InputError
 from sa_solver.types import Array
 from wear.joints.evolution import JointEvolution
@@ -121,7 +122,7 @@ class LongTest:
 
         Raise InputError for cycles outside the test.
         """
-        cycles = np.asarray(cycles, dtype=np.float64)
+        cycles = checks.array("cycles", cycles, None)
         if np.any((cycles < 0.0) | (cycles > self.total_cycles)):
             raise InputError(
                 f"the test has {self.total_cycles:g} cycles, not all of those given; allowed: from "
@@ -135,7 +136,7 @@ class LongTest:
         They are NaN for energies not reached in the test. Raise InputError for energies below that
         before the test.
         """
-        energy = np.asarray(energy, dtype=np.float64)
+        energy = checks.array("energies", energy, None)
         if np.any(energy < self.energy_before):
             raise InputError(
                 f"an energy is below the {self.energy_before:g} N mm dissipated before the test; "
@@ -216,22 +217,15 @@ def long_test(
     >>> print(f"{test.evaluations} cycles were computed")
     144 cycles were computed
     """
-    if not cycles > 0.0:
-        raise InputError(f"a test has {cycles:g} cycles; allowed: more than 0")
-    if not 0.0 <= start < np.inf:
-        raise InputError(f"{start:g} N mm are dissipated before the test; allowed: 0 or more")
-    if not until > start:
-        raise InputError(
-            f"the test ends at {until:g} N mm; allowed: above the {start:g} N mm dissipated before "
-            "it"
-        )
+    cycles = checks.number("cycles", cycles, above=0.0, infinite=True)
+    start = checks.number("start", start, least=0.0)
+    until = checks.number("until", until, above=start, infinite=True)
     if cycles == until == np.inf:
-        raise InputError("the test has no end; allowed: a number of cycles or a final energy")
-    if not SMALLEST_TOLERANCE <= tolerance < 1.0:
-        raise InputError(
-            f"the tolerance is {tolerance:g}; allowed: from {SMALLEST_TOLERANCE:g} to below 1"
-        )
-    return _TestInProgress(energy_per_cycle, cycles, until, tolerance, sorted(breaks)).run(start)
+        raise InputError("a test without end; allowed: a number of cycles or an energy that end it")
+    if not SMALLEST_TOLERANCE <= checks.number("tolerance", tolerance) < 1.0:
+        raise InputError(f"tolerance {tolerance:g}; allowed: {SMALLEST_TOLERANCE:g} to 1")
+    kinks = sorted(checks.array("breaks", breaks, (None,)).tolist())
+    return _TestInProgress(energy_per_cycle, cycles, until, tolerance, kinks).run(start)
 
 
 @dataclass
@@ -393,6 +387,8 @@ def steady_stroke(law: UniaxialLaw, evolution: JointEvolution, amplitude: float)
     >>> print(f"{long_test(steady, cycles=1e6).final_energy:.0f} N mm")
     1000000 N mm
     """
+
+    amplitude = checks.number("amplitude", amplitude, least=0.0)
 
     def energy_per_cycle(energy: float) -> float:
         return float(evolution.at(law, energy).loop_energy(amplitude))

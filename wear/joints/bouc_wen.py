@@ -32,6 +32,7 @@ from wear.joints.parameters import (
     JointError,
     Parameter,
     UniaxialLaw,
+    amplitudes,
     parameter_columns,
     require,
 )
@@ -310,5 +311,5 @@ class BoucWen(UniaxialLaw):
 
         For n = 2 and σ = 1/2 it is -(µN)²/K (ξ² + ln(1 - ξ²)), where ξ + artanh ξ = 2 K A/µN.
         """
-        energy: Array = _loop_energy(amplitude, *self._constants)
+        energy: Array = _loop_energy(amplitudes(amplitude), *self._constants)
         return energy

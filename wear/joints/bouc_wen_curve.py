@@ -168,6 +168,6 @@ class TabulatedBoucWen(BoucWen):
         exponent, gain = float(self.exponent), 2.0 * float(self.sigma) - 1.0
         if exponent in CLOSED:
             return super().respond(state, increment)
-        moved = self.fitting(state, increment)
+        state, moved = self.fitting(state, increment)
         curve = bouc_wen_curve(exponent, gain)
         return JointResponse(*_respond_along(curve, self.parameters, state, moved))

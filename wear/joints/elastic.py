@@ -5,7 +5,7 @@ They dissipate no energy, and their state is the displacement alone.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import cached_property
 
 import numpy as np
@@ -19,8 +19,8 @@ from wear.joints.parameters import (
     parameter_columns,
     require,
     require_not_negative,
-    require_one_each,
     require_positive,
+    settle_parameters,
 )
 from wear.joints.periodic.sliders import DrivenJoints, Period
 
@@ -127,7 +127,7 @@ class PolynomialSpring(ElasticLaw):
     quintic: Parameter = 0.0
 
     def __post_init__(self) -> None:
-        require_one_each(*self._coefficients)
+        settle_parameters(self, [parameter.name for parameter in fields(self)])
         for value in self._coefficients:
             require("a coefficient", value, np.isfinite(value), "finite")
 
@@ -178,7 +178,7 @@ class ElasticStop(ElasticLaw):
     two_sided: bool = False
 
     def __post_init__(self) -> None:
-        require_one_each(self.stiffness, self.gap)
+        settle_parameters(self, ("stiffness", "gap"))
         require_positive(stiffness=self.stiffness)
         require_not_negative(gap=self.gap)
         if not isinstance(self.two_sided, bool | np.bool_):

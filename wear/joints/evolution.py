@@ -28,6 +28,7 @@ from typing import TYPE_CHECKING, Protocol, TypeVar
 
 import numpy as np
 
+from sa_solver import checks
 from sa_solver.errors import InputError
 from sa_solver.types import Array
 from wear.evolution import EnergyTable
@@ -65,11 +66,11 @@ class LogarithmicEvolution:
     rate: float
 
     def __post_init__(self) -> None:
-        if not self.rate >= 0.0:
-            raise InputError(f"the rate is {self.rate:g}: it must be 0 or more")
+        checks.numbers(self, "change")
+        checks.numbers(self, "rate", least=0.0)
 
     def __call__(self, energy: Array | float) -> Array:
-        return np.asarray(1.0 + self.change * np.log1p(self.rate * np.asarray(energy)))
+        return np.asarray(1.0 + self.change * np.log1p(self.rate * _energies(energy)))
 
 
 @dataclass(frozen=True)
@@ -93,11 +94,11 @@ class ArrheniusEvolution:
     scale: float
 
     def __post_init__(self) -> None:
-        if not self.scale > 0.0:
-            raise InputError(f"the energy scale is {self.scale:g}: it must be above 0")
+        checks.numbers(self, "change")
+        checks.numbers(self, "scale", above=0.0)
 
     def __call__(self, energy: Array | float) -> Array:
-        energy = np.asarray(energy, dtype=np.float64)
+        energy = _energies(energy)
         ratio = np.full_like(energy, np.inf)
         # An overflow to infinity is correct here: nothing has changed yet at such a low energy.
         with np.errstate(over="ignore"):
@@ -120,8 +121,11 @@ class LinearEvolution:
 
     slope: float
 
+    def __post_init__(self) -> None:
+        checks.numbers(self, "slope")
+
     def __call__(self, energy: Array | float) -> Array:
-        return np.asarray(1.0 + self.slope * np.asarray(energy))
+        return np.asarray(1.0 + self.slope * _energies(energy))
 
 
 @dataclass(frozen=True)
@@ -156,12 +160,11 @@ class ExponentialEvolution:
     second_rate: float = 0.0
 
     def __post_init__(self) -> None:
-        for name in ("rate", "second_rate"):
-            if not getattr(self, name) <= 0.0:
-                raise InputError(f"the {name} is {getattr(self, name):g}: it must be 0 or below")
+        checks.numbers(self, "final", "share")
+        checks.numbers(self, "rate", "second_rate", most=0.0)
 
     def __call__(self, energy: Array | float) -> Array:
-        energy = np.asarray(energy)
+        energy = _energies(energy)
         first, second = np.exp(self.rate * energy), np.exp(self.second_rate * energy)
         decay = self.share * first + (1.0 - self.share) * second
         return np.asarray(self.final + (1.0 - self.final) * decay)
@@ -200,10 +203,11 @@ class TabulatedEvolution:
     values: tuple[float, ...]
 
     def __post_init__(self) -> None:
-        EnergyTable(self.energies, self.values)  # Raises an error if the table is invalid.
+        table = EnergyTable(self.energies, self.values)  # refuses what is no table
+        checks.settle(self, energies=table.energy, values=table.factor)
 
     def __call__(self, energy: Array | float) -> Array:
-        return np.asarray(np.interp(energy, self.energies, self.values))
+        return np.asarray(np.interp(_energies(energy), self.energies, self.values))
 
 
 @dataclass(frozen=True)
@@ -242,6 +246,11 @@ class JointEvolution:
     friction: WearFunction | None = None
     normal_load: WearFunction | None = None
 
+    def __post_init__(self) -> None:
+        for name, function in self._functions():
+            if not callable(function):
+                raise InputError(f"{name} is {function!r}: give a function of the energy")
+
     def at(self, law: Law, energy: Array | float) -> Law:
         """Return the ``law`` after an ``energy`` [N mm]; its parameters given are the initial ones.
 
@@ -275,3 +284,11 @@ class JointEvolution:
 
     def _functions(self) -> Iterator[tuple[str, WearFunction]]:
         return ((name, function) for name, function in vars(self).items() if function is not None)
+
+
+def _energies(energy: object) -> Array:
+    """Return energies of any shape, unless one is below 0 or missing."""
+    found = checks.array("energies", energy, None)
+    if (found < 0.0).any():
+        raise InputError(f"energies down to {found.min():g} N mm: give 0 or more")
+    return found

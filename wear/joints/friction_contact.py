@@ -34,7 +34,7 @@ not elementary, while the force turns, is integrated by Gauss's rule to 1e-13.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 
 import numpy as np
@@ -45,9 +45,12 @@ from wear.joints.parameters import (
     CompiledLaw,
     JointError,
     Parameter,
+    joint_values,
     parameter_columns,
+    require,
     require_not_negative,
     require_positive,
+    settle_parameters,
 )
 from wear.joints.periodic.friction_path import advance_contact
 
@@ -121,6 +124,7 @@ class FrictionContact(CompiledLaw):
     gap: Parameter = 0.0
 
     def __post_init__(self) -> None:
+        settle_parameters(self, [parameter.name for parameter in fields(self)])
         require_positive(stiffness=self.stiffness)
         require_not_negative(
             normal_stiffness=self.normal_stiffness,
@@ -169,6 +173,7 @@ class FrictionContact(CompiledLaw):
                 "a contact with a normal stiffness of 0 keeps its load whatever is worn: give a "
                 "stiffness above 0"
             )
-        apart = self.clearance + depth
+        apart = self.clearance + joint_values("depth", depth)
+        require("clearance", apart, np.isfinite(apart), "finite")
         load = self.normal_stiffness * np.maximum(-apart, 0.0)
         return replace(self, normal_load=load, gap=np.maximum(apart, 0.0))

@@ -11,7 +11,7 @@ import numpy as np
 from sa_solver.types import Array
 from wear.joints.compiled import compiled
 from wear.joints.law import JointState
-from wear.joints.parameters import Parameter, UniaxialLaw, parameter_columns
+from wear.joints.parameters import Parameter, UniaxialLaw, amplitudes, parameter_columns
 
 
 @compiled()
@@ -108,8 +108,8 @@ class Jenkins(UniaxialLaw):
 
         It is in N mm.
         """
-        limit = self.limit
-        energy: Array = 4.0 * limit * np.maximum(np.subtract(amplitude, limit / self.stiffness), 0)
+        limit, reach = self.limit, self.limit / self.stiffness
+        energy: Array = 4.0 * limit * np.maximum(np.subtract(amplitudes(amplitude), reach), 0.0)
         return energy
 
     def first_harmonic(self, amplitude: Parameter) -> tuple[Array, Array]:
@@ -118,7 +118,7 @@ class Jenkins(UniaxialLaw):
         With cos θs = 1 - 2 µN/(kt A) where the slider slips, a = A kr + A kt (θs - sin θs cos θs)/π
         and b = -4 µN (1 - µN/(kt A))/π, which is minus the energy of the loop over π A.
         """
-        amplitude = np.asarray(amplitude, float)
+        amplitude = np.asarray(amplitudes(amplitude))
         reach = self.limit / self.stiffness
         moving = np.where(amplitude > 0.0, amplitude, 1.0)
         sticking = np.arccos(1.0 - 2.0 * np.minimum(reach / moving, 1.0))

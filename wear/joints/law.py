@@ -16,6 +16,7 @@ from typing import Protocol
 
 import numpy as np
 
+from sa_solver import checks
 from sa_solver.types import Array
 
 JointState = Array
@@ -111,6 +112,8 @@ def march_joints(
     displacement
         Displacements to go through ``(t, n, d)`` [mm].
 
+    Raises InputError for arrays of other shapes, or whose numbers are missing or not finite.
+
     Examples
     --------
     Two joints go through one cycle; the second only sticks and dissipates nothing:
@@ -123,6 +126,8 @@ def march_joints(
     >>> print(history.dissipated[1:].sum(axis=0), "of", law.loop_energy(0.01))
     [1. 0.] of [1. 0.]
     """
+    displacement = checks.array("displacements", displacement, (None, None, law.directions))
+    start = checks.array("starts", start, displacement.shape[1:])
     forces, dissipated = np.empty(displacement.shape), np.empty(displacement.shape[:2])
     for step, increment in enumerate(np.diff(displacement, axis=0, prepend=start[None])):
         response = law.respond(state, increment)

@@ -34,7 +34,7 @@ from numba import vectorize
 from sa_solver.types import Array
 from wear.joints.compiled import compiled
 from wear.joints.law import JointState
-from wear.joints.parameters import Parameter, UniaxialLaw, parameter_columns
+from wear.joints.parameters import Parameter, UniaxialLaw, amplitudes, parameter_columns
 
 SliderCurve = tuple[float, float, float, float]
 """Parameters K, limit, c and m of the curve."""
@@ -220,5 +220,7 @@ class MasingLaw(UniaxialLaw):
 
     def loop_energy(self, amplitude: Parameter) -> Array:
         """Return the energy of a cycle between ± ``amplitude`` [mm]: 4 L(A) [N mm]."""
-        energy: Array = _loop_energy(amplitude, self.stiffness, self.limit, *self.spread)
+        energy: Array = _loop_energy(
+            amplitudes(amplitude), self.stiffness, self.limit, *self.spread
+        )
         return energy

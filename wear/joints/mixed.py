@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from sa_solver import checks
 from sa_solver.types import Array
 from wear.joints.bouc_wen import BoucWen
 from wear.joints.elastic import ElasticLaw
@@ -20,7 +21,7 @@ from wear.joints.law import JointResponse, JointState
 from wear.joints.masing import MasingLaw
 from wear.joints.parameters import JointError
 from wear.joints.periodic.linearised import LinearisedMarch, Maps
-from wear.joints.periodic.march import PeriodicMarch, SettledCycle
+from wear.joints.periodic.march import PeriodicMarch, SettledCycle, driven_by
 
 
 @dataclass(frozen=True)
@@ -36,6 +37,10 @@ class JointGroup:
 
     law: Jenkins | BoucWen | MasingLaw | FrictionContact | ElasticLaw
     joints: int
+
+    def __post_init__(self) -> None:
+        if checks.whole("joints of a group", self.joints, JointError) < 1:
+            raise JointError(f"a group of {self.joints} joints: give 1 or more")
 
 
 @dataclass(frozen=True)
@@ -59,6 +64,11 @@ class MixedLaw:
 
     groups: tuple[JointGroup, ...]
 
+    def __post_init__(self) -> None:
+        if not self.groups or not all(isinstance(group, JointGroup) for group in self.groups):
+            raise JointError(f"groups are {self.groups!r}: give one JointGroup or more")
+        checks.settle(self, groups=tuple(self.groups))
+
     @property
     def directions(self) -> int:
         """Largest number of directions of any group."""
@@ -75,8 +85,12 @@ class MixedLaw:
 
     def respond(self, state: JointState, increment: Array) -> JointResponse:
         """Return the response, as :meth:`wear.joints.law.JointLaw.respond`."""
+        state = checks.array("states", state, (None, None), error=JointError, finite=False)
         self._require(len(state))
         count, d = len(state), self.directions
+        increment = checks.array(
+            "increments", increment, (count, d), error=JointError, finite=False
+        )
         force, tangent, lost = np.zeros((count, d)), np.zeros((count, d, d)), np.zeros(count)
         states = []
         for group, rows in self.rows():
@@ -135,6 +149,7 @@ class MixedMarch:
         self, coefficients: Array, basis: Array, weights: Array, lead: Array | None = None
     ) -> SettledCycle:
         """Return the settled period, as :meth:`PeriodicMarch.settle`."""
+        coefficients = driven_by(coefficients)
         joints, size, d = coefficients.shape
         parts = list(self._parts(coefficients))
         cycles = [march.settle(own, basis, weights, lead) for march, _, _, own in parts]
@@ -161,6 +176,7 @@ class MixedMarch:
         self, coefficients: Array, basis: Array, lead: Array, memory: int = 0
     ) -> LinearisedMarch:
         """Return the linearised increments, as :meth:`PeriodicMarch.linearise`."""
+        coefficients = driven_by(coefficients)
         joints, _, directions = coefficients.shape
         parts = list(self._parts(coefficients))
         marches = [march.linearise(own, basis, lead, memory) for march, _, _, own in parts]

@@ -8,11 +8,13 @@ most of it for the arrays that it returns.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Iterable
 from dataclasses import dataclass, fields
 from typing import ClassVar
 
 import numpy as np
 
+from sa_solver import checks
 from sa_solver.errors import InputError
 from sa_solver.types import Array
 from wear.joints.law import JointResponse, JointState
@@ -22,6 +24,36 @@ Parameter = float | Array
 
 class JointError(InputError):
     """Parameters of a joint law are out of range, or arrays do not fit its joints."""
+
+
+def settle_parameters(law: object, names: Iterable[str]) -> None:
+    """Make parameters of a ``law`` numbers or arrays ``(n,)`` of one length, while it is made.
+
+    Raises :class:`JointError` for what is neither.
+    """
+    for name in names:
+        checks.settle(law, **{name: joint_values(name, getattr(law, name))})
+    require_one_each(*(getattr(law, name) for name in names))
+
+
+def joint_values(name: str, value: object) -> Parameter:
+    """Return a number, or an array of them of any shape, that belongs to joints.
+
+    Raises :class:`JointError` for anything else, and where one is masked. Whether they are finite
+    is looked at with their range.
+    """
+    found = checks.array(f"values of {name}", value, None, error=JointError, finite=False)
+    return found if found.ndim else float(found)
+
+
+def amplitudes(value: object) -> Parameter:
+    """Return amplitudes of a loop, a number or an array, unless one is below 0.
+
+    Raises :class:`JointError`.
+    """
+    found = joint_values("amplitude", value)
+    require_not_negative(amplitude=found)
+    return found
 
 
 def require(name: str, value: Parameter, proper: np.ndarray, range_text: str) -> None:
@@ -92,22 +124,27 @@ class CompiledLaw(ABC):
 
         Raise :class:`JointError` if shapes differ: the kernel itself checks no bounds.
         """
-        return JointResponse(*self.kernel(self.parameters, state, self.fitting(state, increment)))
+        return JointResponse(*self.kernel(self.parameters, *self.fitting(state, increment)))
 
-    def fitting(self, state: JointState, increment: Array) -> Array:
-        """Return ``increment`` ``(n, d)`` as a kernel takes it.
+    def fitting(self, state: JointState, increment: Array) -> tuple[JointState, Array]:
+        """Return ``state`` and ``increment`` ``(n, d)`` as a kernel takes them.
 
-        Raises :class:`JointError` where the increment or the law does not fit the state.
+        Raise :class:`JointError` where the increment or the law does not fit the state.
         """
+        # Iterations may come to numbers that are not finite, and find that out by themselves.
+        state = checks.array("states", state, (None, None), error=JointError, finite=False)
         shape, laws = (len(state), self.directions), len(self.parameters)
-        if increment.shape != shape:
-            raise JointError(f"the increment has shape {increment.shape}: it must be {shape}")
+        moved = checks.array("increments", increment, None, error=JointError, finite=False)
+        if moved.shape != shape:
+            raise JointError(f"the increment has shape {moved.shape}: it must be {shape}")
+        if state.shape[1] < self.columns:
+            raise JointError(f"states of {state.shape[1]} columns: give {self.columns}")
         if laws not in (1, len(state)):
             raise JointError(
                 f"the law has parameters of {laws} joints, the state is of {len(state)}: give as "
                 "many of both, or numbers as parameters"
             )
-        return np.ascontiguousarray(increment, float)
+        return state, moved
 
 
 @dataclass(frozen=True)
@@ -136,7 +173,7 @@ class UniaxialLaw(CompiledLaw):
     residual_stiffness: Parameter = 0.0
 
     def __post_init__(self) -> None:
-        require_one_each(*(getattr(self, parameter.name) for parameter in fields(self)))
+        settle_parameters(self, [parameter.name for parameter in fields(self)])
         require_positive(stiffness=self.stiffness)
         require_not_negative(
             friction=self.friction,

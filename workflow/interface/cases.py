@@ -66,8 +66,9 @@ class Check:
     """What a case would run.
 
     ``title`` is its own, ``memory`` the upper estimate of what it needs [bytes], ``seconds`` the
-    order of magnitude of its time [s], ``outline`` what would run in rows of name and text,
-    ``doubts`` what looks like a slip.
+    order of magnitude of its time [s] and ``time`` the same in words, with what of it cannot be
+    known before the run, ``outline`` what would run in rows of name and text, ``doubts`` what looks
+    like a slip.
 
     Examples
     --------
@@ -83,11 +84,12 @@ class Check:
     outline: tuple[tuple[str, str], ...]
     memory: float
     seconds: float
+    time: str
     doubts: tuple[str, ...]
 
     def __str__(self) -> str:
         memory = f"up to {self.memory / 1e9:.1f} GB"
-        rows = *self.outline, ("memory", memory), ("seconds", f"about {self.seconds:.2g}")
+        rows = *self.outline, ("memory", memory), ("time", self.time)
         lines = [f"  {name:<10} {text}" for name, text in rows]
         return "\n".join([self.title, *lines, *(f"doubt: {doubt}" for doubt in self.doubts)])
 
@@ -111,7 +113,7 @@ def check(case: AnyCase, /, **overrides: Any) -> Check:
     memory, time = analysis.memory(loaded), analysis.run_time(loaded)
     memory.check()
     outline, doubts = (*loaded.outline(), *taken(loaded)), tuple(doubts_of(loaded))
-    return Check(loaded.title, outline, memory.required, time.seconds, doubts)
+    return Check(loaded.title, outline, memory.required, time.seconds, time.text, doubts)
 
 
 def _text(value: object) -> str:

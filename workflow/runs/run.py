@@ -23,7 +23,6 @@ from workflow.shell import checkpoint
 from workflow.shell.analysis import Analysis, Pictures, Run, Share, Summary
 from workflow.shell.checkpoint import StoredState
 from workflow.shell.folder import ASIDE, MANIFEST, REPORT, OutputFolder
-from workflow.shell.forecast import in_words
 from workflow.shell.lock import locked
 from workflow.shell.measured import check_measured, tell_measured
 from workflow.shell.processes import Beside
@@ -286,7 +285,7 @@ def _share(analysis: Analysis, case: Case) -> Share:
 def _announce(case: Case, expected: RunTime, resume: bool, reporter: Reporter) -> None:
     """Say what runs, about how long, and what in the case is hardly meant."""
     long = not resume and expected.seconds >= SHORT_RUN
-    takes = f" (about {in_words(expected.seconds)})" if long else ""
+    takes = f" ({expected.short})" if long else ""
     reporter.say(f"{'resume' if resume else 'run'}: {case.title}{takes}")
     for doubt in doubts_of(case):
         reporter.say(f"doubt: {doubt}", always=True)

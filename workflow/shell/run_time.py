@@ -23,11 +23,17 @@ FACTOR, FACTOR_NODES, FACTOR_POWER = 5.0, 3e4, 1.6
 
 @dataclass(frozen=True)
 class RunTime:
-    """Seconds ``before`` the long part of a run, in its ``course``, and ``after`` that."""
+    """Seconds ``before`` the long part of a run, in its ``course``, and ``after`` that.
+
+    Where ``unknown`` says what of the work cannot be counted before the run, the seconds are those
+    of the work that ``assumed`` names in its place. Both are empty otherwise.
+    """
 
     before: float = 0.0
     course: float = 0.0
     after: float = FIGURES
+    assumed: str = ""
+    unknown: str = ""
 
     @property
     def begun(self) -> float:
@@ -40,9 +46,14 @@ class RunTime:
         return self.begun + self.course + self.after
 
     @property
+    def short(self) -> str:
+        """The time in a few words, with the work that it is for where that is assumed."""
+        return f"{about(self.seconds)} for {self.assumed}" if self.unknown else about(self.seconds)
+
+    @property
     def text(self) -> str:
-        """As it is told."""
-        return f"{about(self.seconds)}, within a factor of five"
+        """The time as a check reports it."""
+        return "; ".join(filter(None, (f"{self.short}, within a factor of five", self.unknown)))
 
 
 def solves(count: float, cells: int, convolutions: float) -> float:

@@ -21,7 +21,7 @@ from typing import Generic, Literal
 import numpy as np
 from scipy.optimize import brentq
 
-from fe_models.dynamics.curves.continuation import ContinuationControl
+from fe_models.dynamics.curves.control import ContinuationControl
 from fe_models.dynamics.curves.followed_curve import Chord, FollowedCurve, Place
 from fe_models.dynamics.curves.newton import L
 from fe_models.dynamics.periodic.harmonic_solution import HarmonicSolution

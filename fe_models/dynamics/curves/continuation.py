@@ -18,6 +18,7 @@ from typing import Generic, Protocol, TypeVar
 import numpy as np
 
 from fe_models.dynamics.curves.bordered import Bordered, solve_bordered
+from fe_models.dynamics.curves.control import ContinuationControl
 from fe_models.dynamics.curves.newton import (
     Equations,
     L,
@@ -51,43 +52,6 @@ MOST_CHANGE = 2.0
 # Share of its right-hand side that an iterative solver may leave of a tangent, which only begins
 # the next step.
 TANGENT_TOLERANCE = 1e-4
-
-
-@dataclass(frozen=True)
-class ContinuationControl:
-    """Steps along a curve, as shares of the unknowns and of λ.
-
-    ``first``, ``least`` and ``most`` sizes; ``iterations`` of Newton's method that are wanted, and
-    ``max_iterations``, after which a step is halved; ``max_angle`` [degrees] by which the tangent
-    may turn in one step; ``max_points`` on one curve; ``tolerance`` of Newton's method.
-    Each new λ is told to ``watch``.
-
-    Examples
-    --------
-    A branch whose points are limited says that it did not get to the end:
-
-    >>> import numpy as np
-    >>> from fe_models.dynamics import *
-    >>> from wear.joints import Jenkins, PeriodicMarch
-    >>> rig = lumped_rig({"m": 1e-3}, {Link("m"): 1e3}, [[Link("m")]], damping_ratio=0.02)
-    >>> load = PeriodicLoad({1: -1j * unit_force(rig, "m")})
-    >>> law = Jenkins(stiffness=1e3, friction=0.5, normal_load=10.0)
-    >>> problem = HarmonicBalance(rig, PeriodicMarch(law), load, Resolution((1,), 64))
-    >>> control = ContinuationControl(max_points=3)
-    >>> branch = along_frequency(problem, 1.0, (100.0, 300.0), control=control)
-    >>> print(branch.message.partition(" and ")[0], branch.frequencies.max() < 300.0)
-    the curve has 3 points True
-    """
-
-    first: float = 0.02
-    least: float = 1e-6
-    most: float = 0.3
-    iterations: int = 4
-    max_iterations: int = 8
-    max_angle: float = 30.0
-    max_points: int = 2000
-    tolerance: float = 1e-10
-    watch: Callable[[float], None] = lambda parameter: None
 
 
 @dataclass(frozen=True)

@@ -17,13 +17,15 @@ from itertools import pairwise
 import numpy as np
 from scipy.optimize import brentq, minimize_scalar
 
-from fe_models.dynamics.curves.continuation import ContinuationControl
+from fe_models.dynamics.curves.control import ContinuationControl
 from fe_models.dynamics.curves.followed_curve import Chord, curve_by_frequency
 from fe_models.dynamics.curves.forced_response import ResponseBranch
 from fe_models.dynamics.curves.newton import NewtonControl, NewtonSolution, solve
 from fe_models.dynamics.curves.sizes import norm
 from fe_models.dynamics.periodic.harmonic_balance import Balance
 from fe_models.dynamics.periodic.harmonic_solution import HarmonicSolution
+from fe_models.dynamics.periodic.harmonics import HarmonicBalanceError
+from sa_solver import checks
 from sa_solver.steps import COMPUTED, Steps
 from sa_solver.types import Array
 
@@ -62,6 +64,7 @@ def motions_at(
     >>> print(motion.frequency, abs(motion.amplitude(0) / alone.amplitude(0) - 1.0) < 1e-9)
     200.0 True
     """
+    checks.number("frequency", frequency, above=0.0, error=HarmonicBalanceError)
     control = control or ContinuationControl()
     curve = _Curve(branch, control)
     found: list[HarmonicSolution] = []

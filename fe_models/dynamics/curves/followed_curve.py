@@ -12,7 +12,8 @@ from typing import Generic
 
 import numpy as np
 
-from fe_models.dynamics.curves.continuation import ContinuationControl, CurvePoint, Scaling, correct
+from fe_models.dynamics.curves.continuation import CurvePoint, Scaling, correct
+from fe_models.dynamics.curves.control import ContinuationControl
 from fe_models.dynamics.curves.newton import Equations, L
 from fe_models.dynamics.curves.phase_resonance import PhaseBalance, PhaseResonance
 from fe_models.dynamics.curves.sizes import norm

@@ -9,13 +9,13 @@ from typing import Literal
 import numpy as np
 
 from fe_models.dynamics.curves.continuation import (
-    ContinuationControl,
     CurvePoint,
     Refinement,
     SolutionCurve,
     first_point,
     follow,
 )
+from fe_models.dynamics.curves.control import ContinuationControl
 from fe_models.dynamics.curves.newton import Equations, solve
 from fe_models.dynamics.periodic.harmonic_balance import (
     SAMPLES_PER_PERIOD,
@@ -25,6 +25,7 @@ from fe_models.dynamics.periodic.harmonic_balance import (
 from fe_models.dynamics.periodic.harmonic_solution import HarmonicSolution, ResolutionError
 from fe_models.dynamics.periodic.harmonics import HarmonicBalanceError, Resolution
 from fe_models.dynamics.periodic.resolution_error import resolution_error, richer_problem
+from sa_solver import checks
 from sa_solver.steps import COMPUTED, Steps
 from sa_solver.types import Array
 
@@ -58,6 +59,12 @@ class Accuracy:
     tolerance: float
     highest: int = 63
     most_samples: int = 4096
+
+    def __post_init__(self) -> None:
+        checks.numbers(self, "tolerance", above=0.0, error=HarmonicBalanceError)
+        for name in ("highest", "most_samples"):
+            if checks.whole(name, getattr(self, name), HarmonicBalanceError) < 1:
+                raise HarmonicBalanceError(f"{name} = {getattr(self, name)}: give 1 or more")
 
 
 @dataclass(frozen=True)
@@ -261,6 +268,8 @@ def _branch(
     accuracy: Accuracy | None,
     steps: Steps,
 ) -> ResponseBranch:
+    checks.number("force or frequency", along.other, error=HarmonicBalanceError)
+    checks.array("ends of the span", span, (2,), error=HarmonicBalanceError, finite=False)
     above = 0.0 if along.varies == "frequency" else -np.inf
     if not above < span[0] < span[1] < np.inf:
         raise HarmonicBalanceError(

@@ -15,13 +15,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from fe_models.dynamics.curves.continuation import (
-    ContinuationControl,
-    CurvePoint,
-    Refinement,
-    first_point,
-    follow,
-)
+from fe_models.dynamics.curves.continuation import CurvePoint, Refinement, first_point, follow
+from fe_models.dynamics.curves.control import ContinuationControl
 from fe_models.dynamics.curves.followed_curve import Chord, curve_by_frequency
 from fe_models.dynamics.curves.forced_response import Accuracy, Along, BranchRecorder, Motions
 from fe_models.dynamics.curves.newton import NewtonControl, solve

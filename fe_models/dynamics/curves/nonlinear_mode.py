@@ -25,17 +25,14 @@ from functools import cached_property, partial
 import numpy as np
 
 from fe_models.dynamics.curves.bordered import solve_alone
-from fe_models.dynamics.curves.continuation import (
-    ContinuationControl,
-    CurvePoint,
-    first_point,
-    follow,
-)
+from fe_models.dynamics.curves.continuation import CurvePoint, first_point, follow
+from fe_models.dynamics.curves.control import ContinuationControl
 from fe_models.dynamics.curves.newton import NewtonControl, solve
 from fe_models.dynamics.periodic.harmonic_balance import Balance, HarmonicBalance
 from fe_models.dynamics.periodic.harmonic_solution import HarmonicSolution
 from fe_models.dynamics.periodic.harmonics import ComplexArray, HarmonicBalanceError
 from fe_models.dynamics.periodic.resolution_error import richer_problem
+from sa_solver import checks
 from sa_solver.steps import COMPUTED, Steps
 from sa_solver.types import Array
 
@@ -280,7 +277,7 @@ class LinearMode:
         _ = problem.alone
         stuck = problem.rest.stuck.stiffened
         elastic = np.flatnonzero(stuck.squares)
-        if not 1 <= number <= len(elastic):
+        if not 1 <= checks.whole("mode", number, HarmonicBalanceError) <= len(elastic):
             raise HarmonicBalanceError(
                 f"mode {number}: the structure with stuck joints has 1 to {len(elastic)}"
             )
@@ -321,7 +318,8 @@ def along_nonlinear_mode(
     >>> print(f"{mode.damping_ratios[-1]:.4f} of {D:.4f}")
     0.0998 of 0.0998
     """
-    least, largest = amplitudes
+    ends = checks.array("amplitudes", amplitudes, (2,), error=HarmonicBalanceError, finite=False)
+    least, largest = ends.tolist()
     if not 0.0 < least < largest < np.inf:
         raise HarmonicBalanceError(
             f"amplitudes from {least:g} to {largest:g}: give two above 0 that ascend"

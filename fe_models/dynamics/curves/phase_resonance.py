@@ -25,13 +25,8 @@ from itertools import pairwise
 import numpy as np
 
 from fe_models.dynamics.curves.bordered import Bordered, LinearMap
-from fe_models.dynamics.curves.continuation import (
-    ContinuationControl,
-    CurvePoint,
-    Refinement,
-    first_point,
-    follow,
-)
+from fe_models.dynamics.curves.continuation import CurvePoint, Refinement, first_point, follow
+from fe_models.dynamics.curves.control import ContinuationControl
 from fe_models.dynamics.curves.forced_response import Accuracy, Motions, ResponseBranch, finer_for
 from fe_models.dynamics.curves.newton import NewtonControl, solve
 from fe_models.dynamics.periodic.harmonic_balance import Balance, HarmonicBalance
@@ -39,6 +34,7 @@ from fe_models.dynamics.periodic.harmonic_solution import HarmonicSolution
 from fe_models.dynamics.periodic.harmonics import ComplexArray, HarmonicBalanceError, Resolution
 from fe_models.dynamics.periodic.receptance import SteadyMotion
 from fe_models.dynamics.periodic.resolution_error import resolution_error
+from sa_solver import checks
 from sa_solver.steps import COMPUTED, Steps
 from sa_solver.types import Array
 
@@ -187,13 +183,13 @@ def along_phase_resonance(
     >>> print(np.abs(taken / backbone.forces - 1.0).max() < 1e-3)
     True
     """
+    low, high = checks.array("forces", forces, (2,), error=HarmonicBalanceError).tolist()
     weights = _weights(problem, output)
     nearest = nearest_to_phase(start, weights) if isinstance(start, ResponseBranch) else start
     if nearest is None:
         return Backbone(
             (), "the response does not pass through the phase: give one with its peak", problem
         )
-    low, high = forces
     if not 0.0 < low <= nearest.force <= high:
         raise HarmonicBalanceError(
             f"forces from {low:g} to {high:g} with a start at {nearest.force:g}: give two above 0 "
@@ -406,9 +402,10 @@ def _weights(problem: HarmonicBalance, output: Array | None) -> ComplexArray:
         raise HarmonicBalanceError("the load has no harmonic 1: no phase is relative to it")
     if output is None:
         return np.asarray(wave, dtype=complex)
-    if np.shape(output) != wave.shape or not np.any(output):
+    output = checks.complex_array("outputs", output, None, error=HarmonicBalanceError)
+    if output.shape != wave.shape or not np.any(output):
         raise HarmonicBalanceError(
-            f"the output displacement has shape {np.shape(output)}: give a combination, not zero, "
+            f"the output displacement has shape {output.shape}: give a combination, not zero, "
             f"of the {len(wave)} of the structure"
         )
     largest = wave[np.argmax(np.abs(wave))]

@@ -22,7 +22,8 @@ from functools import cached_property
 import numpy as np
 
 from fe_models.dynamics.curves.bordered import LinearMap
-from fe_models.dynamics.curves.continuation import ContinuationControl, first_point, follow
+from fe_models.dynamics.curves.continuation import first_point, follow
+from fe_models.dynamics.curves.control import ContinuationControl
 from fe_models.dynamics.curves.newton import NewtonControl, NewtonSolution, solve
 from fe_models.dynamics.curves.sizes import norm, relative_norm
 from fe_models.dynamics.joint_rest import Rest
@@ -39,6 +40,7 @@ from fe_models.dynamics.periodic.load import PeriodicLoad
 from fe_models.dynamics.periodic.receptance import Receptance, SteadyMotion
 from fe_models.dynamics.rings.sector import CyclicSector
 from fe_models.dynamics.rings.travelling_wave import WaveReceptance
+from sa_solver import checks
 from sa_solver.types import Array
 
 # Unknowns up to which a matrix is assembled and factorised; beyond, products with it are cheaper,
@@ -139,11 +141,7 @@ class HarmonicBalance:
             raise HarmonicBalanceError(
                 f"the load has harmonics {missing or [0]} that the motion has not: add them"
             )
-        forces = [*load.waves.values(), *load.inertial.values()]
-        if load.static is not None:
-            forces.append(load.static)
-        if not all(np.isfinite(force).all() for force in forces):
-            raise HarmonicBalanceError("a force of the load is not a number: give finite ones")
+        load.require(len(model.mass))
         self.model, self.joints, self.load, self.resolution = model, joints, load, resolution
         self.receptance = receptance or Receptance(model)
         self.transfer = _transfer(resolution, self.receptance, joints.directions)
@@ -238,11 +236,8 @@ class HarmonicBalance:
         solution are those with the frequency as parameter. Raises :class:`HarmonicBalanceError` for
         a frequency that is not above zero, and for numbers that are not finite.
         """
-        if not (0.0 < frequency < np.inf and np.isfinite(force)):
-            raise HarmonicBalanceError(
-                f"frequency {frequency:g} Hz, force {force:g}: give a frequency above 0, and both "
-                "finite"
-            )
+        checks.number("frequency", frequency, above=0.0, error=HarmonicBalanceError)
+        checks.number("force", force, error=HarmonicBalanceError)
         control = replace(control or ContinuationControl(), watch=lambda parameter: None)
         newton = NewtonControl(control.tolerance)
         direct = solve(self.by_frequency(force), unknowns, frequency, newton)

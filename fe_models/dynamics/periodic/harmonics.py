@@ -12,6 +12,7 @@ from functools import cached_property, lru_cache
 import numpy as np
 from numba import njit
 
+from sa_solver import checks
 from sa_solver.errors import InputError
 from sa_solver.types import Array
 
@@ -62,7 +63,11 @@ class Resolution:
     samples: int
 
     def __post_init__(self) -> None:
-        given = self.harmonics
+        given = tuple(
+            checks.whole("a harmonic", order, HarmonicBalanceError) for order in self.harmonics
+        )
+        checks.settle(self, harmonics=given)
+        checks.whole("samples", self.samples, HarmonicBalanceError)
         if not given or given[0] < 0 or list(given) != sorted(set(given)) or given[-1] == 0:
             raise HarmonicBalanceError(
                 f"harmonics {given}: give them ascending, each once, from 0 or above, one above 0"

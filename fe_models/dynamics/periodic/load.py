@@ -12,7 +12,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from fe_models.dynamics.periodic.harmonics import ComplexArray
+from fe_models.dynamics.periodic.harmonics import ComplexArray, HarmonicBalanceError
+from sa_solver import checks
 from sa_solver.types import Array
 
 
@@ -47,6 +48,31 @@ class PeriodicLoad:
     waves: Mapping[int, ComplexArray]
     static: Array | None = None
     inertial: Mapping[int, ComplexArray] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        found: dict[str, dict[int, ComplexArray]] = {"waves": {}, "inertial": {}}
+        for name, waves in found.items():
+            for harmonic, wave in getattr(self, name).items():
+                checks.whole("a harmonic", harmonic, HarmonicBalanceError)
+                what = f"forces of harmonic {harmonic}"
+                waves[harmonic] = checks.complex_array(
+                    what, wave, (None,), error=HarmonicBalanceError
+                )
+        checks.settle(self, **found)
+        if self.static is not None:
+            static = checks.array("static forces", self.static, (None,), error=HarmonicBalanceError)
+            checks.settle(self, static=static)
+
+    def require(self, size: int) -> None:
+        """Raise :class:`HarmonicBalanceError` unless forces are those on ``size`` displacements."""
+        forces = [*self.waves.values(), *self.inertial.values()]
+        lengths = {len(force) for force in forces} | {
+            size if self.static is None else len(self.static)
+        }
+        if lengths != {size}:
+            raise HarmonicBalanceError(
+                f"forces on {sorted(lengths)} displacements of a structure of {size}: give as many"
+            )
 
     @property
     def harmonics(self) -> set[int]:

@@ -41,6 +41,7 @@ from fe_models.dynamics.stability.deviating_structure import (
 )
 from fe_models.dynamics.stability.refined_motion import EVENTS_LONGER, MotionInTime
 from fe_models.dynamics.transient.linear_steps import SPLIT
+from sa_solver import checks
 from sa_solver.types import Array
 
 Verdict = Literal["stable", "unstable", "unknown"]
@@ -132,7 +133,7 @@ class Floquet:
     """
 
     def __init__(self, problem: HarmonicBalance, most_modes: int = MOST_MODES) -> None:
-        self._most_modes = most_modes
+        self._most_modes = checks.whole("most_modes", most_modes)
         self._problem, self._joints = problem, problem.joints
         self._reduced: ModalStructure | None = None
         # Sectors in a wave are followed one by one: deviations need not travel as it does.

@@ -31,6 +31,7 @@ import numpy as np
 from scipy.signal import butter, hilbert, savgol_filter, sosfiltfilt, sosfreqz
 
 from fe_models.dynamics.transient.impact_hammer import SignalError
+from sa_solver import checks
 from sa_solver.types import Array
 
 ORDER = 2
@@ -108,8 +109,10 @@ def ring_down(
 
 def _checked(response: Array, step: float, band: tuple[float, float], periods: float) -> Array:
     """The record, if it can be filtered."""
-    signal = np.asarray(response, dtype=float)
-    low, high = band
+    signal = checks.array("responses", response, None, error=SignalError, finite=False)
+    low, high = checks.array("ends of the band", band, (2,), error=SignalError)
+    for name, value in (("step", step), ("periods", periods)):
+        checks.number(name, value, error=SignalError)
     if signal.ndim != 1 or not np.isfinite(signal).all() or not signal.any():
         raise SignalError("the response is to be (t,) finite numbers that are not all 0")
     if not (step > 0.0 and 0.0 < low < high < 0.5 / step):

@@ -20,6 +20,7 @@ from typing import Literal
 
 import numpy as np
 
+from sa_solver import checks
 from sa_solver.errors import InputError
 from sa_solver.types import Array
 
@@ -95,6 +96,9 @@ def frequency_response(
     1.651 um/N of 1.651
     """
     forces, responses = _records(force, response)
+    checks.choice("quantity", quantity, list(DERIVATIVES), SignalError)
+    for name, value in (("step", step), ("decay", decay), ("blow_end", blow_end or 0.0)):
+        checks.number(name, value, error=SignalError)
     if not (step > 0.0 and 0.0 <= decay < np.inf):
         raise SignalError(
             f"step {step:g} s, decay {decay:g} 1/s: give a step above 0, a decay >= 0"
@@ -121,8 +125,10 @@ def frequency_response(
 
 def _records(force: Array, response: Array) -> tuple[Array, Array]:
     """Both as ``(b, t)``, checked."""
-    forces = np.atleast_2d(np.asarray(force, dtype=float))
-    responses = np.atleast_2d(np.asarray(response, dtype=float))
+    forces, responses = (
+        np.atleast_2d(checks.array(name, values, None, error=SignalError, finite=False))
+        for name, values in (("forces", force), ("responses", response))
+    )
     if forces.ndim != 2 or forces.shape != responses.shape or forces.shape[1] < 4:
         raise SignalError(
             f"force has the shape {np.shape(force)}, the response {np.shape(response)}; allowed: "

@@ -37,6 +37,8 @@ from fe_models.dynamics.transient.joint_equilibrium import (
     largest_entry,
 )
 from fe_models.dynamics.transient.record import MotionRecord, RecordedSteps, StepState
+from sa_solver import checks
+from sa_solver.errors import InputError
 from sa_solver.steps import COMPUTED, Steps
 from sa_solver.types import Array
 
@@ -82,13 +84,14 @@ class TimeStepControl:
     every: int = 1
 
     def __post_init__(self) -> None:
-        if not self.step > 0.0 or self.every < 1:
-            raise ValueError(
+        checks.numbers(self, "step", "tolerance")
+        if not self.step > 0.0 or checks.whole("every", self.every) < 1:
+            raise InputError(
                 f"a step of {self.step:g} s, every {self.every}: give a step above 0, every 1 "
                 "or more"
             )
         if self.tolerance is not None and not self.tolerance > 0.0:
-            raise ValueError(f"tolerance {self.tolerance:g}: give one above 0")
+            raise InputError(f"tolerance {self.tolerance:g}: give one above 0")
 
 
 def integrate(
@@ -108,7 +111,7 @@ def integrate(
     ``duration`` [s]. A motion that has not been found to the end says so in its ``message``. Each
     of the ``steps`` marches many steps in time; ``reached`` is told after each what share of the
     work is done.
-    Raises ``ValueError`` if joints and connection do not have the same directions, or the model has
+    Raises InputError if joints and connection do not have the same directions, or the model has
     structural damping, which there is in steady vibration only.
 
     Examples
@@ -126,15 +129,17 @@ def integrate(
     True
     """
     if model.structural is not None:
-        raise ValueError("structural damping is not known in time: give damping of the modes")
+        raise InputError("structural damping is not known in time: give damping of the modes")
     laws = joints if joints is not None else _FreeJoints()
     if len(model.connection) % laws.directions:
-        raise ValueError(
+        raise InputError(
             f"a connection of {len(model.connection)} rows for joints of {laws.directions} "
             "directions: give a row for each direction of each joint"
         )
+    checks.number("duration", duration, least=0.0)
     count = int(np.ceil(duration / control.step * (1.0 - 1e-12)))
     forcing = excitation if excitation is not None else _NoForce(len(model.mass))
+    checks.array("forces of the excitation", forcing(np.zeros(1)), (1, len(model.mass)))
     begin = start or Start()
     allowed, before = np.inf, 0.0
     if control.tolerance is not None:

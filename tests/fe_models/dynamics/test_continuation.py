@@ -8,12 +8,8 @@ import numpy as np
 import pytest
 
 from fe_models.dynamics.curves.bordered import Bordered, Preconditioned, solve_alone, solve_bordered
-from fe_models.dynamics.curves.continuation import (
-    ContinuationControl,
-    Refinement,
-    first_point,
-    follow,
-)
+from fe_models.dynamics.curves.continuation import Refinement, first_point, follow
+from fe_models.dynamics.curves.control import ContinuationControl
 from fe_models.dynamics.curves.newton import NewtonControl, solve
 from fe_models.dynamics.curves.sizes import relative_norm
 

@@ -8,7 +8,7 @@ from scipy.integrate import solve_ivp
 from scipy.special import mathieu_a, mathieu_b
 
 from fe_models.dynamics.curves.bifurcations import find_bifurcations
-from fe_models.dynamics.curves.continuation import ContinuationControl
+from fe_models.dynamics.curves.control import ContinuationControl
 from fe_models.dynamics.curves.followed_curve import curve_by_force, curve_by_frequency
 from fe_models.dynamics.curves.forced_response import along_force, along_frequency
 from fe_models.dynamics.curves.further_branches import further_branches, vibrating_starts

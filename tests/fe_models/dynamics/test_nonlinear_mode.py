@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.special import ellipk
 
-from fe_models.dynamics.curves.continuation import ContinuationControl
+from fe_models.dynamics.curves.control import ContinuationControl
 from fe_models.dynamics.curves.forced_response import along_frequency
 from fe_models.dynamics.curves.nonlinear_mode import LinearMode, NonlinearMode, along_nonlinear_mode
 from fe_models.dynamics.curves.phase_resonance import along_phase_resonance

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from fe_models.dynamics.curves.continuation import ContinuationControl
+from fe_models.dynamics.curves.control import ContinuationControl
 from fe_models.dynamics.curves.forced_response import Accuracy, along_frequency
 from fe_models.dynamics.curves.phase_resonance import PhaseResonance, along_phase_resonance
 from fe_models.dynamics.excitation import HarmonicForce

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fe_models.dynamics.curves.continuation import ContinuationControl
+from fe_models.dynamics.curves.control import ContinuationControl
 from fe_models.dynamics.curves.forced_response import along_frequency
 from fe_models.dynamics.periodic.harmonic_balance import HarmonicBalance
 from fe_models.dynamics.periodic.harmonics import Resolution

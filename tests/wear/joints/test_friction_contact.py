@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 from numba import njit
 from scipy.integrate import quad, solve_ivp
-from tests.wear.joints.periodic.friction_paths import (
+
+from tests.wear.joints.friction_paths import (
     KN,
     KT,
     LAW,
@@ -25,7 +26,6 @@ from tests.wear.joints.periodic.friction_paths import (
     random_path,
     split,
 )
-
 from wear.joints.friction_contact import FrictionContact, advance_contact
 from wear.joints.parameters import JointError
 from wear.joints.periodic.friction_path import ForcePath

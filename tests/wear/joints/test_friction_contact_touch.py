@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from tests.wear.joints.periodic.friction_paths import (
+
+from tests.wear.joints.friction_paths import (
     KN,
     KT,
     LAW,
@@ -17,7 +18,6 @@ from tests.wear.joints.periodic.friction_paths import (
     one,
     random_path,
 )
-
 from wear.joints.friction_contact import FrictionContact
 
 

@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from sa_solver import checks
 from sa_solver.errors import InputError
 from sa_solver.types import Array, Indices
 
@@ -139,13 +140,19 @@ def loop_record(
         If shapes differ, numbers are not finite, the time does not grow, or a normal load is not
         above 0.
     """
-    motion = np.asarray(displacement, dtype=float)
-    columns = {"displacement": motion, "force": np.asarray(force, dtype=float)}
+
+    def column(name: str, values: object) -> Array:
+        return checks.array(
+            f"values of {name}", values, None, error=MeasuredLoopError, finite=False
+        )
+
+    motion = column("displacement", displacement)
+    columns = {"displacement": motion, "force": column("force", force)}
     if normal_load is not None:
-        load = np.asarray(normal_load, dtype=float)
+        load = column("normal load", normal_load)
         columns["normal load"] = np.full(motion.shape, load) if load.ndim == 0 else load
     if time is not None:
-        columns["time"] = np.asarray(time, dtype=float)
+        columns["time"] = column("time", time)
     for name, values in columns.items():
         if values.ndim != 1 or values.shape != motion.shape:
             raise MeasuredLoopError(

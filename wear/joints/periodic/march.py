@@ -25,6 +25,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from sa_solver import checks
 from sa_solver.types import Array
 from wear.joints.bouc_wen import BoucWen
 from wear.joints.elastic import ElasticLaw, settle_elastic
@@ -116,6 +117,27 @@ class SettledCycle:
         return self.dissipate()
 
 
+def driven_by(coefficients: object) -> Array:
+    """Return coefficients ``(j, m, d)`` of joints.
+
+    Raises :class:`JointError`. Iterations may come to ones that are not finite, and find that out
+    by themselves.
+    """
+    shape = (None, None, None)
+    return checks.array("coefficients", coefficients, shape, error=JointError, finite=False)
+
+
+def _sampled(functions: object) -> Array:
+    """Return functions of time at samples, or the weights of these. Raises :class:`JointError`.
+
+    An iteration gives the same ones each time: whether they are finite its forces tell.
+    """
+    shape = (None, None)
+    return checks.array(
+        "functions at samples", functions, shape, error=JointError, finite=False, order="K"
+    )
+
+
 @dataclass(frozen=True)
 class PeriodicMarch:
     """March of the joints of one ``law`` over whole periods.
@@ -141,6 +163,9 @@ class PeriodicMarch:
 
     law: Jenkins | BoucWen | MasingLaw | FrictionContact | ElasticLaw
     threads: int = 1
+
+    def __post_init__(self) -> None:
+        checks.whole("threads", self.threads, JointError)
 
     @property
     def directions(self) -> int:
@@ -168,7 +193,8 @@ class PeriodicMarch:
         JointError
             If the shapes do not fit.
         """
-        lead = basis[:1] if lead is None else lead
+        coefficients, basis, weights = driven_by(coefficients), *map(_sampled, (basis, weights))
+        lead = basis[:1] if lead is None else _sampled(lead)
         self._require(coefficients, basis, weights, lead)
         joints, size, directions = coefficients.shape
         kernels = self._kernels[0]
@@ -206,6 +232,7 @@ class PeriodicMarch:
             Least size of the memory of joints of distributed sliders, so that motions with fewer
             turning points have arrays of the same shape.
         """
+        coefficients, basis, lead = driven_by(coefficients), _sampled(basis), _sampled(lead)
         joints, _, directions = coefficients.shape
         self._require(coefficients, basis, basis.T, lead)
         driven = self._driven(coefficients, basis, lead, 0)

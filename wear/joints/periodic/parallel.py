@@ -14,7 +14,7 @@ import numpy as np
 from sa_solver.types import Array
 from wear.joints.jenkins import Jenkins
 from wear.joints.parameters import JointError
-from wear.joints.periodic.march import SLIP, STICK, PeriodicMarch, SettledCycle
+from wear.joints.periodic.march import SLIP, STICK, PeriodicMarch, SettledCycle, driven_by
 
 
 @dataclass(frozen=True)
@@ -61,12 +61,13 @@ class ParallelSliders:
         The arguments are those of :meth:`wear.joints.periodic.march.PeriodicMarch.settle`. Raise
         :class:`JointError` for more than one joint.
         """
+        coefficients = driven_by(coefficients)
         if len(coefficients) != 1:
             raise JointError(
                 f"the coefficients are of {len(coefficients)} joints, the sliders of one: give the "
                 "coefficients of one joint"
             )
-        stiffness = np.atleast_1d(self.law.stiffness)
+        stiffness = np.broadcast_to(self.law.stiffness, len(self.law.parameters))
         shared = np.repeat(coefficients, len(stiffness), axis=0)
         cycle = PeriodicMarch(self.law).settle(shared, basis, weights, lead)
         held = np.where(cycle.states == STICK, stiffness, 0.0).sum(axis=1)

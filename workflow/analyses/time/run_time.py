@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from workflow.analyses import wear
 from workflow.analyses.rig.excitation import Harmonic
 from workflow.analyses.rig.matrix_body import MatrixBody
@@ -9,7 +11,7 @@ from workflow.analyses.rig.structure import JointedBody, ReducedBody
 from workflow.analyses.specimens.run_time import reduction_of
 from workflow.analyses.time.case import JointCase, RigCase
 from workflow.case.loading import load_case
-from workflow.shell.run_time import RunTime
+from workflow.shell.run_time import FIGURES, RunTime
 
 # A step of a rig in time; of a reduced body [s]. Chosen steps are parts of what the case gives.
 STEP, REDUCED_STEP, CHOSEN = 8e-5, 1e-3, 5.0
@@ -21,9 +23,10 @@ JOINT = 1.0
 
 def run_time(case: JointCase | RigCase) -> RunTime:
     """Of all motions, or of the cycles up to steady ones."""
-    worn = _computed_wear(case.evolution.file)
+    computed = _computed_wear(case.evolution.file)
+    begun = 0.0 if computed is None else computed.seconds
     if isinstance(case, JointCase):
-        return RunTime(worn, JOINT)
+        return _after(computed, begun, JOINT)
     reduced = isinstance(case.structure, JointedBody)
     motions = len(case.energies)
     if isinstance(case.excitation, Harmonic):
@@ -32,15 +35,22 @@ def run_time(case: JointCase | RigCase) -> RunTime:
     if case.integration.tolerance is not None:
         step *= CHOSEN
     if isinstance(case.structure, ReducedBody):
-        worn += reduction_of(case.structure.file)
+        begun += reduction_of(case.structure.file)
     elif isinstance(case.structure, MatrixBody):
-        worn += case.structure.build_time()
-    return RunTime(worn, motions * case.steps * step)
+        begun += case.structure.build_time()
+    return _after(computed, begun, motions * case.steps * step)
 
 
-def _computed_wear(file: str | None) -> float:
-    """Of the wear case that the joint follows, if there is one [s]."""
+def _after(computed: RunTime | None, begun: float, course: float) -> RunTime:
+    """Return the time of a ``course`` that has ``begun`` with the wear case computed before it."""
+    if computed is None:
+        return RunTime(begun, course)
+    return replace(computed, before=begun, course=course, after=FIGURES)
+
+
+def _computed_wear(file: str | None) -> RunTime | None:
+    """Return the time of the wear case that the joint follows, or None where there is none."""
     if file is None or not file.endswith(".yaml"):
-        return 0.0
+        return None
     kinds = list(wear.ANALYSIS.cases.values())
-    return wear.ANALYSIS.run_time(load_case(file, kinds)).seconds
+    return wear.ANALYSIS.run_time(load_case(file, kinds))

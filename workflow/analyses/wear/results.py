@@ -103,7 +103,8 @@ def write_output(outcome: Outcome, lives: Begun, run: Run[WearCase]) -> None:
     worn_nodes = write_worn_faces(source, stages, state.interfaces, folder, reporter)
     loops = write_loop_tables(folder, source.line)
     warn_of_border(loops, case.loops, reporter)
-    warn_of_errors(case, outcome.interfaces, budget, reporter)
+    drift = float(state.drift.max(initial=0.0))
+    warn_of_errors(case, outcome.interfaces, budget, drift, reporter)
     summary = _summary(outcome, structure, stresses, budget, recorded)
     uniform = uniformities(source, stages, state.interfaces)
     uniformity = {name: vars(alike) for name, alike in uniform.items()}

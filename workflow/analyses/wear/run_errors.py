@@ -30,17 +30,22 @@ SHORTER, STRICTER = 4.0, 10.0
 
 
 def warn_of_errors(
-    case: WearCase, contacts: Sequence[InterfaceOutcome], budget: Budget, reporter: Reporter
+    case: WearCase,
+    contacts: Sequence[InterfaceOutcome],
+    budget: Budget,
+    drift: float,
+    reporter: Reporter,
 ) -> None:
     """Results farther off than the case's accuracy, and steps than was asked for.
 
-    And few increments of surfaces that move over each other, which no estimate knows of.
+    ``drift`` is the largest that was found after a jump. And few increments of surfaces that move
+    over each other, which no estimate knows of.
     """
     for contact in contacts:
         name, state, shorter = contact.stage.name, contact.state, shorter_steps(case.wear, contact)
         _warn_of_steps(case.wear, contact, shorter, reporter)
         settings = {**SETTINGS, **structure_of(case).settings(case), "steps": shorter}
-        settings |= _of_link_and_coupling(case, shorter)
+        settings |= _of_link_and_coupling(case, shorter, drift)
         if beyond := warning_of(name, budget[name], case.accuracy, settings):
             reporter.warn(beyond)
         fewest = min(mission.stop - mission.start for mission in state.loads.missions)
@@ -73,12 +78,16 @@ def shorter_steps(wear: Duration, contact: InterfaceOutcome) -> str:
     return f"wear.step: {{kind: {kind}, cycles: {max(cycles, 1.0):.2g}}}"
 
 
-def _of_link_and_coupling(case: WearCase, shorter: str) -> dict[str, str]:
-    """Yield the settings, not in use yet, that make the errors of link and coupling smaller."""
-    coupling = case.recoupling
+def _of_link_and_coupling(case: WearCase, shorter: str, drift: float) -> dict[str, str]:
+    """Return the settings, not in use yet, that make the errors of link and coupling smaller.
+
+    A smaller ``coupling.drift`` does nothing above the largest ``drift`` that was found.
+    """
+    coupling, every = case.recoupling, "coupling.resultants: every"
+    reached = min(coupling.drift, drift) / SHORTER
     settings = {
-        "constant": "coupling.resultants: drift",
-        "drift": f"coupling.drift: {100.0 * coupling.drift / SHORTER:.2g} %",
+        "constant": every,
+        "drift": f"coupling.drift: {100.0 * reached:.2g} %" if reached > 0.0 else every,
         "every": shorter,
     }
     told = {"coupling": settings[coupling.resultants]}

@@ -71,6 +71,13 @@ def _choose(case: MeshCase) -> tuple[MeshCase, dict[str, Any] | None]:
         raise UserError(f"structure: {error}") from error
 
 
+def _settings(case: MeshCase) -> dict[str, str]:
+    """Return what makes the error of the mesh smaller; only CAD is meshed at a size."""
+    size = case.mesh.size
+    finer = "a finer mesh" if size is None else f"mesh.size: {0.5 * size:g} mm"
+    return {"mesh": f"mesh.order: 2, or {finer}" if case.mesh.order == 1 else finer}
+
+
 STRUCTURE = WearStructure(
     name="mesh",
     case=MeshCase,
@@ -79,7 +86,5 @@ STRUCTURE = WearStructure(
     memory=_memory,
     choose=_choose,
     finer=_finer,
-    settings=lambda case: {
-        "mesh": "mesh.order: 2, or a finer mesh" if case.mesh.order == 1 else "a finer mesh"
-    },
+    settings=_settings,
 )
