@@ -1,7 +1,7 @@
-"""Names that a package offers, imported when they are first asked for (PEP 562).
+"""Lazy imports: the public names of a package are imported on first access (PEP 562).
 
-So that importing a package of the library costs next to nothing, and the transforms, compilers,
-meshers and finite elements behind its names are loaded by those who use them.
+Importing a package of the library then costs next to nothing. The transforms, compilers, meshers
+and finite elements behind its names are loaded only by programs that use them.
 """
 
 from __future__ import annotations
@@ -14,9 +14,10 @@ from importlib import import_module
 def lazy_names(
     package: str, modules: Mapping[str, Sequence[str]], within: str = ""
 ) -> tuple[Callable[[str], object], Callable[[], list[str]]]:
-    """``__getattr__`` and ``__dir__`` of a ``package`` that offers names of its ``modules``.
+    """Return ``__getattr__`` and ``__dir__`` of a ``package`` whose names are imported lazily.
 
-    The modules may lie ``within`` another package.
+    ``modules`` lists the public names by the module that defines them. The modules are looked up in
+    the package ``within``, or in ``package`` itself if that is empty.
     """
     home = within or package
     homes = {name: f"{home}.{module}" for module, names in modules.items() for name in names}

@@ -87,15 +87,15 @@ class CoupledLevel:
                 slipping[box.window],
                 tolerance,
                 max_iterations - iterations,
-                box.left_by,
+                box.is_reached_by,
             )
             self._count(operator.half_space, operator.half_space.count - before)
-            traction = np.array([box.placed(component) for component in found.traction])
-            slipping = box.placed(found.slipping.astype(np.float64)) > 0.0
+            traction = np.array([box.on_whole_grid(component) for component in found.traction])
+            slipping = box.on_whole_grid(found.slipping.astype(np.float64)) > 0.0
             iterations += found.iterations
             if not found.left:
                 return replace(found, traction=traction, slipping=slipping, iterations=iterations)
-            box = box.grown()
+            box = box.enlarged()
 
     # -- starts -------------------------------------------------------------------------------
     def _on_cones(

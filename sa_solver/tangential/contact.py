@@ -122,6 +122,11 @@ class TangentialState:
     convolutions: int = 0
 
     @property
+    def motion(self) -> Array:
+        """Rigid motion (Δδx, Δδy, Δφz) of the increment [mm, rad]."""
+        return np.array([self.shift_x, self.shift_y, self.twist])
+
+    @property
     def stick_area(self) -> float:
         """Area of the cells that stick [mm²; in a line contact, per mm, their width in mm]."""
         return float(np.count_nonzero(self.sticking)) * self.cell_area

@@ -431,7 +431,7 @@ def test_no_load_no_stress():
 
 def test_what_does_not_fit_is_refused():
     line, plane = Grid.strips(1.0, 8), Grid((4, 5), (0.1, 0.1))
-    with pytest.raises(SubsurfaceError, match="bodies 1 and 2"):
+    with pytest.raises(SubsurfaceError, match="body is 3"):
         SubsurfaceStress(line, STEEL, 3)
     with pytest.raises(SubsurfaceError, match="section along y"):
         SubsurfaceStress(line, STEEL, 1).section(np.ones((3, 8, 1)), "y", 0.0, np.ones(1))
