@@ -142,7 +142,7 @@ def test_what_is_no_scan_is_refused():
         filled(holes, 0.05)
     with pytest.raises(InputError, match="fill them first"):
         resampled(holes, Grid.covering((2.0, 2.0), (2, 2)))
-    with pytest.raises(InputError, match="3 points to fit a plane to: give at least 6"):
+    with pytest.raises(InputError, match="3 points are too few to fit a plane: give at least 6"):
         levelled(Scan(np.array([[0.0, 1.0], [2.0, np.nan]]), (1.0, 1.0)), "plane")
     with pytest.raises(InputError, match="a scan of 4 columns: give a profile"):
         resampled(filled(holes), Grid.strips(2.0, 8))
