@@ -343,7 +343,7 @@ class Frame:
         checks.settle(self, origin=checks.array("origins of a frame", self.origin, (3,)), axes=axes)
         if np.abs(axes @ axes.T - np.eye(3)).max() > SQUARE or np.linalg.det(axes) < 0.0:
             raise InputError(
-                f"the axes of a frame are {axes.tolist()}: give orthogonal rows of length 1 that "
+                f"axes of a frame {axes.tolist()}: give rows of length 1, at right angles, that "
                 "form a right-handed system"
             )
 

@@ -73,8 +73,8 @@ class Scan:
         dimensions = np.ndim(self.heights)
         if dimensions != 2 or not all(0.0 < pitch < np.inf for pitch in self.pitch):
             raise InputError(
-                f"a scan has {dimensions} dimensions and a pitch of {self.pitch} mm: give heights "
-                "with two dimensions, along x and along y, and pitches above 0"
+                f"a scan of {dimensions} dimensions, with points {self.pitch} mm apart: give rows "
+                "along x and columns along y, and a pitch above 0"
             )
         heights = checks.array(
             "heights of a scan", self.heights, (None, None), masked=np.nan, finite=False, order="K"

@@ -67,9 +67,9 @@ class GrossSlip:
         if self.missing <= ACCURACY:
             return ""
         return (
-            f"the energy of the sliding contact differs from that of its loads by "
-            f"{self.missing:.1e} of it: take smaller increments; if the energy comes from a "
-            "structure, refine its mesh; if it comes from a file of loads, check Edx and Edy"
+            f"the sliding contact dissipates an energy off by {self.missing:.1e} of that of its "
+            "loads: take smaller increments; if the energy comes from a structure, refine its "
+            "mesh; if it comes from a file of loads, check Edx and Edy"
         )
 
 

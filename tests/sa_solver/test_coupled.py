@@ -23,12 +23,12 @@ RADIUS = 10.0
 
 
 def rigid_on_elastic(beta):
-    """A pair with Dundurs' ``beta``: body 1 rigid, body 2 with ν from 0.5 to 0."""
+    """Return a pair with Dundurs' ``beta``: body 1 is rigid, body 2 has ν from 0.5 to 0."""
     return ElasticPair(Material(np.inf, 0.3), Material(70e3, (1 - 2 * beta) / (2 - 2 * beta)))
 
 
 def sphere(cells, beta, friction, width=2.6):
-    """Sphere contact on a grid of ``width`` Hertzian contact radii, and its height."""
+    """Return a sphere contact on a grid of ``width`` Hertzian contact radii, and its height."""
     pair = rigid_on_elastic(beta)
     radius = (0.75 * P * RADIUS / pair.contact_modulus) ** (1 / 3)
     grid = Grid.covering((width * radius, width * radius), (cells, cells))
@@ -37,7 +37,7 @@ def sphere(cells, beta, friction, width=2.6):
 
 
 def cylinder(cells, beta, friction):
-    """The same for a line contact under P newtons per mm."""
+    """Return a line contact under P newtons per mm, and its height."""
     pair = rigid_on_elastic(beta)
     half_width = np.sqrt(4 * P * RADIUS / (np.pi * pair.contact_modulus))
     grid = Grid.strips(2.6 * half_width, cells)
@@ -46,7 +46,7 @@ def cylinder(cells, beta, friction):
 
 
 def flat_strip(cells, beta, friction):
-    """A rigid flat punch of sharp edges in plane strain."""
+    """Return a rigid flat punch with sharp edges in plane strain, and its height."""
     grid = Grid.strips(1.2, cells)
     height = np.where(np.abs(grid.x) < 0.5, 0.0, 1.0)
     return CoupledContact(HalfSpace(grid, rigid_on_elastic(beta)), friction), height
@@ -57,7 +57,7 @@ def loads(load=P, Qx=0.0, Qy=0.0, Mx=0.0, My=0.0, Mz=0.0):
 
 
 def march(contact, height, path, motion=coupled.ALL_FORCES):
-    """States along ``path``, an iterable of six values; all must converge."""
+    """Return the states along ``path``, an iterable of six values each; all must converge."""
     states, offset, start = [], None, None
     for values in path:
         state = contact.solve(height, offset, values, motion, start=start)
@@ -73,7 +73,7 @@ def sticking(state, friction):
 
 
 def stick_share(state, friction):
-    """Share of the pressed cells that stick: in plane strain c/a."""
+    """Return the share of the pressed cells that stick, which is c/a in plane strain."""
     return sticking(state, friction).sum() / (state.pressure > 0).sum()
 
 
@@ -82,7 +82,7 @@ def assert_same(computed, expected, accuracy):
 
 
 def assert_solves(contact, height, offset, state):
-    """Every condition of the problem, from the tractions alone."""
+    """Assert every condition of the problem, from the tractions alone."""
     friction, scale = contact.friction, np.abs(state.displacement).max()
     displacement = contact.half_space.displacement(state.traction)
     rigid = RigidModes(contact.grid)
@@ -127,7 +127,7 @@ def test_every_condition_is_met(build, beta, friction):
 
 @pytest.mark.parametrize("seed", range(8))
 def test_rough_contacts_under_random_loads(seed):
-    """Tilted and turned so that the shear force acts at the centre of pressure."""
+    """The bodies are tilted and twisted so that the shear acts at the centre of pressure."""
     rng = np.random.default_rng(seed)
     friction = 10 ** rng.uniform(-1.5, 0.0)
     contact, height = sphere(24, rng.uniform(0.0, 0.5), friction)
@@ -204,7 +204,7 @@ def test_similar_bodies_without_shear_force_have_no_shear():
 def test_stuck_flat_punch():
     """Mossakovskii: P = 4 G a δ ln(3-4ν)/(1-2ν); without friction 4 G a δ/(1-ν).
 
-    Here ν = 0. Their ratio hardly depends on what radius the grid gives to the punch.
+    Here ν = 0. The ratio of the two loads hardly depends on the radius of the punch on the grid.
     """
     grid = Grid.covering((2.2, 2.2), (48, 48))
     height = np.where(np.hypot(grid.x, grid.y) < 1.0, 0.0, 1.0)
@@ -230,10 +230,11 @@ def test_stick_zone_of_a_flat_strip_for_weak_coupling():
 
 @pytest.mark.parametrize("beta", [0.3, slow(0.5)])
 def test_punch_and_growing_contacts_share_one_stick_zone(beta):
-    """Spence 1968: c/a is the same for every power-law profile under a load that grows.
+    """Spence 1968: c/a is the same for every power-law profile under a growing load.
 
-    A flat punch, solved in one step, has no increments to refine; with a cylinder c/a comes closer
-    with every refinement of the increments and stays the same while the load grows.
+    A flat punch is solved in one step and has no increments to refine. For a cylinder c/a
+    approaches that of the punch as the increments are refined, and is constant while the load
+    grows.
     """
     friction = beta
     contact, height = flat_strip(400, beta, friction)
@@ -250,7 +251,7 @@ def test_punch_and_growing_contacts_share_one_stick_zone(beta):
 
 
 def test_one_step_and_many_differ():
-    """Loading dissimilar bodies depends on the path: one step sticks less."""
+    """Loading of dissimilar bodies depends on the path: less sticks after a single step."""
     contact, height = sphere(32, 0.5, 0.5)
     one = contact.solve(height, None, loads())
     many = march(contact, height, [loads(k / 6 * P) for k in range(1, 7)])[-1]
@@ -270,7 +271,7 @@ def test_adjusting_in_turns_gives_the_same(friction):
 
 
 def test_newton_and_the_splitting_find_the_same(monkeypatch):
-    """Two methods that share no more than the half-space and the residuals."""
+    """The two methods share only the half-space and the residuals."""
     contact, height = sphere(24, 0.4, 0.3)
     path = [loads(), loads(Qx=0.7 * 0.3 * P, Mz=0.5)]
     by_newton = march(contact, height, path)
@@ -283,7 +284,7 @@ def test_newton_and_the_splitting_find_the_same(monkeypatch):
 
 
 def test_a_contact_that_outgrows_its_box_is_that_of_the_whole_grid(monkeypatch):
-    """From a start that covers a tenth of the cells, which a second contact has joined since."""
+    """The initial guess covers a tenth of the cells; a second contact has formed since."""
     contact, height = sphere(48, 0.4, 0.5, width=6.0)
     small = contact.solve(height, None, loads(0.05 * P))
     x, y = contact.grid.x / contact.grid.size[0], contact.grid.y / contact.grid.size[1]
@@ -323,7 +324,7 @@ def test_shear_turns_with_the_load():
 
 
 def test_pressing_alone_shears_towards_or_from_the_centre():
-    """Body 2, the more compliant, is drawn in under pressure and friction holds it back."""
+    """Pressure draws in body 2, the more compliant one, and friction resists this."""
     for build, cells in ((sphere, 24), (cylinder, 100)):
         contact, height = build(cells, 0.4, 0.4)
         state = contact.solve(height, None, loads())
@@ -338,7 +339,7 @@ def test_pressing_alone_shears_towards_or_from_the_centre():
 # -- energy -----------------------------------------------------------------------------------
 @pytest.mark.parametrize("build", [sphere, cylinder])
 def test_dissipation_is_the_work_of_the_shear_forces_less_what_is_stored(build):
-    """Per increment: -Σ q·Δs S = Q·Δδ + Mz Δφz - Σ q·Δu S >= 0."""
+    """In each increment -Σ q·Δs S = Q·Δδ + Mz Δφz - Σ q·Δu S >= 0."""
     contact, height = build(24 if build is sphere else 100, 0.4, 0.4)
     path = [loads(k / 3 * P) for k in (1, 2, 3)]
     path += [loads(Qx=0.3 * P * np.sin(angle)) for angle in np.linspace(0.5, 6.0, 8)]
@@ -383,7 +384,7 @@ def test_a_large_imposed_shift_slides_everywhere():
 
 
 def test_an_imposed_mismatch_shears_the_contact():
-    """A stretch of the surfaces by bulk stress is resisted by antisymmetric shear."""
+    """Antisymmetric shear resists a stretch of the surfaces by bulk stress."""
     contact, height = cylinder(100, 0.2, 0.5)
     first = contact.solve(height, None, loads())
     offset = -first.displacement[:2]
@@ -450,7 +451,7 @@ def test_friction_must_make_sense(friction):
         ({"height": np.full((8, 8), np.nan)}, "heights hold NaN"),
         ({"height": np.zeros((8, 9))}, "heights have shape"),
         ({"offset": np.full((2, 8, 8), np.inf)}, "offsets hold NaN"),
-        ({"compliance": np.full((8, 8), -1.0)}, "wear rate's sign"),
+        ({"compliance": np.full((8, 8), -1.0)}, "sign of the wear rate"),
         ({"values": loads(np.nan)}, "values hold NaN"),
         ({"values": loads(-1.0)}, "pulls"),
         ({"values": loads(My=1e3)}, "outside the cells"),
@@ -487,7 +488,7 @@ def test_a_shear_force_above_friction_is_refused_at_once():
 
 
 def test_a_torque_above_friction_is_reported_with_the_largest(monkeypatch):
-    """3π µPa/16 for similar bodies: here the pressure differs a little from Hertz's."""
+    """The limit is 3π µPa/16 for similar bodies; the pressure differs a little from Hertz's."""
     monkeypatch.setattr(coupled, "ITERATIONS", 150)
     contact, height = sphere(24, 0.2, 0.5)
     radius = contact.grid.size[0] / 2.6

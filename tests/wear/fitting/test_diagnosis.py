@@ -1,4 +1,4 @@
-"""Residuals that speak against a fit are told, and those of good data are not."""
+"""Plausibility warnings: bad residuals raise them, good ones do not."""
 
 import numpy as np
 import pytest
@@ -22,7 +22,7 @@ def noise(seed=0, size=1e-4):
 def test_good_data_are_not_spoken_against():
     files = np.arange(len(ENERGY)) % 3
     spoken = sum(len(doubts_of(1e-9 * ENERGY + noise(seed), files=files)) for seed in range(40))
-    # Five tests at one in a thousand each, in 40 fits.
+    # Five tests with a rate of one in a thousand each, in 40 fits.
     assert spoken <= 2
 
 
