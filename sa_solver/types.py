@@ -128,7 +128,7 @@ class Material:
 
     @property
     def shear_modulus(self) -> float:
-        """G = E / 2(1+ν) [MPa]."""
+        """Shear modulus G = E / 2(1+ν) [MPa]."""
         return self.young / (2.0 * (1.0 + self.poisson))
 
     @property

@@ -256,7 +256,7 @@ class _Search:
         self._motions = np.zeros(len(shapes))
         self.iterations = 0
         self.contact, self.slipping = traction[Z] > 0.0, slipping & (traction[Z] > 0.0)
-        self._turned = int(np.count_nonzero(self.contact))
+        self._changed = int(np.count_nonzero(self.contact))
         self._take(traction)
         self._motions = self._supported()
         self._relative = self._without_motion(self._moved)
@@ -280,7 +280,7 @@ class _Search:
         balanced.
         """
         self._linearise()
-        share = max(STEADY if self._turned == 0 else SETTLED, ENOUGH * goal)
+        share = max(STEADY if self._changed == 0 else SETTLED, ENOUGH * goal)
         step, moved = self._solve(share)
         return bool(np.all(np.isfinite(step))) and self._project(step, moved)
 
@@ -425,7 +425,7 @@ class _Search:
         contact = self._mask(pressed) | joining
         slipping |= joining | (self._mask(pressed & ~slipped) & pushed)
         changed = (contact ^ self.contact) | (contact & (slipping ^ self.slipping))
-        self._turned = int(np.count_nonzero(changed))
+        self._changed = int(np.count_nonzero(changed))
         self.contact, self.slipping = contact, slipping
         self._take(traction)
         self._relative = self._without_motion(self._moved)

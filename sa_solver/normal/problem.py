@@ -68,7 +68,7 @@ class NormalProblem:
 
 @dataclass(frozen=True)
 class Iterate:
-    """Pressure, its displacement ``(K + D) p`` and the free rigid motions ``(k,)``."""
+    """Iterate of a solver: pressure, displacement ``(K + D) p`` and free rigid motions ``(k,)``."""
 
     pressure: Array
     displacement: Array

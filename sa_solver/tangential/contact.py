@@ -267,7 +267,7 @@ class TangentialContact:
             start = checks.array(
                 "shears to start from", start, offset.shape, error=TangentialContactError
             )
-        begin, on_circle = _begun(problem, window, start, slipping)
+        begin, on_circle = _initial_shear(problem, window, start, slipping)
         shear = problem.balanced(begin, on_circle) if on_circle.any() else None
         if shear is None:
             shear = problem.balanced(begin) if begin.any() else level.begin(problem, begin)
@@ -448,7 +448,7 @@ def listed(places: Sequence[int], forces: Array) -> str:
     return ", ".join(f"{NAMES[k]} = {force:.6g} {UNITS[k]}" for k, force in pairs)
 
 
-def _begun(
+def _initial_shear(
     problem: TangentialProblem, window: Window, start: Array | None, slipping: Mask | None
 ) -> tuple[Array, Mask]:
     """Return the shear to begin from on the ``window``, and the cells on their circle."""

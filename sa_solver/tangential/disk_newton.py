@@ -137,7 +137,7 @@ class _Search:
         self._punches = np.zeros((len(problem.target), *shear.shape))
         self._punch_set: Mask | None = None
         self._slow = False
-        self._turned = int(np.count_nonzero(problem.pressed))
+        self._changed = int(np.count_nonzero(problem.pressed))
         self._rigid = np.zeros(len(problem.target))
         self.iterations = 0
         self._linearise(curved=False)
@@ -159,7 +159,7 @@ class _Search:
         """
         step = np.zeros_like(self._shear)
         gradient, search, decrement = self._descent()
-        steady = self._turned <= NEARLY * np.count_nonzero(self._problem.pressed)
+        steady = self._changed <= NEARLY * np.count_nonzero(self._problem.pressed)
         share = max(STEADY if steady else SETTLED, ENOUGH * goal)
         settled = share * share * decrement
         for count in range(PHASE_STEPS):
@@ -190,7 +190,7 @@ class _Search:
         if curved:
             curvature = np.maximum(-dot(slip, self._normal), 0.0) * problem.per_limit
         tangents = _Tensor(*across)
-        self._bend = tangents.weighted(curvature)
+        self._curvature = tangents.weighted(curvature)
         windows, rest = problem.operator.windows(curvature)
         self._windows = [(level, self._free.weighted(window)) for level, window in windows]
         self._rest = tangents.weighted(rest)
@@ -202,9 +202,9 @@ class _Search:
         """Set up shear fields that carry resultants, close to those of rigid punches."""
         before, changed = self._punch_set, True
         if before is not None:
-            turned = int(np.count_nonzero(self._slipping ^ before))
+            changed_cells = int(np.count_nonzero(self._slipping ^ before))
             stale = STALE * int(np.count_nonzero(self._problem.pressed))
-            changed = turned > stale or self._slow
+            changed = changed_cells > stale or self._slow
         sources = self._problem.modes.fields() if changed else self._punches
         apply = self._inverted if changed else self._free.times
         for k, source in enumerate(sources):
@@ -247,7 +247,7 @@ class _Search:
             if conjugacy > 0.0:
                 add_scaled(direction, self._direction, conjugacy)
         image = self._problem.operator.displacement(direction)
-        image += self._bend.times(direction)
+        image += self._curvature.times(direction)
         curvature = float(np.vdot(direction, image))
         if not curvature > 0.0:
             return False
@@ -271,12 +271,12 @@ class _Search:
         """Project to an admissible, balanced shear of no higher energy; False if there is none."""
         problem, base = self._problem, self._shear
         rounding = ROUNDING * float(np.abs(base * self._displacement).sum())
-        kept = self._slipping & ~self._released(step)
+        still_slipping = self._slipping & ~self._released(step)
         share = 1.0
         for _ in range(BACKTRACKS):
             trial = base + share * step
             beyond = squared(trial) > problem.limit * problem.limit
-            slipping = kept | (beyond & ~self._slipping)
+            slipping = still_slipping | (beyond & ~self._slipping)
             shear = problem.balanced(trial, slipping)
             if shear is not None:
                 displacement = problem.operator.displacement(shear)
@@ -285,12 +285,12 @@ class _Search:
                     self._accept(shear, displacement, energy, slipping, cut=share < 1.0)
                     return True
             share *= BACKTRACK
-            kept = self._slipping
+            still_slipping = self._slipping
         return self._hold()
 
     def _released(self, step: Array) -> Mask:
         """Return slipping cells whose slip after ``step`` has the direction of their shear."""
-        slip = self._moved - self._bend.times(step)
+        slip = self._moved - self._curvature.times(step)
         self._problem.modes.add_motion(slip, -self._rigid)
         return self._slipping & (dot(slip, self._shear + step) > 0.0)
 
@@ -308,10 +308,10 @@ class _Search:
         self, shear: Array, displacement: Array, energy: float, slipping: Mask, cut: bool
     ) -> None:
         self._shear, self._displacement, self._energy = shear, displacement, energy
-        self._turned = int(np.count_nonzero(self._slipping ^ slipping))
+        self._changed = int(np.count_nonzero(self._slipping ^ slipping))
         self._slipping = slipping
         self._linearise(curved=True)
-        if cut or self._turned or self._direction is None:
+        if cut or self._changed or self._direction is None:
             self._direction = None
         else:
             self._direction = self._without_resultants(self._free.times(self._direction))

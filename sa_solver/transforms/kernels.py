@@ -22,12 +22,12 @@ def multiply_spectrum(spectrum, symbol):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def multiply_spectra(spectra, symbols, places, turned_inputs, turned_outputs):  # type: ignore[no-untyped-def]
+def multiply_spectra(spectra, symbols, places, imaginary_inputs, imaginary_outputs):  # type: ignore[no-untyped-def]
     """Replace the first spectra ``(k, mx, m)`` by sums of them times real symbols ``(s, mx, m)``.
 
     ``places[i, j]`` is the index of the symbol that multiplies input j in output i. Inputs marked
-    in ``turned_inputs`` ``(c,)`` are first divided by the imaginary unit; outputs marked in
-    ``turned_outputs`` ``(r,)`` are multiplied by it.
+    in ``imaginary_inputs`` ``(c,)`` are first divided by the imaginary unit; outputs marked in
+    ``imaginary_outputs`` ``(r,)`` are multiplied by it.
     """
     outputs, inputs = places.shape
     _, lines, length = spectra.shape
@@ -36,7 +36,7 @@ def multiply_spectra(spectra, symbols, places, turned_inputs, turned_outputs):  
         for j in range(inputs):
             for n in range(length):
                 z = spectra[j, line, n]
-                given[j, n] = complex(z.imag, -z.real) if turned_inputs[j] else z
+                given[j, n] = complex(z.imag, -z.real) if imaginary_inputs[j] else z
         for i in range(outputs):
             first = places[i, 0]
             for n in range(length):
@@ -47,29 +47,29 @@ def multiply_spectra(spectra, symbols, places, turned_inputs, turned_outputs):  
                 for n in range(length):
                     s, z, y = symbols[place, line, n], given[j, n], spectra[i, line, n]
                     spectra[i, line, n] = complex(y.real + s * z.real, y.imag + s * z.imag)
-            if turned_outputs[i]:
+            if imaginary_outputs[i]:
                 for n in range(length):
                     z = spectra[i, line, n]
                     spectra[i, line, n] = complex(-z.imag, z.real)
 
 
 @njit(cache=True, nogil=True)
-def split_in_two(spectrum, turns):  # type: ignore[no-untyped-def]
-    """Set the second half of rows ``(2 m, k)`` to the first times ``turns[1]`` ``(m,)``."""
+def split_in_two(spectrum, twiddles):  # type: ignore[no-untyped-def]
+    """Set the second half of rows ``(2 m, k)`` to the first times ``twiddles[1]`` ``(m,)``."""
     half, columns = len(spectrum) // 2, spectrum.shape[1]
     for n in range(half):
-        c, s = turns[1, n].real, turns[1, n].imag
+        c, s = twiddles[1, n].real, twiddles[1, n].imag
         for j in range(columns):
             a = spectrum[n, j]
             spectrum[half + n, j] = complex(a.real * c - a.imag * s, a.real * s + a.imag * c)
 
 
 @njit(cache=True, nogil=True)
-def join_two(spectrum, turns):  # type: ignore[no-untyped-def]
-    """Add the second half of rows ``(2 m, k)``, times ``turns[1]`` conjugate, to the first."""
+def join_two(spectrum, twiddles):  # type: ignore[no-untyped-def]
+    """Add the second half of rows ``(2 m, k)``, times ``twiddles[1]`` conjugate, to the first."""
     half, columns = len(spectrum) // 2, spectrum.shape[1]
     for n in range(half):
-        c, s = turns[1, n].real, turns[1, n].imag
+        c, s = twiddles[1, n].real, twiddles[1, n].imag
         for j in range(columns):
             a, b = spectrum[n, j], spectrum[half + n, j]
             spectrum[n, j] = complex(
@@ -78,14 +78,14 @@ def join_two(spectrum, turns):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def split_in_four(spectrum, turns):  # type: ignore[no-untyped-def]
-    """Set quarter r of rows ``(4 m, k)`` to (a + (-i)^r b) ``turns[r]``.
+def split_in_four(spectrum, twiddles):  # type: ignore[no-untyped-def]
+    """Set quarter r of rows ``(4 m, k)`` to (a + (-i)^r b) ``twiddles[r]``.
 
     a and b are the first two quarters.
     """
     quarter, columns = len(spectrum) // 4, spectrum.shape[1]
     for n in range(quarter):
-        c, s = turns[:, n].real, turns[:, n].imag
+        c, s = twiddles[:, n].real, twiddles[:, n].imag
         for j in range(columns):
             a, b = spectrum[n, j], spectrum[quarter + n, j]
             spectrum[n, j] = a + b
@@ -98,14 +98,14 @@ def split_in_four(spectrum, turns):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def join_four(spectrum, turns):  # type: ignore[no-untyped-def]
-    """Set a to Σ w_r and b to Σ i^r w_r, where w_r is quarter r times ``turns[r]`` conjugate.
+def join_four(spectrum, twiddles):  # type: ignore[no-untyped-def]
+    """Set a to Σ w_r and b to Σ i^r w_r, where w_r is quarter r times ``twiddles[r]`` conjugate.
 
     a and b are the first two quarters of the rows ``(4 m, k)``.
     """
     quarter, columns = len(spectrum) // 4, spectrum.shape[1]
     for n in range(quarter):
-        c, s = turns[:, n].real, turns[:, n].imag
+        c, s = twiddles[:, n].real, twiddles[:, n].imag
         for j in range(columns):
             z0, z1 = spectrum[n, j], spectrum[quarter + n, j]
             z2, z3 = spectrum[2 * quarter + n, j], spectrum[3 * quarter + n, j]

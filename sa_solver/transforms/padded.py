@@ -120,10 +120,13 @@ def _matrix_multiplication(
     )
     different = {id(symbol): symbol for row in rows for symbol in row}.values()
     stacked = np.stack([symbol[order] for symbol in different])
-    turned_outputs, turned_inputs = np.zeros(places.shape[0], bool), np.zeros(places.shape[1], bool)
-    turned_inputs[list(imaginary[0])] = turned_outputs[list(imaginary[1])] = True
+    imaginary_outputs, imaginary_inputs = (
+        np.zeros(places.shape[0], bool),
+        np.zeros(places.shape[1], bool),
+    )
+    imaginary_inputs[list(imaginary[0])] = imaginary_outputs[list(imaginary[1])] = True
 
     def multiply(spectra: Spectra) -> None:
-        multiply_spectra(spectra, stacked, places, turned_inputs, turned_outputs)
+        multiply_spectra(spectra, stacked, places, imaginary_inputs, imaginary_outputs)
 
     return multiply

@@ -72,94 +72,96 @@ def multiply_spectra(
     spectra: Spectra,
     symbols: Array,
     places: Indices,
-    turned_inputs: NDArray[np.bool_],
-    turned_outputs: NDArray[np.bool_],
+    imaginary_inputs: NDArray[np.bool_],
+    imaginary_outputs: NDArray[np.bool_],
 ) -> None:
     """Replace the first spectra ``(k, mx, m)`` by sums of them times real symbols ``(s, mx, m)``.
 
     ``places[i, j]`` is the index of the symbol that multiplies input j in output i. Inputs marked
-    in ``turned_inputs`` ``(c,)`` are first divided by the imaginary unit; outputs marked in
-    ``turned_outputs`` ``(r,)`` are multiplied by it.
+    in ``imaginary_inputs`` ``(c,)`` are first divided by the imaginary unit; outputs marked in
+    ``imaginary_outputs`` ``(r,)`` are multiplied by it.
     """
     for block in _blocks(*spectra.shape[1:]):
         given = [
-            (z.imag.copy(), -z.real) if turned else (z.real.copy(), z.imag.copy())
-            for z, turned in zip(spectra[: places.shape[1], block], turned_inputs, strict=True)
+            (z.imag.copy(), -z.real) if is_imaginary else (z.real.copy(), z.imag.copy())
+            for z, is_imaginary in zip(
+                spectra[: places.shape[1], block], imaginary_inputs, strict=True
+            )
         ]
-        for z, row, turned in zip(spectra[:, block], places, turned_outputs, strict=False):
+        for z, row, is_imaginary in zip(spectra[:, block], places, imaginary_outputs, strict=False):
             real, imaginary = (symbols[row[0], block] * part for part in given[0])
             for place, (x, y) in zip(row[1:], given[1:], strict=True):
                 real += symbols[place, block] * x
                 imaginary += symbols[place, block] * y
-            z.real, z.imag = (-imaginary, real) if turned else (real, imaginary)
+            z.real, z.imag = (-imaginary, real) if is_imaginary else (real, imaginary)
 
 
 @_compiled_in_long_runs
-def split_in_two(spectrum: Spectrum, turns: Spectra) -> None:
-    """Set the second half of rows ``(2 m, k)`` to the first times ``turns[1]`` ``(m,)``."""
+def split_in_two(spectrum: Spectrum, twiddles: Spectra) -> None:
+    """Set the second half of rows ``(2 m, k)`` to the first times ``twiddles[1]`` ``(m,)``."""
     first, second = np.split(spectrum, 2)
     for block in _blocks(*first.shape):
         a = first[block]
-        _turn(a.real, a.imag, turns[1, block], second[block])
+        _rotate(a.real, a.imag, twiddles[1, block], second[block])
 
 
 @_compiled_in_long_runs
-def join_two(spectrum: Spectrum, turns: Spectra) -> None:
-    """Add the second half of rows ``(2 m, k)``, times ``turns[1]`` conjugate, to the first."""
+def join_two(spectrum: Spectrum, twiddles: Spectra) -> None:
+    """Add the second half of rows ``(2 m, k)``, times ``twiddles[1]`` conjugate, to the first."""
     first, second = np.split(spectrum, 2)
     for block in _blocks(*first.shape):
         a = first[block]
-        x, y = _turned_back(second[block], turns[1, block])
+        x, y = _rotated_back(second[block], twiddles[1, block])
         a.real += x
         a.imag += y
 
 
 @_compiled_in_long_runs
-def split_in_four(spectrum: Spectrum, turns: Spectra) -> None:
-    """Set quarter r of rows ``(4 m, k)`` to (a + (-i)^r b) ``turns[r]``.
+def split_in_four(spectrum: Spectrum, twiddles: Spectra) -> None:
+    """Set quarter r of rows ``(4 m, k)`` to (a + (-i)^r b) ``twiddles[r]``.
 
     a and b are the first two quarters.
     """
     quarters = np.split(spectrum, 4)
     for block in _blocks(*quarters[0].shape):
         a, b, c, d = (quarter[block] for quarter in quarters)
-        _turn(a.real - b.real, a.imag - b.imag, turns[2, block], c)
-        _turn(a.real - b.imag, a.imag + b.real, turns[3, block], d)
+        _rotate(a.real - b.real, a.imag - b.imag, twiddles[2, block], c)
+        _rotate(a.real - b.imag, a.imag + b.real, twiddles[3, block], d)
         x, y = a.real + b.imag, a.imag - b.real
         a += b
-        _turn(x, y, turns[1, block], b)
+        _rotate(x, y, twiddles[1, block], b)
 
 
 @_compiled_in_long_runs
-def join_four(spectrum: Spectrum, turns: Spectra) -> None:
-    """Set a to Σ w_r and b to Σ i^r w_r, where w_r is quarter r times ``turns[r]`` conjugate.
+def join_four(spectrum: Spectrum, twiddles: Spectra) -> None:
+    """Set a to Σ w_r and b to Σ i^r w_r, where w_r is quarter r times ``twiddles[r]`` conjugate.
 
     a and b are the first two quarters of the rows ``(4 m, k)``.
     """
     quarters = np.split(spectrum, 4)
     for block in _blocks(*quarters[0].shape):
         a, b, c, d = (quarter[block] for quarter in quarters)
-        x1, y1 = _turned_back(b, turns[1, block])
-        x2, y2 = _turned_back(c, turns[2, block])
-        x3, y3 = _turned_back(d, turns[3, block])
+        x1, y1 = _rotated_back(b, twiddles[1, block])
+        x2, y2 = _rotated_back(c, twiddles[2, block])
+        x3, y3 = _rotated_back(d, twiddles[3, block])
         np.subtract(a.real - x2, y1 - y3, out=b.real)
         np.add(a.imag - y2, x1 - x3, out=b.imag)
         np.add(a.real + x2, x1 + x3, out=a.real)
         np.add(a.imag + y2, y1 + y3, out=a.imag)
 
 
-def _turn(x: Array, y: Array, turns: Spectrum, out: Spectrum) -> None:
-    """Write the numbers x + i y ``(m, k)`` times ``turns`` ``(m,)`` to ``out``."""
+def _rotate(x: Array, y: Array, twiddles: Spectrum, out: Spectrum) -> None:
+    """Write the numbers x + i y ``(m, k)`` times ``twiddles`` ``(m,)`` to ``out``."""
     # Real and imaginary parts are computed separately because the rounding of numpy's complex
     # product differs between machines.
-    c, s = turns.real[:, None], turns.imag[:, None]
+    c, s = twiddles.real[:, None], twiddles.imag[:, None]
     np.subtract(x * c, y * s, out=out.real)
     np.add(x * s, y * c, out=out.imag)
 
 
-def _turned_back(z: Spectrum, turns: Spectrum) -> tuple[Array, Array]:
-    """Return real and imaginary parts of ``z`` ``(m, k)`` times ``turns`` ``(m,)`` conjugate."""
-    c, s, x, y = turns.real[:, None], turns.imag[:, None], z.real, z.imag
+def _rotated_back(z: Spectrum, twiddles: Spectrum) -> tuple[Array, Array]:
+    """Return real and imaginary parts of ``z`` ``(m, k)`` times ``twiddles`` ``(m,)`` conjugate."""
+    c, s, x, y = twiddles.real[:, None], twiddles.imag[:, None], z.real, z.imag
     return x * c + y * s, y * c - x * s
 
 

@@ -66,8 +66,8 @@ def _steps(spectrum: Spectrum, parts: int) -> tuple[Callable[[], Any], Callable[
         return _nothing, _nothing
     split, join = {2: (split_in_two, join_two), 4: (split_in_four, join_four)}[parts]
     steps = np.arange(parts)[:, None] * np.arange(len(spectrum) // parts)
-    turns = np.exp(-2j * np.pi / len(spectrum) * steps)
-    return lambda: split(spectrum, turns), lambda: join(spectrum, turns)
+    twiddles = np.exp(-2j * np.pi / len(spectrum) * steps)
+    return lambda: split(spectrum, twiddles), lambda: join(spectrum, twiddles)
 
 
 def _nothing() -> None:

@@ -67,7 +67,7 @@ def test_those_of_a_cylinder_are_per_length():
     assert pressed.elastic_energy == pytest.approx(work, rel=1e-3)
 
 
-@pytest.mark.parametrize("body", [STEEL, RIGID], ids=["alike", "unlike"])
+@pytest.mark.parametrize("body", [STEEL, RIGID], ids=["similar", "dissimilar"])
 def test_work_is_stored_or_dissipated(body):
     """The work by trapezoids in n and 2 n increments is compared with the energies.
 

@@ -75,7 +75,7 @@ def test_energy_is_of_second_order_in_the_increments():
     assert changes[-1] < 1e-2 * energies[-1]
 
 
-@pytest.mark.parametrize("second", [TITANIUM, STEEL], ids=["alike", "unlike"])
+@pytest.mark.parametrize("second", [TITANIUM, STEEL], ids=["similar", "dissimilar"])
 def test_a_near_state_to_begin_from_changes_the_work_only(second):
     """The surface has worn by a thousandth of the approach since the state of the initial guess."""
     solver = FrictionalContact(HalfSpace(GRID, ElasticPair(TITANIUM, second)), FRICTION)
@@ -170,7 +170,7 @@ def test_strain_is_that_of_body_2_over_body_1():
     np.testing.assert_allclose(again.shear, stretched.shear, atol=1e-6 * abs(right))
 
 
-@pytest.mark.parametrize("second", [TITANIUM, Material(200e3, 0.3)], ids=["alike", "unlike"])
+@pytest.mark.parametrize("second", [TITANIUM, Material(200e3, 0.3)], ids=["similar", "dissimilar"])
 def test_surfaces_that_move_evenly_along_x_are_strained(second):
     """Displacements ε x of the surfaces, before they touch and after, are a strain ε."""
     solver = FrictionalContact(HalfSpace(GRID, ElasticPair(TITANIUM, second)), FRICTION)

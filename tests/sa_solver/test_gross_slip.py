@@ -27,9 +27,9 @@ def slide(limit, energy, force, offset=REST, direction="energies", half_space=HA
         x, y = map(float, shift)
         twist = {} if half_space.grid.line else {"twist": 0.0}
         state = contact.solve(limit, offset, shift_x=x, shift_y=y, **twist, tolerance=tolerance)
-        spent = -np.sum(state.shear * state.slip, axis=(1, 2)) * area
+        dissipation = -np.sum(state.shear * state.slip, axis=(1, 2)) * area
         states.append(state)
-        return np.array([state.Qx, state.Qy]), spent
+        return np.array([state.Qx, state.Qy]), dissipation
 
     carried = float(limit.sum()) * area
     slip = gross_slip(solve, carried, np.array(energy), np.array(force), 1e-9, direction)

@@ -82,9 +82,9 @@ def test_the_estimate_is_near_the_error(begins: float, count: int) -> None:
     pressure, slip, exact = cycle(count, begins)
     error = errors_of_increments(pressure, slip, np.ones(count, dtype=bool))
     assert error is not None
-    told = float(error.sum(axis=0).mean())
+    estimate = float(error.sum(axis=0).mean())
     true = float(np.mean(summed(pressure, slip) - exact))
-    assert 1.0 / 3.0 < told / true < 3.0
+    assert 1.0 / 3.0 < estimate / true < 3.0
 
 
 @pytest.mark.parametrize("apart", [0.0, 2.0])

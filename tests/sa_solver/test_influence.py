@@ -28,7 +28,7 @@ POINTS = {
     "corner": (0.4, 0.25),
     "opposite corner": (-0.4, -0.25),
     "on the line of an edge": (0.9, 0.25),
-    "beside": (0.0, 0.6),
+    "next to it": (0.0, 0.6),
     "outside": (-0.7, 1.1),
     "far": (6.0, -9.0),
 }
@@ -134,7 +134,7 @@ def test_a_rectangle_is_the_integral_of_point_forces(pair, place):
     np.testing.assert_allclose(rectangle(point, pair), expected, rtol=0, atol=accuracy)
 
 
-@pytest.mark.parametrize("place", ["on the line of an edge", "beside", "outside", "far"])
+@pytest.mark.parametrize("place", ["on the line of an edge", "next to it", "outside", "far"])
 def test_outside_the_rectangle_gauss_points_find_the_same(place):
     x, w = np.polynomial.legendre.leggauss(40)
     sources = [c - 0.5 * s * x for c, s in zip(POINTS[place], SIZE, strict=True)]
@@ -181,9 +181,9 @@ def test_a_rectangle_is_the_sum_of_its_halves(place):
 def test_finite_on_corners_and_edges(row, column):
     edges = np.array([-1.0, 0.0, 1.0])
     coefficients = rectangle_influence(edges, edges, DISSIMILAR, row, column)
-    beside = rectangle_influence(edges + 1e-9, edges - 1e-9, DISSIMILAR, row, column)
+    shifted = rectangle_influence(edges + 1e-9, edges - 1e-9, DISSIMILAR, row, column)
     assert np.all(np.isfinite(coefficients))
-    np.testing.assert_allclose(coefficients, beside, rtol=0, atol=1e-7 * DISSIMILAR.normal)
+    np.testing.assert_allclose(coefficients, shifted, rtol=0, atol=1e-7 * DISSIMILAR.normal)
 
 
 def test_a_quarter_turn_exchanges_the_directions():

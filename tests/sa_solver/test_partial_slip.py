@@ -172,9 +172,9 @@ def test_a_flat_punch_slips_all_at_once():
 def test_unlike_bodies_and_no_load_are_refused():
     grid = grid_of(sphere(STEEL), 16)
     gap = (grid.x**2 + grid.y**2) / (2.0 * RADIUS)
-    unlike = NormalContact(HalfSpace(grid, ElasticPair(STEEL, SOFT)))
+    dissimilar = NormalContact(HalfSpace(grid, ElasticPair(STEEL, SOFT)))
     with pytest.raises(PartialSlipError, match="dissimilar"):
-        partial_slip_curve(unlike, gap, LOAD, tolerance=1e-8)
-    alike = NormalContact(HalfSpace(grid, ElasticPair(STEEL, STEEL)))
+        partial_slip_curve(dissimilar, gap, LOAD, tolerance=1e-8)
+    similar = NormalContact(HalfSpace(grid, ElasticPair(STEEL, STEEL)))
     with pytest.raises(PartialSlipError, match=r"load P .* = 0"):
-        partial_slip_curve(alike, gap, 0.0, tolerance=1e-8)
+        partial_slip_curve(similar, gap, 0.0, tolerance=1e-8)

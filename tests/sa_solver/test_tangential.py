@@ -213,9 +213,9 @@ def test_energy_of_every_increment():
         motions = np.array([state.shift_x, state.shift_y, state.twist])
         work = resultants(solver.grid, state.shear) @ motions
         elastic = np.sum(state.shear * (state.displacement - u)) * solver.grid.cell_area
-        spent = dissipated(solver, state)
-        assert spent >= 0.0
-        assert spent == pytest.approx(work - elastic, rel=1e-9, abs=1e-11 * abs(work))
+        lost = dissipated(solver, state)
+        assert lost >= 0.0
+        assert lost == pytest.approx(work - elastic, rel=1e-9, abs=1e-11 * abs(work))
         assert_solves(solver, limit, -u, state)
         expected = np.array(list(loads.values()))
         np.testing.assert_allclose(

@@ -128,7 +128,7 @@ transform = Transform({shape}, {padded})
 transform.forward(np.random.default_rng(0).standard_normal({shape}), 0)
 sys.stdout.buffer.write(transform.spectra[0].tobytes())
 """
-    told = subprocess.run([sys.executable, "-c", code], capture_output=True, check=True).stdout
+    output = subprocess.run([sys.executable, "-c", code], capture_output=True, check=True).stdout
     transform = Transform(shape, padded)
     transform.forward(np.random.default_rng(0).standard_normal(shape), 0)
-    assert told == transform.spectra[0].tobytes()
+    assert output == transform.spectra[0].tobytes()

@@ -116,8 +116,8 @@ def restless():
 
 @pytest.mark.usefixtures("restless")
 def test_a_tally_counts_what_any_thread_has_done_in_order():
-    told, things, threads = [], 500, 4
-    done = Tally(lambda count, total: told.append((count, total)), things * threads)
+    reported, things, threads = [], 500, 4
+    done = Tally(lambda count, total: reported.append((count, total)), things * threads)
     with ThreadPoolExecutor(threads) as pool:
         list(pool.map(lambda _: [done() for _ in range(things)], range(threads)))
-    assert told == [(count, things * threads) for count in range(1, things * threads + 1)]
+    assert reported == [(count, things * threads) for count in range(1, things * threads + 1)]

@@ -188,8 +188,7 @@ def test_what_has_no_meaning_is_refused(attempt):
 @pytest.mark.parametrize("form", [np.inf, "masked"])
 @pytest.mark.parametrize("cells", [48, 96])
 def test_a_disk_without_surroundings_is_a_flat_punch(form, cells):
-    """The approach is δ = P / 2 a E* for a circle of the same area, with half a cell at the edge.
-    """
+    """The approach is δ = P / 2 a E* for a circle of the same area, and half a cell at its edge."""
     grid = Grid.covering((2.4, 2.4), (cells, cells))
     disk = np.hypot(grid.x, grid.y) < 1.0
     height = np.where(disk, 0.0, np.inf)
@@ -211,7 +210,7 @@ def test_a_disk_without_surroundings_is_a_flat_punch(form, cells):
 HOLE = np.hypot(GRID.x - 0.05, GRID.y) < 0.08
 
 
-@pytest.mark.parametrize("pair", [ALIKE, UNLIKE], ids=["alike", "unlike"])
+@pytest.mark.parametrize("pair", [ALIKE, UNLIKE], ids=["similar", "dissimilar"])
 def test_nothing_touches_a_hole(pair):
     """A hole is like a pit one metre deep, for sheared bodies, free tilts and imposed approach."""
     pit, masked = np.where(HOLE, 1e3, BALL), np.ma.array(BALL, mask=HOLE)
@@ -283,7 +282,7 @@ def test_loads_by_name_are_those_by_place():
 # --- the border of the grid -----------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("pair", [ALIKE, UNLIKE], ids=["alike", "unlike"])
+@pytest.mark.parametrize("pair", [ALIKE, UNLIKE], ids=["similar", "dissimilar"])
 def test_a_contact_that_is_cut_off_says_so(pair):
     inside, cut = (advanced(height, pair) for height in (BALL, 1e-3 * BALL))
     assert inside.converged

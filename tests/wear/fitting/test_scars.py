@@ -61,17 +61,17 @@ def test_a_cylinder_between_two_runs_is_met_with_shift_height_and_tilt():
 
 def test_the_error_of_few_runs_is_told():
     """One run with twice the coefficient has a large error, a nearer third one a small error."""
-    told, errors = [], []
+    estimated, errors = [], []
     for of in (runs(2.0), runs(1.6, 2.0), runs(1.05, 1.6, 2.0)):
         scars = scar_problem([scan(UNIT, of)])
         found = fit(scars.problem)
-        told.append(scars.error_of_runs(found)[0])
+        estimated.append(scars.error_of_runs(found)[0])
         errors.append(found.values[0] / UNIT - 1.0)
-    assert np.isnan(told[0])
+    assert np.isnan(estimated[0])
     assert abs(errors[0]) > 0.02
-    assert abs(errors[1]) < abs(told[1])
+    assert abs(errors[1]) < abs(estimated[1])
     assert abs(errors[2]) < 1e-3
-    assert abs(told[2]) < 0.02
+    assert abs(estimated[2]) < 0.02
 
 
 def test_a_change_of_the_depths_moves_the_coefficient_to_first_order():
@@ -140,7 +140,7 @@ def test_profiles_of_two_materials_contradict_each_other():
     [
         ({"x": PLACES[::-1]}, "scan: places do not rise"),
         ({"depth": np.full(201, np.nan)}, "scan: a place or depth is not finite"),
-        ({"x": PLACES[:9]}, "scan: places and depths do not fit"),
+        ({"x": PLACES[:9]}, "scan: 9 places and 201 depths"),
         ({"x": PLACES[:4], "depth": np.ones(4)}, "scan: 4 points, which coefficient, shift"),
     ],
 )
