@@ -269,8 +269,7 @@ class Grid:
     def over(cls, size: tuple[float, float], shape: tuple[int, int], line: bool) -> Grid:
         """Return the grid over a face of ``size`` [mm], of one row of cells for a ``line``.
 
-        A line contact takes the first of ``size`` and ``shape`` only, as in :meth:`strips`; other
-        contacts are covered as by :meth:`covering`.
+        A line contact uses the first of ``size`` and of ``shape`` only.
         """
         return cls.strips(size[0], shape[0]) if line else cls.covering(size, shape)
 
@@ -373,7 +372,8 @@ def resultants(forces: Array, x: Array, y: Array) -> Array:
 
     Returns
     -------
-    ``(P, Qx, Qy, Mx, My, Mz)`` ``(6,)`` [N, N mm].
+    Array
+        ``(P, Qx, Qy, Mx, My, Mz)`` ``(6,)`` [N, N mm].
     """
     fx, fy, fz = forces
     moments = np.sum(fz * y), -np.sum(fz * x), np.sum(fy * x - fx * y)

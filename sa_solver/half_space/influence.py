@@ -49,7 +49,8 @@ def rectangle_influence(
 
     Returns
     -------
-    Influence coefficients ``(n, m)`` [mm/MPa].
+    Array
+        Influence coefficients ``(n, m)`` [mm/MPa].
     """
     x, y = np.asarray(edges_x)[:, None], np.asarray(edges_y)[None, :]
     corner = _corner_function(x, y, pair, row, column)

@@ -319,7 +319,8 @@ def sections(
 
     Returns
     -------
-    Stress ``(6, n, k)`` [MPa] of each body, below the n cells along ``axis``.
+    list of Array
+        Stress ``(6, n, k)`` [MPa] of each body, below the n cells along ``axis``.
 
     Raises
     ------

@@ -54,7 +54,8 @@ def rectangle_stress(edges_x: Array, edges_y: Array, depth: float, poisson: floa
 
     Returns
     -------
-    Stress ``(6, 3, n, m)`` [1] for six components and three tractions.
+    Array
+        Stress ``(6, 3, n, m)`` [1] for six components and three tractions.
     """
     x, y = np.asarray(edges_x)[:, None], np.asarray(edges_y)[None, :]
     corner = np.stack(

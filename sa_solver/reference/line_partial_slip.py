@@ -221,9 +221,11 @@ class BulkStressedCylinder:
         centre = self._offset(change, 0.5 * strain)
         slack = ROUNDING * self.contact.half_width
         if abs(centre) + stick > self.contact.half_width + slack:
-            raise InputError("the change of bulk stress reverses slip at one edge")
+            raise InputError("the change of bulk stress reverses slip at one edge: lower it")
         if abs(centre - self.offset) + self.stick_half_width > stick + slack:
-            raise InputError("slip on the way back reaches what stuck on first loading")
+            raise InputError(
+                "slip on the way back reaches the zone that stuck on first loading: turn back less"
+            )
         return stick, centre
 
     def reversed_shear(self, x: Array, tangential: float, bulk_stress: float) -> Array:
