@@ -283,7 +283,7 @@ def test_first_loading_of_a_line_contact_is_two_normal_problems(monkeypatch):
     np.testing.assert_allclose(two.shear[0], expected, atol=1e-6 * np.abs(expected).max())
 
 
-def test_progress_tells_what_is_done_of_all_marches():
+def test_progress_counts_all_marches():
     """With one part and then two, the first march is 5 of 15, and the second the rest."""
     half_space, height = cylinder(32)
     shares = []

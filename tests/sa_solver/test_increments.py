@@ -107,12 +107,12 @@ def test_slip_that_is_left_when_bodies_part_is_missed(apart: float) -> None:
     np.testing.assert_allclose(error[-1], -0.5 * (1.0 - 0.25), rtol=1e-12)
 
 
-def test_increments_that_all_turn_tell_nothing() -> None:
+def test_increments_that_all_turn_have_no_error_estimate() -> None:
     pressure, slip, _ = cycle(2)
     assert errors_of_increments(pressure, slip, np.ones(2, dtype=bool)) is None
 
 
-def test_a_few_cells_that_go_one_way_tell_nothing_of_the_others() -> None:
+def test_a_few_cells_that_go_one_way_give_no_estimate_for_the_others() -> None:
     """Two increments reverse the slip where most is worn; one cell creeps in one direction."""
     pressure = np.array([[2.0, 3.0, 1.0], [1.0, 2.0, 1.0]])
     slip = np.zeros((2, 2, 3))

@@ -128,7 +128,7 @@ def test_cells_dissipate_what_sliders_do_and_more_stages_say_so_better():
     assert errors[2] < 0.3 * errors[1] < 0.1 * errors[0]
 
 
-def test_a_contact_that_slides_slips_everywhere_alike():
+def test_a_sliding_contact_slips_uniformly():
     curve, _, _ = moved(sphere(STEEL))
     less, more = (curve.travelled(travel_of(curve, k * curve.shift[-1])) for k in (1.5, 3.0))
     pressed = curve.normal.pressure > 0.0
@@ -169,7 +169,7 @@ def test_a_flat_punch_slips_all_at_once():
 # --- what it cannot be --------------------------------------------------------------------------
 
 
-def test_unlike_bodies_and_no_load_are_refused():
+def test_dissimilar_bodies_and_no_load_are_refused():
     grid = grid_of(sphere(STEEL), 16)
     gap = (grid.x**2 + grid.y**2) / (2.0 * RADIUS)
     dissimilar = NormalContact(HalfSpace(grid, ElasticPair(STEEL, SOFT)))

@@ -133,7 +133,7 @@ def test_slope_after_a_reversal_tends_to_the_stuck_stiffness():
     assert extrapolated == pytest.approx(loop.stiffness, rel=0.01)
 
 
-def test_both_axes_are_alike_for_a_sphere():
+def test_both_axes_are_equal_for_a_sphere():
     along, across = (
         run(sphere(TITANIUM), LoopPath(LOAD, 0.5 * SLIDING, "force", 4, axis), cells=24)
         for axis in ("x", "y")
@@ -240,7 +240,7 @@ def test_stuck_dissimilar_bodies_are_softer_where_pressure_is_free():
 # --- dissimilar bodies --------------------------------------------------------------------------
 
 
-def test_dissimilar_bodies_slide_alike_and_close():
+def test_dissimilar_bodies_slide_symmetrically_and_close():
     """With β = 0.35 Mindlin's stiffness and energy, which neglect β, are within 2 %."""
     case = sphere(STEEL, SOFT)
     onset = case.displacement(SLIDING)

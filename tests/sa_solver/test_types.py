@@ -38,7 +38,7 @@ def test_identical_materials_are_exactly_similar(poisson):
     assert pair.similar
 
 
-def test_the_same_modulus_in_other_units_is_alike():
+def test_the_same_modulus_in_other_units_is_similar():
     """Conversions of units change the last digits."""
     off = 115e3 * (1.0 + 4.0 * np.finfo(float).eps)
     pair = ElasticPair(Material(115e3, 0.29), Material(off, 0.29))

@@ -283,7 +283,7 @@ def test_loads_by_name_are_those_by_place():
 
 
 @pytest.mark.parametrize("pair", [ALIKE, UNLIKE], ids=["similar", "dissimilar"])
-def test_a_contact_that_is_cut_off_says_so(pair):
+def test_a_contact_that_is_cut_off_has_a_message(pair):
     inside, cut = (advanced(height, pair) for height in (BALL, 1e-3 * BALL))
     assert inside.converged
     assert not inside.message
@@ -293,7 +293,7 @@ def test_a_contact_that_is_cut_off_says_so(pair):
     assert "border" in NormalContact(HALF_SPACE).solve(1e-3 * BALL, P).message
 
 
-def test_bodies_of_a_contact_modulus_are_alike():
+def test_bodies_of_a_contact_modulus_are_identical():
     pair = ElasticPair.from_contact_modulus(1e5, poisson=0.25)
     assert pair.contact_modulus == pytest.approx(1e5, rel=1e-14)
     assert pair.similar

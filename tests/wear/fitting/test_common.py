@@ -63,7 +63,7 @@ def test_tests_that_agree_are_called_apart_as_often_as_the_level_says(known):
     assert chances.mean() == pytest.approx(0.5, abs=4 * np.sqrt(1 / 12 / 80))
 
 
-def test_a_test_that_does_not_tell_has_no_value_of_its_own():
+def test_a_test_without_information_has_no_value_of_its_own():
     """A volume at zero energy does not determine the slope."""
     energy = np.array([1e6, 2e6, 4e6, 5e6, 0.0, 0.0])
     data = VolumeData("both", energy, 1e-9 * energy + 1e-5 * np.array([1, -2, 1, 0, 1, -1]))

@@ -101,7 +101,7 @@ def test_products_quotients_and_what_does_not_count_are_named():
     assert np.isnan([one.deviation for one in (a, b, c, d)]).all()
 
 
-def test_a_parameter_at_its_bound_is_told():
+def test_a_parameter_at_its_bound_is_reported():
     y = 1.0 - 0.5 * X
     held = FitProblem(
         (Unknown("start", size=1.0), Unknown("slope", lower=0.0)),

@@ -59,7 +59,7 @@ def test_a_cylinder_between_two_runs_is_met_with_shift_height_and_tilt():
     assert found.values[1:] == pytest.approx([0.13, 2e-3 + 1.5e-3 * middle, 1.5e-3], rel=2e-3)
 
 
-def test_the_error_of_few_runs_is_told():
+def test_the_error_of_few_runs_is_reported():
     """One run with twice the coefficient has a large error, a nearer third one a small error."""
     estimated, errors = [], []
     for of in (runs(2.0), runs(1.6, 2.0), runs(1.05, 1.6, 2.0)):
