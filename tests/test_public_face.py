@@ -117,7 +117,10 @@ def test_texts_of_public_classes_speak_of_every_field(name):
         fields = dataclasses.fields(value) if dataclasses.is_dataclass(value) else ()
         text = " ".join(base.__doc__ or "" for base in value.__mro__) if fields else ""
         quoted = " ".join(text.split("``")[1::2])
-        silent = {field.name for field in fields} - set(re.findall(r"\w+", quoted))
+        # An entry of a numpydoc section: names on a line, and an indented text below them.
+        entries = [names for _, names in re.findall(r"(?m)^( *)(\w+(?:, \w+)*)\n\1    \S", text)]
+        spoken = set(re.findall(r"\w+", " ".join([quoted, *entries])))
+        silent = {field.name for field in fields} - spoken
         assert not silent, f"{name}.{public} says nothing of {', '.join(sorted(silent))}"
 
 
