@@ -1,35 +1,35 @@
-"""Contact mechanics on elastic half-spaces, and the types, frames and signs that all share.
+"""Contact mechanics on elastic half-spaces, and the types, frames and signs shared by all packages.
 
-What is given
+Input
     - ``Material``: an isotropic elastic material.
-    - ``ElasticPair``: two of them in contact, as the compliances that count.
-    - ``Grid``: a uniform grid of cells over a contact, or the strips of a line contact.
+    - ``ElasticPair``: the elastic constants of two bodies in contact.
+    - ``Grid``: a uniform grid of cells over a contact, or over the width of a line contact.
     - ``Frame``: the origin and axes of an interface.
     - ``LoadHistory``: the resultants of an interface over a closed cycle.
 
-What is solved
+Solvers
     - ``HalfSpace``: displacement of two half-spaces under tractions on a grid, by FFT.
     - ``NormalContact``: pressure under a force or an approach.
     - ``TangentialContact``: shear and slip under a given pressure.
-    - ``CoupledContact``: pressure and shear of dissimilar bodies, together.
-    - ``FrictionalContact``: one increment after the other, whatever the bodies.
-    - ``ContactLoad``: what is imposed at the end of an increment.
+    - ``CoupledContact``: pressure and shear of dissimilar bodies, solved together.
+    - ``FrictionalContact``: increments of a contact with friction, for any pair of bodies.
+    - ``ContactLoad``: load or motion imposed at the end of an increment.
     - ``ContactLoadPath``: a sequence of such loads.
-    - ``march_history``: the states along a path, all of them or only those that count.
-    - ``LoopPath``: a motion or force to and fro.
-    - ``march_loop``: the hysteresis loop that it leads to, with stiffness and friction.
+    - ``march_history``: the states along a path, at all increments or at turning points only.
+    - ``LoopPath``: an imposed oscillating motion or force.
+    - ``march_loop``: the resulting hysteresis loop, with stiffness and friction.
     - ``partial_slip_curve``: force against motion up to sliding, from normal problems alone.
     - ``SubsurfaceStress``: stress inside either body under the tractions.
-    - ``von_mises``, ``principal_stresses``: what its components amount to.
+    - ``von_mises``, ``principal_stresses``: equivalent and principal stresses.
 
-What is raised
-    - ``FretscaleError``: the base of all.
-    - ``InputError``: data without a meaning or a solution.
-    - ``ConvergenceError``: a method that did not come to its end.
+Exceptions
+    - ``FretscaleError``: the base class of all exceptions.
+    - ``InputError``: data that are meaningless or admit no solution.
+    - ``ConvergenceError``: a method that did not converge.
 
-Closed forms to compare with are in :mod:`sa_solver.reference`, measured surfaces in
-:mod:`sa_solver.surfaces.scans`. Units are N, mm and MPa; signs are
-those of :mod:`sa_solver.types`. A sphere on a flat, against Hertz:
+Closed-form solutions for comparison are in :mod:`sa_solver.reference`, measured surfaces in
+:mod:`sa_solver.surfaces.scans`. Units are N, mm and MPa; signs are those of :mod:`sa_solver.types`.
+A sphere on a flat, compared with Hertz:
 
 >>> from sa_solver import ElasticPair, Grid, HalfSpace, Material, NormalContact
 >>> from sa_solver.reference.hertz import HertzSphere

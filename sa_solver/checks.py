@@ -1,8 +1,8 @@
-"""Checks of the arrays, numbers and choices that public functions and classes are given.
+"""Validation of the arrays, numbers and choices that are passed to public functions and classes.
 
-Anything else is refused with an :class:`~sa_solver.errors.InputError` that says what to give.
-Without that numpy would pass over the mask of a masked array, read texts and truth values as
-numbers, and fail far from the cause where a list or a single number stands for a field.
+Invalid values raise an :class:`~sa_solver.errors.InputError` that says what to give instead.
+Without these checks numpy would ignore the mask of a masked array, read texts and truth values as
+numbers, and fail far from the cause where a list or a single number is given in place of a field.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from sa_solver.errors import FretscaleError, InputError
 
 REAL = "fiu"
-"""Kinds of numpy's numbers that are real: floats, and whole numbers with and without a sign."""
+"""Kinds of numpy data types that hold real numbers: floats, signed and unsigned integers."""
 
 Shape = Sequence[int | None]
 
@@ -33,31 +33,31 @@ def array(
     finite: bool = True,
     order: Literal["C", "K"] = "C",
 ) -> NDArray[np.float64]:
-    """Return ``values`` as an array of 64-bit floats of ``shape``, itself where it is one.
+    """Return ``values`` as an array of 64-bit floats of ``shape``, without a copy if possible.
 
     Parameters
     ----------
     name
-        What the values are, in the plural, as it begins a message.
+        Name of the values in messages, in the plural.
     values
         An array or nested lists of real numbers.
     shape
-        The shape that they must have, with None for each length that may be any; None alone: any
-        shape.
+        Required shape, with None for axes that may have any length; None alone allows any shape.
     error
-        What is raised.
+        Class of the exception to raise.
     masked
-        What a masked value counts as; None: masked values are refused.
+        Value that replaces masked ones; None refuses masked values.
     infinite
-        Whether +infinity is a value.
+        Whether +infinity is allowed.
     finite
-        Whether values are looked at; False where whatever takes them does that.
+        Whether the values are checked to be finite. False skips the check, where a later step
+        makes it.
     order
-        C: rows lie one after the other in memory; K: as they are, for large matrices.
+        Memory layout: ``C`` for contiguous rows, ``K`` to keep the layout of large matrices.
     """
     plain = values if type(values) is np.ndarray else _without_mask(name, values, masked, error)
     if plain.dtype.kind not in REAL:
-        raise error(f"{name} are of the type {plain.dtype}: give real numbers")
+        raise error(f"{name} have the type {plain.dtype}: give real numbers")
     found: NDArray[np.float64] = np.asarray(plain, dtype=np.float64, order=order)
     if shape is not None and not _fits(shape, found.shape):
         raise error(f"{name} have shape {found.shape}: give {_shown(shape, found.shape)}")
@@ -94,7 +94,11 @@ def number(
     infinite: bool = False,
     error: type[FretscaleError] = InputError,
 ) -> float:
-    """Return ``value`` as a float within bounds; finite, but for +infinity where it is allowed."""
+    """Return ``value`` as a float, or raise ``error`` unless it is one number within the bounds.
+
+    The bounds are ``above`` (exclusive), ``least`` and ``most`` (both inclusive). The number must
+    be finite; ``infinite`` also allows +infinity. ``name`` is the name of the value in messages.
+    """
     plain: Any = np.ma.asanyarray(value)
     if plain.ndim or np.ma.getmaskarray(plain).any() or plain.dtype.kind not in REAL:
         raise error(f"{name} is {value!r}: give one real number")
@@ -110,7 +114,7 @@ def number(
 
 
 def numbers(holder: object, *names: str, **bounds: Any) -> None:
-    """Refuse what :func:`number` does in fields of these names, None excepted."""
+    """Check the fields ``names`` of ``holder`` by :func:`number`, except those that are None."""
     for name in names:
         value = getattr(holder, name)
         if value is not None:
@@ -118,7 +122,7 @@ def numbers(holder: object, *names: str, **bounds: Any) -> None:
 
 
 def whole(name: str, value: Any, error: type[FretscaleError] = InputError) -> int:
-    """Return ``value`` as a whole number, which a truth value is none of."""
+    """Return ``value`` as an integer, or raise ``error``: a truth value is no number."""
     try:
         if not isinstance(value, bool):
             return index(value)
@@ -130,7 +134,7 @@ def whole(name: str, value: Any, error: type[FretscaleError] = InputError) -> in
 def places(
     name: str, values: object, count: int, error: type[FretscaleError] = InputError
 ) -> NDArray[np.int64]:
-    """Return ``values`` as whole numbers from 0 to below ``count``, of any shape."""
+    """Return ``values``, of any shape, as indices from 0 to ``count`` - 1, or raise ``error``."""
     found = values if type(values) is np.ndarray else _without_mask(name, values, None, error)
     if found.size and (found.dtype.kind not in "iu" or found.min() < 0 or found.max() >= count):
         raise error(f"{name} {np.unique(found)}: give whole numbers from 0 to {count - 1}")
@@ -140,13 +144,13 @@ def places(
 def choice(
     name: str, value: object, allowed: Sequence[str], error: type[FretscaleError] = InputError
 ) -> None:
-    """Refuse a ``value`` that is none of those ``allowed``."""
+    """Raise ``error`` unless ``value`` is one of those ``allowed``."""
     if value not in allowed:
         raise error(f"{name} is {value!r}: give {' or '.join(allowed)}")
 
 
 def settle(frozen: object, **fields: object) -> None:
-    """Set checked ``fields`` of a frozen dataclass while it is made."""
+    """Set checked ``fields`` of a ``frozen`` dataclass instance during its construction."""
     for name, value in fields.items():
         object.__setattr__(frozen, name, value)
 
@@ -154,9 +158,12 @@ def settle(frozen: object, **fields: object) -> None:
 def _without_mask(
     name: str, values: object, masked: float | None, error: type[FretscaleError]
 ) -> NDArray[Any]:
-    """An array of ``values`` without its mask."""
+    """Return ``values`` as an array without a mask.
+
+    Masked values are replaced by ``masked``, or raise ``error`` if that is None.
+    """
     try:
-        # Lists may hold masked arrays, whose masks numpy alone would lose.
+        # Lists may hold masked arrays, whose masks np.asarray would lose.
         found: Any = np.ma.asanyarray(values)
     except ValueError as problem:
         raise error(f"{name} are no array: {problem}") from problem
@@ -178,7 +185,7 @@ def _fits(shape: Shape, given: tuple[int, ...]) -> bool:
 
 
 def _shown(shape: Shape, given: tuple[int, ...]) -> str:
-    """A shape for a message, and what was likely meant."""
+    """Return the required ``shape`` as text for a message, with a hint if axes seem swapped."""
     sizes = ", ".join("any" if wanted is None else str(wanted) for wanted in shape)
     text = f"({sizes},)" if len(shape) == 1 else f"({sizes})"
     turned = None not in shape and tuple(shape) == given[::-1] and len(given) > 1

@@ -1,9 +1,9 @@
-"""One increment of a frictional contact: normal and tangential problem, from state to state.
+"""Increments of a frictional contact: normal and tangential problems, from state to state.
 
-For similar bodies the normal problem does not feel shear and is solved first; its µp is the limit
-of the tangential one. Dissimilar bodies have both solved together. Where the load asks for more
-shear than friction carries, the contact slides as a whole, by the energies that the load history
-gives (:mod:`sa_solver.tangential.gross_slip`).
+For similar bodies the normal problem does not depend on shear and is solved first; its µp is the
+limit of the tangential problem. For dissimilar bodies both are solved together. Where the load
+needs more shear than friction can carry, the whole contact slides. The sliding motion then follows
+from the energies in the load history (:mod:`sa_solver.tangential.gross_slip`).
 
 Source: Gallego, Nélias & Jacq 2006, J. Tribol. 128, 476, doi:10.1115/1.2194914; Gallego 2007,
 eqs 6-8.
@@ -36,15 +36,15 @@ _State = TypeVar("_State", TangentialState, CoupledState)
 
 
 class FrictionError(InputError):
-    """The friction coefficient is not a number of 0 or more."""
+    """Friction coefficient that is not a number of 0 or more."""
 
 
 class FrictionalContact:
-    """Contact with friction on one grid; owns the solvers.
+    """Contact with friction on one grid, for similar and dissimilar bodies.
 
     Examples
     --------
-    Pressed, sheared and released, a cylinder keeps some of its slip:
+    A cylinder that is pressed, sheared and released does not recover all of its slip:
 
     >>> import numpy as np
     >>> from sa_solver import ContactLoad, ElasticPair, FrictionalContact, Grid, HalfSpace, Material
@@ -68,12 +68,10 @@ class FrictionalContact:
         tolerance: float = 1e-8,
         sliding: SlidingRule = "force",
     ) -> None:
-        """Plan for ``half_space`` and Coulomb's coefficient ``friction`` µ.
+        """Prepare the solvers for ``half_space`` and Coulomb's coefficient ``friction`` µ.
 
-        ``sliding`` is how gross slip finds its direction: see
-        :mod:`sa_solver.tangential.gross_slip`.
-
-        Raises FrictionError unless µ is finite and 0 or more.
+        ``sliding`` selects how the direction of gross slip is found: see
+        :mod:`sa_solver.tangential.gross_slip`. Raises FrictionError unless µ is finite and >= 0.
         """
         friction = checks.number("friction", friction, least=0.0, error=FrictionError)
         tolerance = checks.number("tolerance", tolerance, above=0.0)
@@ -83,7 +81,7 @@ class FrictionalContact:
         self._modes = PlanarModes.on(self.grid)
 
     def apart(self, height: Array, along: Array | None = None) -> ContactState:
-        """The bodies before they touch, at the gap ``height`` ``(nx, ny)`` [mm].
+        """Return the state of the unloaded bodies, with the gap ``height`` ``(nx, ny)`` [mm].
 
         Their surfaces may have moved ``along`` each other: see :class:`ContactLoad`.
         """
@@ -111,36 +109,36 @@ class FrictionalContact:
         load: ContactLoad,
         start: ContactStart | None = None,
     ) -> ContactState:
-        """The state under ``load``, from the state ``before`` it.
+        """Return the state under ``load`` that follows the state ``before``.
 
         ``height`` ``(nx, ny)`` [mm] is the gap of the unloaded bodies, infinite or masked where a
-        body has no surface. The search begins from ``start``, or from the state before. Raises what
-        the solvers raise for impossible data: NormalContactError, TangentialContactError.
+        body has no surface. ``start`` is the initial guess, by default the state ``before``. For
+        impossible data the solvers raise NormalContactError or TangentialContactError.
         """
         height = checked_heights(height, self.grid)
-        known = start or ContactStart()
+        guess = start or ContactStart()
         if not self.half_space.pair.similar:
-            return self._together(before, height, load, known)
-        normal = self._press(before, height, load, known.normal)
+            return self._advance_dissimilar(before, height, load, guess)
+        normal = self._press(before, height, load, guess.normal)
         limit = self.friction * normal.pressure
         offset, area = self.offset(before, load), self.grid.cell_area
         sliding = slides(limit, load, self._modes, self.grid.cell_area)
         if sliding:
-            tangential, creeps = self._slide(before, limit, offset, load, known)
-            held = self._held(before, limit, offset, load) if creeps else None
-            tangential, sliding = (tangential, True) if held is None else (held, False)
+            tangential, creeps = self._slide_similar(before, limit, offset, load, guess)
+            carried = self._carry_force(before, limit, offset, load) if creeps else None
+            tangential, sliding = (tangential, True) if carried is None else (carried, False)
         elif self.two_normal_problems(before, load) and abs(load.values[1]) < limit.sum() * area:
             tangential = first_loading(
                 self.normal, height, normal, self.friction, load.values[1], self.tolerance
             )
         else:
-            begin = ContactStart(shear=before.shear) if known.shear is None else known
+            begin = ContactStart(shear=before.shear) if guess.shear is None else guess
             tangential = self._shear(before, limit, offset, load, begin)
-        slip = self._slip(before, normal.pressure > 0.0, offset, tangential, _motion_of(tangential))
+        slip = self._slip(before, normal.pressure > 0.0, offset, tangential, tangential.motion)
         return self._state(before, load, normal, replace(tangential, slip=slip), sliding)
 
     def two_normal_problems(self, before: ContactState, load: ContactLoad) -> bool:
-        """Whether the shear follows from two normal problems: first loading of a line contact."""
+        """Return whether two normal problems give the shear: first loading of a line contact."""
         along_x = load.values[1] != 0.0 and load.values[2] == 0.0
         by_force = not any(load.motion[k] for k in (0, 1, 2, 4))
         moved = load.along is not None or before.along is not None
@@ -148,7 +146,11 @@ class FrictionalContact:
         return self.grid.line and self.friction > 0.0 and along_x and by_force and fresh
 
     def offset(self, before: ContactState, load: ContactLoad) -> Array:
-        """Tangential displacement ``(2, nx, ny)`` [mm] of the increment without its tractions."""
+        """Return the slip ``(2, nx, ny)`` [mm] of the increment but for new tractions and motions.
+
+        It holds the elastic displacement of the state ``before``, with the opposite sign, and the
+        imposed relative motion of the unloaded surfaces.
+        """
         offset = -before.displacement[:2]
         offset[0] += (load.strain - before.strain) * self.grid.x
         if load.along is not None:
@@ -160,12 +162,12 @@ class FrictionalContact:
     # -- similar bodies -----------------------------------------------------------------------
     @cached_property
     def normal(self) -> NormalContact:
-        """The solver of its pressure, where the bodies are alike."""
+        """Solver of the normal problem of similar bodies."""
         return NormalContact(self.half_space)
 
     @cached_property
     def tangential(self) -> TangentialContact:
-        """The solver of its shear, where the bodies are alike."""
+        """Solver of the tangential problem of similar bodies."""
         return TangentialContact(self.half_space)
 
     def _press(
@@ -214,13 +216,13 @@ class FrictionalContact:
             slipping=start.slipping,
         )
 
-    def _held(
+    def _carry_force(
         self, before: ContactState, limit: Array, offset: Array, load: ContactLoad
     ) -> TangentialState | None:
-        """The contact that creeps under its force, where that is still below the limit.
+        """Return the state under the imposed shear force, or None if friction cannot carry it.
 
-        Bodies that creep towards sliding dissipate less than sliding would: then the force of the
-        increment is to be believed, not its energy.
+        Bodies that creep towards sliding dissipate less than sliding bodies would. The state of the
+        increment then follows from its force, not from its energy.
         """
         try:
             state = self._shear(before, limit, offset, load, ContactStart(shear=before.shear))
@@ -228,18 +230,18 @@ class FrictionalContact:
             return None
         return state if state.converged else None
 
-    def _slide(
+    def _slide_similar(
         self,
         before: ContactState,
         limit: Array,
         offset: Array,
         load: ContactLoad,
-        known: ContactStart,
+        guess: ContactStart,
     ) -> tuple[TangentialState, bool]:
-        """Gross slip by the energy of ``load``, and whether it creeps."""
+        """Return similar bodies in gross slip by the energy of ``load``, and whether they creep."""
         shear = limit * sliding_direction(load.values[1:3])[:, None, None]
         twist = {} if self.grid.line else {"twist": 0.0}
-        begin = (shear, None) if known.shear is None else (known.shear, known.slipping)
+        begin = (shear, None) if guess.shear is None else (guess.shear, guess.slipping)
 
         def solve(shift: Array, tolerance: float, last: TangentialState | None) -> TangentialState:
             x, y = map(float, shift)
@@ -256,14 +258,14 @@ class FrictionalContact:
             )
 
         def slip_of(state: TangentialState) -> Array:
-            return self._slip(before, limit > 0.0, offset, state, _motion_of(state))
+            return self._slip(before, limit > 0.0, offset, state, state.motion)
 
-        near = _increment(before, known)
-        return self._by_energy(
+        near = guess.motion_from(before)
+        return self._slide_by_energy(
             solve, lambda state: limit, slip_of, before, shear, offset, load, near
         )
 
-    def _by_energy(
+    def _slide_by_energy(
         self,
         solve: Callable[[Array, float, _State | None], _State],
         limit_of: Callable[[_State], Array],
@@ -274,21 +276,21 @@ class FrictionalContact:
         load: ContactLoad,
         near: Array | None = None,
     ) -> tuple[_State, bool]:
-        """Gross slip by the energy of ``load``, and whether it creeps.
+        """Return the state in gross slip by the energy of ``load``, and whether it creeps.
 
-        ``solve`` finds the state for a motion (Δδx, Δδy), to a tolerance, from the last one;
-        ``limit_of`` gives its µp and ``slip_of`` its slip, and ``shear`` ``(2, nx, ny)`` is about
-        that of sliding. A motion ``near`` the one sought may be known.
+        ``solve`` returns the state after a motion (Δδx, Δδy), to a tolerance, from the last state.
+        ``limit_of`` returns its µp and ``slip_of`` its slip. ``shear`` ``(2, nx, ny)`` is an
+        estimate of the shear in sliding, and ``near`` an initial guess of the motion, if known.
         """
         assert load.energy is not None
         last: deque[_State] = deque(maxlen=1)
-        spent = 0
+        convolutions = 0
 
         def slide(shift: Array, tolerance: float) -> tuple[Array, Array]:
-            nonlocal spent
+            nonlocal convolutions
             state = solve(shift, tolerance, last[0] if last else None)
             last.append(state)
-            spent += state.convolutions
+            convolutions += state.convolutions
             force = state.shear.sum(axis=(1, 2)) * self.grid.cell_area
             return force, self._dissipated(before, limit_of(state), slip_of(state))
 
@@ -301,7 +303,7 @@ class FrictionalContact:
         found = last[0]
         failure = slip.message if found.converged else ""
         converged, message = found.converged and not failure, failure or found.message
-        state = replace(found, convolutions=spent, converged=converged, message=message)
+        state = replace(found, convolutions=convolutions, converged=converged, message=message)
         return state, slip.creeps
 
     def _state(
@@ -312,9 +314,9 @@ class FrictionalContact:
         tangential: TangentialState,
         sliding: bool,
     ) -> ContactState:
-        shift = _motion_of(tangential)
+
         rigid = np.array([normal.approach, 0.0, 0.0, normal.tilt_x, normal.tilt_y, 0.0])
-        rigid[list(PLANAR)] = before.rigid[list(PLANAR)] + shift
+        rigid[list(PLANAR)] = before.rigid[list(PLANAR)] + tangential.motion
         resultants = np.array([normal.P, 0.0, 0.0, normal.Mx, normal.My, 0.0])
         resultants[list(PLANAR)] = tangential.Qx, tangential.Qy, tangential.Mz
         messages = [message for message in (normal.message, tangential.message) if message]
@@ -346,11 +348,12 @@ class FrictionalContact:
         state: TangentialState | CoupledState,
         motion: Array,
     ) -> Array:
-        """Slip ``(2, nx, ny)`` [mm] of an increment, of the cells that part in it too.
+        """Return the slip ``(2, nx, ny)`` [mm] of an increment, also in cells that separate in it.
 
-        ``pressed`` ``(nx, ny)`` are in contact at its end, ``motion`` (3,) is (Δδx, Δδy, Δφz).
-        Where cells part their surfaces move on apart: they slip no farther than the pressed cell
-        next to them. Where all of the bodies part, nothing says how far they slid before.
+        ``pressed`` ``(nx, ny)`` are the cells in contact at its end; ``motion`` (3,) is (Δδx, Δδy,
+        Δφz). Surfaces of cells that separate go on to move without friction. Their slip is
+        therefore limited to that of the nearest cell in contact. Where all cells separate, the slip
+        before separation is unknown and taken as 0.
         """
         slip = np.where(pressed, state.slip, 0.0)
         parting = (before.pressure > 0.0) & ~pressed
@@ -358,12 +361,12 @@ class FrictionalContact:
             return slip
         moved, modes = state.displacement[:2] + offset, self._modes
         modes.add_motion(moved, -motion[: len(modes.free)] * modes.lengths)
-        beside, size = of_nearest(np.hypot(*slip), pressed, self.grid.pitch), np.hypot(*moved)
-        share = np.divide(beside, size, out=np.ones_like(size), where=size > beside)
+        nearest, size = of_nearest(np.hypot(*slip), pressed, self.grid.pitch), np.hypot(*moved)
+        share = np.divide(nearest, size, out=np.ones_like(size), where=size > nearest)
         return np.where(parting, share * moved, slip)
 
     def _dissipated(self, before: ContactState, limit: Array, slip: Array) -> Array:
-        """Energy in x and in y [N mm], where the increment ends with µp = ``limit``."""
+        """Return the energy (2,) [N mm] dissipated along x and y; ``limit`` is µp at the end."""
         mean = 0.5 * (self.friction * before.pressure + limit)
         work = dissipated(mean.ravel(), slip.reshape(2, -1))
         return np.asarray(work.sum(axis=1) * self.grid.cell_area)
@@ -373,20 +376,20 @@ class FrictionalContact:
     def _coupled(self) -> CoupledContact:
         return CoupledContact(self.half_space, self.friction)
 
-    def _together(
-        self, before: ContactState, height: Array, load: ContactLoad, known: ContactStart
+    def _advance_dissimilar(
+        self, before: ContactState, height: Array, load: ContactLoad, guess: ContactStart
     ) -> ContactState:
         offset = self.offset(before, load)
-        start = before.traction if known.together is None else known.together
+        start = before.traction if guess.together is None else guess.together
         sliding = False
         if load.energy is not None:
-            # The pressure hardly changes with shear: that without friction will do to judge it.
+            # Shear hardly changes the pressure, so the frictionless pressure gives the limit.
             unsheared = NormalStart(before.pressure, self.half_space.normal(before.pressure))
             limit = self.friction * self._press(before, height, load, unsheared).pressure
             sliding = slides(limit, load, self._modes, self.grid.cell_area)
         if sliding:
-            near = _increment(before, known)
-            state = self._slide_together(before, height, offset, load, limit, start, near)
+            near = guess.motion_from(before)
+            state = self._slide_dissimilar(before, height, offset, load, limit, start, near)
         else:
             values = load.values.copy()
             for k in PLANAR:
@@ -419,7 +422,7 @@ class FrictionalContact:
             cell_area=self.grid.cell_area,
         )
 
-    def _slide_together(
+    def _slide_dissimilar(
         self,
         before: ContactState,
         height: Array,
@@ -429,7 +432,10 @@ class FrictionalContact:
         start: Array,
         near: Array | None,
     ) -> CoupledState:
-        """Gross slip by the energy of ``load``, from tractions and perhaps a motion near it."""
+        """Return dissimilar bodies in gross slip by the energy of ``load``.
+
+        The search begins from the tractions ``start`` and the motion ``near``, if known.
+        """
         values = load.values.copy()
         values[5] = 0.0
         motion = (load.motion[0], True, True, load.motion[3], load.motion[4], not self.grid.line)
@@ -449,14 +455,4 @@ class FrictionalContact:
             motion = state.rigid[list(PLANAR)]
             return self._slip(before, state.pressure > 0.0, offset, state, motion)
 
-        return self._by_energy(solve, limit_of, slip_of, before, shear, offset, load, near)[0]
-
-
-def _motion_of(state: TangentialState) -> Array:
-    """(Δδx, Δδy, Δφz) [mm, rad] of an increment."""
-    return np.array([state.shift_x, state.shift_y, state.twist])
-
-
-def _increment(before: ContactState, known: ContactStart) -> Array | None:
-    """The motion (Δδx, Δδy) [mm] that leads from one to the other, if that is known."""
-    return None if known.motion is None else known.motion - before.rigid[1:3]
+        return self._slide_by_energy(solve, limit_of, slip_of, before, shear, offset, load, near)[0]

@@ -1,4 +1,4 @@
-"""What is imposed on a frictional contact in an increment, and its state at the end."""
+"""Load of a frictional contact in one increment, and its state at the end of the increment."""
 
 from __future__ import annotations
 
@@ -14,33 +14,49 @@ from sa_solver.traction_state import TractionState
 from sa_solver.types import Array, Mask
 
 MOTIONS = ("approach", "shift_x", "shift_y", "tilt_x", "tilt_y", "twist")
-"""Names of the motions conjugate to the resultants."""
+"""Names of the motions that are conjugate to the resultants, in the same order."""
 
 
 @dataclass(frozen=True, init=False)
 class ContactLoad:
-    """Load or motion imposed at the end of an increment, by names or as an array.
+    """Load or motion imposed at the end of an increment, given by keywords or as an array.
 
-    By names it is ``P`` [N; per mm on line grids] or the ``approach`` δz [mm] since the bodies were
-    apart; of ``Qx`` and ``shift_x`` δx, ``Qy`` and ``shift_y`` δy, ``Mz`` [N mm] and ``twist`` φz
-    [rad] one each, the force 0 where neither is named; and of ``Mx`` and ``tilt_x`` φx, ``My`` and
-    ``tilt_y`` φy one each, the tilt held at 0 where neither is named: ``Mx=0.0, My=0.0`` lets the
-    bodies turn.
+    For each of the six rigid freedoms either the resultant or the motion is imposed. Forces are per
+    mm on line grids. Motions count from the state in which the bodies are apart.
 
-    As an array, ``values`` (6,) are (P, Qx, Qy, Mx, My, Mz) or, where ``motion`` (6,) says so, the
-    motions (δz, δx, δy, φx, φy, φz). A moment of 0 in it lets the bodies turn.
+    Parameters
+    ----------
+    values
+        All six values at once, instead of the keywords below: the resultants (P, Qx, Qy, Mx, My,
+        Mz) or, where ``motion`` is true, the motions (δz, δx, δy, φx, φy, φz). A moment Mx or My of
+        0 lets the bodies turn.
+    motion
+        For each of ``values``, whether it is a motion.
+    strain
+        Mismatch ε_2 - ε_1 along x between the unloaded surfaces, due to a bulk stress.
+    energy
+        Energy (2,) [N mm] that the increment dissipates along x and y, if known.
+    along
+        Tangential motion ``(2, nx, ny)`` [mm] of the unloaded surfaces relative to each other, in
+        addition to ``strain`` and without rigid motions.
+    P, approach
+        Normal force [N] or approach δz [mm]; one of them is required.
+    Qx, shift_x, Qy, shift_y, Mz, twist
+        Shear forces [N] or shifts δx, δy [mm], and moment [N mm] or twist φz [rad]. The force or
+        moment is 0 where neither of a pair is given.
+    Mx, tilt_x, My, tilt_y
+        Moments [N mm] or tilts φx, φy [rad]. The tilt is held at 0 where neither of a pair is
+        given; ``Mx=0.0, My=0.0`` lets the bodies turn.
 
-    ``strain`` is the mismatch ε_2 - ε_1 along x of the unloaded surfaces (bulk stress). ``along``
-    ``(2, nx, ny)`` [mm] is what these have moved relative to each other beside that, tractions and
-    rigid motions apart. ``energy`` (2,) [N mm], if known, is what the increment dissipates in x and
-    in y.
-
-    Raises InputError for both of a pair, neither ``P`` nor ``approach``, names beside ``values``,
-    or values of another number or type.
+    Raises
+    ------
+    InputError
+        If both of a pair are given, neither ``P`` nor ``approach``, keywords in addition to
+        ``values``, or values of a wrong number or type.
 
     Examples
     --------
-    500 N, and then a motion of 2 µm along x while it is kept:
+    A load of 500 N, followed by a motion of 2 µm along x under the same load:
 
     >>> from sa_solver import ContactLoad
     >>> from sa_solver import ElasticPair, FrictionalContact, Grid, HalfSpace, Material
@@ -87,9 +103,11 @@ class ContactLoad:
         if values is None:
             values, motion = _named(forces, motions)
         elif any(value is not None for value in forces + motions):
-            raise InputError("a load has values and names beside them: give one or the other")
+            raise InputError(
+                "a load is given by values and by keywords such as P: give one or the other"
+            )
         if np.shape(motion) != (6,):
-            raise InputError(f"the motion of a load is {motion!r}: give six switches")
+            raise InputError(f"the motion of a load is {motion!r}: give six truth values")
         checks.settle(
             self,
             values=checks.array("values of a load", values, (6,), finite=False),
@@ -105,12 +123,12 @@ class ContactLoad:
 def _named(
     forces: tuple[float | None, ...], motions: tuple[float | None, ...]
 ) -> tuple[Array, tuple[bool, ...]]:
-    """Values and switches of a load of which some forces and motions are named."""
+    """Return the values (6,) of a load given by keywords, and which of them are motions."""
     values, switches = [], []
     for k, (force, motion) in enumerate(zip(forces, motions, strict=True)):
         if force is not None and motion is not None:
             raise InputError(
-                f"a load has {RESULTANTS[k]} and {MOTIONS[k]}: impose one, the other follows"
+                f"a load has both {RESULTANTS[k]} and {MOTIONS[k]}: impose one, the other follows"
             )
         if k == 0 and force is None and motion is None:
             raise InputError("a load has neither P nor approach: impose one of them")
@@ -123,12 +141,23 @@ def _named(
 
 @dataclass(frozen=True)
 class ContactStart:
-    """Where a search may begin if somebody knows a state near the one sought.
+    """Initial guess of the solver: a known state near the one sought.
 
-    Its ``normal`` pressure, its ``shear`` ``(2, nx, ny)`` [MPa] with the cells ``slipping``
-    ``(nx, ny)`` and the ``motion`` (δx, δy) [mm] since the bodies were apart, or of unlike bodies
-    both tractions ``together`` ``(3, nx, ny)``; None of what nobody knows. What is found is the
-    same within the tolerance.
+    The guess affects the number of iterations but not the solution, within the tolerance. Fields
+    that are not known are None.
+
+    Attributes
+    ----------
+    normal
+        Pressure and its displacement, of similar bodies.
+    shear
+        Shear ``(2, nx, ny)`` [MPa] of similar bodies.
+    slipping
+        Cells ``(nx, ny)`` that slip under this shear.
+    motion
+        Rigid motion (δx, δy) [mm] since the bodies were apart.
+    together
+        Shear and pressure ``(3, nx, ny)`` [MPa] of dissimilar bodies.
     """
 
     normal: NormalStart | None = None
@@ -137,22 +166,50 @@ class ContactStart:
     motion: Array | None = None
     together: Array | None = None
 
+    def motion_from(self, before: ContactState) -> Array | None:
+        """Return the motion (Δδx, Δδy) [mm] from ``before`` to this guess, None if unknown."""
+        return None if self.motion is None else self.motion - before.rigid[1:3]
+
 
 @dataclass(frozen=True)
 class ContactState(TractionState):
     """State of a frictional contact at the end of an increment.
 
-    Fields: ``traction`` ``(3, nx, ny)`` ordered qx, qy, p [MPa], its ``displacement`` K t
-    ``(3, nx, ny)`` [mm], ``slip`` ``(2, nx, ny)`` [mm] of the increment in cells
-    pressed before or after it, ``gap`` ``(nx, ny)`` [mm],
-    ``sticking`` ``(nx, ny)``. ``resultants`` (6,) and ``rigid`` (6,) are ordered as in
-    :class:`ContactLoad`, of which ``strain`` and ``along`` are; ``rigid`` counts from the bodies
-    apart. ``energy`` (2,) is dissipated in the increment in x and y [N mm]. ``sliding`` says that
-    the whole contact slipped by its energy: then the Q in ``resultants`` follows, and need not be
-    the one given. ``residual`` is the largest of the residuals of the problems solved; ``message``
-    says what is wrong, of a state that has not ``converged`` and of a contact that reaches the
-    grid's border, where cells carry the share ``border_load`` of P; else it is empty. ``cell_area``
-    [mm²] is that of the grid.
+    Attributes
+    ----------
+    traction
+        Tractions qx, qy, p ``(3, nx, ny)`` [MPa].
+    displacement
+        Elastic displacement K t ``(3, nx, ny)`` [mm] under these tractions.
+    slip
+        Slip ``(2, nx, ny)`` [mm] of the increment in cells that were in contact before or after it.
+    gap
+        Gap ``(nx, ny)`` [mm].
+    sticking
+        Cells in contact that stick ``(nx, ny)``.
+    resultants, rigid
+        Resultants (6,) and rigid motions (6,) since the bodies were apart, ordered as in
+        :class:`ContactLoad`.
+    energy
+        Energy (2,) [N mm] dissipated in the increment along x and y.
+    converged
+        Whether all problems were solved to the tolerance.
+    cell_area
+        Area of a cell of the grid [mm²].
+    strain, along
+        Mismatch of the unloaded surfaces, as in :class:`ContactLoad`.
+    sliding
+        Whether the whole contact slid by a motion that follows from the given energy. The shear
+        force in ``resultants`` is then a result and may differ from the imposed one.
+    residual
+        Largest residual of the problems solved.
+    message
+        What is wrong, if the state has not ``converged`` or the contact reaches the border of the
+        grid; empty otherwise.
+    convolutions
+        Cost of the increment in convolutions.
+    border_load
+        Share of P that the outermost cells carry; above 0 the grid is too small.
     """
 
     traction: Array
@@ -181,11 +238,11 @@ class ContactState(TractionState):
 
     @property
     def pressed(self) -> NormalStart:
-        """To begin from in the search for pressures near this one's."""
+        """Initial guess for a normal problem with a similar pressure."""
         return NormalStart(self.pressure, self.displacement[2])
 
     @property
     def as_start(self) -> ContactStart:
-        """To begin from in the search for a state near this one."""
+        """Initial guess for a search for a state near this one."""
         motion = self.rigid[1:3]
         return ContactStart(self.pressed, self.shear, self.slipping, motion, self.traction)

@@ -1,7 +1,7 @@
-"""Names that a package offers, imported when they are first asked for (PEP 562).
+"""Lazy imports: the public names of a package are imported on first access (PEP 562).
 
-So that importing a package of the library costs next to nothing, and the transforms, compilers,
-meshers and finite elements behind its names are loaded by those who use them.
+Importing a package of the library then costs next to nothing. The transforms, compilers, meshers
+and finite elements behind its names are loaded only by programs that use them.
 """
 
 from __future__ import annotations
@@ -14,9 +14,10 @@ from importlib import import_module
 def lazy_names(
     package: str, modules: Mapping[str, Sequence[str]], within: str | None = None
 ) -> tuple[Callable[[str], object], Callable[[], list[str]]]:
-    """Return ``__getattr__`` and ``__dir__`` of a ``package`` that offers names of its ``modules``.
+    """Return ``__getattr__`` and ``__dir__`` of a ``package`` whose names are imported lazily.
 
-    The modules lie ``within`` the package itself, or another one; "" if their names are complete.
+    ``modules`` lists the public names by the module that defines them. The modules are looked up in
+    the package ``within``, or in ``package`` itself by default; "" if their names are complete.
     """
     home = package if within is None else within
     prefix = f"{home}." if home else ""

@@ -1,10 +1,10 @@
-"""The two steps of a contact's splitting, on tractions of the zero-padded grid.
+"""Elastic step and local step of the splitting of a contact problem, on the zero-padded grid.
 
-The elastic relation ``v = K t + offset - R c`` is met exactly there, since the padded K is
+The elastic relation ``v = K t + offset - R c`` is met exactly there, because the padded K is
 circulant and the law off the grid is t = 0. The rigid motions c are such that t has the given
-resultants. The caller says which components the tractions have and which law they obey on the grid:
-pressure alone (:mod:`sa_solver.normal.splitting`) or pressure and shear
-(:mod:`sa_solver.dissimilar.contact`).
+resultants. The caller decides which components the tractions have and which law they obey on the
+grid: pressure alone (:mod:`sa_solver.normal.splitting`) or pressure and shear
+(:mod:`sa_solver.dissimilar.splitting`).
 """
 
 from __future__ import annotations
@@ -18,15 +18,16 @@ from sa_solver.half_space.operator import HalfSpaceResolvent
 from sa_solver.types import Array
 
 Sums = Callable[[Array], Array]
-"""Products ``(k,)`` with k rigid modes of a traction ``(c, nx, ny)``."""
+"""Function that returns the products ``(k,)`` of a traction ``(c, nx, ny)`` with k rigid modes."""
 
 
 @dataclass(frozen=True)
 class RigidResponse:
-    """Tractions ``(k, c, mx, my)`` in answer to unit motions, and their products ``(k, k)``.
+    """Response of a resolvent to unit rigid motions.
 
-    Row i of ``products`` are those of the traction in answer to motion i with all k modes, which
-    ``sums`` gives of any traction.
+    ``tractions`` ``(k, c, mx, my)`` are the tractions in response to each of the k motions. Row i
+    of ``products`` ``(k, k)`` holds the products of the response to motion i with all k modes.
+    ``sums`` returns such products of any traction.
     """
 
     tractions: Array
@@ -35,7 +36,7 @@ class RigidResponse:
 
     @classmethod
     def of(cls, resolvent: HalfSpaceResolvent, motions: Array, sums: Sums) -> RigidResponse:
-        """That to the ``motions`` ``(k, c, nx, ny)`` of unit size; one solve for each."""
+        """Return the response to unit ``motions`` ``(k, c, nx, ny)``, by one solve for each."""
         shape = (motions.shape[1], *resolvent.padded_shape)
         tractions = np.array([resolvent.solve(resolvent.padded(motion)) for motion in motions])
         products = [sums(resolvent.on_grid(traction)) for traction in tractions]
@@ -43,13 +44,13 @@ class RigidResponse:
         return cls(tractions.reshape(count, *shape), np.reshape(products, (count, count)), sums)
 
     def only(self, places: list[int]) -> RigidResponse:
-        """That to some of the motions."""
+        """Return the response to the motions with the indices ``places``."""
         products = self.products[np.ix_(places, places)]
         return RigidResponse(self.tractions[places], products, lambda t: self.sums(t)[places])
 
 
 class PaddedSplitting:
-    """``elastic_step`` and ``local_law`` of :func:`sa_solver.splitting.douglas_rachford`."""
+    """Steps ``elastic_step`` and ``local_law`` for :func:`sa_solver.splitting.douglas_rachford`."""
 
     def __init__(
         self,
@@ -59,9 +60,21 @@ class PaddedSplitting:
         offset: Array,
         law: Callable[[Array], Array],
     ) -> None:
-        """``offset`` ``(c, nx, ny)`` [mm], ``target`` ``(k,)`` [MPa] the imposed sums.
+        """Prepare the two steps.
 
-        ``law`` takes a traction ``(c, nx, ny)`` on the grid to one that obeys the contact law.
+        Parameters
+        ----------
+        resolvent
+            Resolvent of the half-space on the padded grid.
+        response
+            Its response to the free rigid motions.
+        target
+            Imposed sums ``(k,)`` of the tractions [MPa].
+        offset
+            Relative displacement ``(c, nx, ny)`` without tractions [mm].
+        law
+            Function that maps a traction ``(c, nx, ny)`` on the grid to one that obeys the contact
+            law.
         """
         self._resolvent, self._response = resolvent, response
         self._target, self._law = target, law
@@ -71,7 +84,7 @@ class PaddedSplitting:
         """Motions ``(k,)`` of the last elastic step."""
 
     def elastic_step(self, state: Array) -> Array:
-        """``(K + ρ)⁻¹ (ρ s - offset + R c)`` with the motions c that meet the resultants."""
+        """Return ``(K + ρ)⁻¹ (ρ s - offset + R c)`` with the motions c that meet the resultants."""
         resolvent = self._resolvent
         traction = resolvent.solve(resolvent.shift * state - self._offset)
         missing = self._target - self._response.sums(resolvent.on_grid(traction))
@@ -80,5 +93,5 @@ class PaddedSplitting:
         return traction
 
     def local_law(self, trial: Array) -> Array:
-        """The contact law on the grid, and 0 off it."""
+        """Return ``trial`` with the contact law applied on the grid, and 0 off it."""
         return self._resolvent.padded(self._law(self._resolvent.on_grid(trial)))

@@ -1,11 +1,11 @@
-"""Rigid motions on cells, and the resultants that are their conjugates.
+"""Rigid motions of the cells of a grid, and the conjugate resultants.
 
 A rigid motion (δx, δy, δz, φx, φy, φz) displaces the cell at (x, y) by
 
     u_x = δx - φz y,    u_y = δy + φz x,    u_z = δz + φx y - φy x
 
-The normal problem knows the three of u_z (:class:`NormalModes`), the tangential problem the three
-of u_x and u_y (:class:`PlanarModes`), the contact of dissimilar bodies all six
+The normal problem has the three modes of u_z (:class:`NormalModes`), the tangential problem the
+three modes of u_x and u_y (:class:`PlanarModes`), and the contact of dissimilar bodies has all six
 (:class:`RigidModes`). Signs are those of :mod:`sa_solver.types`.
 """
 
@@ -20,41 +20,42 @@ import numpy as np
 from sa_solver.types import Array, Grid, Indices
 
 BALANCE_TOLERANCE = 1e-13
-"""Resultants left by :meth:`NormalModes.balance`, relative to the load: rounding of a sum."""
+"""Error of the resultants after :meth:`NormalModes.balance`, relative to the load: rounding."""
 
 BALANCE_ITERATIONS = 100
-"""Newton takes 2 to 5; the rest lets a load close to the edge of its support be reached."""
+"""Most iterations of a balance. Newton's method usually takes 2 to 5; loads close to the edge of
+the pressed cells take more."""
 
 LARGEST_EXPONENT_STEP = 2.0
-"""Cap on one Newton step of the exponent, so that no cell changes by more than e² at once."""
+"""Largest Newton step of the exponent, so that no cell changes by more than e² at once."""
 
 RANK_CUTOFF = 1e-12
-"""Relative singular value below which a set of cells is one point or one line, and cannot feel
-the corresponding rotation."""
+"""Relative singular value below which a set of cells is a single point or line, so that it cannot
+resist the corresponding rotation."""
 
 APPROACH, TILT_X, TILT_Y = range(3)
-"""The normal modes δz, φx and φy."""
+"""Indices of the normal modes δz, φx and φy."""
 
 POWERS, SIGNS = ((0, 0), (0, 1), (1, 0)), (1.0, 1.0, -1.0)
-"""Of x and y in each of these modes, and its sign."""
+"""Powers of x and y in each normal mode, and the sign of the mode."""
 
 RESULTANTS = ("P", "Qx", "Qy", "Mx", "My", "Mz")
-"""Order of the six resultants, and of the motions conjugate to them: δz, δx, δy, φx, φy, φz."""
+"""Order of the six resultants, and of the conjugate motions δz, δx, δy, φx, φy, φz."""
 
 NORMAL, PLANAR = (0, 3, 4), (1, 2, 5)
-"""Places among the six of P, Mx, My and of Qx, Qy, Mz, and of their motions."""
+"""Indices of P, Mx, My and of Qx, Qy, Mz among the six resultants, and of their motions."""
 
 Window = tuple[slice, slice]
 
 
 @dataclass(frozen=True)
 class NormalModes:
-    """Those modes of ``δz + φx y - φy x`` that are ``free``, on a box of cells.
+    """Free modes of the rigid motion ``δz + φx y - φy x`` on a box of cells.
 
-    ``x`` ``(nx,)`` and ``y`` ``(ny,)`` are the cell centres over half the size of the whole grid,
-    Lx and Ly, so that the modes 1, y, -x lie within -1 and 1. Their products with a pressure field
-    are P/S, Mx/(Ly S), My/(Lx S), all in MPa. Coefficients and sums ``(k,)`` are of the free modes,
-    in their order.
+    ``x`` ``(nx,)`` and ``y`` ``(ny,)`` are the coordinates of the cell centres over half the size
+    of the whole grid, Lx and Ly, so that the modes 1, y and -x lie between -1 and 1. Products of
+    the modes with a pressure field are P/S, Mx/(Ly S) and My/(Lx S), all in MPa. Coefficients and
+    sums ``(k,)`` have one entry for each of the modes ``free``, in their order.
     """
 
     x: Array
@@ -63,7 +64,7 @@ class NormalModes:
 
     @classmethod
     def on(cls, grid: Grid, free: tuple[int, ...] = (APPROACH, TILT_X, TILT_Y)) -> NormalModes:
-        """Modes of a whole grid; a tilt that moves none of its cells is never free."""
+        """Return the modes of a whole grid, without tilts that move none of its cells."""
         x, y = (
             centres.ravel() / (0.5 * size)
             for centres, size in zip((grid.x, grid.y), grid.size, strict=True)
@@ -72,24 +73,24 @@ class NormalModes:
         return cls(x, y, tuple(mode for mode in free if not still.get(mode, False)))
 
     def cropped(self, window: Window) -> NormalModes:
-        """The same modes on part of the cells."""
+        """Return the same modes on the cells of ``window``."""
         x, y = self.x[window[0]], self.y[window[1]]
         whole = len(x) == len(self.x) and len(y) == len(self.y)
         return self if whole else replace(self, x=x, y=y)
 
     def sums(self, fields: Array) -> Array:
-        """Products ``(..., k)`` of fields ``(..., nx, ny)`` with the modes."""
+        """Return the products ``(..., k)`` of ``fields`` ``(..., nx, ny)`` with the modes."""
         moments = self._powers_x[:2] @ (fields @ self._powers_y[:, :2])
         i, j, signs = self._places
         return np.asarray(signs * moments[..., i, j])
 
     def motion(self, coefficients: Array) -> Array:
-        """Rigid displacement field ``(nx, ny)``."""
+        """Return the rigid displacement field ``(nx, ny)`` with these ``coefficients`` ``(k,)``."""
         along_x, along_y = self._profiles(coefficients)
         return along_x[:, None] + along_y
 
     def subtract(self, field: Array, coefficients: Array, out: Array) -> None:
-        """``field - motion(coefficients)`` into ``out``, all ``(nx, ny)``."""
+        """Write ``field - motion(coefficients)`` to ``out``, all ``(nx, ny)``."""
         along_x, along_y = self._profiles(coefficients)
         np.subtract(field, along_x[:, None], out=out)
         if along_y.any():
@@ -98,27 +99,28 @@ class NormalModes:
     def subtract_weighted(
         self, field: Array, weight: Array, coefficients: Array, scratch: Array
     ) -> None:
-        """``field -= weight * motion(coefficients)`` in place, all ``(nx, ny)``."""
+        """Subtract ``weight * motion(coefficients)`` from ``field`` in place, all ``(nx, ny)``."""
         along_x, along_y = self._profiles(coefficients)
         field -= np.multiply(weight, along_x[:, None], out=scratch)
         if along_y.any():
             field -= np.multiply(weight, along_y, out=scratch)
 
     def fields(self) -> Array:
-        """The modes themselves, ``(k, nx, ny)``."""
+        """Return the modes as fields ``(k, nx, ny)``."""
         units = np.eye(len(self.free))
         return np.reshape([self.motion(unit) for unit in units], (-1, self.x.size, self.y.size))
 
     def products(self, weight: Array) -> Array:
-        """Products ``(k, k)`` of the modes with one another, weighted by a field ``(nx, ny)``."""
+        """Return the products ``(k, k)`` of the modes, weighted by a field ``(nx, ny)``."""
         return self._products(self._powers_x @ (weight @ self._powers_y))
 
     def balance(self, pressure: Array, target: Array) -> Array | None:
-        """``pressure`` times ``exp(a + b y + c x)`` such that its sums are ``target`` ``(k,)``.
+        """Return ``pressure`` times ``exp(a + b y + c x)`` such that its sums are ``target``.
 
-        The factor is positive, so cells in contact stay in contact: Newton's method on a convex
-        function (the field of least relative entropy). Returns None where no such field exists,
-        because the load acts outside the convex hull of the pressed cells.
+        The factor is positive, so that cells in contact stay in contact. It is found by Newton's
+        method on a convex function: the result is the field of least relative entropy with the sums
+        ``target`` ``(k,)``. None is returned where no such field exists because the load acts
+        outside the convex hull of the pressed cells.
         """
         if not self.free:
             return pressure
@@ -143,46 +145,46 @@ class NormalModes:
             exponent += step * min(1.0, LARGEST_EXPONENT_STEP / self._largest(step))
         return None
 
-    # -- fields that are sums or products of a profile along x and one along y ------------------
+    # -- fields that are the sum or product of a profile along x and one along y ----------------
     @cached_property
     def _powers_x(self) -> Array:
-        """1, x and x² ``(3, nx)``."""
+        """Powers 1, x and x² ``(3, nx)``."""
         return np.stack([np.ones_like(self.x), self.x, self.x * self.x])
 
     @cached_property
     def _powers_y(self) -> Array:
-        """1, y and y² ``(ny, 3)``."""
+        """Powers 1, y and y² ``(ny, 3)``."""
         return np.stack([np.ones_like(self.y), self.y, self.y * self.y], axis=1)
 
     @cached_property
     def _places(self) -> tuple[Indices, Indices, Array]:
-        """Powers of x and y in the free modes, and their signs ``(k,)`` each."""
+        """Powers of x and of y in the free modes, and the signs of the modes, each ``(k,)``."""
         free = list(self.free)
         i, j = np.array(POWERS)[free].T
         return i, j, np.array(SIGNS)[free]
 
     @cached_property
     def _places_of_products(self) -> tuple[Indices, Indices, Array]:
-        """The same of products of two free modes ``(k, k)`` each."""
+        """Powers of x and of y in products of two free modes, and their signs, each ``(k, k)``."""
         i, j, signs = self._places
         return i[:, None] + i, j[:, None] + j, signs[:, None] * signs
 
     def _profiles(self, coefficients: Array) -> tuple[Array, Array]:
-        every = np.zeros(3)
-        every[list(self.free)] = coefficients
-        return self._all_profiles(every)
+        all_three = np.zeros(3)
+        all_three[list(self.free)] = coefficients
+        return self._all_profiles(all_three)
 
-    def _all_profiles(self, every: Array) -> tuple[Array, Array]:
-        """Parts along x and along y of the motion with three coefficients."""
-        return every[APPROACH] - every[TILT_Y] * self.x, every[TILT_X] * self.y
+    def _all_profiles(self, all_three: Array) -> tuple[Array, Array]:
+        """Return the profiles along x and y of the motion with the coefficients of all modes."""
+        return all_three[APPROACH] - all_three[TILT_Y] * self.x, all_three[TILT_X] * self.y
 
-    def _largest(self, every: Array) -> float:
-        """Largest size of that motion, which it has at a corner."""
-        along_x, along_y = (profile[[0, -1]] for profile in self._all_profiles(every))
+    def _largest(self, all_three: Array) -> float:
+        """Return the largest size of this motion, which is at a corner of the grid."""
+        along_x, along_y = (profile[[0, -1]] for profile in self._all_profiles(all_three))
         return max(float(np.abs(along_x[:, None] + along_y).max()), np.finfo(float).tiny)
 
     def _moments(self, weight: Array, exponent: Array) -> Array:
-        """``Σ w e x^i y^j`` for i, j up to 2, with e the exponential of a rigid motion."""
+        """Return ``Σ w e x^i y^j`` for i, j up to 2, with e the exponential of a rigid motion."""
         along_x, along_y = (np.exp(part) for part in self._all_profiles(exponent))
         return (self._powers_x * along_x) @ (weight @ (self._powers_y * along_y[:, None]))
 
@@ -192,7 +194,10 @@ class NormalModes:
 
 
 def pseudoinverse(matrix: Array) -> Array:
-    """That of a symmetric ``matrix`` ``(k, k)`` of few modes, for which numpy's takes long."""
+    """Return the pseudoinverse of a symmetric ``matrix`` ``(k, k)``.
+
+    For matrices of a few modes this is much faster than numpy's function.
+    """
     values, vectors = np.linalg.eigh(matrix)
     sizes = np.abs(values)
     kept = sizes > RANK_CUTOFF * sizes.max(initial=0.0)
@@ -201,17 +206,21 @@ def pseudoinverse(matrix: Array) -> Array:
 
 
 def mode_lengths(grid: Grid) -> Array:
-    """1, Ly, Lx: coefficients of normal modes over these are δz [mm], φx and φy [rad], ``(3,)``."""
+    """Return 1, Ly, Lx ``(3,)``: coefficients of normal modes over these are δz, φx and φy.
+
+    Ly and Lx are half the size of the grid [mm].
+    """
     return np.array([1.0, 0.5 * grid.size[1], 0.5 * grid.size[0]])
 
 
 @dataclass(frozen=True)
 class PlanarModes:
-    """Those rigid motions δx, δy, φz in the contact plane that are ``free``, on a box of cells.
+    """Free modes δx, δy and φz of rigid motion in the contact plane, on a box of cells.
 
     The rotation is scaled by ``length``, half the larger side of the grid: ``x`` ``(nx,)`` and
-    ``y`` ``(ny,)`` are cell centres over that. Coefficients and sums ``(k,)`` are of the free
-    modes; products with a shear field are Qx/S, Qy/S, Mz/(L S), all in MPa.
+    ``y`` ``(ny,)`` are the coordinates of the cell centres over this length. Products of the modes
+    with a shear field are Qx/S, Qy/S and Mz/(L S), all in MPa. Coefficients and sums ``(k,)`` have
+    one entry for each of the modes ``free``.
     """
 
     x: Array
@@ -221,30 +230,30 @@ class PlanarModes:
 
     @classmethod
     def on(cls, grid: Grid) -> PlanarModes:
-        """All modes of a whole grid; a line contact knows no rotation."""
+        """Return all modes of a whole grid; a line contact has no rotation."""
         length = 0.5 * max(grid.size)
         free = (0, 1) if grid.line else (0, 1, 2)
         return cls(grid.x[:, 0] / length, grid.y[0] / length, length, free)
 
     def cropped(self, window: Window) -> PlanarModes:
-        """The same modes on part of the cells."""
+        """Return the same modes on the cells of ``window``."""
         return replace(self, x=self.x[window[0]], y=self.y[window[1]])
 
     def only(self, free: tuple[int, ...]) -> PlanarModes:
-        """Fewer of the modes."""
+        """Return the same modes with only those in ``free``."""
         return replace(self, free=free)
 
     @property
     def lengths(self) -> Array:
-        """Resultants over sums and cell area, ``(k,)``: 1, 1 and the length."""
+        """Factors 1, 1 and the length ``(k,)`` from sums times the cell area to resultants."""
         return np.array([1.0, 1.0, self.length])[list(self.free)]
 
     def sums(self, field: Array) -> Array:
-        """Products ``(k,)`` of a field ``(2, nx, ny)`` with the modes."""
-        along_x, along_y = field @ self._lines_y
-        turned = self.x @ along_y[:, 0] - along_x[:, 1].sum()
-        every = np.array([along_x[:, 0].sum(), along_y[:, 0].sum(), turned])
-        return every[list(self.free)]
+        """Return the products ``(k,)`` of a field ``(2, nx, ny)`` with the modes."""
+        along_x, along_y = field @ self._powers_y
+        rotation = self.x @ along_y[:, 0] - along_x[:, 1].sum()
+        all_three = np.array([along_x[:, 0].sum(), along_y[:, 0].sum(), rotation])
+        return all_three[list(self.free)]
 
     def add_motion(self, field: Array, coefficients: Array) -> None:
         """Add the rigid motion with these coefficients ``(k,)`` to a field ``(2, nx, ny)``."""
@@ -259,78 +268,81 @@ class PlanarModes:
         field[1] += weight * along_y[:, None]
 
     def fields(self) -> Array:
-        """The modes themselves, ``(k, 2, nx, ny)``."""
+        """Return the modes as fields ``(k, 2, nx, ny)``."""
         fields = np.zeros((len(self.free), 2, self.x.size, self.y.size))
         for field, unit in zip(fields, np.eye(len(self.free)), strict=True):
             self.add_motion(field, unit)
         return fields
 
     def products(self, xx: Array, xy: Array, yy: Array) -> Array:
-        """Products ``(k, k)`` of the modes with one another under a field of tensors."""
-        moments = np.array([tensor @ self._lines_y for tensor in (xx, xy, yy)])
+        """Return the products ``(k, k)`` of the modes, weighted by a symmetric tensor field.
+
+        ``xx``, ``xy`` and ``yy`` ``(nx, ny)`` are the components of the tensors.
+        """
+        moments = np.array([tensor @ self._powers_y for tensor in (xx, xy, yy)])
         (xx_, xy_, yy_), x = moments, self.x
-        turned_x = x @ xy_[:, 0] - xx_[:, 1].sum()
-        turned_y = x @ yy_[:, 0] - xy_[:, 1].sum()
-        twice = xx_[:, 2].sum() - 2.0 * (x @ xy_[:, 1]) + (x * x) @ yy_[:, 0]
-        both = xy_[:, 0].sum()
-        every = np.array(
+        x_rotation = x @ xy_[:, 0] - xx_[:, 1].sum()
+        y_rotation = x @ yy_[:, 0] - xy_[:, 1].sum()
+        rotation_squared = xx_[:, 2].sum() - 2.0 * (x @ xy_[:, 1]) + (x * x) @ yy_[:, 0]
+        x_y = xy_[:, 0].sum()
+        all_products = np.array(
             [
-                [xx_[:, 0].sum(), both, turned_x],
-                [both, yy_[:, 0].sum(), turned_y],
-                [turned_x, turned_y, twice],
+                [xx_[:, 0].sum(), x_y, x_rotation],
+                [x_y, yy_[:, 0].sum(), y_rotation],
+                [x_rotation, y_rotation, rotation_squared],
             ]
         )
-        return every[np.ix_(self.free, self.free)]
+        return all_products[np.ix_(self.free, self.free)]
 
     @cached_property
-    def _lines_y(self) -> Array:
-        """1, y and y² as columns, ``(ny, 3)``."""
+    def _powers_y(self) -> Array:
+        """Powers 1, y and y² ``(ny, 3)``."""
         return np.stack([np.ones_like(self.y), self.y, self.y * self.y], axis=1)
 
     def _profiles(self, coefficients: Array) -> tuple[Array, Array]:
-        """The motion along x, ``(ny,)``, and along y, ``(nx,)``."""
-        every = np.zeros(3)
-        every[list(self.free)] = coefficients
-        return every[0] - every[2] * self.y, every[1] + every[2] * self.x
+        """Return the displacement along x, ``(ny,)``, and along y, ``(nx,)``."""
+        all_three = np.zeros(3)
+        all_three[list(self.free)] = coefficients
+        return all_three[0] - all_three[2] * self.y, all_three[1] + all_three[2] * self.x
 
 
 class RigidModes:
-    """All six rigid motions on a grid, in the order of :data:`RESULTANTS`.
+    """All six modes of rigid motion on a grid, in the order of :data:`RESULTANTS`.
 
-    Coefficients ``(6,)`` are in mm: rotations times ``lengths``, half the grid's size across their
-    axis. Resultants ``(6,)`` are in MPa: over the cell area, and moments over ``lengths`` too.
-    ``present`` are the motions that move some cell of the grid.
+    Coefficients ``(6,)`` are in mm: rotations are multiplied by ``lengths``, half the size of the
+    grid across their axis. Sums ``(6,)`` are in MPa: resultants over the cell area, moments also
+    over ``lengths``. ``present`` lists the motions that move at least one cell of the grid.
     """
 
     def __init__(self, grid: Grid) -> None:
-        """Modes of ``grid``. A line contact goes on along y and knows neither φx nor φz."""
+        """Prepare the modes of ``grid``; a line contact has neither φx nor φz."""
         self.grid = grid
         self._normal, self._planar = NormalModes.on(grid), PlanarModes.on(grid)
         self.lengths = np.ones(6)
         self.lengths[list(NORMAL)] = mode_lengths(grid)
         self.lengths[PLANAR[-1]] = self._planar.length
-        # On a single cell a twist moves nothing.
+        # A twist does not move the centre of a single cell.
         planar = self._planar.free if max(grid.shape) > 1 else self._planar.free[:2]
         self._planar = self._planar.only(planar)
         self._places = [NORMAL[k] for k in self._normal.free], [PLANAR[k] for k in planar]
         self.present = tuple(sorted([*self._places[0], *self._places[1]]))
 
     def cropped(self, window: Window) -> RigidModes:
-        """The same modes on part of the cells."""
+        """Return the same modes on the cells of ``window``."""
         part = copy(self)
         part._normal, part._planar = self._normal.cropped(window), self._planar.cropped(window)
         return part
 
     def normal(self, free: tuple[int, ...]) -> NormalModes:
-        """Those of pressure among the ``free`` ones."""
+        """Return the normal modes among the motions ``free``."""
         return replace(self._normal, free=tuple(k for k in self._normal.free if NORMAL[k] in free))
 
     def planar(self, free: tuple[int, ...]) -> PlanarModes:
-        """Those of shear among the ``free`` ones."""
+        """Return the planar modes among the motions ``free``."""
         return self._planar.only(tuple(k for k in self._planar.free if PLANAR[k] in free))
 
     def motion(self, coefficients: Array) -> Array:
-        """The displacement ``(3, nx, ny)`` [mm] with ``coefficients`` ``(6,)``."""
+        """Return the displacement ``(3, nx, ny)`` [mm] with these ``coefficients`` ``(6,)``."""
         normal, planar = self._places
         field = np.zeros((3, self._normal.x.size, self._normal.y.size))
         self._planar.add_motion(field[:2], coefficients[planar])
@@ -338,7 +350,10 @@ class RigidModes:
         return field
 
     def sums(self, traction: Array) -> Array:
-        """Products ``(6,)`` of ``traction`` ``(3, nx, ny)`` with the modes, 0 if not present."""
+        """Return the products ``(6,)`` of ``traction`` ``(3, nx, ny)`` with the modes.
+
+        They are 0 for modes that are not ``present``.
+        """
         normal, planar = self._places
         sums = np.zeros(6)
         sums[normal] = self._normal.sums(traction[2])
@@ -346,5 +361,5 @@ class RigidModes:
         return sums
 
     def resultants(self, traction: Array) -> Array:
-        """``(P, Qx, Qy, Mx, My, Mz)`` [N, N mm] of ``traction`` ``(3, nx, ny)`` [MPa]."""
+        """Return ``(P, Qx, Qy, Mx, My, Mz)`` [N, N mm] of ``traction`` ``(3, nx, ny)`` [MPa]."""
         return self.sums(traction) * self.lengths * self.grid.cell_area

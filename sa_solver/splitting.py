@@ -1,13 +1,13 @@
-"""Douglas-Rachford splitting with Anderson acceleration, for contact problems of any kind.
+"""Douglas-Rachford splitting with Anderson acceleration, for any contact problem.
 
-A contact problem asks for tractions that satisfy an elastic relation (linear, global) and a contact
-law (nonlinear, cell by cell). The splitting needs only the two resolvents: it repeats
+The tractions of a contact problem satisfy an elastic relation (linear, global) and a contact law
+(nonlinear, cell by cell). The splitting needs only the resolvents of the two and repeats
 
-    t1 = elastic_step(s)            the elastic relation near s, resultants met exactly
+    t1 = elastic_step(s)            the elastic relation near s, with the exact resultants
     t2 = local_law(2 t1 - s)        the contact law near the reflected point
     s  = s + 1.6 (t2 - t1)
 
-until ``t1 = t2``, which then satisfies both.
+until ``t1 = t2``, which satisfies both.
 
 Sources: Lions & Mercier 1979, SIAM J. Numer. Anal. 16, 964, doi:10.1137/0716071; Walker & Ni 2011,
 SIAM J. Numer. Anal. 49, 1715, doi:10.1137/10078356X.
@@ -24,55 +24,55 @@ from numpy.typing import NDArray
 from sa_solver.types import Array
 
 OVER_RELAXATION = 1.6
-"""Step along ``t2 - t1``, in (0, 2). Once accelerated it hardly matters: 1.0 to 1.9 took 35 to 52
-iterations on flats and spheres, without an order."""
+"""Factor of the step along ``t2 - t1``, between 0 and 2. With acceleration it hardly matters: 1.0
+to 1.9 took 35 to 52 iterations on flats and spheres, without a trend."""
 
 ANDERSON_DEPTH = 10
-"""Differences remembered. On flats and spheres 0, 3, 5, 10 and 20 took about 285, 70, 60, 43 and 39
-iterations, and each difference costs memory and time."""
+"""Number of stored differences. On flats and spheres 0, 3, 5, 10 and 20 differences took about 285,
+70, 60, 43 and 39 iterations. Each difference costs memory and time."""
 
 RESTART_GROWTH = 2.0
-"""The memory is dropped when the residual grows by this factor in one iteration: the contact set
-has changed and the old differences mislead."""
+"""Growth of the residual in one iteration above which the stored differences are dropped: the
+contact set has changed, so that they mislead."""
 
 GRAM_CUTOFF = 1e-13
-"""Eigenvalues of the scaled Gram matrix below this are rounding, since it squares the differences:
-their directions are left out of the least-squares problem."""
+"""Eigenvalues of the scaled Gram matrix below this value are rounding, because the matrix squares
+the differences. Their directions are left out of the least-squares problem."""
 
 RETURN_GROWTH = 10.0
-"""An extrapolation to a residual this many times the least so far is taken back: it may have thrown
-a body off its contacts, where it would float on for ever. Plain steps get on, if slowly. A body
-that floats towards its contacts must not be held back so: there the residual grows on landing."""
+"""Growth of the residual over the smallest so far above which an extrapolation is undone. Such an
+extrapolation may have lifted a body off its contacts, where it would move on for ever; plain steps
+converge, if slowly. It must not be undone for a body that moves towards its contacts, because the
+residual grows when the body lands."""
 
 AT_REST = 1e-9
-"""A residual that changes by less than this share of itself is that of a body in free motion, at
-constant speed until it meets something: differences are rounding, and would throw it far off."""
+"""Relative change of the residual below which a body moves freely at constant speed. Differences
+are then rounding, and an extrapolation from them would throw the body far off."""
 
 ROUNDING = float(np.finfo(np.float64).eps)
-"""A state larger than its steps by more than the inverse of this holds no digit of them."""
+"""A step smaller than the state by more than this factor is lost in the digits of the state."""
 
 TINY = np.finfo(float).tiny
 """Keeps divisions by a vanishing size finite."""
 
 REFRESHED = 1e4
-"""An elastic step that is exact near one state only is told of the present one where that is
-farther from it than so many steps: of a matrix in single precision the error is then 1/2000 of the
-step. It takes as many iterations as in double precision, and so it did with a tenth and ten times
-of this."""
+"""Distance from the last refreshed state, in steps, beyond which an inexact elastic step is
+refreshed. The error of a matrix in single precision is then 1/2000 of the step. The number of
+iterations is the same as in double precision, also with a tenth or ten times this distance."""
 
 HARDLY_CHANGED = 1e-3
-"""So it is where the residual changes by less than this share of itself: whether a body is at
-constant speed, see :data:`AT_REST`, only exact steps tell."""
+"""Relative change of the residual below which an inexact elastic step is refreshed as well: only
+exact steps show whether a body moves at constant speed (:data:`AT_REST`)."""
 
 SplittingStep = Callable[[Array], Array]
 
 
 @dataclass(frozen=True)
 class SplittingResult:
-    """Outcome of a splitting; arrays have the shape of the start.
+    """Result of a splitting; arrays have the shape of the start.
 
-    ``solution`` obeys the local law exactly and ``elastic`` the elastic relation exactly; they
-    differ by ``residual`` times the scale. ``state`` is the start of a next solve.
+    ``solution`` obeys the local law exactly, ``elastic`` the elastic relation. They differ by
+    ``residual`` times the scale. ``state`` can start the next solve.
     """
 
     state: Array
@@ -96,26 +96,38 @@ def douglas_rachford(
 ) -> SplittingResult:
     """Iterate the two steps from ``start`` until ``|t2 - t1| <= tolerance scale``.
 
-    ``scale`` is the size to measure the residual against, max(|t1|, |t2|) unless it is given.
-    ``elastic_step`` and ``local_law`` map an array of any shape to one of the same shape and must
-    not modify it. ``returning`` takes back extrapolations that made things much worse. With
-    ``refresh`` the ``elastic_step`` need be exact only at the start, and then at the last state
-    that ``refresh`` was called with: whenever its error might count, and where the tolerance is
-    met, which must be so afterwards. A result that has not converged after ``max_iterations`` says
-    so.
+    Parameters
+    ----------
+    elastic_step, local_law
+        Steps that map an array to a new array of the same shape, without modifying it.
+    start
+        Initial state, of any shape.
+    scale
+        Size to which the residual is relative; max(|t1|, |t2|) by default.
+    tolerance
+        Bound on the relative residual.
+    max_iterations
+        Most iterations. The result says whether the iteration has converged.
+    returning
+        Whether an extrapolation that made the residual much larger is undone.
+    refresh
+        Function for an ``elastic_step`` that is exact near one state only: first near the start,
+        then near the state with which ``refresh`` was last called. It is called whenever the error
+        of the step may matter, and before a state is accepted as converged.
     """
     state = np.array(start, dtype=np.float64)
     memory = AndersonMemory(state.size, returning)
     elastic = solution = state
-    residual, last, known, iterations = np.inf, np.inf, state, 0
+    residual, last, refreshed, iterations = np.inf, np.inf, state, 0
     while iterations < max_iterations:
         iterations += 1
         elastic, solution, residual = _both_steps(elastic_step, local_law, state, scale, tolerance)
-        if refresh is not None and state is not known:
-            far = np.linalg.norm(state - known) > REFRESHED * np.linalg.norm(solution - elastic)
+        if refresh is not None and state is not refreshed:
+            distance = np.linalg.norm(state - refreshed)
+            far = distance > REFRESHED * np.linalg.norm(solution - elastic)
             if far or residual <= tolerance or abs(residual - last) <= HARDLY_CHANGED * last:
                 refresh(state)
-                known = state
+                refreshed = state
                 elastic, solution, residual = _both_steps(
                     elastic_step, local_law, state, scale, tolerance
                 )
@@ -134,14 +146,14 @@ def _both_steps(
     scale: float | None,
     tolerance: float,
 ) -> tuple[Array, Array, float]:
-    """``t1``, ``t2`` and the residual that they leave."""
+    """Return ``t1``, ``t2`` and their relative difference."""
     elastic = elastic_step(state)
     solution = local_law(2.0 * elastic - state)
     size = scale or max(np.linalg.norm(solution), np.linalg.norm(elastic), TINY)
     residual = float(np.linalg.norm(solution - elastic) / size)
     if ROUNDING * np.linalg.norm(state) > tolerance * size:
-        # Thrown so far off that steps of this size are lost in its digits: no solution, though
-        # nothing may seem to be left.
+        # The state is so large that such a step is lost in its digits. This is no solution, even
+        # if the difference vanishes.
         residual = np.inf
     return elastic, solution, residual
 
@@ -149,14 +161,18 @@ def _both_steps(
 class AndersonMemory:
     """Anderson acceleration (type II) of a fixed-point iteration ``s ← s + f(s)``.
 
-    Holds the last :data:`ANDERSON_DEPTH` differences of images and of residuals, and the Gram
-    matrix of the latter, of which each iteration renews one row and column. Differences are kept in
-    single precision, over the first residual's size: they only correct an image that is exact, take
-    the same number of iterations as in double precision, and reading them is most of the work.
+    It stores the last :data:`ANDERSON_DEPTH` differences of images and of residuals, and the Gram
+    matrix of the differences of residuals; each iteration renews one row and column of the matrix.
+    The differences are stored in single precision, relative to the size of the first residual. They
+    only correct an exact image, so that the number of iterations is the same as in double
+    precision, and reading them is most of the work.
     """
 
     def __init__(self, size: int, returning: bool) -> None:
-        """Memory for vectors of ``size`` values."""
+        """Allocate memory for vectors of ``size`` values.
+
+        ``returning`` is that of :func:`douglas_rachford`.
+        """
         self._returning = returning
         self._images = np.empty((ANDERSON_DEPTH, size), dtype=np.float32)
         self._residuals = np.empty((ANDERSON_DEPTH, size), dtype=np.float32)
@@ -169,7 +185,7 @@ class AndersonMemory:
         self._seen = 0
 
     def next_state(self, state: Array, residual: Array) -> Array:
-        """The next state from this ``state`` and its ``residual`` f(s), both ``(size,)``."""
+        """Return the state that follows ``state`` with its ``residual`` f(s), both ``(size,)``."""
         image = state + residual
         norm = float(np.linalg.norm(residual))
         if self._seen == 0:
@@ -188,31 +204,31 @@ class AndersonMemory:
         return accelerated
 
     def _accelerate(self, image: Array, residual: Array) -> Array:
-        """Combine the remembered images so that the combined residual is least."""
+        """Return the combination of the stored images that has the smallest residual."""
         slot = (self._seen - 1) % ANDERSON_DEPTH
         used = min(self._seen, ANDERSON_DEPTH)
-        self._keep(self._residuals[slot], residual, self._last_residual)
-        self._keep(self._images[slot], image, self._last_image)
-        remembered = self._residuals[:used]
-        moved = np.linalg.norm(self._residuals[slot]) * self._unit
-        if moved <= AT_REST * self._last_norm:
+        self._store_difference(self._residuals[slot], residual, self._last_residual)
+        self._store_difference(self._images[slot], image, self._last_image)
+        stored = self._residuals[:used]
+        change = np.linalg.norm(self._residuals[slot]) * self._unit
+        if change <= AT_REST * self._last_norm:
             self._seen = 0
             return image
-        self._gram[slot, :used] = self._gram[:used, slot] = remembered @ self._residuals[slot]
+        self._gram[slot, :used] = self._gram[:used, slot] = stored @ self._residuals[slot]
         scaled = (residual / self._unit).astype(np.float32)
-        products = (remembered @ scaled).astype(np.float64)
+        products = (stored @ scaled).astype(np.float64)
         weights = _solve_gram(self._gram[:used, :used], products)
         correction = weights.astype(np.float32) @ self._images[:used]
         return image - self._unit * correction
 
-    def _keep(self, place: NDArray[np.float32], new: Array, last: Array) -> None:
-        """The difference of ``new`` and ``last`` over the unit, into ``place``."""
-        np.subtract(new, last, out=place, casting="same_kind")
-        place /= self._unit
+    def _store_difference(self, out: NDArray[np.float32], new: Array, last: Array) -> None:
+        """Write the difference of ``new`` and ``last``, relative to the unit, to ``out``."""
+        np.subtract(new, last, out=out, casting="same_kind")
+        out /= self._unit
 
 
 def _solve_gram(gram: Array, right: Array) -> Array:
-    """Least-squares weights from a Gram matrix that may be singular to rounding."""
+    """Return the least-squares weights for a Gram matrix that may be singular to rounding."""
     scale = 1.0 / np.sqrt(np.maximum(np.diag(gram), TINY))
     values, vectors = np.linalg.eigh(gram * np.outer(scale, scale))
     kept = values > GRAM_CUTOFF * values[-1]

@@ -1,8 +1,9 @@
-"""Long work in steps whose results somebody may keep, so that whoever is cut off goes on from them.
+"""Long computations in steps whose results can be stored, so that an interrupted run can resume.
 
-A method hands its steps over and knows nothing of files. What a step gives follows from what the
-method knows before it, and a method remembers nothing else of it: then a step that is taken from
-what an earlier run has kept leads to the same end, bit for bit, as one that is computed.
+A method passes its steps to a :class:`Steps` object and knows nothing of files. The result of a
+step must follow from the state of the method before the step, and the method must use nothing of
+the step but its result. A run that reads the result of a step from an earlier run then ends in the
+same state, bit for bit, as a run that computes it.
 """
 
 from __future__ import annotations
@@ -14,25 +15,26 @@ T = TypeVar("T")
 
 
 class Steps(Protocol):
-    """Whoever takes the steps of a method, one after the other, in the order they are handed over.
+    """Runner of the steps of a method, which takes them in the order in which they are passed.
 
-    A step may have steps of its own. ``name`` says what a step is.
+    A step may have steps of its own. ``name`` identifies a step.
     """
 
     def __call__(self, name: str, step: Callable[[], T]) -> T:
-        """What a ``step`` gives."""
+        """Return the result of ``step``, computed or read from storage."""
         ...
 
     def march(self, name: str, state: T, advance: Callable[[T], T | None]) -> T:
-        """The last of states of which each follows from the one before, which is then forgotten.
+        """Return the last state of a sequence in which each state follows from the one before.
 
-        ``advance`` gives the next, None after the last.
+        ``advance`` returns the next state, or None after the last. Only the latest state is needed
+        to continue.
         """
         ...
 
 
 class _Computed:
-    """Every step is computed, nothing is kept."""
+    """Runner that computes every step and stores nothing."""
 
     def __call__(self, name: str, step: Callable[[], T]) -> T:
         return step()
@@ -44,4 +46,4 @@ class _Computed:
 
 
 COMPUTED: Steps = _Computed()
-"""Steps of a method that nobody interrupts."""
+"""Runner for methods that need not resume: every step is computed, nothing is stored."""

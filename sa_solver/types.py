@@ -42,24 +42,25 @@ Indices = NDArray[np.int64]
 Mask = NDArray[np.bool_]
 
 ALIKE = 1e-12
-"""|β| up to which bodies are alike: what rounding leaves of moduli in different units."""
+"""Largest |β| of elastically similar bodies; it allows for moduli rounded in different units."""
 
 SQUARE = 1e-6
-"""How far products of a frame's axes may be from 0 and 1: six printed digits."""
+"""Largest error of the products of a frame's axes (0 and 1): axes of six printed digits pass."""
 
 Progress = Callable[[int, int], None]
-"""Told how many of how many things are done, as often as it may be."""
+"""Callback that receives the number of items done and the total number of items."""
 
 
 def unseen(done: int, total: int) -> None:
-    """Progress that nobody looks at."""
+    """Ignore the progress."""
 
 
 @dataclass
 class Tally:
-    """Tells ``progress`` of each of ``total`` things as it is done; called once for each.
+    """Thread-safe counter that reports to ``progress`` each time one of ``total`` items is done.
 
-    From any thread: ``progress`` is told by one at a time, in order.
+    Call it once per item, from any thread. A lock makes ``progress`` receive the counts one at a
+    time and in order.
     """
 
     progress: Progress
@@ -74,18 +75,33 @@ class Tally:
 
 
 Tilt = Literal["free", "held"]
-"""Whether bodies turn about x and y as imposed moments make them, or keep the tilt that they have
-unloaded and unworn, whatever moments that takes."""
+"""``free``: the bodies turn about x and y under the imposed moments. ``held``: they keep the tilt
+that they have when unloaded and unworn, whatever moments this takes."""
 
 
 @dataclass(frozen=True)
 class Material:
     """Isotropic linear elastic material.
 
-    ``young`` and ``yield_stress`` in MPa (210e3 for steel, not 210 or 210e9), ``density`` in t/mm³,
-    ``poisson`` is Poisson's ratio and ``expansion`` the coefficient of linear thermal expansion
-    [1/K]. An infinite ``young`` is a rigid body. Raises InputError for a modulus or yield stress
-    not above 0, a ratio not from 0 to 0.5, or a density below 0.
+    Parameters
+    ----------
+    young
+        Young's modulus [MPa]: 210e3 for steel, not 210 or 210e9. An infinite modulus makes the
+        body rigid.
+    poisson
+        Poisson's ratio, from 0 to 0.5.
+    density
+        Density [t/mm³].
+    yield_stress
+        Yield stress [MPa].
+    expansion
+        Coefficient of linear thermal expansion [1/K].
+
+    Raises
+    ------
+    InputError
+        For a modulus or yield stress that is not above 0, a Poisson's ratio outside 0 to 0.5, or a
+        density below 0.
 
     Examples
     --------
@@ -112,7 +128,7 @@ class Material:
 
     @property
     def shear_modulus(self) -> float:
-        """G = E / 2(1+ν) [MPa]."""
+        """Shear modulus G = E / 2(1+ν) [MPa]."""
         return self.young / (2.0 * (1.0 + self.poisson))
 
     @property
@@ -123,16 +139,16 @@ class Material:
 
 @dataclass(frozen=True)
 class ElasticPair:
-    """Two half-spaces in contact, as the compliances that their relative displacement depends on.
+    """Elastic constants of two half-spaces in contact.
 
-    ``body_1`` is the lower, fixed one, ``body_2`` the upper. All compliances in 1/MPa: ``normal``
-    Σ (1-ν)/G, ``shear`` Σ 1/G, ``poisson`` Σ ν/G and ``coupling`` ½ [(1-2ν2)/G2 - (1-2ν1)/G1],
-    exactly 0 for identical materials. An infinite Young's modulus is a rigid body; both rigid are
-    not an elastic pair (InputError).
+    ``body_1`` is the lower, fixed body and ``body_2`` the upper one. The relative displacement of
+    their surfaces depends on four compliances [1/MPa]: ``normal`` Σ (1-ν)/G, ``shear`` Σ 1/G,
+    ``poisson`` Σ ν/G and ``coupling`` ½ [(1-2ν2)/G2 - (1-2ν1)/G1], which is exactly 0 for identical
+    materials. A body with an infinite Young's modulus is rigid; two rigid bodies raise InputError.
 
     Examples
     --------
-    Two alike bodies have the contact modulus E / 2 (1 - ν²), and no coupling:
+    Two bodies of the same material have the contact modulus E / 2 (1 - ν²), and no coupling:
 
     >>> from sa_solver import ElasticPair, Material
     >>> steel = Material(young=210e3, poisson=0.3)
@@ -153,10 +169,11 @@ class ElasticPair:
 
     @classmethod
     def from_contact_modulus(cls, contact_modulus: float, poisson: float = 0.3) -> ElasticPair:
-        """Return two alike bodies of the contact modulus E* [MPa], both of ``poisson`` ν.
+        """Return a pair of identical bodies with the contact modulus E* [MPa] and ``poisson`` ν.
 
-        Young's modulus of each is 2 (1 - ν²) E*. Pressure depends on E* alone; ν counts for shear
-        and for stress inside the bodies. Raises InputError for an E* not above 0 or infinite.
+        The Young's modulus of each body is 2 (1 - ν²) E*. The pressure depends on E* alone; ν
+        matters for shear and for the stress inside the bodies. Raises InputError for an E* that is
+        infinite or not above 0.
         """
         checks.number("contact modulus [MPa]", contact_modulus, above=0.0)
         checks.number("Poisson's ratio", poisson, least=0.0, most=0.5)
@@ -165,22 +182,22 @@ class ElasticPair:
 
     @property
     def normal(self) -> float:
-        """Σ (1-ν)/G [1/MPa]: of pressure on the normal displacement."""
+        """Compliance Σ (1-ν)/G [1/MPa] of the normal displacement under pressure."""
         return sum((1.0 - m.poisson) / m.shear_modulus for m in (self.body_1, self.body_2))
 
     @property
     def shear(self) -> float:
-        """Σ 1/G [1/MPa]: of shear on the displacement along it."""
+        """Compliance Σ 1/G [1/MPa] of the displacement under shear, along the shear."""
         return sum(1.0 / m.shear_modulus for m in (self.body_1, self.body_2))
 
     @property
     def poisson(self) -> float:
-        """Σ ν/G [1/MPa]: what Poisson's ratio makes of shear."""
+        """Compliance Σ ν/G [1/MPa]: the effect of Poisson's ratio on the response to shear."""
         return sum(m.poisson / m.shear_modulus for m in (self.body_1, self.body_2))
 
     @property
     def coupling(self) -> float:
-        """½ [(1-2ν2)/G2 - (1-2ν1)/G1] [1/MPa]: of pressure and shear on each other."""
+        """Compliance ½ [(1-2ν2)/G2 - (1-2ν1)/G1] [1/MPa] that couples pressure and shear."""
         first, second = (
             (1.0 - 2.0 * m.poisson) / m.shear_modulus for m in (self.body_1, self.body_2)
         )
@@ -188,12 +205,12 @@ class ElasticPair:
 
     @property
     def contact_modulus(self) -> float:
-        """E* = 2 / Σ (1-ν)/G [MPa] (Johnson 1985, eq. 4.20)."""
+        """Contact modulus E* = 2 / Σ (1-ν)/G [MPa] (Johnson 1985, eq. 4.20)."""
         return 2.0 / self.normal
 
     @property
     def dundurs_beta(self) -> float:
-        """β of Dundurs 1969, positive where body 2 is the more compliant in ``(1-2ν)/G``."""
+        """Dundurs' β (1969), positive where body 2 has the larger ``(1-2ν)/G``."""
         return self.coupling / self.normal
 
     @property
@@ -206,9 +223,10 @@ class ElasticPair:
 class Grid:
     """Uniform grid of rectangular cells, centred on the frame's origin.
 
-    ``shape`` is ``(nx, ny)``, ``pitch`` is ``(dx, dy)`` in mm. Fields on it have that shape: the
-    first index counts along x, the second along y. A ``line`` grid has cells along x only, slices
-    1 mm long of strips that go on along y for ever (plane strain): resultants on it are per mm.
+    ``shape`` is ``(nx, ny)``, ``pitch`` is ``(dx, dy)`` in mm. Fields on the grid have that shape:
+    the first index counts along x, the second along y. A ``line`` grid describes a line contact in
+    plane strain: it has cells along x only, each a slice 1 mm long of a strip that is infinite
+    along y, so that resultants are per mm.
 
     Examples
     --------
@@ -230,31 +248,34 @@ class Grid:
         shape = tuple(checks.whole("a number of cells", n) for n in _pair("shape", self.shape))
         pitch = tuple(checks.array("pitches of a grid", self.pitch, (2,), finite=False).tolist())
         if min(shape) < 1 or not all(0.0 < length < np.inf for length in pitch):
-            raise InputError(f"a grid of {shape} cells of {pitch} mm has no area")
+            raise InputError(f"a grid of {shape} cells of {pitch} mm has no area: give more than 0")
         checks.settle(self, shape=shape, pitch=pitch)
         if self.line and (self.shape[1] != 1 or self.pitch[1] != 1.0):
             raise InputError("a line grid has one row of cells 1 mm long: use Grid.strips")
 
     @classmethod
     def strips(cls, width: float, count: int) -> Grid:
-        """Line contact: ``count`` strips that together cover ``width`` (mm)."""
+        """Return the grid of a line contact: ``count`` cells that together cover ``width`` [mm]."""
         width = checks.number("the width of a grid [mm]", width)
         return cls((count, 1), (width / max(count, 1), 1.0), line=True)
 
     @classmethod
     def covering(cls, size: tuple[float, float], shape: tuple[int, int]) -> Grid:
-        """The grid of ``shape`` cells that exactly covers a rectangle of ``size`` (mm, mm)."""
+        """Return the grid of ``shape`` cells that exactly covers a rectangle of ``size`` [mm]."""
         (along_x, along_y), (nx, ny) = _pair("size", size), _pair("shape", shape)
         return cls((nx, ny), (along_x / max(nx, 1), along_y / max(ny, 1)))
 
     @classmethod
     def over(cls, size: tuple[float, float], shape: tuple[int, int], line: bool) -> Grid:
-        """The grid over a face: strips across the width of a line contact, else as covering."""
+        """Return the grid over a face of ``size`` [mm], of one row of cells for a ``line``.
+
+        A line contact uses the first of ``size`` and of ``shape`` only.
+        """
         return cls.strips(size[0], shape[0]) if line else cls.covering(size, shape)
 
     @property
     def cell_area(self) -> float:
-        """S [mm²]."""
+        """Area S of a cell [mm²]."""
         return self.pitch[0] * self.pitch[1]
 
     @property
@@ -274,12 +295,12 @@ class Grid:
 
     @property
     def centres(self) -> Array:
-        """x and y of all cell centres ``(2, nx, ny)`` [mm]."""
+        """Coordinates x and y of all cell centres ``(2, nx, ny)`` [mm]."""
         return np.stack(np.broadcast_arrays(self.x, self.y))
 
 
 def _pair(name: str, values: Sequence[T]) -> Sequence[T]:
-    """``values`` where they are two, along x and along y."""
+    """Return ``values``, or raise InputError unless they are two: along x and along y."""
     given: Any = values
     if np.shape(given) != (2,):
         raise InputError(f"the {name} of a grid is {values!r}: give two, along x and along y")
@@ -287,19 +308,20 @@ def _pair(name: str, values: Sequence[T]) -> Sequence[T]:
 
 
 def _centres(count: int, pitch: float) -> Array:
-    """Centres of ``count`` cells about zero."""
+    """Return the centres ``(count,)`` [mm] of cells that are centred on zero."""
     return (np.arange(count, dtype=np.float64) - 0.5 * (count - 1)) * pitch
 
 
 @dataclass(frozen=True)
 class Frame:
-    """Interface frame: ``origin`` (3,) in mm and ``axes`` (3, 3), whose rows are x, y and z.
+    """Coordinate frame of an interface: its ``origin`` (3,) [mm] and ``axes`` (3, 3).
 
-    Raises InputError for axes that are not of length 1, at right angles and right-handed.
+    The rows of ``axes`` are the unit vectors along x, y and z. InputError is raised unless they
+    have length 1, are orthogonal and right-handed.
 
     Examples
     --------
-    A flank at 45°: a force along the global Z has a part along it and one across.
+    On a flank at 45°, a force along the global Z has a component along x and one along z:
 
     >>> import numpy as np
     >>> from sa_solver import Frame
@@ -320,28 +342,38 @@ class Frame:
         checks.settle(self, origin=checks.array("origins of a frame", self.origin, (3,)), axes=axes)
         if np.abs(axes @ axes.T - np.eye(3)).max() > SQUARE or np.linalg.det(axes) < 0.0:
             raise InputError(
-                f"axes of a frame {axes.tolist()}: give rows of length 1, at right angles, with z "
-                "that follows from x and y by the right hand"
+                f"axes of a frame {axes.tolist()}: give rows of length 1, at right angles, that "
+                "form a right-handed system"
             )
 
     def coordinates(self, points: Array) -> Array:
-        """Local coordinates of global ``points`` ``(..., 3)``."""
+        """Return the local coordinates of global ``points`` ``(..., 3)`` [mm]."""
         return self.components(points - self.origin)
 
     def components(self, vectors: Array) -> Array:
-        """Local components of global ``vectors`` ``(..., 3)``."""
+        """Return the local components of global ``vectors`` ``(..., 3)``."""
         return np.asarray(vectors @ self.axes.T, dtype=np.float64)
 
     def to_global(self, components: Array) -> Array:
-        """Global vectors of local ``components`` ``(..., 3)``."""
+        """Return the global vectors of local ``components`` ``(..., 3)``."""
         return components @ self.axes
 
 
 def resultants(forces: Array, x: Array, y: Array) -> Array:
-    """``(P, Qx, Qy, Mx, My, Mz)`` of point forces on body 2, in the interface frame.
+    """Return the resultants of point forces on body 2, in the interface frame.
 
-    ``forces`` has shape ``(3, ...)`` ordered x, y, z [N] (the z component is the pressure force,
-    positive); ``x`` and ``y`` broadcast against ``forces[0]`` [mm]. Returns ``(6,)``, N and N mm.
+    Parameters
+    ----------
+    forces
+        Forces ``(3, ...)`` along x, y and z [N]; the z component is the pressure force, positive
+        where the bodies are pressed together.
+    x, y
+        Coordinates of the points [mm], which broadcast against ``forces[0]``.
+
+    Returns
+    -------
+    Array
+        ``(P, Qx, Qy, Mx, My, Mz)`` ``(6,)`` [N, N mm].
     """
     fx, fy, fz = forces
     moments = np.sum(fz * y), -np.sum(fz * x), np.sum(fy * x - fx * y)
@@ -349,10 +381,11 @@ def resultants(forces: Array, x: Array, y: Array) -> Array:
 
 
 def resultant_change(now: Array, then: Array, sizes: Array) -> Array:
-    """Change of resultants ``(faces, 6)``: of forces by P, of moments by P and half a face.
+    """Return the relative change ``(faces, 6)`` from the resultants ``then`` to those of ``now``.
 
-    ``sizes`` ``(faces, 2)`` are extents along x and y [mm]. A face that was open is measured by the
-    P of the heaviest loaded; where none was loaded there is no change.
+    Forces are relative to the P of ``then``, moments to that P times half the size of the face. A
+    face without load in ``then`` is measured by the largest P of all faces; where no face was
+    loaded the change is 0. ``sizes`` ``(faces, 2)`` are the extents along x and y [mm].
     """
     halves = 0.5 * sizes
     longest = halves.max(axis=1)
@@ -367,17 +400,28 @@ def resultant_change(now: Array, then: Array, sizes: Array) -> Array:
 
 @dataclass(frozen=True)
 class LoadHistory:
-    """Resultants of one interface over the increments of one closed cycle, each ``(n,)``.
+    """Resultants of one interface over the increments of a closed cycle, each ``(n,)``.
 
-    ``P, Qx, Qy`` in N, ``Mx, My, Mz`` in N mm; ``Edx, Edy`` [N mm] is the energy dissipated in the
-    increment that ends at this state, by direction; ``sliding`` marks gross slip.
+    A mix of missions holds several closed cycles one after the other.
 
-    A mix of missions holds several closed cycles one after the other: ``block`` counts them from 0,
-    and ``share`` is how often each increment happens per mean cycle.
+    Parameters
+    ----------
+    P, Qx, Qy
+        Forces at the end of each increment [N].
+    Mx, My, Mz
+        Moments at the end of each increment [N mm].
+    Edx, Edy
+        Energy dissipated in the increment by slip along x and along y [N mm].
+    sliding
+        Whether the whole contact slides in the increment (gross slip).
+    share
+        How often each increment occurs per mean cycle; 1 by default.
+    block
+        Number of the closed cycle that each increment belongs to, from 0.
 
     Examples
     --------
-    A pad under 100 N that slides to and fro by 0.1 mm with µ = 0.5:
+    A pad under 100 N that slides back and forth by 0.1 mm with µ = 0.5:
 
     >>> import numpy as np
     >>> from sa_solver import LoadHistory
@@ -421,7 +465,10 @@ class LoadHistory:
 
     @classmethod
     def mix(cls, cycles: Sequence[LoadHistory], shares: Sequence[float]) -> LoadHistory:
-        """Closed ``cycles`` of one mission each, each so large a share of all cycles."""
+        """Return a mix of closed ``cycles``, one per mission.
+
+        ``shares`` are the relative frequencies of the cycles; they should add up to 1.
+        """
         lengths = [len(cycle) for cycle in cycles]
         columns = {
             column.name: np.concatenate([getattr(cycle, column.name) for cycle in cycles])
@@ -433,18 +480,18 @@ class LoadHistory:
 
     @property
     def resultants(self) -> Array:
-        """P, Qx, Qy, Mx, My and Mz ``(n, 6)``."""
+        """Resultants P, Qx, Qy, Mx, My and Mz of all increments ``(n, 6)``."""
         return np.stack([self.P, self.Qx, self.Qy, self.Mx, self.My, self.Mz], axis=1)
 
     @property
     def missions(self) -> list[slice]:
-        """The increments of each mission, a closed cycle."""
+        """Increments of each mission as a slice; a mission is one closed cycle."""
         begins = np.flatnonzero(np.diff(self.block, prepend=-1)).tolist()
         return [slice(*ends) for ends in pairwise([*begins, len(self)])]
 
     @property
     def mixed(self) -> bool:
-        """Whether there is more than one closed cycle, each with its share."""
+        """Whether the history has more than one cycle, or shares other than 1."""
         return bool(self.block.any() or np.any(self.share != 1.0))
 
     @property

@@ -1,13 +1,15 @@
-"""A loading history: the increments of a frictional contact, all of them or only those that count.
+"""Loading history of a frictional contact: all increments, or only the turning points of the load.
 
-Friction remembers, so in general every increment is solved from the one before (``full``), to
-first order in its length: unlike bodies pressed in one increment stick over half the radius that a
-growing load leaves (Spence 1968, Proc. R. Soc. A 305, 55). Such increments are split until little
-error is left. Where the bodies are alike and pressure stays while the shear load moves back and
-forth along one line, the contact remembers only the turning points of the load, and legs are taken
-in one step (``reversals``): exact for line contacts and for ν = 0, where slip keeps its direction
-during a leg, and measured otherwise. A shear force that only grows is one leg; in a line contact
-two normal problems give its end (``ciavarella_jaeger``:
+Friction depends on the path, so that in general every increment is solved from the one before
+(``full``). This is of first order in the length of the increments: dissimilar bodies pressed in one
+increment stick over half the radius that results from a growing load (Spence 1968, Proc. R. Soc. A
+305, 55). Such increments are split until the error is small.
+
+Where the bodies are similar and the pressure is constant while the shear load moves back and forth
+along one line, the contact remembers only the turning points of the load, and each leg between them
+is taken in one step (``reversals``). This is exact for line contacts and for ν = 0, where slip
+keeps its direction during a leg; otherwise the error is measured. A shear force that only grows is
+a single leg. In a line contact its end follows from two normal problems (``ciavarella_jaeger``:
 :mod:`sa_solver.tangential.ciavarella_jaeger`).
 
 Source: Spinu & Frunza 2015, J. Phys. Conf. Ser. (reversals).
@@ -33,43 +35,45 @@ from sa_solver.types import Array
 
 Method = Literal["full", "reversals", "ciavarella_jaeger"]
 Progress = Callable[[int, ContactState, float], None]
-"""Told the row of a path, the state that it has got to, and how much of the whole is behind."""
+"""Callback that receives the row of a path, the state at its end, and the share of the work done.
+"""
 
 STRAIGHT = 1e-9
-"""How far two increments of the shear load may be from parallel: rounding of a straight leg."""
+"""Deviation from parallel of two increments of a straight leg, due to rounding."""
 
 ACCURACY = 0.02
-"""Default bound on the error of increments: it leaves 0.02 of c/a of pressed unlike bodies."""
+"""Default bound on the error of increments: c/a of pressed dissimilar bodies is then within 0.02.
+"""
 
 MOST_INCREMENTS = 256
-"""So many are chosen for a path, or twice its own where these are more than half as many. In one
-leg 9 to 15 keep 2 %; more is for who asks for it."""
+"""Most increments into which a path is split automatically, or twice the number of its own
+increments if these are more than half as many. 9 to 15 increments per leg give 2 %."""
 
 USUAL_PARTS = 10
-"""About so many increments of a path that must be split are mostly enough: to say what is to
-come."""
+"""Usual number of increments of a path that must be split, to predict the remaining work."""
 
 PARTS_OF_LEGS = 4
-"""Two halves of a leg differ little from the whole: they tell a sixth of its error, these half."""
+"""Parts of a leg for its error estimate. Two halves differ little from the whole leg and show only
+a sixth of its error; four parts show half of it."""
 
 NO_ENERGY = 1e-3
-"""Share of the work of the shear loads below which energies are none: what sticks by all rules."""
+"""Share of the work of the shear loads to which errors of the energy are relative at least: where
+bodies stick, the energy is 0."""
 
 IN_PARTS = "the same path, its increments in parts:"
 
 
 class HistoryError(InputError):
-    """The method asked for does not suffice for the load path."""
+    """Invalid method for a load path."""
 
 
 @dataclass(frozen=True)
 class ContactLoadPath:
-    """Loads at the ends of n increments, from bodies apart.
+    """Loads at the ends of n increments, starting from bodies that are apart.
 
-    ``values`` ``(n, 6)``, ``motion`` (6,) and ``strain`` ``(n,)`` as in
-    :class:`~sa_solver.contact_state.ContactLoad`; ``energy`` ``(n, 2)`` or None. Moments of 0 let
-    the bodies turn: to hold their tilt, take (False, False, False, True, True, False) for
-    ``motion``.
+    ``values`` ``(n, 6)``, ``motion`` (6,), ``strain`` ``(n,)`` and ``energy`` ``(n, 2)`` are those
+    of :class:`~sa_solver.contact_state.ContactLoad`. Moments of 0 let the bodies turn. To hold
+    their tilt, set ``motion`` to (False, False, False, True, True, False).
 
     Examples
     --------
@@ -93,7 +97,9 @@ class ContactLoadPath:
         values = checks.array("values of a load path", self.values, (None, 6), finite=False)
         checks.settle(self, values=values)
         if not len(values) or np.shape(self.motion) != (6,):
-            raise InputError("a load path needs one increment or more, and six switches")
+            raise InputError(
+                "a load path needs at least one increment, and motion needs six truth values"
+            )
         for name, shape in (("strain", (len(values),)), ("energy", (len(values), 2))):
             column = getattr(self, name)
             if column is not None:
@@ -104,7 +110,7 @@ class ContactLoadPath:
         return len(self.values)
 
     def load(self, row: int, share: float = 1.0) -> ContactLoad:
-        """The load after that share of increment ``row``, passed in a straight line."""
+        """Return the load after a ``share`` of increment ``row``, by linear interpolation."""
 
         def reached(column: Array) -> Array:
             before = column[row - 1] if row else np.zeros_like(column[0])
@@ -115,28 +121,45 @@ class ContactLoadPath:
         return ContactLoad(reached(self.values), self.motion, strain, energy)
 
     def at(self, rows: list[int]) -> ContactLoadPath:
-        """The path that leads straight to each of these rows."""
+        """Return the path that leads directly from one of these ``rows`` to the next."""
         strain = None if self.strain is None else self.strain[rows]
         energy = None if self.energy is None else self.energy[rows]
         return ContactLoadPath(self.values[rows], self.motion, strain, energy)
 
     @property
     def shear(self) -> Array:
-        """Shear load and mismatch strain, ``(n, 4)``: Qx, Qy, Mz (or their motions), strain."""
+        """Shear load Qx, Qy, Mz (or their motions) and mismatch strain ``(n, 4)``."""
         strain = np.zeros(len(self)) if self.strain is None else self.strain
         return np.column_stack([self.values[:, list(PLANAR)], strain])
 
 
 @dataclass(frozen=True)
 class History:
-    """The increments solved: ``states`` at the rows ``indices`` of the path.
+    """Solved increments of a load path, with error estimates.
 
-    ``method`` is what was taken and ``reason`` why, every increment in so many ``parts``. ``error``
-    is the measured error of the shear, summed over all cells, over the largest µP of the path, by
-    what ``error_of`` says, and largest at row ``error_at``; ``energy_error`` that of the energy of
-    all rows, relative; both None where increments do not matter. Then ``others`` are the states at
-    the same rows, by another number of parts, and any result of ``states`` has an estimated error
-    of ``share`` times what it differs from theirs.
+    Attributes
+    ----------
+    states
+        States at the rows ``indices`` of the path.
+    indices
+        Rows of the path that were solved.
+    method, reason
+        Method that was used, and why.
+    parts
+        Number of parts into which every increment was split.
+    error
+        Estimated error of the shear, summed over all cells, over the largest µP of the path. It is
+        None where the size of the increments does not matter.
+    error_of
+        Description of the calculation with which the history was compared.
+    error_at
+        Row of the path with the largest error.
+    energy_error
+        Estimated relative error of the energies of all rows, or None.
+    others
+        States at the same rows with another number of parts.
+    share
+        Ratio of the error of any result of ``states`` to its difference from that of ``others``.
     """
 
     states: list[ContactState]
@@ -163,21 +186,42 @@ def march_history(
     tolerance: float = 1e-8,
     progress: Progress = lambda row, state, share: None,
 ) -> History:
-    """Solve a history on surfaces that do not wear.
+    """Solve a loading history on surfaces that do not wear.
 
-    ``height`` ``(nx, ny)`` [mm] is the gap of the unloaded bodies. ``history`` ``auto`` takes the
-    cheapest method that suffices, and splits increments that matter until shear and energy are
-    within ``accuracy``; ``full`` takes those of the path, and estimates what they leave;
-    ``reversals`` raises HistoryError where legs cannot be taken in one step. An increment that has
-    not converged ends the march: it is the last state. ``progress`` is called with each row, its
-    state and about what share of the work is done; anew when increments are split.
+    The march ends at an increment that has not converged, which is then the last state.
 
-    Raises what :meth:`FrictionalContact.advance` raises.
+    Parameters
+    ----------
+    half_space
+        Half-space of the two bodies.
+    height
+        Gap of the unloaded bodies ``(nx, ny)`` [mm].
+    path
+        Loads at the ends of the increments.
+    friction
+        Coefficient of friction µ.
+    history
+        Method. ``auto`` uses the cheapest valid method and splits increments until shear and energy
+        are within ``accuracy``. ``full`` solves the increments of the path and estimates their
+        error. ``reversals`` solves only the turning points of the load.
+    accuracy
+        Bound on the errors of shear and energy due to increments.
+    tolerance
+        Tolerance of the contact problems.
+    progress
+        Callback that receives the row, its state and the approximate share of the work done; rows
+        are repeated when increments are split.
+
+    Raises
+    ------
+    HistoryError
+        If ``reversals`` is not valid for the path. The exceptions of
+        :meth:`FrictionalContact.advance` may be raised as well.
 
     Examples
     --------
-    A cylinder sheared to and fro. Alike bodies remember the turning points only, and only these
-    are solved:
+    A cylinder sheared back and forth. Similar bodies remember only the turning points, so that only
+    these are solved:
 
     >>> import numpy as np
     >>> from sa_solver import ContactLoadPath, ElasticPair, Grid, HalfSpace, Material, march_history
@@ -217,20 +261,23 @@ def march_history(
 
 
 def turning_points(path: ContactLoadPath) -> list[int]:
-    """Rows where a load, normal or shear, is about to begin or to leave its direction; the last."""
+    """Return the last row and those after which a load, normal or shear, changes its direction.
+
+    A load that begins after a row counts as well.
+    """
     changes = _changes(np.column_stack([path.values[:, list(NORMAL)], path.shear]))
     rows = [row for row, pair in enumerate(pairwise(changes)) if _turns(*pair)]
     return [*rows, len(path) - 1]
 
 
 def _obstacle_to_legs(half_space: HalfSpace, path: ContactLoadPath) -> str:
-    """Why a leg of the shear load may not be taken in one step; empty if it may."""
+    """Return why a leg of the shear load may not be taken in one step, or an empty text."""
     if not half_space.pair.similar:
         return "the bodies are dissimilar"
     if path.energy is not None:
         return "sliding is given by its energy"
     sheared = np.flatnonzero(path.shear.any(axis=1))
-    # The row before the shear begins, or the bodies apart, has the pressure that must stay.
+    # The pressure must not change from the row before the shear begins, or from bodies apart.
     normal = np.vstack([np.zeros(len(NORMAL)), path.values[:, list(NORMAL)]])
     pressed = normal[sheared[0] if len(sheared) else -1 :]
     if np.any(pressed != pressed[0]):
@@ -239,14 +286,14 @@ def _obstacle_to_legs(half_space: HalfSpace, path: ContactLoadPath) -> str:
 
 
 def _changes(loads: Array) -> Array:
-    """Changes of loads ``(n, k)`` in each increment, ``(n, k)``, by the largest of each kind."""
+    """Return the changes ``(n, k)`` of loads in each increment, over the largest of each kind."""
     scale = np.abs(loads).max(axis=0)
     changes: Array = np.diff(loads, axis=0, prepend=np.zeros((1, loads.shape[1])))
     return changes / np.where(scale > 0.0, scale, 1.0)
 
 
 def _turns(change: Array, following: Array) -> bool:
-    """Whether the next increment leaves the direction of this one."""
+    """Return whether the increment ``following`` leaves the direction of ``change``."""
     if not following.any():
         return False
     along = float(change @ following)
@@ -255,13 +302,13 @@ def _turns(change: Array, following: Array) -> bool:
 
 
 def _proportional(shear: Array) -> bool:
-    """Whether all changes of the shear load are along one line."""
+    """Return whether all changes of the shear load are along one line."""
     singular = np.linalg.svd(_changes(shear), compute_uv=False)
     return bool(len(singular) < 2 or singular[1] <= STRAIGHT * singular[0])
 
 
 class _Marches:
-    """Marches over one path, in ever more parts, and how much of their work is done."""
+    """Marches over one path, each in more parts than the last, with their progress."""
 
     def __init__(
         self, contact: FrictionalContact, height: Array, path: ContactLoadPath, progress: Progress
@@ -270,7 +317,10 @@ class _Marches:
         self._progress, self._solved, self.rows = progress, 0, len(path)
 
     def __call__(self, parts: int, ahead: int = 0) -> list[ContactState]:
-        """States at all rows; marches in ``ahead`` parts are expected after this one."""
+        """Return the states at all rows, with each increment split into ``parts``.
+
+        ``ahead`` is the number of parts of later marches that are expected, for the progress.
+        """
         solved = self._solved
         whole = solved + self.rows * (parts + ahead)
 
@@ -288,7 +338,10 @@ def _march(
     parts: int,
     passed_row: Callable[[int, ContactState], None],
 ) -> list[ContactState]:
-    """States at all rows, each increment passed in ``parts``; ends where one has not converged."""
+    """Return the states at all rows, up to one that has not converged.
+
+    Each increment is split into ``parts``.
+    """
     states, state = [], contact.apart(height)
     for row in range(len(path)):
         passed = []
@@ -316,33 +369,37 @@ def _march(
 
 
 def _as_given(contact: FrictionalContact, march: _Marches, reason: str, parts: int) -> History:
-    """The increments of the path, with their error by as many ``parts``; none if that is 1."""
+    """Return the increments of the path, with their error by a march in ``parts``.
+
+    The error is not estimated if ``parts`` is 1.
+    """
     history = _history(march(1, parts if parts > 1 else 0), reason)
     if parts == 1 or not history.states[-1].converged:
         return history
     finer = march(parts)
     if not finer[-1].converged:
         return history
-    # Backward Euler is of first order: the parts leave their share of the error.
+    # Backward Euler is of first order: the error is inversely proportional to the parts.
     return _estimated(contact, history, finer, parts / (parts - 1), parts)
 
 
 def _split(
     contact: FrictionalContact, march: _Marches, reason: str, accuracy: float, most: int
 ) -> History:
-    """The increments in as many parts as keep ``accuracy``, or in up to ``most``."""
+    """Return the increments in as many parts as ``accuracy`` requires, but at most ``most``."""
     more = USUAL_PARTS // march.rows
     history, error = _history(march(1, 2 + more), reason), inf
     while history.states[-1].converged and error > accuracy and 2 * history.parts <= most:
         parts = history.parts
-        # Energy converges faster where pressure changes, after a first error that tells little.
+        # The first error is not reliable where the pressure changes and the energy converges
+        # faster, so that the first split is in two parts.
         wanted = 2 if parts == 1 else ceil(parts * (history.error or 0.0) / accuracy)
         finer = min(most, max(2 * parts, wanted))
         ahead = more if parts == 1 else 0
         coarse, history = history.states, _history(march(finer, ahead), reason, finer)
         if not history.states[-1].converged:
             break
-        # First order: errors are as lengths, and the change is their difference.
+        # Errors are of first order in the length of the parts; the change is their difference.
         history = _estimated(contact, history, coarse, parts / (finer - parts), parts)
         error = max(history.error or 0.0, history.energy_error or 0.0)
     return history
@@ -355,7 +412,10 @@ def _estimated(
     share: float,
     parts: int,
 ) -> History:
-    """The history with its errors, ``share`` of what it differs from ``others`` in ``parts``."""
+    """Return the history with its errors: ``share`` times its difference from ``others``.
+
+    ``parts`` is the number of parts of ``others``.
+    """
     change, row = _shear_difference(contact, history.states, others)
     return replace(
         history,
@@ -384,8 +444,8 @@ def _reversals(
     march = _Marches(
         contact, height, legs, lambda leg, state, share: progress(rows[leg], state, share)
     )
-    alike = contact.grid.line or contact.half_space.pair.poisson == 0.0
-    exact = alike and _proportional(path.shear)
+    keeps_direction = contact.grid.line or contact.half_space.pair.poisson == 0.0
+    exact = keeps_direction and _proportional(path.shear)
     reason = "similar bodies, pressure constant while the shear load turns"
     parts = 1 if exact or len(rows) == 1 else PARTS_OF_LEGS
     history = _as_given(contact, march, reason, parts)
@@ -396,28 +456,31 @@ def _reversals(
 
 
 def _one_leg(contact: FrictionalContact, states: list[ContactState], legs: ContactLoadPath) -> bool:
-    """Whether the last leg is the first loading of a line contact."""
+    """Return whether the last leg is the first loading of a line contact."""
     begun = len(states) == len(legs) > 1
     return begun and contact.two_normal_problems(states[-2], legs.load(len(legs) - 1))
 
 
 def _energy_difference(ones: list[ContactState], others: list[ContactState]) -> float:
-    """Difference of the energies of all rows, relative, rows that cancel added by their sizes."""
-    found, known = (np.array([state.energy.sum() for state in states]) for states in (ones, others))
+    """Return the relative difference of energies, added over all rows without regard to sign."""
+    one, other = (np.array([state.energy.sum() for state in states]) for states in (ones, others))
     planar = list(PLANAR)
     forces, motions = (
         np.array([getattr(state, name)[planar] for state in ones])
         for name in ("resultants", "rigid")
     )
     worked = np.abs(np.sum(forces * np.diff(motions, axis=0, prepend=0.0), axis=1)).sum()
-    scale = max(float(found.sum()), NO_ENERGY * float(worked))
-    return float(np.abs(found - known).sum()) / scale if scale > 0.0 else 0.0
+    scale = max(float(one.sum()), NO_ENERGY * float(worked))
+    return float(np.abs(one - other).sum()) / scale if scale > 0.0 else 0.0
 
 
 def _shear_difference(
     contact: FrictionalContact, ones: list[ContactState], others: list[ContactState]
 ) -> tuple[float, int]:
-    """Largest difference of shear, summed over all cells, over the largest µP; and its place."""
+    """Return the largest difference of shear, over the largest µP, and its row.
+
+    The difference is summed over all cells.
+    """
     pairs = zip(ones, others, strict=True)
     apart = [float(np.hypot(*(one.shear - other.shear)).sum()) for one, other in pairs]
     limit = contact.friction * max(float(state.pressure.sum()) for state in ones)

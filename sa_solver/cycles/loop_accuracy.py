@@ -1,10 +1,11 @@
-"""What grid and increments leave of a tangential loop.
+"""Errors of a tangential loop due to its grid and increments.
 
-Stiffness goes with the root of the area, and that comes in whole cells: a quarter of those at its
-rim may be too many or too few. This is a bound; two grids may agree by chance. What is mobilised of
-friction, and the energy, are held against a loop of half as many cells and increments. Energy of
-partial slip goes with Q³ / kt (Mindlin & Deresiewicz 1953), under an imposed motion with kt²: it is
-no better known than that.
+The stiffness is proportional to the square root of the area of contact, which consists of whole
+cells: it may be too large or too small by a quarter of the cells at its rim. This is a bound,
+because two grids may agree by chance. The mobilised friction and the energy are compared with a
+loop of half as many cells and increments. The energy of partial slip is proportional to Q³ / kt
+(Mindlin & Deresiewicz 1953), and under an imposed motion to kt², so that its error is at least that
+which follows from the stiffness.
 """
 
 from __future__ import annotations
@@ -18,19 +19,19 @@ from sa_solver.half_space.nested_grids import GridTransfer
 from sa_solver.types import Array, Grid
 
 OFF = 0.25
-"""Part of a cell at the rim by which the area may be off: errors of spheres, new and worn flat, 6
-to 29 cells in radius, were 0.005 to 0.8 of what this gives, so that it is meant as a bound."""
+"""Error of the area, as a share of the cells at the rim. For new and worn spheres of 6 to 29 cells
+in radius the true errors were 0.005 to 0.8 of this, so that it is a bound."""
 
 FEWEST_INCREMENTS = 2
-"""Of a branch of any loop."""
+"""Least number of increments of a branch."""
 
 
 @dataclass(frozen=True)
 class LoopErrors:
     """Estimated errors of a loop: ``stiffness`` [N/mm], ``friction`` [1], ``energy`` [N mm].
 
-    Per mm on line grids. ``friction`` is that of :attr:`TangentialLoop.friction`: of what is
-    mobilised, hardly anything where the contact slides.
+    They are per mm on line grids. ``friction`` is the error of :attr:`TangentialLoop.friction`, the
+    mobilised friction; it is almost 0 where the contact slides.
     """
 
     stiffness: float
@@ -41,16 +42,22 @@ class LoopErrors:
 def loop_errors(
     contact: FrictionalContact, height: Array, path: LoopPath, loop: TangentialLoop
 ) -> LoopErrors:
-    """How far the ``loop`` of :func:`march_loop` may be off, by its rim and one half as fine.
+    """Estimate the errors of a loop of :func:`march_loop`, by its rim and by a coarser loop.
 
-    ``height`` ``(nx, ny)`` [mm] and ``path`` are those of the loop. Cells and increments are
-    halved, no fewer than 2 a branch. Friction and energy have errors as large as they are where the
-    coarse loop does not converge.
+    The coarser loop has half as many cells and increments, but at least 2 per branch. If it does
+    not converge, the errors of friction and energy are as large as these.
+
+    Parameters
+    ----------
+    contact, height, path
+        The arguments of :func:`march_loop`.
+    loop
+        Its result.
 
     Examples
     --------
-    A sphere in partial slip: its stiffness is within the estimate of Mindlin's 1949 (J. Appl.
-    Mech. 16, 259):
+    For a sphere in partial slip the stiffness differs from that of Mindlin 1949 (J. Appl. Mech. 16,
+    259) by less than the estimated error:
 
     >>> from sa_solver import ElasticPair, FrictionalContact, Grid, HalfSpace, LoopPath, Material
     >>> from sa_solver import march_loop

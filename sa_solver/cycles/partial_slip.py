@@ -1,24 +1,25 @@
-"""A contact moved to and fro along one axis under a constant load, from normal problems alone.
+"""Partial slip of a contact under a constant load and a motion along one axis.
 
-Between alike bodies shear moves the surfaces along as pressure moves them apart, κ times as far. So
-if p(P) presses under P, and the shear force has grown from 0, then
+The solution follows from normal problems alone. Between similar bodies, shear displaces the
+surfaces tangentially by κ times as much as pressure of the same distribution displaces them
+normally. If p(P) is the pressure under P, and the shear force has grown from 0, then
 
     q = µ [p(P) - p(P*)],   T = µ (P - P*),   δ = κ µ (δz - δz*),   s = κ µ g*
 
-with P* < P at the same tilt: where p(P*) presses the surfaces stick, elsewhere in the contact they
-slip, by κ µ times the gap g* that P* leaves there. When P* has come down to 0 the contact slides.
-After a reversal everything follows the same curve doubled (Masing): a closed loop of amplitude A
-has slipped by 4 s(A) in every place and has lost 4 µ Σ p s(A) S.
+with P* < P at the same tilt. The surfaces stick where p(P*) > 0. Elsewhere in the contact they slip
+by κ µ times the gap g* under P*. When P* has fallen to 0 the contact slides. After a reversal the
+contact follows the same curve, doubled (Masing). In a closed loop of amplitude A each place slips
+by 4 s(A), and the loop dissipates 4 µ Σ p s(A) S.
 
-Without Poisson's ratio this is the discrete solution itself; with one it neglects the shear across
-the motion and takes for κ the ratio of the stiffnesses of the pressed cells, normal to tangential,
-which between spheres is Mindlin's (2 - ν)/(2 - 2ν).
+For ν = 0 this is the solution of the discrete problem. Otherwise the shear across the motion is
+neglected, and κ is the ratio of the normal to the tangential stiffness of the pressed cells, which
+between spheres is Mindlin's (2 - ν)/(2 - 2ν).
 
-To a structure such a contact is so many sliders in parallel. They are not its cells: what gives way
-when a ring of cells slips is the support that it gave to all others. Cells taken each for itself,
-with its share of the stuck stiffness and its own µp, do not know each other: on a sphere they would
-follow T = µP (3 s - 2 s^1.5) with s = kt δ/(3 µP), and half way to full slip carry 23 % less than
-Mindlin's T = µP (1 - (1 - 2 s)^1.5) and lose 37 % more in a loop.
+A structure can represent such a contact by sliders in parallel. The sliders are not the cells: when
+a ring of cells slips, its support of all other cells is lost. Independent cells, each with its
+share of the stuck stiffness and its own µp, would follow T = µP (3 s - 2 s^1.5) on a sphere, with
+s = kt δ/(3 µP). Half way to full slip they would carry 23 % less than Mindlin's
+T = µP (1 - (1 - 2 s)^1.5), and dissipate 37 % more in a loop.
 
 Sources: Ciavarella 1998, J. Appl. Mech. 65, 998 (contacts over an area); Jäger 1997, J. Tribol.
 119, 401; the sliders, Iwan 1966, J. Appl. Mech. 33, 893.
@@ -46,32 +47,43 @@ from sa_solver.ties import SAME
 from sa_solver.types import Array, Tilt
 
 STAGES = 24
-"""Reduced loads. The energies of loops between spheres then differ from those of the whole
-tangential problem by less than 2 %, from a quarter of the amplitude at which all slides."""
+"""Number of reduced loads P*. The energies of loops between spheres then differ from those of the
+full tangential problem by less than 2 %, from a quarter of the amplitude of full sliding up."""
 
 DENSER = 1.5
-"""Stages go with this power of their number: closer to each other where little has slipped yet,
-since the energy of small loops goes with the cube of their amplitude."""
+"""Power of their number with which the stages are spaced. They are denser where little has slipped,
+because the energy of small loops grows with the cube of their amplitude."""
 
 FEWEST_STAGES = 2
-"""Between rest and sliding: the first of them bends the curve."""
+"""Least number of stages between rest and sliding: the first of them bends the curve."""
 
 ROUNDING = 1e-9
-"""Share of the stuck stiffness below which a slope has not changed."""
+"""Change of a slope, relative to the stuck stiffness, that is due to rounding."""
 
 
 class PartialSlipError(InputError):
-    """A contact that cannot be moved to and fro in this way."""
+    """Contact whose partial slip does not follow from normal problems."""
 
 
 @dataclass(frozen=True)
 class PartialSlip:
-    """What a contact does when it is moved, for a coefficient of friction of 1.
+    """Response of a contact to a tangential motion, for a coefficient of friction of 1.
 
-    ``normal`` is the state at rest. Moved by ``shift`` ``(k,)`` [mm], ascending from 0 to where all
-    of it slides, it carries ``force`` ``(k,)`` [N], and its cells have slipped by ``slip``
-    ``(k, nx, ny)`` [mm]. With the coefficient µ all three are µ times as large. In between they are
-    taken for straight; the first slope is ``stiffness`` [N/mm], that of the stuck contact.
+    For a coefficient of friction µ, shifts, forces and slips are µ times as large. Between the
+    points of the curve they are linear.
+
+    Attributes
+    ----------
+    normal
+        Normal contact at rest.
+    stiffness
+        Stiffness of the stuck contact [N/mm], which is the first slope of the curve.
+    shift
+        Tangential motion ``(k,)`` [mm], ascending from 0 to full sliding.
+    force
+        Tangential force ``(k,)`` [N].
+    slip
+        Slip of the cells ``(k, nx, ny)`` [mm].
     """
 
     normal: NormalState
@@ -86,28 +98,29 @@ class PartialSlip:
 
     @property
     def reach(self) -> Array:
-        """Shifts at which the sliders of :attr:`slider_stiffness` give way, ``(n,)`` [mm]."""
+        """Shifts ``(n,)`` [mm] at which the sliders of :attr:`slider_stiffness` begin to slide."""
         return self.shift[1:]
 
     @property
     def slider_stiffness(self) -> Array:
-        """Springs ``(n,)`` [N/mm] of sliders in parallel that follow the curve."""
+        """Stiffness ``(n,)`` [N/mm] of each of n parallel sliders that represent the curve."""
         return -np.diff(self._slopes)
 
     @property
     def slider_load(self) -> Array:
-        """What presses each slider ``(n,)`` [N]; their sum is the load of the contact."""
+        """Normal load ``(n,)`` [N] of each slider; the sum is the load of the contact."""
         return self.slider_stiffness * self.reach
 
     def travelled(self, travel: Array) -> Array:
-        """Path ``(nx, ny)`` [mm] of every cell while the sliders travel by ``travel`` ``(n,)``.
+        """Return the sliding path ``(nx, ny)`` [mm] of every cell for given paths of the sliders.
 
-        A slider of reach d travels by 4 (A - d) in a closed loop of amplitude A, which is the
-        second integral of where the loop ends: the same sum, with the sliders' own kinks, gives the
-        path of a cell. Loops within the loop add up.
+        ``travel`` ``(n,)`` [mm] are the paths of the sliders. A slider with the reach d travels by
+        4 (A - d) in a closed loop of amplitude A. The slip of a cell is a piecewise linear function
+        of the shift, with kinks at the reaches of the sliders. Its path is the sum over the kinks
+        of the change of slope times the path of the slider. Loops inside the loop add to the path.
         """
         kinks = np.diff(self.slip, axis=0) / np.diff(self.shift)[:, None, None]
-        # Beyond the last shift all cells in contact slide by what is moved.
+        # Beyond the last shift all cells in contact slip by the motion itself.
         sliding = (self.normal.pressure > 0.0).astype(float)
         kinks = np.diff(np.concatenate([kinks, sliding[None]]), axis=0)
         path: Array = np.einsum("n,nij->ij", travel, kinks)
@@ -115,9 +128,9 @@ class PartialSlip:
 
     @property
     def onset(self) -> Array:
-        """Shift up to which every cell sticks ``(nx, ny)`` [mm]; 0 off the contact.
+        """Shift up to which each cell sticks ``(nx, ny)`` [mm]; 0 outside the contact.
 
-        The last of a symmetric contact to part do so together, but for rounding.
+        Slips that differ by rounding only, as in a symmetric contact, count as equal.
         """
         sticking = np.count_nonzero(self.slip <= SAME * self.slip.max(), axis=0) - 1
         return np.where(self.normal.pressure > 0.0, self.shift[sticking], 0.0)
@@ -133,17 +146,37 @@ def partial_slip_curve(
     start: NormalStart | None = None,
     tilt: Tilt = "held",
 ) -> PartialSlip:
-    """What a contact of alike bodies does when it is moved along x under a load ``P`` [N].
+    """Return the response of a contact of similar bodies to a motion along x.
 
-    ``height`` ``(nx, ny)`` [mm] is the gap of the unloaded bodies, infinite or masked where a body
-    has no surface. Their ``tilt`` under P is held, or free of moments. Raises PartialSlipError for
-    bodies that are not alike or a load that is not above 0, LoopFailure where a normal problem does
-    not converge.
+    Parameters
+    ----------
+    contact
+        Solver of the normal problem.
+    height
+        Gap of the unloaded bodies ``(nx, ny)`` [mm], infinite or masked where a body has no
+        surface.
+    P
+        Normal load [N].
+    stages
+        Number of points of the curve after the first.
+    tolerance
+        Tolerance of the normal problems.
+    start
+        Initial guess for the pressure under P.
+    tilt
+        Whether the tilt under P is held, or free so that there are no moments.
+
+    Raises
+    ------
+    PartialSlipError
+        For dissimilar bodies or a load that is not above 0.
+    LoopFailure
+        If a normal problem does not converge.
 
     Examples
     --------
-    A sphere moved along a flat, against Mindlin. Forces and motions are those of a coefficient of
-    friction of 1:
+    A sphere moved along a flat, compared with Mindlin. Forces and motions are those for a
+    coefficient of friction of 1:
 
     >>> import numpy as np
     >>> from sa_solver import ElasticPair, Grid, HalfSpace, Material, NormalContact
@@ -161,7 +194,9 @@ def partial_slip_curve(
     0.493 um under 12.5 N, Mindlin 0.493 um
     """
     if not contact.half_space.pair.similar:
-        raise PartialSlipError("bodies that are not alike: their pressure follows the shear")
+        raise PartialSlipError(
+            "the pressure of dissimilar bodies depends on the shear: use march_loop instead"
+        )
     P = checks.number("load P [N]", P, above=0.0, error=PartialSlipError)
     if checks.whole("stages", stages) < FEWEST_STAGES:
         raise PartialSlipError(f"{stages} stages: give {FEWEST_STAGES} or more")
@@ -190,18 +225,18 @@ def partial_slip_curve(
         )
         force.append(normal.P - reduced.P)
         gaps.append(np.where(reduced.pressure > 0.0, 0.0, reduced.gap))
-    # Without any load they just touch.
+    # Without load the bodies just touch.
     force.append(normal.P)
     gaps.append(tilted - tilted.min())
     slip = ratio * np.where(normal.pressure > 0.0, np.maximum(gaps, 0.0), 0.0)
     curve = PartialSlip(normal, tangential, ratio * depth * shares, np.array(force), slip)
-    return _bent_at_once(_bending(curve))
+    return _with_first_kink(_concave(curve))
 
 
-def _bending(curve: PartialSlip) -> PartialSlip:
-    """The curve without the stages at which its slope does not fall: nothing gives way there.
+def _concave(curve: PartialSlip) -> PartialSlip:
+    """Return the curve without the stages at which its slope does not fall.
 
-    Between some of them no cell leaves the contact. What is left lies on straight lines over them.
+    No cell leaves the contact there. The remaining curve is concave.
     """
     shift, force, kept = curve.shift, curve.force, [0]
     for stage in range(1, len(shift)):
@@ -216,11 +251,11 @@ def _bending(curve: PartialSlip) -> PartialSlip:
     return replace(curve, shift=shift[kept], force=force[kept], slip=curve.slip[kept])
 
 
-def _bent_at_once(curve: PartialSlip) -> PartialSlip:
-    """The curve with its first stretch bent, so that it begins as stiff as the stuck contact.
+def _with_first_kink(curve: PartialSlip) -> PartialSlip:
+    """Return the curve with its first segment bent, so that it begins with the stuck stiffness.
 
-    A grid loses its outermost cells somewhere within the first stretch: here where the slope that
-    follows would go on from the first one.
+    On a grid the outermost cells start to slip somewhere within the first segment. The kink is
+    where the line of the second segment, extended backwards, meets the line of stuck stiffness.
     """
     first, second = curve._slopes[:2]
     if not second < first < curve.stiffness * (1.0 - ROUNDING):
@@ -232,7 +267,10 @@ def _bent_at_once(curve: PartialSlip) -> PartialSlip:
 
 
 def _stiffness(half_space: HalfSpace, normal: NormalState) -> tuple[float, float]:
-    """Tangential stiffness of the pressed cells [N/mm], and κ, the normal one over it."""
+    """Return the tangential stiffness [N/mm] of the pressed cells, and κ.
+
+    κ is the ratio of the normal to the tangential stiffness.
+    """
     pressed = normal.pressure > 0.0
     tangential = stuck_stiffness(half_space, pressed, LoopPath(normal.P, 1.0))
     unit = np.ones((1, np.count_nonzero(pressed)))

@@ -1,17 +1,18 @@
-"""A tangential loop: press, move to and fro along one axis, and read off what a joint law needs.
+"""Tangential loop of a contact: press, move back and forth along one axis, and find a joint law.
 
-The normal load stays while body 1 is moved relative to body 2, by an imposed motion or force along
-x or y; it does not turn and does not move across. After first loading whole cycles are marched,
-until one closes.
+The normal load is constant while body 1 is moved relative to body 2, by an imposed motion or force
+along x or y, without rotation and without transverse motion. After first loading, whole cycles are
+marched until one closes.
 
-Energy is taken from slip, at the mean pressure of both ends of an increment. Where pressure stays
-and slip keeps its direction during a branch (line contacts; areas with ν = 0) a cell slips only
-while |q| = µp, so this is that of the grid whatever the number of increments; the loop's area by
-trapezoids is less by ½ Σ (q_n - q_n-1)·Δs S, which is of second order in their size.
+The energy is computed from slip, with the mean pressure of both ends of an increment. Where the
+pressure is constant and slip keeps its direction during a branch (line contacts, and areas with
+ν = 0), a cell slips only while |q| = µp. The energy then depends on the grid but not on the number
+of increments. The area of the loop by the trapezoidal rule is less by ½ Σ (q_n - q_n-1)·Δs S, which
+is of second order in the size of the increments.
 
-Stiffness is that of the contact with all pressed cells stuck: the slope right after a reversal, at
-which nothing slips (Mindlin 1949). Measuring it from the first increments would add what already
-slips in them. For dissimilar bodies pressure follows the motion, P, Mx and My staying.
+The stiffness is that of the contact with all pressed cells stuck, which is the slope immediately
+after a reversal (Mindlin 1949). Measured from the first increments it would include their slip. For
+dissimilar bodies the pressure changes with the motion while P, Mx and My are constant.
 
 Source: Mindlin & Deresiewicz 1953, J. Appl. Mech. 20, 327, doi:10.1115/1.4010702 (the loop).
 """
@@ -35,42 +36,63 @@ from sa_solver.half_space.operator import HalfSpace
 from sa_solver.types import Array, Mask
 
 MOST_CYCLES = 4
-"""Cycles marched for one that closes. Similar bodies close the first; dissimilar ones forget how
-they were pressed once they have slid both ways, and otherwise creep by less from cycle to cycle."""
+"""Most cycles marched to find one that closes. For similar bodies the first one closes. Dissimilar
+bodies forget how they were pressed once they have slid both ways; otherwise they creep by less in
+each cycle."""
 
 CLOSED = 1e-3
-"""A cycle is closed when the force that ends it is this close to that which began it, in ranges of
-the force, or the motion in ranges of the motion: well below what a grid leaves."""
+"""Difference between the force at the end and the start of a cycle, over the range of the force,
+below which the cycle counts as closed; or the same of the motion. It is well below the error due to
+the grid."""
 
 STUCK_TOLERANCE = 1e-10
-"""Relative residual of the stuck contact: its stiffness then has twice as many digits."""
+"""Relative residual of the stuck contact; its stiffness then has twice as many digits."""
 
 STUCK_ITERATIONS = 2000
-"""Conjugate gradients of the stuck contact: 40 on 32² cells, 100 on 256², growing with the root."""
+"""Most conjugate gradient iterations of the stuck contact. It takes 40 on 32² cells and 100 on
+256²; the number grows with the square root of the cells across."""
 
 LoopAxis = Literal["x", "y"]
 
 
 class LoopError(InputError):
-    """The loop asked for makes no sense."""
+    """Invalid data of a loop."""
 
 
 class LoopFailure(ConvergenceError):
-    """An increment of the loop, or its stuck contact, did not converge."""
+    """Failure of an increment of a loop, or of its stuck contact, to converge."""
 
 
 @dataclass(frozen=True)
 class LoopPath:
-    """What is imposed: normal load ``P`` [N], then a motion or a force to and fro.
+    """Load path of a loop: a normal load, then an oscillating motion or force.
 
-    ``amplitude`` is a motion [mm] or, with ``by`` ``force``, a force [N], along ``axis``. Each
-    branch has ``increments`` of equal size. The bodies do not tilt unless ``moments`` (Mx, My)
-    [N mm] are imposed with P. Per mm on line grids, whose Mx is not asked for. Raises
-    LoopError for a P or amplitude not above 0 or less than 2 increments.
+    Forces are per mm on line grids.
+
+    Parameters
+    ----------
+    P
+        Normal load [N].
+    amplitude
+        Amplitude of the motion [mm] or force [N].
+    by
+        Whether a ``motion`` or a ``force`` is imposed.
+    increments
+        Number of increments of each branch, all of equal size.
+    axis
+        Direction of the motion, ``x`` or ``y``.
+    moments
+        Moments (Mx, My) [N mm] imposed together with P; without them the bodies do not tilt. On
+        line grids Mx does not matter.
+
+    Raises
+    ------
+    LoopError
+        For a P or amplitude that is not above 0, or less than 2 increments.
 
     Examples
     --------
-    To and fro by ±2 µm under 500 N, with 12 increments a branch:
+    An oscillation by ±2 µm under 500 N, with 12 increments per branch:
 
     >>> from sa_solver import LoopPath
     >>> path = LoopPath(P=500.0, amplitude=0.002)
@@ -79,7 +101,7 @@ class LoopPath:
     >>> LoopPath(P=500.0, amplitude=0.0)
     Traceback (most recent call last):
         ...
-    sa_solver.cycles.tangential_loop.LoopError: amplitude = 0: a loop needs one above 0
+    sa_solver.cycles.tangential_loop.LoopError: amplitude = 0: give a value above 0
     """
 
     P: float
@@ -98,28 +120,45 @@ class LoopPath:
         checks.whole("increments of a branch", self.increments, LoopError)
         for name in ("P", "amplitude"):
             if not 0.0 < getattr(self, name) < np.inf:
-                raise LoopError(f"{name} = {getattr(self, name):g}: a loop needs one above 0")
+                raise LoopError(f"{name} = {getattr(self, name):g}: give a value above 0")
         if self.increments < 2:
             raise LoopError(f"{self.increments} increments: give a branch of a loop at least 2")
 
     @property
     def place(self) -> int:
-        """Place of the axis among the resultants and motions."""
+        """Index of the axis among the resultants and motions."""
         return 1 if self.axis == "x" else 2
 
 
 @dataclass(frozen=True)
 class TangentialLoop:
-    """A loop and what it says; per mm on line grids.
+    """Hysteresis loop of a contact and its properties; forces and areas are per mm on line grids.
 
-    ``displacement`` [mm] of body 1 relative to body 2, counted from the pressed state, and
-    ``force`` [N] on body 2 are ``(k,)``, both from 0 on: first loading, then cycles of two branches
-    of ``increments`` each, of which the last counts. ``energy`` [N mm] is dissipated by slip in it;
-    ``stiffness`` [N/mm] is that of the stuck contact; ``sliding`` is the share of P on cells that
-    slip as the branches end; ``area`` [mm²] is in contact, ``rim`` [mm²] of it on cells that have a
-    neighbour apart. ``border_load`` is the largest share of
-    P on the outermost cells: above 0, the grid may be too small. ``closure`` is how far the cycle
-    is from closed (``CLOSED``), ``residual`` the largest of the solver.
+    Attributes
+    ----------
+    P
+        Normal load [N].
+    increments
+        Number of increments of a branch.
+    displacement
+        Displacement ``(k,)`` [mm] of body 1 relative to body 2 since the pressed state. First
+        loading is followed by cycles of two branches each, of which the last one is evaluated.
+    force
+        Force ``(k,)`` [N] on body 2.
+    energy
+        Energy [N mm] dissipated by slip in the last cycle.
+    stiffness
+        Stiffness [N/mm] of the stuck contact.
+    sliding
+        Share of P on cells that slip at the ends of the branches.
+    area, rim
+        Area of contact, and its part on cells that have a neighbour out of contact [mm²].
+    border_load
+        Largest share of P on the outermost cells; above 0 the grid may be too small.
+    closure
+        Relative distance between the ends of the last cycle: see ``CLOSED``.
+    residual, convolutions
+        Largest residual of the solver, and cost of the loop in convolutions.
     """
 
     P: float
@@ -138,13 +177,16 @@ class TangentialLoop:
 
     @property
     def loading(self) -> tuple[Array, Array]:
-        """First loading from 0: displacement and force, ``(increments + 1,)``."""
+        """Displacement and force of first loading from 0, each ``(increments + 1,)``."""
         end = self.increments + 1
         return self.displacement[:end], self.force[:end]
 
     @property
     def cycle(self) -> tuple[Array, Array]:
-        """The last cycle: displacement and force, ``(2 increments + 1,)``, back first."""
+        """Displacement and force of the last cycle, each ``(2 increments + 1,)``.
+
+        The branch of falling displacement comes first.
+        """
         begin = len(self.force) - 2 * self.increments - 1
         return self.displacement[begin:], self.force[begin:]
 
@@ -160,26 +202,29 @@ class TangentialLoop:
 
     @property
     def work(self) -> float:
-        """∮ Q dδ by trapezoids [N mm]: the energy but for the size of the increments."""
+        """Area ∮ Q dδ of the loop by the trapezoidal rule [N mm].
+
+        It tends to the energy as the increments shrink.
+        """
         displacement, force = self.cycle
         return float(np.sum(0.5 * (force[1:] + force[:-1]) * np.diff(displacement)))
 
     @property
     def slides(self) -> bool:
-        """Whether the whole contact slides as the branches end."""
+        """Whether the whole contact slides at the ends of the branches."""
         return self.sliding >= 1.0
 
     @property
     def friction(self) -> float:
-        """``max |Q| / P``: µ where the contact slides, else what is mobilised of it."""
+        """Mobilised friction ``max |Q| / P``, which is µ where the contact slides."""
         return float(np.abs(self.cycle[1]).max()) / self.P
 
     @property
     def friction_by_opening(self) -> float:
-        """ΔT / 2P with ΔT between the branches in the middle of the stroke.
+        """Friction ΔT / 2P, with the distance ΔT of the branches in the middle of the stroke.
 
-        A residual stiffness beside the contact would cancel: this is how µ is measured. It is µ
-        where the contact slides by then, less otherwise.
+        This is how µ is measured, because a stiffness parallel to the contact cancels. It is µ
+        where the contact slides in the middle of the stroke, and less otherwise.
         """
         (down, down_force), (up, up_force) = self._branches
         middle = 0.5 * float(down[0] + down[-1])
@@ -189,19 +234,19 @@ class TangentialLoop:
 
     @property
     def residual_stiffness(self) -> float:
-        """Mean slope of the last increments of both branches [N/mm]; 0 where it slides."""
+        """Mean slope of the last increments of both branches [N/mm]; 0 in sliding."""
         return self._mean_slope(-2)
 
     @property
     def reversal_stiffness(self) -> float:
         """Mean secant of the first increments after both reversals [N/mm].
 
-        What one would measure; it tends to ``stiffness`` as the increments shrink.
+        This is what a test would measure; it tends to ``stiffness`` as the increments shrink.
         """
         return self._mean_slope(0)
 
     def _mean_slope(self, increment: int) -> float:
-        """Of both branches, from point ``increment`` on."""
+        """Return the mean slope of both branches in the increment that starts at this point."""
         slopes = [
             (force[increment + 1] - force[increment])
             / (displacement[increment + 1] - displacement[increment])
@@ -211,22 +256,26 @@ class TangentialLoop:
 
     @property
     def _branches(self) -> tuple[tuple[Array, Array], tuple[Array, Array]]:
-        """Displacement and force on the way back and on the way forth."""
+        """Displacement and force of the falling and of the rising branch."""
         displacement, force = self.cycle
         n = self.increments
         return (displacement[: n + 1], force[: n + 1]), (displacement[n:], force[n:])
 
 
 def march_loop(contact: FrictionalContact, height: Array, path: LoopPath) -> TangentialLoop:
-    """Press and move to and fro on surfaces that do not wear.
+    """March the loop of a contact on surfaces of gap ``height`` ``(nx, ny)`` [mm], without wear.
 
-    ``height`` ``(nx, ny)`` [mm] is the gap of the unloaded bodies. Raises LoopFailure where a solve
-    does not converge, and what the solvers raise for impossible data: FrictionLimitError for a
-    force that friction cannot carry.
+    Raises
+    ------
+    LoopFailure
+        If a solve does not converge.
+    FrictionLimitError
+        For a force that friction cannot carry. Other exceptions of the solvers for impossible data
+        may be raised as well.
 
     Examples
     --------
-    A cylinder under ±60 N/mm, against the closed form of the energy lost:
+    The energy dissipated by a cylinder under ±60 N/mm, compared with the closed form:
 
     >>> from sa_solver import ElasticPair, FrictionalContact, Grid, HalfSpace, LoopPath, Material
     >>> from sa_solver import march_loop
@@ -267,21 +316,21 @@ def march_loop(contact: FrictionalContact, height: Array, path: LoopPath) -> Tan
 
 
 def stuck_stiffness(half_space: HalfSpace, pressed: Mask, path: LoopPath) -> float:
-    """Force per motion along the axis with the cells ``pressed`` ``(nx, ny)`` stuck [N/mm].
+    """Return the stiffness [N/mm] along the axis with all cells ``pressed`` ``(nx, ny)`` stuck.
 
-    Minimises ½ t·K t - Σ t_axis over tractions of these cells whose pressure keeps P and, where
-    imposed, the moments: conjugate gradients, projected. Raises LoopFailure if they stall.
+    Projected conjugate gradients minimise ½ t·K t - Σ t_axis over tractions of these cells whose
+    pressure does not change P or imposed moments. LoopFailure is raised if they stall.
     """
     grid, similar = half_space.grid, half_space.pair.similar
     components = 2 if similar else 3
     apply = half_space.shear if similar else half_space.displacement
-    kept = _balanced_modes(half_space, pressed, path.moments is not None)
+    fixed = _fixed_modes(half_space, pressed, path.moments is not None)
 
     def project(values: Array) -> Array:
-        """The nearest traction on the pressed cells that changes no imposed resultant."""
+        """Return the nearest traction on the pressed cells that changes no imposed resultant."""
         tractions = values.reshape(components, -1).copy()
         if not similar:
-            tractions[Z] -= kept @ (kept.T @ tractions[Z])
+            tractions[Z] -= fixed @ (fixed.T @ tractions[Z])
         return tractions.ravel()
 
     motion = np.zeros((components, np.count_nonzero(pressed)))
@@ -296,10 +345,23 @@ def tractions_of_motion(
     motion: Array,
     project: Callable[[Array], Array] = np.ravel,
 ) -> Array:
-    """Tractions ``(c m,)`` of the m cells ``pressed`` that move them by ``motion`` ``(c, m)``.
+    """Return the tractions ``(c m,)`` of m cells that displace them by a given motion.
 
-    ``displace`` takes tractions ``(c, nx, ny)`` to displacements, ``project`` tractions of the
-    cells to such as are allowed. Raises LoopFailure where conjugate gradients stall.
+    Parameters
+    ----------
+    displace
+        Function from tractions ``(c, nx, ny)`` to displacements.
+    pressed
+        The m cells with tractions ``(nx, ny)``.
+    motion
+        Displacement of these cells ``(c, m)`` [mm].
+    project
+        Projection of tractions of the cells on admissible ones.
+
+    Raises
+    ------
+    LoopFailure
+        If conjugate gradients stall.
     """
 
     def compliance(values: Array) -> Array:
@@ -312,13 +374,16 @@ def tractions_of_motion(
     if status != 0:
         raise LoopFailure(
             f"the stuck contact of {motion.shape[1]} cells did not converge in {STUCK_ITERATIONS} "
-            "iterations"
+            "iterations: take a coarser grid"
         )
     return np.asarray(traction)
 
 
-def _balanced_modes(half_space: HalfSpace, pressed: Mask, tilting: bool) -> Array:
-    """Orthonormal pressures ``(cells, modes)`` whose amounts P, and Mx, My if ``tilting``, fix."""
+def _fixed_modes(half_space: HalfSpace, pressed: Mask, tilting: bool) -> Array:
+    """Return orthonormal pressures ``(cells, modes)`` that imposed resultants fix.
+
+    These are P and, if ``tilting``, Mx and My.
+    """
     grid = half_space.grid
     modes = [np.ones(grid.shape)]
     if tilting:
@@ -327,12 +392,15 @@ def _balanced_modes(half_space: HalfSpace, pressed: Mask, tilting: bool) -> Arra
             modes.append(np.broadcast_to(grid.y, grid.shape))
     columns = np.stack([mode[pressed] for mode in modes], axis=1)
     basis, sizes, _ = np.linalg.svd(columns, full_matrices=False)
-    # A single row of cells knows no moment about its own line.
+    # A single row of cells has no moment about its own line.
     return basis[:, sizes > np.finfo(float).eps * len(columns) * sizes[0]]
 
 
 def _press(contact: FrictionalContact, height: Array, path: LoopPath) -> ContactState:
-    """The pressed state; dissimilar bodies slip meanwhile, so they are pressed in steps."""
+    """Return the pressed state.
+
+    Dissimilar bodies are pressed in several steps, because they slip while the load grows.
+    """
     steps = 1 if contact.half_space.pair.similar else path.increments
     tilts = path.moments is None
     motion = (False, False, False, tilts and not contact.grid.line, tilts, False)
@@ -347,7 +415,7 @@ def _press(contact: FrictionalContact, height: Array, path: LoopPath) -> Contact
 def _states(
     contact: FrictionalContact, height: Array, path: LoopPath, pressed: ContactState
 ) -> Iterator[ContactState]:
-    """The pressed state, first loading, and cycles up to one that closes."""
+    """Yield the pressed state, the states of first loading, and of cycles until one closes."""
     n = path.increments
     back = np.linspace(1.0, -1.0, n + 1)
     load = _Imposed.after(pressed, path, contact.grid.line)
@@ -368,19 +436,22 @@ def _states(
 
 @dataclass(frozen=True)
 class _Imposed:
-    """Loads of the loop: ``rest`` is imposed at rest, ``step`` more of it at the amplitude."""
+    """Loads of the loop: ``rest`` in the middle and ``step`` more at the amplitude."""
 
     rest: ContactLoad
     step: Array
 
     @classmethod
     def after(cls, pressed: ContactState, path: LoopPath, line: bool) -> _Imposed:
-        """Guided from the pressed state on: no motion across and no twist."""
+        """Return the loads that follow the state ``pressed``.
+
+        The bodies are guided, without transverse motion and twist.
+        """
         tilts = path.moments is None
         motion = [False, True, True, tilts and not line, tilts, not line]
         motion[path.place] = path.by == "motion"
         values = np.where(motion, pressed.rigid, pressed.resultants)
-        # As asked for, not as solved: nothing adds up.
+        # The values of the path, not the solved ones, so that errors do not accumulate.
         values[0] = path.P
         if path.moments is not None:
             values[3:5] = path.moments
@@ -391,12 +462,15 @@ class _Imposed:
         return cls(ContactLoad(values, tuple(motion), pressed.strain), step)
 
     def at(self, share: float) -> ContactLoad:
-        """The load at ``share`` of the amplitude."""
+        """Return the load at ``share`` of the amplitude."""
         return replace(self.rest, values=self.rest.values + share * self.step)
 
 
 def _closure(cycle: list[ContactState], path: LoopPath) -> float:
-    """What separates the ends of a cycle: of force and motion the one that is not imposed."""
+    """Return the relative distance between the ends of a cycle.
+
+    It is that of the force under an imposed motion, and that of the motion under an imposed force.
+    """
     name = "resultants" if path.by == "motion" else "rigid"
     values = np.array([getattr(state, name)[path.place] for state in cycle])
     extent = float(np.ptp(values))
@@ -404,13 +478,13 @@ def _closure(cycle: list[ContactState], path: LoopPath) -> float:
 
 
 def _rim_cells(pressed: Mask, line: bool) -> int:
-    """Pressed cells with a neighbour that is not, or is off the grid."""
+    """Return the number of pressed cells with a neighbour that is not pressed or off the grid."""
     structure = np.ones((3, 1)) if line else None
     return int(np.count_nonzero(pressed & ~binary_erosion(pressed, structure)))
 
 
 def _slipping_share(state: ContactState) -> float:
-    """Share of the normal force on cells that slip."""
+    """Return the share of the normal force on cells that slip."""
     pressure = state.pressure
     return float(pressure[~state.sticking].sum() / pressure.sum())
 

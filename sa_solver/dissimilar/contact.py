@@ -1,12 +1,13 @@
-"""Contact of dissimilar bodies: pressure and shear found together.
+"""Contact of dissimilar bodies, whose pressure and shear are solved together.
 
-Where the bodies differ, pressure moves the surfaces tangentially and shear moves them normally
-(:mod:`sa_solver.dissimilar.problem` states the problem of one increment). Adjusting the normal and
-the tangential problem to each other in turns slows down with µ times Dundurs' β and fails from µβ =
-1; here both are one problem, solved by Newton's method (:mod:`sa_solver.dissimilar.newton`) and,
-where it gives up, by Douglas-Rachford splitting (:mod:`sa_solver.dissimilar.splitting`), slower and
-more often successful. The friction limit follows the pressure, so that no minimum principle and no
-proof of convergence exist: a result carries residuals that do not depend on the method.
+Between dissimilar bodies, pressure displaces the surfaces tangentially and shear displaces them
+normally (:mod:`sa_solver.dissimilar.problem` states the problem of one increment). Alternating
+between the normal and the tangential problem slows down with µ times Dundurs' β and fails from
+µβ = 1. Here both are one problem, solved by Newton's method (:mod:`sa_solver.dissimilar.newton`).
+Where Newton's method fails, Douglas-Rachford splitting (:mod:`sa_solver.dissimilar.splitting`) is
+used, which is slower but converges more often. The friction limit depends on the pressure, so that
+there is no minimum principle and no proof of convergence. Results therefore carry residuals that do
+not depend on the method.
 
 Source: Gallego, Nélias & Jacq 2006, J. Tribol. 128, 476, doi:10.1115/1.2194914 (the problem).
 """
@@ -41,64 +42,65 @@ TOLERANCE = 1e-8
 """Default bound on every residual of :class:`CoupledResiduals`."""
 
 NEWTON_ITERATIONS = 200
-"""Directions of Newton's method; 10 to 35 are usual, 150 on lines with µ far below β."""
+"""Most directions of Newton's method; 10 to 35 are usual, 150 on lines with µ far below β."""
 
 ROUNDS = 4
-"""Most searches in larger and larger boxes."""
+"""Most searches in ever larger boxes."""
 
 ITERATIONS = 2000
-"""The splitting takes 40 to 110 on spheres and punches with µ from 0.005 to 1 and β up to 0.5, 200
-within 0.1 % of sliding, and up to 1000 on lines of 1024 cells with µ below 0.02."""
+"""Most iterations of the splitting. It takes 40 to 110 on spheres and punches (µ 0.005 to 1, β up
+to 0.5), 200 within 0.1 % of sliding, up to 1000 on lines of 1024 cells with µ below 0.02."""
 
 CHUNK = 400
-"""After as many iterations a load is checked for being more than friction can carry."""
+"""Iterations after which the load is compared with the largest that friction can carry."""
 
 LOST = 1e-2
-"""Residual above which the search begins anew then, once, from the pressure without friction. Those
-that are only slow are below it; on rough heights far above the elastic displacement, resting on
-three cells, others still had 0.4 to 0.9 after 2000 iterations, and took 70 to 310 from there."""
+"""Residual above which the splitting is restarted then, once, from the frictionless pressure. Slow
+searches are below this value. On rough heights far above the elastic displacement, resting on three
+cells, others still had 0.4 to 0.9 after 2000 iterations and took 70 to 310 after the restart."""
 
 TIGHTENING, TIGHTEST = 0.1, 1e-4
-"""The splitting's own residual is no bound on those of the state: its tolerance is lowered by this
-factor until they are met, down to this share of the tolerance asked for."""
+"""Factor by which the tolerance of the splitting is lowered until the residuals of the state are
+met, and the lowest tolerance, as a share of the given one. The residual of the splitting does not
+bound those of the state."""
 
 OVERLOAD = 0.999
-"""A load is taken to be more than friction can carry where at most this share of it can be: the
-pressure of a search that has not converged is not more accurate than that."""
+"""Share of a load that friction must be able to carry, else the load is refused. The pressure of a
+search that has not converged is not more accurate than this."""
 
 BARELY = 1.001
-"""Where at most this multiple of a load can be carried, it is taken to be all that can: the motion
-is hardly determined there, and the splitting crawls."""
+"""Ratio of the largest load to the given one below which the contact is close to sliding. The
+motion is then hardly determined, and the splitting converges slowly."""
 
 FEW_CELLS = 8
-"""Contacts of fewer cells can hardly carry the moments imposed on them, and the splitting crawls:
-of random rough contacts those that failed had 0 to 3 cells."""
+"""Cells in contact below which a contact can hardly carry moments, so that the splitting is slow.
+Random rough contacts that failed had 0 to 3 cells."""
 
 ALL_FORCES = (False,) * 6
-"""Every resultant imposed, no motion."""
+"""Motion switches for which all resultants are imposed."""
 
 TILTS = (3, 4)
-"""Places of Mx and My among the resultants."""
+"""Indices of Mx and My among the resultants."""
 
 
 class CoupledContactError(ContactProblemError):
-    """The data of a coupled contact problem admit no solution."""
+    """Data of a coupled contact problem that admit no solution."""
 
 
 @dataclass(frozen=True)
 class CoupledState(TractionState):
     """Solution of one increment.
 
-    ``traction`` ``(qx, qy, p)`` [MPa] and ``displacement`` K t [mm] are ``(3, nx, ny)``, ``slip``
-    Δs of the increment [mm] (0 off the contact) is ``(2, nx, ny)``, ``gap`` [mm] ``(nx, ny)``.
-    ``resultants`` are (P, Qx, Qy, Mx, My, Mz) [N, N mm] and ``rigid`` the motions (δz, δx, δy, φx,
-    φy, φz) [mm, rad], those in the plane being of the increment. ``sticking`` ``(nx, ny)`` are the
-    cells in contact that do not slip, ``cell_area`` [mm²] is that of the grid. ``border_load`` is
-    the share of P on the outermost cells: above 0, the grid is too small. ``message`` says what is
-    wrong and what to try, of a state that has not ``converged`` and of a contact that reaches the
-    grid's border; else it is empty. ``convolutions`` of three components
-    are in units of one on the whole grid, by the size of their transforms, rounded up. (Each
-    iteration also transforms unpadded fields, a quarter of a convolution.)
+    ``traction`` (qx, qy, p) [MPa] and ``displacement`` K t [mm] are ``(3, nx, ny)``; the ``slip``
+    Δs of the increment [mm], 0 outside the contact, is ``(2, nx, ny)``; ``gap`` [mm] and
+    ``sticking``, the cells in contact that do not slip, are ``(nx, ny)``. ``resultants`` are (P,
+    Qx, Qy, Mx, My, Mz) [N, N mm]. ``rigid`` are the motions (δz, δx, δy, φx, φy, φz) [mm, rad], of
+    which δx, δy and φz are those of the increment. ``border_load`` is the share of P on the
+    outermost cells; above 0 the grid is too small. ``cell_area`` [mm²] is the area of a cell.
+    ``message`` says what is wrong and what to try, if the state has not ``converged`` or the
+    contact reaches the border of the grid; otherwise it is empty. ``convolutions`` is the cost in
+    convolutions of three components on the whole grid, by the size of the transforms, rounded up.
+    Transforms of unpadded fields, a quarter of a convolution per iteration, are not counted.
     """
 
     traction: Array
@@ -118,22 +120,22 @@ class CoupledState(TractionState):
 
     @property
     def start(self) -> Array:
-        """Start of a next solve on the same grid."""
+        """Initial guess for the next solve on the same grid."""
         return self.traction
 
     @property
     def touches_border(self) -> bool:
-        """Whether the contact reaches the outermost cells of the grid."""
+        """Whether the outermost cells of the grid carry load."""
         return self.border_load > 0.0
 
 
 class CoupledContact:
-    """Contact of dissimilar bodies with friction on one grid; owns the planned transforms.
+    """Solver of contact problems of dissimilar bodies with friction, on one grid.
 
     Examples
     --------
-    A cylinder pressed on a rigid flat: with friction its surface sticks in the middle, and the
-    pressure is higher than Hertz's.
+    A cylinder pressed on a rigid flat. With friction its surface sticks in the middle, and the
+    pressure is higher than Hertz's:
 
     >>> from sa_solver import CoupledContact, ElasticPair, Grid, HalfSpace, Material
     >>> from sa_solver.reference.hertz import HertzCylinder
@@ -150,7 +152,7 @@ class CoupledContact:
     """
 
     def __init__(self, half_space: HalfSpace, friction: float) -> None:
-        """Plan for ``half_space`` and the coefficient of friction µ.
+        """Prepare the solver for ``half_space`` and the coefficient of ``friction`` µ.
 
         Raises CoupledContactError for a µ below 0 or not finite.
         """
@@ -171,19 +173,31 @@ class CoupledContact:
         start: Array | None = None,
         compliance: Array | None = None,
     ) -> CoupledState:
-        """Tractions and motions at the end of one increment.
+        """Solve for the tractions and motions at the end of one increment.
 
-        ``height`` is the gap before all loading ``(nx, ny)``, infinite or masked where a body has
-        no surface, and ``offset`` ``(2, nx, ny)`` (0 if None) less the displacement u_τ of the
-        previous state plus any imposed mismatch [mm].
-        ``values`` ``(6,)`` are P, Qx, Qy [N], Mx, My, Mz [N mm] or, where ``motion`` is true, the
-        motion conjugate to each: δz, δx, δy [mm], φx, φy, φz [rad]. ``compliance`` ``(nx, ny)``
-        [mm/MPa] adds D p to the gap. Converged means that every residual is within ``tolerance``.
-        Moments of 0 let the bodies turn: to hold them give a φx and φy of 0.
+        Parameters
+        ----------
+        height
+            Gap before loading ``(nx, ny)`` [mm], infinite or masked where a body has no surface.
+        offset
+            Imposed mismatch minus the displacement of the previous state ``(2, nx, ny)`` [mm].
+        values, motion
+            Resultants P, Qx, Qy [N], Mx, My, Mz [N mm] or, where ``motion`` is true, the conjugate
+            motions δz, δx, δy [mm], φx, φy, φz [rad]. Moments of 0 let the bodies turn; to hold
+            them, impose tilts φx and φy of 0.
+        tolerance
+            Bound on every residual.
+        start
+            Initial guess: tractions ``(3, nx, ny)`` of any state on the same grid.
+        compliance
+            Compliance D ``(nx, ny)`` [mm/MPa], which adds D p to the gap.
 
-        Raises CoupledContactError for fields that are not finite or have another shape, a load
-        that pulls, a moment that the cells cannot carry or feel; FrictionLimitError for a shear
-        force above µP.
+        Raises
+        ------
+        CoupledContactError
+            For invalid fields, a negative load, or moments that the cells cannot carry.
+        FrictionLimitError
+            For a shear force above µP.
         """
         error, shape = CoupledContactError, self.grid.shape
         height = checked_heights(height, self.grid, error)
@@ -193,7 +207,7 @@ class CoupledContact:
             offset = checks.array("offsets", offset, (2, *shape), error=error)
         tolerance = checks.number("tolerance", tolerance, above=0.0, error=error)
         if np.shape(values) != (6,) or np.shape(motion) != (6,):
-            raise error("give six values and six switches: P, Qx, Qy, Mx, My, Mz")
+            raise error("give six values, for P, Qx, Qy, Mx, My and Mz, and six truth values")
         values = checks.array("values", values, (6,), error=error)
         self._check(values, motion)
 
@@ -211,19 +225,19 @@ class CoupledContact:
     def _search(
         self, problem: CoupledProblem, tolerance: float, start: Array | None
     ) -> CoupledState:
-        """Newton's method and, where it gives up, the splitting from where it has got to."""
+        """Solve by Newton's method and, where it fails, by the splitting from its last state."""
         if start is not None and start.shape != problem.offset.shape:
-            raise CoupledContactError("start belongs to another grid: start from a state on this")
+            raise CoupledContactError("start is from another grid: give a state on the same grid")
         before = self._level.transformed
         solution, iterations, verified = None, 0, 0
-        begun, missed = self._begun(problem, start), None
-        while begun is not None and verified < ROUNDS:
-            left = NEWTON_ITERATIONS - iterations
-            found = self._level.search(problem, begun, tolerance, left, missed)
+        guess, missed = self._guess(problem, start), None
+        while guess is not None and verified < ROUNDS:
+            remaining = NEWTON_ITERATIONS - iterations
+            found = self._level.search(problem, guess, tolerance, remaining, missed)
             solution = self._state(problem, found.traction, found.rigid)
             iterations, verified = iterations + found.iterations, verified + 1
-            begun = found.traction, found.slipping
-            # A box knows no gap around it.
+            guess = found.traction, found.slipping
+            # The search does not see the gap outside its box.
             missed = solution.gap < -tolerance * solution.displacement[Z].max()
             if not (found.converged and (missed & (solution.pressure == 0.0)).any()):
                 break
@@ -239,18 +253,18 @@ class CoupledContact:
             convolutions=convolutions + solution.convolutions,
         )
 
-    def _begun(self, problem: CoupledProblem, start: Array | None) -> tuple[Array, Mask] | None:
-        """Traction and slipping cells to search from; None where there are none to be had."""
+    def _guess(self, problem: CoupledProblem, start: Array | None) -> tuple[Array, Mask] | None:
+        """Return tractions and slipping cells as initial guess, or None if there are none."""
         if start is not None and start[Z].any():
-            begun = self._level.near(problem, start)
-            if begun is not None:
-                return begun
+            guess = self._level.near(problem, start)
+            if guess is not None:
+                return guess
         return self._level.begin(problem)
 
     def _split(
         self, problem: CoupledProblem, tolerance: float, last: CoupledState | None
     ) -> CoupledState:
-        """Iterate the splitting until the residuals of its solution are met, or cannot be."""
+        """Iterate the splitting until the residuals of its solution are met, or it fails."""
         before = self.half_space.count
         whole, free = self._splitting, list(problem.free)
         splitting = whole.of(problem)
@@ -258,7 +272,7 @@ class CoupledContact:
             state = self._splitting_state(problem, last)
         else:
             state = whole.touching(problem)
-        inner, iterations, message, begun_anew = tolerance, 0, "", False
+        inner, iterations, message, restarted = tolerance, 0, "", False
         while True:
             result = douglas_rachford(
                 splitting.elastic_step,
@@ -276,8 +290,8 @@ class CoupledContact:
                 break
             if not result.converged:
                 message = self._overload(problem, solution)
-                if not (message or begun_anew or solution.residuals.largest <= LOST):
-                    state, begun_anew = self._pressed(problem), True
+                if not (message or restarted or solution.residuals.largest <= LOST):
+                    state, restarted = self._pressed(problem), True
             elif inner > TIGHTEST * tolerance:
                 inner *= TIGHTENING
             else:
@@ -295,13 +309,13 @@ class CoupledContact:
         )
 
     def _splitting_state(self, problem: CoupledProblem, last: CoupledState) -> Array:
-        """The splitting's state at a ``last`` one."""
+        """Return the state of the splitting that corresponds to the ``last`` solution."""
         slip = problem.relative(last.traction, last.displacement, self._free(problem, last.rigid))
         slip[Z] -= problem.compliance * last.pressure
         return self._splitting.state(last.traction, slip)
 
     def _free(self, problem: CoupledProblem, rigid: Array) -> Array:
-        """The part of the motions ``(6,)`` [mm, rad] that is not imposed [mm]."""
+        """Return the part of the motions ``rigid`` ``(6,)`` [mm, rad] that is free [mm]."""
         return np.asarray(rigid * self._modes.lengths - problem.imposed)
 
     @cached_property
@@ -319,7 +333,7 @@ class CoupledContact:
         modes = self._modes
         imposed = np.where(motion, values * modes.lengths, 0.0)
         if not motion[0]:
-            # Counted from where the bodies touch, a small displacement keeps its digits.
+            # Relative to the state in which the bodies touch, a small motion keeps its digits.
             imposed[0] = height.min()
         free = tuple(k for k in modes.present if not motion[k])
         moved = np.zeros((3, *self.grid.shape))
@@ -337,7 +351,7 @@ class CoupledContact:
         )
 
     def _state(self, problem: CoupledProblem, traction: Array, rigid: Array) -> CoupledState:
-        """The state with these tractions and free motions; whether it will do is left open."""
+        """Return the state with these tractions and free motions, not marked as converged."""
         displacement = self.half_space.displacement(traction)
         relative = problem.relative(traction, displacement, rigid)
         return CoupledState(
@@ -354,7 +368,7 @@ class CoupledContact:
         )
 
     def _pressed(self, problem: CoupledProblem) -> Array:
-        """The splitting's state of the bodies pressed without friction."""
+        """Return the state of the splitting for the bodies pressed without friction."""
         pressed = pressed_without_friction(problem, self._normal)
         traction, elastic = np.zeros((2, *problem.offset.shape))
         traction[Z] = pressed.pressure
@@ -367,14 +381,14 @@ class CoupledContact:
 
     @staticmethod
     def _apart(problem: CoupledProblem) -> bool:
-        """Whether no load acts: P = 0, or motions imposed that leave a gap."""
+        """Return whether the bodies are unloaded: P is 0, or the imposed motions leave a gap."""
         if problem.load is not None:
             return problem.load == 0.0
         tilting = TILTS[0] in problem.free or TILTS[1] in problem.free
         return not tilting and float(problem.offset[Z].min()) >= 0.0
 
     def _unloaded(self, problem: CoupledProblem) -> CoupledState:
-        """No load: the bodies just touch, or stay apart where their motion is imposed."""
+        """Return the unloaded state: the bodies just touch, or are apart by imposed motions."""
         if any(value for k, value in zip(problem.free, problem.target, strict=True) if k in PLANAR):
             raise FrictionLimitError(0.0, UNCARRIED)
         traction = np.zeros((3, *self.grid.shape))
@@ -407,10 +421,7 @@ class CoupledContact:
     def _overload(
         self, problem: CoupledProblem, state: CoupledState, least: float = OVERLOAD
     ) -> str:
-        """The load, where friction carries less than ``least`` of it, and the largest; or nothing.
-
-        The pressure is that found.
-        """
+        """Return a message if friction under the pressure of ``state`` carries too little load."""
         limit = self.friction * state.pressure
         planar = [k for k in problem.free if k in PLANAR]
         target = np.array([problem.target[problem.free.index(k)] for k in planar])
@@ -429,7 +440,7 @@ class CoupledContact:
             f"direction is {largest}: lower the force, or impose the sliding motion instead"
         )
 
-    # -- what is refused ----------------------------------------------------------------------
+    # -- checks -------------------------------------------------------------------------------
     def _check(self, values: Array, motion: tuple[bool, ...]) -> None:
         for k, name in enumerate(RESULTANTS):
             if k not in self._modes.present and values[k] != 0.0:
@@ -441,17 +452,17 @@ class CoupledContact:
             self._check_load(values, motion)
 
     def _check_load(self, values: Array, motion: tuple[bool, ...]) -> None:
-        """Signs and bounds that hold for any pressure with the resultant P."""
+        """Raise an error for loads that no pressure with the resultant P can carry."""
         load = values[0]
         if load < 0.0:
-            raise CoupledContactError(f"load {load:g} N pulls: give P >= 0")
+            raise CoupledContactError(f"load P = {load:g} N pulls: give P >= 0")
         for k, centres in zip(TILTS, (self.grid.y, self.grid.x), strict=True):
             reach = float(centres.max())
             if not motion[k] and values[k] != 0.0 and not abs(values[k]) < load * reach:
                 raise CoupledContactError(
                     f"{RESULTANTS[k]} = {values[k]:g} N mm under P = {load:g} N puts the load "
-                    f"outside the cells, over {reach:g} mm off centre: enlarge the grid or lower "
-                    "the moment"
+                    f"outside the cells, more than {reach:g} mm off centre: enlarge the grid or "
+                    "lower the moment"
                 )
         planar = [k for k in (1, 2) if not motion[k]]
         shear = float(np.hypot.reduce(values[planar])) if planar else 0.0

@@ -1,6 +1,6 @@
-"""Contact of dissimilar bodies on one grid: begun on coarser ones, searched in a box around it.
+"""Contact of dissimilar bodies solved with initial guesses from coarser grids, in a box around it.
 
-Both only save time: the answer is verified by a convolution on the whole grid.
+Both only save time: the solution is verified by a convolution on the whole grid.
 """
 
 from __future__ import annotations
@@ -27,37 +27,40 @@ from sa_solver.rigid_modes import NORMAL, RigidModes
 from sa_solver.types import Array, Mask
 
 COARSE_TOLERANCE = 3e-3
-"""Residual of solutions on coarser grids, which are off by more than that."""
+"""Residual of solutions on coarser grids, whose errors are larger than this."""
 
 COARSE_ITERATIONS = 40
-"""Directions on coarser grids: a poor start is worth no more."""
+"""Most directions on coarser grids: a poor initial guess is not worth more."""
 
 BOXES = 4
-"""Boxes whose transforms are kept, the last used."""
+"""Number of boxes whose transforms are cached."""
 
 
 class CoupledLevel:
-    """Searches contacts on one grid; owns what was planned for it.
+    """Solver on one grid, with cached transforms and coarser grids.
 
-    ``transformed`` counts the points of all padded transforms so far, for three components.
+    ``transformed`` counts the points of all padded transforms so far, of three components each.
     """
 
     def __init__(self, half_space: HalfSpace) -> None:
-        """Plan for ``half_space``."""
+        """Prepare the solver for ``half_space``."""
         self.half_space = half_space
         self.transformed = 0.0
         self._boxed = lru_cache(BOXES)(self._plan)
 
     def begin(self, problem: CoupledProblem) -> tuple[Array, Mask] | None:
-        """Admissible, balanced traction ``(3, nx, ny)`` to search from, and the cells that slip.
+        """Return an admissible, balanced traction ``(3, nx, ny)`` and the cells that slip.
 
-        From the solutions on coarser grids, or without friction where there are none. None where
-        there is no such traction.
+        The initial guess comes from the solution on coarser grids, or from the frictionless contact
+        where there are none. None is returned where there is no such traction.
         """
         return self._from_coarser(problem) or self.near(problem, self._pressed(problem))
 
     def near(self, problem: CoupledProblem, traction: Array) -> tuple[Array, Mask] | None:
-        """The same near a traction of p >= 0, of which the cells on their circle slip."""
+        """Return an initial guess as :meth:`begin` does, near a ``traction`` with p >= 0.
+
+        The cells on their circle slip.
+        """
         limit = problem.friction * traction[Z]
         slipping = (np.hypot(*traction[:Z]) >= limit * (1.0 - ROUNDING)) & (traction[Z] > 0.0)
         return self._on_cones(problem, traction, slipping)
@@ -65,16 +68,17 @@ class CoupledLevel:
     def search(
         self,
         problem: CoupledProblem,
-        begun: tuple[Array, Mask],
+        guess: tuple[Array, Mask],
         tolerance: float,
         max_iterations: int,
         missed: Mask | None = None,
     ) -> CoupledIterate:
-        """Newton's method from a traction and its slipping cells, in a box around the contact.
+        """Search by Newton's method in a box around the contact and the cells ``missed`` so far.
 
-        And around cells ``missed`` so far. The box is enlarged while the contact reaches its sides.
+        ``guess`` holds a traction and its slipping cells. The box is enlarged while the contact
+        reaches its sides.
         """
-        (traction, slipping), iterations = begun, 0
+        (traction, slipping), iterations = guess, 0
         pressed = traction[Z] > 0.0
         box = Box.around(pressed if missed is None else pressed | missed)
         while True:
@@ -87,17 +91,17 @@ class CoupledLevel:
                 slipping[box.window],
                 tolerance,
                 max_iterations - iterations,
-                box.left_by,
+                box.is_reached_by,
             )
             self._count(operator.half_space, operator.half_space.count - before)
-            traction = np.array([box.placed(component) for component in found.traction])
-            slipping = box.placed(found.slipping.astype(np.float64)) > 0.0
+            traction = np.array([box.on_whole_grid(component) for component in found.traction])
+            slipping = box.on_whole_grid(found.slipping.astype(np.float64)) > 0.0
             iterations += found.iterations
-            if not found.left:
+            if not found.left_bounds:
                 return replace(found, traction=traction, slipping=slipping, iterations=iterations)
-            box = box.grown()
+            box = box.enlarged()
 
-    # -- starts -------------------------------------------------------------------------------
+    # -- initial guesses ----------------------------------------------------------------------
     def _on_cones(
         self, problem: CoupledProblem, traction: Array, slipping: Mask
     ) -> tuple[Array, Mask] | None:
@@ -107,7 +111,7 @@ class CoupledLevel:
         return None if within is None else (within, slipping)
 
     def _pressed(self, problem: CoupledProblem) -> Array:
-        """Traction without friction, 0 where there is none to be had."""
+        """Return the traction without friction, or 0 if the normal problem has no solution."""
         traction = np.zeros((3, *self.half_space.grid.shape))
         try:
             state = pressed_without_friction(problem, self._normal)
@@ -118,26 +122,27 @@ class CoupledLevel:
         return traction
 
     def _from_coarser(self, problem: CoupledProblem) -> tuple[Array, Mask] | None:
-        """From the solution on the next coarser grid; None without one."""
+        """Return an initial guess from the next coarser grid, or None without one."""
         if self._coarser is None:
             return None
         level, transfer = self._coarser
         coarse, before = level._restricted(problem, transfer), level.transformed
-        begun = level.begin(coarse)
-        if begun is None:
+        guess = level.begin(coarse)
+        if guess is None:
             return None
-        found = level.search(coarse, begun, COARSE_TOLERANCE, COARSE_ITERATIONS)
+        found = level.search(coarse, guess, COARSE_TOLERANCE, COARSE_ITERATIONS)
         self.transformed += level.transformed - before
         traction = np.array([transfer.interpolated(component) for component in found.traction])
         pressed, slipping = (
             transfer.interpolated(cells.astype(np.float64)) > 0.5
             for cells in (found.traction[Z] > 0.0, found.slipping)
         )
-        # Interpolation smears tractions over cells beyond the edge: five directions more.
+        # Interpolation spreads tractions to cells beyond the edge, which would cost five more
+        # directions.
         return self._on_cones(problem, traction * pressed, slipping & pressed)
 
     def _restricted(self, fine: CoupledProblem, transfer: GridTransfer) -> CoupledProblem:
-        """The problem on this level that is the mean of one on the next finer grid."""
+        """Return the problem ``fine`` of the next finer grid, averaged over this level's cells."""
         grid, compliance = self.half_space.grid, fine.compliance
         return replace(
             fine,
@@ -176,7 +181,7 @@ class CoupledLevel:
 
 
 def pressed_without_friction(problem: CoupledProblem, normal: NormalContact) -> NormalState:
-    """The bodies pressed as ``problem`` says, without friction.
+    """Return the normal contact of ``problem`` without friction.
 
     Raises NormalContactError where no pressure on the grid can be balanced.
     """

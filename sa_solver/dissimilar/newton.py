@@ -1,17 +1,18 @@
 """Newton's method with truncated GMRES for pressure and shear of dissimilar bodies together.
 
-Cells are off the contact, or stick, with all three components of traction free, or slip, where the
-shear follows the pressure on the circle |q| = µp and only its direction is free. A phase of the
-search keeps these sets and takes the directions to be straight tangents. The problem is then
-linear: the half-space with its coupling, plus the curvature |Δs|/µp along the tangents. It is not
-symmetric where shear follows pressure, so that GMRES lowers its residual, preconditioned by the
-inverse 3 x 3 symbol of the half-space on the free components. Then the tractions are projected
-back: cells that pull leave, cells that interpenetrate join, cells beyond their circle begin to
-slip, cells whose slip would run along with the shear begin to stick, and the resultants are
-restored.
+Cells are out of contact, or stick, with all three components of traction free, or slip. In cells
+that slip, the shear is on the circle |q| = µp, so that its size follows from the pressure and only
+its direction is free. A phase of the search keeps these sets of cells and replaces the circles by
+their tangents. The problem is then linear: the half-space with its coupling, plus the curvature
+|Δs|/µp along the tangents. It is not symmetric where shear follows pressure. GMRES lowers its
+residual, preconditioned by the inverse 3 x 3 symbol of the half-space on the free components. Then
+the tractions are projected back: cells in tension leave the contact, cells that interpenetrate join
+it, cells outside their circle begin to slip, cells whose slip has the direction of the shear begin
+to stick, and the resultants are restored.
 
-No energy falls from phase to phase, because the friction limit follows the pressure: a search whose
-residual no longer falls gives up and says so, and leaves the rest to :mod:`sa_solver.splitting`.
+There is no energy that falls from phase to phase, because the friction limit depends on the
+pressure. A search whose residual no longer falls stops without convergence. The solution is then
+continued by :mod:`sa_solver.splitting`.
 
 Sources: Alart & Curnier 1991, Comput. Methods Appl. Mech. Eng. 92, 353,
 doi:10.1016/0045-7825(91)90022-X (the linearisation); Saad & Schultz 1986, SIAM J. Sci. Stat.
@@ -45,27 +46,28 @@ from sa_solver.types import Array, Indices, Mask
 
 SETTLED = 0.1
 STEADY = 1e-3
-"""A phase ends once its preconditioned residual has fallen by this factor, by the second where no
-cell has changed since the last: there what is left falls with its square."""
+"""Factors by which the preconditioned residual must fall in a phase: the first in general, the
+second where no cell has changed in the last phase, because convergence is then quadratic."""
 
 ENOUGH = 0.3
-"""Or once it is this far within the tolerance, as far as the phase can know."""
+"""Share of the tolerance at which a phase ends in any case, as far as the phase can estimate it."""
 
 PHASE_STEPS = 16
-"""Most directions of a phase, all of which are remembered."""
+"""Most directions of a phase, all of which are stored."""
 
 LEAST_PUNCH = 1e-3
-"""Share of the largest pressure added to that of each cell, as the weight of a punch."""
+"""Share of the largest pressure that is added to the pressure of each cell in the weight of a
+punch."""
 
 PATIENCE = 8
-"""Phases without a lower residual after which the search gives up."""
+"""Number of phases without a lower residual after which the search stops."""
 
 ROUNDING = 1e-12
-"""How far below its limit shear on the limit may be; and what is left of a direction that lies
-among the others."""
+"""Relative distance below its limit of shear that has reached the limit, and relative size of a
+direction that is a combination of the others."""
 
 LEAST_PRESSURE = 1e-9
-"""Share of the largest pressure from which on down the curvature 1/p grows no more."""
+"""Share of the largest pressure below which the curvature 1/p no longer grows."""
 
 TINY = 1e-200
 """Keeps divisions by a vanishing size finite."""
@@ -73,10 +75,20 @@ TINY = 1e-200
 
 @dataclass(frozen=True)
 class CoupledIterate:
-    """Traction ``(3, nx, ny)`` [MPa] that obeys both bounds and has the resultants.
+    """Result of a search.
 
-    ``slipping`` ``(nx, ny)`` marks cells on their circle, ``rigid`` ``(6,)`` [mm] are the free
-    motions. ``left`` says that the search ended because the contact left its bounds.
+    Attributes
+    ----------
+    traction
+        Traction ``(3, nx, ny)`` [MPa] that obeys both bounds and has the imposed resultants.
+    slipping
+        Cells ``(nx, ny)`` on their circle.
+    rigid
+        Free motions ``(6,)`` [mm].
+    residual, iterations, converged
+        Largest residual, number of directions, and whether the residual is within the tolerance.
+    left_bounds
+        Whether the search ended because the contact left its bounds.
     """
 
     traction: Array
@@ -85,24 +97,24 @@ class CoupledIterate:
     residual: float
     iterations: int
     converged: bool
-    left: bool
+    left_bounds: bool
 
 
 class CoupledOperator:
-    """K on a box of cells, for all three components, and its approximate inverse."""
+    """Elastic operator K for all three components on a box of cells, and its inverse."""
 
     def __init__(self, half_space: HalfSpace) -> None:
-        """Plan for the box that ``half_space`` covers."""
+        """Prepare the operator on the box that ``half_space`` covers."""
         self.half_space = half_space
         self.shear = BoxOperator(half_space)
 
     def precondition(self, displacement: Array) -> Array:
-        """About K⁻¹ u ``(3, nx, ny)`` [MPa] of ``displacement`` u ``(3, nx, ny)`` [mm]."""
+        """Return K⁻¹ u ``(3, nx, ny)`` [MPa], approximately, for a ``displacement`` u [mm]."""
         return self._inverse.apply(displacement)
 
     @cached_property
     def _inverse(self) -> SpectralFilter:
-        """The inverse symbol of the box made periodic, with next to no padding."""
+        """Filter with the inverse symbol of the box made periodic with almost no padding."""
         half_space, shape = self.half_space, self.half_space.grid.shape
         period = fast_lengths(*shape)
         symbols = [[half_space.symbol(i, j, period) for j in ALL] for i in ALL]
@@ -117,23 +129,23 @@ def newton_on_cones(
     slipping: Mask,
     tolerance: float,
     max_iterations: int,
-    leaves: Callable[[Mask], bool],
+    leaves_bounds: Callable[[Mask], bool],
 ) -> CoupledIterate:
-    """Solve ``problem`` from a ``traction`` ``(3, nx, ny)`` with the right resultants.
+    """Solve ``problem`` from a ``traction`` ``(3, nx, ny)`` with the imposed resultants.
 
-    ``slipping`` ``(nx, ny)`` are the cells to begin on their circle. Stops when the largest of the
-    residuals is within ``tolerance``, when ``leaves`` is true of the contact, when residuals no
-    longer fall, or after ``max_iterations`` directions.
+    ``slipping`` ``(nx, ny)`` are the cells that are on their circle at the start. The search stops
+    when the largest residual is within ``tolerance``, when ``leaves_bounds`` is true of the
+    contact, when the residual no longer falls, or after ``max_iterations`` directions.
     """
     search = _Search(problem, operator, traction, slipping)
     best, waited = np.inf, 0
     while True:
         residual = search.residual()
         best, waited = (residual, 0) if residual < best else (best, waited + 1)
-        left = leaves(search.contact)
+        left_bounds = leaves_bounds(search.contact)
         stopped = (
             residual <= tolerance
-            or left
+            or left_bounds
             or waited > PATIENCE
             or search.iterations >= max_iterations
             or not np.isfinite(residual)
@@ -146,15 +158,16 @@ def newton_on_cones(
                 residual,
                 search.iterations,
                 residual <= tolerance,
-                left,
+                left_bounds,
             )
 
 
 class _FreeParts:
-    """The components of traction that are free, on the ``m`` cells of a contact.
+    """Free components of traction on the ``m`` cells of a contact.
 
-    Where a cell slips along ``normal`` ``(2, m)``, what is free is its pressure, which the shear
-    follows, and the direction of its shear. Tensors ``(4, m)`` are xx, xy, yy and zz.
+    In a cell that slips, with shear along ``normal`` ``(2, m)``, the pressure and the direction of
+    the shear are free; the size of the shear follows from the pressure. Tensors ``(4, m)`` have the
+    components xx, xy, yy and zz.
     """
 
     def __init__(
@@ -164,38 +177,54 @@ class _FreeParts:
         slips: Mask,
         follows: Array,
         normal: Array,
-        bend: Array,
-        yielding: Array,
+        curvature: Array,
+        compliance: Array,
     ) -> None:
-        """``follows`` ``(2, m)`` is the shear over the pressure of cells where it ``slips``.
+        """Set up the tensors of the free components.
 
-        ``bend`` ``(m,)`` is |Δs|/µp there, ``yielding`` D ``(m,)`` [mm/MPa].
+        Parameters
+        ----------
+        operator
+            Elastic operator K.
+        cells
+            Indices of the cells in contact ``(m,)``.
+        slips
+            Cells that slip ``(m,)``.
+        follows
+            Shear over pressure of these cells ``(2, m)``.
+        normal
+            Direction of their shear ``(2, m)``.
+        curvature
+            Curvature |Δs|/µp of these cells ``(m,)`` [mm/MPa].
+        compliance
+            Local compliance D ``(m,)`` [mm/MPa].
         """
         self._operator, self.cells, self.follows = operator, cells, follows
         x, y = normal
         across = np.where(slips, [y * y, -x * y, x * x], [[1.0], [0.0], [1.0]])
-        own, own_z = (operator.half_space.self_compliance(k) for k in (X, Z))
-        taken, taken_z = own / (own + bend), own_z / (own_z + yielding)
-        rest, rest_z = (1.0 - taken) / (own + bend), (1.0 - taken_z) / (own_z + yielding)
-        # (K + D)⁻¹ is about χ K⁻¹ χ and a rest that hardly feels other cells: as in shear alone.
-        self._window = np.stack([*(np.sqrt(taken) * across), np.sqrt(taken_z)])
+        cell, cell_z = (operator.half_space.self_compliance(k) for k in (X, Z))
+        share, share_z = cell / (cell + curvature), cell_z / (cell_z + compliance)
+        rest, rest_z = (1.0 - share) / (cell + curvature), (1.0 - share_z) / (cell_z + compliance)
+        # (K + D)⁻¹ is approximately χ K⁻¹ χ plus a rest of cells that hardly interact, as in
+        # BoxOperator.windows.
+        self._window = np.stack([*(np.sqrt(share) * across), np.sqrt(share_z)])
         self._rest = np.stack([*(rest * across), rest_z])
-        self._bend = np.stack([*(bend * across), yielding])
-        self._free = np.stack([*across, np.ones_like(bend)])
+        self._local = np.stack([*(curvature * across), compliance])
+        self._free = np.stack([*across, np.ones_like(curvature)])
 
-    def cut(self, fields: Array) -> Array:
-        """The free components of ``fields`` ``(k, 3, m)``."""
-        cut = np.zeros_like(fields)
-        for part, field in zip(cut, fields, strict=True):
+    def projected(self, fields: Array) -> Array:
+        """Return the free components of ``fields`` ``(k, 3, m)``."""
+        projected = np.zeros_like(fields)
+        for part, field in zip(projected, fields, strict=True):
             add_product(self._free, field, part)
-        return cut
+        return projected
 
-    def add_bent(self, displacement: Array, parts: Array) -> None:
-        """Add what curvature and local compliance make of ``parts``, both ``(3, m)``."""
-        add_product(self._bend, parts, displacement)
+    def add_local(self, displacement: Array, parts: Array) -> None:
+        """Add the displacement of ``parts`` by curvature and local compliance, both ``(3, m)``."""
+        add_product(self._local, parts, displacement)
 
     def inverted(self, displacement: Array) -> Array:
-        """Free components ``(3, m)`` that cause about this ``displacement`` ``(3, m)`` on them."""
+        """Return free components ``(3, m)`` that cause approximately this ``displacement``."""
         field = np.zeros((3, *self._operator.half_space.grid.shape))
         spread_product(self._window, displacement, self.cells, field.reshape(3, -1))
         field = self._operator.precondition(field)
@@ -205,14 +234,17 @@ class _FreeParts:
         return parts
 
     def traction(self, parts: Array) -> Array:
-        """Traction ``(3, m)`` of free components: with the shear that follows the pressure."""
+        """Return the traction ``(3, m)`` of free components ``parts``.
+
+        It includes the shear that follows from the pressure in cells that slip.
+        """
         traction = parts.copy()
         traction[:Z] += self.follows * parts[Z]
         return traction
 
 
 class _Search:
-    """State of the search: admissible tractions, their displacement, the sets and the motion."""
+    """State of the search: admissible tractions, displacement, sets of cells and rigid motion."""
 
     def __init__(
         self, problem: CoupledProblem, operator: CoupledOperator, traction: Array, slipping: Mask
@@ -224,30 +256,31 @@ class _Search:
         self._motions = np.zeros(len(shapes))
         self.iterations = 0
         self.contact, self.slipping = traction[Z] > 0.0, slipping & (traction[Z] > 0.0)
-        self._turned = int(np.count_nonzero(self.contact))
+        self._changed = int(np.count_nonzero(self.contact))
         self._take(traction)
         self._motions = self._supported()
-        self._relative = self._left(self._moved)
+        self._relative = self._without_motion(self._moved)
 
     @property
     def rigid(self) -> Array:
-        """Free motions last found ``(6,)``."""
+        """Free motions ``(6,)`` found last [mm]."""
         rigid = np.zeros(6)
         rigid[list(self._problem.free)] = self._motions
         return rigid
 
     def residual(self) -> float:
-        """The largest of the traction last projected, at the motion last found."""
+        """Return the largest residual of the last projected traction and the last motion."""
         fields = self.traction, self._displacement, self._relative
         return coupled_residuals(self._problem, *fields).largest
 
     def phase(self, goal: float) -> bool:
-        """Directions on the present sets, then a projection; False where none can be balanced.
+        """Take a step on the present sets, then project the tractions.
 
-        ``goal`` is the tolerance over the residual.
+        ``goal`` is the tolerance over the residual. False is returned if the tractions cannot be
+        balanced.
         """
         self._linearise()
-        share = max(STEADY if self._turned == 0 else SETTLED, ENOUGH * goal)
+        share = max(STEADY if self._changed == 0 else SETTLED, ENOUGH * goal)
         step, moved = self._solve(share)
         return bool(np.all(np.isfinite(step))) and self._project(step, moved)
 
@@ -259,80 +292,81 @@ class _Search:
         self._moved = moved.reshape(3, -1)
 
     def _supported(self) -> Array:
-        """Free motions ``(k,)`` with which v does no work on the pressure."""
+        """Return free motions ``(k,)`` for which v does no work on the pressure."""
         shapes = self._shapes.reshape(len(self._shapes), self._moved.size)
         weighted = (self._shapes * self.traction[Z].ravel()).reshape(shapes.shape)
         products = weighted @ shapes.T
         return np.asarray(np.linalg.pinv(products, RANK_CUTOFF) @ (weighted @ self._moved.ravel()))
 
-    def _left(self, moved: Array) -> Array:
-        """``v`` ``(3, nx, ny)`` where it is ``moved`` ``(3, nx ny)`` but for the free motions."""
+    def _without_motion(self, moved: Array) -> Array:
+        """Return v ``(3, nx, ny)``: ``moved`` ``(3, nx ny)`` minus the free motions."""
         motion = self._problem.modes.motion(self.rigid)
         return np.asarray(moved.reshape(motion.shape) - motion)
 
     def _linearise(self) -> None:
-        """Free components, curvature and punches at the present traction."""
+        """Set up the free components, curvature and punches at the present traction."""
         friction, cells = self._problem.friction, np.flatnonzero(self.contact)
         slips = self.slipping.ravel()[cells]
         shear_x, shear_y, pressure = self.traction.reshape(3, -1)[:, cells]
         slip = self._relative.reshape(3, -1)[:Z, cells]
-        # Where nothing presses yet, shear will oppose the slip; without friction there is none.
+        # In cells without pressure so far, shear will oppose the slip, if there is friction.
         along = np.where(pressure > 0.0, [shear_x, shear_y], -slip if friction else 0.0)
         normal = np.where(slips, along / np.maximum(np.hypot(*along), TINY), 0.0)
         limit = friction * np.maximum(pressure, LEAST_PRESSURE * pressure.max()) + TINY
-        bend = np.where(slips, np.maximum(-np.sum(slip * normal, axis=0), 0.0) / limit, 0.0)
-        yielding = np.broadcast_to(self._problem.compliance, self.contact.shape).ravel()[cells]
+        curvature = np.where(slips, np.maximum(-np.sum(slip * normal, axis=0), 0.0) / limit, 0.0)
+        compliance = np.broadcast_to(self._problem.compliance, self.contact.shape).ravel()[cells]
         self._normal = normal
         self._parts = _FreeParts(
-            self._operator, cells, slips, friction * normal, normal, bend, yielding
+            self._operator, cells, slips, friction * normal, normal, curvature, compliance
         )
         self._set_punches(pressure + LEAST_PUNCH * pressure.max())
 
     def _set_punches(self, weight: Array) -> None:
-        """Free components that carry the resultants: rigid motions times a ``weight`` ``(m,)``."""
+        """Set up free components that carry resultants: rigid motions times ``weight`` ``(m,)``."""
         parts = self._parts
         shapes = np.take(self._shapes, parts.cells, axis=2)
-        felt = shapes.copy()
-        felt[:, Z] += np.sum(parts.follows * shapes[:, :Z], axis=1)
+        conjugate = shapes.copy()
+        conjugate[:, Z] += np.sum(parts.follows * shapes[:, :Z], axis=1)
         flat = len(shapes), 3 * len(weight)
-        self._rigid_shapes, self._felt = shapes.reshape(flat), felt.reshape(flat)
-        self._punches = parts.cut(shapes * weight).reshape(flat)
-        self._gain = np.linalg.pinv(self._felt @ self._punches.T, RANK_CUTOFF)
+        self._rigid_shapes, self._conjugate = shapes.reshape(flat), conjugate.reshape(flat)
+        self._punches = parts.projected(shapes * weight).reshape(flat)
+        self._gain = np.linalg.pinv(self._conjugate @ self._punches.T, RANK_CUTOFF)
         self._gain_of_motions = np.linalg.pinv(self._punches @ self._rigid_shapes.T, RANK_CUTOFF)
 
-    def _undone(self, displacement: Array) -> Array:
-        """Free motions ``(k,)`` that leave a ``displacement`` ``(3, m)`` no work on punches."""
+    def _motion_of(self, displacement: Array) -> Array:
+        """Return free motions ``(k,)`` without which ``displacement`` does no work on punches."""
         return np.asarray(self._gain_of_motions @ (self._punches @ displacement.ravel()))
 
     def _descent(self, displacement: Array) -> tuple[Array, Array]:
-        """What ``displacement`` ``(3, m)`` asks of the free components, without resultants.
+        """Return the preconditioned ``displacement`` ``(3, m)``, without resultants.
 
-        And the free motions taken off it first.
+        The free motions that are subtracted from the displacement first are returned as well.
         """
-        motions = self._undone(displacement)
-        left = displacement - (motions @ self._rigid_shapes).reshape(displacement.shape)
-        parts = self._parts.inverted(left)
-        carried = self._gain @ (self._felt @ parts.ravel())
+        motions = self._motion_of(displacement)
+        relative = displacement - (motions @ self._rigid_shapes).reshape(displacement.shape)
+        parts = self._parts.inverted(relative)
+        carried = self._gain @ (self._conjugate @ parts.ravel())
         parts -= (carried @ self._punches).reshape(parts.shape)
         return parts, motions
 
     def _image(self, parts: Array) -> Array:
-        """K t ``(3, nx ny)`` of free components ``(3, m)``: one convolution."""
+        """Return K t ``(3, nx ny)`` of free components ``(3, m)``, by one convolution."""
         traction = np.zeros_like(self.traction)
         traction.reshape(3, -1)[:, self._parts.cells] = self._parts.traction(parts)
         return self._problem.half_space.displacement(traction).reshape(3, -1)
 
     def _solve(self, share: float) -> tuple[Array, Array]:
-        """GMRES until the residual has fallen to ``share`` of itself.
+        """Iterate GMRES until the residual has fallen to ``share`` of itself.
 
-        The step of the traction ``(3, m)``, and v at its end but for the motion ``(3, nx ny)``.
+        The step of the traction ``(3, m)`` is returned, and v ``(3, nx ny)`` at its end, without
+        the free motions.
         """
         cells = self._parts.cells
         begin, motions = self._descent(self._moved[:, cells])
         size = float(np.linalg.norm(begin))
         basis = np.empty((PHASE_STEPS + 1, begin.size))
         np.multiply(begin.ravel(), -1.0 / max(size, TINY), out=basis[0])
-        undone = [motions]
+        all_motions = [motions]
         hessenberg = np.zeros((PHASE_STEPS + 1, PHASE_STEPS))
         wanted = size * np.eye(PHASE_STEPS + 1)[0]
         weights, k = np.zeros(0), 0
@@ -341,10 +375,10 @@ class _Search:
             image = self._image(parts)
             self._images[k] = image.ravel()
             displacement = image[:, cells]
-            self._parts.add_bent(displacement, parts)
-            answer, motions = self._descent(displacement)
-            undone.append(motions)
-            next_one = answer.ravel()
+            self._parts.add_local(displacement, parts)
+            response, motions = self._descent(displacement)
+            all_motions.append(motions)
+            next_one = response.ravel()
             rounding = ROUNDING * float(np.linalg.norm(next_one)) + TINY
             for i in range(k + 1):
                 hessenberg[i, k] = basis[i] @ next_one
@@ -355,21 +389,21 @@ class _Search:
                 return np.full_like(begin, np.nan), self._moved
             matrix = hessenberg[: k + 1, :k]
             weights = np.linalg.lstsq(matrix, wanted[: k + 1])[0]
-            left = float(np.linalg.norm(wanted[: k + 1] - matrix @ weights))
-            if left <= share * size or hessenberg[k, k - 1] <= rounding:
+            residual = float(np.linalg.norm(wanted[: k + 1] - matrix @ weights))
+            if residual <= share * size or hessenberg[k, k - 1] <= rounding:
                 break
             np.multiply(next_one, 1.0 / hessenberg[k, k - 1], out=basis[k])
         self.iterations += k
-        self._motions = undone[0] + weights @ np.array(undone[1:])
+        self._motions = all_motions[0] + weights @ np.array(all_motions[1:])
         step = self._parts.traction((weights @ basis[:k]).reshape(begin.shape))
         return step, self._moved + (weights @ self._images[:k]).reshape(self._moved.shape)
 
     # -- back to the cones ----------------------------------------------------------------------
     def _project(self, step: Array, moved: Array) -> bool:
-        """Back to admissible and balanced tractions on new sets; False where there are none."""
+        """Project to admissible, balanced tractions on new sets; False if there are none."""
         problem, cells = self._problem, self._parts.cells
         reached = self.traction.reshape(3, -1)[:, cells] + step
-        relative = self._left(moved)
+        relative = self._without_motion(moved)
         slip = relative.reshape(3, -1)[:Z, cells]
         pressed, slipped = reached[Z] > 0.0, self.slipping.ravel()[cells]
         opposed = np.sum(slip * self._normal, axis=0) < 0.0
@@ -380,25 +414,25 @@ class _Search:
         slipping = self._mask(slips)
         traction = balanced(problem, self._operator, trial, slipping)
         if traction is None:
-            # Too much of the shear is held on circles: those that slip are left to the balance.
+            # Too much of the shear is fixed on circles: the balance decides which cells slip.
             slipping, slipped = np.zeros_like(slipping), np.zeros_like(slipped)
             traction = balanced(problem, self._operator, trial, slipping)
         if traction is None:
             return False
         joining = (relative[Z] < 0.0) & ~self.contact
-        # Cells released are still on their circle; others the balance may have brought there.
+        # Released cells are still on their circle; the balance may have moved others there.
         pushed = np.hypot(*traction[:Z]) >= problem.friction * traction[Z] * (1.0 - ROUNDING)
         contact = self._mask(pressed) | joining
         slipping |= joining | (self._mask(pressed & ~slipped) & pushed)
         changed = (contact ^ self.contact) | (contact & (slipping ^ self.slipping))
-        self._turned = int(np.count_nonzero(changed))
+        self._changed = int(np.count_nonzero(changed))
         self.contact, self.slipping = contact, slipping
         self._take(traction)
-        self._relative = self._left(self._moved)
+        self._relative = self._without_motion(self._moved)
         return True
 
     def _mask(self, values: Mask) -> Mask:
-        """``(nx, ny)`` of what is true on the cells."""
+        """Return the mask ``(nx, ny)`` with ``values`` on the cells and False elsewhere."""
         mask = np.zeros(self.contact.shape, dtype=bool)
         mask.ravel()[self._parts.cells] = values
         return mask
@@ -407,9 +441,10 @@ class _Search:
 def balanced(
     problem: CoupledProblem, operator: CoupledOperator, traction: Array, slipping: Mask
 ) -> Array | None:
-    """Admissible ``traction`` ``(3, nx, ny)`` near one of p >= 0, with the resultants; or None.
+    """Return an admissible traction near ``traction``, with the imposed resultants, or None.
 
-    Pressure first, then shear within its µp, on the circle where ``slipping`` ``(nx, ny)``.
+    ``traction`` ``(3, nx, ny)`` has p >= 0. The pressure is balanced first, then the shear within
+    its µp, and on the circle in the cells ``slipping`` ``(nx, ny)``.
     """
     pressure = problem.normal.balance(traction[Z], problem.normal_target)
     if pressure is None:

@@ -1,12 +1,13 @@
-"""The discrete contact problem of dissimilar bodies, normal and tangential together.
+"""Discrete contact problem of dissimilar bodies, normal and tangential together.
 
 Tractions ``t = (qx, qy, p)`` and relative displacements ``v = (Δsx, Δsy, g)`` of one increment obey
 
     v = K t + D t + offset - R c
     p >= 0,  g >= 0,  p g = 0,    |q| <= µp,  Δs = -λ q,  λ >= 0,  λ (µp - |q|) = 0
 
-K is the half-space with all nine influence functions, D a local compliance of the pressure alone, R
-the six rigid motions and c their sizes, each imposed or such that its resultant is.
+where K is the half-space with all nine influence functions, D a local compliance that acts on
+pressure alone, R the six rigid motions and c their coefficients. Each coefficient is imposed, or
+follows from an imposed resultant.
 """
 
 from __future__ import annotations
@@ -23,18 +24,34 @@ from sa_solver.rigid_modes import NORMAL, PLANAR, NormalModes, PlanarModes, Rigi
 from sa_solver.types import Array
 
 SMALLEST_SHARE = 1e-4
-"""Where the tangential displacement is below this share of the normal one, friction hardly acts:
-its residual is measured against that share, since against rounding it would never be small."""
+"""Least displacement to which the residual of friction is relative, as a share of the normal
+displacement. Where the tangential displacement is smaller, friction hardly acts, and a residual
+relative to rounding would never be small."""
 
 
 @dataclass(frozen=True)
 class CoupledProblem:
     """Data of one increment.
 
-    ``offset`` ``(3, nx, ny)`` [mm] holds, in z, the gap before loading and, in x and y, what the
-    slip is counted from, with all ``imposed`` motions ``(6,)`` taken off; ``free`` are the motions
-    whose resultants ``target`` ``(len(free),)`` [MPa] are imposed instead; ``compliance`` D
-    ``(nx, ny)`` [mm/MPa] or 0.
+    Attributes
+    ----------
+    half_space
+        Half-space K.
+    modes
+        Rigid motions R.
+    friction
+        Coefficient of friction µ.
+    offset
+        Relative displacement ``(3, nx, ny)`` [mm] without tractions and free motions: the slip in x
+        and y, and the gap in z, minus all imposed motions.
+    imposed
+        Imposed motions ``(6,)`` [mm].
+    free
+        Motions whose resultants are imposed instead.
+    target
+        Sums ``(len(free),)`` [MPa] that follow from these resultants.
+    compliance
+        Local compliance D ``(nx, ny)`` [mm/MPa], or 0.
     """
 
     half_space: HalfSpace
@@ -48,17 +65,17 @@ class CoupledProblem:
 
     @property
     def load(self) -> float | None:
-        """P over the cell area [MPa], or None where the approach is imposed instead."""
+        """Normal load P over the cell area [MPa], or None where the approach is imposed."""
         return float(self.target[0]) if 0 in self.free else None
 
     @cached_property
     def normal(self) -> NormalModes:
-        """The free modes of pressure."""
+        """Free modes of pressure."""
         return self.modes.normal(self.free)
 
     @cached_property
     def planar(self) -> PlanarModes:
-        """The free modes of shear."""
+        """Free modes of shear."""
         return self.modes.planar(self.free)
 
     @cached_property
@@ -72,7 +89,10 @@ class CoupledProblem:
         return self.target[[k in PLANAR for k in self.free]]
 
     def cropped(self, window: Window, half_space: HalfSpace) -> CoupledProblem:
-        """The problem with tractions only on the cells of ``window``, those of ``half_space``."""
+        """Return the problem with tractions only on the cells of ``window``.
+
+        ``half_space`` covers these cells.
+        """
         compliance = self.compliance
         return replace(
             self,
@@ -83,7 +103,10 @@ class CoupledProblem:
         )
 
     def relative(self, traction: Array, displacement: Array, rigid: Array) -> Array:
-        """``v`` ``(3, nx, ny)`` [mm] under tractions t, K t and free motions ``rigid`` ``(6,)``."""
+        """Return the relative displacement v ``(3, nx, ny)`` [mm].
+
+        ``displacement`` is K t for the tractions t, and ``rigid`` ``(6,)`` are the free motions.
+        """
         relative = displacement + self.offset - self.modes.motion(rigid)
         relative[Z] += self.compliance * traction[Z]
         return relative
@@ -91,15 +114,22 @@ class CoupledProblem:
 
 @dataclass(frozen=True)
 class CoupledResiduals:
-    """How far a state is from solving the problem, dimensionless, independent of the method.
+    """Dimensionless residuals of a state, which do not depend on the method of solution.
 
-    ``force``: largest error of an imposed P, Qx or Qy over P; ``moment``: of an imposed Mx, My or
-    Mz over P times half the grid's size; ``penetration`` and ``complementarity`` as in
-    :class:`~sa_solver.normal.problem.NormalResiduals`; ``coulomb``: largest
-    ``κ |q - Π(q - Δs/κ)|`` over the largest ``|u_τ|`` (or, if that is more, 1e-4 of the largest
-    u_z), Π the projection on the disk of radius µp
-    and κ a cell's own compliance, which vanishes only where Coulomb's law holds. Pressure is never
-    negative and shear never above µp.
+    The pressure itself is never negative and the shear never above µp.
+
+    Attributes
+    ----------
+    force
+        Largest error of an imposed P, Qx or Qy over P.
+    moment
+        Largest error of an imposed Mx, My or Mz over P times half the size of the grid.
+    penetration, complementarity
+        As in :class:`~sa_solver.normal.problem.NormalResiduals`.
+    coulomb
+        Largest ``κ |q - Π(q - Δs/κ)|`` over the largest ``|u_τ|``, or over 1e-4 of the largest u_z
+        if that is more. Π is the projection on the disk of radius µp and κ the compliance of a
+        cell. The residual vanishes only where Coulomb's law holds.
     """
 
     force: float
@@ -110,14 +140,18 @@ class CoupledResiduals:
 
     @property
     def largest(self) -> float:
-        """The largest of the five."""
+        """Largest of the five residuals."""
         return max(self.force, self.moment, self.penetration, self.complementarity, self.coulomb)
 
 
 def coupled_residuals(
     problem: CoupledProblem, traction: Array, displacement: Array, relative: Array
 ) -> CoupledResiduals:
-    """All residuals of a state: ``t``, ``K t`` and ``v``, each ``(3, nx, ny)``."""
+    """Return all residuals of a state.
+
+    The state is given by its tractions t, their displacement K t and the relative displacement v,
+    each ``(3, nx, ny)``.
+    """
     pressure, gap = traction[Z], relative[Z]
     load = float(pressure.sum())
     depth = float((displacement[Z] + problem.compliance * pressure).max())

@@ -1,7 +1,7 @@
-"""The fallback of contacts of dissimilar bodies: Douglas-Rachford splitting on the padded grid.
+"""Fallback solver of contacts of dissimilar bodies: Douglas-Rachford splitting, padded grid.
 
-The elastic relation has the exact inverse of the coupled half-space, the contact law is Coulomb's
-with the compliance of the pressure.
+The elastic step uses the exact inverse of the coupled half-space. The contact law is Coulomb's,
+with a local compliance of the pressure.
 """
 
 from __future__ import annotations
@@ -17,20 +17,21 @@ from sa_solver.rigid_modes import RigidModes
 from sa_solver.types import Array
 
 SHIFT = 0.75
-"""ρ over the geometric mean of the extreme eigenvalues of K. On spheres and flats 0.5, 0.75, 1 and
-1.5 took 57, 51, 50 and 60 iterations in the mean; lines prefer the lower ones."""
+"""Shift ρ over the geometric mean of the extreme eigenvalues of K. On spheres and flats 0.5, 0.75,
+1 and 1.5 took 57, 51, 50 and 60 iterations on average; lines take fewer with the lower values."""
 
 LARGEST_WEIGHT = 60.0
-"""ρ of shear over that of pressure is β/µ between 1 and this. Where pressure drives all cells to
-slip and µ is small, shear changes its sign from one cell to the next: with one ρ for all, lines of
-1024 cells at β 0.5, µ 0.02 took up to 1000 iterations, with this 100 to 300."""
+"""Largest ratio of the shift ρ of shear to that of pressure, which is β/µ but at least 1. Where
+pressure makes all cells slip and µ is small, shear changes its sign from one cell to the next. With
+a single ρ, lines of 1024 cells at β = 0.5 and µ = 0.02 took up to 1000 iterations; with this ratio
+they take 100 to 300."""
 
 
 class CoupledSplitting:
-    """Splittings of the problems on one grid; owns the planned transforms."""
+    """Splittings of the problems on one grid, with shared transforms."""
 
     def __init__(self, half_space: HalfSpace, friction: float, modes: RigidModes) -> None:
-        """Plan for ``half_space``, µ and the motions ``modes``."""
+        """Prepare the splitting for ``half_space``, ``friction`` µ and the motions ``modes``."""
         self._friction, self._present = friction, list(modes.present)
         shares = _shift_shares(half_space, friction)
         self.resolvent = HalfSpaceResolvent(half_space, ALL, shares)
@@ -40,15 +41,15 @@ class CoupledSplitting:
         )
 
     def of(self, problem: CoupledProblem) -> PaddedSplitting:
-        """The two steps for ``problem``."""
+        """Return the two steps for ``problem``."""
         shift = self.resolvent.shift[Z]
-        yielding = shift / (shift + problem.compliance)
+        shrinkage = shift / (shift + problem.compliance)
 
         def law(trial: Array) -> Array:
-            """Coulomb's law, with the compliance of the pressure."""
-            yielded = trial.copy()
-            yielded[Z] *= yielding
-            return coulomb(yielded, self._friction)
+            """Apply Coulomb's law, with the local compliance of the pressure."""
+            reduced = trial.copy()
+            reduced[Z] *= shrinkage
+            return coulomb(reduced, self._friction)
 
         return PaddedSplitting(
             self.resolvent,
@@ -59,11 +60,14 @@ class CoupledSplitting:
         )
 
     def state(self, traction: Array, elastic: Array) -> Array:
-        """``t + v/ρ`` on the padded grid of t and v less the compliance's, ``(3, nx, ny)`` both."""
+        """Return the state ``t + v/ρ`` on the padded grid, for t and v ``(3, nx, ny)``.
+
+        ``elastic`` is v without the displacement of the local compliance.
+        """
         return self.resolvent.padded(traction + elastic / self.resolvent.shift)
 
     def touching(self, problem: CoupledProblem) -> Array:
-        """That of bodies that touch without load."""
+        """Return the state of bodies that touch without load."""
         gap = problem.offset[Z]
         lowest = float(gap.min()) if problem.load is not None else 0.0
         elastic = np.zeros_like(problem.offset)
@@ -72,7 +76,7 @@ class CoupledSplitting:
 
 
 def _shift_shares(half_space: HalfSpace, friction: float) -> Array:
-    """ρ of shear, shear and pressure over the geometric mean of K's extreme eigenvalues."""
+    """Return ρ of qx, qy and p over the geometric mean of K's extreme eigenvalues ``(3,)``."""
     beta = abs(half_space.pair.dundurs_beta)
     weight = max(1.0, min(LARGEST_WEIGHT, beta / max(friction, np.finfo(float).tiny)))
     return SHIFT * np.array([weight, weight, 1.0])

@@ -1,7 +1,8 @@
 """Influence coefficients: surface displacement under uniform traction on a rectangle or a strip.
 
-Both bodies together: ``u = u_2 - u_1`` is the displacement of body 2's surface relative to body
-1's under the tractions that body 1 exerts on body 2 (frames and signs: :mod:`sa_solver.types`).
+They hold for both bodies together: ``u = u_2 - u_1`` is the displacement of body 2's surface
+relative to body 1's under the tractions that body 1 exerts on body 2 (frames and signs are those of
+:mod:`sa_solver.types`).
 With the compliances of :class:`~sa_solver.types.ElasticPair` and ``r² = x² + y²``, a unit point
 force gives
 
@@ -28,16 +29,28 @@ import numpy as np
 from sa_solver.types import Array, ElasticPair
 
 X, Y, Z = range(3)
-"""Components of tractions and displacements."""
+"""Indices of the components of tractions and displacements."""
 
 
 def rectangle_influence(
     edges_x: Array, edges_y: Array, pair: ElasticPair, row: int, column: int
 ) -> Array:
-    """Displacement ``row`` at a point, from unit traction ``column`` on rectangles around it.
+    """Return the displacement at a point from unit traction on each of several rectangles.
 
-    A rectangle is what lies between two neighbouring edges: point less source, in order, along x
-    ``(n + 1,)`` and along y ``(m + 1,)`` [mm]. Returns ``(n, m)`` [mm/MPa].
+    Parameters
+    ----------
+    edges_x, edges_y
+        Coordinates of the point minus those of the edges of the rectangles, in ascending order:
+        ``(n + 1,)`` along x and ``(m + 1,)`` along y [mm].
+    pair
+        Elastic constants of the bodies.
+    row, column
+        Components of the displacement and of the traction: ``X``, ``Y`` or ``Z``.
+
+    Returns
+    -------
+    Array
+        Influence coefficients ``(n, m)`` [mm/MPa].
     """
     x, y = np.asarray(edges_x)[:, None], np.asarray(edges_y)[None, :]
     corner = _corner_function(x, y, pair, row, column)
@@ -45,10 +58,11 @@ def rectangle_influence(
 
 
 def strip_influence(edges: Array, pair: ElasticPair, row: int, column: int, datum: float) -> Array:
-    """The same for infinitely long strips in plane strain; ``edges`` ``(n + 1,)`` [mm].
+    """Return the displacement at a point from unit traction on infinitely long strips.
 
-    ``datum`` L [mm] is the distance from a line force at which its displacement vanishes.
-    Returns ``(n,)`` [mm/MPa].
+    The strips are in plane strain. ``datum`` L [mm] is the distance from a line force at which its
+    displacement vanishes; the other arguments are those of :func:`rectangle_influence`, with
+    ``edges`` ``(n + 1,)`` [mm]. The coefficients are ``(n,)`` [mm/MPa].
     """
     x = np.asarray(edges)
     if row == column:
@@ -61,7 +75,7 @@ def strip_influence(edges: Array, pair: ElasticPair, row: int, column: int, datu
 
 
 def _corner_function(x: Array, y: Array, pair: ElasticPair, row: int, column: int) -> Array:
-    """``∬ kernel dx dy`` as a function of one corner, without the factor 1/2π."""
+    """Return ``∬ kernel dx dy`` as a function of one corner, without the factor 1/2π."""
     if row == column == Z:
         return pair.normal * (_y_asinh(x, y) + _y_asinh(y, x))
     if Z in (row, column):
@@ -73,16 +87,17 @@ def _corner_function(x: Array, y: Array, pair: ElasticPair, row: int, column: in
     if row != column:
         return -pair.poisson * np.hypot(x, y)
     along, across = (x, y) if row == X else (y, x)
-    # ∬ along²/r³ = across asinh(along/|across|), and the sum over both directions is ∬ 1/r.
+    # The integral ∬ along²/r³ is across asinh(along/|across|); its sum over both directions is
+    # ∬ 1/r.
     return pair.shear * _y_asinh(along, across) + (pair.shear - pair.poisson) * _y_asinh(
         across, along
     )
 
 
 def _y_asinh(x: Array, y: Array) -> Array:
-    """``y asinh(x / |y|)``, which tends to 0 with y; the integral of ``x²/r³``.
+    """Return ``y asinh(x / |y|)``, the integral of ``x²/r³``, which tends to 0 with y.
 
-    Johnson's logarithms are the same function; asinh does not cancel where ``x < 0``.
+    It equals Johnson's logarithms, but does not suffer from cancellation where ``x < 0``.
     """
     distance = np.abs(y)
     safe = np.where(distance > 0.0, distance, 1.0)
@@ -90,7 +105,7 @@ def _y_asinh(x: Array, y: Array) -> Array:
 
 
 def _gradient_corner(x: Array, y: Array) -> Array:
-    """``∬ x/r²``: ``y ln r + x atan(y/x)``, which tends to ``y ln |y|`` with x."""
+    """Return ``∬ x/r² = y ln r + x atan(y/x)``, which tends to ``y ln |y|`` as x tends to 0."""
     squares = x**2 + y**2
     logarithm = 0.5 * np.log(np.where(squares > 0.0, squares, 1.0))
     safe = np.where(x != 0.0, x, 1.0)
@@ -98,5 +113,5 @@ def _gradient_corner(x: Array, y: Array) -> Array:
 
 
 def _integrated_logarithm(t: Array) -> Array:
-    """``∫ ln|t| dt = t ln|t| - t``, 0 at 0."""
+    """Return ``∫ ln|t| dt = t ln|t| - t``, which is 0 at 0."""
     return t * np.log(np.where(t != 0.0, np.abs(t), 1.0)) - t

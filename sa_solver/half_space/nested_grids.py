@@ -1,4 +1,4 @@
-"""Coarser grids over the same area, and how fields pass between them."""
+"""Coarser grids over the same area, and the transfer of fields between grids."""
 
 from __future__ import annotations
 
@@ -10,13 +10,15 @@ from sa_solver.half_space.operator import HalfSpace
 from sa_solver.types import Array, Grid, Indices
 
 COARSEST = 32
-"""Cells across below which a grid is not coarsened: there a solve costs less than its set-up."""
+"""Number of cells along a side up to which it is not coarsened: a solve on so few cells costs less
+than its preparation."""
 
 
 def coarsened(fine: HalfSpace) -> tuple[HalfSpace, GridTransfer] | None:
-    """The same bodies on half as many cells along each side of more than 32, and the transfer.
+    """Return the same bodies on a grid of half as many cells, and the transfer between the grids.
 
-    None where no side is that long. Any number of cells will do: an odd one is rounded up.
+    Sides of :data:`COARSEST` or fewer cells are kept; None is returned where all sides are so
+    short. Half of an odd number of cells is rounded up.
     """
     nx, ny = ((n + 1) // 2 if n > COARSEST else n for n in fine.grid.shape)
     if (nx, ny) == fine.grid.shape:
@@ -26,7 +28,7 @@ def coarsened(fine: HalfSpace) -> tuple[HalfSpace, GridTransfer] | None:
 
 
 class GridTransfer:
-    """Passes fields between a ``fine`` and a ``coarse`` grid over the same area."""
+    """Transfer of fields between a ``fine`` and a ``coarse`` grid over the same area."""
 
     def __init__(self, fine: Grid, coarse: Grid) -> None:
         self.fine = fine
@@ -35,23 +37,23 @@ class GridTransfer:
         self._interpolation = [_interpolation(n, m) for n, m in pairs]
 
     def averaged(self, field: Array) -> Array:
-        """Means over the coarse cells of a field on the fine ones."""
+        """Return the means of a ``field`` on the fine grid over the coarse cells."""
         return _along_both(self._averages, field)
 
     def interpolated(self, field: Array) -> Array:
-        """Bilinear interpolation at the fine cells of a field on the coarse ones."""
+        """Return a ``field`` on the coarse grid, interpolated bilinearly at the fine cells."""
         return _along_both(self._interpolation, field)
 
 
 @dataclass(frozen=True)
 class _Sums:
-    """Weighted sums of a few rows each: of row ``cells[i, k]`` times ``weights[i, k]`` over k."""
+    """Weighted sums of rows: sum i is that of row ``cells[i, k]`` times ``weights[i, k]``."""
 
     cells: Indices
     weights: Array
 
     def of(self, field: Array) -> Array:
-        """From rows of a field ``(n, k)`` to those of another."""
+        """Return the weighted sums of the rows of a ``field`` ``(n, k)``."""
         first, *others = zip(self.cells.T, self.weights.T[:, :, None], strict=True)
         total: Array = field[first[0]] * first[1]
         for cells, weights in others:
@@ -67,18 +69,18 @@ def _along_both(sums: list[_Sums], field: Array) -> Array:
 
 
 def _averages(fine: int, coarse: int) -> _Sums:
-    """Overlap of coarse cells with fine ones over a coarse cell's length."""
+    """Return the overlaps of the coarse cells with fine ones, over the length of a coarse cell."""
     edges = np.arange(coarse + 1) * (fine / coarse)
     first = np.floor(edges[:-1]).astype(int)
-    # Fine cells are between half as long and as long as coarse ones: three cover one.
+    # Fine cells are at least half as long as coarse ones, so that three of them cover one.
     cells = first[:, None] + np.arange(3)
     overlap = np.minimum(cells + 1, edges[1:, None]) - np.maximum(cells, edges[:-1, None])
-    # Those beyond the last cell have no weight.
+    # Fine cells beyond the last one have no weight.
     return _Sums(np.minimum(cells, fine - 1), np.maximum(overlap, 0.0) * (coarse / fine))
 
 
 def _interpolation(fine: int, coarse: int) -> _Sums:
-    """Weights of coarse cells at the centres of fine ones."""
+    """Return the weights of coarse cells in the interpolation at the centres of fine ones."""
     place = np.clip((np.arange(fine) + 0.5) * (coarse / fine) - 0.5, 0.0, coarse - 1)
     first = np.floor(place).astype(int)
     right = place - first

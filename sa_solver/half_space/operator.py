@@ -1,8 +1,8 @@
-"""Two elastic half-spaces on a uniform grid: displacement under tractions by FFT.
+"""Displacement of two elastic half-spaces under tractions on a uniform grid, by FFT.
 
-Zero padding to at least ``2n - 1`` makes the circular convolution with influence coefficients the
-linear one (Liu, Wang & Liu 2000, Wear 243, 101, doi:10.1016/S0043-1648(00)00427-0). On a line grid
-the same holds for half-planes in plane strain.
+Zero padding to at least ``2n - 1`` cells makes the circular convolution with the influence
+coefficients equal to the linear one (Liu, Wang & Liu 2000, Wear 243, 101,
+doi:10.1016/S0043-1648(00)00427-0). On a line grid the same holds for half-planes in plane strain.
 """
 
 from __future__ import annotations
@@ -28,24 +28,24 @@ DATUM = 2.0
 is positive on the padded grid."""
 
 SHIFT = 0.5
-"""ρ of a resolvent over the geometric mean of the extreme eigenvalues of K: the fewest iterations
-of the splitting on spheres and flats; 0.2 and 2 take up to twice as many."""
+"""Shift ρ of a resolvent over the geometric mean of the extreme eigenvalues of K. This value takes
+the fewest iterations of the splitting on spheres and flats; 0.2 and 2 take up to twice as many."""
 
 SMALLEST_EIGENVALUE = 0.5
-"""Smallest eigenvalue of K over the self-compliance of a cell, about, on square cells; less on long
-ones (0.2) and lines (0.1). It only sets ρ, not the solution."""
+"""Approximate smallest eigenvalue of K over the self-compliance of a cell, for square cells. It is
+smaller for long cells (0.2) and lines (0.1). The value affects ρ only, not the solution."""
 
 POWER_OF_TWO = 1.15
-"""Powers of two transform faster than any other length, so one that is at most this far above is
-taken: 256² in place of 225² or 240² in three quarters of the time, 1024² in place of 960² in four
-fifths. From 200 or 400, which are a quarter away, it would take longer."""
+"""Ratio up to which a longer power of two is preferred to a shorter length, because powers of two
+transform fastest: 256² takes three quarters of the time of 225² or 240², and 1024² four fifths of
+that of 960². Lengths of 200 or 400 would take longer as powers of two, a quarter larger."""
 
 ODD_LENGTHS = [3**i * 5**j for i in range(10) for j in range(7)]
-"""Other lengths that transform fast are these times a power of two."""
+"""Fast transform lengths are one of these times a power of two."""
 
 FAST_PRUNED = (256, 512)
-"""Lengths along x at which pruned columns are faster than shorter ones of any other length: 256 in
-place of 144 takes three quarters of the time, 512 in place of 280 four fifths."""
+"""Lengths along x at which pruned columns are faster than any shorter length: 256 takes three
+quarters of the time of 144, and 512 four fifths of that of 280."""
 
 Components = tuple[int, ...]
 GridShape = tuple[int, int]
@@ -54,7 +54,7 @@ GridShape = tuple[int, int]
 class HalfSpace:
     """Displacement of body 2's surface relative to body 1's under tractions on a grid.
 
-    ``count`` is the number of zero-padded convolutions done so far, of one component (pressure),
+    ``count`` is the number of zero-padded convolutions so far, each of one component (pressure),
     two (shear) or three.
 
     Examples
@@ -72,9 +72,10 @@ class HalfSpace:
     """
 
     def __init__(self, grid: Grid, pair: ElasticPair, datum: float | None = None) -> None:
-        """``datum`` [mm] is for line grids: how far from a line force its displacement vanishes.
+        """Prepare the convolutions on ``grid`` for the bodies ``pair``.
 
-        Raises InputError for a datum shorter than the grid.
+        ``datum`` [mm] is the distance from a line force at which its displacement vanishes; it is
+        used on line grids only. Raises InputError for a datum shorter than the grid.
         """
         self.grid, self.pair = grid, pair
         self.datum = DATUM * grid.size[0] if datum is None else checks.number("datum", datum)
@@ -89,10 +90,11 @@ class HalfSpace:
         self._filters: dict[tuple[Components, Components], SpectralFilter] = {}
         self._symbols: dict[tuple[int, int, GridShape], Array] = {}
         self.transform = cache(Transform)
-        """Transforms by shape, padded shape and components, planned once for all who need them."""
+        """Function that returns the transform for a shape, padded shape and number of components,
+        planned once for all users."""
 
     def on(self, grid: Grid) -> HalfSpace:
-        """The same bodies under another ``grid``."""
+        """Return the same bodies on another ``grid``."""
         half_space = HalfSpace(grid, self.pair, self.datum)
         half_space._coefficients = Coefficients(
             grid, self.pair, self.datum, half_space.padded, self._coefficients
@@ -100,36 +102,40 @@ class HalfSpace:
         return half_space
 
     def normal(self, pressure: Array) -> Array:
-        """``u_z`` under ``pressure`` alone, both ``(nx, ny)`` [MPa] → [mm]."""
+        """Return ``u_z`` [mm] under ``pressure`` [MPa] alone, both ``(nx, ny)``."""
         pressure = checks.array("pressures", pressure, self.grid.shape, finite=False)
         displacement: Array = self._convolve(pressure[None], NORMAL, NORMAL)[0]
         return displacement
 
     def shear(self, shear: Array) -> Array:
-        """``u_x, u_y`` under ``shear`` alone, both ``(2, nx, ny)`` [MPa] → [mm]."""
+        """Return ``u_x, u_y`` [mm] under ``shear`` [MPa] alone, both ``(2, nx, ny)``."""
         return self._convolve(self._checked(shear, 2), SHEAR, SHEAR)
 
     def displacement(self, traction: Array) -> Array:
-        """``u`` under ``traction``, both ``(3, nx, ny)`` ordered x, y, z [MPa] → [mm]."""
+        """Return ``u`` [mm] under ``traction`` [MPa], both ``(3, nx, ny)`` ordered x, y, z."""
         return self._convolve(self._checked(traction, 3), ALL, ALL)
 
     def normal_under_shear(self, shear: Array) -> Array:
-        """``u_z`` ``(nx, ny)`` under ``shear`` ``(2, nx, ny)``; 0 for similar bodies."""
+        """Return ``u_z`` ``(nx, ny)`` [mm] under ``shear`` ``(2, nx, ny)`` [MPa].
+
+        It is 0 for similar bodies.
+        """
         if self.pair.similar:
             return np.zeros(shear.shape[1:])
         displacement: Array = self._convolve(self._checked(shear, 2), NORMAL, SHEAR)[0]
         return displacement
 
     def _checked(self, traction: Array, components: int) -> Array:
-        """Tractions ``(components, nx, ny)`` as the transforms take them."""
+        """Return tractions ``(components, nx, ny)``, checked, in the form for the transforms."""
         return checks.array("tractions", traction, (components, *self.grid.shape), finite=False)
 
     def symbol(self, row: int, column: int, period: GridShape | None = None) -> Array:
-        """Eigenvalues of the influence coefficients made periodic, ``(mx, my//2 + 1)`` [mm/MPa].
+        """Return the symbol of displacement ``row`` under traction ``column`` [mm/MPa].
 
-        ``period`` is the padded shape unless given; each displacement is taken at the nearest
-        image. The matrix of symbols is Hermitian: made real and symmetric here by counting
-        components along z in units of the imaginary one.
+        The symbol ``(mx, my//2 + 1)`` holds the eigenvalues of the influence coefficients, made
+        periodic with ``period``, the padded shape by default: each displacement is that of the
+        nearest image of the source. The matrix of symbols is Hermitian. It is made real and
+        symmetric here by multiplying components along z by the imaginary unit.
         """
         key = (min(row, column), max(row, column), period or self.padded)
         if key not in self._symbols:
@@ -137,7 +143,7 @@ class HalfSpace:
         return self._symbols[key]
 
     def self_compliance(self, component: int) -> float:
-        """Displacement at the centre of a cell under unit traction on it [mm/MPa]."""
+        """Return the displacement at the centre of a cell under unit traction on it [mm/MPa]."""
         edges_x, edges_y = (np.array([-0.5, 0.5]) * pitch for pitch in self.grid.pitch)
         return float(self._coefficients.between(edges_x, edges_y, component, component)[0, 0])
 
@@ -152,14 +158,17 @@ class HalfSpace:
     def _compute_symbol(self, row: int, column: int, period: GridShape) -> Array:
         odd = (row == X) != (column == X), (row == Y) != (column == Y)
         symbol = symbol_of(self._coefficients.quarter(row, column, period), period, odd)
-        # Of a kernel that is odd along both axes the DFT is minus the sum over sines.
+        # The DFT of a kernel that is odd along both axes is minus the sum over sines.
         return -symbol if all(odd) else symbol
 
 
 def spectral_filter(
     transform: Transform, symbols: list[list[Array]], rows: Components, columns: Components
 ) -> SpectralFilter:
-    """A filter with components ``rows`` out and ``columns`` in, from real symbols."""
+    """Return the filter that maps components ``columns`` to components ``rows``.
+
+    ``symbols`` are the real symbols of :meth:`HalfSpace.symbol`.
+    """
     if rows == columns == NORMAL:
         return SpectralFilter(transform, symbols)
     inputs, outputs = ([n for n, k in enumerate(part) if k == Z] for part in (columns, rows))
@@ -167,7 +176,7 @@ def spectral_filter(
 
 
 def padded_shape(grid: Grid) -> GridShape:
-    """The fast transform lengths that hold the linear convolution on ``grid``."""
+    """Return the fast transform lengths that hold the linear convolution on ``grid``."""
     linear = [2 * n - 1 for n in grid.shape]
     along_x, along_y = fast_lengths(*linear)
     power = _power_of_two(linear[0])
@@ -176,7 +185,7 @@ def padded_shape(grid: Grid) -> GridShape:
 
 
 def fast_lengths(nx: int, ny: int) -> GridShape:
-    """The next lengths that transform fast."""
+    """Return the next lengths, from ``nx`` and ``ny`` up, that transform fast."""
     return _fast_length(nx), _fast_length(ny)
 
 
@@ -187,20 +196,20 @@ def _fast_length(count: int) -> int:
 
 
 def _power_of_two(count: int) -> int:
-    """The next one."""
+    """Return the least power of two that is not below ``count``."""
     return 1 << (int(count) - 1).bit_length()
 
 
 class HalfSpaceResolvent:
-    """``(K + ρ)⁻¹`` on the zero-padded grid, where K is circulant and the inverse exact.
+    """Resolvent ``(K + ρ)⁻¹`` on the zero-padded grid, where K is circulant and the inverse exact.
 
-    Fields have the shape ``(c, *padded)``; the grid is their first ``(nx, ny)`` block.
+    Fields have the shape ``(c, *padded)``; the grid is their first block of ``(nx, ny)`` cells.
     """
 
     def __init__(
         self, half_space: HalfSpace, components: Components, share: float | Array = SHIFT
     ) -> None:
-        """Plan for tractions with these ``components``.
+        """Prepare the inverse for tractions with these ``components``.
 
         ``share``, a number or ``(c,)``, is ρ over the geometric mean of K's extreme eigenvalues.
         """
@@ -210,7 +219,7 @@ class HalfSpaceResolvent:
         smallest = SMALLEST_EIGENVALUE * min(half_space.self_compliance(k) for k in components)
         mean = float(np.sqrt(largest * smallest))
         self.shift = (share * np.full(len(components), mean))[:, None, None]
-        """ρ of each component ``(c, 1, 1)`` [mm/MPa]."""
+        """Shift ρ of each component ``(c, 1, 1)`` [mm/MPa]."""
         symbols = [[half_space.symbol(i, j) for j in components] for i in components]
         for k, row in enumerate(symbols):
             row[k] = row[k] + self.shift[k]
@@ -219,23 +228,26 @@ class HalfSpaceResolvent:
         self._filter = spectral_filter(transform, inverse, components, components)
 
     def solve(self, displacement: Array) -> Array:
-        """Traction ``(K + ρ)⁻¹ u`` for ``u`` ``(c, mx, my)`` on the padded grid [mm] → [MPa]."""
+        """Return the traction ``(K + ρ)⁻¹ u`` [MPa] for ``displacement`` u ``(c, mx, my)`` [mm].
+
+        Both are on the padded grid.
+        """
         self._half_space.count += 1
         return self._filter.apply(displacement)
 
     def padded(self, fields: Array) -> Array:
-        """``fields`` ``(c, nx, ny)`` continued by zero to the padded grid."""
+        """Return ``fields`` ``(c, nx, ny)``, extended by zeros to the padded grid."""
         out = np.zeros((len(fields), *self.padded_shape))
         self.on_grid(out)[:] = fields
         return out
 
     def on_grid(self, fields: Array) -> Array:
-        """The part of ``fields`` ``(c, mx, my)`` that lies on the grid."""
+        """Return the part of ``fields`` ``(c, mx, my)`` that lies on the grid."""
         return fields[:, : self._shape[0], : self._shape[1]]
 
 
 def inverse_symbols(symbols: list[list[Array]]) -> list[list[Array]]:
-    """The inverse of a matrix of symbols, frequency by frequency."""
+    """Return the inverse of a symmetric matrix of symbols, frequency by frequency."""
     if len(symbols) == 1:
         return [[1.0 / symbols[0][0]]]
     if len(symbols) == 2:

@@ -1,7 +1,7 @@
-"""An approximate inverse of the half-space for conjugate gradients.
+"""Approximate inverse of the half-space, as preconditioner for conjugate gradients.
 
-The inverse kernel decays as 1/r³, so periodicity without padding costs few iterations, and the
-transform takes a quarter of the time of the convolution.
+The inverse kernel decays as 1/r³, so that periodicity without padding costs few iterations, and the
+transform takes a quarter of the time of a convolution.
 Source: Vollebregt 2014, J. Comput. Phys. 257, 333, doi:10.1016/j.jcp.2013.10.005.
 """
 
@@ -15,21 +15,21 @@ from sa_solver.transforms.padded import SpectralFilter
 from sa_solver.types import Array
 
 SMALLEST_RELATIVE_EIGENVALUE = 1e-6
-"""Floor of a circulant symbol relative to its largest value. The smallest true one is of the order
-of half a cell over the grid's length, far above; the floor only keeps an inverse finite."""
+"""Lower bound of a circulant symbol, relative to its largest value. The true minimum is of the
+order of half a cell over the grid's length, far above; the bound only keeps the inverse finite."""
 
 LEVELS = 4
 LEVEL_SPACING = 2.0
-"""Most levels of local compliance in the preconditioner, and their spacing in natural logarithm.
-Where D runs from 0 to a thousand times a cell's own compliance, one level needs over 100 iterations
-and four need 20; more gain nothing."""
+"""Largest number of levels of local compliance in the preconditioner, and the spacing of their
+natural logarithms. Where D varies from 0 to a thousand times the compliance of a cell, one level
+needs over 100 iterations and four need 20; more levels save no iterations."""
 
 
 class NormalPreconditioner:
-    """The inverse symbol of pressure, on the grid made periodic with next to no padding."""
+    """Inverse of K for pressure, on a grid made periodic with almost no padding."""
 
     def __init__(self, half_space: HalfSpace) -> None:
-        """Plan for ``half_space``."""
+        """Prepare the inverse of ``half_space``."""
         self.half_space = half_space
         shape = half_space.grid.shape
         period = fast_lengths(*shape)
@@ -40,10 +40,10 @@ class NormalPreconditioner:
         self.include(None)
 
     def include(self, compliance: Array | None) -> None:
-        """Make it approximate ``(K + D)⁻¹`` for a local ``compliance`` D ``(nx, ny)`` [mm/MPa].
+        """Include a local ``compliance`` D ``(nx, ny)`` [mm/MPa]: approximate ``(K + D)⁻¹``.
 
         Each level j of D has its own inverse symbol and a window χj on the cells near that level,
-        with Σ χj² = 1: the inverse is Σ χj (K + Dj)⁻¹ χj.
+        with Σ χj² = 1. The inverse is Σ χj (K + Dj)⁻¹ χj. None stands for D = 0.
         """
         if compliance is None:
             self._parts = [(None, self._inverse(0.0))]
@@ -55,7 +55,7 @@ class NormalPreconditioner:
         ]
 
     def apply(self, displacement: Array) -> Array:
-        """Pressure ``(nx, ny)`` [MPa] that causes about ``displacement`` ``(nx, ny)`` [mm]."""
+        """Return the approximate pressure ``(nx, ny)`` [MPa] for a ``displacement`` [mm]."""
         total = np.zeros_like(displacement)
         for window, inverse in self._parts:
             if window is None:
@@ -69,7 +69,10 @@ class NormalPreconditioner:
 
 
 def _compliance_levels(compliance: Array, stiffest: float) -> tuple[Array, list[Array | None]]:
-    """Levels of ``compliance`` evenly spaced in log(D + ``stiffest``), and windows around them."""
+    """Return levels of ``compliance`` and a window around each.
+
+    The levels are evenly spaced in log(D + ``stiffest``).
+    """
     logarithm = np.log(compliance + stiffest)
     lowest, highest = float(logarithm.min()), float(logarithm.max())
     intervals = min(LEVELS - 1, round((highest - lowest) / LEVEL_SPACING))

@@ -1,4 +1,4 @@
-"""Equivalent and principal stress of the six components xx, yy, zz, xy, yz, zx."""
+"""Equivalent and principal stresses from the six components xx, yy, zz, xy, yz, zx."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ def von_mises(stress: Array) -> Array:
 
     Examples
     --------
-    Of a tension, and of a pure shear (√3 of it):
+    For uniaxial tension it is the tension, for pure shear √3 times the shear stress:
 
     >>> import numpy as np
     >>> from sa_solver import von_mises
@@ -30,7 +30,7 @@ def principal_stresses(stress: Array) -> Array:
 
     Examples
     --------
-    Of a pure shear: the largest and the smallest differ by twice the largest shear stress.
+    In pure shear the largest and the smallest differ by twice the shear stress:
 
     >>> import numpy as np
     >>> from sa_solver import principal_stresses

@@ -1,20 +1,21 @@
 """Stress inside either body of a contact, under the tractions on a grid.
 
-Each body is a half-space of its own. Body 2 lies in z > 0 and feels the tractions as they are;
-body 1 lies in z < 0 and feels the opposite ones: mirrored by z → -z it is a half-space like body 2
-under (-qx, -qy, p), whose yz and zx change sign on the way back. Stress has six components xx, yy,
-zz, xy, yz, zx in the interface frame, tension positive [MPa]. It is that of the tractions alone: a
-bulk stress is to be added.
+Each body is a half-space of its own. Body 2 lies in z > 0, under the tractions as they are. Body 1
+lies in z < 0, under the opposite tractions. Mirrored by z → -z, body 1 is a half-space like body 2
+under (-qx, -qy, p); its yz and zx change sign when it is mirrored back. Stress has six components
+xx, yy, zz, xy, yz, zx in the interface frame, tension positive [MPa]. It is due to the tractions
+alone; a bulk stress must be added.
 
-Tractions are uniform on each cell and stress is taken below the cells' centres, or at any points,
-where it is exact for such tractions (:mod:`sa_solver.half_space.subsurface_influence`). At the
+Tractions are uniform on each cell. Stress is computed below the centres of the cells, or at any
+points, and is exact for such tractions (:mod:`sa_solver.half_space.subsurface_influence`). At the
 surface zz, yz and zx are -p, -qy and -qx in both bodies.
 
-Inside, stress is of second order in the pitch where a cell's traction is the mean over it (3/2 for
-Hertz's pressure sampled at the centres). At the surface it is of order 1/2 where shear starts as a
-square root: the tension 2 µ p0 at the trailing edge of a sliding cylinder of half-width a
-comes out 11, 8 and 6 % low for a pitch of a/64, a/128 and a/256. A body is pulled there behind the
-shear it feels: body 2 at the -x end for qx > 0, body 1 at the +x end.
+Inside a body, the stress converges with the second order of the pitch where the traction of a cell
+is the mean over the cell (order 3/2 for Hertz's pressure sampled at the centres). At the surface
+the order is 1/2 where shear rises like a square root: the tension 2 µ p0 at the trailing edge of a
+sliding cylinder of half-width a is 11, 8 and 6 % too low for a pitch of a/64, a/128 and a/256. The
+trailing edge is that from which the shear on the body points away: for qx > 0 it is the -x end of
+body 2 and the +x end of body 1.
 
 Source: Liu & Wang 2002, J. Tribol. 124, 36, doi:10.1115/1.1401017 (convolution at a depth).
 """
@@ -50,33 +51,35 @@ COMPONENTS = ("xx", "yy", "zz", "xy", "yz", "zx")
 """Names of the components of stress, in order."""
 
 BORDER = 1e-9
-"""Share of a pitch up to which a point of the surface lies on the border of a cell."""
+"""Distance, in pitches, within which a point of the surface lies on the border of a cell."""
 
 SHEAR = (0, 1)
-"""The tractions along the surface."""
+"""Indices of the tractions along the surface."""
 
 INSIDE = (XX, YY, ZZ, XY, YZ, ZX)
 ALONG_SURFACE = (XX, YY, XY)
-"""Components that convolutions give at the surface, where the others are the tractions."""
+"""Components that are convolutions at the surface; the others equal the tractions there."""
 
 MIRROR: dict[int, Array] = {1: np.array([-1.0, -1.0, 1.0]), 2: np.ones(3)}
-"""Tractions on the half-space z > 0 that a body is or mirrors, over those on body 2."""
+"""Signs of the tractions on the half-space z > 0, relative to those on body 2. Body 1 is mirrored
+to this half-space, body 2 lies in it."""
 
 
 class SubsurfaceError(InputError):
-    """A body, depth, section or field of tractions that does not fit."""
+    """Invalid body, depth, section or field of tractions."""
 
 
 class SubsurfaceStress:
     """Stress in one body under tractions on ``grid``.
 
-    ``count`` is the number of zero-padded convolutions done so far, from three tractions to six
-    components of stress inside and three at the surface. The symbols of the latest depth are kept.
+    ``count`` is the number of zero-padded convolutions so far, each from three tractions to six
+    components of stress inside the body or three at the surface. The symbols of the latest depth
+    are cached.
 
     Examples
     --------
-    The largest shear stress under a cylinder is 0.30 of the peak pressure (1000 MPa), 0.78 half
-    widths (0.5 mm) deep:
+    The largest shear stress under a cylinder is 0.30 of the peak pressure (1000 MPa). It lies at a
+    depth of 0.78 half-widths (0.5 mm):
 
     >>> import numpy as np
     >>> from sa_solver import Grid, Material, SubsurfaceStress
@@ -92,12 +95,12 @@ class SubsurfaceStress:
     """
 
     def __init__(self, grid: Grid, material: Material, body: Literal[1, 2]) -> None:
-        """Plan for ``body``, of which only Poisson's ratio counts.
+        """Prepare for ``body``, whose stress depends on Poisson's ratio of its ``material`` only.
 
         Raises SubsurfaceError unless the body is 1 or 2.
         """
         if body not in MIRROR:
-            raise SubsurfaceError(f"body {body}: there are bodies 1 and 2")
+            raise SubsurfaceError(f"body is {body}: give 1 or 2")
         self.grid, self.poisson = grid, material.poisson
         self.count = 0
         self._mirror = MIRROR[body]
@@ -105,50 +108,64 @@ class SubsurfaceStress:
         self._filter = lru_cache(1)(self._plan)
 
     def at_depth(self, traction: Array, depth: float) -> Array:
-        """Stress ``(6, nx, ny)`` at ``depth`` below the cells' centres, 0 at the surface [mm].
+        """Return the stress ``(6, nx, ny)`` [MPa] at ``depth`` [mm] below the cells' centres.
 
-        ``traction`` ``(3, nx, ny)`` is ordered qx, qy, p, on body 2 whichever the body [MPa].
-        Raises SubsurfaceError for another shape or a depth below 0.
+        Depth 0 is the surface. ``traction`` ``(3, nx, ny)`` [MPa] is ordered qx, qy, p and acts on
+        body 2, also for the stress in body 1. Raises SubsurfaceError for another shape or a depth
+        below 0.
         """
         traction, (depth,) = self._checked(traction, depth)
         self.count += 1
         rows = ALONG_SURFACE if depth == 0.0 else INSIDE
         stress = np.empty((6, *self.grid.shape))
-        stress[list(rows)] = self._filter(depth, rows).apply(self._felt(traction))
+        stress[list(rows)] = self._filter(depth, rows).apply(self._mirrored(traction))
         if depth == 0.0:
-            # So that they are what the other body feels to the last digit.
+            # Set exactly, so that they equal those of the other body to the last digit.
             stress[[ZX, YZ, ZZ]] = -traction
         else:
             stress[[YZ, ZX]] *= self._mirror[0]
         return stress
 
     def along_surface(self, traction: Array, depth: float) -> Array:
-        """Its components xx, yy and xy alone, ``(3, nx, ny)``, with half as many transforms."""
+        """Return the components xx, yy and xy alone, ``(3, nx, ny)``, with half the transforms.
+
+        The arguments are those of :meth:`at_depth`.
+        """
         traction, (depth,) = self._checked(traction, depth)
         self.count += 1
-        return self._filter(depth, ALONG_SURFACE).apply(self._felt(traction))
+        return self._filter(depth, ALONG_SURFACE).apply(self._mirrored(traction))
 
     def section(self, traction: Array, axis: Literal["x", "y"], at: float, depths: Array) -> Array:
-        """Stress ``(6, n, len(depths))`` in a plane normal to the surface, n cells along ``axis``.
+        """Return the stress ``(6, n, len(depths))`` in a plane normal to the surface.
 
-        As of :func:`sections`.
+        The plane has n cells along ``axis``. The arguments are those of :func:`sections`.
         """
         return sections([(self, traction, depths)], axis, at)[0]
 
     def at_points(self, traction: Array, points: Array) -> Array:
-        """Stress ``(6, n)`` at ``points`` ``(n, 3)``: x, y and the depth below the surface [mm].
+        """Return the stress ``(6, n)`` [MPa] at given points, which may lie off the grid.
 
-        ``traction`` is that of :meth:`at_depth`. Points may lie beside the grid too. It is the sum
-        over all loaded cells, point by point: where many points lie at one depth under the cells'
-        centres, the other methods are faster. Less than a pitch deep it shows the single cells.
+        The stress is summed over all loaded cells, point by point. For many points at one depth
+        below the centres of the cells the other methods are faster. At depths of less than a pitch
+        the result shows the individual cells.
 
-        Raises SubsurfaceError for another shape, a depth below 0, and points of the surface on the
-        border between two cells, where tractions jump.
+        Parameters
+        ----------
+        traction
+            Tractions as in :meth:`at_depth`.
+        points
+            Coordinates x, y and depth below the surface of each point ``(n, 3)`` [mm].
+
+        Raises
+        ------
+        SubsurfaceError
+            For another shape, a depth below 0, and points of the surface on the border between two
+            cells, where the tractions jump.
 
         Examples
         --------
-        The largest von Mises stress under a ball is 0.62 of the peak pressure (1000 MPa), 0.48
-        radii of the contact (0.5 mm) deep:
+        The largest von Mises stress under a ball is 0.62 of the peak pressure (1000 MPa). It lies
+        at a depth of 0.48 contact radii (0.5 mm):
 
         >>> import numpy as np
         >>> from sa_solver import Grid, Material, SubsurfaceStress, von_mises
@@ -166,55 +183,62 @@ class SubsurfaceStress:
         points = checks.array("points", points, (None, 3), error=SubsurfaceError)
         traction, depths = self._checked(traction, *points[:, 2])
         stress = np.zeros((6, len(points)))
-        felt = self._felt(traction)
-        loaded = [np.flatnonzero(felt.any(axis=axes)) for axes in ((0, 2), (0, 1))]
+        mirrored = self._mirrored(traction)
+        loaded = [np.flatnonzero(mirrored.any(axis=axes)) for axes in ((0, 2), (0, 1))]
         if not all(map(len, loaded)):
             return stress
-        # From the last cell back, so that point less source ascends.
+        # The last cell comes first, so that point minus edge ascends.
         (x, y), (rows, columns) = zip(*map(self._edges, (0, 1), loaded), strict=True)
-        felt = felt[:, rows, columns][:, ::-1, ::-1]
+        mirrored = mirrored[:, rows, columns][:, ::-1, ::-1]
         for column, (at, depth) in enumerate(zip(points[:, :2], depths, strict=True)):
-            away = [at[0] - x, at[1] - y]
-            self._check_border(away, depth)
-            stress[:, column] = np.einsum("ijxy,jxy->i", self._influence(away, depth), felt)
+            distances = [at[0] - x, at[1] - y]
+            self._check_border(distances, depth)
+            influence = self._influence(distances, depth)
+            stress[:, column] = np.einsum("ijxy,jxy->i", influence, mirrored)
         stress[[YZ, ZX]] *= self._mirror[0]
         return stress
 
     def _edges(self, axis: int, loaded: Indices) -> tuple[Array, slice]:
-        """Edges [mm] of the cells from the first to the last ``loaded`` one, the last one first."""
+        """Return the edges [mm] of the cells from the last ``loaded`` one to the first.
+
+        The slice of these cells, in ascending order, is returned as well.
+        """
         rows = slice(int(loaded[0]), int(loaded[-1]) + 1)
         count, pitch = self.grid.shape[axis], self.grid.pitch[axis]
         edges = (np.arange(count + 1.0) - 0.5 * count) * pitch
         return edges[rows.start : rows.stop + 1][::-1], rows
 
-    def _check_border(self, away: list[Array], depth: float) -> None:
-        """Refuse a point of the surface that lies on edges ``away`` by 0 along x or y."""
+    def _check_border(self, distances: list[Array], depth: float) -> None:
+        """Raise an error for a point of the surface whose distance from an edge is 0."""
         axes = 1 if self.grid.line else 2
-        pairs = zip(away[:axes], self.grid.pitch, strict=False)
+        pairs = zip(distances[:axes], self.grid.pitch, strict=False)
         if depth == 0.0 and any(np.abs(edges).min() < BORDER * pitch for edges, pitch in pairs):
             raise SubsurfaceError(
                 "a point of the surface lies on the border between two cells, where tractions "
-                "jump: take one within a cell, or a depth above 0"
+                "jump: give a point inside a cell, or a depth above 0"
             )
 
     def _sources(self, traction: Array, axis: Literal["x", "y"], at: float) -> Array | None:
-        """Spectra along a section of the rows of cells: see :func:`_folded`; None without load."""
+        """Return the spectra of the rows of cells along a section, or None without load.
+
+        Rows on both sides are combined: see :func:`_folded`.
+        """
         if axis not in ("x", "y") or (axis == "y" and self.grid.line):
-            raise SubsurfaceError(f"section along {axis}: must be x or, but for lines, y")
+            raise SubsurfaceError(f"section along {axis}: give x, or y unless it is a line contact")
         along = "xy".index(axis)
         row = self._nearest_row(1 - along, at)
-        felt = np.moveaxis(self._felt(traction), along + 1, 1)
-        loaded = np.flatnonzero(felt.any(axis=(0, 1)))
+        mirrored = np.moveaxis(self._mirrored(traction), along + 1, 1)
+        loaded = np.flatnonzero(mirrored.any(axis=(0, 1)))
         if len(loaded) == 0:
             return None
         rows = slice(loaded[0], loaded[-1] + 1)
-        spectra = scipy.fft.rfft(felt[:, :, rows], self._padded[along], axis=1)
+        spectra = scipy.fft.rfft(mirrored[:, :, rows], self._padded[along], axis=1)
         return _folded(spectra, row - np.arange(rows.start, rows.stop))
 
     def _along_section(
         self, sources: Sequence[Array], axis: Literal["x", "y"], depth: float
     ) -> list[Array]:
-        """Stress ``(6, n)`` at a depth of the section under each of the ``sources``."""
+        """Return the stress ``(6, n)`` at a ``depth`` of the section, for each of the sources."""
         along = "xy".index(axis)
         period, count = self._padded[along], self.grid.shape[along]
         rows = np.arange(max(spectra.shape[-1] for spectra in sources) + 1, dtype=np.float64) - 0.5
@@ -227,19 +251,20 @@ class SubsurfaceStress:
         centres = (self.grid.x[:, 0], self.grid.y[0])[axis]
         if not abs(at) <= 0.5 * self.grid.size[axis]:
             raise SubsurfaceError(
-                f"section at {at:g} mm: the grid ends at {0.5 * self.grid.size[axis]:g} mm"
+                f"section at {at:g} mm, but the grid ends at {0.5 * self.grid.size[axis]:g} mm: "
+                "give a place on the grid"
             )
         return int(np.argmin(np.abs(centres - at)))
 
     def _checked(self, traction: Array, *depths: float) -> tuple[Array, list[float]]:
-        """Tractions and depths as all methods take them."""
+        """Return tractions and depths, checked."""
         shape = 3, *self.grid.shape
         traction = checks.array("tractions", traction, shape, error=SubsurfaceError)
         error = SubsurfaceError
         return traction, [checks.number("depth", at, least=0.0, error=error) for at in depths]
 
-    def _felt(self, traction: Array) -> Array:
-        """Tractions on the half-space z > 0 that the body is or mirrors."""
+    def _mirrored(self, traction: Array) -> Array:
+        """Return the tractions on the half-space z > 0 to which the body is mirrored."""
         return traction * self._mirror[:, None, None]
 
     def _influence(self, edges: list[Array], depth: float) -> Array:
@@ -248,7 +273,11 @@ class SubsurfaceStress:
         return rectangle_stress(edges[0], edges[1], depth, self.poisson)
 
     def _plan(self, depth: float, rows: Sequence[int]) -> SpectralFilter:
-        """Real symbols of such components, with shear tractions and yz and zx in units of i."""
+        """Return the filter from tractions to the components ``rows`` of stress at a ``depth``.
+
+        Its symbols are real, because shear tractions and the components yz and zx are multiplied by
+        the imaginary unit.
+        """
         edges = list(map(quarter_edges, self._padded, self.grid.pitch))
         kernels = self._influence(edges, depth)
         symbols = [[self._symbol(kernels[i, k], i, k) for k in range(3)] for i in rows]
@@ -263,29 +292,45 @@ class SubsurfaceStress:
             _odd(component, traction, 1),
         )
         symbol = symbol_of(kernel, self._padded, odd)
-        # What a kernel odd along one axis has of i is counted in the units of its components.
-        turned = component in (YZ, ZX) and along_x != along_y
-        return -symbol if turned or (along_x and along_y) else symbol
+        # The imaginary unit of a kernel that is odd along one axis is in that of its components.
+        sign_changes = component in (YZ, ZX) and along_x != along_y
+        return -symbol if sign_changes or (along_x and along_y) else symbol
 
 
 def sections(
     wanted: Sequence[tuple[SubsurfaceStress, Array, Array]], axis: Literal["x", "y"], at: float
 ) -> list[Array]:
-    """Stress ``(6, n, k)`` in a plane normal to the surface, n cells along ``axis``, of each body.
+    """Return the stress in a plane normal to the surface, for each of several bodies.
 
-    Each that is ``wanted`` is a body, its tractions as :meth:`SubsurfaceStress.at_depth` has them,
-    and depths ``(k,)`` >= 0 [mm]. The section along x lies at y = ``at`` [mm], moved to the centre
-    of the nearest row, and the other way round. Transforms go along the section only, rows without
-    load are left out, and those as far on either side go together: a tenth of the cost of as many
-    planes, each with new symbols. Coefficients of influence, most of that, are shared by those of
-    one grid and Poisson's ratio at depths that they have in common.
+    Fields are transformed along the section only, rows without load are left out, and rows at the
+    same distance on both sides are combined. This takes a tenth of the time of computing planes of
+    constant depth. Most of the time goes into influence coefficients, which are shared by bodies
+    with the same grid, Poisson's ratio and depth.
 
-    Raises SubsurfaceError for another shape, a depth below 0, a plane off the grid or a section
-    along y of a line contact.
+    Parameters
+    ----------
+    wanted
+        For each body the solver, the tractions as in :meth:`SubsurfaceStress.at_depth`, and the
+        depths ``(k,)`` >= 0 [mm].
+    axis
+        Direction of the section, ``x`` or ``y``.
+    at
+        Place of the section along the other axis [mm]; it is moved to the nearest row of cells.
+
+    Returns
+    -------
+    list of Array
+        Stress ``(6, n, k)`` [MPa] of each body, below the n cells along ``axis``.
+
+    Raises
+    ------
+    SubsurfaceError
+        For another shape, a depth below 0, a plane off the grid or a section along y of a line
+        contact.
 
     Examples
     --------
-    Bodies that are pressed without friction fare alike:
+    Two bodies pressed together without friction have the same normal stresses:
 
     >>> import numpy as np
     >>> from sa_solver import Grid, Material, SubsurfaceStress
@@ -324,28 +369,30 @@ def sections(
 
 
 def _odd(component: int, traction: int, axis: int) -> bool:
-    """Whether a component of stress under a traction is odd along x or y."""
+    """Return whether a component of stress under a traction is odd along ``axis`` (0: x, 1: y)."""
     return (*INDICES[component], traction).count(axis) % 2 == 1
 
 
-def _folded(spectra: Array, away: Array) -> Array:
-    """Those of rows ``away`` ``(r,)``, to either side, by distance ``(2, 3, frequency, distance)``.
+def _folded(spectra: Array, offsets: Array) -> Array:
+    """Return sums and differences of the spectra of rows at equal distances on both sides.
 
-    Rows on both sides act alike: their sums are for even kernels, their differences for odd ones.
+    ``offsets`` ``(r,)`` are the positions of the rows relative to the section, in rows. The result
+    ``(2, 3, frequency, distance)`` holds the sums, for even kernels, and the differences, for odd
+    ones.
     """
-    folded = np.zeros((2, *spectra.shape[:2], np.abs(away).max() + 1), dtype=np.complex128)
-    ahead = away >= 0
-    folded[..., away[ahead]] = spectra[..., ahead]
+    folded = np.zeros((2, *spectra.shape[:2], np.abs(offsets).max() + 1), dtype=np.complex128)
+    ahead = offsets >= 0
+    folded[..., offsets[ahead]] = spectra[..., ahead]
     behind = spectra[..., ~ahead]
-    folded[..., -away[~ahead]] += np.stack([behind, -behind])
+    folded[..., -offsets[~ahead]] += np.stack([behind, -behind])
     return folded
 
 
 def _along_rows(kernels: Array, sources: Sequence[Array], along: int, period: int) -> list[Array]:
-    """Convolutions along the rows of cells, summed over them, ``(6, period)`` each.
+    """Return the convolutions along the rows of cells, summed over the rows, each ``(6, period)``.
 
-    ``kernels`` ``(6, 3, distance, row)`` and ``sources``, folded spectra of the tractions of as
-    many rows or fewer; ``along`` is the direction of the rows.
+    ``kernels`` are ``(6, 3, distance, row)``. ``sources`` are the folded spectra of the tractions,
+    of as many rows or fewer. ``along`` is the direction of the rows.
     """
     totals = [np.zeros((6, spectra.shape[2]), dtype=np.complex128) for spectra in sources]
     for i, k in np.ndindex(6, 3):

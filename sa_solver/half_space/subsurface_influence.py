@@ -12,10 +12,10 @@ and V = Ω_zz = 1/ρ, where subscripts are derivatives and ρ is the distance, u
     yz   -z V_yz                            -z V_xy
     zx   -z V_xz                            V_z - z V_xx
 
-all over 2π; under ty, x and y change places. Ω, L and V are harmonic, so that second derivatives by
-z follow from those by x and y, and integrals over a rectangle are differences of closed forms
-between its corners. Parts that the differences cancel are left out of these, so that nothing is
-lost where ρ + x or ρ + y tends to 0.
+all divided by 2π; under ty, x and y are exchanged. Ω, L and V are harmonic, so that second
+derivatives with respect to z follow from those with respect to x and y. Integrals over a rectangle
+are differences of closed forms between its corners. Terms that cancel in these differences are left
+out, so that no digits are lost where ρ + x or ρ + y tends to 0.
 
 Source: Johnson 1985, *Contact Mechanics*, eqs 3.6 to 3.10 (Boussinesq and Cerruti's potentials) and
 Hooke's law; rectangles, Love 1929, doi:10.1098/rsta.1929.0009, and Ahmadi, Keer & Mura 1983, Int.
@@ -29,21 +29,33 @@ import numpy as np
 from sa_solver.types import Array
 
 XX, YY, ZZ, XY, YZ, ZX = range(6)
-"""Places of the components of stress."""
+"""Indices of the components of stress."""
 
 INDICES = ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (2, 0))
 """The two directions of each component of stress."""
 
 EXCHANGED = [YY, XX, ZZ, XY, ZX, YZ]
-"""Components of stress when x and y change places."""
+"""Order of the components of stress when x and y are exchanged."""
 
 
 def rectangle_stress(edges_x: Array, edges_y: Array, depth: float, poisson: float) -> Array:
-    """Stress at a point ``depth`` [mm] below the surface, from unit tractions on rectangles.
+    """Return the stress at a point below the surface from unit tractions on rectangles.
 
-    A rectangle is what lies between two neighbouring edges: point less source, in order, along x
-    ``(n + 1,)`` and along y ``(m + 1,)`` [mm]. Returns ``(6, 3, n, m)`` [1]: stress, traction. At
-    depth 0 it is the limit from inside; not for points on an edge there, where stress is infinite.
+    Parameters
+    ----------
+    edges_x, edges_y
+        Coordinates of the point minus those of the edges of the rectangles, in ascending order:
+        ``(n + 1,)`` along x and ``(m + 1,)`` along y [mm].
+    depth
+        Depth of the point [mm]. At depth 0 the stress is the limit from inside the body. The point
+        must then not lie on an edge, where the stress is infinite.
+    poisson
+        Poisson's ratio.
+
+    Returns
+    -------
+    Array
+        Stress ``(6, 3, n, m)`` [1] for six components and three tractions.
     """
     x, y = np.asarray(edges_x)[:, None], np.asarray(edges_y)[None, :]
     corner = np.stack(
@@ -58,9 +70,10 @@ def rectangle_stress(edges_x: Array, edges_y: Array, depth: float, poisson: floa
 
 
 def strip_stress(edges: Array, depth: float, poisson: float) -> Array:
-    """The same for infinitely long strips in plane strain; ``edges`` ``(n + 1,)`` [mm].
+    """Return the stress ``(6, 3, n)`` [1] at a point from unit tractions on infinite strips.
 
-    Returns ``(6, 3, n)`` [1]: the limits of rectangles whose ends along y go to infinity.
+    The strips are in plane strain: they are the limit of rectangles that are infinite along y. The
+    arguments are those of :func:`rectangle_stress`, with ``edges`` ``(n + 1,)`` [mm].
     """
     x, z = np.asarray(edges), depth
     square = x**2 + z**2
@@ -77,7 +90,7 @@ def strip_stress(edges: Array, depth: float, poisson: float) -> Array:
 
 
 def _pressed(x: Array, y: Array, z: float, poisson: float) -> Array:
-    """``∬ stress dx dy`` under tz as a function of one corner, ``(6, ...)``, without 1/2π."""
+    """Return ``∬ stress dx dy`` under tz as a function of one corner, ``(6, ...)``, times 2π."""
     r = np.sqrt(x**2 + y**2 + z**2)
     v_z = _v_z(x, y, z)
     z_v_xx, z_v_yy = _z_v_xx(x, y, z), _z_v_xx(y, x, z)
@@ -95,7 +108,7 @@ def _pressed(x: Array, y: Array, z: float, poisson: float) -> Array:
 
 
 def _sheared(x: Array, y: Array, z: float, poisson: float) -> Array:
-    """The same under tx."""
+    """Return ``∬ stress dx dy`` under tx as a function of one corner, ``(6, ...)``, times 2π."""
     r = np.sqrt(x**2 + y**2 + z**2)
     v_x, v_y = _v_x(x, y, z), _v_x(y, x, z)
     z_v_xz = _z_v_xz(x, y, z)
@@ -114,25 +127,25 @@ def _sheared(x: Array, y: Array, z: float, poisson: float) -> Array:
 
 
 def _v_x(x: Array, y: Array, z: float) -> Array:
-    """``∬ V_x``: ln(y + ρ) less a function of x alone."""
+    """Return ``∬ V_x``: ln(y + ρ) minus a function of x alone."""
     return np.arcsinh(y / np.hypot(x, z))
 
 
 def _v_z(x: Array, y: Array, z: float) -> Array:
-    """``∬ V_z``: -atan(xy / zρ), which tends to ∓π/2 with z."""
+    """Return ``∬ V_z``: -atan(xy / zρ), which tends to ∓π/2 as z tends to 0."""
     return -np.arctan2(x * y, z * np.sqrt(x**2 + y**2 + z**2))
 
 
 def _z_v_xx(x: Array, y: Array, z: float) -> Array:
-    """``∬ z V_xx``: zx / ρ(ρ + y) less a function of x alone."""
+    """Return ``∬ z V_xx``: zx / ρ(ρ + y) minus a function of x alone."""
     return -z * x * y / (np.sqrt(x**2 + y**2 + z**2) * (x**2 + z**2))
 
 
 def _z_v_xz(x: Array, y: Array, z: float) -> Array:
-    """``∬ z V_xz``: z² / ρ(ρ + y) less a function of x alone."""
+    """Return ``∬ z V_xz``: z² / ρ(ρ + y) minus a function of x alone."""
     return -(z**2) * y / (np.sqrt(x**2 + y**2 + z**2) * (x**2 + z**2))
 
 
 def _l_xx(x: Array, y: Array, z: float) -> Array:
-    """``∬ L_xx``: atan(y/x) - atan(zy / xρ) as one arctangent, which does not jump with x."""
+    """Return ``∬ L_xx = atan(y/x) - atan(zy / xρ)`` as one arctangent, continuous at x = 0."""
     return np.arctan(x * y / (x**2 + z * (np.sqrt(x**2 + y**2 + z**2) + z)))

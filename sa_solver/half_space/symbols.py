@@ -1,8 +1,8 @@
 """Symbols: Fourier transforms of influence coefficients on a grid made periodic.
 
-Coefficients are even or odd along each axis, so those at distances from zero to half a period tell
-all, and their spectrum is found along one axis after the other from half of the other: with half
-of the work and of the memory of a transform of the whole.
+The coefficients are even or odd along each axis, so that those at distances from zero to half a
+period determine all others. The spectrum is computed along one axis after the other, each time from
+half of the values along the other axis. This takes half of the time and memory of a full transform.
 """
 
 from __future__ import annotations
@@ -17,11 +17,11 @@ Odd = tuple[bool, bool]
 
 
 class Coefficients:
-    """Influence coefficients of the cells of a grid at distances from zero on, kept.
+    """Cached influence coefficients of the cells of a grid, by distance.
 
-    Kernels of rectangles are homogeneous of degree one: twice as large cells displace each other
-    twice as far. So those of a grid whose cells are larger in proportion, or which is smaller, are
-    taken from those of a ``finer`` one, where this one's convolutions will be needed anyway.
+    Kernels of rectangles are homogeneous of degree one: cells twice as large displace each other
+    twice as far. The coefficients of a grid with cells of the same proportions, and no more of
+    them, are therefore scaled from those of a ``finer`` grid, which are needed there anyway.
     """
 
     def __init__(
@@ -32,14 +32,20 @@ class Coefficients:
         padded: Period,
         finer: Coefficients | None = None,
     ) -> None:
-        """Of a grid padded to ``padded`` cells; ``datum`` [mm] is for lines."""
+        """Prepare the coefficients of ``grid``, padded to ``padded`` cells.
+
+        ``datum`` [mm] is that of line contacts: see :func:`.influence.strip_influence`.
+        """
         self._grid, self._pair, self._datum = grid, pair, datum
         self._counts = _counts(padded)
         self._finer = finer if finer is not None and self._lies_in(finer) else None
         self._kept: dict[tuple[int, int], Array] = {}
 
     def quarter(self, row: int, column: int, period: Period) -> Array:
-        """Those at distances 0 to ``period``//2 along both axes [mm/MPa]; not to be written to."""
+        """Return the coefficients at distances 0 to ``period``//2 along both axes [mm/MPa].
+
+        The array is shared and must not be modified.
+        """
         nx, ny = counts = _counts(period)
         if not _within(counts, self._counts):
             return self._computed(row, column, counts)
@@ -48,7 +54,10 @@ class Coefficients:
         return self._kept[row, column][:nx, :ny]
 
     def between(self, edges_x: Array, edges_y: Array, row: int, column: int) -> Array:
-        """Those of rectangles, or strips, between neighbouring edges [mm]: point less source."""
+        """Return the coefficients of rectangles, or strips, between neighbouring edges [mm/MPa].
+
+        The edges are those of :func:`.influence.rectangle_influence`.
+        """
         if self._grid.line:
             return strip_influence(edges_x, self._pair, row, column, self._datum)[:, None]
         return rectangle_influence(edges_x, edges_y, self._pair, row, column)
@@ -63,7 +72,7 @@ class Coefficients:
 
     @property
     def period(self) -> Period:
-        """The least whose coefficients are all that are kept."""
+        """Smallest period that needs all cached coefficients."""
         nx, ny = self._counts
         return 2 * nx - 2, 2 * ny - 2
 
@@ -75,14 +84,14 @@ class Coefficients:
         return self.between(edges_x, edges_y, row, column)
 
     def _lies_in(self, finer: Coefficients) -> bool:
-        """Whether a grid's cells have the proportions of a ``finer`` one's, and are no more."""
+        """Return whether the cells have the proportions of those of ``finer`` and are no more."""
         (x, y), (fine_x, fine_y) = self._grid.pitch, finer._grid.pitch
         alike = not self._grid.line and x / fine_x == y / fine_y
         return alike and _within(self._counts, finer._counts)
 
 
 def _counts(period: Period) -> Period:
-    """Numbers of distances from zero to half a period."""
+    """Return the numbers of distances from zero to half a period, along both axes."""
     return period[0] // 2 + 1, period[1] // 2 + 1
 
 
@@ -91,33 +100,33 @@ def _within(counts: Period, others: Period) -> bool:
 
 
 def quarter_edges(period: int, pitch: float) -> Array:
-    """Edges about the distances 0 to period//2 [mm]."""
+    """Return the edges of cells centred at the distances 0 to ``period``//2 [mm]."""
     return (np.arange(period // 2 + 2, dtype=np.float64) - 0.5) * pitch
 
 
 def symbol_of(quarter: Array, period: Period, odd: Odd) -> Array:
-    """Sums of a kernel times cosines or, along axes where it is ``odd``, sines, over a period.
+    """Return the sums over a period of a kernel times cosines, or sines along ``odd`` axes.
 
-    The kernel is given at distances 0 to ``period``//2 along both axes; the sums
-    ``(mx, my//2 + 1)`` have the frequencies of numpy's ``rfft2``, which is ``(-i)^k`` times as much
-    where the kernel is odd along k axes.
+    The kernel ``quarter`` is given at distances 0 to ``period``//2 along both axes. The sums
+    ``(mx, my//2 + 1)`` have the frequencies of numpy's ``rfft2``; the result of ``rfft2`` is
+    ``(-i)^k`` times the sums, where the kernel is odd along k axes.
     """
     sums = _half_spectrum(_half_spectrum(quarter, 1, period[1], odd[1]), 0, period[0], odd[0])
     return np.ascontiguousarray(continued(sums, 0, period[0], odd[0]))
 
 
 def _half_spectrum(kernel: Array, axis: int, period: int, odd: bool) -> Array:
-    """Those sums along one axis, at frequencies 0 to ``period``//2."""
+    """Return such sums along one ``axis``, at frequencies 0 to ``period``//2."""
     spectrum = np.fft.rfft(continued(kernel, axis, period, odd), axis=axis)
     return -spectrum.imag if odd else spectrum.real
 
 
 def continued(kernel: Array, axis: int, period: int, odd: bool) -> Array:
-    """A kernel at distances 0 to period//2 along ``axis``, continued to a whole period."""
+    """Return a ``kernel`` at distances 0 to ``period``//2, extended to a period along ``axis``."""
     kernel = np.moveaxis(kernel, axis, 0)[: period // 2 + 1]
     mirrored = kernel[1 : (period + 1) // 2][::-1]
     if odd:
         kernel, mirrored = kernel.copy(), -mirrored
         if period % 2 == 0:
-            kernel[-1] = 0.0  # as far from one image as from the next, which cancels it
+            kernel[-1] = 0.0  # Two images of the source at the same distance cancel.
     return np.moveaxis(np.concatenate([kernel, mirrored]), 0, axis)

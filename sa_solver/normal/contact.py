@@ -1,12 +1,14 @@
 """Normal contact of two elastic half-spaces on a grid, under imposed forces or motions.
 
+The problem is
+
     p >= 0,  g = h + K p + D p - δz - φx y + φy x >= 0,  p g = 0
     Σ p S = P,  Σ p y S = Mx,  -Σ p x S = My
 
-K is the half-space (Love's coefficients), h the gap before loading and D >= 0 an optional local
-compliance: implicit wear, where D p is the depth worn during the step. Of each pair δz and P, φx
-and Mx, φy and My one is imposed. Conjugate gradients solve it in a few convolutions; where they do
-not converge, a slower splitting takes over from their last pressure.
+where K is the half-space (Love's coefficients), h the gap before loading and D >= 0 an optional
+local compliance, as in implicit wear, where D p is the depth worn during the step. One of each pair
+δz and P, φx and Mx, φy and My is imposed. Conjugate gradients solve the problem in a few
+convolutions. Where they do not converge, slower methods continue from their last pressure.
 
 Source: Gallego, Nélias & Jacq 2006, J. Tribol. 128, 476, doi:10.1115/1.2194914 (the problem).
 """
@@ -42,13 +44,13 @@ TOLERANCE = 1e-8
 """Default bound on every residual of :class:`NormalResiduals`."""
 
 BALANCED = 1e-12
-"""Pressures that balancing changes by less than this share of the largest were balanced already:
-sums over a grid leave about 1e-15 of rounding."""
+"""Relative change in a balance below which the pressure was balanced before. Rounding of sums over
+a grid is about 1e-15."""
 
 
 @dataclass(frozen=True)
 class NormalStart:
-    """What a solve can start from: pressure [MPa] and its displacement K p [mm], ``(nx, ny)``."""
+    """Initial guess of a solve: pressure [MPa] and its displacement K p [mm], ``(nx, ny)``."""
 
     pressure: Array
     displacement: Array
@@ -58,17 +60,36 @@ class NormalStart:
 class NormalState:
     """Solution of a normal contact problem.
 
-    ``pressure`` [MPa], ``gap`` [mm] and ``displacement`` (K p, elastic only) [mm] are ``(nx, ny)``;
-    ``approach`` is δz [mm], ``tilt_x`` φx and ``tilt_y`` φy [rad], ``P`` [N], ``Mx`` and ``My``
-    [N mm] the resultants of the pressure (per mm on a line grid). A tilt that the pressed cells
-    cannot feel (they lie on one line or point) is the smallest that fits.
-
-    ``convolutions`` are in units of one on the whole grid, by the size of their transforms, rounded
-    up. (Each iteration also transforms an unpadded field, a quarter of a convolution.)
-    ``border_load`` is the share of P carried by the
-    outermost cells: above 0, the grid is too small. ``message`` says what is wrong and what to try,
-    of a state that has not ``converged`` and of a contact that reaches the grid's border; else it
-    is empty. ``cell_area`` [mm²] is that of the grid.
+    Attributes
+    ----------
+    pressure
+        Pressure ``(nx, ny)`` [MPa].
+    gap
+        Gap ``(nx, ny)`` [mm].
+    displacement
+        Elastic displacement K p ``(nx, ny)`` [mm].
+    approach, tilt_x, tilt_y
+        Rigid motions δz [mm], φx and φy [rad]. A tilt that the pressed cells cannot resist, because
+        they lie on one line or point, is the smallest possible.
+    P, Mx, My
+        Resultants of the pressure [N, N mm; per mm on a line grid].
+    residuals
+        Residuals of the state, which do not depend on the method.
+    converged
+        Whether all residuals are within the tolerance.
+    message
+        What is wrong and what to try, if the state has not ``converged`` or the contact reaches the
+        border of the grid; empty otherwise.
+    convolutions
+        Cost of the solution in convolutions on the whole grid, by the size of the transforms,
+        rounded up. Each iteration also transforms an unpadded field, at a quarter of the cost of a
+        convolution, which is not counted.
+    border_load
+        Share of P that the outermost cells carry; above 0 the grid is too small.
+    cell_area
+        Area of a cell of the grid [mm²].
+    method
+        Method that found the solution.
     """
 
     pressure: Array
@@ -90,35 +111,35 @@ class NormalState:
 
     @property
     def contact_area(self) -> float:
-        """Area of the cells in contact [mm²; in a line contact, per mm, its width in mm]."""
+        """Area of the cells in contact [mm²]; for a line contact its width [mm]."""
         return float(np.count_nonzero(self.pressure)) * self.cell_area
 
     @property
     def elastic_energy(self) -> float:
-        """Energy ½ Σ p u S stored in both bodies [N mm], with their displacement u = K p.
+        """Elastic energy ½ Σ p u S of both bodies [N mm], with their displacement u = K p.
 
-        Between bodies that do not wear it is the work of P and moments since the bodies were apart.
-        In a line contact, per mm, it counts up to the datum of the half-space.
+        For bodies that do not wear it equals the work of P and the moments since the bodies were
+        apart. For a line contact it is per mm, and within the datum of the half-space.
         """
         return 0.5 * float(np.vdot(self.pressure, self.displacement)) * self.cell_area
 
     @property
     def start(self) -> NormalStart:
-        """Start of a next solve on the same grid."""
+        """Initial guess for the next solve on the same grid."""
         return NormalStart(self.pressure, self.displacement)
 
     @property
     def touches_border(self) -> bool:
-        """Whether the contact reaches the outermost cells of the grid."""
+        """Whether the outermost cells of the grid carry load."""
         return self.border_load > 0.0
 
 
 class NormalContact:
-    """Normal contact solver on one grid; owns the planned transforms.
+    """Solver of normal contact problems on one grid.
 
     Examples
     --------
-    A cylinder on a flat, against Hertz:
+    A cylinder on a flat, compared with Hertz:
 
     >>> from sa_solver import ElasticPair, Grid, HalfSpace, Material, NormalContact
     >>> from sa_solver.reference.hertz import HertzCylinder
@@ -134,7 +155,7 @@ class NormalContact:
     """
 
     def __init__(self, half_space: HalfSpace) -> None:
-        """Plan for ``half_space``.
+        """Prepare the solver for ``half_space``.
 
         Raises NormalContactError for a grid of fewer than 2 cells.
         """
@@ -159,28 +180,38 @@ class NormalContact:
         start: NormalStart | None = None,
         compliance: Array | None = None,
     ) -> NormalState:
-        """Pressure, gap and the unknown motions and resultants of a contact.
+        """Solve for the pressure, the gap and the unknown motions and resultants.
 
-        Imposed are the load ``P`` [N] or the ``approach`` δz [mm]; about x the moment ``Mx`` [N mm]
-        or the tilt ``tilt_x`` φx [rad], about y ``My`` or ``tilt_y``. The bodies do not turn unless
-        one of these is given: ``Mx=0.0, My=0.0`` lets them turn freely, until the load passes
-        through the middle of the grid.
+        Parameters
+        ----------
+        height
+            Gap h before loading ``(nx, ny)`` [mm], large where the surfaces are far apart. It is
+            +infinity, or masked, where a body has no surface: such cells never touch, and their gap
+            stays infinite. To fill in points that were not measured, use
+            :func:`sa_solver.surfaces.scans.filled`.
+        P, approach
+            Load [N] or approach δz [mm]; one of them is required.
+        Mx, tilt_x, My, tilt_y
+            Moments [N mm] or tilts φx, φy [rad] about x and y. The tilt is held at 0 where neither
+            of a pair is given. ``Mx=0.0, My=0.0`` lets the bodies turn freely, until the load
+            passes through the middle of the grid.
+        tolerance
+            Bound on every residual. The ``message`` of the state says if it is not met.
+        start
+            Initial guess, from any state on the same grid.
+        compliance
+            Local compliance D >= 0 ``(nx, ny)`` [mm/MPa].
 
-        ``height`` h is the gap before loading ``(nx, ny)`` [mm], large where the surfaces are far
-        from each other, whatever else moves them apart included. It is +infinity, or masked, where
-        there is no surface: such cells never touch, and stay at an infinite gap. (Where points were
-        only not measured, :func:`sa_solver.surfaces.scans.filled` puts a surface in.)
-        ``compliance`` D >= 0 ``(nx, ny)`` [mm/MPa]; ``start`` that of any state on the same grid.
-        Converged means that every residual is within ``tolerance``; a state that is not says so in
-        its ``message``.
-
-        Raises NormalContactError for heights or compliances that are NaN, no numbers or of another
-        shape, both of a force and its motion, neither ``P`` nor ``approach``, a negative load, or a
-        moment that no pressure on the grid can carry.
+        Raises
+        ------
+        NormalContactError
+            For heights or compliances that are NaN, not numbers or of another shape, both of a
+            force and its motion, neither ``P`` nor ``approach``, a negative load, or a moment that
+            no pressure on the grid can carry.
 
         Examples
         --------
-        A ball 0.1 mm off the middle of its grid, held and free to turn:
+        A ball 0.1 mm off the middle of its grid, with its tilt held and free:
 
         >>> from sa_solver import ElasticPair, Grid, HalfSpace, NormalContact
         >>> grid = Grid.covering((1.0, 1.0), (32, 32))
@@ -213,8 +244,8 @@ class NormalContact:
         start: NormalStart | None,
         compliance: Array | None,
     ) -> NormalState:
-        """The state on finite heights."""
-        # Counted from the lowest point, heights keep the digits of a small displacement.
+        """Return the state for finite heights."""
+        # Heights relative to the lowest point keep the digits of a small displacement.
         lowest = float(height.min()) if APPROACH in control.free else 0.0
         problem = self._problem(height - lowest, control, compliance)
         apart = _separated(problem)
@@ -232,7 +263,7 @@ class NormalContact:
     def _problem(
         self, height: Array, control: NormalControl, compliance: Array | None
     ) -> NormalProblem:
-        """The problem left when imposed motions are taken off the heights."""
+        """Return the problem for the free motions, with imposed motions subtracted from heights."""
         modes = NormalModes.on(self.grid, control.free)
         target = control.sums(self.grid, modes.free)
         delta, phi_x, phi_y = control.motions
@@ -243,19 +274,23 @@ class NormalContact:
     def _start(
         self, problem: NormalProblem, start: NormalStart | None
     ) -> tuple[Array, Array | None]:
-        """Balanced pressure >= 0, from ``start`` if it can be used; its displacement if known."""
+        """Return a balanced pressure >= 0, from ``start`` if possible, and its displacement.
+
+        The displacement is None where it is not known.
+        """
         if start is not None and start.pressure.any():
             pressure = problem.modes.balance(start.pressure, problem.target)
             if pressure is not None:
                 change = np.abs(pressure - start.pressure).max()
                 if change <= BALANCED * start.pressure.max():
-                    kept = start.pressure
-                    return kept, start.displacement + problem.yielded(kept)
+                    local = problem.local_displacement(start.pressure)
+                    return start.pressure, start.displacement + local
                 return pressure, None
         cold = self._solver.cold_start(problem)
         if cold is None:
             raise NormalContactError(
-                "the load acts too close to the edge of the grid to be balanced: enlarge the grid"
+                "no pressure can balance the load, which acts too close to the edge of the grid: "
+                "enlarge the grid"
             )
         return cold, None
 
@@ -278,7 +313,7 @@ class NormalContact:
         return NormalState(
             pressure=iterate.pressure,
             gap=iterate.gap(problem),
-            displacement=iterate.displacement - problem.yielded(iterate.pressure),
+            displacement=iterate.displacement - problem.local_displacement(iterate.pressure),
             approach=float(motions[0]),
             tilt_x=float(motions[1]),
             tilt_y=float(motions[2]),
@@ -298,12 +333,13 @@ class NormalContact:
         given, shape = np.shape(pressure), self.grid.shape
         if start is not None and given != shape:
             raise NormalContactError(
-                f"start has shape {given}, the grid {shape}: start from a state on the same grid"
+                f"start has the shape {given} and the grid {shape}: start from a state on the same "
+                "grid"
             )
 
 
 def _separated(problem: NormalProblem) -> Array | None:
-    """Free motions ``(k,)`` at which no pressure is needed, or None where some is."""
+    """Return free motions ``(k,)`` for which the bodies do not press, or None if they press."""
     if problem.target.any():
         return None
     if APPROACH not in problem.modes.free:
@@ -316,17 +352,17 @@ def _separated(problem: NormalProblem) -> Array | None:
 def checked_heights(
     height: Array, grid: Grid, error: type[ContactProblemError] = NormalContactError
 ) -> Array:
-    """Heights on ``grid``, infinite where there is no surface."""
+    """Return heights on ``grid``, infinite where masked, or raise ``error`` for invalid ones."""
     return checks.array("heights", height, grid.shape, error=error, masked=np.inf, infinite=True)
 
 
 def checked_compliance(
     compliance: Array, grid: Grid, error: type[ContactProblemError] = NormalContactError
 ) -> Array:
-    """Compliances on ``grid``."""
+    """Return compliances on ``grid``, or raise ``error`` for invalid ones."""
     compliance = checks.array("compliances", compliance, grid.shape, error=error)
     if compliance.min() < 0.0:
-        raise error("compliances must be 0 or more: check the wear rate's sign")
+        raise error("compliances must be 0 or more: check the sign of the wear rate")
     return compliance
 
 
@@ -338,9 +374,9 @@ def _failure(
     depth = float(iterate.displacement.max(initial=0.0))
     if depth < smallest:
         remedy = (
-            f"with heights of {largest:.1e} mm in contact, rounding hides what a displacement of "
-            f"{depth:.1e} mm changes: take a slope off the heights, raise the load, or loosen the "
-            "tolerance"
+            f"with heights of {largest:.1e} mm in contact, rounding hides the effect of a "
+            f"displacement of {depth:.1e} mm: subtract a slope from the heights, raise the load, "
+            "or loosen the tolerance"
         )
     else:
         remedy = "loosen the tolerance, or smooth or refine the heights"

@@ -1,4 +1,4 @@
-"""What is imposed on a normal contact: of each rigid freedom its resultant or its motion."""
+"""Control of a normal contact: for each rigid freedom an imposed resultant or motion."""
 
 from __future__ import annotations
 
@@ -13,16 +13,17 @@ from sa_solver.types import Array, Grid
 
 
 class NormalContactError(ContactProblemError):
-    """The data of a normal contact problem admit no solution."""
+    """Data of a normal contact problem that admit no solution."""
 
 
 @dataclass(frozen=True)
 class NormalControl:
-    """One of each pair: ``P`` [N] or ``approach`` [mm], ``Mx`` [N mm] or ``tilt_x`` [rad], ``My``
-    or ``tilt_y``.
+    """Imposed resultants and motions of a normal contact, one of each pair.
 
-    A tilt is held at 0 where neither it nor its moment is given. Raises NormalContactError for both
-    of a pair, neither P nor approach, values that are not finite, and a load that pulls.
+    The pairs are ``P`` [N] and ``approach`` [mm], ``Mx`` [N mm] and ``tilt_x`` [rad], ``My`` and
+    ``tilt_y``. A tilt is held at 0 where neither it nor its moment is given. NormalContactError is
+    raised for both of a pair, neither ``P`` nor ``approach``, values that are not finite, and a
+    negative load.
     """
 
     P: float | None = None
@@ -47,33 +48,36 @@ class NormalControl:
             if value is not None:
                 checks.settle(self, **{name: checks.number(name, value, error=NormalContactError)})
         if self.P is not None and self.P < 0.0:
-            raise NormalContactError(f"load {self.P:g} N pulls: give P >= 0")
+            raise NormalContactError(f"load P = {self.P:g} N pulls: give P >= 0")
 
     @property
     def free(self) -> tuple[int, ...]:
-        """The modes whose resultants are imposed, and whose motions are unknown."""
+        """Modes whose resultants are imposed and whose motions are unknown."""
         motions = (self.approach, self.tilt_x, self.tilt_y)
         return tuple(mode for mode, motion in enumerate(motions) if motion is None)
 
     @property
     def resultants(self) -> Array:
-        """P, Mx, My, with 0 where the motion is imposed, ``(3,)``."""
+        """Resultants P, Mx, My ``(3,)``, 0 where the motion is imposed."""
         return np.array([value or 0.0 for value in (self.P, self.Mx, self.My)])
 
     @property
     def motions(self) -> Array:
-        """δz, φx, φy, with 0 where the resultant is imposed, ``(3,)``."""
+        """Motions δz, φx, φy ``(3,)``, 0 where the resultant is imposed."""
         return np.array([value or 0.0 for value in (self.approach, self.tilt_x, self.tilt_y)])
 
     def sums(self, grid: Grid, free: tuple[int, ...]) -> Array:
-        """Sums of pressure times the modes ``free`` that the resultants ask for [MPa]."""
+        """Return the sums of pressure times each of the modes ``free`` [MPa].
+
+        They follow from the imposed resultants.
+        """
         sums: Array = self.resultants / (mode_lengths(grid) * grid.cell_area)
         return sums[list(free)]
 
     def check_moments(self, grid: Grid) -> None:
         """Raise NormalContactError for a moment that pressure on ``grid`` cannot carry.
 
-        Under an imposed load it acts strictly inside the convex hull of the cell centres.
+        An imposed load must act strictly inside the convex hull of the cell centres.
         """
         P, Mx, My = self.resultants
         for name, moment, centres in (("Mx", Mx, grid.y), ("My", -My, grid.x)):
@@ -83,5 +87,6 @@ class NormalControl:
             if abs(moment) >= P * reach:
                 raise NormalContactError(
                     f"{name} = {abs(moment):g} N mm under P = {P:g} N puts the load outside the "
-                    f"cells, over {reach:g} mm off centre: enlarge the grid or lower the moment"
+                    f"cells, more than {reach:g} mm off centre: enlarge the grid or lower the "
+                    "moment"
                 )

@@ -1,9 +1,10 @@
-"""Normal contacts of few cells, solved exactly: the rigid contact first, then cell by cell.
+"""Exact solution of normal contacts of few cells by a dense active-set method.
 
-Where a load is so small, or so near the edge of what can carry it, that a handful of cells take it,
-resultants rather than elasticity fix the pressure and conjugate gradients have nothing to search.
-There a dense active-set method is exact: it starts from the points on which rigid bodies would
-rest, adds the cells that penetrate most and drops those that would pull. The energy never rises.
+Where a load is so small, or so close to the edge of the possible contact, that a handful of cells
+carry it, the pressure is determined by resultants rather than by elasticity, and conjugate
+gradients fail. The active-set method is exact there: it starts from the points on which rigid
+bodies would rest, adds the cells that penetrate most and drops those in tension. The energy never
+rises.
 
 Source: Nocedal & Wright 2006, *Numerical Optimization*, section 16.5 (active-set methods for convex
 quadratic programmes).
@@ -21,23 +22,24 @@ from sa_solver.types import Array
 Cells = NDArray[np.intp]
 
 LARGEST = 400
-"""Cells up to which the dense systems take less time than the splitting."""
+"""Number of cells up to which the dense systems take less time than the splitting."""
 
 STEPS = 500
-"""Cap on the changes of the set: each takes a convolution, or a dense solve."""
+"""Most changes of the set; each takes a convolution or a dense solve."""
 
 CUTS = 100
-"""Cap on the points that bound the rigid position; rough surfaces take up to 40."""
+"""Most points that bound the rigid position; rough surfaces take up to 40."""
 
 TOUCHING = 1e-6
-"""Gap, over the range of heights, within the accuracy of the linear programme (1e-7)."""
+"""Gap, relative to the range of heights, below which cells touch: the linear programme is accurate
+to about 1e-7."""
 
 DROPPED = 1e-12
-"""A pressure below this share of the largest is rounding of the dense solve."""
+"""Share of the largest pressure below which a pressure is rounding of the dense solve."""
 
 
 def solve_few_cells(problem: NormalProblem, tolerance: float) -> Iterate | None:
-    """The solution of ``problem``; None where it needs too many cells or steps."""
+    """Return the solution of ``problem``, or None if it needs too many cells or steps."""
     if APPROACH in problem.modes.free:
         start = _rigid_contact(problem)
     else:
@@ -53,16 +55,17 @@ def solve_few_cells(problem: NormalProblem, tolerance: float) -> Iterate | None:
 
 
 def _rigid_contact(problem: NormalProblem) -> tuple[Cells, Array] | None:
-    """Cells that rigid bodies touch and pressures there ``(n,)`` [MPa]; None if unknown.
+    """Return the cells at which rigid bodies touch, and the pressures there ``(n,)`` [MPa].
 
-    The rigid position is the solution of a linear programme, largest Σ target · motion with no gap
-    negative; the forces are its multipliers. Points that penetrate are added until none does.
+    The rigid position solves a linear programme: it maximises Σ target · motion such that no gap is
+    negative. The forces are the multipliers. Points that penetrate are added until there are none.
+    None is returned if the programme fails.
     """
     modes, height = problem.modes, problem.height.ravel()
     shapes = modes.fields().reshape(len(modes.free), -1)
     columns = problem.height.shape[1]
     points = [0, columns - 1, height.size - columns, height.size - 1]
-    # Rarely needed, and slow to import: where it is used.
+    # Imported here because it is rarely needed and slow to import.
     import scipy.optimize
 
     scale, target = float(np.ptp(height)) or 1.0, problem.target / problem.target[0]
@@ -78,7 +81,7 @@ def _rigid_contact(problem: NormalProblem) -> tuple[Cells, Array] | None:
         gap = (height - height.min()) / scale - programme.x @ shapes
         lowest = int(np.argmin(gap))
         if gap[lowest] >= -TOUCHING or lowest in points:
-            # Cells that touch without force hold the tilt that the others leave undetermined.
+            # Cells that touch without force determine the tilt that the others leave free.
             touching = programme.slack <= TOUCHING
             pressure = -programme.ineqlin.marginals * problem.target[0]
             return np.array(points)[touching], np.maximum(pressure[touching], 0.0)
@@ -87,7 +90,7 @@ def _rigid_contact(problem: NormalProblem) -> tuple[Cells, Array] | None:
 
 
 class _ActiveSet:
-    """Pressures on the ``cells`` of the set, which meet the resultants and are nowhere negative."""
+    """Active set of ``cells`` with pressures >= 0 that meet the resultants."""
 
     def __init__(self, problem: NormalProblem, cells: Cells, pressure: Array) -> None:
         self._problem = problem
@@ -99,13 +102,13 @@ class _ActiveSet:
         self.cells, self._pressure = cells, pressure
 
     def improve(self, tolerance: float) -> Iterate | None:
-        """Change the set once; the iterate if it solves the problem."""
-        wanted, rigid = self._on_set()
-        falling = wanted < -DROPPED * np.abs(wanted).max(initial=0.0)
-        if falling.any():
-            self._drop(wanted, falling)
+        """Change the set once; return the iterate if it solves the problem, or None."""
+        closing, rigid = self._close_gaps()
+        negative = closing < -DROPPED * np.abs(closing).max(initial=0.0)
+        if negative.any():
+            self._drop(closing, negative)
             return None
-        self._pressure = np.maximum(wanted, 0.0)
+        self._pressure = np.maximum(closing, 0.0)
         pressure = np.zeros(self._problem.height.size)
         pressure[self.cells] = self._pressure
         field = pressure.reshape(self._problem.height.shape)
@@ -117,8 +120,8 @@ class _ActiveSet:
         self._add(gap)
         return None
 
-    def _on_set(self) -> tuple[Array, Array]:
-        """Pressure and rigid motion with no gap on the set, whatever the signs."""
+    def _close_gaps(self) -> tuple[Array, Array]:
+        """Return the pressures, of any sign, and the rigid motion that close all gaps."""
         count, modes = len(self.cells), len(self._shapes)
         unit, shapes = self._kernel[0, 0], self._shapes[:, self.cells]
         matrix = np.block(
@@ -136,16 +139,16 @@ class _ActiveSet:
             matrix[np.diag_indices(len(i))] += self._problem.compliance.ravel()[self.cells]
         return matrix
 
-    def _drop(self, wanted: Array, falling: Array) -> None:
-        """Go towards ``wanted`` until the first cells carry nothing, and leave those out."""
-        parts = self._pressure[falling] / (self._pressure - wanted)[falling]
-        self._pressure = self._pressure + parts.min() * (wanted - self._pressure)
-        first = np.flatnonzero(falling)[parts <= parts.min() * (1.0 + DROPPED)]
+    def _drop(self, closing: Array, negative: Array) -> None:
+        """Change the pressures towards ``closing`` until the first vanish, and drop these cells."""
+        parts = self._pressure[negative] / (self._pressure - closing)[negative]
+        self._pressure = self._pressure + parts.min() * (closing - self._pressure)
+        first = np.flatnonzero(negative)[parts <= parts.min() * (1.0 + DROPPED)]
         self.cells = np.delete(self.cells, first)
         self._pressure = np.maximum(np.delete(self._pressure, first), 0.0)
 
     def _add(self, gap: Array) -> None:
-        """Take in the cells that penetrate most, at most half as many as there are."""
+        """Add the cells that penetrate most, at most half as many as the set has."""
         most = max(1, len(self.cells) // 2)
         deepest = np.argsort(gap)[:most]
         new = deepest[gap[deepest] < 0.0]

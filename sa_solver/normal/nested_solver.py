@@ -1,6 +1,6 @@
-"""Normal contact on one grid: started from coarser ones, searched in a box around the contact.
+"""Normal contact solved with initial guesses from coarser grids, in a box around the contact.
 
-Both only save time: the answer is verified by a convolution on the whole grid.
+Both only save time: the solution is verified by a convolution on the whole grid.
 """
 
 from __future__ import annotations
@@ -22,50 +22,52 @@ from sa_solver.rigid_modes import APPROACH, TILT_X, TILT_Y, NormalModes
 from sa_solver.types import Array
 
 COARSE_TOLERANCE = 1e-3
-"""Of residuals on coarser grids, whose pressure is off by more than that at the contact's edge."""
+"""Tolerance of residuals on coarser grids, where the error of the pressure at the edge of the
+contact is larger than this."""
 
 ENOUGH = 3.0
-"""Load over the moments' least, where the approach is imposed: a start that can be balanced."""
+"""Load of an initial guess over the least load that can carry the moments, where the approach is
+imposed."""
 
 BOXES = 4
-"""Boxes whose transforms are kept, the last used: a wear run needs two or three."""
+"""Number of boxes whose transforms are cached: a wear run needs two or three."""
 
 
 class NestedSolver:
-    """Solves normal contact problems on one grid; owns what was planned for it."""
+    """Solver of normal contact problems on one grid, with cached transforms and coarser grids."""
 
     def __init__(self, half_space: HalfSpace) -> None:
         self.half_space = half_space
         self._boxed = lru_cache(BOXES)(self._plan)
 
     def cold_start(self, problem: NormalProblem) -> Array | None:
-        """A balanced pressure >= 0, from coarser grids where there are any.
+        """Return a balanced pressure >= 0 as initial guess, from coarser grids if there are any.
 
-        None where no pressure on this grid can be balanced or, if the approach is imposed, nothing
-        presses on cells of this size.
+        None is returned where no pressure on this grid can be balanced or, if the approach is
+        imposed, no cell of this size is in contact.
         """
         imposed = APPROACH not in problem.modes.free and not problem.target.any()
         if imposed and problem.height.min() >= 0.0:
             return None
         nested = self._from_coarser(problem)
-        return nested if nested is not None else _uniform(problem)
+        return nested if nested is not None else _uniform_pressure(problem)
 
     def solve(
         self, problem: NormalProblem, pressure: Array, displacement: Array | None, tolerance: float
     ) -> tuple[Iterate, str]:
-        """Solve from a balanced ``pressure`` >= 0, whose ``displacement`` may be known.
+        """Solve from a balanced ``pressure`` >= 0 and its ``displacement``, if known.
 
-        The last iterate on the whole grid, and by which method it was found.
+        The last iterate on the whole grid and the name of the method that found it are returned.
         """
         box = Box.around(pressure > 0.0)
         while True:
             box, result = self._search(problem, box, pressure, displacement, tolerance)
             iterate = result.iterate
             if not result.converged:
-                return self._rescue(problem, box.placed(iterate.pressure), tolerance)
+                return self._rescue(problem, box.on_whole_grid(iterate.pressure), tolerance)
             if box.size == box.shape:
                 return iterate, "conjugate gradients"
-            pressure = box.placed(iterate.pressure)
+            pressure = box.on_whole_grid(iterate.pressure)
             displacement = problem.displacement(pressure)
             iterate = Iterate(pressure, displacement, iterate.rigid)
             missed = iterate.gap(problem) < -tolerance * displacement.max()
@@ -83,19 +85,25 @@ class NestedSolver:
         displacement: Array | None,
         tolerance: float,
     ) -> tuple[Box, SearchResult]:
-        """Solve with pressure in a box only, enlarged while the contact reaches its sides."""
+        """Solve with pressure in a box only, which is enlarged while the contact reaches its sides.
+
+        The last box is returned as well.
+        """
         while True:
             preconditioner = self._preconditioner(box)
             inner = problem.cropped(box.window, preconditioner.half_space)
             preconditioner.include(inner.compliance)
             inside = np.ascontiguousarray(pressure[box.window])
-            moved = inner.displacement(inside) if displacement is None else displacement[box.window]
-            search = BoundConjugateGradients(inner, preconditioner, inside, moved, box.left_by)
+            known = None if displacement is None else displacement[box.window]
+            moved = inner.displacement(inside) if known is None else known
+            search = BoundConjugateGradients(
+                inner, preconditioner, inside, moved, box.is_reached_by
+            )
             result = search.solve(tolerance)
-            if not result.left:
+            if not result.left_bounds:
                 return box, result
-            pressure, displacement = box.placed(result.iterate.pressure), None
-            box = box.grown()
+            pressure, displacement = box.on_whole_grid(result.iterate.pressure), None
+            box = box.enlarged()
 
     def _rescue(
         self, problem: NormalProblem, pressure: Array, tolerance: float
@@ -111,7 +119,7 @@ class NestedSolver:
     # -- coarser grids ------------------------------------------------------------------------
     @cached_property
     def _coarser(self) -> tuple[NestedSolver, GridTransfer] | None:
-        """The solver on the next coarser grid, and how fields pass to and from it."""
+        """Solver on the next coarser grid, and the transfer of fields between the grids."""
         coarser = coarsened(self.half_space)
         return None if coarser is None else (NestedSolver(coarser[0]), coarser[1])
 
@@ -125,11 +133,11 @@ class NestedSolver:
             return None
         box = Box.around(start > 0.0)
         box, result = solver._search(coarse, box, start, None, COARSE_TOLERANCE)
-        pressure = transfer.interpolated(box.placed(result.iterate.pressure))
+        pressure = transfer.interpolated(box.on_whole_grid(result.iterate.pressure))
         return problem.modes.balance(pressure, problem.target)
 
     def _coarse(self, problem: NormalProblem, transfer: GridTransfer) -> NormalProblem:
-        """``problem`` with heights and compliances averaged over this solver's larger cells."""
+        """Return ``problem`` with heights and compliances averaged over this solver's cells."""
         grid, compliance = self.half_space.grid, problem.compliance
         return replace(
             problem,
@@ -142,7 +150,7 @@ class NestedSolver:
 
     # -- boxes --------------------------------------------------------------------------------
     def _preconditioner(self, box: Box) -> NormalPreconditioner:
-        """That of the half-space on a box."""
+        """Return the preconditioner of the half-space on a box."""
         return self._whole if box.size == box.shape else self._boxed(box.size)
 
     @cached_property
@@ -154,11 +162,12 @@ class NestedSolver:
         return NormalPreconditioner(self.half_space.on(grid))
 
 
-def _uniform(problem: NormalProblem) -> Array | None:
-    """Uniform pressure on the largest rectangle of cells centred on the load, balanced.
+def _uniform_pressure(problem: NormalProblem) -> Array | None:
+    """Return a balanced pressure that is uniform but for the balance, or None.
 
-    Where the approach is imposed, on the cells that penetrate if that can be balanced, of a size
-    that lifts the deepest.
+    It acts on the largest rectangle of cells that is centred on the load. Where the approach is
+    imposed, it acts on the cells that penetrate, or on all cells if that cannot be balanced, and is
+    large enough to separate the deepest cell.
     """
     modes, target = problem.modes, problem.target
     if APPROACH not in modes.free:
@@ -168,7 +177,7 @@ def _uniform(problem: NormalProblem) -> Array | None:
             pressure = cells.astype(np.float64)
             depth = max(-problem.height.min(), 1e-3 * np.ptp(problem.height))
             pressure *= depth / problem.displacement(pressure).max()
-            # Balanced as if that load were imposed, or one that can carry the moments.
+            # Balance as if this load were imposed, or a load that can carry the moments.
             load = max(float(pressure.sum()), ENOUGH * float(np.abs(target).max(initial=0.0)))
             loaded = replace(modes, free=(APPROACH, *modes.free))
             balanced = loaded.balance(pressure, np.concatenate([[load], target]))
@@ -177,8 +186,8 @@ def _uniform(problem: NormalProblem) -> Array | None:
         return None
     sums = dict(zip(modes.free, target / target[0], strict=True))
     at = -sums.get(TILT_Y, 0.0), sums.get(TILT_X, 0.0)
-    near = []
+    loaded_rows = []
     for centres, place in zip((modes.x, modes.y), at, strict=True):
         pitch = 2.0 / len(centres)
-        near.append(np.abs(centres - place) <= max(1.0 - abs(place), pitch))
-    return modes.balance(np.outer(near[0], near[1]).astype(np.float64), target)
+        loaded_rows.append(np.abs(centres - place) <= max(1.0 - abs(place), pitch))
+    return modes.balance(np.outer(*loaded_rows).astype(np.float64), target)

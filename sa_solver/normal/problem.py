@@ -1,4 +1,4 @@
-"""The discrete normal contact problem and its residuals, whichever method solves it."""
+"""Discrete normal contact problem and its residuals, independent of the method of solution."""
 
 from __future__ import annotations
 
@@ -12,16 +12,27 @@ from sa_solver.rigid_modes import APPROACH, NormalModes, Window
 from sa_solver.types import Array
 
 Work = Counter[tuple[int, int]]
-"""How many convolutions were done, by the shape of their transforms."""
+"""Number of convolutions done, by the shape of their transforms."""
 
 
 @dataclass(frozen=True)
 class NormalProblem:
-    """p >= 0, g = h + K p + D p - rigid >= 0, p g = 0, with the resultants of free modes imposed.
+    """Problem p >= 0, g = h + (K + D) p - R c >= 0, p g = 0, with given resultants of free modes.
 
-    ``height`` ``(nx, ny)`` [mm] is the gap before loading, imposed motions taken off;
-    ``compliance`` is D ``(nx, ny)`` [mm/MPa] or None for 0; ``target`` ``(k,)`` holds the sums of
-    pressure times mode. ``work`` counts convolutions, those of all problems made from this one too.
+    Attributes
+    ----------
+    height
+        Gap h before loading ``(nx, ny)`` [mm], minus imposed rigid motions.
+    target
+        Imposed sums of pressure times free mode ``(k,)`` [MPa].
+    modes
+        Free modes R of rigid motion.
+    half_space
+        Half-space K.
+    compliance
+        Local compliance D ``(nx, ny)`` [mm/MPa], or None for 0.
+    work
+        Counter of convolutions, shared with all problems derived from this one.
     """
 
     height: Array
@@ -32,17 +43,20 @@ class NormalProblem:
     work: Work
 
     def displacement(self, pressure: Array) -> Array:
-        """``(K + D) p`` [mm], one convolution."""
+        """Return ``(K + D) p`` [mm], by one convolution."""
         self.work[self.half_space.padded] += 1
         elastic = self.half_space.normal(pressure)
         return elastic if self.compliance is None else elastic + self.compliance * pressure
 
-    def yielded(self, pressure: Array) -> Array | float:
-        """``D p`` [mm]."""
+    def local_displacement(self, pressure: Array) -> Array | float:
+        """Return ``D p`` [mm]."""
         return 0.0 if self.compliance is None else self.compliance * pressure
 
     def cropped(self, window: Window, half_space: HalfSpace) -> NormalProblem:
-        """The problem with pressure only on the cells of ``window``."""
+        """Return the problem with pressure only on the cells of ``window``.
+
+        ``half_space`` covers these cells.
+        """
         return replace(
             self,
             height=np.ascontiguousarray(self.height[window]),
@@ -54,14 +68,14 @@ class NormalProblem:
 
 @dataclass(frozen=True)
 class Iterate:
-    """Pressure, its displacement ``(K + D) p`` and the free rigid motions ``(k,)``."""
+    """Iterate of a solver: pressure, displacement ``(K + D) p`` and free rigid motions ``(k,)``."""
 
     pressure: Array
     displacement: Array
     rigid: Array
 
     def gap(self, problem: NormalProblem) -> Array:
-        """``g = h + (K + D) p - rigid`` [mm]."""
+        """Return the gap ``g = h + (K + D) p - R c`` [mm]."""
         gap = problem.height + self.displacement
         problem.modes.subtract(gap, self.rigid, out=gap)
         return gap
@@ -69,13 +83,21 @@ class Iterate:
 
 @dataclass(frozen=True)
 class NormalResiduals:
-    """How far a state is from solving the problem, dimensionless, independent of the method.
+    """Dimensionless residuals of a state, which do not depend on the method of solution.
 
-    ``force``: |Σ p S - P| / P; ``moment``: the larger of |Σ p y S - Mx| / (P Ly) and
-    |Σ p x S + My| / (P Lx) with Lx, Ly half the grid's size; both count what is imposed only.
-    ``penetration``: largest negative gap over the largest displacement (K + D) p;
-    ``complementarity``: max |p g| over the largest pressure times the largest displacement.
-    Pressure is never negative.
+    The pressure itself is never negative.
+
+    Attributes
+    ----------
+    force
+        |Σ p S - P| / P, if P is imposed.
+    moment
+        Larger of |Σ p y S - Mx| / (P Ly) and |Σ p x S + My| / (P Lx), of imposed moments; Lx and Ly
+        are half the size of the grid.
+    penetration
+        Largest negative gap over the largest displacement (K + D) p.
+    complementarity
+        Largest |p g| over the largest pressure times the largest displacement.
     """
 
     force: float
@@ -85,12 +107,12 @@ class NormalResiduals:
 
     @property
     def largest(self) -> float:
-        """The largest of the four."""
+        """Largest of the four residuals."""
         return max(self.force, self.moment, self.penetration, self.complementarity)
 
 
 def contact_residuals(pressure: Array, displacement: Array, gap: Array) -> tuple[float, float]:
-    """Penetration and complementarity as in :class:`NormalResiduals`."""
+    """Return penetration and complementarity as in :class:`NormalResiduals`."""
     scale = float(displacement.max())
     if not scale > 0.0:
         return np.inf, np.inf
@@ -100,7 +122,7 @@ def contact_residuals(pressure: Array, displacement: Array, gap: Array) -> tuple
 
 
 def normal_residuals(problem: NormalProblem, iterate: Iterate) -> NormalResiduals:
-    """All four residuals of ``iterate``."""
+    """Return all four residuals of ``iterate``."""
     total = iterate.pressure.sum()
     if not total > 0.0:
         return NormalResiduals(np.inf, np.inf, np.inf, np.inf)
@@ -118,7 +140,10 @@ def normal_residuals(problem: NormalProblem, iterate: Iterate) -> NormalResidual
 
 
 def border_share(pressure: Array) -> float:
-    """Share of the load on the outermost cells, along each direction that has more than two."""
+    """Return the share of the load on the outermost cells.
+
+    Directions along which the grid has only one or two cells do not count.
+    """
     border = np.zeros(pressure.shape, dtype=bool)
     if pressure.shape[0] > 2:
         border[[0, -1], :] = True
@@ -129,9 +154,9 @@ def border_share(pressure: Array) -> float:
 
 
 def messages(failure: str, border_load: float) -> str:
-    """Return the message of a state: its ``failure``, and whether its grid cuts the contact off."""
+    """Return the message of a state: its ``failure``, and a warning if the grid is too small."""
     border = (
         f"the contact reaches the border of its grid, where cells carry {border_load:.2g} of the "
-        "load, and is cut off there: take a larger grid, unless the bodies end with it"
+        "load, and is cut off there: take a larger grid, unless the bodies end there as well"
     )
     return "; ".join(text for text in (failure, border if border_load > 0.0 else "") if text)

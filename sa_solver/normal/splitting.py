@@ -1,4 +1,4 @@
-"""The fallback of normal contact: Douglas-Rachford splitting on the zero-padded grid."""
+"""Fallback solver of normal contact: Douglas-Rachford splitting on the zero-padded grid."""
 
 from __future__ import annotations
 
@@ -12,28 +12,29 @@ from sa_solver.splitting import douglas_rachford
 from sa_solver.types import Array
 
 SPLITTING_ITERATIONS = 3000
-"""The splitting takes 40 to 220, but 2300 where under 1 % of the cells carry the load."""
+"""Most iterations of the splitting. It usually takes 40 to 220, but 2300 where less than 1 % of the
+cells carry the load."""
 
 SPLITTING_STAGES = 4
-"""The splitting's own residual is no bound on the gap's: it is tightened tenfold at most this many
-times, until the independent residuals are met."""
+"""Most stages with a tolerance ten times tighter each. The residual of the splitting does not bound
+that of the gap, so that it is tightened until the independent residuals are met."""
 
 
 def solve_by_splitting(problem: NormalProblem, start: Iterate, tolerance: float) -> Iterate:
-    """Solve ``problem`` from the pressure of ``start``: the last iterate."""
+    """Solve ``problem`` from the pressure of ``start`` and return the last iterate."""
     resolvent = HalfSpaceResolvent(problem.half_space, NORMAL)
     before = problem.half_space.count
     response = RigidResponse.of(
         resolvent, problem.modes.fields()[:, None], lambda pressure: problem.modes.sums(pressure[0])
     )
     compliance = 0.0 if problem.compliance is None else problem.compliance
-    yielding = resolvent.shift[0] / (resolvent.shift[0] + compliance)
+    shrinkage = resolvent.shift[0] / (resolvent.shift[0] + compliance)
     splitting = PaddedSplitting(
         resolvent,
         response,
         problem.target,
         problem.height[None],
-        lambda trial: unilateral(trial) * yielding,
+        lambda trial: unilateral(trial) * shrinkage,
     )
     problem.work[resolvent.padded_shape] += problem.half_space.count - before
     state = resolvent.padded(start.pressure[None])
@@ -55,12 +56,15 @@ def solve_by_splitting(problem: NormalProblem, start: Iterate, tolerance: float)
 
 
 def _balanced(problem: NormalProblem, pressure: Array) -> Iterate | None:
-    """Balanced pressure with the rigid motion that makes Σ p g vanish for every mode."""
+    """Return the balanced ``pressure`` with the rigid motion that makes Σ p g vanish by modes.
+
+    None is returned where no balanced pressure exists.
+    """
     modes = problem.modes
     balanced = modes.balance(pressure.copy(), problem.target)
     if balanced is None:
         return None
     displacement = problem.displacement(balanced)
-    lifted = modes.sums(balanced * (problem.height + displacement))
-    rigid = np.linalg.pinv(modes.products(balanced), hermitian=True) @ lifted
+    weighted_heights = modes.sums(balanced * (problem.height + displacement))
+    rigid = np.linalg.pinv(modes.products(balanced), hermitian=True) @ weighted_heights
     return Iterate(balanced, displacement, rigid)

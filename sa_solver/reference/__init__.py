@@ -1,1 +1,1 @@
-"""Closed forms that the solvers are measured against, in tests and in reports."""
+"""Closed-form solutions with which the solvers are compared, in tests and in reports."""

@@ -1,6 +1,7 @@
 """Hertz contact of spheres, of general quadratic surfaces and of parallel cylinders.
 
-Valid for frictionless or elastically similar half-spaces, contacts small against the radii.
+The solutions are valid for frictionless or elastically similar half-spaces, and for contacts that
+are small compared with the radii.
 
 Source: Johnson 1985, *Contact Mechanics*, section 4.2, eqs 4.22-4.24 (point) and 4.43-4.46 (line);
 section 3.5 for the displacements inside an ellipse.
@@ -21,9 +22,10 @@ from sa_solver.types import Array, ElasticPair, Material
 
 @dataclass(frozen=True)
 class HertzSphere:
-    """Sphere of relative ``radius`` [mm] pressed with ``load`` [N] at E* ``contact_modulus`` [MPa].
+    """Contact of a sphere with the relative ``radius`` [mm] under a ``load`` [N].
 
-    Raises InputError for one of them that is not above 0, as do all forms here.
+    ``contact_modulus`` is E* [MPa]. InputError is raised for values that are not above 0, as by all
+    classes here.
     """
 
     load: float
@@ -35,32 +37,35 @@ class HertzSphere:
 
     @property
     def contact_radius(self) -> float:
-        """a = (3 P R / 4 E*)^(1/3) [mm]."""
+        """Radius of the contact a = (3 P R / 4 E*)^(1/3) [mm]."""
         return float(np.cbrt(0.75 * self.load * self.radius / self.contact_modulus))
 
     @property
     def peak_pressure(self) -> float:
-        """p0 = 3 P / 2 π a² [MPa]."""
+        """Peak pressure p0 = 3 P / 2 π a² [MPa]."""
         return 1.5 * self.load / (np.pi * self.contact_radius**2)
 
     @property
     def approach(self) -> float:
-        """δz = a² / R [mm]."""
+        """Approach δz = a² / R [mm]."""
         return self.contact_radius**2 / self.radius
 
     def gap(self, x: Array, y: Array) -> Array:
-        """Gap before loading, ``(x² + y²) / 2 R`` [mm]."""
+        """Return the gap before loading, ``(x² + y²) / 2 R`` [mm]."""
         return (x**2 + y**2) / (2.0 * self.radius)
 
     def pressure(self, x: Array, y: Array) -> Array:
-        """p0 sqrt(1 - r²/a²), 0 outside the contact [MPa]; ``x`` and ``y`` broadcast [mm]."""
+        """Return the pressure p0 sqrt(1 - r²/a²) [MPa], 0 outside the contact.
+
+        ``x`` and ``y`` [mm] broadcast.
+        """
         inside = np.maximum(0.0, 1.0 - (x**2 + y**2) / self.contact_radius**2)
         return self.peak_pressure * np.sqrt(inside)
 
 
 @dataclass(frozen=True)
 class FrictionalSphere:
-    """Sphere of relative ``radius`` [mm] under a constant ``load`` [N], with ``friction`` µ."""
+    """Sphere with the relative ``radius`` [mm] and ``friction`` µ under a constant ``load`` [N]."""
 
     load: float
     radius: float
@@ -73,27 +78,36 @@ class FrictionalSphere:
 
     @cached_property
     def pair(self) -> ElasticPair:
-        """Both bodies."""
+        """Elastic constants of both bodies."""
         return ElasticPair(self.body_1, self.body_2)
 
     @cached_property
     def contact(self) -> HertzSphere:
-        """The normal contact, which neither shear nor twist changes."""
+        """Normal contact, which does not depend on shear or twist."""
         return HertzSphere(self.load, self.radius, self.pair.contact_modulus)
 
 
 @dataclass(frozen=True)
 class HertzEllipse:
-    """Relative radii ``radius_x`` and ``radius_y`` [mm] pressed with ``load`` [N] at E* [MPa].
+    """Elliptic contact of surfaces with two relative radii under a load.
 
-    x and y are the principal directions, ``radius_x`` curves the section ``y = 0``; either may be
-    the larger, by any ratio. The semi-axes are a along x and b along y. Inside the ellipse a
-    pressure p0 sqrt(1 - x²/a² - y²/b²) moves the surface by
+    Inside the ellipse with the semi-axes a along x and b along y, the pressure
+    p0 sqrt(1 - x²/a² - y²/b²) displaces the surface by
 
         u_z = (p0 a b / E*) [R_F(0, a², b²) - (x²/3) R_D(0, b², a²) - (y²/3) R_D(0, a², b²)]
 
     with Carlson's complete elliptic integrals R_F and R_D, which are Johnson's integrals of section
-    3.5 without his modulus. u_z = δz - gap gives the ratio b/a (a root), then a and δz, exactly.
+    3.5 without his modulus. The condition u_z = δz - gap determines the ratio b/a (as a root), then
+    a and δz, exactly.
+
+    Parameters
+    ----------
+    load
+        Load [N].
+    radius_x, radius_y
+        Relative radii of curvature [mm] in the principal sections y = 0 and x = 0, of any ratio.
+    contact_modulus
+        Contact modulus E* [MPa].
     """
 
     load: float
@@ -107,43 +121,46 @@ class HertzEllipse:
 
     @cached_property
     def axis_ratio(self) -> float:
-        """b/a, the root of R_D(0, κ², 1) / R_D(0, 1, κ²) = Ry / Rx."""
+        """Ratio b/a of the semi-axes, the root κ of R_D(0, κ², 1) / R_D(0, 1, κ²) = Ry / Rx."""
         target = float(np.log(self.radius_y / self.radius_x))
 
         def excess(log_ratio: float) -> float:
             square = np.exp(2.0 * log_ratio)
             return float(np.log(elliprd(0.0, square, 1.0) / elliprd(0.0, 1.0, square))) - target
 
-        # b/a lies between the square root of Ry/Rx and Ry/Rx itself; 1 keeps the circle inside.
+        # The ratio lies between the square root of Ry/Rx and Ry/Rx; 1 is added for the circle.
         reach = abs(target) + 1.0
         return float(np.exp(brentq(excess, -reach, reach, xtol=1e-15)))
 
     @cached_property
     def semi_axes(self) -> tuple[float, float]:
-        """(a, b) along x and y [mm], a³ = (P Rx / π E*) R_D(0, (b/a)², 1)."""
+        """Semi-axes (a, b) along x and y [mm], with a³ = (P Rx / π E*) R_D(0, (b/a)², 1)."""
         volume = self.load * self.radius_x / (np.pi * self.contact_modulus)
         a = float(np.cbrt(volume * elliprd(0.0, self.axis_ratio**2, 1.0)))
         return a, self.axis_ratio * a
 
     @property
     def peak_pressure(self) -> float:
-        """p0 = 3 P / 2 π a b [MPa]."""
+        """Peak pressure p0 = 3 P / 2 π a b [MPa]."""
         a, b = self.semi_axes
         return 1.5 * self.load / (np.pi * a * b)
 
     @property
     def approach(self) -> float:
-        """δz = (3 P / 2 π E*) R_F(0, a², b²) [mm]."""
+        """Approach δz = (3 P / 2 π E*) R_F(0, a², b²) [mm]."""
         a, b = self.semi_axes
         integral = float(elliprf(0.0, a**2, b**2))
         return 1.5 * self.load * integral / (np.pi * self.contact_modulus)
 
     def gap(self, x: Array, y: Array) -> Array:
-        """Gap before loading, ``x² / 2 Rx + y² / 2 Ry`` [mm]."""
+        """Return the gap before loading, ``x² / 2 Rx + y² / 2 Ry`` [mm]."""
         return x**2 / (2.0 * self.radius_x) + y**2 / (2.0 * self.radius_y)
 
     def pressure(self, x: Array, y: Array) -> Array:
-        """p0 sqrt(1 - x²/a² - y²/b²), 0 outside [MPa]; ``x`` and ``y`` broadcast [mm]."""
+        """Return the pressure p0 sqrt(1 - x²/a² - y²/b²) [MPa], 0 outside the contact.
+
+        ``x`` and ``y`` [mm] broadcast.
+        """
         a, b = self.semi_axes
         inside = np.maximum(0.0, 1.0 - (x / a) ** 2 - (y / b) ** 2)
         return self.peak_pressure * np.sqrt(inside)
@@ -151,7 +168,10 @@ class HertzEllipse:
 
 @dataclass(frozen=True)
 class HertzCylinder:
-    """Parallel cylinders of relative ``radius`` [mm] under ``load`` per length [N/mm], E* [MPa]."""
+    """Contact of parallel cylinders with the relative ``radius`` [mm].
+
+    ``load`` is per length [N/mm] and ``contact_modulus`` is E* [MPa].
+    """
 
     load: float
     radius: float
@@ -162,28 +182,29 @@ class HertzCylinder:
 
     @property
     def half_width(self) -> float:
-        """a = sqrt(4 P R / π E*) [mm]."""
+        """Half-width of the contact a = sqrt(4 P R / π E*) [mm]."""
         return float(np.sqrt(4.0 * self.load * self.radius / (np.pi * self.contact_modulus)))
 
     @property
     def peak_pressure(self) -> float:
-        """p0 = 2 P / π a [MPa]."""
+        """Peak pressure p0 = 2 P / π a [MPa]."""
         return 2.0 * self.load / (np.pi * self.half_width)
 
     def approach(self, datum: float) -> float:
-        """δz = (2 P / π E*) [ln(2 L / a) + 1/2] [mm], for the ``datum`` L [mm].
+        """Return the approach δz = (2 P / π E*) [ln(2 L / a) + 1/2] [mm] for the ``datum`` L [mm].
 
-        A line contact's approach is defined only up to a constant: this one goes with
-        u_z = -(2 / π E*) ∫ p ln(|x - ξ| / L) dξ, a line load's displacement being 0 at L from it.
+        The approach of a line contact is defined only up to a constant. This one belongs to
+        u_z = -(2 / π E*) ∫ p ln(|x - ξ| / L) dξ, where the displacement by a line load is 0 at the
+        distance L.
         """
         logarithm = float(np.log(2.0 * datum / self.half_width))
         return 2.0 * self.load * (logarithm + 0.5) / (np.pi * self.contact_modulus)
 
     def gap(self, x: Array) -> Array:
-        """Gap before loading, ``x² / 2 R`` [mm]."""
+        """Return the gap before loading, ``x² / 2 R`` [mm]."""
         return x**2 / (2.0 * self.radius)
 
     def pressure(self, x: Array) -> Array:
-        """p0 sqrt(1 - x²/a²), 0 outside the contact [MPa]."""
+        """Return the pressure p0 sqrt(1 - x²/a²) [MPa], 0 outside the contact."""
         inside = np.maximum(0.0, 1.0 - (x / self.half_width) ** 2)
         return self.peak_pressure * np.sqrt(inside)

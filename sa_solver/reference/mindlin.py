@@ -1,14 +1,14 @@
 """Tangential contact of spheres under constant normal load (Cattaneo 1938, Mindlin 1949).
 
-The stuck circle is concentric with the contact; outside it the shear is µ p, and
+The sticking circle is concentric with the contact. Outside it the shear is µ p, and
 
     c = a (1 - |Q| / µP)^(1/3)
     qx = (µ p0 / a) [sqrt(a² - r²) - sqrt(c² - r²)]          (the second root for r < c only)
     δx = (3 µP / 16 a) Σ (2 - ν)/G [1 - (1 - |Q| / µP)^(2/3)]
 
-qy = 0 is assumed. The stuck circle then moves rigidly, whatever ν; in the slip annulus slip is not
-quite opposite to the shear unless ν = 0, for which the solution is exact. Bodies of unlike elastic
-constants are treated as if pressure made no tangential displacement (small Dundurs' β).
+qy = 0 is assumed. The sticking circle then moves rigidly for any ν. In the slip annulus, slip is
+exactly opposite to the shear only for ν = 0, for which the solution is exact. For dissimilar bodies
+the tangential displacement by pressure is neglected (small Dundurs' β).
 
 Source: Cattaneo 1938, Rend. Accad. Naz. Lincei 27, 342; Mindlin 1949, J. Appl. Mech. 16, 259;
 Mindlin & Deresiewicz 1953, J. Appl. Mech. 20, 327, doi:10.1115/1.4010702; Johnson 1985, *Contact
@@ -28,32 +28,35 @@ from sa_solver.types import Array
 
 
 class ShearedSphere(FrictionalSphere):
-    """A sphere under a constant load, sheared along x.
+    """Sphere under a constant load, sheared along x.
 
-    Tangential forces are those on body 2, displacements those of body 1 relative
-    to body 2 far from the contact: they have the same sign on first loading. Methods raise
-    ``InputError`` beyond |Q| = µP.
+    Tangential forces act on body 2; displacements are those of body 1 relative to body 2, far from
+    the contact. They have the same sign on first loading. Methods raise ``InputError`` beyond
+    |Q| = µP.
     """
 
     @property
     def sliding_force(self) -> float:
-        """µP [N]."""
+        """Sliding force µP [N]."""
         return self.friction * self.load
 
     @property
     def tangential_compliance(self) -> float:
-        """dδx/dQ where nothing slips, ``Σ (2 - ν)/G / 8 a`` [mm/N]."""
+        """Compliance dδx/dQ without slip, ``Σ (2 - ν)/G / 8 a`` [mm/N]."""
         compliance = 2.0 * self.pair.shear - self.pair.poisson
         return compliance / (8.0 * self.contact.contact_radius)
 
     def stick_radius(self, tangential: float) -> float:
-        """c [mm] on first loading to ``tangential`` [N]."""
+        """Return the stick radius c [mm] on first loading to ``tangential`` [N]."""
         return self.contact.contact_radius * float(
             np.cbrt(reserve(tangential, self.sliding_force, "N"))
         )
 
     def shear(self, x: Array, y: Array, tangential: float) -> Array:
-        """qx on first loading to ``tangential`` [N]; ``x`` and ``y`` broadcast [mm] [MPa]."""
+        """Return the shear qx [MPa] on first loading to ``tangential`` [N].
+
+        ``x`` and ``y`` [mm] broadcast.
+        """
         a, c = self.contact.contact_radius, self.stick_radius(tangential)
         radius_squared = x**2 + y**2
         sliding = np.sqrt(np.maximum(0.0, a**2 - radius_squared))
@@ -62,27 +65,27 @@ class ShearedSphere(FrictionalSphere):
         return scale * (sliding - stuck)
 
     def displacement(self, tangential: float) -> float:
-        """δx [mm] on first loading to ``tangential`` [N]."""
-        spent = 1.0 - float(np.cbrt(reserve(tangential, self.sliding_force, "N"))) ** 2
-        return float(np.sign(tangential)) * self._sliding_displacement * spent
+        """Return the displacement δx [mm] on first loading to ``tangential`` [N]."""
+        share = 1.0 - float(np.cbrt(reserve(tangential, self.sliding_force, "N"))) ** 2
+        return float(np.sign(tangential)) * self._sliding_displacement * share
 
     def shear_after(self, x: Array, y: Array, loads: Sequence[float]) -> Array:
-        """qx [MPa] after the turning points ``loads`` of the tangential force [N]."""
+        """Return the shear qx [MPa] after the turning points ``loads`` of the force [N]."""
         return superpose(lambda tangential: self.shear(x, y, tangential), loads)
 
     def displacement_after(self, loads: Sequence[float]) -> float:
-        """δx [mm] after the turning points ``loads`` of the tangential force [N].
+        """Return the displacement δx [mm] after the turning points ``loads`` of the force [N].
 
-        Between ±Q the loop's turning points are ±``displacement(Q)``: this is its amplitude, half
-        of what the body travels from one end to the other.
+        The turning points of a loop between ±Q are ±``displacement(Q)``. This is the amplitude of
+        the loop, half of the distance between its ends.
         """
         return superpose(self.displacement, loads)
 
     def loop_energy(self, amplitude: float) -> float:
-        """Energy of one cycle between ±``amplitude`` [N], the loop's area ∮ Q dδx [N mm].
+        """Return the energy ∮ Q dδx [N mm] of one cycle between ±``amplitude`` [N].
 
-        4 µP δ1 [(6/5)(1 - v^(5/3)) - (Q/µP)(1 + v^(2/3))], with v = 1 - Q/µP and δ1 the
-        displacement at the onset of sliding.
+        It is 4 µP δ1 [(6/5)(1 - v^(5/3)) - (Q/µP)(1 + v^(2/3))], with v = 1 - Q/µP and the
+        displacement δ1 at the onset of sliding.
         """
         left = reserve(amplitude, self.sliding_force, "N")
         power = float(np.cbrt(left)) ** 2
@@ -91,5 +94,5 @@ class ShearedSphere(FrictionalSphere):
 
     @property
     def _sliding_displacement(self) -> float:
-        """δ1 [mm], at the onset of sliding: 3/2 of what no slip would give."""
+        """Displacement δ1 at the onset of sliding [mm], 3/2 of that without slip."""
         return 1.5 * self.sliding_force * self.tangential_compliance

@@ -1,11 +1,12 @@
 """Stress inside a half-space z >= 0 under point forces and under Hertz contacts, sliding or not.
 
-Forces and tractions act on the half-space: tz or p presses, so that this is body 2 of
-:mod:`sa_solver.types`. Stress has six components xx, yy, zz, xy, yz, zx, tension positive.
+Forces and tractions act on the half-space, and positive tz or p presses on it, so that it is body 2
+of :mod:`sa_solver.types`. Stress has six components xx, yy, zz, xy, yz, zx, tension positive.
 
 Source: Johnson 1985, *Contact Mechanics*, eqs 3.18 (Boussinesq) and 3.76 (Cerruti), 3.42 to 3.45
-and 3.91 (sphere), 4.49 (McEwen 1949, Phil. Mag. 40, 454) and 7.8 (sliding cylinder). The xy of
-eq. 3.18 here has the factor 2 in its first term that turning the axes of xx and yy asks for.
+and 3.91 (sphere), 4.49 (McEwen 1949, Phil. Mag. 40, 454) and 7.8 (sliding cylinder). The component
+xy of eq. 3.18 has a factor 2 in its first term here, which follows from xx and yy by rotating the
+axes.
 """
 
 from __future__ import annotations
@@ -18,9 +19,10 @@ from sa_solver.types import Array
 
 
 def point_force_stress(x: Array, y: Array, z: Array, poisson: float) -> Array:
-    """Stress ``(6, 3, ...)`` from unit forces along x, y and z at the origin [1/mm²].
+    """Return the stress ``(6, 3, ...)`` [1/mm²] from unit forces along x, y and z at the origin.
 
-    Coordinates of one shape ``(...)`` [mm]. Not for points on the axis x = y = 0.
+    The coordinates have the same shape ``(...)`` [mm]. Points on the axis x = y = 0 are not
+    allowed.
     """
     along_y = _cerruti(y, x, z, poisson)[EXCHANGED]
     forces = [_cerruti(x, y, z, poisson), along_y, _boussinesq(x, y, z, poisson)]
@@ -28,7 +30,7 @@ def point_force_stress(x: Array, y: Array, z: Array, poisson: float) -> Array:
 
 
 def _cerruti(x: Array, y: Array, z: Array, poisson: float) -> Array:
-    """Under a force along x, without 1/2π."""
+    """Return the stress under a force along x, times 2π."""
     r = np.sqrt(x**2 + y**2 + z**2)
     k = 1.0 - 2.0 * poisson
     first, second, third = (
@@ -50,7 +52,7 @@ def _cerruti(x: Array, y: Array, z: Array, poisson: float) -> Array:
 
 
 def _boussinesq(x: Array, y: Array, z: Array, poisson: float) -> Array:
-    """Under a force along z, without 1/2π."""
+    """Return the stress under a force along z, times 2π."""
     square = x**2 + y**2
     r = np.sqrt(square + z**2)
     scale = (1.0 - 2.0 * poisson) / square
@@ -70,22 +72,23 @@ def _boussinesq(x: Array, y: Array, z: Array, poisson: float) -> Array:
 def cylinder_stress(
     contact: HertzCylinder, friction: float, x: Array, z: Array, poisson: float
 ) -> Array:
-    """Stress ``(6, ...)`` [MPa] under Hertz's pressure p and a shear q = ``friction`` p along x.
+    """Return the stress ``(6, ...)`` [MPa] under a sliding cylinder, in plane strain.
 
-    ``x`` and ``z`` broadcast to ``(...)`` [mm]; plane strain. At the trailing edge, x = -a for
-    shear towards +x, the surface carries xx = 2 µ p0.
+    The tractions are Hertz's pressure p and a shear q = ``friction`` p along x. ``x`` and ``z``
+    [mm] broadcast to ``(...)``. At the trailing edge, which is x = -a for shear towards +x, the
+    surface carries xx = 2 µ p0.
     """
     x, z = np.broadcast_arrays(x, z)
     a, p0 = contact.half_width, contact.peak_pressure
-    # m + i n of McEwen: n + i m = sqrt((x + i z)² - a²), the root of the sign of x.
+    # McEwen's m and n: n + i m = sqrt((x + i z)² - a²), the root with the sign of x.
     inner, product = a**2 - x**2 + z**2, 2.0 * x * z
     modulus = np.hypot(inner, product)
     m, n = np.sqrt(0.5 * (modulus + inner)), np.sign(x) * np.sqrt(0.5 * (modulus - inner))
-    square = np.where(modulus > 0.0, modulus, 1.0)  # m² + n², 0 at the edges
+    square = np.where(modulus > 0.0, modulus, 1.0)  # m² + n², which is 0 at the edges
     xx = -(p0 / a) * (m * (1.0 + (z**2 + n**2) / square) - 2.0 * z)
     zz = -(p0 / a) * m * (1.0 - (z**2 + n**2) / square)
     zx = -(p0 / a) * n * (m**2 - z**2) / square
-    # Shear stresses as pressure does, one derivative further along x: only xx is new.
+    # Shear causes the same stresses as pressure, shifted by one component: only xx is new.
     xx_shear = friction * (p0 / a) * (n * (2.0 - (z**2 - m**2) / square) - 2.0 * x)
     xx, zz, zx = xx + xx_shear, zz + friction * zx, zx + friction * xx
     zero = np.zeros_like(xx)
@@ -93,7 +96,7 @@ def cylinder_stress(
 
 
 def sphere_axis_stress(contact: HertzSphere, z: Array, poisson: float) -> Array:
-    """Stress ``(6, ...)`` [MPa] on the axis at depths ``z`` > 0 under Hertz's pressure."""
+    """Return the stress ``(6, ...)`` [MPa] on the axis at depths ``z`` > 0 under a sphere."""
     ratio = z / contact.contact_radius
     fall = 1.0 / (1.0 + ratio**2)
     radial = -(1.0 + poisson) * (1.0 - ratio * np.arctan(1.0 / ratio)) + 0.5 * fall
@@ -104,10 +107,11 @@ def sphere_axis_stress(contact: HertzSphere, z: Array, poisson: float) -> Array:
 def sphere_surface_stress(
     contact: HertzSphere, friction: float, x: Array, y: Array, poisson: float
 ) -> Array:
-    """Surface stress ``(6, ...)`` [MPa] for r <= a, under p and a shear ``friction`` p along x.
+    """Return the surface stress ``(6, ...)`` [MPa] in the contact of a sliding sphere.
 
-    ``x`` and ``y`` broadcast to ``(...)`` [mm], not 0 both. Pressure leaves a radial tension
-    (1-2ν) p0 / 3 at the edge; shear adds xx = (4+ν) π µ p0 / 8 at its trailing end x = -a.
+    The tractions are Hertz's pressure p and a shear ``friction`` p along x. ``x`` and ``y`` [mm]
+    broadcast to ``(...)``, with 0 < r <= a. Pressure causes a radial tension (1-2ν) p0 / 3 at the
+    edge; shear adds xx = (4+ν) π µ p0 / 8 at the trailing edge x = -a.
     """
     x, y = np.broadcast_arrays(x, y)
     a, p0 = contact.contact_radius, contact.peak_pressure
@@ -117,7 +121,7 @@ def sphere_surface_stress(
     radial, hoop = bulge - pressure, -bulge - 2.0 * poisson * pressure
     cos_2, sin_2 = (x**2 - y**2) / (x**2 + y**2), 2.0 * x * y / (x**2 + y**2)
     mean, half = 0.5 * (radial + hoop), 0.5 * (radial - hoop)
-    # Shear displaces by quadratics in x and y (eq. 3.91): these are their strains.
+    # The displacements by shear are quadratic in x and y (eq. 3.91); these are their strains.
     slope = np.pi * friction * p0 / (8.0 * a)
     xx = mean + half * cos_2 - slope * (4.0 + poisson) * x
     yy = mean - half * cos_2 - slope * 3.0 * poisson * x

@@ -1,1 +1,1 @@
-"""Shapes and scans of contact faces, and whether a grid resolves their contact."""
+"""Shapes and scans of contact faces, and the resolution of their contact by a grid."""

@@ -1,9 +1,10 @@
-"""Cells without a surface, whose height is +infinity: they never touch.
+"""Cells without a surface, which have an infinite height and never touch.
 
-The solvers know finite heights only. Such cells are therefore put so high above all others that
-nothing reaches them, which the state then shows: as long as they carry no pressure it is that of
-the cells with a surface alone. Between bodies that do not turn the first height is a bound (what
-all the load on one cell would move that); where they turn it may have to grow.
+The solvers accept finite heights only. Such cells are therefore given a height so large that the
+other body does not reach them. If they carry no pressure in the resulting state, the state is that
+of the cells with a surface alone. For bodies that do not turn, the first height tried is a bound:
+the displacement of a single cell that carries the whole load. For bodies that turn it may have to
+be increased.
 """
 
 from __future__ import annotations
@@ -20,13 +21,13 @@ from sa_solver.half_space.operator import HalfSpace
 from sa_solver.types import Array
 
 LIFTS = (1.0, 1e2, 1e4)
-"""Heights that are tried, over the first: digits of a displacement are lost beyond."""
+"""Factors of the first height that are tried; larger ones would cost digits of displacements."""
 
 Control = tuple[float, float, float, float]
 
 
 class Pressed(Protocol):
-    """A state, frozen, with ``pressure`` and ``gap`` ``(nx, ny)``."""
+    """Frozen dataclass of a state with ``pressure`` and ``gap`` ``(nx, ny)``."""
 
     __dataclass_fields__: ClassVar[dict[str, Any]]
 
@@ -46,25 +47,36 @@ def without_absent(
     solve: Callable[[Array], State],
     error: type[ContactProblemError],
 ) -> State:
-    """The state that ``solve`` finds for ``height`` ``(nx, ny)`` with infinite ones in it [mm].
+    """Return the state for heights of which some are infinite.
 
-    ``control`` is P [N] and the imposed δz [mm], φx and φy [rad], 0 where they are not imposed.
-    Raises ``error`` where no cell has a surface, or where the load can be carried by none that has.
+    Parameters
+    ----------
+    height
+        Heights ``(nx, ny)`` [mm], infinite in cells without a surface.
+    half_space
+        Half-space of the contact.
+    control
+        Imposed P [N], δz [mm], φx and φy [rad]; 0 where they are not imposed.
+    solve
+        Function that returns the state for finite heights.
+    error
+        Class of the exception to raise if no cell has a surface, or if the cells with a surface
+        cannot carry the load.
     """
     absent = np.isinf(height)
     if not absent.any():
         return solve(height)
     if absent.all():
         raise error("heights are infinite or masked in all cells: nothing can touch")
-    there, grid = height[~absent], half_space.grid
+    present, grid = height[~absent], half_space.grid
     P, delta, tilt_x, tilt_y = map(abs, control)
-    far = P / grid.cell_area * half_space.self_compliance(Z) + delta + float(np.ptp(there))
+    far = P / grid.cell_area * half_space.self_compliance(Z) + delta + float(np.ptp(present))
     far += 0.5 * (tilt_x * grid.size[1] + tilt_y * grid.size[0])
     for times in LIFTS:
-        state = solve(np.where(absent, there.max() + times * far, height))
+        state = solve(np.where(absent, present.max() + times * far, height))
         if not state.pressure[absent].any():
             return replace(state, gap=np.where(absent, np.inf, state.gap))
     raise error(
         "the load acts beyond the cells that have a surface, those whose height is neither "
-        "infinite nor masked: hold the tilt, or move the load"
+        "infinite nor masked: hold the tilt, or move the load towards them"
     )

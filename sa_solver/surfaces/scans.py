@@ -1,11 +1,11 @@
 """Measured surfaces: levelled, filled where points are missing, and averaged onto a grid.
 
-A scan has points of its own number and pitch. Each is taken as the mean height over its own cell,
-and each cell of the contact's grid gets the mean over its area: nothing finer than the grid comes
-back as a wave that is not there, as it would from points alone, and no volume is lost. Along each
-direction the integral of the heights is interpolated by a cubic spline, which is exact for planes
-and parabolas, and returns the scan itself where the grid is that of the scan
-(Schoenberg 1973, "Splines and histograms", on such splines).
+A scan has its own number of points and pitch. The height of a point is taken as the mean over its
+own cell, and each cell of the contact's grid gets the mean over its area. In this way no aliasing
+occurs, as it would if the points were sampled, and no volume is lost. Along each direction the
+integral of the heights is interpolated by a cubic spline. This is exact for planes and parabolas,
+and returns the scan itself where the grid is that of the scan (Schoenberg 1973, "Splines and
+histograms").
 """
 
 from __future__ import annotations
@@ -20,11 +20,11 @@ from sa_solver.errors import InputError
 from sa_solver.types import Array, Grid, Mask
 
 Level = Literal["none", "mean", "plane", "form"]
-"""What is taken off a scan: nothing, its mean, its mean plane, or the mean surface of second order
-(form), each by least squares over the points that were measured."""
+"""Surface that is subtracted from a scan: none, its mean, its mean plane, or the mean surface of
+second order (``form``), each fitted by least squares to the measured points."""
 
 Beyond = Literal["refused", "mirrored"]
-"""What a grid finds beyond the border of a scan: nothing that it takes, or the scan mirrored."""
+"""Treatment of a grid that extends beyond the border of a scan: an error, or a mirrored scan."""
 
 TERMS: dict[Level, tuple[tuple[int, int], ...]] = {
     "none": (),
@@ -32,25 +32,25 @@ TERMS: dict[Level, tuple[tuple[int, int], ...]] = {
     "plane": ((0, 0), (1, 0), (0, 1)),
     "form": ((0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2)),
 }
-"""Powers of x and y in what is taken off."""
+"""Powers of x and y in the surface that is subtracted."""
 
 ROUNDING = 1e-6
-"""Share of a point's pitch by which a grid of the scan's own size may reach beyond it."""
+"""Distance, in pitches of the scan, by which a grid may extend beyond it due to rounding."""
 
 MOST_POINTS = 5e7
-"""Points over a grid that are taken: 400 MB for each of the few copies that resampling has. More
-come of a scan that is mirrored over a grid many times its size."""
+"""Most points over a grid: 400 MB for each of the few copies in resampling. A scan that is mirrored
+over a grid many times its size would have more."""
 
 QUARTER = 1e-9
-"""Angle [rad] from a multiple of 90° up to which points are turned without interpolation."""
+"""Deviation from a multiple of 90° [rad] within which points are rotated without interpolation."""
 
 
 @dataclass(frozen=True, eq=False)
 class Scan:
-    """Heights as measured: ``heights`` ``(nx, ny)`` and ``pitch`` ``(dx, dy)``, all in mm.
+    """Measured surface: ``heights`` ``(nx, ny)`` and ``pitch`` ``(dx, dy)`` of its points [mm].
 
-    Rows are along x, columns along y; one column is a profile. Heights count out of the body; NaN
-    is a missing point, and so is a masked one. The origin is in the middle.
+    The first index counts along x, the second along y; a single column is a profile. Heights are
+    positive out of the body. NaN or masked heights are missing points. The origin is in the middle.
 
     Examples
     --------
@@ -73,24 +73,24 @@ class Scan:
         dimensions = np.ndim(self.heights)
         if dimensions != 2 or not all(0.0 < pitch < np.inf for pitch in self.pitch):
             raise InputError(
-                f"a scan of {dimensions} dimensions, points {self.pitch} mm apart: give "
-                "rows along x and columns along y, and a pitch above 0"
+                f"a scan of {dimensions} dimensions, with points {self.pitch} mm apart: give rows "
+                "along x and columns along y, and a pitch above 0"
             )
         heights = checks.array(
             "heights of a scan", self.heights, (None, None), masked=np.nan, finite=False, order="K"
         )
         checks.settle(self, heights=heights)
         if not self.measured.any():
-            raise InputError("a scan without a point: give one with heights")
+            raise InputError("a scan without a point: give one with measured heights")
 
     @property
     def measured(self) -> Mask:
-        """Points that were measured ``(nx, ny)``."""
+        """Measured points ``(nx, ny)``."""
         return np.isfinite(self.heights)
 
     @property
     def missing(self) -> float:
-        """Share of points that are missing."""
+        """Share of missing points."""
         return 1.0 - float(self.measured.mean())
 
     @property
@@ -101,12 +101,12 @@ class Scan:
 
     @property
     def turned_over(self) -> Scan:
-        """As the other body sees it: turned over about x, with its heights still out of its own."""
+        """Scan in the frame of the other body: mirrored along y, with unchanged heights."""
         return replace(self, heights=self.heights[:, ::-1])
 
 
 def rms(heights: Array) -> float:
-    """Root mean square about the mean [mm], over the points that were measured."""
+    """Return the root mean square of ``heights`` about their mean [mm], without missing points."""
     return float(np.nanstd(heights))
 
 
@@ -114,9 +114,10 @@ def rms(heights: Array) -> float:
 
 
 def fit(scan: Scan, level: Level, where: Mask | None = None) -> Array:
-    """What ``level`` names, at all points ``(nx, ny)`` [mm]: the least squares fit to those there.
+    """Return the surface of ``level``, fitted by least squares, at all points ``(nx, ny)`` [mm].
 
-    ``where`` narrows the points that count. Raises InputError for fewer than twice the terms.
+    Measured points are used; ``where`` restricts them further. Raises InputError for fewer points
+    than twice the number of terms.
     """
     (nx, ny), points = scan.heights.shape, scan.measured if where is None else where & scan.measured
     terms = [(i, j) for i, j in TERMS[level] if (nx > 1 or i == 0) and (ny > 1 or j == 0)]
@@ -124,10 +125,11 @@ def fit(scan: Scan, level: Level, where: Mask | None = None) -> Array:
         return np.zeros((nx, ny))
     if np.count_nonzero(points) < 2 * len(terms):
         raise InputError(
-            f"{np.count_nonzero(points)} points to fit a {level} to: give at least {2 * len(terms)}"
+            f"{np.count_nonzero(points)} points are too few to fit a {level}: give at least "
+            f"{2 * len(terms)}"
         )
-    # Coordinates reach from -1 to 1, so that the normal equations are well conditioned; powers up
-    # to those of two terms together.
+    # Coordinates from -1 to 1 make the normal equations well conditioned. The highest powers are
+    # those of a product of two terms.
     x, y = (np.vander(np.linspace(-1.0, 1.0, n), 5, increasing=True) for n in (nx, ny))
     moments = x.T @ points @ y
     products = np.array([[moments[i + k, j + m] for k, m in terms] for i, j in terms])
@@ -140,21 +142,22 @@ def fit(scan: Scan, level: Level, where: Mask | None = None) -> Array:
 
 
 def levelled(scan: Scan, level: Level) -> Scan:
-    """The scan without what ``level`` names."""
+    """Return the scan minus the fitted surface of ``level``."""
     return replace(scan, heights=scan.heights - fit(scan, level))
 
 
 def filled(scan: Scan, most: float = 1.0) -> Scan:
-    """The scan with every missing point at the mean of its neighbours, missing ones included.
+    """Return the scan with every missing point at the mean of its neighbours.
 
-    Such a membrane (Laplace's equation with what was measured at its border) is laid over the mean
-    surface of second order, so that tilt and curvature go on. Raises InputError where more than
-    the share ``most`` is missing.
+    The neighbours include missing points, so that the filled points form a membrane (Laplace's
+    equation with the measured points as boundary values). The membrane is added to the mean surface
+    of second order, so that tilt and curvature continue. Raises InputError where more than the
+    share ``most`` of the points is missing.
     """
     if scan.missing > most:
         raise InputError(
             f"{scan.missing:.1%} of the points are missing: allow more than {most:.1%}, or measure "
-            "again"
+            "the surface again"
         )
     measured = scan.measured
     if measured.all():
@@ -166,7 +169,7 @@ def filled(scan: Scan, most: float = 1.0) -> Scan:
 
 
 def _membrane(heights: Array, measured: Mask) -> Array:
-    """Heights ``(nx, ny)`` with the rest at the means of their neighbours."""
+    """Return ``heights`` ``(nx, ny)`` with unmeasured points at the means of their neighbours."""
     from scipy.sparse import coo_array
     from scipy.sparse.linalg import spsolve
 
@@ -176,12 +179,12 @@ def _membrane(heights: Array, measured: Mask) -> Array:
     diagonal, known = np.zeros(count), np.zeros(count)
     pairs = []
     for axis, step in ((0, 1), (0, -1), (1, 1), (1, -1)):
-        here, there = _beside(axis, step)
+        here, there = _neighbours(axis, step)
         own, other, value = numbers[here], numbers[there], heights[there]
-        at, beside = (own >= 0) & (other < 0), (own >= 0) & (other >= 0)
-        diagonal += np.bincount(own[at | beside], minlength=count)
-        known += np.bincount(own[at], value[at], minlength=count)
-        pairs.append((own[beside], other[beside]))
+        measured_next, missing_next = (own >= 0) & (other < 0), (own >= 0) & (other >= 0)
+        diagonal += np.bincount(own[measured_next | missing_next], minlength=count)
+        known += np.bincount(own[measured_next], value[measured_next], minlength=count)
+        pairs.append((own[missing_next], other[missing_next]))
     rows, columns = (np.concatenate(ends) for ends in zip(*pairs, strict=True))
     each = np.arange(count)
     matrix = coo_array(
@@ -196,8 +199,8 @@ def _membrane(heights: Array, measured: Mask) -> Array:
     return whole
 
 
-def _beside(axis: int, step: int) -> tuple[tuple[slice, slice], tuple[slice, slice]]:
-    """Points that have a neighbour one ``step`` along ``axis``, and these neighbours."""
+def _neighbours(axis: int, step: int) -> tuple[tuple[slice, slice], tuple[slice, slice]]:
+    """Return the points that have a neighbour one ``step`` along ``axis``, and the neighbours."""
     first, last = slice(None, -1), slice(1, None)
     here, there = (first, last) if step > 0 else (last, first)
     whole = slice(None)
@@ -209,11 +212,18 @@ def _beside(axis: int, step: int) -> tuple[tuple[slice, slice], tuple[slice, sli
 
 @dataclass(frozen=True)
 class Resampled:
-    """A scan on a grid: mean ``heights`` ``(nx, ny)`` [mm] of its cells.
+    """Scan averaged onto a grid.
 
-    ``lost`` is the root mean square [mm] of what they do not carry: the scan less the surface with
-    these means, over the points within the grid. 0 where no point lies wholly within it.
-    ``beyond`` is the share of the cells whose middle lies beyond the border of the scan.
+    Attributes
+    ----------
+    heights
+        Mean heights of the cells ``(nx, ny)`` [mm].
+    lost
+        Root mean square [mm] of the roughness that the cells do not represent: of the scan minus
+        the surface with these means, at the points within the grid. It is 0 where no point lies
+        completely within the grid.
+    beyond
+        Share of the cells whose middle lies beyond the border of the scan.
     """
 
     heights: Array
@@ -228,18 +238,32 @@ def resampled(
     angle: float = 0.0,
     beyond: Beyond = "refused",
 ) -> Resampled:
-    """The scan, none of whose points are missing, as means over the cells of ``grid``.
+    """Return the means of a scan over the cells of ``grid``.
 
-    ``shift`` [mm] is where its middle lies on the grid, ``angle`` [rad] how far it is turned there,
-    from x to y. Turned by anything but quarters it is first interpolated at its own pitch, by
-    bicubic splines, which takes some of the waves that are only a few points long.
+    Parameters
+    ----------
+    scan
+        Scan without missing points.
+    grid
+        Grid of the contact.
+    shift
+        Position of the middle of the scan on the grid [mm].
+    angle
+        Rotation of the scan from x to y [rad]. For angles other than multiples of 90° the scan is
+        first interpolated at its own pitch by bicubic splines, which dampens waves of only a few
+        points.
+    beyond
+        Treatment of cells beyond the border of the scan.
 
-    Raises InputError for missing points, for a scan of many columns on a line grid or of one on
-    another, and for a grid that reaches beyond the scan, unless that is ``mirrored``.
+    Raises
+    ------
+    InputError
+        For missing points, for a scan of several columns on a line grid or of one column on another
+        grid, and for a grid that extends beyond the scan, unless it is ``mirrored``.
 
     Examples
     --------
-    Waves of 16 points on a grid of cells as large as 4, and as large as 16:
+    Waves with a length of 16 points, on a grid with cells of 4 points and of 16 points:
 
     >>> import numpy as np
     >>> from sa_solver import Grid
@@ -253,33 +277,42 @@ def resampled(
     0.00 of 1.96, lost 0.71
     """
     if not scan.measured.all():
-        raise InputError("a scan with missing points: fill them first")
+        raise InputError("a scan has missing points: fill them first")
     if (scan.heights.shape[1] == 1) != grid.line:
         raise InputError(
-            f"a scan of {scan.heights.shape[1]} columns: give a profile, of one column, in a line "
-            "contact, and more of them elsewhere"
+            f"a scan of {scan.heights.shape[1]} columns: give a profile, of one column, for a line "
+            "contact, and more columns for other contacts"
         )
     off = _share_beyond(scan, grid, shift, angle)
     if not grid.line:
         scan = _turned(scan, grid, shift, angle, beyond)
     elif angle:
-        raise InputError(f"a profile turned by {angle:g} rad: give 0 in a line contact")
+        raise InputError(f"a profile is turned by {angle:g} rad: give 0 for a line contact")
     heights, points = _on_grid(scan, grid, shift, beyond)
     return Resampled(heights, _lost(points, scan.pitch, heights, grid, shift), off)
 
 
 def cell_means(values: Array, known: Array, wanted: Array) -> Array:
-    """Means ``(m, ...)`` between edges ``wanted`` ``(m + 1,)``, of means between edges ``known``.
+    """Return means between the edges ``wanted`` from means between the edges ``known``.
 
-    ``values`` ``(n, ...)`` are means between ``known`` ``(n + 1,)``; all edges ascend. The integral
-    is interpolated by a spline of third order, of lower where there are fewer than 3 values.
+    All edges are in ascending order. The integral is interpolated by a spline of third order, or of
+    lower order for fewer than 3 values.
+
+    Parameters
+    ----------
+    values
+        Means ``(n, ...)`` between known edges.
+    known
+        Known edges ``(n + 1,)``.
+    wanted
+        Edges ``(m + 1,)`` of the means ``(m, ...)`` to return.
     """
     from scipy.interpolate import make_interp_spline
 
     if np.array_equal(known, wanted):
         return values
     widths = np.diff(known).reshape(-1, *[1] * (values.ndim - 1))
-    # About their mean, so that rounding is that of the roughness and not of the form.
+    # The mean is subtracted, so that rounding is relative to the roughness and not to the form.
     mean: Array = values.mean(axis=0)
     integral = np.concatenate([np.zeros((1, *values.shape[1:])), (values - mean) * widths])
     spline = make_interp_spline(known, np.cumsum(integral, axis=0), k=min(3, len(values)))
@@ -290,7 +323,7 @@ def cell_means(values: Array, known: Array, wanted: Array) -> Array:
 
 
 def _share_beyond(scan: Scan, grid: Grid, shift: tuple[float, float], angle: float) -> float:
-    """Share of the cells whose middle is not on the scan."""
+    """Return the share of the cells whose middle is not on the scan."""
     cos, sin = np.cos(angle), np.sin(angle)
     x, y = grid.x - shift[0], grid.y - (0.0 if grid.line else shift[1])
     room = [
@@ -303,14 +336,14 @@ def _share_beyond(scan: Scan, grid: Grid, shift: tuple[float, float], angle: flo
 
 
 def _edges(count: int, pitch: float, middle: float = 0.0) -> Array:
-    """Edges ``(count + 1,)`` of cells about their ``middle``."""
+    """Return the edges ``(count + 1,)`` of cells that are centred on ``middle`` [mm]."""
     return middle + (np.arange(count + 1.0) - 0.5 * count) * pitch
 
 
 def _on_grid(
     scan: Scan, grid: Grid, shift: tuple[float, float], beyond: Beyond
 ) -> tuple[Array, Array]:
-    """Means over the cells, and the points of the scan, mirrored as far as the grid reaches."""
+    """Return the means over the cells, and the points of the scan, mirrored to cover the grid."""
     points, axes = scan.heights, (0,) if grid.line else (0, 1)
     _check_points(scan, grid, axes)
     for axis in axes:
@@ -324,18 +357,19 @@ def _on_grid(
     for axis in axes:
         known = _edges(points.shape[axis], scan.pitch[axis], shift[axis])
         wanted = _edges(grid.shape[axis], grid.pitch[axis])
-        wanted = np.clip(wanted, known[0], known[-1])  # rounding of a grid as large as the scan
+        # A grid as large as the scan may extend beyond it by rounding.
+        wanted = np.clip(wanted, known[0], known[-1])
         heights = np.moveaxis(cell_means(np.moveaxis(heights, axis, 0), known, wanted), 0, axis)
     return np.ascontiguousarray(heights), points
 
 
 def _check_points(scan: Scan, grid: Grid, axes: tuple[int, ...]) -> None:
-    """Refuse a scan that would have too many points over the grid."""
+    """Raise an error for a scan that would have too many points over the grid."""
     points = float(np.prod([grid.size[axis] / scan.pitch[axis] for axis in axes]))
     if points > MOST_POINTS:
         raise InputError(
-            f"{points:.2g} points of the scan's pitch over the grid: take the means of several "
-            "points, or a smaller grid"
+            f"the grid would hold {points:.2g} points of the scan: give means of several points, "
+            "or a smaller grid"
         )
 
 
@@ -355,11 +389,14 @@ def _check_reach(beyond: Beyond, grid: Grid, scan: Scan, shift: tuple[float, flo
 def _turned(
     scan: Scan, grid: Grid, shift: tuple[float, float], angle: float, beyond: Beyond
 ) -> Scan:
-    """The scan turned from x to y, over as much of it as the grid reaches where it is not exact."""
+    """Return the scan, rotated by ``angle`` from x to y.
+
+    Where it must be interpolated, only the part under the grid is returned.
+    """
     quarters = round(angle / (0.5 * np.pi))
     if abs(angle - quarters * 0.5 * np.pi) <= QUARTER:
         dx, dy = scan.pitch
-        # numpy turns from rows to columns, which is from x to y.
+        # numpy rotates from the first to the second axis, which is from x to y.
         return Scan(np.rot90(scan.heights, quarters), (dx, dy) if quarters % 2 == 0 else (dy, dx))
     from scipy.ndimage import map_coordinates
 
@@ -388,7 +425,10 @@ def _lost(
     grid: Grid,
     shift: tuple[float, float],
 ) -> float:
-    """Root mean square of points less the means over them of the surface with cells' means."""
+    """Return the root mean square of the points minus the surface with the means of the cells.
+
+    The surface is averaged over the points.
+    """
     back = heights
     for axis in (0,) if grid.line else (0, 1):
         edges = _edges(points.shape[axis], pitch[axis], shift[axis])

@@ -7,14 +7,25 @@ import numpy as np
 from sa_solver.types import Array
 
 PARTING_SLOPE = 1.0
-"""Slope at which faces part beyond their rounded edges, where fillets and corners begin."""
+"""Slope of the gap beyond rounded edges, where fillets and corners begin."""
 
 
 def rounded_edge(distance: Array, half: float, width: float, radius: float) -> Array:
-    """Gap [mm] at a ``distance`` [mm] from the middle of a face with rounded edges.
+    """Return the gap [mm] of a face with rounded edges.
 
-    Zero on the flat, a circular arc of ``radius`` that begins ``width`` before ``half`` the size of
-    the face, and a slope beyond it.
+    The gap is zero on the flat, a circular arc at the edge, and has a constant slope in addition
+    beyond the face.
+
+    Parameters
+    ----------
+    distance
+        Distance from the middle of the face [mm].
+    half
+        Half the size of the face [mm].
+    width
+        Width of the rounded edge, which ends at ``half`` [mm].
+    radius
+        Radius of the arc [mm].
     """
     into = np.clip(distance - (half - width), 0.0, width)
     beyond = np.maximum(distance - half, 0.0)

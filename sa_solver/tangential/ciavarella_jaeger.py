@@ -1,12 +1,12 @@
 """First loading of a line contact by a shear force: the difference of two normal problems.
 
-Between alike half-planes shear moves the surfaces along as pressure moves them apart. If p(P) is
-the pressure under P, then
+Between similar half-planes, shear displaces the surfaces tangentially by as much as pressure of the
+same distribution displaces them normally. If p(P) is the pressure under P, then
 
     q = µ [p(P) - p(P*)],   P* = P - |Q|/µ, at the tilt of p(P)
 
-sticks where p(P*) presses and slips elsewhere, with the rigid shift µ (δz - δz*): on a grid as in
-the continuum, so it is the solution of the discrete problem as well.
+sticks where p(P*) > 0 and slips elsewhere, with the rigid shift µ (δz - δz*). This holds on a grid
+as in the continuum, so that q also solves the discrete problem.
 
 Sources: Ciavarella 1998, Int. J. Solids Struct. 35, 2349; Jäger 1997, J. Tribol. 119, 401.
 """
@@ -28,9 +28,22 @@ def first_loading(
     Qx: float,
     tolerance: float,
 ) -> TangentialState:
-    """Shear and slip under ``Qx`` [N/mm], below µP in size, of a contact never sheared before.
+    """Return shear and slip of a line contact that is sheared for the first time.
 
-    ``normal`` is the state under P on surfaces of gap ``height`` ``(nx, 1)`` [mm].
+    Parameters
+    ----------
+    contact
+        Solver of the normal problem.
+    height
+        Gap before loading ``(nx, 1)`` [mm].
+    normal
+        State under the normal load P.
+    friction
+        Coefficient of friction µ.
+    Qx
+        Shear force [N/mm], smaller than µP.
+    tolerance
+        Bound on the residuals of the second normal problem.
     """
     stuck = contact.solve(
         height,
@@ -45,7 +58,7 @@ def first_loading(
         [factor * (normal.displacement - stuck.displacement), np.zeros(height.shape)]
     )
     shift = factor * (normal.approach - stuck.approach)
-    # Where p(P) presses its gap is 0: the slip is that of the stuck problem's gap.
+    # In contact under P the gap is 0, so that the slip is µ times the gap under P*.
     slip = np.where(
         normal.pressure > 0.0, displacement - np.array([shift, 0.0])[:, None, None], 0.0
     )

@@ -1,14 +1,17 @@
 """Tangential contact of two elastic half-spaces with friction, for a given pressure.
 
+The problem of one increment is
+
     Δs = K q + offset - Δδ - Δφz (-y, x)
     stick: Δs = 0;  slip: |q| = µp, q opposite to Δs
-    Σ q S = (Qx, Qy), Σ (qy x - qx y) S = Mz, or the motions Δδx, Δδy, Δφz imposed instead
+    Σ q S = (Qx, Qy), Σ (qy x - qx y) S = Mz, or imposed motions Δδx, Δδy, Δφz instead
 
-K couples both shear directions (Cerruti). The ``offset`` carries history: less the displacement of
-the previous state, plus whatever else displaces the surfaces (bulk stress, pressure on dissimilar
-bodies). Source: Gallego, Nélias & Jacq 2006, J. Tribol. 128, 476, doi:10.1115/1.2194914 (the
-problem); the method is that of :mod:`sa_solver.tangential.disk_newton`, with
-:mod:`sa_solver.tangential.disk_gradient` to fall back on.
+K couples both directions of shear (Cerruti). The ``offset`` carries the history: it is minus the
+displacement of the previous state, plus any other displacement of the surfaces (bulk stress,
+pressure on dissimilar bodies). The problem is solved by :mod:`sa_solver.tangential.disk_newton`,
+with :mod:`sa_solver.tangential.disk_gradient` as fallback.
+
+Source: Gallego, Nélias & Jacq 2006, J. Tribol. 128, 476, doi:10.1115/1.2194914 (the problem).
 """
 
 from __future__ import annotations
@@ -36,52 +39,63 @@ TOLERANCE = 1e-8
 """Default bound on every residual of :class:`TangentialResiduals`."""
 
 ITERATIONS = 300
-"""Conjugate directions; 10 to 60 are usual, 100 for rough surfaces close to sliding."""
+"""Most conjugate directions; 10 to 60 are usual, 100 for rough surfaces close to sliding."""
 
 FALLBACK_ITERATIONS = 3000
-"""Projected gradients where Newton's method stalls; 100 to 1000 are usual."""
+"""Most projected gradients where Newton's method stalls; 100 to 1000 are usual."""
 
 BOX_STEP = 16
-"""Boxes around the pressed cells grow in these steps, so that few transforms need be planned."""
+"""Sides of boxes around the pressed cells are multiples of this many cells, so that few transforms
+are planned."""
 
 SLIDES = 100.0
-"""Rigid motion under given forces, over the elastic displacement, from which the contact slides.
-Where ν > 0 turns slip sideways the motion grows with 1/√(1 - Q/µP): 11 times Mindlin's at 1e-6 from
-the limit, and to what rounding makes of it, millimetres, at the limit itself."""
+"""Ratio of the rigid motion under given forces to the elastic displacement above which the contact
+slides. Where ν > 0 turns slip sideways the motion grows with 1/√(1 - Q/µP): it is 11 times
+Mindlin's at 1e-6 from the limit, and millimetres due to rounding at the limit itself."""
 
 UNCARRIED = (
     "nothing carries the shear load: no cell is in contact, or the friction coefficient is 0; give "
     "a normal load first, or impose motions instead of forces"
 )
-"""Said of a shear force or a moment Mz without pressure, or without friction."""
+"""Message for a shear force or a moment Mz without pressure or without friction."""
 
 NAMES = ("Qx", "Qy", "Mz")
 UNITS = ("N", "N", "N mm")
 
 
 class TangentialContactError(ContactProblemError):
-    """The data of a tangential contact problem admit no solution."""
+    """Data of a tangential contact problem that admit no solution."""
 
 
 class FrictionLimitError(TangentialContactError):
-    """Friction cannot carry the shear force; ``share`` of it is the largest it can."""
+    """Shear force that friction cannot carry; ``share`` is the largest share that it can."""
 
     def __init__(self, share: float, message: str) -> None:
         super().__init__(message)
         self.share = share
 
     def __reduce__(self) -> tuple[type[FrictionLimitError], tuple[float, str]]:
-        """To travel between processes: an exception would be made again from its message alone."""
+        """Return how to rebuild the exception after pickling.
+
+        By default it would be rebuilt from its message alone.
+        """
         return type(self), (self.share, str(self))
 
 
 @dataclass(frozen=True)
 class TangentialResiduals:
-    """How far a state is from solving the problem, dimensionless, independent of the method.
+    """Dimensionless residuals of a state, which do not depend on the method of solution.
 
-    ``force``: the largest error of an imposed Qx or Qy over Σ µp S; ``moment``: that of Mz over Σ
-    µp S times half the larger side of the grid; ``coulomb``: see
-    :meth:`~sa_solver.tangential.problem.TangentialProblem.residual`. Shear never exceeds µp.
+    The shear itself never exceeds µp.
+
+    Attributes
+    ----------
+    force
+        Largest error of an imposed Qx or Qy over Σ µp S.
+    moment
+        Error of an imposed Mz over Σ µp S times half the larger side of the grid.
+    coulomb
+        See :meth:`~sa_solver.tangential.problem.TangentialProblem.residual`.
     """
 
     force: float
@@ -90,7 +104,7 @@ class TangentialResiduals:
 
     @property
     def largest(self) -> float:
-        """The largest of the three."""
+        """Largest of the three residuals."""
         return max(self.force, self.moment, self.coulomb)
 
 
@@ -98,12 +112,30 @@ class TangentialResiduals:
 class TangentialState(StickingState):
     """Solution of a tangential contact problem.
 
-    ``shear`` [MPa], ``slip`` Δs (0 off the contact) and ``displacement`` K q [mm] are
-    ``(2, nx, ny)``, ``sticking`` ``(nx, ny)``. ``shift_x``, ``shift_y`` Δδ [mm] and ``twist`` Δφz
-    [rad] are the rigid motions of the increment, ``Qx``, ``Qy`` [N], ``Mz`` [N mm] the resultants.
-    ``message`` is empty when ``converged``, else says what is wrong and what to try.
-    ``convolutions`` have two components, on a box around the pressed cells. ``cell_area`` [mm²] is
-    that of the grid.
+    Attributes
+    ----------
+    shear
+        Shear ``(2, nx, ny)`` [MPa].
+    slip
+        Slip Δs of the increment ``(2, nx, ny)`` [mm], 0 outside the contact.
+    displacement
+        Elastic displacement K q ``(2, nx, ny)`` [mm].
+    sticking
+        Cells in contact that stick ``(nx, ny)``.
+    shift_x, shift_y, twist
+        Rigid motions Δδx, Δδy [mm] and Δφz [rad] of the increment.
+    Qx, Qy, Mz
+        Resultants of the shear [N, N mm; per mm on a line grid].
+    residuals
+        Residuals of the state, which do not depend on the method.
+    converged
+        Whether all residuals are within the tolerance.
+    cell_area
+        Area of a cell of the grid [mm²].
+    message
+        What is wrong and what to try, if the state has not ``converged``; empty otherwise.
+    convolutions
+        Number of convolutions of two components, on a box around the pressed cells.
     """
 
     shear: Array
@@ -123,17 +155,22 @@ class TangentialState(StickingState):
     convolutions: int = 0
 
     @property
+    def motion(self) -> Array:
+        """Rigid motion (Δδx, Δδy, Δφz) of the increment [mm, rad]."""
+        return np.array([self.shift_x, self.shift_y, self.twist])
+
+    @property
     def elastic_energy(self) -> float:
-        """Energy ½ Σ q·u S that shear stores in both bodies [N mm], with u = K q."""
+        """Elastic energy ½ Σ q·u S of the shear in both bodies [N mm], with u = K q."""
         return 0.5 * float(np.vdot(self.shear, self.displacement)) * self.cell_area
 
 
 class TangentialContact:
-    """Tangential contact solver on one grid; owns the planned transforms.
+    """Solver of tangential contact problems on one grid.
 
     Examples
     --------
-    A pressed sphere under half of the force that slides it: the stick zone of Cattaneo.
+    A pressed sphere under half of the sliding force, compared with Cattaneo and Mindlin:
 
     >>> import numpy as np
     >>> from sa_solver import ElasticPair, Grid, HalfSpace, Material, TangentialContact
@@ -152,7 +189,7 @@ class TangentialContact:
     """
 
     def __init__(self, half_space: HalfSpace) -> None:
-        """Plan for ``half_space``."""
+        """Prepare the solver for ``half_space``."""
         self.half_space = half_space
         self.grid = half_space.grid
         self._modes = PlanarModes.on(half_space.grid)
@@ -173,17 +210,35 @@ class TangentialContact:
         start: Array | None = None,
         slipping: Mask | None = None,
     ) -> TangentialState:
-        """Shear and slip of one increment.
+        """Solve for the shear and slip of one increment.
 
-        ``limit`` is µp ``(nx, ny)`` [MPa], ``offset`` ``(2, nx, ny)`` [mm] (0 if None), ``start`` a
-        shear field to begin from, taken to its limit where cells are known to be ``slipping``
-        ``(nx, ny)``. Of ``Qx`` [N] and ``shift_x`` [mm], ``Qy`` and ``shift_y``,
-        ``Mz`` [N mm] and ``twist`` [rad], the motion counts where it is given. A line grid knows
-        no twist.
+        Parameters
+        ----------
+        limit
+            Friction limit µp ``(nx, ny)`` [MPa].
+        offset
+            Tangential displacement ``(2, nx, ny)`` [mm] without the new tractions and motions; 0 by
+            default.
+        Qx, Qy, Mz
+            Imposed forces [N] and moment [N mm].
+        shift_x, shift_y, twist
+            Motions [mm, rad] that are imposed instead of Qx, Qy and Mz, where given. A line grid
+            has no twist.
+        tolerance
+            Bound on every residual.
+        start
+            Shear field to begin from ``(2, nx, ny)`` [MPa].
+        slipping
+            Cells ``(nx, ny)`` that are known to slip; their shear in ``start`` is scaled to its
+            limit.
 
-        Raises TangentialContactError for fields that are not finite, have another shape or a
-        negative limit, and FrictionLimitError for a force beyond the largest that friction can
-        carry, or so close to it that the contact slides.
+        Raises
+        ------
+        TangentialContactError
+            For fields that are not finite or of another shape, or a negative limit.
+        FrictionLimitError
+            For a force beyond the largest that friction can carry, or so close to it that the
+            contact slides.
         """
         limit, offset = self._checked(limit, offset)
         tolerance = checks.number("tolerance", tolerance, above=0.0, error=TangentialContactError)
@@ -197,7 +252,7 @@ class TangentialContact:
             return self._without_contact(forces, free, imposed)
         if not (offset.any() or imposed.any() or forces[list(free)].any()):
             return self._at_rest(limit > 0.0, imposed)
-        # With them comes the compiler, a fifth of a second to import: where something shears.
+        # Imported here because they load the compiler, which takes a fifth of a second.
         from sa_solver.tangential.disk_gradient import gradients_on_disks
         from sa_solver.tangential.disk_newton import newton_on_disks
 
@@ -208,7 +263,7 @@ class TangentialContact:
             start = checks.array(
                 "shears to start from", start, offset.shape, error=TangentialContactError
             )
-        begin, on_circle = _begun(problem, window, start, slipping)
+        begin, on_circle = _initial_shear(problem, window, start, slipping)
         shear = problem.balanced(begin, on_circle) if on_circle.any() else None
         if shear is None:
             shear = problem.balanced(begin) if begin.any() else level.begin(problem, begin)
@@ -226,7 +281,7 @@ class TangentialContact:
 
     # -- steps of solve -----------------------------------------------------------------------
     def _box(self, limit: Array) -> tuple[Window, ShearLevel]:
-        """A box of cells around the pressed ones, and its operators."""
+        """Return a box of cells around the pressed ones, and its operators."""
         from sa_solver.tangential.levels import ShearLevel
 
         window = []
@@ -310,7 +365,7 @@ class TangentialContact:
         )
 
     def _field(self, part: Array, window: Window) -> Array:
-        """A field ``(2, nx, ny)``, 0 off the ``window``."""
+        """Return ``part`` on the whole grid ``(2, nx, ny)``, with 0 outside the ``window``."""
         field = np.zeros((2, *self.grid.shape))
         field[:, *window] = part
         return field
@@ -318,13 +373,13 @@ class TangentialContact:
     def _without_contact(
         self, forces: Array, free: tuple[int, ...], imposed: Array
     ) -> TangentialState:
-        """Bodies apart: no shear, and no slip either."""
+        """Return the state of bodies that are apart, without shear and slip."""
         if forces[list(free)].any():
             raise FrictionLimitError(0.0, UNCARRIED)
         return self._at_rest(np.zeros(self.grid.shape, dtype=bool), imposed)
 
     def _at_rest(self, sticking: Mask, imposed: Array) -> TangentialState:
-        """Neither shear nor slip: the solution where nothing shears the bodies."""
+        """Return the state without shear and slip, where no load or motion shears the bodies."""
         zero = np.zeros((2, *self.grid.shape))
         motions = np.append(imposed, 0.0)
         return TangentialState(
@@ -356,7 +411,7 @@ class TangentialContact:
         )
 
     def _checked(self, limit: Array, offset: Array | None) -> tuple[Array, Array]:
-        """Limits and offsets as the solver takes them."""
+        """Return limits and offsets, checked."""
         shape, error = self.grid.shape, TangentialContactError
         limit = checks.array("limits", limit, shape, error=error)
         if limit.min() < 0.0:
@@ -378,19 +433,21 @@ class TangentialContact:
         for name, value in given.items():
             checks.number(name, value, error=TangentialContactError)
         if self.grid.line and (forces[2] != 0.0 or motions[2]):
-            raise TangentialContactError("a line contact carries no Mz: give Qx and Qy only")
+            raise TangentialContactError(
+                "a line contact carries no Mz and has no twist: give Qx and Qy only, or shifts"
+            )
 
 
 def listed(places: Sequence[int], forces: Array) -> str:
-    """Shear forces and moment by their places, 0 to 2, for a message."""
+    """Return shear forces and moment with their indices ``places``, 0 to 2, as text."""
     pairs = zip(places, forces, strict=True)
     return ", ".join(f"{NAMES[k]} = {force:.6g} {UNITS[k]}" for k, force in pairs)
 
 
-def _begun(
+def _initial_shear(
     problem: TangentialProblem, window: Window, start: Array | None, slipping: Mask | None
 ) -> tuple[Array, Mask]:
-    """Shear to begin from, on the ``window``, and the cells that are on their circle."""
+    """Return the shear to begin from on the ``window``, and the cells on their circle."""
     shear = np.zeros_like(problem.offset)
     if start is None:
         return shear, np.zeros_like(problem.pressed)
@@ -404,7 +461,7 @@ def _begun(
 
 
 def _slides(problem: TangentialProblem, solution: DiskSolution) -> bool:
-    """Whether friction holds the contact nowhere, and the forces say nothing of its motion."""
+    """Return whether all cells slip and the forces do not determine the motion."""
     if not solution.slipping[problem.pressed].all():
         return False
     rigid = np.zeros_like(problem.offset)

@@ -1,10 +1,10 @@
 """Accelerated projected gradients for shear within Coulomb's disks: slow, but sure to converge.
 
-The problem is the minimum of a strongly convex quadratic on a convex set, so steps against the
-gradient no longer than the inverse of the largest eigenvalue of K, each projected on the set,
-converge whatever the limits are; momentum makes the count grow only with the root of the ratio of
-eigenvalues, about that of the cells across. Newton's method takes ten times fewer, but may stall
-where limits differ by orders of magnitude from cell to cell.
+The problem is the minimum of a strongly convex quadratic function on a convex set. Steps against
+the gradient, no longer than the inverse of the largest eigenvalue of K and each projected on the
+set, therefore converge for any limits. With momentum the number of steps grows only with the square
+root of the ratio of eigenvalues, roughly that of the number of cells across. Newton's method takes
+ten times fewer steps, but may stall where limits differ by orders of magnitude between cells.
 
 Sources: Nesterov 1983, Sov. Math. Dokl. 27, 372 (momentum); O'Donoghue & Candès 2015, Found.
 Comput. Math. 15, 715, doi:10.1007/s10208-013-9150-3 (restarts).
@@ -22,9 +22,10 @@ from sa_solver.types import Array
 def gradients_on_disks(
     problem: TangentialProblem, shear: Array, tolerance: float, max_iterations: int
 ) -> DiskSolution:
-    """Solve ``problem`` from an admissible ``shear`` ``(2, nx, ny)`` with the right resultants.
+    """Solve ``problem`` from an admissible ``shear`` ``(2, nx, ny)`` with the imposed resultants.
 
-    Stops when :meth:`TangentialProblem.residual` is within ``tolerance``, or says that it did not.
+    The iteration stops when :meth:`TangentialProblem.residual` is within ``tolerance``, or after
+    ``max_iterations``. The best solution found is returned; it says whether it has converged.
     """
     operator = problem.operator
     stiffness = 1.0 / operator.largest_eigenvalue
@@ -39,7 +40,7 @@ def gradients_on_disks(
         if balance is None:
             break
         new, coefficients = balance
-        # Momentum that would carry the shear back where it came from is dropped.
+        # Momentum that would carry the shear back to where it came from is dropped.
         restart = float(np.vdot(ahead - new, new - shear)) > 0.0
         following = 1.0 if restart else 0.5 * (1.0 + np.sqrt(1.0 + 4.0 * momentum**2))
         share = 0.0 if restart else (momentum - 1.0) / following

@@ -1,12 +1,12 @@
 """Newton's method with truncated conjugate gradients for shear within Coulomb's disks.
 
 Cells either stick, with both components of shear free, or slip on the circle |q| = µp, where only
-the direction is free. A phase of the search takes the directions to be straight tangents: the
-problem is then linear, K plus the curvature λ = |Δs|/µp along the tangents, and preconditioned
-conjugate gradients lower its residual by a fixed factor. Then the shear is projected back: cells
-beyond their disk begin to slip, cells whose slip would run along with the shear begin to stick, the
-resultants are restored, and the search goes on, without losing its direction where no cell has
-changed. A projection that raises the energy is taken back in part, so that no cycle is possible.
+the direction is free. A phase of the search replaces the circles by their tangents. The problem is
+then linear, K plus the curvature λ = |Δs|/µp along the tangents, and preconditioned conjugate
+gradients lower its residual by a fixed factor. Then the shear is projected back: cells outside
+their disk begin to slip, cells whose slip has the direction of the shear begin to stick, and the
+resultants are restored. The search continues with the same direction if no cell has changed. A
+projection that raises the energy is partly undone, so that no cycle is possible.
 
 Sources: Zhao, Vollebregt & Oosterlee 2016, J. Comput. Phys. (conjugate gradients with slip
 directions as unknowns); Vollebregt 2014, doi:10.1016/j.jcp.2013.10.005 (truncated directions,
@@ -26,41 +26,55 @@ from sa_solver.types import Array, Mask
 
 SETTLED = 0.3
 STEADY = 0.01
-"""A phase ends once its preconditioned residual has fallen by this factor, by the second where the
-sets are nearly those of the last. From 0.2 to 0.5 and 0.01 to 0.2 the counts differ by 10 %:
-shorter phases project more often, longer ones solve for wrong sets."""
+"""Factors by which the preconditioned residual must fall in a phase: the first in general, the
+second where the sets of cells have nearly settled. For 0.2 to 0.5 and 0.01 to 0.2 the numbers of
+iterations differ by 10 %: shorter phases project more often, longer ones solve wrong sets too
+accurately."""
 
 NEARLY = 3e-4
-"""Share of the pressed cells that may change between nearly the same sets. Up to 1e-4 or 1e-3 take
-as many convolutions within 3 %; where no cell may change, spheres of 512² take a sixth more."""
+"""Share of the pressed cells that may change between sets that have nearly settled. With 1e-4 or
+1e-3 the number of convolutions is the same within 3 %; with 0 spheres of 512² cells take a sixth
+more."""
 
 ENOUGH = 0.5
-"""Or once it is this far within the tolerance, as far as the phase can know."""
+"""Share of the tolerance at which a phase ends in any case, as far as the phase can estimate it."""
 
 STALE = 0.01
-"""Punches are computed again once this share of the cells has begun to slip or stick; until then
-those at hand, cut to the free components, do as well. Computed only once, they are so far from
+"""Share of the cells that may change before the punches are recomputed. Until then the old ones,
+restricted to the free components, are used. Without recomputation they would differ so much from
 rigid punches close to sliding in torsion that hundreds of iterations follow."""
 
 SLOW = 8
-"""Steps of a phase after which punches are computed again too: 2 to 4 are usual."""
+"""Number of steps of a phase after which the punches are recomputed as well: 2 to 4 are usual."""
 
 PHASE_STEPS = 40
-"""Most steps of a phase; 15 have been seen."""
+"""Most steps of a phase; the largest number seen is 15."""
 
 BACKTRACK = 0.3
 BACKTRACKS = 12
-"""Share of a step kept when a projection has raised the energy, and how often."""
+"""Factor by which a step is shortened when its projection raises the energy, and the most such
+reductions."""
 
 ROUNDING = 1e-12
-"""Rise of the energy that rounding explains, relative to the work of shear on displacement."""
+"""Increase of the energy that is due to rounding, relative to the work of shear on displacement."""
 
 
 @dataclass(frozen=True)
 class DiskSolution:
-    """Shear [MPa], its displacement K q [mm], both ``(2, nx, ny)``, and the free rigid motions.
+    """Solution for the shear on a box of cells.
 
-    ``slipping`` marks cells on their circle.
+    Attributes
+    ----------
+    shear
+        Shear ``(2, nx, ny)`` [MPa].
+    displacement
+        Elastic displacement K q ``(2, nx, ny)`` [mm].
+    rigid
+        Free rigid motions ``(k,)`` [mm].
+    slipping
+        Cells ``(nx, ny)`` on their circle.
+    residual, converged
+        Residual of the solution, and whether it is within the tolerance.
     """
 
     shear: Array
@@ -74,10 +88,11 @@ class DiskSolution:
 def newton_on_disks(
     problem: TangentialProblem, shear: Array, tolerance: float, max_iterations: int
 ) -> DiskSolution:
-    """Solve ``problem`` from an admissible ``shear`` ``(2, nx, ny)`` with the right resultants.
+    """Solve ``problem`` from an admissible ``shear`` ``(2, nx, ny)`` with the imposed resultants.
 
-    Stops when :meth:`TangentialProblem.residual` is within ``tolerance``. A search that stalls or
-    runs into ``max_iterations`` says so; its shear is admissible and balanced all the same.
+    The search stops when :meth:`TangentialProblem.residual` is within ``tolerance``, when it
+    stalls, or after ``max_iterations``. The solution says whether it has converged; its shear is
+    admissible and balanced in any case.
     """
     search = _Search(problem, shear)
     while True:
@@ -92,13 +107,13 @@ def newton_on_disks(
 
 
 class _Tensor:
-    """A symmetric 2 x 2 matrix in every cell, ``(nx, ny)`` each component."""
+    """Field of symmetric 2 x 2 tensors, with components ``(nx, ny)``."""
 
     def __init__(self, xx: Array, xy: Array, yy: Array) -> None:
         self._xx, self._xy, self._yy = xx, xy, yy
 
     def times(self, field: Array) -> Array:
-        """Product ``(2, nx, ny)`` with a field of that shape."""
+        """Return the product ``(2, nx, ny)`` with a field of that shape."""
         product = np.empty_like(field)
         tensor_product(self._xx, self._xy, self._yy, field, product)
         return product
@@ -108,7 +123,7 @@ class _Tensor:
 
 
 class _Search:
-    """State of the search. Between projections the shear may leave its disks."""
+    """State of the search; between projections the shear may leave its disks."""
 
     def __init__(self, problem: TangentialProblem, shear: Array) -> None:
         self._problem = problem
@@ -122,14 +137,14 @@ class _Search:
         self._punches = np.zeros((len(problem.target), *shear.shape))
         self._punch_set: Mask | None = None
         self._slow = False
-        self._turned = int(np.count_nonzero(problem.pressed))
+        self._changed = int(np.count_nonzero(problem.pressed))
         self._rigid = np.zeros(len(problem.target))
         self.iterations = 0
         self._linearise(curved=False)
         self._linearise(curved=True)
 
     def residual(self) -> float:
-        """Of the shear last projected."""
+        """Return the residual of the shear after the last projection."""
         return self._problem.residual(self._shear, self._displacement, self._rigid)
 
     def solution(self, residual: float, converged: bool) -> DiskSolution:
@@ -138,13 +153,13 @@ class _Search:
         )
 
     def phase(self, goal: float) -> bool:
-        """Conjugate gradients on the present sets, then a projection; False where none is left.
+        """Take conjugate gradient steps on the present sets, then project the shear.
 
-        ``goal`` is the tolerance over the residual.
+        ``goal`` is the tolerance over the residual. False is returned if the search has stalled.
         """
         step = np.zeros_like(self._shear)
         gradient, search, decrement = self._descent()
-        steady = self._turned <= NEARLY * np.count_nonzero(self._problem.pressed)
+        steady = self._changed <= NEARLY * np.count_nonzero(self._problem.pressed)
         share = max(STEADY if steady else SETTLED, ENOUGH * goal)
         settled = share * share * decrement
         for count in range(PHASE_STEPS):
@@ -159,9 +174,10 @@ class _Search:
 
     # -- the linear problem of a phase ----------------------------------------------------------
     def _linearise(self, curved: bool) -> None:
-        """Free components, curvature, punches and rigid motion at the present shear.
+        """Set up the free components, curvature, punches and rigid motion at the present shear.
 
-        The curvature needs the slip, and so the rigid motion, last found.
+        The curvature is included only if ``curved``: it depends on the slip, and therefore on the
+        rigid motion found before.
         """
         problem = self._problem
         self._normal = self._shear * np.where(self._slipping, problem.per_limit, 0.0)
@@ -174,7 +190,7 @@ class _Search:
         if curved:
             curvature = np.maximum(-dot(slip, self._normal), 0.0) * problem.per_limit
         tangents = _Tensor(*across)
-        self._bend = tangents.weighted(curvature)
+        self._curvature = tangents.weighted(curvature)
         windows, rest = problem.operator.windows(curvature)
         self._windows = [(level, self._free.weighted(window)) for level, window in windows]
         self._rest = tangents.weighted(rest)
@@ -183,12 +199,12 @@ class _Search:
         self._find_rigid()
 
     def _set_punches(self) -> None:
-        """Shear fields that carry the resultants, close to those of rigid punches on free cells."""
+        """Set up shear fields that carry resultants, close to those of rigid punches."""
         before, changed = self._punch_set, True
         if before is not None:
-            turned = int(np.count_nonzero(self._slipping ^ before))
+            changed_cells = int(np.count_nonzero(self._slipping ^ before))
             stale = STALE * int(np.count_nonzero(self._problem.pressed))
-            changed = turned > stale or self._slow
+            changed = changed_cells > stale or self._slow
         sources = self._problem.modes.fields() if changed else self._punches
         apply = self._inverted if changed else self._free.times
         for k, source in enumerate(sources):
@@ -200,7 +216,7 @@ class _Search:
         self._inverse = np.linalg.pinv(square, rcond=RANK_CUTOFF)
 
     def _inverted(self, displacement: Array) -> Array:
-        """Shear on the free components that causes about this displacement on them."""
+        """Return free components of shear that cause approximately this ``displacement``."""
         shear = self._rest.times(displacement)
         for level, window in self._windows:
             inner = self._problem.operator.precondition(window.times(displacement), level)
@@ -208,19 +224,22 @@ class _Search:
         return shear
 
     def _find_rigid(self) -> None:
-        """Rigid motion that makes the gradient orthogonal to the punches."""
+        """Find the rigid motion that makes the gradient orthogonal to the punches."""
         flat = self._punches.reshape(len(self._punches), self._moved.size)
         self._rigid = self._inverse @ (flat @ self._moved.ravel())
 
     def _descent(self) -> tuple[Array, Array, float]:
-        """Gradient, the direction it asks for on the free components, and their product."""
+        """Return the gradient, the preconditioned gradient, and their product."""
         gradient = self._moved.copy()
         self._problem.modes.add_motion(gradient, -self._rigid)
         search = self._without_resultants(self._inverted(gradient))
         return gradient, search, float(np.vdot(gradient, search))
 
     def _step(self, step: Array, gradient: Array, search: Array, decrement: float) -> bool:
-        """Minimise along the conjugate direction (Polak-Ribière, never negative)."""
+        """Minimise along the conjugate direction (Polak-Ribière, never negative).
+
+        The change of shear is added to ``step``. False is returned if there is no direction.
+        """
         direction = -search
         if self._direction is not None:
             change = decrement - float(np.vdot(search, self._last_gradient))
@@ -228,7 +247,7 @@ class _Search:
             if conjugacy > 0.0:
                 add_scaled(direction, self._direction, conjugacy)
         image = self._problem.operator.displacement(direction)
-        image += self._bend.times(direction)
+        image += self._curvature.times(direction)
         curvature = float(np.vdot(direction, image))
         if not curvature > 0.0:
             return False
@@ -240,7 +259,7 @@ class _Search:
         return True
 
     def _without_resultants(self, field: Array) -> Array:
-        """``field`` less the punches that carry its resultants."""
+        """Return ``field`` minus the punches that carry its resultants."""
         if len(self._punches):
             shares = self._problem.modes.sums(field) @ self._inverse
             for share, punch in zip(shares, self._punches, strict=True):
@@ -249,15 +268,15 @@ class _Search:
 
     # -- back to the disks ----------------------------------------------------------------------
     def _project(self, step: Array) -> bool:
-        """Back to admissible and balanced shear, no higher in energy; False where there is none."""
+        """Project to an admissible, balanced shear of no higher energy; False if there is none."""
         problem, base = self._problem, self._shear
         rounding = ROUNDING * float(np.abs(base * self._displacement).sum())
-        kept = self._slipping & ~self._released(step)
+        still_slipping = self._slipping & ~self._released(step)
         share = 1.0
         for _ in range(BACKTRACKS):
             trial = base + share * step
             beyond = squared(trial) > problem.limit * problem.limit
-            slipping = kept | (beyond & ~self._slipping)
+            slipping = still_slipping | (beyond & ~self._slipping)
             shear = problem.balanced(trial, slipping)
             if shear is not None:
                 displacement = problem.operator.displacement(shear)
@@ -266,19 +285,19 @@ class _Search:
                     self._accept(shear, displacement, energy, slipping, cut=share < 1.0)
                     return True
             share *= BACKTRACK
-            kept = self._slipping
+            still_slipping = self._slipping
         return self._hold()
 
     def _released(self, step: Array) -> Mask:
-        """Slipping cells that a ``step`` from the last shear leaves slipping along with it."""
-        slip = self._moved - self._bend.times(step)
+        """Return slipping cells whose slip after ``step`` has the direction of their shear."""
+        slip = self._moved - self._curvature.times(step)
         self._problem.modes.add_motion(slip, -self._rigid)
         return self._slipping & (dot(slip, self._shear + step) > 0.0)
 
     def _hold(self) -> bool:
-        """Take all cells on their circle to slip, at the old shear; False if they do already.
+        """Let all cells on their circle slip at the old shear; return False if they do already.
 
-        Cells released too early push outwards, which no share of a step mends.
+        Cells that were released too early push outwards, which no shorter step can correct.
         """
         on_circle = self._problem.on_circle(self._shear)
         stalled = bool(np.all(self._slipping[on_circle]))
@@ -289,10 +308,10 @@ class _Search:
         self, shear: Array, displacement: Array, energy: float, slipping: Mask, cut: bool
     ) -> None:
         self._shear, self._displacement, self._energy = shear, displacement, energy
-        self._turned = int(np.count_nonzero(self._slipping ^ slipping))
+        self._changed = int(np.count_nonzero(self._slipping ^ slipping))
         self._slipping = slipping
         self._linearise(curved=True)
-        if cut or self._turned or self._direction is None:
+        if cut or self._changed or self._direction is None:
             self._direction = None
         else:
             self._direction = self._without_resultants(self._free.times(self._direction))

@@ -1,4 +1,4 @@
-"""The largest shear force that friction can carry: limit analysis of a contact that slides."""
+"""Largest shear load that friction can carry, by limit analysis of the sliding contact."""
 
 from __future__ import annotations
 
@@ -8,13 +8,15 @@ from sa_solver.types import Array
 
 ITERATIONS = 200
 ACCURACY = 1e-12
-"""Relative fall of the bound in one iteration at which reweighting stops."""
+"""Relative decrease of the bound in one iteration below which the iteration stops."""
 
 SMALLEST_SPEED = 1e-9
-"""Relative speed below which a cell counts as the centre of rotation, where any weight will do."""
+"""Relative speed below which a cell counts as the centre of rotation, where the weight does not
+matter."""
 
-UNFELT = 1e-6
-"""Relative part of a load from which cells, one or in a line of strips, cannot carry it at all."""
+UNSUPPORTED = 1e-6
+"""Relative part of a load in directions without resistance above which cells cannot carry the load
+at all. A single cell, for example, has no resistance to a moment."""
 
 
 def largest_share(
@@ -25,18 +27,29 @@ def largest_share(
     accuracy: float = ACCURACY,
     enough: float = 0.0,
 ) -> float:
-    """The largest factor λ such that shear within ``limit`` has the resultants λ ``target``.
+    """Return the largest factor λ for which shear within ``limit`` has the resultants λ ``target``.
 
-    ``limit`` µp ``(m,)`` [MPa], ``shapes`` ``(k, 2, m)`` of the rigid motions and ``target``
-    ``(k,)`` [MPa] their resultants, not all 0. The factor is the least dissipation Σ µp |R v| of a
-    sliding velocity v on which the target does unit work (upper bound theorem; Goyal, Ruina &
-    Papadopoulos 1991, Wear 143, 307, doi:10.1016/0043-1648(91)90104-3), found by reweighted least
-    squares, which lower it at every step until it falls by less than ``accuracy`` in one, or is
-    down to ``enough``.
+    The factor is the least dissipation Σ µp |R v| of a sliding velocity v on which the target does
+    unit work (upper bound theorem; Goyal, Ruina & Papadopoulos 1991, Wear 143, 307,
+    doi:10.1016/0043-1648(91)90104-3). It is found by reweighted least squares, which lower the
+    bound in every step.
+
+    Parameters
+    ----------
+    limit
+        Friction limit µp of m cells ``(m,)`` [MPa].
+    shapes
+        Displacements ``(k, 2, m)`` of the cells in k rigid motions.
+    target
+        Resultants ``(k,)`` [MPa] conjugate to these motions, not all 0.
+    accuracy
+        Relative decrease in one step below which the iteration stops.
+    enough
+        Factor at or below which the iteration stops.
     """
     modes = np.tensordot(shapes * limit, shapes, axes=([1, 2], [1, 2]))
-    unfelt = target - modes @ (np.linalg.pinv(modes, hermitian=True) @ target)
-    if np.abs(unfelt).max() > UNFELT * np.abs(target).max():
+    unsupported = target - modes @ (np.linalg.pinv(modes, hermitian=True) @ target)
+    if np.abs(unsupported).max() > UNSUPPORTED * np.abs(target).max():
         return 0.0
     speed = np.ones_like(limit)
     bound = np.inf

@@ -1,12 +1,12 @@
 """Gross slip: whether a contact slides, and its rigid motion, from the energy it dissipates.
 
-A force at its limit no longer says how far the bodies slide; energies do. The rigid increments Δδx,
-Δδy are found such that the contact dissipates Edx + Edy, in one of two directions: ``energies``,
-that which shares the sum between x and y as given (Gallego 2007, eq. 8), with the signs that make
-slip oppose the given force, or ``force``, that in which the shear force has the given direction.
-Rotation is neglected. The two agree where the bodies slide as rigid ones do. Where the surfaces
-also slip sideways, outwards from the middle, eq. 8 takes that for sliding: it implies a force
-across that nothing balances.
+A force at the friction limit does not determine how far the bodies slide, but the dissipated energy
+does. The rigid increments Δδx, Δδy are found such that the contact dissipates Edx + Edy. Their
+direction follows from one of two rules. With ``energies``, the energy is divided between x and y as
+given (Gallego 2007, eq. 8), and the signs are such that slip opposes the given force. With
+``force``, the shear force has the given direction. Rotation is neglected. The rules agree where the
+bodies slide like rigid ones. Where the surfaces also slip sideways, outwards from the middle, eq. 8
+counts this as sliding, which implies a transverse force that no load balances.
 """
 
 from __future__ import annotations
@@ -26,28 +26,30 @@ from sa_solver.types import Array
 SlidingRule = Literal["force", "energies"]
 
 GROSS_SHARE = 0.99
-"""Share of the largest shear force from which the contact counts as sliding, where energies are at
-hand: from there on the force hardly says how far, the energy does. A structure whose last nodes
-stick at the ends of a flank holds 0.2 % less than friction could while it slides by tens of µm."""
+"""Share of the largest shear force above which the contact counts as sliding, where its energy is
+known. Above this share the motion hardly follows from the force, but it does from the energy. A
+structure with a few sticking nodes at the ends of a flank carries 0.2 % less than the largest force
+while it slides by tens of µm."""
 
 SHARE_CHECKED = 0.5
-"""Share of µP or of its moment from which the largest force is computed."""
+"""Share of µP, or of its moment, above which the largest shear load is computed."""
 
 ACCURACY = 1e-6
-"""Error of the energy, relative, and of the direction, in rad, at which the search ends. Shear
-solved to 1e-8 has its direction to about 1e-7."""
+"""Relative error of the energy, and error of the direction [rad], at which the search ends. The
+direction of shear solved to 1e-8 is accurate to about 1e-7."""
 
 LOOSEST = 1e-3
 LOOSER = 0.01
-"""Tolerance of the first contact problem, and of the others over the error before them."""
+"""Tolerance of the first contact problem, and ratio of later tolerances to the error before."""
 
 FLATTEST = 0.05
-"""Least of µP that a longer motion is taken to dissipate more per length, as the contact begins to
-slide, and least part of its own turn that a turned motion is taken to turn force or energies: where
-the last two motions say less, they are too near each other to say anything."""
+"""Least slope of the secants, relative to the slope in full sliding. The slopes are the energy per
+length of the motion, over µP, and the change of the direction of force or energies per change of
+the direction of motion. A smaller slope from the last two motions is not reliable, because the
+motions are too close to each other."""
 
 ITERATIONS = 30
-"""Contact problems solved; 3 to 8 are usual."""
+"""Most contact problems solved; 3 to 8 are usual."""
 
 
 def slides(limit: Array, load: ContactLoad, modes: PlanarModes, cell_area: float) -> bool:
@@ -82,12 +84,20 @@ def slides(limit: Array, load: ContactLoad, modes: PlanarModes, cell_area: float
 
 @dataclass(frozen=True)
 class GrossSlip:
-    """How near the last contact problem solved is to sliding as given: see :data:`ACCURACY`.
+    """Result of a search for gross slip.
 
-    ``missing`` is the error of the energy alone. Shear is coupled by Poisson's ratio, so no
-    direction of sliding spares x or y all energy: then the error of ``energies`` in direction
-    stays, and the sum is met. ``creeps`` says that without any motion the contact dissipates more
-    than given: its force is then below what sliding takes, and to be believed.
+    Attributes
+    ----------
+    error
+        Error of the last contact problem solved: see :data:`ACCURACY`. Poisson's ratio couples
+        both directions of shear, so that no direction of sliding dissipates energy along x or y
+        only. With the rule ``energies`` an error of the direction may then remain, while the total
+        energy is met.
+    missing
+        Relative error of the energy alone.
+    creeps
+        Whether the contact dissipates more than the given energy without any motion. The force is
+        then below the sliding force and determines the state.
     """
 
     error: float
@@ -96,13 +106,13 @@ class GrossSlip:
 
     @property
     def message(self) -> str:
-        """Empty when the energy is met, else what is wrong and what to try."""
+        """Message that says what is wrong and what to try; empty if the energy is met."""
         if self.missing <= ACCURACY:
             return ""
         return (
-            f"the sliding contact dissipates an energy off by {self.missing:.1e} of that which its "
-            "loads say: take smaller increments; where a structure's nodes say it, refine its "
-            "mesh, where a file of loads does, check Edx and Edy"
+            f"the sliding contact dissipates an energy off by {self.missing:.1e} of that of its "
+            "loads: take smaller increments; if the energy comes from a structure, refine its "
+            "mesh; if it comes from a file of loads, check Edx and Edy"
         )
 
 
@@ -116,18 +126,34 @@ def gross_slip(
     stored: float = 0.0,
     near: Array | None = None,
 ) -> GrossSlip:
-    """Slide a contact until it dissipates ``energy`` (Edx, Edy) [N mm], their sum above 0.
+    """Slide a contact until it dissipates a given energy.
 
-    ``slide`` solves it for a motion (Δδx, Δδy) [mm] to a tolerance and gives its shear force (Qx,
-    Qy) [N] and energy (Edx, Edy) [N mm]: its last state is the one sought. ``carried`` is µP [N],
-    P the mean of both ends, and ``force`` the given (Qx, Qy) [N]. ``stored`` [N mm] is the work
-    that the shear of sliding does on its own displacement, about: it makes the first guess good. A
-    motion ``near`` the one sought makes a better one.
+    While all cells slip, the energy grows by µP per length of the motion, and the direction of
+    force and energies turns with the motion. Length and direction are then corrected at once. Where
+    some cells stick the energy grows more slowly, and where friction prevents sideways slip the
+    direction turns more slowly. The slopes are therefore estimated from the last two motions.
 
-    While all slips, a longer motion dissipates µP more per length, and a turned one turns force and
-    shares of energy with it: both are corrected at once by what is missing. Where some cells still
-    stick it dissipates less, and where friction holds sideways slip back it turns less: as much as
-    the last two motions tell.
+    Parameters
+    ----------
+    slide
+        Function that solves the contact for a motion (Δδx, Δδy) [mm] to a tolerance and returns the
+        shear force (Qx, Qy) [N] and the energy (Edx, Edy) [N mm]. The state that it solves last is
+        the result.
+    carried
+        µP [N], with the mean of P at both ends of the increment.
+    energy
+        Energy (Edx, Edy) [N mm] to dissipate, with a sum above 0.
+    force
+        Given shear force (Qx, Qy) [N].
+    tolerance
+        Tolerance of the last contact problem.
+    direction
+        Rule for the direction of sliding.
+    stored
+        Approximate work [N mm] of the shear in sliding on its own displacement, for the initial
+        guess.
+    near
+        Motion near the one sought, as a better initial guess.
     """
     total = float(energy.sum())
     wanted = angle = _angle(force if direction == "force" else np.sqrt(energy.clip(0.0)))
@@ -137,9 +163,9 @@ def gross_slip(
         inner = LOOSER * LOOSEST
         length, angle = float(np.linalg.norm(near)), _angle(near)
     for _ in range(ITERATIONS):
-        shear, spent = slide(length * sliding_direction(force, angle), max(inner, tolerance))
-        measured = _angle(shear if direction == "force" else np.sqrt(spent.clip(0.0)))
-        missing, turn = total - float(spent.sum()), wanted - measured
+        shear, dissipated = slide(length * sliding_direction(force, angle), max(inner, tolerance))
+        measured = _angle(shear if direction == "force" else np.sqrt(dissipated.clip(0.0)))
+        missing, turn = total - float(dissipated.sum()), wanted - measured
         longer, turned = by_length.change(length, missing), by_angle.change(angle, turn)
         turn = float(np.clip(angle + turn, 0.0, 0.5 * np.pi)) - angle
         change = max(abs(missing) / total, abs(turn))
@@ -154,9 +180,10 @@ def gross_slip(
 
 
 class _Secant:
-    """The slope of what is missing of one number against that number, from its last two values.
+    """Secant slope of a quantity against its control, from the last two values.
 
-    It is ``steepest`` until two are known, and at least :data:`FLATTEST` times that.
+    The slope is ``steepest`` until two values are known, and never below :data:`FLATTEST` times
+    that.
     """
 
     def __init__(self, steepest: float) -> None:
@@ -164,7 +191,7 @@ class _Secant:
         self._last: tuple[float, float] | None = None
 
     def change(self, value: float, missing: float) -> float:
-        """Of the number, for what is ``missing`` at this ``value``."""
+        """Return the change of the control for the error ``missing`` at this ``value`` of it."""
         if self._last is not None:
             further, less = value - self._last[0], self._last[1] - missing
             if further * less > 0.0:
@@ -175,13 +202,16 @@ class _Secant:
 
 
 def sliding_direction(force: Array, angle: float | None = None) -> Array:
-    """Unit vector ``(2,)`` in the quadrant of ``force``, at its own angle unless one is given."""
+    """Return the unit vector ``(2,)`` in the quadrant of ``force`` at an ``angle`` [rad].
+
+    The angle is that of the force by default.
+    """
     angle = _angle(force) if angle is None else angle
     vector: Array = np.where(force < 0.0, -1.0, 1.0) * np.array([np.cos(angle), np.sin(angle)])
     return vector
 
 
 def _angle(vector: Array) -> float:
-    """Direction of (±x, ±y) in the first quadrant [rad]."""
+    """Return the angle of (±x, ±y), mirrored to the first quadrant [rad]."""
     along, across = np.abs(vector)
     return float(np.arctan2(across, along))

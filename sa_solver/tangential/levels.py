@@ -1,4 +1,4 @@
-"""Nested grids for shear: a problem is begun from its solution on cells twice as large."""
+"""Nested grids for shear: initial guesses come from the solution on cells twice as large."""
 
 from __future__ import annotations
 
@@ -14,31 +14,32 @@ from sa_solver.tangential.problem import BoxOperator, TangentialProblem
 from sa_solver.types import Array
 
 COARSE_TOLERANCE = 3e-3
-"""Residual of solutions on coarser grids: with thirty times of it the finest takes a third more
-convolutions, with a third of it no fewer."""
+"""Residual of solutions on coarser grids. With thirty times this residual the finest grid takes a
+third more convolutions; with a third of it no fewer."""
 
 COARSE_ITERATIONS = 60
-"""Conjugate directions on coarser grids: a poor start is worth no more."""
+"""Most conjugate directions on coarser grids: a poor initial guess is not worth more."""
 
 
 class ShearLevel:
-    """Operators on a box of cells, and on its coarser grids."""
+    """Operators on a box of cells and on its coarser grids."""
 
     def __init__(self, half_space: HalfSpace) -> None:
-        """Plan for the box that ``half_space`` covers."""
+        """Prepare the operators on the box that ``half_space`` covers."""
         self.half_space = half_space
         self.operator = BoxOperator(half_space)
 
     def begin(self, problem: TangentialProblem, shear: Array) -> Array | None:
-        """Admissible, balanced shear ``(2, nx, ny)`` to search from, near ``shear``.
+        """Return an admissible, balanced shear ``(2, nx, ny)`` near ``shear`` as initial guess.
 
-        Corrected by the solutions on coarser grids. None if there is no such shear.
+        It is corrected by the solutions on coarser grids. None is returned if there is no such
+        shear.
         """
         improved = self._improved(problem, shear)
         return problem.balanced(shear) if improved is None else improved
 
     def _improved(self, problem: TangentialProblem, shear: Array) -> Array | None:
-        """Shear corrected by the solution on the next coarser grid; None without one."""
+        """Return ``shear`` corrected by the solution on the next coarser grid; None without one."""
         if self._coarser is None:
             return None
         level, transfer = self._coarser
@@ -54,7 +55,7 @@ class ShearLevel:
         return problem.balanced((shear + change) * problem.pressed, slipping & problem.pressed)
 
     def restricted(self, fine: TangentialProblem, transfer: GridTransfer) -> TangentialProblem:
-        """The problem on this level that is the mean of one on the next finer grid."""
+        """Return the problem ``fine`` of the next finer grid, averaged over this level's cells."""
         grid = self.half_space.grid
         length = fine.modes.length
         centre_x, centre_y = float(fine.modes.x.mean()), float(fine.modes.y.mean())

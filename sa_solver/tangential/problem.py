@@ -1,12 +1,13 @@
-"""The discrete tangential contact problem on a box of cells, and its residual.
+"""Discrete tangential contact problem on a box of cells, and its residual.
 
-Fields cover the box, shape ``(2, nx, ny)``; cells without limit (µp = 0) carry no shear and their
-slip counts for nothing. With the displacement K q, an imposed ``offset`` and rigid motions R c,
+Fields cover the box and have the shape ``(2, nx, ny)``. Cells without a limit (µp = 0) carry no
+shear and their slip does not matter. With the displacement K q, an imposed ``offset`` and rigid
+motions R c the problem is
 
     Δs = K q + offset - R c,    |q| <= µp,    Δs = -λ q with λ >= 0, λ (µp - |q|) = 0,
 
-where as many resultants Rᵀq are imposed as there are rigid motions in R. For a given limit this is
-the minimum of ½ q·Kq + q·offset over the disks, and unique.
+where the resultants Rᵀq conjugate to the motions are imposed. For a given limit the solution is the
+unique minimum of ½ q·Kq + q·offset over the disks |q| <= µp.
 """
 
 from __future__ import annotations
@@ -28,48 +29,52 @@ from sa_solver.transforms.padded import SpectralFilter
 from sa_solver.types import Array, Mask
 
 BALANCE_TOLERANCE = 1e-13
-"""Resultants left by a balance, relative to the largest shear force: rounding of a sum."""
+"""Error of the resultants after a balance, relative to the largest shear force: rounding."""
 
 BALANCE_ITERATIONS = 200
-"""Newton takes 2 to 10, more only within 1e-3 of the largest force."""
+"""Most iterations of a balance. Newton's method takes 2 to 10, more only within 1e-3 of the largest
+force."""
 
 LONGEST_STEP = 3.0
-"""Longest step of Newton over the coefficients at hand: close to the largest force they grow
-without bound, and so would a step that follows the tangent."""
+"""Longest Newton step relative to the present coefficients. Close to the largest force the
+coefficients grow without bound, and so would a step along the tangent."""
 
 RIDGE = 1e-14
-"""Keeps the Hessian of a balance regular where no cell can change its shear any more."""
+"""Relative size of a multiple of the identity that keeps the Hessian of a balance regular where no
+cell can change its shear."""
 
 REACHED = 1e-12
-"""Relative distance from the limit that rounding leaves to shear that has reached it."""
+"""Relative distance from the limit, due to rounding, of shear that has reached it."""
 
 SMALLEST_INCREMENT = 1e-4
-"""Residuals are relative to the displacement of an increment, unless it is so small a share of the
-displacement present that rounding would be measured."""
+"""Least displacement to which residuals are relative, as a share of the present displacement.
+Residuals are usually relative to the displacement of the increment, but rounding would dominate
+that of a smaller one."""
 
 LEVELS = 2
 LEVEL_RATIO = 8.0
-"""Local compliances for which the preconditioner has an inverse, and what they are over one
-another, a cell's own added to each. Of spheres at Q/µP 0.75, 512² cells, the residual of a phase
-falls by 10⁶ in 18 conjugate directions with one level, in 12 with two, three or four."""
+"""Number of levels of local compliance for which the preconditioner has an inverse, and the ratio
+between levels, each plus the compliance of a cell. For spheres with 512² cells at Q/µP = 0.75 the
+residual of a phase falls by 10⁶ in 18 conjugate directions with one level, in 12 with two to four.
+"""
 
 FEW = 0.05
-"""Share of cells with more compliance than between the levels, below which the first one will do:
-another costs a transform in each iteration."""
+"""Share of cells with a compliance nearer the second level below which the first level is used
+alone, because another level costs a transform in each iteration."""
 
 TINY = 1e-200
-"""Keeps divisions by a vanishing size finite, and their result."""
+"""Keeps divisions by a vanishing size, and their results, finite."""
 
 
 def squared(field: Array) -> Array:
-    """|q|² ``(nx, ny)`` of a field ``(2, nx, ny)``."""
+    """Return |q|² ``(nx, ny)`` of a field ``(2, nx, ny)``."""
     square: Array = field[0] * field[0]
     square += field[1] * field[1]
     return square
 
 
 def dot(one: Array, other: Array) -> Array:
-    """Product ``(nx, ny)`` of two fields ``(2, nx, ny)``, cell by cell."""
+    """Return the scalar product ``(nx, ny)`` of two fields ``(2, nx, ny)``, cell by cell."""
     product: Array = one[0] * other[0]
     product += one[1] * other[1]
     return product
@@ -77,10 +82,21 @@ def dot(one: Array, other: Array) -> Array:
 
 @dataclass(frozen=True)
 class TangentialProblem:
-    """Data of one problem.
+    """Data of a tangential contact problem.
 
-    ``limit`` µp >= 0 ``(nx, ny)`` [MPa], ``offset`` ``(2, nx, ny)`` [mm] with all imposed motions
-    in it, the ``modes`` that are free and ``target`` ``(k,)``, their sums [MPa]; ``operator`` is K.
+    Attributes
+    ----------
+    limit
+        Friction limit µp >= 0 ``(nx, ny)`` [MPa].
+    offset
+        Slip ``(2, nx, ny)`` [mm] without new tractions and free motions; it includes all imposed
+        motions.
+    modes
+        Free modes R of rigid motion.
+    target
+        Imposed sums ``(k,)`` of the shear with these modes [MPa].
+    operator
+        Elastic operator K.
     """
 
     limit: Array
@@ -91,7 +107,7 @@ class TangentialProblem:
 
     @cached_property
     def per_limit(self) -> Array:
-        """1/µp, 0 where there is no limit."""
+        """Inverse 1/µp of the limit, 0 where µp is 0."""
         inverse = np.zeros_like(self.limit)
         return np.divide(1.0, self.limit, out=inverse, where=self.pressed)
 
@@ -102,25 +118,29 @@ class TangentialProblem:
 
     @cached_property
     def largest(self) -> float:
-        """Σ µp [MPa]."""
+        """Sum Σ µp of the limits [MPa]."""
         return float(self.limit.sum())
 
     def energy(self, shear: Array, displacement: Array) -> float:
-        """½ q·Kq + q·offset [MPa mm]: least at the solution."""
+        """Return ½ q·Kq + q·offset [MPa mm], which is least at the solution."""
         return float(0.5 * np.vdot(shear, displacement) + np.vdot(shear, self.offset))
 
     def slip(self, displacement: Array, rigid: Array) -> Array:
-        """Δs ``(2, nx, ny)`` [mm] at free rigid motions ``(k,)``, also where nothing presses."""
+        """Return the slip Δs ``(2, nx, ny)`` [mm] at free motions ``rigid`` ``(k,)``.
+
+        It is given for all cells of the box, also those that are not pressed.
+        """
         slip = displacement + self.offset
         self.modes.add_motion(slip, -rigid)
         return slip
 
     def residual(self, shear: Array, displacement: Array, rigid: Array) -> float:
-        """Largest |q - Π(q - Δs/κ)| κ over the displacement, Π the projection on the disks.
+        """Return the largest κ |q - Π(q - Δs/κ)|, relative to the displacement.
 
-        It vanishes only at the solution, whatever the scale κ [mm/MPa], here a cell's own
-        compliance. Relative to the largest displacement |K q + offset| of a pressed cell, but at
-        least to ``SMALLEST_INCREMENT`` of K q.
+        Π is the projection on the disks. The residual vanishes only at the solution, for any scale
+        κ [mm/MPa], which is here the compliance of a cell. It is relative to the largest
+        displacement |K q + offset| of a pressed cell, but at least to ``SMALLEST_INCREMENT`` times
+        the largest |K q|.
         """
         compliance = self.operator.self_compliance
         step = self.slip(displacement, rigid)
@@ -135,25 +155,25 @@ class TangentialProblem:
         return float(largest / scale) if scale > 0.0 else largest
 
     def on_circle(self, shear: Array) -> Mask:
-        """Pressed cells whose shear has reached its limit."""
+        """Return the pressed cells whose shear has reached its limit."""
         reached: Mask = squared(shear) >= (self.limit * (1.0 - REACHED)) ** 2
         return reached & self.pressed
 
     def balanced(self, shear: Array, on_circle: Mask | None = None) -> Array | None:
-        """The shear that :meth:`balance` finds, or None."""
+        """Return the shear that :meth:`balance` finds, or None."""
         balance = self.balance(shear, on_circle)
         return balance[0] if balance else None
 
     def balance(
         self, shear: Array, on_circle: Mask | None = None, weight: Array | None = None
     ) -> tuple[Array, Array] | None:
-        """Admissible shear near ``shear`` with the resultants ``target``, and c; or None.
+        """Return an admissible shear near ``shear`` with the resultants ``target``, and c.
 
-        ``shear`` ``(2, nx, ny)`` must vanish where nothing presses. The result is Π(q + w R c), Π
-        the projection on the disks or, where ``on_circle`` ``(nx, ny)``, on their circles, and w
-        the ``weight`` ``(nx, ny)``, µp unless given. Its resultants are the gradient of a convex
-        function of c, whose minimum Newton's method finds. None means that no admissible shear has
-        the resultants, or none within rounding.
+        The result is Π(q + w R c), where Π projects on the disks, or on their circles in the cells
+        ``on_circle`` ``(nx, ny)``. The weight w ``(nx, ny)`` is µp by default. ``shear``
+        ``(2, nx, ny)`` must be 0 in cells that are not pressed. The resultants of the result are
+        the gradient of a convex function of c, whose minimum is found by Newton's method. None is
+        returned if no admissible shear has the resultants to within rounding.
         """
         weight = self.limit if weight is None else weight
         on_circle = np.zeros_like(self.pressed) if on_circle is None else on_circle
@@ -189,16 +209,16 @@ class TangentialProblem:
         return None
 
     def _envelope(self, magnitude: Array, factor: Array, weight: Array) -> float:
-        """The convex function of :meth:`balance` without its linear part [MPa]."""
+        """Return the convex function of :meth:`balance` without its linear part [MPa]."""
         reached = magnitude * factor
         magnitude = magnitude - 0.5 * reached
         reached *= np.where(self.pressed, 1.0 / np.maximum(weight, TINY), 0.0)
         return float(np.vdot(reached, magnitude))
 
     def _hessians(self, admissible: Array, slope: Array, outside: Mask) -> tuple[Array, Array]:
-        """Derivative ``(k, k)`` of the resultants of :meth:`balance`, and a bound of it.
+        """Return the derivative ``(k, k)`` of the resultants in :meth:`balance`, and its bound.
 
-        A step by the bound always lowers the convex function: it majorises the envelope.
+        The bound majorises the convex function, so that a step by the bound always lowers it.
         """
         normal = admissible * self.per_limit
         along = np.where(outside, slope, 0.0) * normal
@@ -212,30 +232,30 @@ def _solved(matrix: Array, right: Array) -> Array:
 
 
 class BoxOperator:
-    """K for shear on a box of cells, and its approximate inverse.
+    """Elastic operator K for shear on a box of cells, and its approximate inverse.
 
-    The preconditioner is the inverse symbol of the box made periodic, with next to no padding
-    (Vollebregt 2014, doi:10.1016/j.jcp.2013.10.005).
+    The inverse uses the symbol of the box made periodic with almost no padding (Vollebregt 2014,
+    doi:10.1016/j.jcp.2013.10.005).
     """
 
     def __init__(self, half_space: HalfSpace) -> None:
-        """Plan for the box that ``half_space`` covers."""
+        """Prepare the operator on the box that ``half_space`` covers."""
         self._half_space = half_space
         self.self_compliance = half_space.self_compliance(SHEAR[0])
         self._inverses: dict[int, SpectralFilter] = {}
 
     @cached_property
     def largest_eigenvalue(self) -> float:
-        """Upper bound of K's eigenvalues [mm/MPa]: the largest of the padded, circulant matrix."""
+        """Upper bound of K's eigenvalues [mm/MPa]: the largest one of the circulant matrix."""
         xx, xy, yy = (self._half_space.symbol(*pair) for pair in ((0, 0), (0, 1), (1, 1)))
         return float(np.max(0.5 * (xx + yy) + np.hypot(0.5 * (xx - yy), xy)))
 
     def displacement(self, shear: Array) -> Array:
-        """K q ``(2, nx, ny)`` [mm] of ``shear`` ``(2, nx, ny)`` [MPa]: one convolution."""
+        """Return K q ``(2, nx, ny)`` [mm] for ``shear`` ``(2, nx, ny)`` [MPa]: one convolution."""
         return self._half_space.shear(shear)
 
     def precondition(self, displacement: Array, level: int) -> Array:
-        """About (K + D)⁻¹ u ``(2, nx, ny)`` [MPa] of ``displacement`` u ``(2, nx, ny)`` [mm].
+        """Return (K + D)⁻¹ u ``(2, nx, ny)`` [MPa], approximately, for a ``displacement`` u [mm].
 
         The local compliance D [mm/MPa] is that of ``level``.
         """
@@ -244,12 +264,12 @@ class BoxOperator:
         return self._inverses[level].apply(displacement)
 
     def windows(self, compliance: Array) -> tuple[list[tuple[int, Array]], Array]:
-        """Levels that a local ``compliance`` D ``(nx, ny)`` takes with their windows χ, and a rest.
+        """Return the levels for a local ``compliance`` D ``(nx, ny)``, with windows and a rest.
 
-        (K + D)⁻¹ is about Σ χj (K + Dj)⁻¹ χj plus the rest ``(nx, ny)`` [MPa/mm], the levels evenly
-        spaced in log D. Up to the last level Σ χj² = 1. Beyond, the windows carry what D leaves of
-        its inverse, and the rest is 1 - Σ χj² over D and a cell's own compliance: such cells hardly
-        feel one another.
+        (K + D)⁻¹ is approximately Σ χj (K + Dj)⁻¹ χj plus the rest ``(nx, ny)`` [MPa/mm], where χj
+        is the window of level j and the levels are evenly spaced in log D. Up to the last level
+        Σ χj² = 1. Beyond the last level the sum is smaller and the rest is (1 - Σ χj²) over the sum
+        of D and the compliance of a cell, because such cells hardly interact.
         """
         place: Array = np.log1p(compliance / self.self_compliance) / np.log(LEVEL_RATIO)
         yielding = int(np.count_nonzero(place > 0.5))

@@ -1,4 +1,4 @@
-"""pyFFTW: on the functions of FFTW, and without its interfaces."""
+"""Import of pyFFTW, bound to its own FFTW library and without its interface modules."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ INTERFACES = "pyfftw.interfaces"
 _LOADING = Lock()
 
 
-class _Later(ModuleType):
-    """Stands for the interfaces until somebody asks for one of them."""
+class _LazyInterfaces(ModuleType):
+    """Placeholder for the interface modules, which imports them on first access."""
 
     def __getattr__(self, name: str) -> Any:
         if name.startswith("__"):
@@ -24,21 +24,22 @@ class _Later(ModuleType):
 
 
 def load_pyfftw() -> Any:
-    """The module ``pyfftw``, bound to its own FFTW; its interfaces are loaded when asked for.
+    """Return the module ``pyfftw``, bound to its own FFTW library.
 
-    MKL has functions of the same names. Where it is used first, as for finite elements or by a
-    numpy that is built on it, the linker would give pyfftw those, and results would be rounded
-    otherwise than where it is not, as with a structure that comes from the cache.
+    MKL has functions of the same names. If MKL is loaded first, by finite elements or by a numpy
+    that is built on it, the linker would bind pyfftw to the functions of MKL. The rounding of
+    results would then depend on whether MKL had been loaded before.
 
-    The interfaces to numpy, scipy and dask load ten times as long as the rest.
+    The interfaces to numpy, scipy and dask take ten times as long to load as the rest. They are
+    imported on first access.
     """
-    with _LOADING:  # a module that another thread has begun to load has not all its names yet
-        return sys.modules.get("pyfftw") or _loaded()
+    with _LOADING:  # While another thread imports the module, some of its names are missing.
+        return sys.modules.get("pyfftw") or _imported()
 
 
-def _loaded() -> ModuleType:
+def _imported() -> ModuleType:
     flags = sys.getdlopenflags()
-    sys.modules[INTERFACES] = _Later(INTERFACES)
+    sys.modules[INTERFACES] = _LazyInterfaces(INTERFACES)
     sys.setdlopenflags(flags | getattr(os, "RTLD_DEEPBIND", 0))
     try:
         return importlib.import_module("pyfftw")
@@ -48,10 +49,10 @@ def _loaded() -> ModuleType:
 
 
 def plan(before: Any, after: Any, axis: int, backward: bool = False) -> Any:
-    """FFTW's plan of DFTs along an ``axis`` of ``before`` into ``after``, unnormalised.
+    """Return FFTW's plan of unnormalised DFTs of ``before`` into ``after`` along an ``axis``.
 
-    It is estimated, not measured: measuring picks another algorithm, and with it another rounding,
-    from one run to the next. What is in ``before`` may be lost.
+    The plan is estimated, not measured: measuring would choose different algorithms, and thus a
+    different rounding, from one run to the next. Execution may overwrite ``before``.
     """
     return load_pyfftw().FFTW(
         before,

@@ -1,8 +1,9 @@
-"""Loops over the cells of a grid that are compiled, where numpy would pass over memory many times.
+"""Compiled loops over the cells of a grid, where numpy would read the memory several times.
 
-They are called through their namesakes in :mod:`sa_solver.transforms.passes`. None calls another,
-so that what is kept of each stays right as long as this file does. Sums keep the order in which
-they are written: a function gives the same digits on every machine.
+The loops are called through the functions of the same names in :mod:`sa_solver.transforms.passes`.
+None calls another, so that the cached machine code of each is valid as long as this file does not
+change. Sums are evaluated in the order in which they are written, so that a function returns the
+same digits on every machine.
 """
 
 from __future__ import annotations
@@ -21,11 +22,12 @@ def multiply_spectrum(spectrum, symbol):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def multiply_spectra(spectra, symbols, places, turned_inputs, turned_outputs):  # type: ignore[no-untyped-def]
+def multiply_spectra(spectra, symbols, places, imaginary_inputs, imaginary_outputs):  # type: ignore[no-untyped-def]
     """Replace the first spectra ``(k, mx, m)`` by sums of them times real symbols ``(s, mx, m)``.
 
-    ``places`` ``(r, c)`` names the symbol that takes input j to output i. Inputs that are
-    ``turned`` ``(c,)`` are divided by the imaginary unit first, outputs ``(r,)`` multiplied by it.
+    ``places[i, j]`` is the index of the symbol that multiplies input j in output i. Inputs marked
+    in ``imaginary_inputs`` ``(c,)`` are first divided by the imaginary unit; outputs marked in
+    ``imaginary_outputs`` ``(r,)`` are multiplied by it.
     """
     outputs, inputs = places.shape
     _, lines, length = spectra.shape
@@ -34,7 +36,7 @@ def multiply_spectra(spectra, symbols, places, turned_inputs, turned_outputs):  
         for j in range(inputs):
             for n in range(length):
                 z = spectra[j, line, n]
-                given[j, n] = complex(z.imag, -z.real) if turned_inputs[j] else z
+                given[j, n] = complex(z.imag, -z.real) if imaginary_inputs[j] else z
         for i in range(outputs):
             first = places[i, 0]
             for n in range(length):
@@ -45,29 +47,29 @@ def multiply_spectra(spectra, symbols, places, turned_inputs, turned_outputs):  
                 for n in range(length):
                     s, z, y = symbols[place, line, n], given[j, n], spectra[i, line, n]
                     spectra[i, line, n] = complex(y.real + s * z.real, y.imag + s * z.imag)
-            if turned_outputs[i]:
+            if imaginary_outputs[i]:
                 for n in range(length):
                     z = spectra[i, line, n]
                     spectra[i, line, n] = complex(-z.imag, z.real)
 
 
 @njit(cache=True, nogil=True)
-def split_in_two(spectrum, turns):  # type: ignore[no-untyped-def]
-    """Set the second half of rows ``(2 m, k)`` to the first times ``turns[1]`` ``(m,)``."""
+def split_in_two(spectrum, twiddles):  # type: ignore[no-untyped-def]
+    """Set the second half of rows ``(2 m, k)`` to the first times ``twiddles[1]`` ``(m,)``."""
     half, columns = len(spectrum) // 2, spectrum.shape[1]
     for n in range(half):
-        c, s = turns[1, n].real, turns[1, n].imag
+        c, s = twiddles[1, n].real, twiddles[1, n].imag
         for j in range(columns):
             a = spectrum[n, j]
             spectrum[half + n, j] = complex(a.real * c - a.imag * s, a.real * s + a.imag * c)
 
 
 @njit(cache=True, nogil=True)
-def join_two(spectrum, turns):  # type: ignore[no-untyped-def]
-    """Add the second half of rows ``(2 m, k)``, times ``turns[1]`` conjugate, to the first."""
+def join_two(spectrum, twiddles):  # type: ignore[no-untyped-def]
+    """Add the second half of rows ``(2 m, k)``, times ``twiddles[1]`` conjugate, to the first."""
     half, columns = len(spectrum) // 2, spectrum.shape[1]
     for n in range(half):
-        c, s = turns[1, n].real, turns[1, n].imag
+        c, s = twiddles[1, n].real, twiddles[1, n].imag
         for j in range(columns):
             a, b = spectrum[n, j], spectrum[half + n, j]
             spectrum[n, j] = complex(
@@ -76,11 +78,14 @@ def join_two(spectrum, turns):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def split_in_four(spectrum, turns):  # type: ignore[no-untyped-def]
-    """Of rows ``(4 m, k)``, a and b the first two quarters: (a + (-i)^r b) ``turns[r]`` in each."""
+def split_in_four(spectrum, twiddles):  # type: ignore[no-untyped-def]
+    """Set quarter r of rows ``(4 m, k)`` to (a + (-i)^r b) ``twiddles[r]``.
+
+    a and b are the first two quarters.
+    """
     quarter, columns = len(spectrum) // 4, spectrum.shape[1]
     for n in range(quarter):
-        c, s = turns[:, n].real, turns[:, n].imag
+        c, s = twiddles[:, n].real, twiddles[:, n].imag
         for j in range(columns):
             a, b = spectrum[n, j], spectrum[quarter + n, j]
             spectrum[n, j] = a + b
@@ -93,11 +98,14 @@ def split_in_four(spectrum, turns):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def join_four(spectrum, turns):  # type: ignore[no-untyped-def]
-    """Sum the quarters z_r times ``turns[r]`` conjugate into a, and i^r times them into b."""
+def join_four(spectrum, twiddles):  # type: ignore[no-untyped-def]
+    """Set a to Σ w_r and b to Σ i^r w_r, where w_r is quarter r times ``twiddles[r]`` conjugate.
+
+    a and b are the first two quarters of the rows ``(4 m, k)``.
+    """
     quarter, columns = len(spectrum) // 4, spectrum.shape[1]
     for n in range(quarter):
-        c, s = turns[:, n].real, turns[:, n].imag
+        c, s = twiddles[:, n].real, twiddles[:, n].imag
         for j in range(columns):
             z0, z1 = spectrum[n, j], spectrum[quarter + n, j]
             z2, z3 = spectrum[2 * quarter + n, j], spectrum[3 * quarter + n, j]
@@ -112,7 +120,10 @@ def join_four(spectrum, turns):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, nogil=True)
 def tensor_product(xx, xy, yy, field, product):  # type: ignore[no-untyped-def]
-    """``product`` ``(2, nx, ny)`` of symmetric tensors ``(nx, ny)`` with a ``field``."""
+    """Write the product of a symmetric tensor field with a ``field`` to ``product``.
+
+    The components of the tensors are ``(nx, ny)``; the fields are ``(2, nx, ny)``.
+    """
     rows, columns = xx.shape
     for i in range(rows):
         for j in range(columns):
@@ -133,7 +144,10 @@ def add_scaled(total, field, scale):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, nogil=True)
 def spread_product(tensor, values, cells, field):  # type: ignore[no-untyped-def]
-    """Set cells of a field ``(3, n)`` to tensors xx, xy, yy, zz ``(4, m)`` times ``(3, m)``."""
+    """Set ``cells`` of a ``field`` ``(3, n)`` to the product of tensors with ``values``.
+
+    The tensors ``(4, m)`` have the components xx, xy, yy, zz; ``values`` are ``(3, m)``.
+    """
     for i in range(len(cells)):
         x, y, cell = values[0, i], values[1, i], cells[i]
         field[0, cell] = tensor[0, i] * x + tensor[1, i] * y
@@ -143,7 +157,10 @@ def spread_product(tensor, values, cells, field):  # type: ignore[no-untyped-def
 
 @njit(cache=True, nogil=True)
 def gather_product(tensor, field, cells, product):  # type: ignore[no-untyped-def]
-    """Add the same tensors times what a ``field`` ``(3, n)`` has on cells to ``product``."""
+    """Add the product of tensors with the values of a ``field`` on ``cells`` to ``product``.
+
+    The tensors ``(4, m)`` have the components xx, xy, yy, zz; ``field`` is ``(3, n)``.
+    """
     for i in range(len(cells)):
         cell = cells[i]
         x, y = field[0, cell], field[1, cell]
@@ -154,7 +171,10 @@ def gather_product(tensor, field, cells, product):  # type: ignore[no-untyped-de
 
 @njit(cache=True, nogil=True)
 def add_product(tensor, values, product):  # type: ignore[no-untyped-def]
-    """Add the same tensors times ``values`` ``(3, m)`` to ``product`` ``(3, m)``."""
+    """Add the product of tensors xx, xy, yy, zz ``(4, m)`` with ``values`` to ``product``.
+
+    ``values`` and ``product`` are ``(3, m)``.
+    """
     for i in range(values.shape[1]):
         x, y = values[0, i], values[1, i]
         product[0, i] += tensor[0, i] * x + tensor[1, i] * y

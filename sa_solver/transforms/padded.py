@@ -1,6 +1,6 @@
-"""Real Fourier transforms of zero-padded fields, several components side by side.
+"""Real Fourier transforms of zero-padded fields with several components.
 
-The DFT is unnormalised forwards and carries ``1/N`` backwards.
+The forward DFT is unnormalised and the backward DFT is divided by N.
 """
 
 from __future__ import annotations
@@ -17,22 +17,23 @@ from sa_solver.types import Array, Indices
 Multiplication = Callable[[Spectra], None]
 
 SPARE_COLUMNS = 4
-"""Unused complex numbers after each row of a spectrum: rows of 2ⁿ + 1 of them lie so close to a
-multiple of a memory page that the pass along columns takes 1.6 to 2 times as long from 1024 up."""
+"""Unused complex numbers after each row of a spectrum. Without them, rows of 2ⁿ + 1 numbers are so
+close to a multiple of a memory page that transforms along columns take 1.6 to 2 times as long for
+lengths from 1024 up."""
 
 
 class Transform:
-    """Real DFT of ``(nx, ny)`` fields zero-padded to ``padded``, and back, planned once with FFTW.
+    """Real DFT of ``(nx, ny)`` fields, zero-padded to ``padded``, and its inverse.
 
-    ``spectra`` ``(k, mx, my//2 + 1)`` holds one of each component; a backward transform uses its
-    component's up. Row ``i`` of them has the frequency ``order[i]`` along x. Rows of padding are
-    zero, so their pass along y is skipped.
+    The transforms are planned once with FFTW. ``spectra`` ``(k, mx, my//2 + 1)`` holds one spectrum
+    for each component; a backward transform destroys it. Row ``i`` of a spectrum has the frequency
+    ``order[i]`` along x. Rows of padding are zero, so that they are not transformed along y.
     """
 
     def __init__(
         self, shape: tuple[int, int], padded: tuple[int, int], components: int = 1
     ) -> None:
-        """Plan for fields of ``shape`` ``(nx, ny)``."""
+        """Plan the transforms of fields of ``shape`` ``(nx, ny)``, padded to ``padded``."""
         fftw = load_pyfftw()
         self.shape, self.padded = shape, padded
         rows, columns = shape[0], padded[1] // 2 + 1
@@ -53,7 +54,7 @@ class Transform:
         self._columns[component].forward()
 
     def backward(self, component: int, out: Array) -> None:
-        """The first ``(nx, ny)`` values of the field whose spectrum ``component`` holds."""
+        """Write the field with the spectrum of ``component`` to ``out`` ``(nx, ny)``."""
         self._columns[component].backward()
         self._backward[component].execute()
         # execute() leaves the inverse transform unnormalised.
@@ -62,11 +63,11 @@ class Transform:
 
 
 class SpectralFilter:
-    """A circulant matrix operator: fields with some components from fields with others.
+    """Circulant matrix operator that maps fields with several components to other fields.
 
     ``symbols[i][j]`` is the real array that multiplies the DFT of input ``j`` in output ``i``.
-    ``imaginary`` names the inputs and the outputs that are counted in units of the imaginary one:
-    a kernel that is odd along one direction between these and the rest has an imaginary symbol.
+    ``imaginary`` lists the inputs and the outputs that are multiplied by the imaginary unit, so
+    that all symbols are real: a kernel that is odd along one direction has an imaginary symbol.
     """
 
     def __init__(
@@ -75,18 +76,18 @@ class SpectralFilter:
         symbols: Sequence[Sequence[Array]],
         imaginary: tuple[Sequence[int], Sequence[int]] = ((), ()),
     ) -> None:
-        """``transform`` needs as many spectra as there are inputs or outputs."""
+        """Prepare the operator; ``transform`` needs a spectrum for each input and output."""
         self._transform = transform
         self._outputs = len(symbols)
         single = len(symbols) == len(symbols[0]) == 1 and not any(imaginary)
         self._multiply = (
-            _by_one(symbols[0][0][transform.order])
+            _single_multiplication(symbols[0][0][transform.order])
             if single
-            else _by_several(symbols, transform.order, imaginary)
+            else _matrix_multiplication(symbols, transform.order, imaginary)
         )
 
     def apply(self, fields: Array) -> Array:
-        """Outputs ``(r, nx, ny)`` from inputs ``(c, nx, ny)``."""
+        """Return the outputs ``(r, nx, ny)`` for the inputs ``fields`` ``(c, nx, ny)``."""
         transform = self._transform
         for component, field in enumerate(fields):
             transform.forward(field, component)
@@ -97,29 +98,35 @@ class SpectralFilter:
         return outputs
 
 
-def _by_one(symbol: Array) -> Multiplication:
-    """Multiplies a spectrum by one symbol."""
+def _single_multiplication(symbol: Array) -> Multiplication:
+    """Return a function that multiplies the first spectrum by one ``symbol``."""
     return lambda spectra: multiply_spectrum(spectra[0], symbol)
 
 
-def _by_several(
+def _matrix_multiplication(
     symbols: Sequence[Sequence[Array]],
     order: Indices,
     imaginary: tuple[Sequence[int], Sequence[int]],
 ) -> Multiplication:
-    """Replaces the inputs among spectra, whose rows have an ``order``, by the outputs."""
+    """Return a function that replaces the spectra of the inputs by those of the outputs.
+
+    The rows of the spectra have the frequencies ``order``.
+    """
     rows = [list(row) for row in symbols]
     place: dict[int, int] = {}
-    # Symmetric kernels give some of their symbols twice.
+    # In a symmetric matrix some symbols are the same array, which is stored once.
     places = np.array(
         [[place.setdefault(id(symbol), len(place)) for symbol in row] for row in rows]
     )
     different = {id(symbol): symbol for row in rows for symbol in row}.values()
     stacked = np.stack([symbol[order] for symbol in different])
-    turned_outputs, turned_inputs = np.zeros(places.shape[0], bool), np.zeros(places.shape[1], bool)
-    turned_inputs[list(imaginary[0])] = turned_outputs[list(imaginary[1])] = True
+    imaginary_outputs, imaginary_inputs = (
+        np.zeros(places.shape[0], bool),
+        np.zeros(places.shape[1], bool),
+    )
+    imaginary_inputs[list(imaginary[0])] = imaginary_outputs[list(imaginary[1])] = True
 
     def multiply(spectra: Spectra) -> None:
-        multiply_spectra(spectra, stacked, places, turned_inputs, turned_outputs)
+        multiply_spectra(spectra, stacked, places, imaginary_inputs, imaginary_outputs)
 
     return multiply

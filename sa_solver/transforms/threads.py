@@ -1,4 +1,4 @@
-"""Work side by side in threads, for what spends its time where Python's lock is not held."""
+"""Parallel work in threads, for jobs that mostly run without Python's interpreter lock."""
 
 from __future__ import annotations
 
@@ -10,22 +10,23 @@ from typing import TypeVar
 
 T = TypeVar("T")
 
-# What tells the libraries below how many threads they may take; without it they take all cores.
 THREADS = "OMP_NUM_THREADS"
+"""Environment variable that limits the threads of numerical libraries, which otherwise use all
+cores."""
 
 
 def threads() -> int:
-    """How many threads may work: all cores of this process, or as many as ``THREADS`` says."""
+    """Return the number of threads to use: that of ``THREADS``, or all cores of this process."""
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
-    told = os.environ.get(THREADS, "")
-    return int(told) if told.isdecimal() and int(told) > 0 else cores or 1
+    setting = os.environ.get(THREADS, "")
+    return int(setting) if setting.isdecimal() and int(setting) > 0 else cores or 1
 
 
 def at_once(jobs: Sequence[Callable[[], T]]) -> list[T]:
-    """What each of the jobs gives, as many side by side as threads may work.
+    """Run ``jobs`` in parallel threads and return their results.
 
-    Raises what one of them raised, or Ctrl-C, once those that had begun have ended; others do not
-    begin.
+    If a job raises an exception, or Ctrl-C is pressed, the exception is raised again after the
+    running jobs have ended. No further jobs are started.
 
     Examples
     --------
@@ -42,9 +43,10 @@ def at_once(jobs: Sequence[Callable[[], T]]) -> list[T]:
 
 
 def begun(job: Callable[[], T]) -> Callable[[], T]:
-    """Begin with a job beside what is to come; what is returned gives what it gives, or raises.
+    """Start a job in another thread and return a function that waits for its result.
 
-    Where a single thread may work it is done when that is asked for.
+    The function returns the result of the job or raises its exception. If only a single thread may
+    be used, the job runs when the function is called.
 
     Examples
     --------

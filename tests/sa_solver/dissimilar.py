@@ -13,12 +13,12 @@ RADIUS = 10.0
 
 
 def rigid_on_elastic(beta):
-    """A pair with Dundurs' ``beta``: body 1 rigid, body 2 with ν from 0.5 to 0."""
+    """Return a pair with Dundurs' ``beta``: body 1 is rigid, body 2 has ν from 0.5 to 0."""
     return ElasticPair(Material(np.inf, 0.3), Material(70e3, (1 - 2 * beta) / (2 - 2 * beta)))
 
 
 def sphere(cells, beta, friction, width=2.6):
-    """Sphere contact on a grid of ``width`` Hertzian contact radii, and its height."""
+    """Return a sphere contact on a grid of ``width`` Hertzian contact radii, and its height."""
     pair = rigid_on_elastic(beta)
     radius = (0.75 * P * RADIUS / pair.contact_modulus) ** (1 / 3)
     grid = Grid.covering((width * radius, width * radius), (cells, cells))
@@ -27,7 +27,7 @@ def sphere(cells, beta, friction, width=2.6):
 
 
 def cylinder(cells, beta, friction):
-    """The same for a line contact under P newtons per mm."""
+    """Return a line contact under P newtons per mm, and its height."""
     pair = rigid_on_elastic(beta)
     half_width = np.sqrt(4 * P * RADIUS / (np.pi * pair.contact_modulus))
     grid = Grid.strips(2.6 * half_width, cells)
@@ -36,7 +36,7 @@ def cylinder(cells, beta, friction):
 
 
 def flat_strip(cells, beta, friction):
-    """A rigid flat punch of sharp edges in plane strain."""
+    """Return a rigid flat punch with sharp edges in plane strain, and its height."""
     grid = Grid.strips(1.2, cells)
     height = np.where(np.abs(grid.x) < 0.5, 0.0, 1.0)
     return CoupledContact(HalfSpace(grid, rigid_on_elastic(beta)), friction), height

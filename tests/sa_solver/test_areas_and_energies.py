@@ -1,4 +1,4 @@
-"""Areas and elastic energy that states tell, against closed forms and the work of their loads."""
+"""Contact areas and elastic energies of states, against closed forms and the work of loads."""
 
 import numpy as np
 import pytest
@@ -31,7 +31,7 @@ def on_grid(cells, pair=None):
 
 
 def test_those_of_hertz_and_of_cattaneo():
-    """Area to the cells at its edge, 2 % on 32 across; the energy is 2/5 P δ."""
+    """The area is accurate to the cells at its edge, 2 % on 32 across; the energy is 2/5 P δ."""
     half_space, height = on_grid(48)
     area = np.pi * SPHERE.contact.contact_radius**2
     pressed = NormalContact(half_space).solve(height, P)
@@ -60,16 +60,19 @@ def test_those_of_a_cylinder_are_per_length():
     assert state.contact_area == pytest.approx(2.0 * hertz.half_width, abs=2.0 * grid.pitch[0])
     stick = ShearedCylinder(hertz, FRICTION).stick_half_width(60.0)
     assert state.stick_area == pytest.approx(2.0 * stick, abs=2.0 * grid.pitch[0])
-    # ∫ P dδ of δ(P) = (2 P / π E*) [ln(2 L / a) + 1/2], in which a grows with √P.
+    # The integral ∫ P dδ of δ(P) = (2 P / π E*) [ln(2 L / a) + 1/2], where a grows with √P.
     pressed = NormalContact(half_space).solve(height, 200.0)
     less = 200.0 / (2.0 * np.pi * hertz.contact_modulus)
     work = 0.5 * 200.0 * (hertz.approach(half_space.datum) - less)
     assert pressed.elastic_energy == pytest.approx(work, rel=1e-3)
 
 
-@pytest.mark.parametrize("body", [STEEL, RIGID], ids=["alike", "unlike"])
+@pytest.mark.parametrize("body", [STEEL, RIGID], ids=["similar", "dissimilar"])
 def test_work_is_stored_or_dissipated(body):
-    """Pressed, then pressed and sheared along a curve, in n and 2 n increments: trapezoids."""
+    """The work by trapezoids in n and 2 n increments is compared with the energies.
+
+    The contact is pressed, then pressed and sheared along a curved path.
+    """
     half_space, height = on_grid(16, ElasticPair(body, STEEL))
     contact, missing = FrictionalContact(half_space, FRICTION), []
     for increments in (4, 8):

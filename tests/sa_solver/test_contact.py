@@ -1,4 +1,4 @@
-"""Increments of a frictional contact: normal, tangential and sliding states, one from another."""
+"""Increments of a frictional contact: normal, tangential and sliding states in sequence."""
 
 from dataclasses import replace
 from itertools import pairwise
@@ -29,9 +29,9 @@ def load(P, Qx=0.0, Qy=0.0, Mz=0.0, **more):
 
 
 def test_resultants_motions_and_energy_add_up():
-    """Over increments with changing pressure: -Σ q·Δs S = Σ Q·Δδ + Mz Δφz - Σ q·Δu S each time.
+    """-Σ q·Δs S = Σ Q·Δδ + Mz Δφz - Σ q·Δu S holds in increments with changing pressure.
 
-    What is dissipated takes the mean pressure of both ends of the increment instead.
+    The dissipated energy uses the mean pressure of both ends of the increment instead.
     """
     solver = contact()
     state = solver.apart(HEIGHT)
@@ -59,7 +59,7 @@ def test_resultants_motions_and_energy_add_up():
 
 
 def test_energy_is_of_second_order_in_the_increments():
-    """Shear there and back while the pressure rises and falls, and cells part."""
+    """Shear moves forward and back while the pressure rises and falls, and cells separate."""
     solver = contact()
     energies = []
     for count in (2, 4, 8, 16, 32):
@@ -75,9 +75,9 @@ def test_energy_is_of_second_order_in_the_increments():
     assert changes[-1] < 1e-2 * energies[-1]
 
 
-@pytest.mark.parametrize("second", [TITANIUM, STEEL], ids=["alike", "unlike"])
+@pytest.mark.parametrize("second", [TITANIUM, STEEL], ids=["similar", "dissimilar"])
 def test_a_near_state_to_begin_from_changes_the_work_only(second):
-    """On a surface that has worn by a thousandth of the approach since."""
+    """The surface has worn by a thousandth of the approach since the state of the initial guess."""
     solver = FrictionalContact(HalfSpace(GRID, ElasticPair(TITANIUM, second)), FRICTION)
     pressed = solver.advance(solver.apart(HEIGHT), HEIGHT, load(300.0, 20.0))
     near = solver.advance(pressed, HEIGHT, load(400.0, 150.0))
@@ -131,7 +131,7 @@ def test_sliding_is_decided_by_force_and_energy():
 
 
 def test_a_contact_that_creeps_keeps_its_force():
-    """Close to its limit, but with less energy than sliding on falling pressure takes."""
+    """The force is close to its limit, but the energy is less than sliding would dissipate."""
     solver = contact()
     pressed = solver.advance(solver.apart(HEIGHT), HEIGHT, load(300.0))
     held = solver.advance(pressed, HEIGHT, load(300.0, 162.0))
@@ -159,7 +159,7 @@ def test_friction_without_meaning(friction):
 
 
 def test_strain_is_that_of_body_2_over_body_1():
-    """Tension in body 2 alone: its surface would stretch, shear from body 1 holds it back."""
+    """Tension in body 2 alone would stretch its surface; the shear by body 1 resists this."""
     solver = contact()
     pressed = solver.advance(solver.apart(HEIGHT), HEIGHT, load(300.0))
     stretched = solver.advance(pressed, HEIGHT, load(300.0, strain=1e-4))
@@ -170,9 +170,9 @@ def test_strain_is_that_of_body_2_over_body_1():
     np.testing.assert_allclose(again.shear, stretched.shear, atol=1e-6 * abs(right))
 
 
-@pytest.mark.parametrize("second", [TITANIUM, Material(200e3, 0.3)], ids=["alike", "unlike"])
+@pytest.mark.parametrize("second", [TITANIUM, Material(200e3, 0.3)], ids=["similar", "dissimilar"])
 def test_surfaces_that_move_evenly_along_x_are_strained(second):
-    """Displacements ε x of the surfaces before they touch, and after, are the strain ε."""
+    """Displacements ε x of the surfaces, before they touch and after, are a strain ε."""
     solver = FrictionalContact(HalfSpace(GRID, ElasticPair(TITANIUM, second)), FRICTION)
     stretch = np.stack([1e-4 * np.broadcast_to(GRID.x, GRID.shape), np.zeros(GRID.shape)])
     moved, strained = solver.apart(HEIGHT, along=-stretch), solver.apart(HEIGHT)
@@ -189,7 +189,7 @@ def test_surfaces_that_move_evenly_along_x_are_strained(second):
 @settings(max_examples=15, deadline=None, derandomize=True)
 @given(st.integers(0, 2**32 - 1))
 def test_any_rough_history(seed):
-    """Equilibrium, cone and dissipation on rough surfaces, materials, frictions and histories."""
+    """Equilibrium, friction and dissipation hold for rough surfaces and random histories."""
     rng = np.random.default_rng(seed)
     grid = Grid(tuple(rng.integers(6, 24, 2)), tuple(rng.uniform(0.02, 0.1, 2)))
     material = Material(10.0 ** rng.uniform(3, 5.5), rng.uniform(0.0, 0.49))

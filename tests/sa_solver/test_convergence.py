@@ -1,7 +1,8 @@
-"""Rates at which the grid reaches the closed forms that are not smooth at the contact's edge.
+"""Rates of convergence to closed forms that are not smooth at the edge of the contact.
 
-Pressure and shear end like a square root, so that in the mean square they converge about as the
-pitch; what is an integral of them (approach, twist, shift) does about as its 3/2 power or better.
+Pressure and shear end like a square root, so that their mean square errors are about of first order
+in the pitch. Integrals of them (approach, twist, shift) converge with about the order 3/2 or
+better.
 """
 
 import numpy as np
@@ -25,7 +26,7 @@ FRICTION = 0.5
 
 
 def rate(errors):
-    """Order of convergence over all halvings of the pitch together."""
+    """Return the order of convergence over all halvings of the pitch together."""
     return np.log2(errors[0] / errors[-1]) / (len(errors) - 1)
 
 
@@ -61,7 +62,7 @@ def test_twisted_sphere(share):
         state = contact.advance(contact.apart(height), height, load)
         expected = sphere.shear(np.hypot(grid.x, grid.y), moment)
         shears.append(mean_square(np.hypot(*state.shear), expected))
-        # The steps of the contact's edge give the error either sign: a bound, not a rate.
+        # The edge moves in steps of cells, so that the sign of the error varies: test a bound.
         assert abs(state.rigid[5] / sphere.twist(moment) - 1.0) < 0.08 * (2.5 / cells) ** 1.5
     assert rate(shears) > 0.7
     assert shears[-1] < 0.03

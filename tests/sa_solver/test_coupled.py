@@ -29,7 +29,7 @@ from tests.sa_solver.dissimilar import (
 
 
 def march(contact, height, path, motion=coupled.ALL_FORCES):
-    """States along ``path``, an iterable of six values; all must converge."""
+    """Return the states along ``path``, an iterable of six values each; all must converge."""
     states, offset, start = [], None, None
     for values in path:
         state = contact.solve(height, offset, values, motion, start=start)
@@ -45,7 +45,7 @@ def sticking(state, friction):
 
 
 def stick_share(state, friction):
-    """Share of the pressed cells that stick: in plane strain c/a."""
+    """Return the share of the pressed cells that stick, which is c/a in plane strain."""
     return sticking(state, friction).sum() / (state.pressure > 0).sum()
 
 
@@ -54,7 +54,7 @@ def assert_same(computed, expected, accuracy):
 
 
 def assert_solves(contact, height, offset, state):
-    """Every condition of the problem, from the tractions alone."""
+    """Assert every condition of the problem, from the tractions alone."""
     friction, scale = contact.friction, np.abs(state.displacement).max()
     displacement = contact.half_space.displacement(state.traction)
     rigid = RigidModes(contact.grid)
@@ -99,7 +99,7 @@ def test_every_condition_is_met(build, beta, friction):
 
 @pytest.mark.parametrize("seed", range(8))
 def test_rough_contacts_under_random_loads(seed):
-    """Tilted and turned so that the shear force acts at the centre of pressure."""
+    """The bodies are tilted and twisted so that the shear acts at the centre of pressure."""
     rng = np.random.default_rng(seed)
     friction = 10 ** rng.uniform(-1.5, 0.0)
     contact, height = sphere(24, rng.uniform(0.0, 0.5), friction)
@@ -176,7 +176,7 @@ def test_similar_bodies_without_shear_force_have_no_shear():
 def test_stuck_flat_punch():
     """Mossakovskii: P = 4 G a δ ln(3-4ν)/(1-2ν); without friction 4 G a δ/(1-ν).
 
-    Here ν = 0. Their ratio hardly depends on what radius the grid gives to the punch.
+    Here ν = 0. The ratio of the two loads hardly depends on the radius of the punch on the grid.
     """
     grid = Grid.covering((2.2, 2.2), (48, 48))
     height = np.where(np.hypot(grid.x, grid.y) < 1.0, 0.0, 1.0)
@@ -202,10 +202,11 @@ def test_stick_zone_of_a_flat_strip_for_weak_coupling():
 
 @pytest.mark.parametrize("beta", [0.3, slow(0.5)])
 def test_punch_and_growing_contacts_share_one_stick_zone(beta):
-    """Spence 1968: c/a is the same for every power-law profile under a load that grows.
+    """Spence 1968: c/a is the same for every power-law profile under a growing load.
 
-    A flat punch, solved in one step, has no increments to refine; with a cylinder c/a comes closer
-    with every refinement of the increments and stays the same while the load grows.
+    A flat punch is solved in one step and has no increments to refine. For a cylinder c/a
+    approaches that of the punch as the increments are refined, and is constant while the load
+    grows.
     """
     friction = beta
     contact, height = flat_strip(400, beta, friction)
@@ -222,7 +223,7 @@ def test_punch_and_growing_contacts_share_one_stick_zone(beta):
 
 
 def test_one_step_and_many_differ():
-    """Loading dissimilar bodies depends on the path: one step sticks less."""
+    """Loading of dissimilar bodies depends on the path: less sticks after a single step."""
     contact, height = sphere(32, 0.5, 0.5)
     one = contact.solve(height, None, loads())
     many = march(contact, height, [loads(k / 6 * P) for k in range(1, 7)])[-1]
@@ -242,7 +243,7 @@ def test_adjusting_in_turns_gives_the_same(friction):
 
 
 def test_newton_and_the_splitting_find_the_same(monkeypatch):
-    """Two methods that share no more than the half-space and the residuals."""
+    """The two methods share only the half-space and the residuals."""
     contact, height = sphere(24, 0.4, 0.3)
     path = [loads(), loads(Qx=0.7 * 0.3 * P, Mz=0.5)]
     by_newton = march(contact, height, path)
@@ -255,7 +256,7 @@ def test_newton_and_the_splitting_find_the_same(monkeypatch):
 
 
 def test_a_contact_that_outgrows_its_box_is_that_of_the_whole_grid(monkeypatch):
-    """From a start that covers a tenth of the cells, which a second contact has joined since."""
+    """The initial guess covers a tenth of the cells; a second contact has formed since."""
     contact, height = sphere(48, 0.4, 0.5, width=6.0)
     small = contact.solve(height, None, loads(0.05 * P))
     x, y = contact.grid.x / contact.grid.size[0], contact.grid.y / contact.grid.size[1]
@@ -295,7 +296,7 @@ def test_shear_turns_with_the_load():
 
 
 def test_pressing_alone_shears_towards_or_from_the_centre():
-    """Body 2, the more compliant, is drawn in under pressure and friction holds it back."""
+    """Pressure draws in body 2, the more compliant one, and friction resists this."""
     for build, cells in ((sphere, 24), (cylinder, 100)):
         contact, height = build(cells, 0.4, 0.4)
         state = contact.solve(height, None, loads())
@@ -310,7 +311,7 @@ def test_pressing_alone_shears_towards_or_from_the_centre():
 # -- energy -----------------------------------------------------------------------------------
 @pytest.mark.parametrize("build", [sphere, cylinder])
 def test_dissipation_is_the_work_of_the_shear_forces_less_what_is_stored(build):
-    """Per increment: -Σ q·Δs S = Q·Δδ + Mz Δφz - Σ q·Δu S >= 0."""
+    """In each increment -Σ q·Δs S = Q·Δδ + Mz Δφz - Σ q·Δu S >= 0."""
     contact, height = build(24 if build is sphere else 100, 0.4, 0.4)
     path = [loads(k / 3 * P) for k in (1, 2, 3)]
     path += [loads(Qx=0.3 * P * np.sin(angle)) for angle in np.linspace(0.5, 6.0, 8)]
@@ -355,7 +356,7 @@ def test_a_large_imposed_shift_slides_everywhere():
 
 
 def test_an_imposed_mismatch_shears_the_contact():
-    """A stretch of the surfaces by bulk stress is resisted by antisymmetric shear."""
+    """Antisymmetric shear resists a stretch of the surfaces by bulk stress."""
     contact, height = cylinder(100, 0.2, 0.5)
     first = contact.solve(height, None, loads())
     offset = -first.displacement[:2]

@@ -41,7 +41,7 @@ def test_friction_must_make_sense(friction):
         ({"height": np.full((8, 8), np.nan)}, "heights hold NaN"),
         ({"height": np.zeros((8, 9))}, "heights have shape"),
         ({"offset": np.full((2, 8, 8), np.inf)}, "offsets hold NaN"),
-        ({"compliance": np.full((8, 8), -1.0)}, "wear rate's sign"),
+        ({"compliance": np.full((8, 8), -1.0)}, "sign of the wear rate"),
         ({"values": loads(np.nan)}, "values hold NaN"),
         ({"values": loads(-1.0)}, "pulls"),
         ({"values": loads(My=1e3)}, "outside the cells"),
@@ -78,7 +78,7 @@ def test_a_shear_force_above_friction_is_refused_at_once():
 
 
 def test_a_torque_above_friction_is_reported_with_the_largest(monkeypatch):
-    """3π µPa/16 for similar bodies: here the pressure differs a little from Hertz's."""
+    """The limit is 3π µPa/16 for similar bodies; the pressure differs a little from Hertz's."""
     monkeypatch.setattr(coupled, "ITERATIONS", 150)
     contact, height = sphere(24, 0.2, 0.5)
     radius = contact.grid.size[0] / 2.6

@@ -1,4 +1,4 @@
-"""Everything that the library raises has one base."""
+"""The exceptions of the library have a common base class."""
 
 import ast
 import pickle

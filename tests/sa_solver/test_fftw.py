@@ -1,4 +1,4 @@
-"""pyFFTW loads without what it is not used for, and has it for who asks."""
+"""pyFFTW loads without the interfaces that are not used, and provides them on access."""
 
 import subprocess
 import sys

@@ -1,4 +1,4 @@
-"""The largest shear load that friction can carry: closed forms, search, properties."""
+"""Largest shear load that friction can carry: closed forms, search, properties."""
 
 import numpy as np
 import pytest
@@ -15,7 +15,7 @@ RADIUS = np.hypot(GRID.x, GRID.y)
 
 
 def share(limit, loads, grid=GRID):
-    """Largest factor of (Qx, Qy, Mz)."""
+    """Return the largest factor of (Qx, Qy, Mz)."""
     modes = PlanarModes.on(grid)
     pressed = limit > 0.0
     target = np.array(loads) / (modes.lengths * grid.cell_area)
@@ -45,7 +45,7 @@ def test_pure_torsion(limit, ratio):
 @settings(max_examples=20, deadline=None, derandomize=True)
 @given(st.integers(0, 2**32 - 1))
 def test_combined_loads_against_a_search(seed):
-    """The bound is the least over all sliding velocities that do unit work."""
+    """The bound is the minimum over all sliding velocities that do unit work."""
     rng = np.random.default_rng(seed)
     grid = Grid((7, 6), (0.1, 0.2))
     limit = rng.exponential(size=grid.shape) * (rng.random(grid.shape) < 0.6)
@@ -86,7 +86,7 @@ def test_the_limit_surface_is_convex():
 
 
 def test_a_load_that_the_cells_cannot_feel():
-    """One cell carries no moment about itself."""
+    """A single cell carries no moment about itself."""
     limit = np.zeros(GRID.shape)
     limit[150, 100] = 1.0
     assert share(limit, (0.0, 0.0, 1.0)) == 0.0

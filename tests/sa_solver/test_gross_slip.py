@@ -1,4 +1,4 @@
-"""Gross slip by energies: they are met, and the limit of uniform pressure is exact."""
+"""Gross slip by energies: the energies are met, and uniform pressure is the exact limit."""
 
 from types import SimpleNamespace
 
@@ -27,9 +27,9 @@ def slide(limit, energy, force, offset=REST, direction="energies", half_space=HA
         x, y = map(float, shift)
         twist = {} if half_space.grid.line else {"twist": 0.0}
         state = contact.solve(limit, offset, shift_x=x, shift_y=y, **twist, tolerance=tolerance)
-        spent = -np.sum(state.shear * state.slip, axis=(1, 2)) * area
+        dissipation = -np.sum(state.shear * state.slip, axis=(1, 2)) * area
         states.append(state)
-        return np.array([state.Qx, state.Qy]), spent
+        return np.array([state.Qx, state.Qy]), dissipation
 
     carried = float(limit.sum()) * area
     slip = gross_slip(solve, carried, np.array(energy), np.array(force), 1e-9, direction)
@@ -54,7 +54,7 @@ def test_energies_and_signs_are_met(signs):
 
 
 def test_the_implied_force_is_all_that_friction_carries():
-    """In the direction whose cos² and sin² share the energy."""
+    """The force acts in the direction whose cos² and sin² are the shares of the energy."""
     carried = BALL.sum() * GRID.cell_area
     state = slide(BALL, (30.0, 10.0), (1.0, 1.0)).state
     assert np.hypot(state.Qx, state.Qy) == pytest.approx(carried, rel=2e-3)
@@ -63,7 +63,7 @@ def test_the_implied_force_is_all_that_friction_carries():
 
 
 def test_uniform_pressure_slides_by_energy_over_friction():
-    """Δδ = Ed/µP + Σ q·K q S/µP: what slides, and the elastic part before it."""
+    """Δδ = Ed/µP + Σ q·K q S/µP: the sliding distance and the elastic part before it."""
     limit = np.full(GRID.shape, 50.0)
     carried = limit.sum() * GRID.cell_area
     state = slide(limit, (40.0, 0.0), (1.0, 0.0)).state
@@ -81,7 +81,7 @@ def test_from_a_state_that_slid_the_other_way():
 
 
 def test_a_share_that_no_direction_has_is_reported():
-    """Poisson's ratio couples x and y: some energy goes across even if none is asked for."""
+    """Poisson's ratio couples x and y, so that some energy is dissipated along both."""
     slid = slide(BALL, (2.0, 0.0), (1.0, 1.0))
     assert energies(slid.state).sum() == pytest.approx(2.0, rel=1e-5)
     assert 1e-5 < slid.error < 0.2
@@ -103,7 +103,10 @@ def test_solves_stay_few(monkeypatch):
 
 @pytest.mark.parametrize("known", [False, True])
 def test_a_force_that_turns_less_than_the_motion_takes_few_solves(known):
-    """By 0.3 of what the motion turns; correcting by all that is missing would take 40 solves."""
+    """The force turns by 0.3 of the angle of the motion.
+
+    Corrections by the whole missing angle would take 40 solves.
+    """
     solves = []
 
     def solve(shift, tolerance):
@@ -121,14 +124,14 @@ def test_a_force_that_turns_less_than_the_motion_takes_few_solves(known):
 
 @pytest.mark.parametrize("energy", [0.1, 0.01])
 def test_a_contact_that_begins_to_slide_meets_its_energy(energy):
-    """Where a sixth or a third of the cells still stick, a motion dissipates far less than µP."""
+    """Where a sixth or a third of the cells still stick, a motion dissipates much less than µP."""
     slid = slide(BALL, (energy, 0.0), (1.0, 0.0))
     assert energies(slid.state).sum() == pytest.approx(energy, rel=1e-6)
     assert slid.state.sticking[BALL > 0.0].any()
 
 
 def test_the_force_keeps_its_direction():
-    """Whatever the shares of the energy are; their sum is met."""
+    """The direction is kept for any shares of the energy, and the sum of the energy is met."""
     state = slide(BALL, (2.0, 3.0), (40.0, -10.0), direction="force").state
     assert energies(state).sum() == pytest.approx(5.0, rel=1e-5)
     assert state.Qy / state.Qx == pytest.approx(-0.25, rel=1e-4)

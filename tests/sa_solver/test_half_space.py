@@ -46,12 +46,12 @@ def tractions(grid, count=1, seed=0):
 
 
 def assert_same(computed, expected, accuracy=ROUNDING):
-    """Equal to ``accuracy`` of the largest value."""
+    """Assert that two fields agree to ``accuracy`` of the largest value."""
     np.testing.assert_allclose(computed, expected, rtol=0, atol=accuracy * np.abs(expected).max())
 
 
 def kernel(grid, pair, distances, datum):
-    """All nine influence coefficients ``(3, 3, ...)`` at steps ``distances`` along x and y."""
+    """Return all influence coefficients ``(3, 3, ...)`` at ``distances`` in cells along x and y."""
     edges = [
         np.append(steps - 0.5, steps[-1] + 0.5) * pitch
         for steps, pitch in zip(distances, grid.pitch, strict=True)
@@ -66,7 +66,7 @@ def kernel(grid, pair, distances, datum):
 
 
 def dense_operator(grid, pair, datum=None):
-    """K as a matrix ``(3 n, 3 n)``, from the influence coefficients alone."""
+    """Return K as a matrix ``(3 n, 3 n)``, from the influence coefficients alone."""
     datum = 2.0 * grid.size[0] if datum is None else datum
     distances = [np.arange(1 - n, n) for n in grid.shape]
     coefficients = kernel(grid, pair, distances, datum)
@@ -77,9 +77,9 @@ def dense_operator(grid, pair, datum=None):
 
 
 def circulant(half_space, traction):
-    """K on the padded grid made periodic, by complex transforms of the whole kernel.
+    """Return K on the padded periodic grid, by complex transforms of the whole kernel.
 
-    As far from one image as from the next, the displacement is the mean of both.
+    At the same distance from two images, the displacement is the mean of both.
     """
     grid, period = half_space.grid, half_space.padded
     distances = [np.arange(-(m // 2), m // 2 + 1) for m in period]
@@ -95,7 +95,7 @@ def circulant(half_space, traction):
 
 
 def symbols(half_space):
-    """The matrix of symbols ``(mx, my//2 + 1, 3, 3)``."""
+    """Return the matrix of symbols ``(mx, my//2 + 1, 3, 3)``."""
     rows = [[half_space.symbol(i, j) for j in ALL] for i in ALL]
     return np.moveaxis(np.array(rows), (0, 1), (-2, -1))
 
@@ -130,7 +130,10 @@ def test_parts_are_those_of_the_full_vector(grid, pair):
 @pytest.mark.parametrize("grid", [Grid((16, 13), (0.3, 0.5)), Grid.strips(2.0, 16)])
 @pytest.mark.parametrize(("cells", "larger"), [((9, 7), 1.0), ((8, 6), 2.0), ((5, 4), 3.1)])
 def test_coefficients_from_a_finer_grid_are_those_of_the_grid(grid, cells, larger):
-    """Of boxes in it, and of larger cells in the same proportion, which is what lines have not."""
+    """Boxes of the grid share coefficients, and larger cells of the same proportions.
+
+    Lines do not.
+    """
     if grid.line:
         other = Grid.strips(larger * grid.pitch[0] * cells[0], cells[0])
     else:
@@ -165,7 +168,7 @@ def test_swapping_the_bodies_changes_the_sign_of_the_cross_terms_alone(grid):
 @every_grid
 @pytest.mark.parametrize("pair", [DISSIMILAR, STRONGEST])
 def test_reciprocity(grid, pair):
-    """Betti: the work of one traction on the displacement of another is mutual."""
+    """Betti: the work of either traction on the displacement of the other is the same."""
     first, second = tractions(grid, 2)
     half_space = HalfSpace(grid, pair)
     displacement = half_space.displacement(second)
@@ -177,7 +180,7 @@ def test_reciprocity(grid, pair):
 @every_small_grid
 @pytest.mark.parametrize("axis", [X, Y])
 def test_mirrored_tractions_give_mirrored_displacements(grid, axis):
-    """The component along the mirrored direction changes sign, the others do not."""
+    """The component along the mirrored direction changes its sign; the others do not."""
     (traction,) = tractions(grid)
     half_space = HalfSpace(grid, DISSIMILAR)
     signs = np.ones((3, 1, 1))
@@ -226,14 +229,14 @@ def test_self_compliance_is_the_displacement_of_a_loaded_cell(grid):
 
 
 def hertz_disc(cells):
-    """Grid just larger than the unit disc, and √(1-r²) on it."""
+    """Return a grid just larger than the unit disc, and √(1-r²) on it."""
     grid = Grid.covering((2.2, 2.2), (cells, cells))
     return grid, np.sqrt(np.maximum(0.0, 1.0 - grid.x**2 - grid.y**2))
 
 
 @pytest.mark.parametrize(("cells", "accuracy"), [(32, 4e-3), (128, 5e-4)])
 def test_shear_of_hertzian_shape(cells, accuracy):
-    """Johnson eqs 3.91a, b, of both bodies together; the edge leaves O(pitch^1.5)."""
+    """Johnson eqs 3.91a, b hold for both bodies together; the error at the edge is O(pitch^1.5)."""
     grid, profile = hertz_disc(cells)
     pair = DISSIMILAR
     s, v = pair.shear, pair.poisson
@@ -247,7 +250,7 @@ def test_shear_of_hertzian_shape(cells, accuracy):
 
 @pytest.mark.parametrize(("cells", "accuracy"), [(32, 4e-3), (128, 5e-4)])
 def test_pressure_of_hertzian_shape_pulls_the_softer_surface_inwards(cells, accuracy):
-    """Johnson eqs 3.41a, b: u_r = -(1-2ν)/(6 G) p0 [1 - (1-r²)^1.5] / r, body 2 less body 1."""
+    """Johnson eqs 3.41a, b: u_r = -(1-2ν)/(6 G) p0 [1 - (1-r²)^1.5] / r, body 2 minus body 1."""
     grid, profile = hertz_disc(cells)
     pair = DISSIMILAR
     squares = grid.x**2 + grid.y**2
@@ -266,7 +269,10 @@ def test_pressure_of_hertzian_shape_pulls_the_softer_surface_inwards(cells, accu
 
 @pytest.mark.parametrize(("cells", "accuracy"), [(50, 4e-3), (400, 1.8e-4)])
 def test_line_load_of_hertzian_shape(cells, accuracy):
-    """Parabola under the load (Johnson eq. 4.45), -∫ ln|s/L| p ds at its centre, and the jump."""
+    """The displacement is a parabola under the load (Johnson eq. 4.45).
+
+    At the centre it is -∫ ln|s/L| p ds, and the tangential displacement has a jump in slope.
+    """
     grid, datum = Grid.strips(2.2, cells), 5.0
     x, pair = grid.x, DISSIMILAR
     profile = np.sqrt(np.maximum(0.0, 1.0 - x**2))
@@ -303,7 +309,7 @@ def test_a_datum_shorter_than_the_grid_is_refused(datum):
 @pytest.mark.parametrize("poisson", [0.0, 0.1, 0.3, 0.5])
 @pytest.mark.parametrize("rigid_below", [True, False])
 def test_symbol_is_positive_definite(grid, poisson, rigid_below):
-    """At every frequency, with β up to 0.5 and the datum as near as it may be.
+    """The symbol is positive at every frequency, for β up to 0.5 and the smallest datum.
 
     Otherwise neither the resolvent nor the preconditioner would be positive definite.
     """
@@ -316,7 +322,7 @@ def test_symbol_is_positive_definite(grid, poisson, rigid_below):
 @every_small_grid
 @pytest.mark.parametrize("pair", [DISSIMILAR, STRONGEST])
 def test_strain_energy_is_positive(grid, pair):
-    """Of every traction: the smallest eigenvalue of K summed directly."""
+    """The energy of every traction is positive: the smallest eigenvalue of a direct K is."""
     assert np.linalg.eigvalsh(dense_operator(grid, pair, grid.size[0])).min() > 0.0
 
 
@@ -343,7 +349,7 @@ def test_resolvent_inverts_the_circulant(grid, components):
 
 @every_small_grid
 def test_circulant_is_the_half_space_on_the_grid(grid):
-    """So that what the resolvent inverts is the operator, where the padding is free of traction."""
+    """The resolvent inverts the operator where the padding carries no traction."""
     half_space = HalfSpace(grid, DISSIMILAR)
     traction = np.zeros((3, *half_space.padded))
     nx, ny = grid.shape
@@ -363,7 +369,7 @@ def test_resolvent_is_symmetric_and_positive(grid, components):
     mutual = np.vdot(resolvent.solve(first), second)
     assert np.vdot(first, solved) == pytest.approx(mutual, abs=1e-13 * scale)
     assert np.vdot(second, solved) > 0.0
-    # Never stiffer than 1/ρ, which bounds the splitting's step.
+    # The resolvent is never stiffer than 1/ρ, which bounds the step of the splitting.
     assert np.linalg.norm(solved) <= np.linalg.norm(second) / resolvent.shift.min() * (
         1.0 + ROUNDING
     )
@@ -377,7 +383,7 @@ def test_repeated_half_spaces_give_the_same_bits():
 
 
 def test_parts_share_transforms_without_disturbing_each_other():
-    """In any order of calls, as each leaves its spectra behind."""
+    """The result does not depend on the order of calls, which leave their spectra behind."""
     grid = GRIDS["even"]
     (traction,) = tractions(grid)
     half_space, fresh = HalfSpace(grid, DISSIMILAR), HalfSpace(grid, DISSIMILAR)

@@ -1,4 +1,4 @@
-"""Histories: what is chosen and why, legs in one step, errors measured and their rate."""
+"""Load histories: the choice of method, legs in one step, measured errors and their rate."""
 
 from dataclasses import replace
 from itertools import pairwise
@@ -33,7 +33,7 @@ def cylinder(cells=128):
 
 
 def path(shares, press=3, strain=None, turned=0.0):
-    """Pressing in a few increments, then shear forces."""
+    """Return a path with a few pressing increments, followed by shear forces."""
     shares = np.array(shares)
     values = np.zeros((press + len(shares), 6))
     values[:press, 0] = LOAD * np.arange(1, press + 1) / press
@@ -78,7 +78,7 @@ def test_legs_in_one_step_are_exact_where_slip_keeps_its_direction(contact):
 
 
 def apart(marched, reference, friction=FRICTION):
-    """Error of the last shear, as the history tells it."""
+    """Return the error of the last shear, in the norm of the history."""
     last, true = marched.states[-1], reference.states[-1]
     return np.hypot(*(last.shear - true.shear)).sum() / (friction * last.pressure.sum())
 
@@ -135,7 +135,7 @@ def test_auto_says_why_it_takes_every_increment(change, reason):
 
 
 def turned(steps):
-    """A load that turns in the plane."""
+    """Return a path whose shear load turns in the plane."""
     angle = np.linspace(0.0, 0.5 * np.pi, steps + 1)
     values = np.zeros((steps + 2, 6))
     values[:, 0] = LOAD
@@ -145,7 +145,7 @@ def turned(steps):
 
 
 def test_increments_of_a_load_that_turns_are_split_as_accuracy_asks():
-    """Backward steps are of first order, and so is their estimate."""
+    """Backward steps and their error estimate are of first order."""
     half_space, height = ball(0.3, 12)
     given, rough, finest = (
         march_history(half_space, height, turned(2), FRICTION, **settings)
@@ -158,7 +158,7 @@ def test_increments_of_a_load_that_turns_are_split_as_accuracy_asks():
 
 
 def both_rising():
-    """Pressed, pressed more and sheared at once, and back."""
+    """Return values of a path that is pressed, then pressed more and sheared, and unloaded."""
     values = np.zeros((3, 6))
     values[:, 0], values[:, 1] = [40.0, 80.0, 40.0], [0.0, 20.0, 0.0]
     return values
@@ -176,7 +176,7 @@ def round_an_ellipse(steps=12):
     ("values", "parts", "within"), [(both_rising(), 32, 0.01), slow(round_an_ellipse(), 24, 0.03)]
 )
 def test_energy_has_an_error_of_its_own(values, parts, within):
-    """Where the shear is within 2 % of µP at once, 29 and 4 % of the energy may be missing."""
+    """When the shear is within 2 % of µP, 29 and 4 % of the energy may still be missing."""
     material = Material(115e3, 0.29)
     grid = Grid.covering((0.48, 0.48), (16, 16))
     half_space, height = HalfSpace(grid, ElasticPair(material, material)), grid.x**2 / 20.0
@@ -198,7 +198,7 @@ def test_energy_has_an_error_of_its_own(values, parts, within):
 
 @pytest.mark.parametrize("friction", [0.5, slow(0.3)])
 def test_unlike_bodies_pressed_in_one_increment_stick_as_those_of_a_growing_load(friction):
-    """Spence 1968: c/a of any profile is that of a flat strip, which has nothing to refine."""
+    """Spence 1968: c/a of any profile is that of a flat strip, which needs no refinement."""
     pair = ElasticPair(Material(np.inf, 0.3), Material(115e3, 0.0))
     grid = Grid.strips(2.0, 200)
     pressed = ContactLoadPath(np.array([[LOAD, 0.0, 0.0, 0.0, 0.0, 0.0]]))
@@ -217,13 +217,13 @@ def test_unlike_bodies_pressed_in_one_increment_stick_as_those_of_a_growing_load
     assert share == pytest.approx(punch, abs=0.03)
     assert split.error < 0.02
     assert split.parts >= 4
-    # What a state says of its increment is said of all its parts: less slips, and less is lost.
+    # The slip and the energy of a state are those of all parts of its increment, and are smaller.
     assert 0.0 < split.states[0].energy.sum() < given.states[0].energy.sum()
     assert split.states[0].convolutions > 2 * given.states[0].convolutions
 
 
 def test_pressing_and_shearing_at_once_is_not_pressing_first():
-    """Loads in a fixed proportion below µ stick all over; µP is on the rim if P comes first."""
+    """Proportional loads below µ stick everywhere; if P comes first, µP is reached at the rim."""
     half_space, height = ball(0.0, 24)
     marched = march_history(half_space, height, path([0.5], press=1), FRICTION)
     assert marched.method == "reversals"
@@ -246,7 +246,7 @@ def test_a_path_of_many_increments_is_split_once_at_most(monkeypatch):
 
 
 def test_first_loading_of_a_line_contact_is_two_normal_problems(monkeypatch):
-    """The same as Newton's method finds, and as the reference makes of any pressure solver."""
+    """Newton's method and the reference with any pressure solver find the same."""
     half_space, _ = cylinder(256)
     grid = half_space.grid
     height = np.maximum(np.abs(grid.x) - 0.4, 0.0) ** 2 / 20.0
@@ -268,7 +268,7 @@ def test_first_loading_of_a_line_contact_is_two_normal_problems(monkeypatch):
         assert two.energy == pytest.approx(one.energy, rel=1e-6, abs=1e-15)
         assert two.resultants == pytest.approx(loading.values[-1], rel=1e-8, abs=1e-8 * LOAD)
         np.testing.assert_array_equal(two.sticking, one.sticking)
-        # Those of shear have two components, those of pressure one.
+        # Convolutions of shear have two components, those of pressure one.
         unsheared = replace(loading, values=loading.values * np.eye(6)[0])
         pressed = march_history(
             half_space, height, unsheared, FRICTION, history="full", tolerance=1e-10
@@ -283,8 +283,8 @@ def test_first_loading_of_a_line_contact_is_two_normal_problems(monkeypatch):
     np.testing.assert_allclose(two.shear[0], expected, atol=1e-6 * np.abs(expected).max())
 
 
-def test_progress_tells_what_is_done_of_all_marches():
-    """In one part and in two: 5 of 15, and on from there to the end."""
+def test_progress_counts_all_marches():
+    """With one part and then two, the first march is 5 of 15, and the second the rest."""
     half_space, height = cylinder(32)
     shares = []
     march_history(

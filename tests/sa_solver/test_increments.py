@@ -1,4 +1,4 @@
-"""Sums over increments: both orders of summation, the rate of convergence, and what they leave."""
+"""Sums over increments: both orders of summation, the rate of convergence, estimated errors."""
 
 import numpy as np
 import pytest
@@ -24,7 +24,7 @@ def test_a_cycle_begins_where_it_ends() -> None:
 
 
 def test_increments_and_states_add_up_to_the_same() -> None:
-    """Also where bodies part on the way, which counts for none on either side."""
+    """Both sums are the same also where bodies separate, which does not count in either."""
     rng = np.random.default_rng(3)
     pressure, slip = rng.random((2, 7, 5))
     loaded = np.array([1, 1, 0, 1, 1, 1, 1], dtype=bool)
@@ -40,10 +40,11 @@ def test_work_is_against_the_slip() -> None:
 
 
 def cycle(count: int, begins: float = 0.0) -> tuple[Array, Array, Array]:
-    """Pressure, slip and exact Σ p |ds| of places that slide out and back in ``count`` increments.
+    """Return pressure, slip and exact Σ p |ds| of places that slide out and back in a cycle.
 
-    On the way out, from 0 to 1, a place slides from t = ``begins`` times its own number on; on the
-    way back all the time. Pressure is 1 + t² on the way out, and falls the same way back.
+    The cycle has ``count`` increments. On the way out, t runs from 0 to 1 and a place slides from t
+    = ``begins`` times its number on; on the way back it always slides. The pressure is 1 + t² on
+    the way out and falls in the same way on the way back.
     """
     half = count // 2
     t = np.linspace(0.0, 1.0, half + 1)[:, None]
@@ -70,7 +71,7 @@ def test_second_order(begins: float) -> None:
     rates = np.log2(np.abs(errors[:-1]) / np.abs(errors[1:]))
     assert rates.min() > 1.6
     assert rates.mean() > 1.9
-    # The pressure at the end alone: first order, of several times the error.
+    # The pressure at the end alone is of first order, with several times the error.
     at_end = np.sum(pressure * np.abs(slip[:, 0]), axis=0)
     assert abs(np.mean(at_end - exact)) > 5.0 * abs(errors[-1])
 
@@ -81,16 +82,16 @@ def test_the_estimate_is_near_the_error(begins: float, count: int) -> None:
     pressure, slip, exact = cycle(count, begins)
     error = errors_of_increments(pressure, slip, np.ones(count, dtype=bool))
     assert error is not None
-    told = float(error.sum(axis=0).mean())
+    estimate = float(error.sum(axis=0).mean())
     true = float(np.mean(summed(pressure, slip) - exact))
-    assert 1.0 / 3.0 < told / true < 3.0
+    assert 1.0 / 3.0 < estimate / true < 3.0
 
 
 @pytest.mark.parametrize("apart", [0.0, 2.0])
 def test_slip_that_is_left_when_bodies_part_is_missed(apart: float) -> None:
-    """Out under a load of 1 that falls to 0 in the last increment, in which all slides back.
+    """The load is 1 on the way out and falls to 0 in the last increment, in which all slides back.
 
-    Worn bodies have come some way ``apart`` where they meet again, which friction has no share in.
+    Worn bodies have moved ``apart`` where they meet again, without friction.
     """
     count = 5
     pressure = np.ones((count, 3))
@@ -101,18 +102,18 @@ def test_slip_that_is_left_when_bodies_part_is_missed(apart: float) -> None:
     loaded = pressure[:, 0] > 0.0
     error = errors_of_increments(pressure, slip, loaded)
     assert error is not None
-    # Pressure that falls evenly over the way back of 1 does work of a half, which is left out; that
-    # of the first increment grows from none. Nobody knows where within that they meet.
+    # Pressure that falls linearly over the way back of 1 does work of a half, which is missing. In
+    # the first increment the pressure grows from 0, and where the bodies meet is unknown.
     np.testing.assert_allclose(error[-1], -0.5 * (1.0 - 0.25), rtol=1e-12)
 
 
-def test_increments_that_all_turn_tell_nothing() -> None:
+def test_increments_that_all_turn_have_no_error_estimate() -> None:
     pressure, slip, _ = cycle(2)
     assert errors_of_increments(pressure, slip, np.ones(2, dtype=bool)) is None
 
 
-def test_a_few_cells_that_go_one_way_tell_nothing_of_the_others() -> None:
-    """Two increments that turn wherever much is worn; one cell creeps along one way in both."""
+def test_a_few_cells_that_go_one_way_give_no_estimate_for_the_others() -> None:
+    """Two increments reverse the slip where most is worn; one cell creeps in one direction."""
     pressure = np.array([[2.0, 3.0, 1.0], [1.0, 2.0, 1.0]])
     slip = np.zeros((2, 2, 3))
     slip[:, 0] = [[1.0, 1.0, 1e-3], [-1.0, -1.0, 1e-3]]
@@ -122,7 +123,7 @@ def test_a_few_cells_that_go_one_way_tell_nothing_of_the_others() -> None:
 
 
 def test_values_of_the_nearest_cells_keep_symmetry():
-    """Around a square of cells many are equally near: no side is preferred."""
+    """Around a square of cells many are at the same distance, and no side is preferred."""
     values = np.zeros((8, 8))
     values[2:6, 2:6] = np.array([4.0, 1.0, 1.0, 4.0])[:, None] + [3.0, 2.0, 2.0, 3.0]
     found = of_nearest(values, values > 0.0, (0.1, 0.1))

@@ -28,22 +28,26 @@ POINTS = {
     "corner": (0.4, 0.25),
     "opposite corner": (-0.4, -0.25),
     "on the line of an edge": (0.9, 0.25),
-    "beside": (0.0, 0.6),
+    "next to it": (0.0, 0.6),
     "outside": (-0.7, 1.1),
     "far": (6.0, -9.0),
 }
 
 
 def point_kernel(x, y, body):
-    """Half-space z > 0 under forces along x, y and z at the origin; columns are forces.
+    """Return the displacement of the half-space z > 0 under unit forces at the origin.
 
-    Johnson 1985, eqs 3.75 (Cerruti) and 3.18 (Boussinesq), at the surface.
+    The columns are the forces along x, y and z. Johnson 1985, eqs 3.75 (Cerruti) and 3.18
+    (Boussinesq), at the surface.
     """
     r, z = np.hypot(x, y), 0.0
     k = 1.0 - 2.0 * body.poisson
 
     def cerruti(a, b):
-        """Displacement along the force, across it and along z; ``a`` is along the force."""
+        """Return the displacement along the force, across it and along z.
+
+        ``a`` is the coordinate along the force.
+        """
         return (
             1.0 / r + a**2 / r**3 + k * (1.0 / (r + z) - a**2 / (r * (r + z) ** 2)),
             a * b / r**3 - k * a * b / (r * (r + z) ** 2),
@@ -62,9 +66,10 @@ def point_kernel(x, y, body):
 
 
 def line_kernel(x, body):
-    """Half-plane z > 0 under line forces along x, y and z at the origin; columns are forces.
+    """Return the displacement of the half-plane z > 0 under unit line forces at the origin.
 
-    Johnson 1985, eqs 2.22 and 2.19; along y antiplane shear, where τ = q/(π r) on half circles.
+    The columns are the forces along x, y and z. Johnson 1985, eqs 2.22 and 2.19; along y antiplane
+    shear, where τ = q/(π r) on half circles.
     """
     E, nu = body.young, body.poisson
     logarithm = -2.0 * (1.0 - nu**2) / (np.pi * E) * np.log(abs(x) / DATUM)
@@ -74,10 +79,10 @@ def line_kernel(x, body):
 
 
 def relative(kernel, pair, *point):
-    """``u_2 - u_1`` under the tractions on body 2.
+    """Return ``u_2 - u_1`` under the tractions on body 2.
 
-    Body 2 is the half-space of the kernel. Body 1 feels the opposite tractions and lies in z < 0:
-    the mirror z → -z takes it to the kernel's half-space and its displacement back.
+    Body 2 is the half-space of the kernel. Body 1 carries the opposite tractions and lies in z < 0:
+    the mirror z → -z maps it to the kernel's half-space, and its displacement back.
     """
     mirror = np.array([1.0, 1.0, -1.0])
     signs = (mirror[:, None] * mirror).reshape(3, 3, *[1] * (np.ndim(point[0])))
@@ -85,7 +90,7 @@ def relative(kernel, pair, *point):
 
 
 def rectangle(point, pair, size=SIZE):
-    """All nine coefficients (3, 3) at ``point`` from the centre of a rectangle."""
+    """Return all coefficients (3, 3) at ``point`` from the centre of a rectangle."""
     edges = [np.array([c - 0.5 * s, c + 0.5 * s]) for c, s in zip(point, size, strict=True)]
     return np.array(
         [[rectangle_influence(*edges, pair, i, j)[0, 0] for j in range(3)] for i in range(3)]
@@ -100,17 +105,17 @@ def strip(x, pair, width, datum=DATUM):
 
 
 def rectangle_by_quadrature(point, pair):
-    """The kernel integrated along the rectangle's boundary.
+    """Return the kernel integrated over the rectangle, by its boundary.
 
-    It falls as 1/r, so that over the triangle from the point to a piece of boundary its integral is
-    its value on the boundary times twice the triangle's area.
+    The kernel falls as 1/r. Its integral over the triangle between the point and a piece of the
+    boundary is therefore its value on the boundary times twice the area of the triangle.
     """
     corners = np.array(point) + 0.5 * np.array(SIZE) * [[-1, -1], [1, -1], [1, 1], [-1, 1]]
     total = np.zeros((3, 3))
     for begin, end in zip(corners, np.roll(corners, -1, axis=0), strict=True):
         twice_area = begin[0] * end[1] - begin[1] * end[0]
         if abs(twice_area) < 1e-14:
-            continue  # the point is on the line of this edge
+            continue  # The point is on the line of this edge.
 
         def on_edge(t, begin=begin, end=end):
             return relative(point_kernel, pair, *(begin + t * (end - begin)))
@@ -129,7 +134,7 @@ def test_a_rectangle_is_the_integral_of_point_forces(pair, place):
     np.testing.assert_allclose(rectangle(point, pair), expected, rtol=0, atol=accuracy)
 
 
-@pytest.mark.parametrize("place", ["on the line of an edge", "beside", "outside", "far"])
+@pytest.mark.parametrize("place", ["on the line of an edge", "next to it", "outside", "far"])
 def test_outside_the_rectangle_gauss_points_find_the_same(place):
     x, w = np.polynomial.legendre.leggauss(40)
     sources = [c - 0.5 * s * x for c, s in zip(POINTS[place], SIZE, strict=True)]
@@ -141,7 +146,7 @@ def test_outside_the_rectangle_gauss_points_find_the_same(place):
 
 
 def test_centre_of_a_square():
-    """∬ 1/r = 4 ln(1+√2) s (Johnson eq. 3.26), of which x²/r³ and y²/r³ are one half each."""
+    """∬ 1/r = 4 ln(1+√2) s (Johnson eq. 3.26); x²/r³ and y²/r³ are one half of it each."""
     pair = DISSIMILAR
     integral = 4.0 * np.log(1.0 + np.sqrt(2.0)) * 0.6
     tangential = (pair.shear - 0.5 * pair.poisson) * integral / (2.0 * np.pi)
@@ -176,13 +181,13 @@ def test_a_rectangle_is_the_sum_of_its_halves(place):
 def test_finite_on_corners_and_edges(row, column):
     edges = np.array([-1.0, 0.0, 1.0])
     coefficients = rectangle_influence(edges, edges, DISSIMILAR, row, column)
-    beside = rectangle_influence(edges + 1e-9, edges - 1e-9, DISSIMILAR, row, column)
+    shifted = rectangle_influence(edges + 1e-9, edges - 1e-9, DISSIMILAR, row, column)
     assert np.all(np.isfinite(coefficients))
-    np.testing.assert_allclose(coefficients, beside, rtol=0, atol=1e-7 * DISSIMILAR.normal)
+    np.testing.assert_allclose(coefficients, shifted, rtol=0, atol=1e-7 * DISSIMILAR.normal)
 
 
 def test_a_quarter_turn_exchanges_the_directions():
-    """x → y, y → -x."""
+    """A quarter turn maps x to y and y to -x."""
     x, y = POINTS["outside"]
     turn = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
     turned = rectangle((-y, x), DISSIMILAR, SIZE[::-1])
@@ -202,7 +207,7 @@ def test_rectangles_between_edges_are_those_taken_one_by_one():
 @pytest.mark.parametrize("pair", PAIRS)
 @pytest.mark.parametrize("x", [0.0, 0.2, 0.4, -0.4, 0.9, -5.0])
 def test_a_strip_is_the_integral_of_line_forces(pair, x):
-    """Both bodies, with the displacement of a line force zero at the datum."""
+    """Both bodies are tested; the displacement by a line force is zero at the datum."""
     width = 0.8
     breaks = sorted({x - 0.5 * width, x + 0.5 * width, 0.0 if abs(x) < 0.4 else x + 0.5 * width})
     expected = np.zeros((3, 3))
@@ -221,7 +226,7 @@ def test_a_strip_is_the_integral_of_line_forces(pair, x):
 
 @pytest.mark.parametrize("pair", PAIRS)
 def test_a_strip_is_a_very_long_rectangle_up_to_a_rigid_displacement(pair):
-    """Differences between two points, at mid-length; the ends matter as x / length."""
+    """Differences between two points at mid-length agree; the ends have an effect of x / length."""
     width, length = 0.8, 2e7
     strips = strip(1.7, pair, width) - strip(-0.2, pair, width)
     rectangles = [rectangle((x, 0.0), pair, (width, length)) for x in (1.7, -0.2)]
@@ -230,7 +235,7 @@ def test_a_strip_is_a_very_long_rectangle_up_to_a_rigid_displacement(pair):
 
 
 def test_a_farther_datum_moves_a_strip_rigidly():
-    """By F/π ln(L'/L) times the compliance, wherever the point is."""
+    """The shift is F/π ln(L'/L) times the compliance, at any point."""
     pair, width = DISSIMILAR, 0.8
     compliances = np.diag([pair.normal, pair.shear, pair.normal])
     expected = width * compliances * np.log(3.0) / np.pi
@@ -266,7 +271,7 @@ def test_swapping_the_bodies_changes_the_sign_of_the_cross_terms_alone(row, colu
 
 @pytest.mark.parametrize("place", POINTS)
 def test_a_rigid_body_adds_nothing(place):
-    """Two equal bodies give twice the direct terms of one on a rigid body, which couples too."""
+    """Two equal bodies have twice the direct terms of one on a rigid body, which couples too."""
     alone = rectangle(POINTS[place], ON_RIGID)
     both = rectangle(POINTS[place], ElasticPair(ALUMINIUM, ALUMINIUM))
     direct = np.array([[1, 1, 0], [1, 1, 0], [0, 0, 1]])

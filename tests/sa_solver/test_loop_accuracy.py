@@ -1,4 +1,4 @@
-"""What a loop says of its own errors, against closed forms."""
+"""Estimated errors of a loop, against closed forms."""
 
 import numpy as np
 import pytest
@@ -16,7 +16,7 @@ FORCE = 0.5 * SPHERE.sliding_force
 
 
 def marched(height, path, size, cells, pair=None):
-    """A loop on a square of ``size`` and its errors; ``height`` takes the radius."""
+    """Return a loop on a square of ``size`` and its errors; ``height`` takes the radius."""
     grid = Grid.covering((size, size), (cells, cells))
     pair = pair or ElasticPair(BODY, BODY)
     contact = FrictionalContact(HalfSpace(grid, pair), SPHERE.friction)
@@ -27,9 +27,9 @@ def marched(height, path, size, cells, pair=None):
 
 @pytest.mark.parametrize(("cells", "size"), [(16, 1.0), (24, 1.4), (32, 1.4)])
 def test_a_sphere_is_as_far_from_mindlin_as_said(cells, size):
-    """Grids of any number of cells across: the estimate is a bound, and no more than 8 %.
+    """The estimate is a bound of at most 8 % for any number of cells across.
 
-    With 24 the grid of half as many agrees to 1 %, by chance: 2.5 % are missing.
+    With 24 cells the grid of half as many agrees to 1 % by chance, while the error is 2.5 %.
     """
     path = LoopPath(400.0, SPHERE.displacement(FORCE), increments=6)
     loop, errors = marched(lambda r: r**2 / 20.0, path, size, cells)
@@ -40,9 +40,9 @@ def test_a_sphere_is_as_far_from_mindlin_as_said(cells, size):
 
 
 def test_a_worn_sphere_has_the_stiffness_of_its_contact():
-    """kt = 8 G* a whatever the profile of revolution (Jaeger 1995, doi:10.1007/BF00787897).
+    """Jaeger 1995: kt = 8 G* a for any profile of revolution (doi:10.1007/BF00787897).
 
-    Of a paraboloid worn flat within b the load is that of the reduction to one dimension (Heß
+    For a paraboloid worn flat within b the load follows from the reduction to one dimension (Heß
     2011): P = 2E*/R (a² d - d³/3), d² = a² - b².
     """
     a, b, radius = 0.4, 0.3, 10.0
@@ -58,7 +58,7 @@ def test_a_worn_sphere_has_the_stiffness_of_its_contact():
     loop, errors = marched(height, LoopPath(load, 0.01, increments=2), 1.0, 48)
     assert abs(loop.stiffness - stiffness) < max(errors.stiffness, 2e-3 * stiffness)
     assert errors.stiffness < 0.03 * stiffness
-    # All of it slides: µ is the coefficient, and the grid has no part in it.
+    # The whole contact slides: the friction is µ on any grid.
     assert loop.slides
     assert loop.friction == pytest.approx(0.7, rel=1e-3)
     assert errors.friction < 1e-3
@@ -72,6 +72,6 @@ def test_a_coarse_loop_that_fails_leaves_nothing_known(monkeypatch):
     loop = march_loop(contact, height, path)
     monkeypatch.setattr("sa_solver.cycles.tangential_loop.STUCK_ITERATIONS", 1)
     known = loop_errors(contact, height, path, loop)
-    # Two of the strips are at the rim.
+    # Two of the cells are at the rim.
     stiffness = loop.stiffness / 8.0 * 2.0 * grid.pitch[0] / loop.area
     assert known == LoopErrors(pytest.approx(stiffness), loop.friction, loop.energy)

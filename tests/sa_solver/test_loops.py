@@ -1,4 +1,4 @@
-"""Passes by numpy against the compiled ones: the same digits."""
+"""Loops by numpy and compiled loops give the same digits."""
 
 import subprocess
 import sys
@@ -15,13 +15,13 @@ STRAIGHT = np.zeros(2, bool)
 
 
 def spectrum(*shape):
-    """Complex numbers of every sign in rows with spare ones at their ends, as transforms have."""
+    """Return complex numbers of all signs, in rows with spare numbers at their ends."""
     parts = np.random.default_rng(shape).standard_normal((*shape[:-1], shape[-1] + 4, 2))
     return parts.view(complex)[..., : shape[-1], 0]
 
 
 def arguments(rows, columns):
-    """Each loop and what it may be given."""
+    """Return each loop with arguments for it."""
     rng = np.random.default_rng(rows)
     cells = np.flatnonzero(rng.random(rows * columns) < 0.3)
     tensors, some = rng.standard_normal((4, len(cells))), rng.standard_normal((3, len(cells)))
@@ -47,7 +47,7 @@ def arguments(rows, columns):
 
 @pytest.mark.parametrize("shape", [(8, 5), (256, 129)])
 def test_numpy_and_the_compiled_loop_give_the_same_digits(shape, monkeypatch):
-    """Of one block, and of several."""
+    """A single block and several blocks are tested."""
     compared = zip(arguments(*shape), arguments(*shape), arguments(*shape), strict=True)
     for (name, by_numpy), (_, later), (_, compiled) in compared:
         monkeypatch.setattr(loops, "PAYS", np.inf)

@@ -1,4 +1,4 @@
-"""Normal contact: closed forms, imposed resultants, warm starts, wear compliance, refusals."""
+"""Normal contact: closed forms, imposed resultants, warm starts, wear compliance, errors."""
 
 from dataclasses import replace
 
@@ -23,7 +23,7 @@ SOLVED = 1e-8
 
 
 def assert_solves(grid, height, P, Mx, My, state, compliance=0.0):
-    """Residuals from the fields alone, with a fresh convolution."""
+    """Assert small residuals from the fields alone, with a new convolution."""
     p, S = state.pressure, grid.cell_area
     displacement = HalfSpace(grid, PAIR).normal(p) + compliance * p
     rigid = state.approach + state.tilt_x * grid.y - state.tilt_y * grid.x
@@ -46,7 +46,7 @@ def sphere_on(cells):
 
 
 def flat(shape=(64, 64)):
-    """Flat 8 mm x 54 mm with rounded edges, and its height."""
+    """Return a flat of 8 mm x 54 mm with rounded edges, and its height."""
     grid = Grid.covering((10.0, 60.0), shape)
     dx = np.maximum(np.abs(grid.x) - 4.0, 0.0)
     dy = np.maximum(np.abs(grid.y) - 27.0, 0.0)
@@ -54,7 +54,7 @@ def flat(shape=(64, 64)):
 
 
 def rough(grid, amplitude):
-    """Self-affine roughness of standard deviation ``amplitude``."""
+    """Return self-affine roughness with the standard deviation ``amplitude``."""
     noise = np.fft.fft2(np.random.default_rng(0).standard_normal(grid.shape))
     wave = np.hypot(*np.meshgrid(*(np.fft.fftfreq(n) for n in grid.shape), indexing="ij"))
     field = np.fft.ifft2(noise / (wave**1.8 + 1e-2)).real
@@ -74,7 +74,10 @@ def test_sphere_on_a_fine_grid():
 
 
 def test_sphere_converges():
-    """Approach to second order, pressure (L2) to first, limited by the √ at its edge."""
+    """The approach converges with second order.
+
+    The pressure (L2) converges with first order, because of the square root at its edge.
+    """
     errors = []
     for cells in (32, 64, 128, 256):
         grid, height = sphere_on(cells)
@@ -89,8 +92,11 @@ def test_sphere_converges():
 
 @pytest.mark.parametrize("cells_off", [(3, 0), (-5, 7)])
 def test_a_moment_moves_the_paraboloid(cells_off):
-    """A paraboloid about an apex d off centre differs from a centred one by a tilt and a constant,
-    so a load with moment P d presses the same field, d further; with whole cells exactly so."""
+    """A load with the moment P d has the same pressure, shifted by d.
+
+    A paraboloid with the apex off centre by d differs from a centred one by a tilt and a constant.
+    For whole cells this is exact.
+    """
     grid = Grid.covering((1.5, 1.2), (60, 48))
     contact, height = NormalContact(HalfSpace(grid, PAIR)), SPHERE.gap(grid.x, grid.y)
     offset = np.array(cells_off) * grid.pitch
@@ -131,7 +137,7 @@ def test_flat_meets_resultants_and_law(share, eccentricity):
 
 
 def test_middle_of_a_long_flat_is_the_plane_closed_form():
-    """Profile within 3 % of the peak, peak within 1 %: discretisation, one cell at the edge."""
+    """The profile is within 3 % of the peak and the peak within 1 %, with one cell at the edge."""
     grid, height = flat((256, 64))
     state = NormalContact(HalfSpace(grid, PAIR)).solve(height, 9e4)
     profile = state.pressure[:, 32]
@@ -165,7 +171,7 @@ def test_rough_flat(amplitude):
 
 # -- starts, methods --
 def test_any_start_gives_the_same_answer():
-    """1e-8 on the gap leaves 1e-5 of the peak on single cells (they are stiffer by their size)."""
+    """1e-8 on the gap is 1e-5 of the peak on single cells, which are stiffer by their size."""
     grid, height = flat()
     contact = NormalContact(HalfSpace(grid, PAIR))
     cold = contact.solve(height, 9e4, Mx=0.0, My=9e3)
@@ -192,7 +198,7 @@ def test_a_solution_is_its_own_start():
 
 
 def test_a_worn_flat_starts_warm():
-    """Wear of 2 % of the approach between jumps: at most 25 convolutions, as a run's time asks."""
+    """With wear of 2 % of the approach between jumps a solve takes at most 25 convolutions."""
     grid, height = flat((128, 128))
     contact = NormalContact(HalfSpace(grid, PAIR))
     state = contact.solve(height, 9e4, Mx=9e4, My=0.0)
@@ -244,7 +250,7 @@ def compliances(grid):
 @pytest.mark.parametrize("kind", ["uniform", "edges", "stuck centre", "random"])
 @pytest.mark.parametrize("size", [1e-6, 1e-4, 1e-3])
 def test_implicit_wear_is_consistent(kind, size):
-    """Heights worn by D p, without compliance, carry the same pressure."""
+    """Heights worn by D p, solved without compliance, give the same pressure."""
     grid, height = flat()
     compliance = size * compliances(grid)[kind]
     contact = NormalContact(HalfSpace(grid, PAIR))
@@ -257,7 +263,7 @@ def test_implicit_wear_is_consistent(kind, size):
 
 
 def test_wear_without_end_spreads_the_load_evenly():
-    """D far above K: pressure uniform under a centred load, linear under a moment."""
+    """For D far above K the pressure is uniform under a centred load, and linear under a moment."""
     grid, height = flat((32, 32))
     compliance = np.full(grid.shape, 1e3)
     state = NormalContact(HalfSpace(grid, PAIR)).solve(

@@ -17,13 +17,13 @@ DATUM = 50.0
 
 
 def cap(grid):
-    """A blunt cap, flatter along y."""
+    """Return the gap of a blunt cap that is flatter along y."""
     return grid.x**2 / 40.0 + (grid.y - 0.1) ** 2 / 300.0
 
 
 @pytest.mark.parametrize("control", list(itertools.product(*zip(RESULTANTS, MOTIONS, strict=True))))
 def test_motions_fed_back_give_the_same_pressure(control):
-    """Whatever is imposed of each pair; 1e-8 of the gap leaves 1e-5 of the peak on a cell."""
+    """Any choice of each pair gives the same; 1e-8 of the gap is 1e-5 of the peak on a cell."""
     grid = Grid.covering((2.0, 5.0), (40, 66))
     contact = NormalContact(HalfSpace(grid, PAIR))
     forced = contact.solve(cap(grid), 400.0, 120.0, -60.0)
@@ -59,7 +59,7 @@ def test_bodies_apart_carry_nothing(motions):
 
 
 def test_a_free_tilt_turns_a_body_out_of_contact():
-    """A plane that leans into the other body at one edge: free to tilt, it does not press."""
+    """A plane that penetrates at one edge does not press if its tilt is free."""
     grid = Grid.covering((2.0, 5.0), (20, 22))
     height = 0.1 + 0.1 * grid.y + np.zeros(grid.shape)
     contact = NormalContact(HalfSpace(grid, PAIR))
@@ -109,7 +109,10 @@ def test_cylinder():
 
 
 def test_cylinder_converges():
-    """Approach to second order, pressure (L2) to first, limited by the √ at its edge."""
+    """The approach converges with second order.
+
+    The pressure (L2) converges with first order, because of the square root at its edge.
+    """
     errors = []
     for count in (64, 128, 256, 512, 1024):
         grid, state = cylinder(count)

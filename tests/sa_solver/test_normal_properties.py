@@ -25,7 +25,7 @@ shares = st.floats(-0.6, 0.6)
 
 
 def surface(grid, kind, radius, seed, roughness):
-    """A gap before loading: a cap, a flat with rounded ends, or waves, with white roughness."""
+    """Return a gap before loading: a cap, a flat with rounded ends, or waves, with white noise."""
     x, y = grid.x / grid.size[0], grid.y / grid.size[1]
     smooth = {
         "cap": x**2 + y**2,
@@ -45,9 +45,9 @@ surfaces = {
 
 
 def assert_contact(grid, pair, height, state, worn=0.0):
-    """p >= 0, no penetration, p g = 0 and resultants, from the pressure alone.
+    """Assert p >= 0, no penetration, p g = 0 and the resultants, from the pressure alone.
 
-    ``worn`` is a depth already in ``height`` that the solver counts as displacement.
+    ``worn`` is a depth in ``height`` that the solver counts as displacement.
     """
     p, S = state.pressure, grid.cell_area
     moved = HalfSpace(grid, pair).normal(p)
@@ -64,7 +64,10 @@ def assert_contact(grid, pair, height, state, worn=0.0):
 
 
 def load(grid, pair, log):
-    """From a few cells pressed to nearly all: mean pressure over E* of 1e-6 to 1e-2."""
+    """Return a load for a random number of pressed cells, from a few to nearly all.
+
+    The mean pressure over E* is 1e-6 to 1e-2.
+    """
     area = grid.size[0] * grid.size[1]
     return 1e-3 * 10.0**log * pair.contact_modulus * area
 
@@ -99,7 +102,7 @@ def test_motions_are_resisted(grid, pair, form, log, share):
 @RUNS
 @given(grids, pairs, st.fixed_dictionaries(surfaces), logs, st.floats(-2.0, 3.0))
 def test_wear_softens(grid, pair, form, log, softness):
-    """Heights worn by D p, pressed without compliance, carry the same pressure."""
+    """Heights worn by D p, pressed without compliance, give the same pressure."""
     height, half_space = surface(grid, **form), HalfSpace(grid, pair)
     compliance = np.full(grid.shape, 10.0**softness * half_space.self_compliance(2))
     contact, P = NormalContact(half_space), load(grid, pair, log)

@@ -1,4 +1,4 @@
-"""Contacts moved to and fro by normal problems alone: Mindlin, and the whole tangential problem."""
+"""Partial slip by normal problems alone, against Mindlin and the full tangential problem."""
 
 from dataclasses import replace
 
@@ -16,9 +16,9 @@ from sa_solver.types import ElasticPair, Grid, Material
 LOAD, RADIUS, FRICTION = 60.0, 47.619, 0.5
 PLAIN, STEEL, SOFT = Material(200e3, 0.0), Material(200e3, 0.3), Material(100e3, 0.3)
 CELLS = 48
-# What a grid of so many cells over a sphere's contact leaves of its stiffness and its curve.
+# Errors of stiffness and curve by the number of cells across the contact of a sphere.
 GRID_ERROR = 2e-3
-# Two solvers of the same discrete problem, each to 1e-8.
+# Two solvers solve the same discrete problem, each to 1e-8.
 SOLVED = 1e-6
 
 
@@ -32,7 +32,7 @@ def grid_of(case, cells=CELLS):
 
 
 def moved(case, cells=CELLS, height=None, **settings):
-    """The contact of a sphere, or of a ``height`` over the same grid, with its half-space."""
+    """Return the contact of a sphere, or of a ``height`` over the same grid, and its half-space."""
     grid = grid_of(case, cells)
     half_space = HalfSpace(grid, ElasticPair(case.body_1, case.body_2))
     gap = case.contact.gap(grid.x, grid.y) if height is None else height(grid)
@@ -41,13 +41,13 @@ def moved(case, cells=CELLS, height=None, **settings):
 
 
 def dented(grid):
-    """A sphere with a shallow scar and a slope, of no symmetry."""
+    """Return the gap of a sphere with a shallow scar and a slope, without symmetry."""
     scar = 3e-4 * np.exp(-((grid.x - 0.05) ** 2 + 2.0 * grid.y**2) / 0.03)
     return (grid.x**2 + grid.y**2) / (2.0 * RADIUS) + scar + 1e-4 * grid.x
 
 
 def travel_of(curve, *amplitudes):
-    """Travel of the sliders in loops of these amplitudes, for a coefficient of 1."""
+    """Return the paths of the sliders in loops of these amplitudes, for a friction of 1."""
     return sum(4.0 * np.maximum(amplitude - curve.reach, 0.0) for amplitude in amplitudes)
 
 
@@ -96,7 +96,7 @@ def test_without_poissons_ratio_it_is_the_discrete_solution(height, share):
     loop = march_loop(FrictionalContact(half_space, FRICTION), gap, path)
     force = loop.loading[1][-1]
     assert force == pytest.approx(FRICTION * curve.force[stage], rel=1e-5)
-    # The energy of the grid itself, from the cells that have slipped.
+    # The energy on the grid itself, from the cells that have slipped.
     pressure = curve.normal.pressure
     cells = 4.0 * FRICTION**2 * np.vdot(pressure, curve.slip[stage]) * half_space.grid.cell_area
     assert cells == pytest.approx(loop.energy, rel=1e-3)
@@ -124,11 +124,11 @@ def test_cells_dissipate_what_sliders_do_and_more_stages_say_so_better():
         cells = float(np.vdot(curve.normal.pressure, curve.travelled(travel)))
         cells *= half_space.grid.cell_area
         errors.append(abs(cells / float(curve.slider_load @ travel) - 1.0))
-    # Stages by their number to the power 1.5, and curves taken for straight between them.
+    # Stages are spaced with the power 1.5 of their number, and curves are linear between them.
     assert errors[2] < 0.3 * errors[1] < 0.1 * errors[0]
 
 
-def test_a_contact_that_slides_slips_everywhere_alike():
+def test_a_sliding_contact_slips_uniformly():
     curve, _, _ = moved(sphere(STEEL))
     less, more = (curve.travelled(travel_of(curve, k * curve.shift[-1])) for k in (1.5, 3.0))
     pressed = curve.normal.pressure > 0.0
@@ -147,7 +147,7 @@ def test_what_has_not_reached_its_onset_has_not_slipped():
 
 
 def test_the_last_cells_to_slip_do_so_together():
-    """Four of them in the middle, which rounding parts one after the other."""
+    """Rounding makes four cells in the middle slip one after the other."""
     curve, _, _ = moved(sphere(STEEL))
     slip = curve.slip.copy()
     middle = [k // 2 for k in slip.shape[1:]]
@@ -169,12 +169,12 @@ def test_a_flat_punch_slips_all_at_once():
 # --- what it cannot be --------------------------------------------------------------------------
 
 
-def test_unlike_bodies_and_no_load_are_refused():
+def test_dissimilar_bodies_and_no_load_are_refused():
     grid = grid_of(sphere(STEEL), 16)
     gap = (grid.x**2 + grid.y**2) / (2.0 * RADIUS)
-    unlike = NormalContact(HalfSpace(grid, ElasticPair(STEEL, SOFT)))
-    with pytest.raises(PartialSlipError, match="not alike"):
-        partial_slip_curve(unlike, gap, LOAD, tolerance=1e-8)
-    alike = NormalContact(HalfSpace(grid, ElasticPair(STEEL, STEEL)))
+    dissimilar = NormalContact(HalfSpace(grid, ElasticPair(STEEL, SOFT)))
+    with pytest.raises(PartialSlipError, match="dissimilar"):
+        partial_slip_curve(dissimilar, gap, LOAD, tolerance=1e-8)
+    similar = NormalContact(HalfSpace(grid, ElasticPair(STEEL, STEEL)))
     with pytest.raises(PartialSlipError, match=r"load P .* = 0"):
-        partial_slip_curve(alike, gap, 0.0, tolerance=1e-8)
+        partial_slip_curve(similar, gap, 0.0, tolerance=1e-8)

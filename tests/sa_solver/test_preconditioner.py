@@ -1,4 +1,4 @@
-"""The approximate inverse for conjugate gradients: symmetry, exactness where periodic, use."""
+"""Approximate inverse for conjugate gradients: symmetry, exactness for periodic fields, use."""
 
 import numpy as np
 import pytest
@@ -21,14 +21,14 @@ def as_matrix(apply, grid):
 
 
 def ramp(grid, largest):
-    """Compliance from 0 to ``largest`` across the grid."""
+    """Return a compliance from 0 to ``largest`` across the grid."""
     return largest * np.linspace(0.0, 1.0, grid.shape[0] * grid.shape[1]).reshape(grid.shape)
 
 
 @pytest.mark.parametrize("grid", GRIDS)
 @pytest.mark.parametrize("largest", [None, 1e-6, 1e-2])
 def test_preconditioner_is_symmetric_positive_definite(grid, largest):
-    """Conjugate gradients need it, with one level of compliance or several."""
+    """Conjugate gradients require it, with one level of compliance or several."""
     preconditioner = NormalPreconditioner(HalfSpace(grid, PAIR))
     if largest is not None:
         preconditioner.include(ramp(grid, largest))
@@ -39,9 +39,9 @@ def test_preconditioner_is_symmetric_positive_definite(grid, largest):
 
 @pytest.mark.parametrize("compliance", [None, 0.0, 1e-5])
 def test_on_a_periodic_half_space_it_is_the_inverse(compliance):
-    """Each displacement taken at the nearest image, and a compliance the same everywhere.
+    """The displacement is that of the nearest image, and the compliance is uniform.
 
-    On lengths that transform fast, so that no padding comes between the periods.
+    The lengths transform fast, so that there is no padding between the periods.
     """
     grid = Grid((12, 8), GRID.pitch)
     nearest = [
@@ -69,7 +69,7 @@ def test_on_a_periodic_half_space_it_is_the_inverse(compliance):
 
 
 def test_where_compliance_dominates_it_is_nearly_its_inverse():
-    """1/D interpolated linearly in ln D between three levels: the chord of a convex function."""
+    """1/D is interpolated linearly in ln D between three levels: the chord of a convex function."""
     compliance = np.geomspace(1.0, 100.0, 84).reshape(GRID.shape)
     preconditioner = NormalPreconditioner(HalfSpace(GRID, PAIR))
     preconditioner.include(compliance)
@@ -103,7 +103,7 @@ def condition(matrix):
 
 @pytest.mark.parametrize("largest", [None, 1e-4, 1e-2])
 def test_it_leaves_a_condition_of_a_few(largest):
-    """Of 40 without compliance and thousands with it."""
+    """The condition number is 40 without compliance and thousands with it."""
     grid = Grid((20, 20), (0.1, 0.1))
     half_space = HalfSpace(grid, PAIR)
     matrix = as_matrix(half_space.normal, grid)

@@ -1,4 +1,4 @@
-"""Transforms of columns whose second half is zero, against numpy's of whole columns."""
+"""Transforms of columns whose second half is zero, against numpy's transforms of whole columns."""
 
 import numpy as np
 import pytest
@@ -20,7 +20,7 @@ from sa_solver.transforms.pruned import LARGE, PARTS, PrunedColumns
     ],
 )
 def test_frequencies_and_back(length: int, rows: int):
-    """Whatever is left in the padding; more rows than a half, or another length, in one piece."""
+    """The content of the padding does not matter; columns that are not split are tested as well."""
     rng = np.random.default_rng(length + rows)
     shape = length, LARGE // length + 1
     spectrum = rng.standard_normal(shape) + 1j * rng.standard_normal(shape)

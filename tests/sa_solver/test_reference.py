@@ -57,7 +57,7 @@ def test_with_sharp_edges_it_is_a_flat_punch():
 
 
 def test_pressure_closes_the_gap():
-    """The profile's curvature from the pressure: H[p] = (π E*/2) h' where h' = 0 (flat part).
+    """The curvature of the profile follows from the pressure: H[p] = (π E*/2) h', 0 on the flat.
 
     Plane relation (Johnson eq. 2.25 with 2(1-ν²)/E → 2/E*): PV ∫ p(s)/(x-s) ds = (π E*/2) h'(x).
     """

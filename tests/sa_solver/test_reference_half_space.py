@@ -1,4 +1,4 @@
-"""Uniform tractions and wavy contacts, by quadrature of the point and line forces."""
+"""Uniform tractions and wavy contacts, by quadrature of point and line forces."""
 
 import numpy as np
 import pytest
@@ -17,7 +17,10 @@ PLACES = [(0.0, 0.0), (0.1, -0.15), (0.3, 0.05), (0.3, 0.2), (0.7, 0.2), (1e-9, 
 
 
 def cerruti(body: Material, x: float, y: float) -> np.ndarray:
-    """Johnson section 3.6: surface of z > 0 under a unit force along x, z into the body."""
+    """Return the displacement of the surface of z > 0 under a unit force along x.
+
+    Johnson section 3.6, with z into the body.
+    """
     r, lame = np.hypot(x, y), 4.0 * np.pi * body.shear_modulus
     return np.array(
         [
@@ -29,14 +32,20 @@ def cerruti(body: Material, x: float, y: float) -> np.ndarray:
 
 
 def boussinesq(body: Material, x: float, y: float) -> np.ndarray:
-    """Johnson section 3.2: the same under a unit force into the body."""
+    """Return the displacement of the surface under a unit force into the body.
+
+    Johnson section 3.2.
+    """
     r, lame = np.hypot(x, y), 4.0 * np.pi * body.shear_modulus
     inward = (1.0 - 2.0 * body.poisson) / (lame * r**2)
     return np.array([-inward * x, -inward * y, 2.0 * (1.0 - body.poisson) / (lame * r)])
 
 
 def pair(solution, x: float, y: float, flip: np.ndarray) -> np.ndarray:
-    """Body 2 less body 1, whose own normal points down and whose force is ``flip`` of body 2's."""
+    """Return body 2 minus body 1.
+
+    The normal of body 1 points down, and its force is ``flip`` times that of body 2.
+    """
     below = solution(STEEL, x, y) * flip
     return solution(RUBBERY, x, y) - below * np.array([1.0, 1.0, -1.0])
 
@@ -46,7 +55,7 @@ def pair(solution, x: float, y: float, flip: np.ndarray) -> np.ndarray:
     [("sheared", cerruti, -1.0), ("pressed", boussinesq, 1.0)],
 )
 def test_rectangle_is_the_integral_of_point_forces(loading, solution, flip):
-    """Force q on body 2 and -q on body 1; pressure pushes into both."""
+    """The force is q on body 2 and -q on body 1; pressure acts into both."""
     for place in ((0.7, 0.2), (-0.4, 0.5)):
         expected = [
             dblquad(
@@ -63,7 +72,7 @@ def test_rectangle_is_the_integral_of_point_forces(loading, solution, flip):
 
 @pytest.mark.parametrize("place", PLACES)
 def test_four_quarters_make_the_rectangle(place):
-    """Points inside, on edges, at corners: the quarters see them from outside or a corner."""
+    """Points lie inside, on edges and at corners: outside of the quarters or at their corners."""
     quarter = UniformRectangle((0.15, 0.1), STEEL, RUBBERY)
     x, y = place
     for loading in ("pressed", "sheared"):
@@ -91,13 +100,13 @@ def test_like_bodies_do_not_couple():
 
 
 def test_coupling_is_reciprocal():
-    """What shear at one place lifts elsewhere, pressure there moves along x here (Betti)."""
+    """The normal displacement by shear equals the tangential displacement by pressure (Betti)."""
     assert PAIR.sheared(0.5, 0.1)[2] == pytest.approx(PAIR.pressed(-0.5, -0.1)[0], rel=1e-12)
 
 
 @pytest.mark.parametrize("loading", ["pressed", "sheared"])
 def test_a_long_rectangle_is_a_strip(loading):
-    """Differences between two points, for the strip has a datum: u_x and u_z."""
+    """Differences of u_x and u_z between two points are compared, because a strip has a datum."""
     strip = UniformStrip(0.3, STEEL, RUBBERY, 10.0)
     long = UniformRectangle((0.3, 3e6), STEEL, RUBBERY)
     for near, far in ((0.0, 0.25), (-0.1, 0.9)):
@@ -133,7 +142,7 @@ def test_waves_carry_the_mean_pressure():
 
 @pytest.mark.parametrize("x", [0.0, 0.3, 0.55, -0.7])
 def test_waves_close_the_gap(x):
-    """Slope under a row of line loads, cot(π (x-ξ)/λ) π/λ each: -h' where touching, more beyond."""
+    """A row of line loads causes slopes cot(π (x-ξ)/λ) π/λ: -h' in contact, more outside."""
     a, wavelength = 0.6, WAVES.wavelength
     mean = WAVES.full_contact_pressure * np.sin(np.pi * a / wavelength) ** 2
     waves = WavySurface(1e-3, wavelength, mean, MODULUS)
@@ -154,7 +163,7 @@ def test_waves_close_the_gap(x):
     if abs(x) < a:
         assert abs(slope) < 1e-8
     else:
-        assert slope * x > 1e-5  # opens away from the contact
+        assert slope * x > 1e-5  # The gap opens away from the contact.
 
 
 def test_light_waves_are_hertz_and_heavy_ones_are_full():
@@ -176,7 +185,7 @@ PUNCH = ChebyshevPunch(1.5, 300.0, 0.3, 8, MODULUS)
 
 
 def punch_surface(punch: ChebyshevPunch, x: float, datum: float) -> float:
-    """Gap under load by quadrature, less the approach."""
+    """Return the gap under load by quadrature, without the approach."""
     a = punch.half_width
     displacement = quad(
         lambda s: float(punch.pressure(s)) * np.log(abs(x - s) / datum),

@@ -1,4 +1,4 @@
-"""Hertz: the displacement of the pressure closes the gap, by quadrature of Green's functions."""
+"""Hertz: the displacement by the pressure closes the gap, by quadrature of Green's functions."""
 
 import numpy as np
 import pytest
@@ -11,11 +11,11 @@ LOAD = 400.0
 
 
 def displacement_inside(contact: HertzEllipse, x: float, y: float) -> float:
-    """u_z at a point inside: ∫∫ p dρ dθ / π E*, in polar coordinates about the point."""
+    """Return u_z inside: ∫∫ p dρ dθ / π E*, in polar coordinates about the point."""
     a, b = contact.semi_axes
 
     def along_ray(angle: float) -> float:
-        # A chord of the ellipse meets p² along a parabola, whose root integrates to half an arc.
+        # Along a chord of the ellipse p² is a parabola; its square root integrates to half an arc.
         c, s = np.cos(angle), np.sin(angle)
         square = (c / a) ** 2 + (s / b) ** 2
         half = (x * c / a**2 + y * s / b**2) / square
@@ -57,10 +57,10 @@ def test_ellipse_closes_the_gap(radius_y):
 
 
 def test_a_long_ellipse_is_a_cylinder():
-    """Where b >> a every section is a line contact under its own load per length."""
+    """For b >> a every section is a line contact under its own load per length."""
     contact = HertzEllipse(LOAD, 10.0, 1e7, MODULUS)
     a, b = contact.semi_axes
-    per_length = 1.5 * LOAD / (2.0 * b)  # at y = 0, of a parabola along y
+    per_length = 1.5 * LOAD / (2.0 * b)  # at y = 0; it is a parabola along y
     line = HertzCylinder(per_length, 10.0, MODULUS)
     assert b / a > 200.0
     assert a == pytest.approx(line.half_width, rel=1e-3)

@@ -1,4 +1,4 @@
-"""Plane partial slip: strains and slips of the shear by quadrature of Flamant's solution."""
+"""Plane partial slip: strains and slips by quadrature of Flamant's solution."""
 
 from itertools import pairwise
 
@@ -25,7 +25,7 @@ TRACTION = FRICTION * LINE.peak_pressure
 
 
 def strain(shear, x: float, ends: list[float]) -> float:
-    """du_x/dx from the shear alone: Cauchy's principal value, between the roots at ``ends``."""
+    """Return du_x/dx by the shear alone: Cauchy's principal value, with roots at ``ends``."""
     total = 0.0
     for low, high in pairwise(sorted(ends)):
         if high - low < 1e-12:
@@ -46,7 +46,7 @@ def bulk(tangential: float, stress: float, body: int = 2) -> BulkStressedCylinde
 
 
 def slip_at(contact: BulkStressedCylinder, x: float) -> float:
-    """Slip at ``x``: what body 2 stretches over body 1 from the stuck zone's edge to there."""
+    """Return the slip at ``x``: the stretch of body 2 relative to body 1 from the sticking edge."""
     ends = [-A, A, contact.offset - contact.stick_half_width]
     ends.append(contact.offset + contact.stick_half_width)
     node, gauss = np.polynomial.legendre.leggauss(12)
@@ -97,7 +97,7 @@ def test_loop_area_needs_no_datum_and_is_the_energy():
 
 @pytest.mark.slow
 def test_energy_is_the_work_of_friction():
-    """Masing: a half cycle slips twice as much as first loading, under µ p at both edges."""
+    """Masing: a half cycle slips twice as far as first loading, under µ p at both edges."""
     contact = bulk(90.0, 0.0)
     c = contact.stick_half_width
     node, gauss = np.polynomial.legendre.leggauss(16)
@@ -124,7 +124,7 @@ def test_shear_after_reversals():
 @pytest.mark.parametrize("tangential", [80.0, -80.0])
 @pytest.mark.parametrize("stress", [0.5 * TRACTION, -0.5 * TRACTION])
 def test_bulk_stress_is_undone_where_the_contact_sticks(body, tangential, stress):
-    """The surface strains must be equal: K q, and ± σ (1 - ν²)/E in the body that carries it."""
+    """The surface strains are equal: K q, and ± σ (1 - ν²)/E in the body with the stress."""
     contact = bulk(tangential, stress, body)
     e, c = contact.offset, contact.stick_half_width
     ends = [-A, e - c, e + c, A]
@@ -156,7 +156,7 @@ def test_without_bulk_stress_it_is_the_plain_contact():
 
 @pytest.mark.parametrize(("tangential", "share"), [(20.0, 1.0), (-20.0, -0.25), (-80.0, -1.0)])
 def test_on_the_way_back_what_sticks_keeps_its_slip(tangential, share):
-    """The change of shear strains the reversed stuck zone by minus the change of mismatch."""
+    """The change of shear strains the reversed sticking zone by minus the change of mismatch."""
     stress = 0.5 * TRACTION
     contact = bulk(80.0, stress)
     half_width, centre = contact.reversed_zone(tangential, share * stress)
@@ -209,7 +209,7 @@ def test_ciavarella_jaeger_of_a_cylinder_is_cattaneo_mindlin():
 
 
 def test_ciavarella_jaeger_sticks_a_rounded_flat():
-    """No strain where p(P*) is in contact, slip against the shear beyond, and the load Q."""
+    """There is no strain where p(P*) > 0 and slip against the shear outside; the load is Q."""
     load, tangential = 400.0, 160.0
     whole = FlatRoundedPunch(1.0, 60.0, load, MODULUS)
     inner = FlatRoundedPunch(1.0, 60.0, load - tangential / FRICTION, MODULUS)
@@ -230,7 +230,7 @@ def test_ciavarella_jaeger_sticks_a_rounded_flat():
     slipping = strain(shear, 0.5 * (b + c), ends)
     for x in (0.0, 0.6, 0.5 * (1.0 + c)):
         assert abs(strain(shear, x, ends)) < 1e-4 * abs(slipping)
-    assert slipping < 0.0  # lags the body ever more towards the edge
+    assert slipping < 0.0  # The surface lags behind the body more towards the edge.
 
 
 def test_ciavarella_jaeger_at_and_beyond_sliding():

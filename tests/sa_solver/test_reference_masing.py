@@ -1,4 +1,4 @@
-"""Masing's rule on an independent model: parallel sliders, each elastic and perfectly plastic."""
+"""Masing's rule against an independent model: parallel sliders, elastic and perfectly plastic."""
 
 import numpy as np
 import pytest
@@ -14,7 +14,7 @@ def first_loading(displacement: float) -> float:
 
 
 def march(displacements: list[float]) -> float:
-    """Force of the sliders after a path, each keeping its own slip."""
+    """Return the force of the sliders after a path, where each slider keeps its own slip."""
     force, at = np.zeros(40), 0.0
     for displacement in displacements:
         force = np.clip(force + STIFFNESS * (displacement - at), -LIMIT, LIMIT)
@@ -28,10 +28,10 @@ def march(displacements: list[float]) -> float:
         [4.0],
         [4.0, -1.0],
         [4.0, -4.0, 2.0],
-        [4.0, -2.0, 1.0, 3.0],  # on in the same direction
+        [4.0, -2.0, 1.0, 3.0],  # continued in the same direction
         [4.0, -2.0, 1.0, -2.5],  # closes the inner loop
         [4.0, -2.0, 5.0],  # beyond the first peak
-        [4.0, -6.0],  # beyond it on the other side
+        [4.0, -6.0],  # beyond the first peak on the other side
         [4.0, -6.0, 5.0, -5.0, 5.0, 0.0],
         [2.0, 1.0, 1.5, 1.2, 4.0, -1.0, -3.0],
         [0.0, 3.0, 3.0, -1.0],

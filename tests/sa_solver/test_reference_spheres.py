@@ -1,4 +1,4 @@
-"""Sheared and twisted spheres, by quadrature of Cerruti's Green function."""
+"""Sheared and twisted spheres, by quadrature of Cerruti's Green's function."""
 
 from itertools import pairwise
 
@@ -19,7 +19,7 @@ RADIUS = SHEARED.contact.contact_radius
 
 
 def polar(field, x: float, y: float, weight) -> float:
-    """∫ weight(θ) ∫ field dρ dθ about (x, y), by midpoints around and Gauss points out to a."""
+    """Return ∫ weight(θ) ∫ field dρ dθ about (x, y), by midpoints in θ and Gauss points to a."""
     angle = (np.arange(256) + 0.5)[:, None] * (2.0 * np.pi / 256)
     node, gauss = np.polynomial.legendre.leggauss(400)
     toward = x * np.cos(angle) + y * np.sin(angle)
@@ -31,9 +31,9 @@ def polar(field, x: float, y: float, weight) -> float:
 
 
 def ring_twist(contact: TwistedSphere, moment: float, r: float) -> float:
-    """u_θ of one body of modulus G times G, by rings of radius s: ∮ cos θ / ρ in K and E."""
+    """Return u_θ times G of one body, by rings of radius s: ∮ cos θ / ρ in K and E."""
     a, c = contact.contact.contact_radius, contact.stick_radius(moment)
-    # The double-exponential rule takes the logarithm at s = r and the roots at c and a.
+    # The double-exponential rule handles the logarithm at s = r and the roots at c and a.
     u = np.linspace(-2.7, 2.7, 201)
     node = np.tanh(0.5 * np.pi * np.sinh(u))
     weight = 0.5 * np.pi * np.cosh(u) / np.cosh(0.5 * np.pi * np.sinh(u)) ** 2 * (u[1] - u[0])
@@ -70,11 +70,11 @@ def test_shear_carries_the_load(tangential):
 
 @pytest.mark.parametrize("position", [(0.0, 0.0), (0.4, 0.0), (0.0, 0.5), (-0.3, 0.4)])
 def test_stuck_points_move_with_the_body(position):
-    """u_x from q alone, by Cerruti with ν: what slips moves, what sticks has δx."""
+    """u_x follows from q alone, by Cerruti with ν; it is δx where the surface sticks."""
     contact = ShearedSphere(400.0, 10.0, TITANIUM, Material(115e3, 0.0), 0.7)
     a = contact.contact.contact_radius
     x, y = position[0] * RADIUS, position[1] * RADIUS
-    scale = a / RADIUS  # the quadrature is over the disk of RADIUS
+    scale = a / RADIUS  # The quadrature is over the disk of RADIUS.
     moved = sum(
         polar(
             lambda x, y: contact.shear(scale * x, scale * y, 210.0),
@@ -110,7 +110,7 @@ def test_loop_of_shear_is_closed_and_its_area_is_the_energy():
 
 
 def test_energy_is_the_work_of_friction_in_the_annulus():
-    """ν = 0, Masing: a half cycle slips twice what first loading would to Q, under µ p."""
+    """Masing, ν = 0: a half cycle slips twice as far as first loading to Q, under µ p."""
     contact = ShearedSphere(400.0, 10.0, Material(115e3, 0.0), Material(115e3, 0.0), 0.7)
     tangential, steps = 210.0, 40
     a, modulus = contact.contact.contact_radius, 57.5e3
@@ -127,7 +127,7 @@ def test_energy_is_the_work_of_friction_in_the_annulus():
             lambda angle: 1.0,
         )
         slip = 2.0 * moved * scale / (2.0 * np.pi * modulus) - contact.displacement(tangential)
-        assert slip < 1e-9  # against the shear
+        assert slip < 1e-9  # slip against the shear
         work -= weight * 2.0 * np.pi * r * float(contact.shear(r, 0.0, tangential)) * slip
     assert 4.0 * work == pytest.approx(contact.loop_energy(tangential), rel=2e-3)
 
@@ -141,7 +141,7 @@ def test_reversed_shear_carries_the_load_and_respects_friction():
 
 
 def test_a_load_at_the_limit_but_for_rounding_is_at_the_limit():
-    """As one that a solver was given, and found again from the shear."""
+    """Such a load comes from a solver that was given the limit and summed up its shear."""
     assert SHEARED.stick_radius(SHEARED.sliding_force * (1.0 + 1e-9)) == 0.0
     assert TWISTED.stick_radius(TWISTED.sliding_moment * (1.0 + 1e-9)) == 0.0
 
@@ -169,7 +169,7 @@ def test_twist_shear_carries_the_moment(moment):
     node, gauss = np.polynomial.legendre.leggauss(60)
     c, total = TWISTED.stick_radius(moment), 0.0
     for low, high in ((0.0, c), (c, RADIUS)):
-        # r = end - u² at the stick radius, where the slope is infinite, and at the edge.
+        # With r = end - u², at the stick radius, where the slope is infinite, and at the edge.
         u = 0.5 * np.sqrt(high - low) * (1.0 + node)
         r = high - u**2
         integrand = 2.0 * np.pi * r**2 * TWISTED.shear(r, moment) * 2.0 * u

@@ -1,4 +1,4 @@
-"""Cells across a contact, and what a grid leaves of its pressure."""
+"""Cells across a contact, and the error of its pressure."""
 
 import numpy as np
 import pytest
@@ -17,7 +17,7 @@ def test_cells_across_are_unbroken_rows():
     pressed = np.zeros((12, 10), dtype=bool)
     assert cells_across(pressed) == (0, 0)
     assert not is_point(pressed)
-    pressed[1:3, 4:9] = True  # two strips, with a gap between them
+    pressed[1:3, 4:9] = True  # Two contacts with a gap between them.
     pressed[5:9, 4:9] = True
     assert cells_across(pressed) == (4, 5)
     assert not is_point(pressed)
@@ -25,13 +25,13 @@ def test_cells_across_are_unbroken_rows():
     pressed[5:7, 3:5] = True
     assert cells_across(pressed) == (2, 2)
     assert is_point(pressed)
-    pressed[11, 9] = True  # a second spot: where they lie is a field
+    pressed[11, 9] = True  # A second spot: there is a field.
     assert not is_point(pressed)
 
 
 @pytest.mark.parametrize("share", [2.9, 4.0, 5.9, 8.1, 12.0, 15.8, 16.2])
 def test_the_peak_of_hertz_is_as_far_off_as_said(share):
-    """``share`` cells in the true diameter, on a grid that need not end where the contact does."""
+    """There are ``share`` cells in the true diameter, on a grid of any position."""
     hertz = HertzSphere(100.0, 10.0, PAIR.contact_modulus)
     pitch = 2.0 * hertz.contact_radius / share
     grid = Grid((24, 24), (pitch, pitch))

@@ -1,4 +1,4 @@
-"""Scans: what they give to a grid, against closed forms, balances and rates."""
+"""Scans averaged onto grids, against closed forms, balances and rates."""
 
 import doctest
 
@@ -13,7 +13,7 @@ RNG = np.random.default_rng
 
 
 def over(size, shape, of):
-    """A scan of points at the middles of its cells."""
+    """Return a scan of points at the middles of its cells."""
     grid = Grid.covering(size, shape)
     return Scan(np.asarray(of(grid.x, grid.y) + 0.0 * (grid.x + grid.y)), grid.pitch)
 
@@ -30,9 +30,9 @@ def test_a_grid_of_its_own_points_gets_the_scan_itself():
 
 
 def test_parabolas_are_exact_and_no_volume_is_lost():
-    """On a grid that has nothing to do with the points, shifted too."""
+    """The grid has nothing in common with the points of the scan, and is shifted as well."""
 
-    def mean(x, y, dx, dy):  # of 3 + x + 2 y + x² - x y + y² / 2 over cells
+    def mean(x, y, dx, dy):  # Means of 3 + x + 2 y + x² - x y + y² / 2 over cells.
         return 3 + x + 2 * y + x**2 + dx**2 / 12 - x * y + 0.5 * (y**2 + dy**2 / 12)
 
     scan = over((1.0, 0.9), (37, 41), lambda x, y: mean(x, y, 1 / 37, 0.9 / 41))
@@ -47,7 +47,7 @@ def test_parabolas_are_exact_and_no_volume_is_lost():
 
 
 def test_waves_finer_than_the_grid_do_not_come_back_as_others():
-    """A sine over cells of its 0.9 wavelengths: by the sinc, where points would have all of it."""
+    """A sine is averaged over cells of 0.9 wavelengths: sampled points would show all of it."""
     cells, wave = 20, 1.0 / 20 / 0.9
     scan = over((1.0, 1.0), (2000, 3), lambda x, y: np.sin(2 * np.pi * x / wave))
     got = resampled(scan, Grid.covering((1.0, 1.0), (cells, 1)))
@@ -57,9 +57,9 @@ def test_waves_finer_than_the_grid_do_not_come_back_as_others():
 
 
 def test_smooth_surfaces_converge_with_the_pitch_of_the_scan():
-    """By the fourth power, where the points are means; cells are finer than all points."""
+    """The order is four where points are means; the cells are finer than all points."""
     grid, k = Grid.covering((0.5, 0.5), (64, 4)), 2 * np.pi / 0.3
-    # Means of cos k x over a cell of width d are cos k x sin(k d/2) / (k d/2).
+    # The mean of cos k x over a cell of width d is cos k x sin(k d/2) / (k d/2).
     exact = np.cos(k * grid.x) * np.sinc(k * grid.pitch[0] / 2 / np.pi)
     errors = []
     for count in (32, 64, 128):
@@ -94,8 +94,8 @@ def test_what_turns_and_goes_on_mirrored_is_the_mirrored_scan():
     assert got.beyond == 0.5
     assert resampled(scan, grid, shift=(0.5, 0.0), beyond="mirrored").beyond == 0.5
     turned = resampled(scan, grid, angle=0.5 * np.pi, beyond="mirrored")
-    assert turned.beyond == pytest.approx(0.5)  # 2 x 3 mm of 4 x 3 mm, whichever way round
-    # Its corners turn out of a square.
+    assert turned.beyond == pytest.approx(0.5)  # 2 x 3 mm of 4 x 3 mm, in either orientation.
+    # The corners of the grid turn out of a square scan.
     square = Scan(RNG(2).normal(size=(20, 20)), (0.1, 0.1))
     with pytest.raises(InputError, match="where it is put"):
         resampled(square, Grid.covering((1.9, 1.9), (20, 20)), angle=0.3)
@@ -103,7 +103,7 @@ def test_what_turns_and_goes_on_mirrored_is_the_mirrored_scan():
 
 @pytest.mark.parametrize("shape", [(40, 30), (200, 1)])
 def test_forms_are_taken_off_where_points_are_missing(shape):
-    """Least squares over those that there are: the form is gone to rounding."""
+    """Least squares over the measured points remove the form to rounding."""
     one = float(shape[1] > 1)
 
     def form(x, y):
@@ -117,13 +117,13 @@ def test_forms_are_taken_off_where_points_are_missing(shape):
     for level in ("mean", "plane"):
         left = levelled(scan, level)
         assert abs(np.nanmean(left.heights)) < 1e-15
-        assert np.abs(fit(left, level)).max() < 1e-15  # nothing is left to take off
-        assert rms(left.heights) > 0.02  # the parabola along x alone: 0.3 rms(x²) = 0.022
+        assert np.abs(fit(left, level)).max() < 1e-15  # There is nothing left to subtract.
+        assert rms(left.heights) > 0.02  # The parabola along x alone: 0.3 rms(x²) = 0.022.
     assert rms(levelled(scan, "plane").heights) < rms(levelled(scan, "mean").heights)
 
 
 def test_filled_points_lie_among_their_neighbours():
-    """No new extremes; a cluster at the border, and one in the middle."""
+    """There are no new extremes, for a cluster at the border and one in the middle."""
     scan = Scan(RNG(4).normal(size=(30, 30)), (1.0, 1.0))
     scan.heights[:3, 5:9] = scan.heights[12:16, 20:22] = np.nan
     whole = filled(scan).heights
@@ -142,7 +142,7 @@ def test_what_is_no_scan_is_refused():
         filled(holes, 0.05)
     with pytest.raises(InputError, match="fill them first"):
         resampled(holes, Grid.covering((2.0, 2.0), (2, 2)))
-    with pytest.raises(InputError, match="3 points to fit a plane to: give at least 6"):
+    with pytest.raises(InputError, match="3 points are too few to fit a plane: give at least 6"):
         levelled(Scan(np.array([[0.0, 1.0], [2.0, np.nan]]), (1.0, 1.0)), "plane")
     with pytest.raises(InputError, match="a scan of 4 columns: give a profile"):
         resampled(filled(holes), Grid.strips(2.0, 8))
@@ -158,7 +158,7 @@ def test_profiles_go_onto_strips():
 
 
 def test_pressures_converge_with_the_pitch_of_the_scan():
-    """A ball with waves from points: the pressure on a grid that stays, by the second power."""
+    """The pressure of a ball with waves converges with second order on a fixed grid."""
     steel = Material(young=210e3, poisson=0.3)
     grid = Grid.covering((0.6, 0.6), (48, 48))
     contact = NormalContact(HalfSpace(grid, ElasticPair(steel, steel)))
@@ -174,13 +174,13 @@ def test_pressures_converge_with_the_pitch_of_the_scan():
     errors = [np.linalg.norm(pressure(n) - finest) / np.linalg.norm(finest) for n in (24, 48, 96)]
     assert errors[0] > 5e-3
     assert np.all(np.log2(np.array(errors[:-1]) / errors[1:]) > 1.9), errors
-    # Points of 0.5 um and the middles of the cells, of 12.5 um, are means apart.
+    # Points of 0.5 um and the middles of cells of 12.5 um are means over different lengths.
     points = contact.solve(ball(grid.x, grid.y), P=50.0).pressure
     assert np.linalg.norm(points - finest) < 2e-3 * np.linalg.norm(finest)
 
 
 def test_a_masked_point_of_a_scan_is_a_missing_one():
-    """It is filled, here by the plane around it, and does not count as it stands in the array."""
+    """The point is filled by the plane around it; its value in the array does not matter."""
     plane = over((1.0, 1.0), (12, 12), lambda x, y: 0.1 * x - 0.2 * y)
     spoiled = np.ma.array(plane.heights.copy(), mask=False)
     spoiled.data[3:5, 6] = 1e3

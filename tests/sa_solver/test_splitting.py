@@ -21,7 +21,7 @@ def test_shear_is_scaled_back_along_its_direction():
 
 
 def test_projection_is_the_nearest_point():
-    """Of many points of the disk none is nearer."""
+    """None of many points of the disk is nearer."""
     rng = np.random.default_rng(0)
     shear, limit = 3.0 * rng.standard_normal((2, 50)), rng.random(50)
     nearest = np.linalg.norm(shear - project_on_disk(shear, limit), axis=0)
@@ -36,14 +36,14 @@ def test_coulomb_separates_where_pressure_pulls():
 
 
 def linear_complementarity(size, seed):
-    """A random positive definite LCP: w = A z + q, z >= 0, w >= 0, z w = 0."""
+    """Return a random positive definite LCP: w = A z + q, z >= 0, w >= 0, z w = 0."""
     rng = np.random.default_rng(seed)
     factor = rng.standard_normal((size, size))
     return factor @ factor.T + 0.1 * np.eye(size), rng.standard_normal(size)
 
 
 def enumerated(matrix, vector):
-    """The unique solution, by trying every set of positive unknowns."""
+    """Return the unique solution, by trying every set of positive unknowns."""
     size = len(vector)
     for positive in itertools.product([False, True], repeat=size):
         mask = np.array(positive)
@@ -55,7 +55,7 @@ def enumerated(matrix, vector):
 
 
 def unaccelerated(_, state, residual):
-    """The next state of the splitting without memory."""
+    """Return the next state of the splitting without acceleration."""
     return state + residual
 
 
@@ -99,7 +99,7 @@ def test_acceleration_pays_and_a_warm_start_ends_at_once(monkeypatch):
 
 
 def test_a_step_in_single_precision_ends_exact():
-    """With what changed since it was refreshed: as many iterations, and no error at the end."""
+    """A step with changes since its refresh takes as many iterations and ends without error."""
     matrix, vector = linear_complementarity(60, 7)
     shift = np.sqrt(np.linalg.eigvalsh(matrix)[[0, -1]].prod())
     inverse = np.linalg.inv(matrix + shift * np.eye(60))
@@ -138,7 +138,7 @@ def test_failure_is_said():
 
 
 def test_free_motion_is_no_solution():
-    """A residual that stays the same moves the state on, and is never taken for small."""
+    """A constant residual moves the state on and is never taken for a small one."""
     push = np.full(5, 1e-3)
     result = douglas_rachford(lambda s: s - push, lambda trial: trial + 1.3 * push, np.zeros(5))
     assert not result.converged
@@ -147,7 +147,7 @@ def test_free_motion_is_no_solution():
 
 
 def test_what_is_thrown_far_off_has_not_converged():
-    """A free body under a load, so far off that its steps are lost in the digits of its place."""
+    """A free body under a load is so far off that its steps are lost in its digits."""
     load = 1.0
     result = douglas_rachford(
         lambda s: s - load, lambda t: t, np.array([1e17]), scale=1.0, tolerance=1e-8

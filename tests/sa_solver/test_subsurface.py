@@ -45,13 +45,13 @@ POINTS = [
 
 
 def rectangle(x, y, z, poisson, size=SIZE):
-    """All coefficients (6, 3) at a point from the centre of a rectangle."""
+    """Return all coefficients (6, 3) at a point from the centre of a rectangle."""
     edges = [np.array([c - 0.5 * s, c + 0.5 * s]) for c, s in zip((x, y), size, strict=True)]
     return rectangle_stress(edges[0], edges[1], z, poisson)[..., 0, 0]
 
 
 def as_tensor(stress):
-    """(6, ...) → (3, 3, ...)."""
+    """Return stress (6, ...) as tensors (3, 3, ...)."""
     tensor = np.empty((3, 3, *stress.shape[1:]))
     for component, (i, j) in zip(stress, INDICES, strict=True):
         tensor[i, j] = tensor[j, i] = component
@@ -61,7 +61,7 @@ def as_tensor(stress):
 @pytest.mark.parametrize("poisson", RATIOS)
 @pytest.mark.parametrize("point", POINTS)
 def test_a_rectangle_is_the_integral_of_point_forces(point, poisson):
-    """Gauss points, 60 each way, converge to rounding at these depths and distances."""
+    """60 Gauss points in each direction converge to rounding at these depths and distances."""
     x, y, z = point
     nodes, weights = np.polynomial.legendre.leggauss(60)
     sources = [c - 0.5 * s * nodes for c, s in zip((x, y), SIZE, strict=True)]
@@ -74,9 +74,10 @@ def test_a_rectangle_is_the_integral_of_point_forces(point, poisson):
 
 @pytest.mark.parametrize("point", POINTS[:4])
 def test_a_rectangle_is_in_equilibrium_and_compatible(point):
-    """Divergence 0, and Beltrami and Michell's ∇²σ_ij + σ_kk,ij / (1+ν) = 0, by differences.
+    """The divergence is 0, and Beltrami and Michell's ∇²σ_ij + σ_kk,ij / (1+ν) = 0.
 
-    Central differences over a step h leave O(h²), divided by it twice rounding: 1e-4 of σ/size².
+    Central differences over a step h have errors O(h²), and twice the rounding over h²: 1e-4 of
+    σ/size².
     """
     step, poisson = 2e-3, 0.3
 
@@ -99,7 +100,7 @@ def test_a_rectangle_is_in_equilibrium_and_compatible(point):
 
 
 def test_an_endless_rectangle_carries_its_traction_everywhere():
-    """Equilibrium: the sum of zz, yz and zx over any plane is minus the load (Betti)."""
+    """In equilibrium the sum of zz, yz and zx over any plane is minus the load (Betti)."""
     stress = rectangle(0.0, 0.0, 3.0, 0.3, (1e9, 1e9))
     np.testing.assert_allclose(stress[[ZX, YZ, ZZ]], -np.eye(3), atol=1e-7)
 
@@ -107,7 +108,7 @@ def test_an_endless_rectangle_carries_its_traction_everywhere():
 @pytest.mark.parametrize("place", [(0.01, 0.01), (0.4 - 1e-9, 0.25 - 1e-9), (0.4 + 1e-9, 0.1)])
 @pytest.mark.parametrize("depth", [1e-15, 1e-12])
 def test_the_surface_is_the_limit_of_the_depth(place, depth):
-    """Even 1e-9 from an edge or a corner, at 1e-3 of that distance below."""
+    """The limit holds even 1e-9 from an edge or a corner, at 1e-3 of that distance below."""
     deep, surface = rectangle(*place, depth, 0.3), rectangle(*place, 0.0, 0.3)
     np.testing.assert_allclose(deep, surface, atol=2e-3 * depth / 1e-12 + 1e-12)
 
@@ -118,7 +119,7 @@ def test_below_a_corner_nothing_is_infinite():
 
 
 def test_far_below_rounding_stays_small():
-    """Differences between corners of a cell 1000 cells away against a point force."""
+    """Differences between corners of a cell 1000 cells away are compared with a point force."""
     depth = 10.0
     stress = rectangle(3.0, -2.0, depth, 0.3, (0.01, 0.01))
     expected = 1e-4 * point_force_stress(3.0, -2.0, depth, 0.3)
@@ -141,7 +142,7 @@ def sheared(pressure, friction=FRICTION):
 
 
 def cylinder_error(count, depths):
-    """Largest error of a section over p0, at each depth."""
+    """Return the largest error of a section over p0, at each depth."""
     grid = Grid.strips(4.0 * CYLINDER.half_width, count)
     traction = sheared(cell_means(grid))
     stress = SubsurfaceStress(grid, STEEL, 2).section(traction, "x", 0.0, depths)
@@ -150,7 +151,7 @@ def cylinder_error(count, depths):
 
 
 def cell_means(grid):
-    """Hertz's line pressure, averaged over each cell."""
+    """Return Hertz's line pressure, averaged over each cell."""
     a = CYLINDER.half_width
     edges = (np.arange(grid.shape[0] + 1) - 0.5 * grid.shape[0]) * grid.pitch[0]
     t = np.clip(edges / a, -1.0, 1.0)
@@ -171,9 +172,10 @@ def test_sliding_cylinder_converges_all_over_a_section():
 @pytest.mark.parametrize(("body", "side"), [(1, 1.0), (2, -1.0)])
 @pytest.mark.parametrize("sense", [1.0, -1.0])
 def test_the_trailing_edge_is_in_tension(body, side, sense):
-    """xx = 2 µ p0 at x = -a of body 2 under shear towards +x, at x = a of body 1.
+    """The tension is 2 µ p0 at x = -a of body 2 under shear towards +x, at x = a of body 1.
 
-    It falls off as a square root outside: the grid finds it to O(sqrt(h)), 6 % at h = a / 256.
+    It falls as a square root outside the contact, so that the grid has an error O(sqrt(h)): 6 % at
+    h = a / 256.
     """
     a, p0 = CYLINDER.half_width, CYLINDER.peak_pressure
     values = []
@@ -197,7 +199,7 @@ def sphere_grid(count, size=3.0):
 
 @pytest.mark.parametrize("poisson", RATIOS)
 def test_sphere_on_its_axis(poisson):
-    """Johnson 3.45 from 0.2 a down."""
+    """Johnson 3.45, at depths from 0.2 a."""
     grid, pressure = sphere_grid(95)
     depths = np.linspace(0.2, 2.0, 10) * SPHERE.contact_radius
     solver = SubsurfaceStress(grid, Material(1.0, poisson), 2)
@@ -207,7 +209,7 @@ def test_sphere_on_its_axis(poisson):
 
 
 def test_yield_starts_below_the_sphere():
-    """Largest shear 0.310 p0 at a depth of 0.481 a for ν = 0.3 (Johnson 3.46)."""
+    """The largest shear is 0.310 p0 at a depth of 0.481 a for ν = 0.3 (Johnson 3.46)."""
     a = SPHERE.contact_radius
     grid, pressure = sphere_grid(95)
     depths = np.linspace(0.4, 0.56, 17) * a
@@ -218,7 +220,7 @@ def test_yield_starts_below_the_sphere():
 
 
 def surface_error(count):
-    """Mean error at the surface over p0, inside the contact."""
+    """Return the mean error at the surface over p0, inside the contact."""
     grid, pressure = sphere_grid(count)
     stress = SubsurfaceStress(grid, STEEL, 2).at_depth(sheared(pressure), 0.0)
     expected = sphere_surface_stress(SPHERE, FRICTION, grid.x, grid.y, STEEL.poisson)
@@ -227,7 +229,7 @@ def surface_error(count):
 
 
 def test_surface_of_a_sliding_sphere():
-    """Johnson 3.42 and 3.91: first order in the mean, for the edge runs through cells."""
+    """Johnson 3.42 and 3.91: first order in the mean, because the edge runs through cells."""
     coarse, fine = surface_error(64), surface_error(256)
     convolved = [XX, YY, XY]
     assert np.all(fine[convolved] < 2.5e-3)
@@ -236,9 +238,10 @@ def test_surface_of_a_sliding_sphere():
 
 
 def test_pressure_pulls_radially_at_the_edge():
-    """(1-2ν) p0 / 3 at r = a (Johnson 3.44), from outside, where it falls as a²/r².
+    """The tension is (1-2ν) p0 / 3 at r = a (Johnson 3.44), and falls as a²/r² outside.
 
-    How the edge runs through the cells makes the error jump: first order over a wide range only.
+    The error jumps with the course of the edge through the cells, so that it is of first order over
+    a wide range only.
     """
     coarse, fine = edge_error(32), edge_error(256)
     assert fine < 0.004
@@ -246,7 +249,7 @@ def test_pressure_pulls_radially_at_the_edge():
 
 
 def edge_error(count):
-    """Largest relative error of the radial stress outside the contact, in one row."""
+    """Return the largest relative error of the radial stress outside the contact, in one row."""
     grid, pressure = sphere_grid(count + 1)
     stress = SubsurfaceStress(grid, STEEL, 2).at_depth(sheared(pressure, 0.0), 0.0)
     r = np.abs(grid.x[:, 0]) / SPHERE.contact_radius
@@ -255,7 +258,7 @@ def edge_error(count):
 
 
 def random_traction(grid, seed=3):
-    """Random tractions on the middle of the grid."""
+    """Return random tractions on the middle of the grid."""
     rng = np.random.default_rng(seed)
     traction = np.zeros((3, *grid.shape))
     middle = tuple(slice(n // 4, n - n // 4) for n in grid.shape)
@@ -298,14 +301,14 @@ def test_a_section_is_cut_from_planes(body, axis):
 
 @pytest.mark.parametrize("body", [1, 2])
 def test_both_bodies_are_in_equilibrium(body):
-    """Differences over the grid, O(h²): the divergence is 4 times less on half the pitch."""
+    """The divergence by differences over the grid, O(h²), is 4 times less on half the pitch."""
     worst = [divergence(body, count) for count in (24, 48)]
     assert worst[1] < 0.015
     assert worst[0] / worst[1] > 3.5
 
 
 def divergence(body, count):
-    """Largest divergence at a depth over the largest derivative of stress there."""
+    """Return the largest divergence at a depth over the largest derivative of stress there."""
     grid = Grid.covering((4.0, 4.0), (count, count))
     bump = np.maximum(0.0, 1.0 - grid.x**2 - (grid.y - 0.2) ** 2) ** 2
     traction = np.stack([0.5 * bump * (1.0 + grid.x), -0.3 * bump, bump])
@@ -322,7 +325,7 @@ def divergence(body, count):
 
 
 def test_a_plane_below_carries_the_load():
-    """Line load on the middle cells: what passes between ±R at depth z, from Flamant's stress."""
+    """The force of a line load between ±R at a depth z follows from Flamant's stress."""
     grid, depth = Grid.strips(20.0, 2001), 0.5
     traction = np.zeros((3, 2001, 1))
     traction[:, 1000] = np.array([20.0, 0.0, 50.0])[:, None]
@@ -335,7 +338,7 @@ def test_a_plane_below_carries_the_load():
 
 
 def test_body_1_is_body_2_turned_over():
-    """Half a turn about x takes one onto the other's place, with xy and zx changing sign."""
+    """Half a turn about x maps one to the other; xy and zx change their signs."""
     grid = Grid((12, 17), (0.2, 0.15))
     traction = random_traction(grid)
     turned = traction[:, :, ::-1] * np.array([-1.0, 1.0, 1.0])[:, None, None]
@@ -358,7 +361,7 @@ def test_exchange_of_the_axes():
 @pytest.mark.parametrize("body", [1, 2])
 @pytest.mark.parametrize("grid", [Grid((12, 17), (0.2, 0.15)), Grid.strips(2.0, 12)], ids=str)
 def test_points_are_where_planes_and_sections_are(grid, body):
-    """Below cells' centres, in the middle of a part of the grid that is loaded."""
+    """The points are below the centres of cells, in the middle of the loaded part of the grid."""
     traction = random_traction(grid)
     traction[:, :3] = 0.0
     solver, depths = SubsurfaceStress(grid, STEEL, body), np.array([0.0, 1e-3, 0.3])
@@ -373,7 +376,7 @@ def test_points_are_where_planes_and_sections_are(grid, body):
 
 
 def test_points_far_away_see_a_point_force_and_none_without_load():
-    """Of forces along all axes on a cell of 0.1 mm, seen from 10 mm: the square of that."""
+    """A cell of 0.1 mm differs from a point force at 10 mm by the square of the ratio."""
     grid = Grid.covering((1.0, 1.0), (10, 10))
     solver, traction = SubsurfaceStress(grid, STEEL, 2), np.zeros((3, 10, 10))
     assert not solver.at_points(traction, [[0.3, 0.2, 0.1]]).any()
@@ -386,8 +389,10 @@ def test_points_far_away_see_a_point_force_and_none_without_load():
 
 
 def test_a_ball_yields_below_its_middle():
-    """Johnson: the largest shear stress is 0.310 p0 at 0.48 a for ν = 0.3; on the axis √J is twice
-    that, and two of the principal stresses are equal."""
+    """Johnson: the largest shear stress is 0.310 p0 at 0.48 a for ν = 0.3.
+
+    On the axis √J is twice that, and two of the principal stresses are equal.
+    """
     a, p0 = SPHERE.contact_radius, SPHERE.peak_pressure
     grid = Grid.covering((2.2 * a,) * 2, (64, 64))
     traction = np.zeros((3, 64, 64))
@@ -431,7 +436,7 @@ def test_no_load_no_stress():
 
 def test_what_does_not_fit_is_refused():
     line, plane = Grid.strips(1.0, 8), Grid((4, 5), (0.1, 0.1))
-    with pytest.raises(SubsurfaceError, match="bodies 1 and 2"):
+    with pytest.raises(SubsurfaceError, match="body is 3"):
         SubsurfaceStress(line, STEEL, 3)
     with pytest.raises(SubsurfaceError, match="section along y"):
         SubsurfaceStress(line, STEEL, 1).section(np.ones((3, 8, 1)), "y", 0.0, np.ones(1))
@@ -445,7 +450,7 @@ def test_what_does_not_fit_is_refused():
 
 @pytest.mark.parametrize("axis", ["x", "y"])
 def test_sections_together_are_those_of_each(axis):
-    """What they share is the same for each, whatever rows are loaded and depths asked for."""
+    """Shared coefficients are the same for each body, for any loaded rows and depths."""
     grid = Grid.covering((2.0, 3.0), (10, 12))
     one, other = random_traction(grid), np.roll(random_traction(grid, 4), 3, axis=1)
     bodies = [SubsurfaceStress(grid, Material(1.0, poisson), 1) for poisson in (0.3, 0.3, 0.1)]

@@ -1,4 +1,4 @@
-"""Tangential contact: closed forms, energy, symmetries, controls and refusals."""
+"""Tangential contact: closed forms, energy, symmetries, controls and errors."""
 
 import numpy as np
 import pytest
@@ -26,7 +26,7 @@ SOLVED = 1e-8
 
 
 def sphere(cells, material=TITANIUM, width=0.8, friction=FRICTION):
-    """A contact of spheres, its limit µp and closed form."""
+    """Return a contact of spheres, its limit µp and its closed form."""
     exact = ShearedSphere(LOAD, RADIUS, material, material, friction)
     grid = Grid.covering((width, width), (cells, cells))
     solver = TangentialContact(HalfSpace(grid, ElasticPair(material, material)))
@@ -45,7 +45,7 @@ def line(cells, material=TITANIUM):
 
 
 def assert_solves(solver, limit, offset, state):
-    """Coulomb's law from the fields alone, with a fresh convolution."""
+    """Assert Coulomb's law from the fields alone, with a new convolution."""
     moved = HalfSpace(solver.grid, solver.half_space.pair).shear(state.shear) + offset
     grid, pressed = solver.grid, limit > 0.0
     turn = np.stack([-grid.y + 0.0 * grid.x, grid.x + 0.0 * grid.y])
@@ -61,7 +61,7 @@ def assert_solves(solver, limit, offset, state):
     work = np.sum(state.shear * slip, axis=0)
     amount = np.hypot(*slip)
     free = magnitude < limit * (1.0 - 1e-6)
-    assert np.all(amount[free] <= 1e3 * SOLVED * scale)  # κ/Δs-weighted residual is 1e-8
+    assert np.all(amount[free] <= 1e3 * SOLVED * scale)  # the residual weighted with κ/Δs is 1e-8
     assert np.abs(work + limit * amount).max() <= 1e3 * SOLVED * scale * limit.max()
 
 
@@ -107,8 +107,11 @@ def test_sheared_sphere_converges():
 
 
 def test_mindlin_deresiewicz_loop():
-    """Tractions at the turning points, and the area of the loop, Σ Q Δδ, against the closed form
-    and against what the increments dissipate: to first order in their number."""
+    """Tractions and the area of the loop agree with the closed form.
+
+    The area Σ Q Δδ also agrees with the energy that the increments dissipate, to first order in
+    their number.
+    """
     solver, limit, exact = sphere(48, ISOCHORIC)
     Q = 0.75 * SLIDING
     areas = []
@@ -125,7 +128,7 @@ def test_mindlin_deresiewicz_loop():
         assert np.abs(state.shear[0] - first).mean() < 0.02 * np.abs(first).mean()
         assert shift == pytest.approx(exact.displacement(Q), rel=5e-3)
     ratio = areas[0][0] / areas[2][0]
-    assert 10.0 < ratio < 22.0  # the trapezoidal area converges to second order
+    assert 10.0 < ratio < 22.0  # The trapezoidal area converges with second order.
     assert areas[2][1] == pytest.approx(exact.loop_energy(Q), rel=0.02)
 
 
@@ -133,7 +136,7 @@ def test_mindlin_deresiewicz_loop():
 @pytest.mark.parametrize("share", [0.2, 0.6, 0.9])
 @pytest.mark.parametrize("material", [ISOCHORIC, TITANIUM])
 def test_twisted_sphere(share, material):
-    """Circumferential for any ν: no slip and no shear along the radius."""
+    """The shear is circumferential for any ν: there is no slip and no shear along the radius."""
     solver, limit, _ = sphere(96, material)
     exact = TwistedSphere(LOAD, RADIUS, material, material, FRICTION)
     moment = share * exact.sliding_moment
@@ -176,7 +179,7 @@ def test_sheared_cylinder_converges(share):
 @pytest.mark.parametrize("body", [1, 2])
 @pytest.mark.parametrize("stress", [0.6, -0.6])
 def test_bulk_stress_moves_the_stuck_zone(body, stress):
-    """On first loading to either side, for either body; then back at constant stress."""
+    """First loading in either direction, for either body; then back at constant stress."""
     solver, limit, contact = line(256)
     sigma = stress * FRICTION * contact.peak_pressure
     Q = 0.7 * FRICTION * contact.load
@@ -201,7 +204,7 @@ COMBINED = {"Qx": 0.45 * SLIDING, "Qy": -0.3 * SLIDING, "Mz": 12.0}
 
 
 def test_energy_of_every_increment():
-    """-Σ q·Δs S = Q·Δδ + Mz Δφz - Σ q·Δu S."""
+    """In each increment -Σ q·Δs S = Q·Δδ + Mz Δφz - Σ q·Δu S."""
     solver, limit, _ = sphere(40)
     q = u = np.zeros((2, 40, 40))
     for scale in (0.5, 1.0, 0.2, -0.7, 0.1):
@@ -210,9 +213,9 @@ def test_energy_of_every_increment():
         motions = np.array([state.shift_x, state.shift_y, state.twist])
         work = resultants(solver.grid, state.shear) @ motions
         elastic = np.sum(state.shear * (state.displacement - u)) * solver.grid.cell_area
-        spent = dissipated(solver, state)
-        assert spent >= 0.0
-        assert spent == pytest.approx(work - elastic, rel=1e-9, abs=1e-11 * abs(work))
+        lost = dissipated(solver, state)
+        assert lost >= 0.0
+        assert lost == pytest.approx(work - elastic, rel=1e-9, abs=1e-11 * abs(work))
         assert_solves(solver, limit, -u, state)
         expected = np.array(list(loads.values()))
         np.testing.assert_allclose(
@@ -230,7 +233,7 @@ def test_a_cycle_closes_after_first_loading():
         q, u = state.shear, state.displacement
         if scale == 1.0:
             ends.append(q)
-    # A step over a zone that slipped and stuck again follows its end, not its path: 1st order.
+    # A step over a zone that slips and sticks again depends on its end, not its path: 1st order.
     np.testing.assert_allclose(ends[2], ends[1], atol=1e-3 * limit.max())
 
 
@@ -256,7 +259,7 @@ def test_the_sign_of_the_load_is_that_of_the_shear():
 
 
 def test_similar_bodies_may_change_places():
-    """Two moduli with the same (1-2ν)/G; shear, its displacement and slip are pair quantities."""
+    """For two moduli with the same (1-2ν)/G, shear, displacement and slip do not change."""
     one = Material(2e5, 0.3)
     shear = one.shear_modulus * (1.0 - 2.0 * 0.1) / (1.0 - 2.0 * 0.3)
     other = Material(2.0 * shear * 1.1, 0.1)
@@ -272,7 +275,7 @@ def test_similar_bodies_may_change_places():
 # -- controls --
 @pytest.fixture(scope="module")
 def forced():
-    """Under forces, after others; with the offset that these leave."""
+    """Return states under forces one after the other, each with the offset of the one before."""
     solver, limit, _ = sphere(32)
     offset = -solver.solve(limit, Qx=-0.5 * SLIDING, Mz=-20.0, tolerance=1e-11).displacement
     return solver.solve(limit, offset, **COMBINED, tolerance=1e-11), offset
@@ -305,7 +308,7 @@ def test_full_sliding_by_motion():
 
 # -- convergence --
 def flat(grid):
-    """Pressure that peaks at the edges of a flat, and falls to 0 at rounded ones."""
+    """Return a pressure that peaks at the edges of a flat and falls to 0 at rounded edges."""
     distance = np.maximum(np.abs(grid.x) / 0.35, np.abs(grid.y) / 0.35)
     peak = 1.0 / np.sqrt(1.05 - np.minimum(distance, 1.0) ** 2)
     return 100.0 * peak * np.sqrt(np.clip((1.1 - distance) / 0.1, 0.0, 1.0))
@@ -352,7 +355,7 @@ def test_no_change_of_load_is_solved_at_once():
 
 
 def test_limits_of_all_sizes_fall_back_on_gradients():
-    """Limits spread over seven decades from cell to cell, close to sliding."""
+    """Limits vary over seven decades from cell to cell, close to sliding."""
     rng = np.random.default_rng(1)
     grid = Grid((16, 12), (0.05, 0.05))
     pair = ElasticPair(Material(1e4, 0.499), Material(1e4, 0.499))
@@ -366,7 +369,7 @@ def test_limits_of_all_sizes_fall_back_on_gradients():
 @settings(max_examples=25, deadline=None, derandomize=True)
 @given(st.integers(0, 2**32 - 1))
 def test_any_contact(seed):
-    """Equilibrium, cone, complementarity and dissipation on random contacts and histories."""
+    """Equilibrium, friction and dissipation hold for random contacts and histories."""
     rng = np.random.default_rng(seed)
     grid = Grid(tuple(rng.integers(4, 20, 2)), tuple(rng.uniform(0.02, 0.1, 2)))
     material = Material(10.0 ** rng.uniform(2, 6), rng.uniform(0.0, 0.49))

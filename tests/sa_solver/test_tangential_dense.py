@@ -1,4 +1,4 @@
-"""Tangential contact against dense matrices and a method without FFT, preconditioner or sets."""
+"""Tangential contact against dense matrices and a method without FFT and preconditioner."""
 
 import numpy as np
 import pytest
@@ -18,14 +18,14 @@ UNIT = LIMIT.sum() * GRID.cell_area
 
 
 def matrix():
-    """K ``(128, 128)``, column by column."""
+    """Return K ``(128, 128)``, column by column."""
     half_space = HalfSpace(GRID, PAIR)
     units = np.eye(128).reshape(128, 2, 8, 8)
     return np.stack([half_space.shear(unit).ravel() for unit in units], axis=1)
 
 
 def admm(stiffness, limit, offset, modes, target, iterations=20000):
-    """Alternating directions: the equality-constrained quadratic, then the disks, and a price."""
+    """Solve by alternating directions: the quadratic problem with equalities, then the disks."""
     penalty = np.sqrt(np.prod(np.linalg.eigvalsh(stiffness)[[0, -1]]))
     count = len(target)
     size = len(stiffness)
@@ -98,7 +98,7 @@ def test_projected_gradients_reach_the_same(share):
 
 @pytest.mark.parametrize("cells", [0, 3, 32])
 def test_the_approximate_inverse_of_shear(cells):
-    """Symmetric, positive, and of a condition of a few whether none, few or many cells yield."""
+    """The inverse is symmetric and positive, with a small condition number for any compliance."""
     operator, compliance = BoxOperator(HalfSpace(GRID, PAIR)), np.zeros(GRID.shape)
     compliance.ravel()[20 : 20 + cells] = np.geomspace(0.3, 3e3, cells) * operator.self_compliance
     windows, rest = operator.windows(compliance)
@@ -115,7 +115,7 @@ def test_the_approximate_inverse_of_shear(cells):
 
 
 def test_modes_and_their_sums():
-    """Sums, motions and products against the fields themselves."""
+    """Sums, motions and products are compared with the fields themselves."""
     rng = np.random.default_rng(0)
     modes = PlanarModes.on(GRID).cropped((slice(1, 6), slice(2, 8)))
     field, tensor = rng.standard_normal((2, 5, 6)), rng.standard_normal((3, 5, 6))

@@ -28,7 +28,7 @@ def sphere(body_1, body_2=None):
 
 
 def run(case, path, cells=CELLS):
-    """The loop of a sphere on a grid that just holds its contact."""
+    """Return the loop of a sphere on a grid that is just larger than its contact."""
     size = 2.2 * case.contact.contact_radius
     grid = Grid.covering((size, size), (cells, cells))
     pair = ElasticPair(case.body_1, case.body_2)
@@ -37,7 +37,7 @@ def run(case, path, cells=CELLS):
 
 
 def press_flat(pair, cells, path, friction=FRICTION):
-    """A flat punch 2 mm wide, in the plane."""
+    """Return a flat punch 2 mm wide, in plane strain."""
     grid = Grid.strips(2.0, cells)
     contact = FrictionalContact(HalfSpace(grid, pair), friction)
     return march_loop(contact, np.zeros(grid.shape), path)
@@ -45,13 +45,13 @@ def press_flat(pair, cells, path, friction=FRICTION):
 
 @pytest.fixture(scope="module")
 def partial():
-    """Sphere with ν = 0, in partial slip at 3/4 of the sliding force."""
+    """Return the loop of a sphere with ν = 0, in partial slip at 3/4 of the sliding force."""
     return run(sphere(PLAIN), LoopPath(LOAD, 0.75 * SLIDING, "force"))
 
 
 @pytest.fixture(scope="module")
 def sliding():
-    """The same, slid to and fro by three times the displacement at which it begins to slide."""
+    """Return the loop of this sphere, with three times the displacement at the onset of sliding."""
     return run(sphere(PLAIN), LoopPath(LOAD, 3.0 * sphere(PLAIN).displacement(SLIDING)))
 
 
@@ -75,7 +75,7 @@ def test_first_loading_is_cattaneos(partial):
 
 
 def test_sliding_share_is_that_of_the_annulus(partial):
-    """The load on r > c is P (1 - c²/a²)^(3/2); cells at its rim count whole."""
+    """The load on r > c is P (1 - c²/a²)^(3/2); cells at its rim count completely."""
     case = sphere(PLAIN)
     ratio = case.stick_radius(0.75 * SLIDING) / case.contact.contact_radius
     assert partial.sliding == pytest.approx((1.0 - ratio**2) ** 1.5, abs=0.02)
@@ -83,7 +83,7 @@ def test_sliding_share_is_that_of_the_annulus(partial):
 
 @pytest.mark.parametrize("material", [PLAIN, TITANIUM])
 def test_stiffness_is_mindlins(material):
-    """1/kt = Σ (2-ν)/G / 8a, for ν > 0 too as nothing slips."""
+    """The compliance is 1/kt = Σ (2-ν)/G / 8a, also for ν > 0, because nothing slips."""
     loop = run(sphere(material), LoopPath(LOAD, 0.1 * SLIDING, "force", increments=2))
     expected = 1.0 / sphere(material).tangential_compliance
     assert loop.stiffness == pytest.approx(expected, rel=GRID_ERROR)
@@ -101,7 +101,10 @@ def test_branches_are_first_loading_doubled(partial):
 
 @pytest.mark.slow
 def test_energy_does_not_depend_on_the_increments_and_the_area_does_by_their_square():
-    """ν = 0: cells slip only at |q| = µp, so slip's energy is exact; trapezoids cut the corners."""
+    """For ν = 0 cells slip only at |q| = µp, so that the energy of slip is exact.
+
+    The area by trapezoids is too small.
+    """
     by_count = {
         count: run(sphere(PLAIN), LoopPath(LOAD, 0.75 * SLIDING, "force", count), cells=32)
         for count in (6, 12, 24)
@@ -115,7 +118,7 @@ def test_energy_does_not_depend_on_the_increments_and_the_area_does_by_their_squ
 
 
 def test_slope_after_a_reversal_tends_to_the_stuck_stiffness():
-    """First increments slip already: the secant is Mindlin's, and so less than the tangent."""
+    """The first increments slip: the secant is that of Mindlin, less than the tangent."""
     case, amplitude = sphere(PLAIN), 0.75 * SLIDING
     secants = []
     for count in (3, 6):
@@ -124,13 +127,13 @@ def test_slope_after_a_reversal_tends_to_the_stuck_stiffness():
         expected = step / (2.0 * case.displacement(0.5 * step))
         assert loop.reversal_stiffness == pytest.approx(expected, rel=2.0 * GRID_ERROR)
         secants.append(loop.reversal_stiffness)
-    # It falls in proportion to the increment, to first order.
+    # The difference is of first order in the increment.
     extrapolated = 2.0 * secants[1] - secants[0]
     assert secants[0] < secants[1] < loop.stiffness
     assert extrapolated == pytest.approx(loop.stiffness, rel=0.01)
 
 
-def test_both_axes_are_alike_for_a_sphere():
+def test_both_axes_are_equal_for_a_sphere():
     along, across = (
         run(sphere(TITANIUM), LoopPath(LOAD, 0.5 * SLIDING, "force", 4, axis), cells=24)
         for axis in ("x", "y")
@@ -151,7 +154,7 @@ def test_line_contact():
     expected = line.displacement(0.75 * SLIDING, datum)
     assert loop.energy == pytest.approx(line.loop_energy(0.75 * SLIDING), rel=GRID_ERROR)
     assert loop.amplitude == pytest.approx(expected, rel=GRID_ERROR)
-    # Stuck: q = Q/π sqrt(a²-x²) moves it by (2Q/πE*) ln(2L/a); its singular ends cost 1/cells.
+    # Stuck: q = Q/π sqrt(a²-x²) moves it by (2Q/πE*) ln(2L/a); singular ends have errors 1/cells.
     logarithm = np.log(2.0 * datum / line.contact.half_width)
     stuck = 0.5 * np.pi * pair.contact_modulus / logarithm
     assert loop.stiffness == pytest.approx(stuck, rel=1.0 / 128)
@@ -161,7 +164,10 @@ def test_line_contact():
 
 
 def test_sliding_loop_of_a_sphere(sliding):
-    """Beyond the onset δ1 of sliding the loop of ±µP, 0.8 µP δ1, grows by 4 µP per stroke."""
+    """The area of the loop of ±µP is 0.8 µP δ1 at the onset δ1 of sliding.
+
+    Beyond the onset it grows by 4 µP per stroke.
+    """
     onset = sphere(PLAIN).displacement(SLIDING)
     assert sliding.slides
     assert sliding.friction == pytest.approx(FRICTION, rel=1e-7)
@@ -172,9 +178,10 @@ def test_sliding_loop_of_a_sphere(sliding):
 
 
 def test_flat_punch_is_a_jenkins_element():
-    """µ p(P) - µ p(P - Q/µ) is in proportion to p: all sticks, then all slides.
+    """The shear µ p(P) - µ p(P - Q/µ) is proportional to p: all stick, then all slide.
 
-    Energy 4 µP (A - µP/kt), to the solver's tolerance on any grid, and so is the opening.
+    The energy is 4 µP (A - µP/kt), to the solver's tolerance on any grid, and so is the friction by
+    opening.
     """
     pair = ElasticPair(TITANIUM, TITANIUM)
     loop = press_flat(pair, 32, LoopPath(LOAD, 0.02))
@@ -204,7 +211,7 @@ def test_stuck_stiffness_agrees_with_friction_without_limit():
 
 
 def test_stuck_dissimilar_bodies_are_softer_where_pressure_is_free():
-    """Against dense algebra: tilts held or moments imposed, P always."""
+    """Compared with dense algebra for held tilts and imposed moments, always with constant P."""
     grid = Grid.covering((1.0, 1.0), (6, 5))
     half_space = HalfSpace(grid, ElasticPair(STEEL, SOFT))
     count = 30
@@ -233,8 +240,8 @@ def test_stuck_dissimilar_bodies_are_softer_where_pressure_is_free():
 # --- dissimilar bodies --------------------------------------------------------------------------
 
 
-def test_dissimilar_bodies_slide_alike_and_close():
-    """β 0.35. Mindlin's formulas leave out β: stiffness and energy within 2 %."""
+def test_dissimilar_bodies_slide_symmetrically_and_close():
+    """With β = 0.35 Mindlin's stiffness and energy, which neglect β, are within 2 %."""
     case = sphere(STEEL, SOFT)
     onset = case.displacement(SLIDING)
     loop = run(case, LoopPath(LOAD, 2.5 * onset, increments=8), cells=16)
@@ -247,7 +254,7 @@ def test_dissimilar_bodies_slide_alike_and_close():
 
 
 def test_dissimilar_bodies_in_partial_slip_are_marched_until_they_close():
-    """Pressing has left slip of its own, which takes cycles to forget."""
+    """The slip by pressing takes several cycles to be forgotten."""
     path = LoopPath(LOAD, 0.4 * SLIDING, "force", 6)
     loop = run(sphere(STEEL, SOFT), path, cells=12)
     assert loop.closure <= loops.CLOSED
@@ -260,7 +267,7 @@ def test_dissimilar_bodies_in_partial_slip_are_marched_until_they_close():
 
 
 def test_moments_and_tilts():
-    """Moments put the pressure where they say; without, the bodies do not tilt."""
+    """Moments determine the position of the pressure; without them the bodies do not tilt."""
     grid = Grid.covering((1.0, 1.0), (16, 16))
     contact = FrictionalContact(HalfSpace(grid, ElasticPair(TITANIUM, TITANIUM)), FRICTION)
     height = (grid.x**2 + grid.y**2) / 400.0

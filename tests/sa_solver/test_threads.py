@@ -1,4 +1,4 @@
-"""Work in threads: as many as may work, answers in order, and what one of them raises."""
+"""Work in threads: number of threads, order of the results, and exceptions."""
 
 import threading
 import time
@@ -27,7 +27,7 @@ def test_answers_are_in_the_order_of_the_jobs(monkeypatch: pytest.MonkeyPatch) -
 def test_jobs_work_side_by_side_only_where_threads_may(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv(THREADS, "2")
     assert threads() == 2
-    # Each waits for the other.
+    # Each job waits for the other.
     barrier = threading.Barrier(2, timeout=120.0)
     assert sorted(at_once([barrier.wait, barrier.wait])) == [0, 1]
     monkeypatch.setenv(THREADS, "1")
@@ -49,7 +49,7 @@ def test_what_a_job_raises_is_raised_and_later_jobs_do_not_begin(
 
 @pytest.mark.parametrize("allowed", ["1", "2"])
 def test_a_job_that_is_begun_is_done_once(monkeypatch: pytest.MonkeyPatch, allowed: str) -> None:
-    """Beside what comes after it where two threads may work, and else when it is asked for."""
+    """With two threads the job runs in the other one, otherwise when its result is needed."""
     monkeypatch.setenv(THREADS, allowed)
     where: list[int] = []
     answer = begun(lambda: where.append(threading.get_ident()) or len(where))

@@ -1,4 +1,4 @@
-"""Comparisons that rounding must not decide."""
+"""Comparisons whose outcome must not depend on rounding."""
 
 import numpy as np
 import pytest

@@ -14,7 +14,7 @@ ROUNDING = 1e-13
 
 
 def kernel_and_symbol(padded, odd, rng):
-    """A periodic kernel, even or odd along each axis, and its symbol without a factor i."""
+    """Return a periodic kernel, even or odd along each axis, and its symbol without factors i."""
     kernel = rng.standard_normal(padded)
     for axis, sign in enumerate(-1.0 if o else 1.0 for o in odd):
         mirrored = np.roll(np.flip(kernel, axis), 1, axis)
@@ -24,7 +24,7 @@ def kernel_and_symbol(padded, odd, rng):
 
 
 def circular_convolution(kernel, field):
-    """By direct summation; the first values, as many as the field has."""
+    """Return the circular convolution by direct summation, on the cells of the field."""
     total = np.zeros(kernel.shape)
     for (i, j), value in np.ndenumerate(field):
         total += value * np.roll(kernel, (i, j), (0, 1))
@@ -61,7 +61,7 @@ def test_a_filter_multiplies_spectra_as_numpy_does(padded, inputs, outputs):
 
 @pytest.mark.parametrize("padded", PADDED)
 def test_a_filter_is_a_circular_convolution_of_all_components(padded):
-    """Of two even components and one that couples to them through odd kernels."""
+    """Two even components, and one that couples to them through odd kernels."""
     rng = np.random.default_rng(7)
     odd = [[(0, 0), (1, 1), (1, 0)], [(1, 1), (0, 0), (0, 1)], [(1, 0), (0, 1), (0, 0)]]
     kernels, symbols = zip(
@@ -69,7 +69,7 @@ def test_a_filter_is_a_circular_convolution_of_all_components(padded):
         strict=True,
     )
     fields = rng.standard_normal((3, *SHAPE))
-    # In units of i, outputs 0 and 1 have symbols S/i from input 2, and output 2 has S i from them.
+    # In units of i, outputs 0 and 1 have symbols S/i for input 2, and output 2 has S i for them.
     signs = np.array([[1, 1, 1], [1, 1, 1], [-1, -1, 1]])
     expected = np.array(
         [
@@ -118,7 +118,7 @@ def test_a_filter_leaves_its_input_and_earlier_output_alone():
 
 @pytest.mark.parametrize("before", ["", "from fe_models.solvers.pardiso import library; library()"])
 def test_a_transform_is_that_of_fftw_whatever_is_loaded_before_it(before):
-    """MKL's functions of the same names round otherwise."""
+    """The functions of the same names in MKL have a different rounding."""
     shape, padded = (100, 30), (256, 64)
     code = f"""{before}
 import sys
@@ -128,7 +128,7 @@ transform = Transform({shape}, {padded})
 transform.forward(np.random.default_rng(0).standard_normal({shape}), 0)
 sys.stdout.buffer.write(transform.spectra[0].tobytes())
 """
-    told = subprocess.run([sys.executable, "-c", code], capture_output=True, check=True).stdout
+    output = subprocess.run([sys.executable, "-c", code], capture_output=True, check=True).stdout
     transform = Transform(shape, padded)
     transform.forward(np.random.default_rng(0).standard_normal(shape), 0)
-    assert told == transform.spectra[0].tobytes()
+    assert output == transform.spectra[0].tobytes()

@@ -1,4 +1,4 @@
-"""Pairs of materials, grids and tallies: known values, symmetries, refusals."""
+"""Pairs of materials, grids and counters: known values, symmetries, errors."""
 
 import sys
 from concurrent.futures import ThreadPoolExecutor
@@ -38,8 +38,8 @@ def test_identical_materials_are_exactly_similar(poisson):
     assert pair.similar
 
 
-def test_the_same_modulus_in_other_units_is_alike():
-    """Conversions leave the last digits to chance."""
+def test_the_same_modulus_in_other_units_is_similar():
+    """Conversions of units change the last digits."""
     off = 115e3 * (1.0 + 4.0 * np.finfo(float).eps)
     pair = ElasticPair(Material(115e3, 0.29), Material(off, 0.29))
     assert pair.coupling != 0.0
@@ -49,7 +49,7 @@ def test_the_same_modulus_in_other_units_is_alike():
 
 @pytest.mark.parametrize(("poisson", "beta"), [(0.0, 0.5), (0.3, 2.0 / 7.0), (0.5, 0.0)])
 def test_dundurs_beta_of_a_body_on_a_rigid_one(poisson, beta):
-    """β = (1-2ν) / 2(1-ν), positive where body 2 is the compliant one."""
+    """The value is β = (1-2ν) / 2(1-ν), positive where body 2 is the compliant one."""
     body = Material(3e3, poisson)
     assert ElasticPair(RIGID, body).dundurs_beta == pytest.approx(beta, abs=1e-15)
     assert ElasticPair(body, RIGID).dundurs_beta == pytest.approx(-beta, abs=1e-15)
@@ -107,7 +107,7 @@ def test_a_covering_grid_has_the_size_it_covers():
 
 @pytest.fixture
 def restless():
-    """Threads that take turns after every few instructions."""
+    """Let threads switch after every few instructions."""
     interval = sys.getswitchinterval()
     sys.setswitchinterval(1e-7)
     yield
@@ -116,8 +116,8 @@ def restless():
 
 @pytest.mark.usefixtures("restless")
 def test_a_tally_counts_what_any_thread_has_done_in_order():
-    told, things, threads = [], 500, 4
-    done = Tally(lambda count, total: told.append((count, total)), things * threads)
+    reported, things, threads = [], 500, 4
+    done = Tally(lambda count, total: reported.append((count, total)), things * threads)
     with ThreadPoolExecutor(threads) as pool:
         list(pool.map(lambda _: [done() for _ in range(things)], range(threads)))
-    assert told == [(count, things * threads) for count in range(1, things * threads + 1)]
+    assert reported == [(count, things * threads) for count in range(1, things * threads + 1)]

@@ -1,4 +1,4 @@
-"""What public functions of the solver are given: arrays of any kind, no surfaces, loads by name."""
+"""Input of public functions of the solvers: arrays of any kind, missing surfaces, named loads."""
 
 import numpy as np
 import pytest
@@ -40,7 +40,7 @@ def advanced(height, pair=ALIKE, load=None):
     return contact.advance(contact.apart(height), height, load or ContactLoad(P=P))
 
 
-# Of each entry a good field, and the numbers that it makes of it.
+# A valid field for each function, and the numbers that follow from it.
 ENTRIES = {
     "normal": (BALL, lambda h: NormalContact(HALF_SPACE).solve(h, P).pressure),
     "compliance": (
@@ -80,13 +80,13 @@ EVERY = pytest.mark.parametrize("entry", ENTRIES)
 
 
 def assert_same(found, expected):
-    """But for what solvers leave: sums of arrays that begin elsewhere in memory are rounded so."""
+    """Assert equality up to errors of solvers, whose sums depend on memory alignment."""
     np.testing.assert_allclose(found, expected, rtol=0.0, atol=1e-6 * np.abs(expected).max())
 
 
 @EVERY
 def test_numbers_count_and_not_how_they_are_held(entry):
-    """Lists, single precision, columns first, every second of an array twice as long."""
+    """Lists, single precision, column order and strided views give the same results."""
     field, made = ENTRIES[entry]
     field = field.astype(np.float32).astype(np.float64)
     expected = made(field)
@@ -106,7 +106,7 @@ def test_numbers_count_and_not_how_they_are_held(entry):
 def test_what_is_no_field_of_numbers_is_refused(entry, kind):
     field, made = ENTRIES[entry]
     if kind == "none" and entry in ("compliance", "offset"):
-        return  # they may be left out
+        return  # They may be left out.
     hole = np.ma.array(field, mask=field > 0.5 * field.max())
     if kind == "masked" and entry in HEIGHTS:
         assert np.isfinite(made(hole)).all()
@@ -149,7 +149,7 @@ def test_what_is_no_number_is_refused(value):
 @pytest.mark.parametrize(
     "attempt",
     [
-        lambda: Grid.covering((1.0, 1.0), (8.0, 8.0)),  # sizes and numbers of cells exchanged
+        lambda: Grid.covering((1.0, 1.0), (8.0, 8.0)),  # Sizes and numbers of cells are exchanged.
         lambda: Grid.covering(1.0, (8, 8)),
         lambda: Grid.covering((1.0, 1.0), (8,)),
         lambda: Material(-210e3, 0.3),
@@ -188,7 +188,7 @@ def test_what_has_no_meaning_is_refused(attempt):
 @pytest.mark.parametrize("form", [np.inf, "masked"])
 @pytest.mark.parametrize("cells", [48, 96])
 def test_a_disk_without_surroundings_is_a_flat_punch(form, cells):
-    """δ = P / 2 a E*, with a the radius of a circle of its area; half a cell at the edge."""
+    """The approach is δ = P / 2 a E* for a circle of the same area, and half a cell at its edge."""
     grid = Grid.covering((2.4, 2.4), (cells, cells))
     disk = np.hypot(grid.x, grid.y) < 1.0
     height = np.where(disk, 0.0, np.inf)
@@ -203,16 +203,16 @@ def test_a_disk_without_surroundings_is_a_flat_punch(form, cells):
     assert np.all(state.pressure[disk] > 0.0)
     assert not state.pressure[~disk].any()
     assert np.all(np.isinf(state.gap[~disk]))
-    # The punch is flat: all of the load moves by δ.
+    # The punch is flat, so that the whole load moves by δ.
     assert state.elastic_energy == pytest.approx(0.5 * P * state.approach, rel=1e-7)
 
 
 HOLE = np.hypot(GRID.x - 0.05, GRID.y) < 0.08
 
 
-@pytest.mark.parametrize("pair", [ALIKE, UNLIKE], ids=["alike", "unlike"])
+@pytest.mark.parametrize("pair", [ALIKE, UNLIKE], ids=["similar", "dissimilar"])
 def test_nothing_touches_a_hole(pair):
-    """As a pit of a metre: both bodies, sheared, turning freely, and by their approach."""
+    """A hole is like a pit one metre deep, for sheared bodies, free tilts and imposed approach."""
     pit, masked = np.where(HOLE, 1e3, BALL), np.ma.array(BALL, mask=HOLE)
     for load in (
         ContactLoad(P=P, Qx=20.0),
@@ -244,7 +244,10 @@ def test_a_load_beyond_all_surfaces_is_refused_unless_the_tilt_is_held():
 
 
 def test_a_ball_off_the_middle_is_held_unless_its_moments_are_given():
-    """10 mm, 0.1 mm off the middle: free, it rolls by 0.01 rad until its load is in the middle."""
+    """A free ball of radius 10 mm, offset by 0.1 mm, rolls by 0.01 rad.
+
+    Its load is then in the middle.
+    """
     height = ((GRID.x - 0.1) ** 2 + GRID.y**2) / 20.0
     contact = NormalContact(HALF_SPACE)
     hertz = HertzSphere(P, 10.0, ALIKE.contact_modulus)
@@ -279,8 +282,8 @@ def test_loads_by_name_are_those_by_place():
 # --- the border of the grid -----------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("pair", [ALIKE, UNLIKE], ids=["alike", "unlike"])
-def test_a_contact_that_is_cut_off_says_so(pair):
+@pytest.mark.parametrize("pair", [ALIKE, UNLIKE], ids=["similar", "dissimilar"])
+def test_a_contact_that_is_cut_off_has_a_message(pair):
     inside, cut = (advanced(height, pair) for height in (BALL, 1e-3 * BALL))
     assert inside.converged
     assert not inside.message
@@ -290,7 +293,7 @@ def test_a_contact_that_is_cut_off_says_so(pair):
     assert "border" in NormalContact(HALF_SPACE).solve(1e-3 * BALL, P).message
 
 
-def test_bodies_of_a_contact_modulus_are_alike():
+def test_bodies_of_a_contact_modulus_are_identical():
     pair = ElasticPair.from_contact_modulus(1e5, poisson=0.25)
     assert pair.contact_modulus == pytest.approx(1e5, rel=1e-14)
     assert pair.similar

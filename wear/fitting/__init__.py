@@ -1,28 +1,28 @@
-"""Parameters from measurements: least squares with bounds, and what the data say of each.
+"""Parameters from measurements, by least squares with bounds.
 
-The arithmetic
-    - ``fit``: the least squares of a problem.
-    - ``FitProblem``: what is free, what was measured, and the model between them.
+Fits
+    - ``fit``: solve a problem by least squares.
+    - ``FitProblem``: free parameters, measured data, and the model between them.
     - ``Unknown``: a free parameter and its bounds.
     - ``Series``: data of one kind.
-    - ``Fit``: the best values, with residuals, correlation and bands.
-    - ``Estimate``: value, deviation and bounds of one parameter, or why it has none.
-    - ``diagnose``: what the residuals say against the fit: waves, outliers, groups.
-    - ``common_over``: which test decides a common parameter, and whether they agree on it.
-    - ``Common``: what tests say of one parameter.
-    - ``FitError``: data or parameters that no fit can be made of.
+    - ``Fit``: the best values, with residuals, correlation and confidence bands.
+    - ``Estimate``: value, deviation and bounds of one parameter, or why it is not determined.
+    - ``diagnose``: plausibility warnings from the residuals: trends, outliers, groups.
+    - ``common_over``: which test determines a common parameter, and whether the tests agree.
+    - ``Common``: contributions of several tests to one parameter.
+    - ``FitError``: data or parameters that cannot be fitted.
 
-What is fitted
-    - ``evolution_problem``: how joint parameters follow the dissipated energy.
-    - ``EvolutionData``: what was measured of one of them.
+Problems
+    - ``evolution_problem``: joint parameters as functions of the dissipated energy.
+    - ``EvolutionData``: measured values of one of them.
     - ``loop_problem``: a joint law from measured loops.
-    - ``loop_data``, ``LoopData``: loops of a record that are alike, as data.
+    - ``loop_data``, ``LoopData``: similar loops of a record, as data.
     - ``volume_problem``: wear coefficients from worn volumes.
-    - ``VolumeData``, ``VolumeLaw``: the volumes, and what of the law is asked for.
-    - ``scar_problem``: wear coefficients from depths and profiles, through a model's runs.
-    - ``ScarData``, ``ComputedScars``: a measured profile, and those of runs of the model.
+    - ``VolumeData``, ``VolumeLaw``: the volumes, and the free parameters of the law.
+    - ``scar_problem``: wear coefficients from depths and profiles, by runs of a model.
+    - ``ScarData``, ``ComputedScars``: a measured profile, and profiles from runs of the model.
 
-A slope of measured points, with what it is known to:
+The slope of measured points, with its confidence bounds:
 
 >>> import numpy as np
 >>> from wear.fitting import VolumeData, VolumeLaw, fit, volume_problem

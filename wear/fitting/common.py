@@ -1,10 +1,10 @@
-"""A parameter common to several tests: which of them decides it, and whether they agree on it.
+"""Parameter common to several tests: which test determines it, and whether the tests agree.
 
-The fit with one value for all tests is held against that in which each test has a value of its own
-and all other parameters stay common: what the sum of squares loses by the further values, over what
-is left of it for each degree of freedom, is F distributed where the tests agree (Seber & Lee 2003,
-Linear Regression Analysis, section 4.3), and chi-squared where deviations are given. Both are
-linear about the common fit: exact for what is linear in its parameters.
+The fit with one value for all tests is compared with a fit in which each test has its own value and
+all other parameters stay common. The reduction of the sum of squares by the additional values, over
+the remaining sum per degree of freedom, is F distributed if the tests agree (Seber & Lee 2003,
+Linear Regression Analysis, section 4.3), and chi-squared where deviations are given. Both fits are
+linearised about the common fit, which is exact for models that are linear in their parameters.
 """
 
 from __future__ import annotations
@@ -23,17 +23,29 @@ from wear.fitting.problem import FitError
 
 @dataclass(frozen=True)
 class Common:
-    """One parameter, its ``name``, over several ``tests`` ``(m,)``, their numbers.
+    """Contributions of several tests to one common parameter.
 
-    ``shares`` ``(m,)`` are those of the tests in its variance, which add up to 1. ``own`` ``(m,)``
-    is the value that each test alone would have, all other parameters common, with its standard
-    ``deviations`` ``(m,)``; NaN where a test does not tell. ``chance`` is that of tests that agree
-    to lie so far apart; NaN where nothing tells their scatter, where the
-    model meets the data but for rounding, or where fewer than two have a value.
+    Attributes
+    ----------
+    name
+        Name of the parameter.
+    tests
+        Numbers of the tests ``(m,)``.
+    shares
+        Shares of the tests in the variance of the parameter ``(m,)``, which add up to 1.
+    own
+        Value that each test alone would have ``(m,)``, with all other parameters common; NaN where
+        a test does not determine it.
+    deviations
+        Standard deviations of these values ``(m,)``.
+    chance
+        Probability that tests which agree differ by this much. It is NaN where the scatter is
+        unknown, where the model meets the data exactly but for rounding, or where fewer than two
+        tests have a value.
 
     Examples
     --------
-    The second of two tests alone tells the coefficient, since the first has no energy:
+    Only the second of two tests determines the coefficient, because the first has no energy:
 
     >>> import numpy as np
     >>> from wear.fitting import VolumeData, VolumeLaw, common_over, fit, volume_problem
@@ -53,10 +65,11 @@ class Common:
 
 
 def common_over(fit: Fit, tests: Indices) -> list[Common]:
-    """What single tests say of each parameter that the data determine.
+    """Return the contributions of single tests to each parameter that the data determine.
 
-    ``tests`` ``(n,)`` is the number of the test that each datum is of. Logarithms are compared
-    where these are fitted. Raises FitError for tests that are not whole numbers, one per datum.
+    ``tests`` ``(n,)`` is the number of the test of each datum. For parameters that are fitted as
+    logarithms, the logarithms are compared. Raise FitError for tests
+    that are not whole numbers, one per datum.
 
     Examples
     --------
@@ -94,9 +107,9 @@ def _common(
     each = _Linear(np.concatenate([alone, np.delete(slopes, place, axis=1)], axis=1), residuals)
     weights = one.inverse[place] ** 2
     shares = np.array([weights[tests == number].sum() for number in numbers]) / weights.sum()
-    further, left = each.rank - one.rank, len(residuals) - each.rank
-    scatter = 1.0 if fit.known else np.sqrt(each.squares / left) if left else np.nan
-    told = ~each.open[: len(numbers)]
+    added, freedom = each.rank - one.rank, len(residuals) - each.rank
+    scatter = 1.0 if fit.known else np.sqrt(each.squares / freedom) if freedom else np.nan
+    determined = ~each.undetermined[: len(numbers)]
     inner = fit.problem.inner(fit.values)[place] + each.found[: len(numbers)]
     deviations = scatter * np.linalg.norm(each.inverse[: len(numbers)], axis=1)
     if fit.problem.unknowns[place].logarithmic:
@@ -106,40 +119,46 @@ def _common(
         name=fit.problem.unknowns[place].name,
         tests=numbers,
         shares=shares,
-        own=np.where(told, inner, np.nan),
-        deviations=np.where(told, deviations, np.nan),
+        own=np.where(determined, inner, np.nan),
+        deviations=np.where(determined, deviations, np.nan),
         chance=np.nan
         if is_exact(fit.problem, fit.residuals)
-        else _chance(one.squares - each.squares, further, each.squares, left, fit.known),
+        else _chance(one.squares - each.squares, added, each.squares, freedom, fit.known),
     )
 
 
-def _chance(gained: float, further: int, squares: float, left: int, known: bool) -> float:
-    """Of a sum of squares to fall by so much with ``further`` parameters that nothing needs."""
-    if further < 1 or (not known and (left < 1 or squares <= 0.0)):
+def _chance(reduction: float, added: int, squares: float, freedom: int, known: bool) -> float:
+    """Return the probability that ``added`` needless parameters reduce the squares by this much.
+
+    ``squares`` is the remaining sum of squares with ``freedom`` degrees of freedom; ``known`` says
+    whether the deviations of the data are given.
+    """
+    if added < 1 or (not known and (freedom < 1 or squares <= 0.0)):
         return float("nan")
-    gained = max(gained, 0.0)
+    reduction = max(reduction, 0.0)
     if known:
-        return float(chdtrc(further, gained))
-    return float(fdtrc(further, left, gained / further / (squares / left)))
+        return float(chdtrc(added, reduction))
+    return float(fdtrc(added, freedom, reduction / added / (squares / freedom)))
 
 
 class _Linear:
-    """Linear least squares of residuals ``(n,)`` by columns ``(n, q)``.
+    """Linear least squares fit of residuals ``(n,)`` by columns ``(n, q)``.
 
-    ``found`` ``(q,)``, ``inverse`` ``(q, n)``, the ``rank``, the sum of ``squares`` that is left,
-    and what is ``open`` ``(q,)``: part of a direction that nothing decides.
+    The results are the coefficients ``found`` ``(q,)``, the pseudoinverse ``inverse`` ``(q, n)``,
+    the ``rank``, the remaining sum of ``squares``, and which coefficients are ``undetermined``
+    ``(q,)`` because they are part of a direction that no residual determines.
     """
 
     def __init__(self, columns: Array, residuals: Array) -> None:
         lengths = np.linalg.norm(columns, axis=0)
         lengths = np.where(lengths > 0.0, lengths, 1.0)
         left, values, right = np.linalg.svd(columns / lengths, full_matrices=False)
-        some = values > RANK * values[0]
-        self.rank = int(some.sum())
-        self.inverse = (right[some].T / values[some]) @ left[:, some].T / lengths[:, None]
+        significant = values > RANK * values[0]
+        self.rank = int(significant.sum())
+        scaled = right[significant].T / values[significant]
+        self.inverse = scaled @ left[:, significant].T / lengths[:, None]
         self.found = self.inverse @ residuals
         self.squares = float(np.sum((residuals - columns @ self.found) ** 2))
-        # Fewer data than columns leave directions that the economic form does not list.
-        seen = np.sum(right[some] ** 2, axis=0)
-        self.open = 1.0 - seen > RANK
+        # With fewer data than columns, the reduced form does not list all undetermined directions.
+        determined = np.sum(right[significant] ** 2, axis=0)
+        self.undetermined = 1.0 - determined > RANK

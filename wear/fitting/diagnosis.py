@@ -1,7 +1,7 @@
-"""What residuals say against a fit: waves, outliers, two groups, files that disagree.
+"""Plausibility warnings from residuals: trends, outliers, two groups, files that disagree.
 
-Bounds of a fit are right for data that scatter independently about the model. Each test here has a
-level of about one false alarm in a thousand fits of such data.
+The bounds of a fit are valid for data that scatter independently about the model. Each test here
+raises about one false alarm in a thousand fits of such data.
 """
 
 from __future__ import annotations
@@ -18,40 +18,38 @@ from wear.fitting.least_squares import Fit
 from wear.fitting.problem import FitError
 
 ALARM = 1e-3
-"""Of good data, fits in which a test speaks up."""
+"""Rate of false alarms of a test for valid data."""
 
 FEWEST = 6
-"""Data of a series to judge it by."""
+"""Least number of data of a series for the tests."""
 
 SAMPLES, SEED = 4000, 0
-"""Normal samples that a split into two groups is held against, always the same."""
+"""Number and seed of the normal samples with which a split into two groups is compared."""
 
 SMALLEST_GROUP = 0.1
-"""Share of the data in the smaller one of two groups, of which there are two at least: fewer are
+"""Least share of the data in the smaller of two groups, which has at least two data: fewer are
 outliers."""
-
-MOST_NAMED = 5
-"""Data of a list in a message."""
 
 
 @dataclass(frozen=True)
-class Doubt:
-    """Something that the data of a series say against the fit: ``text``, and the ``data`` meant."""
+class FitWarning:
+    """Plausibility warning about the data of a series: a ``text``, and indices of the ``data``."""
 
     series: str
     text: str
     data: tuple[int, ...] = ()
 
 
-def diagnose(fit: Fit, order: Array, files: Indices | None = None) -> list[Doubt]:
-    """What residuals say against a fit.
+def diagnose(fit: Fit, order: Array, files: Indices | None = None) -> list[FitWarning]:
+    """Return plausibility warnings from the residuals of a fit.
 
-    ``order`` ``(n,)`` is what the data of each series are sorted by, such as their energy, and
-    ``files`` ``(n,)`` the number of the file that each is of. Raises FitError for other shapes.
+    ``order`` ``(n,)`` is the quantity by which the data of each series are sorted, such as their
+    energy. ``files`` ``(n,)`` is the number of the file of each datum. Raise FitError
+    for other shapes.
 
     Examples
     --------
-    Volumes of two materials under one line: two groups of residuals, which are told.
+    Volumes of two materials fitted by one line have two groups of residuals:
 
     >>> import numpy as np
     >>> from wear.fitting import VolumeData, VolumeLaw, diagnose, fit, volume_problem
@@ -59,11 +57,11 @@ def diagnose(fit: Fit, order: Array, files: Indices | None = None) -> list[Doubt
     >>> coefficient = np.where(np.arange(16) % 4 < 2, 1e-9, 2e-9)
     >>> mixed = VolumeData("both", energy, coefficient * energy)
     >>> found = fit(volume_problem([mixed], VolumeLaw()).problem)
-    >>> for doubt in diagnose(found, energy):
-    ...     print(doubt.text.partition(":")[0])
+    >>> for warning in diagnose(found, energy):
+    ...     print(warning.text.partition(":")[0])
     residuals are of two groups, 8 and 8
     """
-    doubts = []
+    warnings = []
     residuals = fit.standardised
     order = checks.array("order of the data", order, residuals.shape, error=FitError)
     if files is not None:
@@ -75,18 +73,18 @@ def diagnose(fit: Fit, order: Array, files: Indices | None = None) -> list[Doubt
         if len(here) < FEWEST or fit.freedoms[place] < FEWEST // 2 or _is_exact(fit, here):
             continue
         found = _of_series(fit, place, residuals, order, files)
-        doubts += [Doubt(series.name, text, tuple(map(int, data))) for text, data in found]
+        warnings += [FitWarning(series.name, text, tuple(map(int, data))) for text, data in found]
     freedom = float(fit.freedoms.sum())
     if fit.known and freedom * fit.excess**2 > chdtri(freedom, ALARM):
         text = f"data scatter {fit.excess:.2g} times as much as their standard deviations say"
-        doubts.append(
-            Doubt("", f"{text}: the model, or these, are wrong, and the bounds too small")
+        warnings.append(
+            FitWarning("", f"{text}: the model, or these, are wrong, and the bounds too small")
         )
-    return doubts
+    return warnings
 
 
 def _is_exact(fit: Fit, here: Indices) -> bool:
-    """Whether the model meets the data but for rounding."""
+    """Return whether the model meets the data up to rounding."""
     size = np.abs(fit.problem.data[here]).max()
     return bool(np.abs(fit.residuals[here]).max() <= 1e-9 * size)
 
@@ -100,8 +98,8 @@ def _of_series(
         sizes = f"{len(groups) - np.count_nonzero(groups)} and {np.count_nonzero(groups)}"
         text = f"residuals are of two groups, {sizes}: data of two materials or tests in one?"
         found.append((text, here[groups]))
-    elif len(wild := here[_are_outliers(fit, place, residuals[here])]):
-        found.append(("far from all others: outliers?", wild))
+    elif len(outliers := here[_are_outliers(fit, place, residuals[here])]):
+        found.append(("far from all others: outliers?", outliers))
     sorted_here = here[np.argsort(order[here], kind="stable")]
     if groups is None and _goes_in_waves(residuals[sorted_here]):
         text = (
@@ -118,10 +116,10 @@ def _of_series(
 
 
 def _two_groups(residuals: Array, fitted: Array) -> Mask | None:
-    """Which residuals are of the upper one of two groups, if there are two.
+    """Return which residuals are in the upper of two groups, or None if there are no two groups.
 
-    As they are, or over the fitted values, as of two slopes. What is left within two groups, of the
-    sum of squares, is held against that of normal samples.
+    The residuals are tested as they are, and over the fitted values, which finds two slopes. The
+    share of the sum of squares that remains within the groups is compared with normal samples.
     """
     for values in (residuals, residuals / np.where(fitted == 0.0, np.inf, fitted)):
         ratio, limit = _best_split(values[None, :])
@@ -133,22 +131,26 @@ def _two_groups(residuals: Array, fitted: Array) -> Mask | None:
 
 @cache
 def _smallest_split(count: int) -> float:
-    """What a share within two groups is below in few normal samples of so many."""
+    """Return the share within two groups below which :data:`ALARM` of normal samples are.
+
+    The samples have ``count`` values each.
+    """
     samples = np.random.default_rng(SEED).standard_normal((SAMPLES, count))
     return float(np.quantile(_best_split(samples)[0], ALARM))
 
 
 def _best_split(values: Array) -> tuple[Array, Array]:
-    """Least sum of squares within two groups over that of all, and where they part, ``(m,)``.
+    """Return the least share of the sum of squares within two groups, and the limit between them.
 
-    Of samples ``(m, n)``; each group has a share of :data:`SMALLEST_GROUP` or more.
+    Both are ``(m,)`` for samples ``(m, n)``. Each group has a share of :data:`SMALLEST_GROUP` or
+    more of the values.
     """
     ordered = np.sort(values - values.mean(axis=1, keepdims=True), axis=1)
     count = ordered.shape[1]
     smallest = max(2, round(SMALLEST_GROUP * count))
     below = np.cumsum(ordered, axis=1)[:, smallest - 1 : count - smallest]
     sizes = np.arange(smallest, count - smallest + 1)
-    # Two means m, -m n1/n2: what lies between the groups.
+    # The sum of squares between groups with the means m and -m n1/n2.
     between = below**2 * count / (sizes * (count - sizes))
     best = between.argmax(axis=1)
     rows = np.arange(len(ordered))
@@ -159,7 +161,10 @@ def _best_split(values: Array) -> tuple[Array, Array]:
 
 
 def _are_outliers(fit: Fit, place: int, values: Array) -> Mask:
-    """Which residuals, without themselves in the scatter, would come once in a thousand fits."""
+    """Return which residuals would occur at most once in a thousand fits.
+
+    The scatter is estimated without the residual itself.
+    """
     freedom = float(fit.freedoms[place])
     if fit.problem.series[place].deviations is None:
         rest = np.maximum(freedom - values**2, 1e-9)
@@ -170,7 +175,7 @@ def _are_outliers(fit: Fit, place: int, values: Array) -> Mask:
 
 
 def _goes_in_waves(residuals: Array) -> bool:
-    """Whether neighbours are alike: von Neumann 1941, Ann. Math. Stat. 12, 367."""
+    """Return whether neighbours are correlated (von Neumann 1941, Ann. Math. Stat. 12, 367)."""
     count = len(residuals)
     ratio = np.sum(np.diff(residuals) ** 2) / np.sum(residuals**2)
     spread = np.sqrt(4.0 * (count - 2.0) / (count**2 - 1.0))
@@ -178,7 +183,10 @@ def _goes_in_waves(residuals: Array) -> bool:
 
 
 def _scatter_grows(residuals: Array, fitted: Array) -> bool:
-    """Whether large values scatter more: Spearman's rank correlation with the residuals' size."""
+    """Return whether large values scatter more.
+
+    The test is Spearman's rank correlation of the values with the size of the residuals.
+    """
     count = len(residuals)
     ranks = [np.argsort(np.argsort(np.abs(one), kind="stable")) for one in (residuals, fitted)]
     correlation = np.corrcoef(ranks[0], ranks[1])[0, 1]
@@ -186,7 +194,7 @@ def _scatter_grows(residuals: Array, fitted: Array) -> bool:
 
 
 def _files_differ(residuals: Array, files: Indices) -> bool:
-    """Whether means of files differ by more than the scatter within them: a test of variances."""
+    """Return whether the means of files differ by more than the scatter within them (F test)."""
     names, numbers = np.unique(files, return_inverse=True)
     count, groups = len(residuals), len(names)
     if groups < 2 or count <= groups:

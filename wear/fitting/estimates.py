@@ -1,9 +1,9 @@
-"""What the data say of each parameter: deviation, bounds, shares, or why it is not determined.
+"""Estimate of each parameter: deviation, bounds, shares, or why it is not determined.
 
-The estimate is a linear combination A of the data near the solution, and its variance the sum of
-(A_ji σ_i)² over the data: the terms' shares tell which data decide a parameter. What no data decide
-is found by the singular values of the Jacobian, columns scaled to length 1, and by bounds wider
-than the parameter itself.
+Near the solution an estimate is a linear combination A of the data. Its variance is the sum of
+(A_ji σ_i)² over the data, and the shares of these terms show which data determine a parameter.
+Parameters that are not determined are found by the singular values of the Jacobian, with columns
+scaled to length 1, and by bounds that are wider than the parameter itself.
 """
 
 from __future__ import annotations
@@ -17,37 +17,54 @@ from sa_solver.types import Array, Mask
 from wear.fitting.problem import FitProblem, Unknown
 
 RANK = 1e-6
-"""Singular values of the Jacobian below this share of the largest are nothing: central differences
-leave 1e-9 of noise in it."""
+"""Share of the largest singular value of the Jacobian below which a singular value counts as 0. The
+noise of central differences is 1e-9."""
 
 ALIKE = 1e-5
-"""Columns of the Jacobian, in relative changes, that differ by no more are one: a product."""
+"""Relative difference below which two columns of the Jacobian, for relative changes of their
+parameters, are equal: only the product of the parameters matters."""
 
 PRODUCT, QUOTIENT = "product with", "quotient by"
 
 DECADE = float(np.log(10.0))
-"""A logarithm that is known no better than to a decade is not determined."""
+"""Uncertainty of a logarithm, a decade, above which the parameter is not determined."""
 
 FOLLOWS = 0.95
-"""Correlation from which on a parameter follows another."""
+"""Correlation above which a parameter is tied to another."""
 
 
 @dataclass(frozen=True)
 class Estimate:
-    """What the data say of one parameter.
+    """Estimate of one parameter.
 
-    ``name`` is that of the unknown, ``value`` what it is most likely, with its standard
-    ``deviation`` and ``bounds`` of 95 %; of what is not determined these are NaN, and ``doubt``
-    says why. The deviation of a ``logarithmic`` one is its value times that of the logarithm.
-    ``shares`` ``(k,)`` are those of the series in its variance, which add up to 1, and ``heaviest``
-    the datum with the largest share of its own, ``heaviest_share``. ``quantile`` is what the
-    deviation is multiplied with for linear bounds; where the model bends within these, which
-    ``straight`` then denies, bounds are those of the profile (:mod:`wear.fitting.profiles`).
-    ``partner`` is the name of another of which only the product with this one counts, if any.
+    Attributes
+    ----------
+    name
+        Name of the unknown.
+    value
+        Best value.
+    deviation, bounds
+        Standard deviation and 95 % bounds, NaN if the parameter is not determined. The deviation of
+        a logarithmic parameter is its value times that of the logarithm.
+    doubt
+        Reason why the parameter is not determined, empty if it is.
+    shares
+        Shares of the series in the variance ``(k,)``, which add up to 1.
+    heaviest, heaviest_share
+        Index of the datum with the largest share, and this share.
+    logarithmic
+        Whether the logarithm was fitted.
+    quantile
+        Factor from the deviation to linear bounds.
+    straight
+        Whether the bounds are linear. Where the model is not linear within them, they are those of
+        the profile (:mod:`wear.fitting.profiles`).
+    partner
+        Name of a parameter of which only the product with this one matters, if any.
 
     Examples
     --------
-    A force from friction and load, of which only the product counts:
+    A force from friction and load, of which only the product matters:
 
     >>> import numpy as np
     >>> from wear.fitting import FitProblem, Series, Unknown, fit
@@ -77,18 +94,22 @@ class Estimate:
 
     @property
     def determined(self) -> bool:
-        """Whether the data tell it."""
+        """Whether the data determine the parameter."""
         return not self.doubt
 
 
 def inverse_of(jacobian: Array) -> tuple[Array, Array]:
-    """Pseudo-inverse ``(p, n)``, and shares ``(p,)`` of each parameter in what nothing decides."""
+    """Return the pseudoinverse ``(p, n)`` of a Jacobian, and the undetermined share ``(p,)``.
+
+    The undetermined share of a parameter is its part in directions that the data do not determine.
+    """
     lengths = np.linalg.norm(jacobian, axis=0)
     scale = np.where(lengths > 0.0, lengths, 1.0)
     left, singular, right = np.linalg.svd(jacobian / scale, full_matrices=False)
-    told = singular > RANK * max(singular.max(), np.finfo(float).tiny)
-    inverse = (right[told].T / singular[told]) @ left[:, told].T / scale[:, None]
-    return inverse, np.asarray(1.0 - np.sum(right[told] ** 2, axis=0))
+    significant = singular > RANK * max(singular.max(), np.finfo(float).tiny)
+    scaled = right[significant].T / singular[significant]
+    inverse = scaled @ left[:, significant].T / scale[:, None]
+    return inverse, np.asarray(1.0 - np.sum(right[significant] ** 2, axis=0))
 
 
 def estimate_at(
@@ -101,7 +122,25 @@ def estimate_at(
     jacobian: Array,
     quantile: float,
 ) -> Estimate:
-    """What is known of the parameter at a ``place``."""
+    """Return the estimate of the parameter with the index ``place``.
+
+    Parameters
+    ----------
+    problem
+        Problem that was fitted.
+    place
+        Index of the parameter.
+    values
+        Values of all parameters ``(p,)``.
+    inverse, kernel
+        Result of :func:`inverse_of` for the Jacobian.
+    held
+        Parameters that a bound holds ``(p,)``.
+    jacobian
+        Jacobian of the residuals over their deviations ``(n, p)``.
+    quantile
+        Factor from the deviation to linear bounds.
+    """
     unknown, terms = problem.unknowns[place], inverse[place] ** 2
     total = float(terms.sum())
     shares = np.array([terms[problem.places == k].sum() for k in range(len(problem.series))])
@@ -111,13 +150,14 @@ def estimate_at(
         bounds, deviation = (value / factor, value * factor), value * deviation
     else:
         bounds = value - quantile * deviation, value + quantile * deviation
-    doubt = _doubt(problem, place, values, kernel, held, jacobian)
+    doubt = _why_undetermined(problem, place, values, kernel, held, jacobian)
     if not doubt:
-        doubt = width_doubt(unknown, value, bounds)
+        doubt = why_too_wide(unknown, value, bounds)
     if doubt:
         deviation, bounds = np.nan, (np.nan, np.nan)
     heaviest = int(np.argmax(terms))
-    products = [name for name, how in _together(problem, place, values, jacobian) if how == PRODUCT]
+    partners = _partners(problem, place, values, jacobian)
+    products = [name for name, relation in partners if relation == PRODUCT]
     return Estimate(
         name=unknown.name,
         value=value,
@@ -133,8 +173,8 @@ def estimate_at(
     )
 
 
-def width_doubt(unknown: Unknown, value: float, bounds: tuple[float, float]) -> str:
-    """Why bounds are too wide to tell anything, empty if they are not."""
+def why_too_wide(unknown: Unknown, value: float, bounds: tuple[float, float]) -> str:
+    """Return why bounds are too wide for a determined parameter, or an empty text."""
     lower, upper = bounds
     if unknown.logarithmic:
         within = upper <= value * np.exp(DECADE) and lower >= value / np.exp(DECADE)
@@ -144,10 +184,11 @@ def width_doubt(unknown: Unknown, value: float, bounds: tuple[float, float]) -> 
     return ""
 
 
-def led_astray(alone: Sequence[Estimate], place: int, covariance: Array) -> Estimate:
-    """The estimate at a ``place``; none where it follows one that is not determined.
+def checked_for_ties(alone: Sequence[Estimate], place: int, covariance: Array) -> Estimate:
+    """Return the estimate at ``place``, marked if it is tied to an undetermined parameter.
 
-    Over so wide a range the model bends, and linear bounds of what goes with it are wrong.
+    Over the wide range of the other parameter the model is not linear, so that linear bounds of the
+    tied parameter are wrong.
     """
     estimate, spread = alone[place], np.sqrt(np.diag(covariance))
     for k, other in enumerate(alone):
@@ -158,10 +199,10 @@ def led_astray(alone: Sequence[Estimate], place: int, covariance: Array) -> Esti
     return estimate
 
 
-def _doubt(
+def _why_undetermined(
     problem: FitProblem, place: int, values: Array, kernel: Array, held: Mask, jacobian: Array
 ) -> str:
-    """Why a parameter is not determined, empty if it is."""
+    """Return why a parameter is not determined, or an empty text."""
     unknown = problem.unknowns[place]
     if held[place]:
         lower = values[place] - unknown.lower <= unknown.upper - values[place]
@@ -173,21 +214,24 @@ def _doubt(
         return "the data do not depend on it"
     tied = (kernel > ALIKE) & (lengths > 0.0)
     others = [problem.unknowns[k].name for k in np.flatnonzero(tied) if k != place]
-    for name, how in _together(problem, place, values, jacobian):
-        return f"only its {how} {name} counts"
+    for name, relation in _partners(problem, place, values, jacobian):
+        return f"only its {relation} {name} counts"
     return f"only together with {', '.join(others)}"
 
 
-def _together(
+def _partners(
     problem: FitProblem, place: int, values: Array, jacobian: Array
 ) -> list[tuple[str, str]]:
-    """Others of which only product or quotient with the one at a ``place`` counts, and which."""
+    """Return parameters of which only the product or quotient with that at ``place`` matters.
+
+    Each is returned with this relation.
+    """
     relative = jacobian * np.where(problem.logarithmic, 1.0, values)
     length = float(np.linalg.norm(relative[:, place]))
     pairs = []
     for k, other in enumerate(problem.unknowns):
-        for sign, how in ((1.0, PRODUCT), (-1.0, QUOTIENT)):
-            apart = np.linalg.norm(relative[:, place] - sign * relative[:, k])
-            if k != place and length > 0.0 and apart <= ALIKE * length:
-                pairs.append((other.name, how))
+        for sign, relation in ((1.0, PRODUCT), (-1.0, QUOTIENT)):
+            difference = np.linalg.norm(relative[:, place] - sign * relative[:, k])
+            if k != place and length > 0.0 and difference <= ALIKE * length:
+                pairs.append((other.name, relation))
     return pairs

@@ -1,9 +1,9 @@
-"""How joint parameters follow the dissipated energy: the functions of :mod:`wear.joints` fitted.
+"""Fits of joint parameters as functions of the dissipated energy, as in :mod:`wear.joints`.
 
 Each quantity is an initial value times a function of the energy E. For given rates the product is
-linear in what is left, so that starts need no guess: rates are tried on a grid of powers of ten,
-the rest follows in closed form (the variable projection of Golub and Pereyra 1973, SIAM J. Numer.
-Anal. 10, 413, on a grid), and the best few are where the solver begins.
+linear in the other parameters, so that no initial guess is needed: rates are tried on a grid of
+powers of ten, and the other parameters follow in closed form (variable projection of Golub and
+Pereyra 1973, SIAM J. Numer. Anal. 10, 413, on a grid). The solver starts from the best few.
 """
 
 from __future__ import annotations
@@ -33,35 +33,44 @@ from wear.joints.evolution import (
 )
 
 STARTS = 4
-"""The solver begins at so many of the best rates."""
+"""Number of the best rates from which the solver starts."""
 
 PER_DECADE = 2
-"""Rates tried in each power of ten."""
+"""Number of rates tried in each power of ten."""
 
 DECADES = {"scale": (-3.0, 2.0), "rate": (-2.0, 2.0), "second_rate": (-2.0, 2.0)}
-"""Powers of ten about the energies of the data between which rates are tried: from the inverse of
-the largest energy to that of the smallest, a scale over that of the energies themselves."""
+"""Powers of ten by which the range of rates that are tried exceeds that of the energies: from the
+inverse of the largest energy to that of the smallest, and for a scale that of the energies."""
 
 LATE = 13.0
-"""A logarithm goes on rising far beyond 1/rate: it is tried for so many powers of ten more."""
+"""Additional powers of ten that are tried for a logarithm, which still rises far beyond 1/rate."""
 
 REACH = 1e6
-"""Rates may lie so far beyond those that are tried."""
+"""Factor by which the bounds of a rate exceed the rates that are tried."""
 
 HELD_WEIGHT = 1e3
-"""Of a held initial value beside the data, where starts are looked for."""
+"""Weight of a held initial value relative to the data, in the search for initial values."""
 
 INITIAL = "initial"
-"""The value at no energy, beside the parameters of a function."""
+"""Name of the value at zero energy, which every function has in addition to its parameters."""
 
 
 @dataclass(frozen=True)
 class EvolutionForm:
-    """A function of the energy as it is fitted.
+    """Form of a function of the energy for the fit.
 
-    ``function`` makes it of its parameters by name; ``bounds`` are those of its linear parameters
-    and ``rates`` the names of the others. ``columns`` are the functions of E that it is a
-    combination of, given the rates, and ``parts`` its linear parameters from their coefficients.
+    Attributes
+    ----------
+    function
+        Function of the energy for given parameters by name.
+    bounds
+        Bounds of its linear parameters by name.
+    rates
+        Names of its other parameters.
+    columns
+        Functions of E, for given rates, of which it is a linear combination.
+    parts
+        Linear parameters from the coefficients of this combination.
     """
 
     function: Callable[[Mapping[str, float]], WearFunction]
@@ -72,7 +81,7 @@ class EvolutionForm:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Its parameters."""
+        """Names of all parameters."""
         return *self.bounds, *self.rates
 
 
@@ -107,7 +116,7 @@ def _decay(energy: Array, rate: float) -> Array:
 
 
 ANY, NOT_NEGATIVE, SHARE = (-np.inf, np.inf), (0.0, np.inf), (0.0, 1.0)
-# No less than -1: the parameter would be below 0 in the end.
+# Below -1 the final value of the parameter would be negative.
 CHANGE = (-1.0, np.inf)
 
 FORMS: Mapping[str, EvolutionForm] = {
@@ -149,7 +158,7 @@ FORMS: Mapping[str, EvolutionForm] = {
         _exponentials,
     ),
 }
-"""By the names that a case has for them; rates are 0 or above, as there."""
+"""Forms by the names that a case uses; rates are 0 or above, as in a case."""
 
 SINGLE = EvolutionForm(
     FORMS["exponential"].function,
@@ -158,20 +167,32 @@ SINGLE = EvolutionForm(
     lambda energy, rates: (np.ones_like(energy), _decay(energy, rates["rate"])),
     _single,
 )
-"""An exponential whose second one is held at a share of nothing."""
+"""Form of a single exponential, without the second term."""
 
 
 @dataclass(frozen=True)
 class EvolutionData:
-    """Values of one joint parameter, its ``name``, against energy.
+    """Measured values of one joint parameter against energy.
 
-    ``energy`` ``(n,)`` [N mm], 0 or above, and ``values`` ``(n,)``, with their standard
-    ``deviations`` ``(n,)`` if they are known. ``form`` is a key of ``FORMS``, and ``held`` the
-    parameters that are not free, by name, ``initial`` among them.
+    Parameters
+    ----------
+    name
+        Name of the joint parameter.
+    energy
+        Dissipated energy ``(n,)`` [N mm], 0 or above.
+    values
+        Values of the parameter ``(n,)``.
+    form
+        Function of the energy, a key of ``FORMS``.
+    held
+        Values of parameters of the function that are not free, by name; ``initial`` is the value at
+        zero energy.
+    deviations
+        Standard deviations of the values ``(n,)``, if they are known.
 
     Examples
     --------
-    Friction whose initial value is known from elsewhere:
+    Friction with a known initial value:
 
     >>> import numpy as np
     >>> from wear.fitting import EvolutionData
@@ -204,27 +225,28 @@ class EvolutionData:
 
     @property
     def shape(self) -> EvolutionForm:
-        """The function, with as many terms as are free."""
+        """Form of the function, without terms that are held at 0."""
         if self.form == "exponential" and self.held.get("share") == 1.0:
             return SINGLE
         return FORMS[self.form]
 
     @property
     def free(self) -> tuple[str, ...]:
-        """Names of the parameters that are free."""
+        """Names of the free parameters."""
         return tuple(name for name in (INITIAL, *self.shape.names) if name not in self.held)
 
     def at(self, energy: Array, values: Mapping[str, float]) -> Array:
-        """The parameter at an ``energy`` with values of all that is free."""
+        """Return the joint parameter at an ``energy``, for ``values`` of the free parameters."""
         all_values = {**self.held, **values}
         return np.asarray(all_values[INITIAL] * self.shape.function(all_values)(energy))
 
 
 @dataclass(frozen=True)
 class EvolutionFit:
-    """The problem of some :class:`EvolutionData`, and where each finds its values.
+    """Problem of a fit of :class:`EvolutionData`.
 
-    ``names`` has the place among the unknowns by data and parameter: those ``shared`` have one.
+    ``names`` maps data and parameter to the index among the unknowns. A shared parameter has the
+    same index for all data.
     """
 
     problem: FitProblem
@@ -232,24 +254,27 @@ class EvolutionFit:
     names: Mapping[tuple[str, str], int]
 
     def values_of(self, data: EvolutionData, values: Array) -> dict[str, float]:
-        """The free parameters of one of the data by name, of all values ``(p,)``."""
+        """Return the free parameters of ``data`` by name, from all ``values`` ``(p,)``."""
         return _named(data, self.names, values)
 
     def curve(self, data: EvolutionData, energy: Array) -> Callable[[Array], Array]:
-        """What all values ``(p,)`` make of one of the data at an ``energy`` ``(m,)`` [N mm]."""
+        """Return a function from all values ``(p,)`` to the joint parameter ``(m,)``.
+
+        The joint parameter is that of ``data`` at an ``energy`` ``(m,)`` [N mm].
+        """
         return lambda values: data.at(energy, self.values_of(data, values))
 
 
 def evolution_problem(data: Sequence[EvolutionData], shared: Sequence[str] = ()) -> EvolutionFit:
-    """How joint parameters follow the energy, as a problem of :func:`fit`.
+    """Return a problem of :func:`fit` for joint parameters as functions of the energy.
 
-    ``shared`` are names of parameters that have one value in all the data where they are free, as
-    the rates of Li et al. 2020, table A1. Raises FitError for energies below 0, values that are not
-    finite, data without energies above 0, and a shared parameter that none has free.
+    ``shared`` are the names of parameters that have the same value in all data where they are free,
+    as the rates of Li et al. 2020, table A1. Raises FitError for energies below 0, values that are
+    not finite, data without energies above 0, and a shared parameter that is free in none of them.
 
     Examples
     --------
-    Preload that a bolt loses, measured without error, comes back:
+    The loss of preload of a bolt, from data without error:
 
     >>> import numpy as np
     >>> from wear.fitting import EvolutionData, evolution_problem, fit
@@ -295,34 +320,38 @@ def _named(
 def _unknowns(
     data: Sequence[EvolutionData], shared: Sequence[str]
 ) -> tuple[dict[tuple[str, str], int], tuple[Unknown, ...]]:
-    """Where each free parameter of the data is among the unknowns, and these."""
+    """Return the index of each free parameter among the unknowns, and the unknowns."""
     for name in shared:
         if not any(name in one.free for one in data):
-            raise FitError(f"{name}: shared, but free nowhere; allowed: a free parameter")
+            raise FitError(f"{name}: shared, but not free in any data; allowed: a free parameter")
     largest = max(one.energy.max() for one in data)
     smallest = min(one.energy[one.energy > 0.0].min() for one in data)
     names: dict[tuple[str, str], int] = {}
     unknowns: dict[str, Unknown] = {}
     for one in data:
         for name in one.free:
-            called = name if name in shared else f"{one.name}.{name}"
-            unknowns.setdefault(called, _unknown(one, name, called, (smallest, largest)))
-            names[one.name, name] = list(unknowns).index(called)
+            full_name = name if name in shared else f"{one.name}.{name}"
+            unknowns.setdefault(full_name, _unknown(one, name, full_name, (smallest, largest)))
+            names[one.name, name] = list(unknowns).index(full_name)
     return names, tuple(unknowns.values())
 
 
-def _unknown(data: EvolutionData, name: str, called: str, energies: tuple[float, float]) -> Unknown:
+def _unknown(
+    data: EvolutionData, name: str, full_name: str, energies: tuple[float, float]
+) -> Unknown:
     if name == INITIAL:
-        return Unknown(called, lower=0.0)
+        return Unknown(full_name, lower=0.0)
     if name in data.shape.rates:
-        lowest, highest = _tried(data, name, energies)
-        return Unknown(called, lowest / REACH, highest * REACH, logarithmic=True)
+        lowest, highest = _rate_range(data, name, energies)
+        return Unknown(full_name, lowest / REACH, highest * REACH, logarithmic=True)
     lower, upper = data.shape.bounds[name]
-    return Unknown(called, lower, upper, size=1.0 / energies[1] if name == "slope" else 1.0)
+    return Unknown(full_name, lower, upper, size=1.0 / energies[1] if name == "slope" else 1.0)
 
 
-def _tried(data: EvolutionData, name: str, energies: tuple[float, float]) -> tuple[float, float]:
-    """Lowest and highest rate that is tried; a scale is an energy."""
+def _rate_range(
+    data: EvolutionData, name: str, energies: tuple[float, float]
+) -> tuple[float, float]:
+    """Return the lowest and highest rate that is tried; a scale is an energy."""
     smallest, largest = energies
     below, above = DECADES[name]
     if name == "scale":
@@ -331,7 +360,7 @@ def _tried(data: EvolutionData, name: str, energies: tuple[float, float]) -> tup
     return 10.0**below / largest, 10.0 ** (above + more) / smallest
 
 
-# --- starts -------------------------------------------------------------------------------------
+# --- initial values -----------------------------------------------------------------------------
 
 
 def _starts(
@@ -339,7 +368,7 @@ def _starts(
     shared: Sequence[str],
     names: Mapping[tuple[str, str], int],
 ) -> list[Array]:
-    """Values ``(p,)`` of the best rates of a grid, the best first."""
+    """Return initial values ``(p,)`` for the best rates of a grid, the best first."""
     common = [name for name in shared if any(name in one.shape.rates for one in data)]
     ranked: list[tuple[float, list[list[dict[str, float]]]]] = []
     for rates in _grid(data, common):
@@ -371,7 +400,10 @@ def _start(
 def _ranked(
     data: EvolutionData, common: Mapping[str, float]
 ) -> list[tuple[float, dict[str, float]]]:
-    """Cost and values of the data's own rates on their grid, the best first."""
+    """Return cost and values for the rates of ``data`` alone on their grid, the best first.
+
+    ``common`` are the values of shared rates.
+    """
     known = {**data.held, **{k: v for k, v in common.items() if k in data.free}}
     own = [name for name in data.shape.rates if name not in known]
     found = [_linear(data, {**known, **rates}) for rates in _grid([data], own)]
@@ -379,7 +411,7 @@ def _ranked(
 
 
 def _grid(data: Sequence[EvolutionData], names: Sequence[str]) -> Iterator[dict[str, float]]:
-    """Rates that are tried together; of two exponentials the first is the slower one."""
+    """Yield combinations of rates; the first of two exponentials is the slower one."""
     if not names:
         yield {}
         return
@@ -388,7 +420,7 @@ def _grid(data: Sequence[EvolutionData], names: Sequence[str]) -> Iterator[dict[
     lines = []
     for name in names:
         one = next(one for one in data if name in one.shape.rates)
-        lowest, highest = _tried(one, name, (smallest, largest))
+        lowest, highest = _rate_range(one, name, (smallest, largest))
         count = 1 + round(PER_DECADE * np.log10(highest / lowest))
         lines.append(np.geomspace(lowest, highest, count).tolist())
     for values in product(*lines):
@@ -398,7 +430,10 @@ def _grid(data: Sequence[EvolutionData], names: Sequence[str]) -> Iterator[dict[
 
 
 def _linear(data: EvolutionData, known: Mapping[str, float]) -> tuple[float, dict[str, float]]:
-    """Cost and values where the rates are known; of what is held beside them only the initial."""
+    """Return the cost and the values of the free parameters for known rates.
+
+    Of other held parameters only the initial value is used.
+    """
     columns = np.stack(data.shape.columns(data.energy, known), axis=1)
     weights = np.ones(len(data.values))
     if data.deviations is not None:
@@ -419,6 +454,6 @@ def _linear(data: EvolutionData, known: Mapping[str, float]) -> tuple[float, dic
 
 
 def _allowed(data: EvolutionData, name: str, value: float) -> float:
-    """A value within its bounds, 1 for none."""
+    """Return ``value`` within its bounds, or 1 if it is not finite."""
     lower, upper = data.shape.bounds.get(name, NOT_NEGATIVE)
     return float(np.clip(value, lower, upper)) if np.isfinite(value) else 1.0

@@ -1,18 +1,20 @@
-"""Least squares with bounds, and what the data say of each parameter.
+"""Least squares with bounds, and the uncertainty of each parameter.
 
 Residuals are divided by the standard deviations of the data. Where these are not known, each series
-has one of its own, from its residuals: s² = Σ r² / (n - p), n of its data and p parameters that
-they decide (the sum of their leverages); with several series that share parameters it is found
-anew until it stays, the iterated least squares of Carroll and Ruppert 1988, *Transformation and
-Weighting in Regression*, chapter 2. For a single series the covariance then is the usual
-s² (JᵀJ)⁻¹, J the Jacobian at the solution (Bates and Watts 1988, *Nonlinear Regression Analysis*,
-chapter 2), and bounds of 95 % are Student's, with n - p degrees of freedom. A parameter that
-several series decide has those of Satterthwaite 1946, Biometrics 2, 110: 1/f = Σ (share of the
-variance)² / f of the series. With given standard deviations bounds are the normal ones.
+has its own, which is estimated from its residuals: s² = Σ r² / (n - p), with its n data and the p
+parameters that they determine (the sum of their leverages). For several series with common
+parameters the estimate is iterated until it is constant (iterated least squares of Carroll and
+Ruppert 1988, *Transformation and Weighting in Regression*, chapter 2). For a single series the
+covariance is the usual s² (JᵀJ)⁻¹, with the Jacobian J at the solution (Bates and Watts 1988,
+*Nonlinear Regression Analysis*, chapter 2), and 95 % bounds follow from Student's distribution with
+n - p degrees of freedom. For a parameter that depends on several series the degrees of freedom f
+are those of Satterthwaite 1946, Biometrics 2, 110: 1/f is the sum of (share of the variance)² / f
+of the series. With given standard deviations the bounds follow from the normal distribution.
 
-Energies and rates go over powers of ten: they are fitted as logarithms, so that their bounds are
-factors. Bounds are linear at first; each is held, all else fitted anew, and replaced by where the
-misfit rises as it should if it does not there (:mod:`wear.fitting.profiles`).
+Energies and rates vary over powers of ten. They are fitted as logarithms, so that their bounds are
+factors. Bounds are linear at first. Each bound is then checked: the parameter is held there and all
+others are fitted again. If the misfit does not rise as it should, the bound is replaced by the
+point at which it does (:mod:`wear.fitting.profiles`).
 """
 
 from __future__ import annotations
@@ -26,49 +28,64 @@ from scipy.special import ndtri, stdtrit
 from sa_solver import checks
 from sa_solver.errors import ConvergenceError
 from sa_solver.types import Array, Mask
-from wear.fitting.estimates import RANK, Estimate, estimate_at, inverse_of, led_astray
+from wear.fitting.estimates import RANK, Estimate, checked_for_ties, estimate_at, inverse_of
 from wear.fitting.problem import FitError, FitProblem
 from wear.fitting.profiles import profiled
 from wear.fitting.solving import pinned, solve
 
 LEVEL = 0.95
-"""Of all bounds."""
+"""Confidence level of all bounds."""
 
 NEAR = 0.1
-"""A bound holds a parameter that is so near to it that the data could hardly tell, in deviations of
-the data, ..."""
+"""Distance from a bound, in deviations of the data, below which the bound may hold a parameter."""
 
 PUSHED = 1e-3
-"""... and that they push against it: the misfit falls by so much for a step of one deviation."""
+"""Decrease of the misfit for a step of one deviation beyond a bound, above which the bound holds a
+parameter."""
 
 SETTLED, MOST_ROUNDS = 1e-6, 100
-"""Relative change of the scatter at which it counts as found, and rounds before giving up."""
+"""Relative change of the scatter at which its iteration ends, and most iterations."""
 
 EXACT = 1e-12
-"""Scatter of data that a model meets exactly, in their largest value."""
+"""Scatter of data that a model meets exactly, relative to their largest value."""
 
 ROUNDING = 1e-9
-"""Residuals of a model that meets a series, in its largest value."""
+"""Residuals of a model that meets a series exactly, relative to its largest value."""
 
 SAME_MINIMUM = 1e-4
-"""Costs that differ by less, relatively, are of one minimum."""
+"""Relative difference below which costs are those of the same minimum."""
 
 
 @dataclass(frozen=True)
 class Fit:
-    """The best fit of a ``problem``.
+    """Best fit of a problem.
 
-    ``values`` ``(p,)`` are those of all its parameters, also of what is not determined; which are,
-    ``estimates`` say of all but nuisances, which come last. ``covariance`` ``(p, p)`` is that of
-    the fitted ones (logarithms where these are fitted), without directions that nothing decides,
-    and ``parts`` ``(k, p, p)`` what each series brings to it. ``fitted`` and ``residuals``
-    ``(n,)``, ``deviations`` ``(n,)`` of the data, and their ``leverages`` ``(n,)``. ``freedoms``
-    ``(k,)`` are the data of each series less the parameters that they decide. ``reached`` of the
-    ``tried`` starts ended here. ``known`` says whether all deviations were given.
+    Attributes
+    ----------
+    problem
+        Problem that was fitted.
+    values
+        Values of all parameters ``(p,)``, also of those that are not determined.
+    estimates
+        Estimates of all parameters but nuisances, which come last.
+    parts
+        Contributions of each series to the covariance of the fitted values ``(k, p, p)``, without
+        directions that the data do not determine.
+    fitted, residuals
+        Data according to the model, and measured minus fitted data ``(n,)``.
+    deviations, leverages
+        Standard deviations and leverages of the data ``(n,)``.
+    freedoms
+        Degrees of freedom of each series ``(k,)``: its data minus the parameters that they
+        determine.
+    reached, tried
+        Number of initial values that led to this solution, and of all that were tried.
+    known
+        Whether the standard deviations of all data were given.
 
     Examples
     --------
-    The 95 % band of a line through the origin, which opens with the distance from it:
+    The 95 % band of a line through the origin widens with the distance from the origin:
 
     >>> import numpy as np
     >>> from wear.fitting import VolumeData, VolumeLaw, fit, volume_problem
@@ -95,12 +112,12 @@ class Fit:
 
     @property
     def covariance(self) -> Array:
-        """Of the fitted parameters ``(p, p)``."""
+        """Covariance of the fitted values ``(p, p)``, of logarithms where these are fitted."""
         return np.asarray(self.parts.sum(axis=0))
 
     @property
     def correlation(self) -> Array:
-        """Of the parameters that have estimates ``(q, q)``; NaN where one is not determined."""
+        """Correlation of the parameters with estimates ``(q, q)``; NaN if not determined."""
         found = np.array([estimate.determined for estimate in self.estimates])
         covariance = self.covariance[: len(found), : len(found)]
         scale = np.sqrt(np.where(found, np.diag(covariance), np.nan))
@@ -108,9 +125,9 @@ class Fit:
 
     @property
     def standardised(self) -> Array:
-        """Residuals over the deviations that they are to be expected with ``(n,)``.
+        """Residuals over their expected deviations ``(n,)``.
 
-        0 of data that decide a parameter alone: they are met whatever they are.
+        They are 0 for data that determine a parameter alone, which any value of them would meet.
         """
         left = 1.0 - self.leverages
         alone = left < RANK
@@ -120,23 +137,27 @@ class Fit:
 
     @property
     def excess(self) -> float:
-        """Scatter over that of the given deviations: 1 where they are right; NaN for none given."""
+        """Ratio of the scatter to the given deviations, which should be 1; NaN for none given."""
         if not self.known:
             return float("nan")
         squares = np.sum((self.residuals / self.deviations) ** 2)
         return float(np.sqrt(squares / self.freedoms.sum()))
 
     def product(self, first: int, second: int) -> tuple[float, float]:
-        """Product of two parameters that are fitted as they are, and its standard deviation."""
+        """Return the product of two parameters, and its standard deviation.
+
+        The parameters with the indices ``first`` and ``second`` must not be logarithmic.
+        """
         slopes = np.zeros(len(self.values))
         slopes[first], slopes[second] = self.values[second], self.values[first]
         variance = float(slopes @ self.covariance @ slopes)
         return float(self.values[first] * self.values[second]), float(np.sqrt(max(variance, 0.0)))
 
     def slopes(self, predict: Callable[[Array], Array]) -> Array:
-        """Change ``(m, p)`` of what ``predict`` says, by the fitted parameters.
+        """Return the derivatives ``(m, p)`` of ``predict`` with respect to the fitted values.
 
-        Of logarithms where these are fitted; by central differences, within the bounds.
+        They are computed by central differences within the bounds, with respect to logarithms where
+        these are fitted.
         """
         inner = self.problem.inner(self.values)
         steps = _steps(inner)
@@ -152,9 +173,9 @@ class Fit:
         return np.stack(columns, axis=-1)
 
     def band(self, predict: Callable[[Array], Array]) -> Array:
-        """Half the width ``(m,)`` of the 95 % band of what ``predict`` says of the parameters.
+        """Return half the width ``(m,)`` of the 95 % band of the result of ``predict``.
 
-        To first order, of the curve itself: data scatter about it.
+        The band is that of the curve itself, to first order. Data scatter about it.
         """
         slopes = self.slopes(predict)
         terms = np.maximum(np.einsum("mi,kij,mj->mk", slopes, self.parts, slopes), 0.0)
@@ -165,10 +186,10 @@ class Fit:
 
 
 def quantile_of(terms: Array, problem: FitProblem, freedoms: Array) -> float:
-    """What a standard deviation is multiplied with for 95 %.
+    """Return the factor from a standard deviation to its 95 % bound.
 
-    ``terms`` ``(k,)`` are those of the series in the variance, ``freedoms`` ``(k,)`` theirs; given
-    deviations have no scatter of their own.
+    ``terms`` ``(k,)`` are the contributions of the series to the variance, and ``freedoms``
+    ``(k,)`` their degrees of freedom. Series with given deviations have no uncertain scatter.
     """
     tail, total = 0.5 * (1.0 + LEVEL), float(terms.sum())
     found = np.array([series.deviations is None for series in problem.series])
@@ -177,7 +198,7 @@ def quantile_of(terms: Array, problem: FitProblem, freedoms: Array) -> float:
 
 
 def _steps(inner: Array) -> Array:
-    """Steps of central differences."""
+    """Return the steps of central differences."""
     return np.asarray(np.cbrt(np.finfo(float).eps) * np.maximum(np.abs(inner), 1e-9))
 
 
@@ -186,14 +207,15 @@ def _within(problem: FitProblem, inner: Array) -> Array:
 
 
 def fit(problem: FitProblem) -> Fit:
-    """The least squares of a problem, and how well the data determine it.
+    """Fit a problem by least squares, and estimate the uncertainty of its parameters.
 
-    Raises FitError for data that are not more than the parameters or not finite, or a series with
-    too few of them to tell their scatter; ConvergenceError where no start leads to a solution.
+    Raises FitError for data that are no more than the parameters or not finite, or for a series
+    with too few data to estimate their scatter, and ConvergenceError if no initial values lead to a
+    solution.
 
     Examples
     --------
-    A slope and an intercept from four points; the bounds are the ones of any textbook:
+    A slope and an intercept from four points, with the usual bounds:
 
     >>> import numpy as np
     >>> from wear.fitting import FitProblem, Series, Unknown, fit
@@ -222,7 +244,7 @@ def fit(problem: FitProblem) -> Fit:
     inverse = inverse * wider[:, None]
     masks = [problem.places == k for k in range(len(problem.series))]
     parts = np.stack([inverse[:, here] @ inverse[:, here].T for here in masks])
-    # The sum of leverages is the number of parameters that the data of a series decide.
+    # The sum of leverages is the number of parameters that the data of a series determine.
     freedoms = np.array([here.sum() - leverages[here].sum() for here in masks])
     known = all(series.deviations is not None for series in problem.series)
     values = problem.outer(inner)
@@ -235,8 +257,9 @@ def fit(problem: FitProblem) -> Fit:
     ]
     if not is_exact(problem, residuals):
         alone = profiled(problem, inner, deviations, alone, wider)
-    asked = sum(not unknown.nuisance for unknown in problem.unknowns)
-    estimates = tuple(led_astray(alone, place, parts.sum(axis=0)) for place in range(asked))
+    reported = sum(not unknown.nuisance for unknown in problem.unknowns)
+    covariance = parts.sum(axis=0)
+    estimates = tuple(checked_for_ties(alone, place, covariance) for place in range(reported))
     return Fit(
         problem=problem,
         values=values,
@@ -254,11 +277,11 @@ def fit(problem: FitProblem) -> Fit:
 
 
 def _wider(problem: FitProblem, inverse: Array, scaled: Array, leverages: Array) -> Array:
-    """By how much deviations ``(p,)`` grow where shares of a scatter are not those of the data.
+    """Return factors ``(p,)`` that widen deviations where the shares of a scatter are too small.
 
-    Shares are themselves estimated; what the residuals of the data that decide a parameter say is
-    taken where it is more (White 1980, Econometrica 48, 817; residuals over 1 - h as MacKinnon and
-    White 1985, J. Econometrics 29, 305).
+    The shares of a series are estimates. Where the residuals of the data that determine a parameter
+    imply a larger deviation, this is used (White 1980, Econometrica 48, 817; residuals over 1 - h
+    as in MacKinnon and White 1985, J. Econometrics 29, 305).
     """
     shared = np.array([series.shares is not None for series in problem.series])[problem.places]
     squares = np.where(shared, (scaled / np.maximum(1.0 - leverages, RANK)) ** 2, 1.0)
@@ -268,25 +291,25 @@ def _wider(problem: FitProblem, inverse: Array, scaled: Array, leverages: Array)
 
 
 def is_exact(problem: FitProblem, residuals: Array) -> bool:
-    """Whether a series is met but for rounding: its scatter then is anything."""
+    """Return whether the model meets a series up to rounding, so that its scatter is arbitrary."""
     sizes = [np.abs(series.values).max() for series in problem.series]
-    left = [np.abs(residuals[problem.places == k]).max() for k in range(len(sizes))]
+    largest = [np.abs(residuals[problem.places == k]).max() for k in range(len(sizes))]
     return any(
         one <= ROUNDING * size and series.deviations is None
-        for one, size, series in zip(left, sizes, problem.series, strict=True)
+        for one, size, series in zip(largest, sizes, problem.series, strict=True)
     )
 
 
 def _check(problem: FitProblem) -> None:
     data, free = problem.data, len(problem.unknowns)
     if not free:
-        raise FitError("nothing is free; allowed: at least one parameter to be fitted")
+        raise FitError("nothing is free; allowed: at least one free parameter")
     for series in problem.series:
         given = series.deviations
         if not np.isfinite(series.values).all():
             raise FitError(f"{series.name}: a value is not finite; allowed: finite numbers")
         if not series.values.any():
-            raise FitError(f"{series.name}: all values are 0; allowed: data that say something")
+            raise FitError(f"{series.name}: all values are 0; allowed: data that are not all 0")
         if given is not None and not ((given > 0.0) & np.isfinite(given)).all():
             raise FitError(f"{series.name}: a standard deviation is not above 0; allowed: above 0")
     if len(data) <= free:
@@ -308,7 +331,7 @@ def _check_model(problem: FitProblem) -> None:
 
 
 def _best(problem: FitProblem) -> tuple[Array, int]:
-    """The lowest end of all starts, fitted values ``(p,)``, and how many of them ended there."""
+    """Return the best fitted values ``(p,)``, and how many initial values led to them."""
     deviations = _first_deviations(problem)
     ends = [solve(problem, problem.inner(start), deviations) for start in problem.starts]
     found = [end for end in ends if end is not None]
@@ -323,7 +346,7 @@ def _best(problem: FitProblem) -> tuple[Array, int]:
 
 
 def _first_deviations(problem: FitProblem) -> Array:
-    """Of data whose deviations are not known the size of their series."""
+    """Return the deviations of the data ``(n,)``, or the size of a series where unknown."""
     return np.concatenate(
         [
             one.scattered(max(np.abs(one.values).max(), np.finfo(float).tiny))
@@ -335,12 +358,12 @@ def _first_deviations(problem: FitProblem) -> Array:
 
 
 def _weighted(problem: FitProblem, best: Array) -> tuple[Array, Array, Array]:
-    """Deviations ``(n,)`` that the residuals bear out, fitted values and Jacobian with them."""
+    """Return deviations ``(n,)`` consistent with the residuals, fitted values and Jacobian."""
     deviations = _first_deviations(problem)
     inner = best
     for _ in range(MOST_ROUNDS):
         solved = solve(problem, inner, deviations)
-        if solved is None:  # pragma: no cover - it was finite before
+        if solved is None:  # pragma: no cover - the solution was finite before
             break
         inner, _, jacobian = solved
         found = _scatter(problem, inner, jacobian, deviations)
@@ -350,13 +373,13 @@ def _weighted(problem: FitProblem, best: Array) -> tuple[Array, Array, Array]:
         if settled or len(problem.series) == 1:
             return deviations, inner, jacobian
     raise ConvergenceError(
-        f"the scatter of the series does not settle in {MOST_ROUNDS} rounds; remedy: give their "
-        "standard deviations"
+        f"the scatter of the series does not converge in {MOST_ROUNDS} iterations; remedy: give "
+        "their standard deviations"
     )
 
 
 def _scatter(problem: FitProblem, inner: Array, jacobian: Array, deviations: Array) -> Array:
-    """Deviations ``(n,)`` of the data: given ones, or of each series as its residuals have it."""
+    """Return the deviations ``(n,)`` of the data, given or estimated from the residuals."""
     residuals = problem.predict(problem.outer(inner)) - problem.data
     free = ~_at_bounds(problem, inner, jacobian, residuals / deviations)
     inverse, _ = inverse_of(jacobian * free)
@@ -366,22 +389,22 @@ def _scatter(problem: FitProblem, inner: Array, jacobian: Array, deviations: Arr
         if series.deviations is not None:
             continue
         here = problem.places == place
-        left = float(here.sum() - leverages[here].sum())
-        if left < 0.5:
+        freedom = float(here.sum() - leverages[here].sum())
+        if freedom < 0.5:
             raise FitError(
-                f"{series.name}: {here.sum()} values, which the parameters can all meet and which "
-                "do not tell their own scatter; allowed: more values, or their standard deviations"
+                f"{series.name}: the parameters can meet all {here.sum()} values, so that their "
+                "scatter is unknown; allowed: more values, or their standard deviations"
             )
         least = max(EXACT * np.abs(series.values).max(), np.finfo(float).tiny)
         squares = np.sum((residuals[here] / series.scattered(1.0)) ** 2)
-        found[here] = series.scattered(max(float(np.sqrt(squares / left)), least))
+        found[here] = series.scattered(max(float(np.sqrt(squares / freedom)), least))
     return found
 
 
 def _at_bounds(problem: FitProblem, inner: Array, jacobian: Array, residuals: Array) -> Mask:
-    """Which parameters a bound holds ``(p,)``: near it, and pushed against it by the data.
+    """Return which parameters a bound holds ``(p,)``: near it and pushed against it by the data.
 
-    ``residuals`` ``(n,)`` are fitted less measured, over the deviations.
+    ``residuals`` ``(n,)`` are fitted minus measured data, over the deviations.
     """
     lower, upper = problem.bounds
     lengths = np.linalg.norm(jacobian, axis=0)

@@ -1,12 +1,13 @@
-"""Joint laws from measured hysteresis loops: the law's own loop beside those of a record.
+"""Joint laws from measured hysteresis loops.
 
-Nothing is averaged: samples of single loops are taken as they are, of those that are alike
-(:class:`wear.joints.measured.measured_loops.MeasuredLoops`) some. The law goes through its settled
-loop from one turning point to the other. Where these are is fitted too, since the samples only pass
-them by, and so is a constant force of each step of like loops: of loops within others, Masing's
-laws leave just that. Every sample counts by the noise of its force and, where the loop is steep,
-that of its displacement. Bounds count what scatters about the law: a displacement that is wrong in
-every cycle alike is not seen.
+The loop of the law is compared with those of a record. Nothing is averaged: samples of single loops
+are used as they are, from some of the loops that are similar
+(:class:`wear.joints.measured.measured_loops.MeasuredLoops`). The law follows its steady loop from
+one turning point to the other. The turning points are fitted too, because samples do not lie
+exactly on them. A constant force of each step of similar loops is fitted as well; it is what
+remains of outer loops in Masing's laws. Samples are weighted by the noise of their force and, where
+the loop is steep, by that of their displacement. The bounds include scatter about the law, but not
+an error of the displacement that is the same in every cycle.
 """
 
 from __future__ import annotations
@@ -35,49 +36,50 @@ from wear.joints.measured.measured_loops import MeasuredLoops
 from wear.joints.parameters import UniaxialLaw
 
 POINTS = 40
-"""Most of each branch of a loop."""
+"""Most samples of each branch of a loop."""
 
 SLOPE_STEP = 1e-3
-"""Of the amplitude: slopes that tell the noise of a displacement in that of the force."""
+"""Step for slopes of the loop, relative to the amplitude. The slopes convert the noise of the
+displacement to that of the force."""
 
 SETTLING = 2
-"""Cycles before the loop that counts: a law that forgets is settled after one."""
+"""Number of cycles before the loop that is compared: a law reaches its steady loop after one."""
 
 BEYOND, WITHIN = 3.0, 0.5
-"""A turning point is no farther beyond the outermost sample, nor within it, than so many times the
-distance of that to its neighbours, ..."""
+"""Largest distance of a turning point beyond the outermost sample, and inside it, relative to the
+distance of this sample from its neighbours."""
 
 TURN_NOISE = 5.0
-"""... or than this many standard deviations of the noise."""
+"""Standard deviations of the noise that are added to these distances."""
 
 ROUNDED = 1e-6
-"""Noise of displacements and forces that show none, in their largest values."""
+"""Noise of displacements and forces without visible noise, relative to their largest values."""
 
 LEAST_SHARE = 0.01
-"""Of the scatter of a sample in that of the noisiest one."""
+"""Least ratio of the scatter of a sample to that of the noisiest one."""
 
 MOST_LOOPS = 12
-"""Loops of like ones that are fitted: each has two turning points of its own to be found."""
+"""Most similar loops that are fitted: each has two turning points that are fitted as well."""
 
 STIFFER = 1.0 - 1e-9
-"""Largest residual stiffness of a Bouc-Wen joint, in its stiffness."""
+"""Largest residual stiffness of a Bouc-Wen joint, relative to its stiffness."""
 
 MOBILISED = 1.2
-"""Friction to begin with where nothing slides, over what the record has mobilised."""
+"""Initial value of the friction over the mobilised one, where no loop slides."""
 
 OFFSET = "offset"
-"""Mean force of loops, beside the parameters of the law."""
+"""Name of the mean force of loops, which is fitted in addition to the parameters of the law."""
 
 COMMON = ("stiffness", "friction", "normal_load", "residual_stiffness")
-"""Parameters that all laws have, none below 0."""
+"""Parameters of all laws, 0 or above."""
 
 
 @dataclass(frozen=True)
 class LoopLaw:
-    """A law as it is fitted.
+    """Joint law for the fit.
 
-    ``law`` makes it of its parameters, ``shape`` are those that it has beside the common ones, with
-    bounds, and ``tried`` values of these to begin with.
+    ``law`` is its class, ``shape`` the bounds of its parameters other than the common ones, by
+    name, and ``tried`` the initial values of these parameters.
     """
 
     law: Callable[..., UniaxialLaw]
@@ -99,24 +101,41 @@ LAWS: Mapping[str, LoopLaw] = {
         {"chi": (-0.5, 0.5), "beta": (0.3, 3.0)},
     ),
 }
-"""By the names that a case has for them."""
+"""Laws by the names that a case uses."""
 
 
 @dataclass(frozen=True)
 class LoopData:
-    """Samples of ``l`` loops of one step of the record ``name``.
+    """Samples of l loops of one step of a record.
 
-    ``displacement`` ``(n,)`` [mm] about its mean and ``force`` ``(n,)`` [N], each of the ``loop``
-    ``(n,)``, 0 to l - 1, and on its branch of ``sense`` ``(n,)`` ±1; ``turns`` ``(l, 2)`` [mm] the
-    lowest and the highest sample of each loop, which are not among them, and ``spacing`` ``(l,)``
-    [mm] the distance to their neighbours; ``noise`` the standard deviations of displacement [mm]
-    and force [N]. ``amplitude`` [mm] is half the stroke, ``normal_load`` [N] NaN if it is not
-    known. ``stiffness``, ``residual_stiffness`` [N/mm] and ``limit`` [N], the friction force, are
-    what the record says of itself, to begin with.
+    Attributes
+    ----------
+    name
+        Name of the record.
+    displacement
+        Displacements about their mean ``(n,)`` [mm].
+    force
+        Forces ``(n,)`` [N].
+    sense
+        Direction ±1 of the branch of each sample ``(n,)``.
+    loop
+        Number of the loop of each sample ``(n,)``, 0 to l - 1.
+    turns
+        Lowest and highest sample of each loop ``(l, 2)`` [mm], which are not among the samples.
+    spacing
+        Distance of these samples from their neighbours ``(l,)`` [mm].
+    noise
+        Standard deviations of displacement [mm] and force [N].
+    amplitude
+        Half of the stroke [mm].
+    normal_load
+        Normal load [N], NaN if it is not known.
+    stiffness, residual_stiffness, limit
+        Stiffnesses [N/mm] and friction force [N] of the record, as initial values.
 
     Examples
     --------
-    The loop of a Jenkins joint, which is what its record says:
+    The friction force and amplitude from the record of a Jenkins joint:
 
     >>> import numpy as np
     >>> from wear.fitting import loop_data
@@ -145,10 +164,10 @@ class LoopData:
 
 
 def loop_data(name: str, measured: MeasuredLoops, most: int = MOST_LOOPS) -> LoopData:
-    """Return ``most`` loops of those that are alike, or all, as data of :func:`loop_problem`.
+    """Return up to ``most`` of the similar loops as data of :func:`loop_problem`.
 
-    Of each branch up to :data:`POINTS` samples. Raises MeasuredLoopError for loops of several steps
-    and branches without samples between their reversals.
+    Each branch has up to :data:`POINTS` samples. Raises MeasuredLoopError for loops of several
+    steps and for branches without samples between their reversals.
 
     Examples
     --------
@@ -169,7 +188,7 @@ def loop_data(name: str, measured: MeasuredLoops, most: int = MOST_LOOPS) -> Loo
     if min(counts) == 0:
         raise MeasuredLoopError(
             f"sample {branches[int(np.argmin(counts))].begin}: no samples between two reversals; "
-            "allowed: some"
+            "allowed: at least one"
         )
     motion = record.displacement[np.concatenate(chosen)]
     # A branch of sense -1 ends at the lowest sample, the other at the highest.
@@ -199,23 +218,23 @@ def loop_data(name: str, measured: MeasuredLoops, most: int = MOST_LOOPS) -> Loo
 
 
 def _chosen(record: LoopRecord, branch: LoopBranch, exact: bool) -> Indices:
-    """Samples of a branch, its ends left out: up to :data:`POINTS` at equal times.
+    """Return up to :data:`POINTS` samples of a branch without its ends, at equal times.
 
-    Of an ``exact`` displacement, in which a rest is no time, as much by its way.
+    For an ``exact`` displacement, the path counts as much as the time, so that rests do not matter.
     """
     motion = record.displacement[branch.samples]
     last = len(motion) - 1
     phase = np.arange(last + 1) / last
     if exact:
-        way = np.maximum.accumulate(branch.sense * (motion - motion[0]))
-        phase = 0.5 * (phase + way / way[-1])
+        path = np.maximum.accumulate(branch.sense * (motion - motion[0]))
+        phase = 0.5 * (phase + path / path[-1])
     count = min(POINTS, last - 1)
     places = np.interp((np.arange(count) + 0.5) / max(count, 1), phase, np.arange(last + 1.0))
     return branch.samples[_spread(places, last)]
 
 
 def _spread(places: Array, last: int) -> Indices:
-    """Different whole numbers from 1 to ``last`` - 1, each near one of the growing ``places``."""
+    """Return distinct integers from 1 to ``last`` - 1, each near one of the rising ``places``."""
     count = len(places)
     order = np.arange(count)
     taken = np.maximum.accumulate(np.clip(np.rint(places).astype(int), 1, last - 1) - order)
@@ -223,7 +242,10 @@ def _spread(places: Array, last: int) -> Indices:
 
 
 def _stiffness(measured: MeasuredLoops, limit: float) -> float:
-    """Stick stiffness: where no slope tells it, by the energy of a slider, 4 µN (A - µN/kt)."""
+    """Return the stick stiffness, or that of a slider with the same energy if it is not known.
+
+    The energy of a slider is 4 µN (A - µN/kt).
+    """
     if np.isfinite(measured.stick_stiffness).all():
         return measured.stick_estimate.value
     amplitude = 0.5 * float(measured.stroke.mean())
@@ -233,10 +255,24 @@ def _stiffness(measured: MeasuredLoops, limit: float) -> float:
 
 @dataclass(frozen=True)
 class LoopFit:
-    """The problem of some :class:`LoopData` under a law of parameters that are ``held`` or free.
+    """Problem of a fit of :class:`LoopData` to a law.
 
-    ``names`` has the place among the unknowns by parameter of the law; ``offsets`` ``(k,)`` those
-    of the data, and ``turns``, for each of them, ``(l, 2)`` those of its loops.
+    Attributes
+    ----------
+    problem
+        Problem of the fit.
+    data
+        Measured loops.
+    law
+        Law that is fitted.
+    held
+        Parameters of the law that are not free, by name.
+    names
+        Index among the unknowns of each free parameter of the law.
+    offsets
+        Index of the mean force of each of the data ``(k,)``.
+    turns
+        For each of the data the indices of the turning points of its loops ``(l, 2)``.
     """
 
     problem: FitProblem
@@ -248,22 +284,32 @@ class LoopFit:
     turns: tuple[Indices, ...]
 
     def record(self, name: str, values: Array) -> Array:
-        """Force ``(n,)`` of the law at the displacements of all data of a record [N]."""
+        """Return the force ``(n,)`` [N] of the law at the displacements of all data of a record."""
         chosen = [number for number, one in enumerate(self.data) if one.name == name]
         return _forces(self, chosen, values)
 
 
 def loop_problem(data: Sequence[LoopData], law: str, held: Mapping[str, float]) -> LoopFit:
-    """A joint law from loops, as a problem of :func:`fit`.
+    """Return a problem of :func:`fit` for a joint law from loops.
 
-    The data of a record, which have one name and follow each other, are one series. ``law`` is a
-    key of ``LAWS``; ``held`` are parameters that are not free, by name. A normal load
-    that is neither held nor free (``nan``) is that of each record. Raises FitError for a record
-    without one.
+    Parameters
+    ----------
+    data
+        Measured loops. Those of the same record have the same name and follow each other; they form
+        one series.
+    law
+        Law, a key of ``LAWS``.
+    held
+        Parameters that are not free, by name. For a normal load of NaN that of each record is used.
+
+    Raises
+    ------
+    FitError
+        For a record without a normal load if this is required.
 
     Examples
     --------
-    The joint that a record was made with comes back:
+    The joint that was used for a record:
 
     >>> import numpy as np
     >>> from wear.fitting import fit, loop_data, loop_problem
@@ -315,7 +361,7 @@ def loop_problem(data: Sequence[LoopData], law: str, held: Mapping[str, float]) 
 
 
 def _offsets(data: Sequence[LoopData]) -> list[Unknown]:
-    """The mean forces of the data; of a record with several steps nobody asks for them."""
+    """Return the mean forces of the data, as nuisances if a record has several steps."""
     size = max(float(np.abs(one.force).max()) for one in data)
     names = [one.name for one in data]
     several = len(set(names)) < len(names)
@@ -326,7 +372,10 @@ def _offsets(data: Sequence[LoopData]) -> list[Unknown]:
 
 
 def _turns(data: LoopData, number: int) -> list[Unknown]:
-    """The turning points of all loops of the data with a ``number``, lower and upper in turn."""
+    """Return the turning points of all loops of the data with a ``number``.
+
+    The lower and the upper point of each loop alternate.
+    """
     unknowns = []
     noise = TURN_NOISE * data.noise[0]
     for loop, (pair, spacing) in enumerate(zip(data.turns, data.spacing, strict=True)):
@@ -339,9 +388,9 @@ def _turns(data: LoopData, number: int) -> list[Unknown]:
 
 
 def _series(name: str, data: Sequence[LoopData], slopes: Sequence[Array]) -> Series:
-    """The forces of a record, which scatter by their own noise and that of the displacement.
+    """Return the forces of a record, which scatter by their own noise and that of displacements.
 
-    Where none shows both are rounded: as much, in their ranges.
+    Where no noise is visible, both are assumed to be rounded to :data:`ROUNDED` of their size.
     """
     chosen = [(one, slope) for one, slope in zip(data, slopes, strict=True) if one.name == name]
     forces = np.concatenate([one.force for one, _ in chosen])
@@ -357,16 +406,16 @@ def _unknown(name: str, law: LoopLaw, stiffness: float) -> Unknown:
         lower, upper = law.shape[name]
         return Unknown(name, lower, upper, size=1.0)
     if name == "residual_stiffness":
-        # Nothing, within a small part of the stiffness, is a residual stiffness too.
+        # A residual stiffness of 0, to within a small part of the stiffness, is also determined.
         return Unknown(name, 0.0, size=stiffness)
     return Unknown(name, 0.0)
 
 
 def _forces(made: LoopFit, chosen: Iterable[int], values: Array) -> Array:
-    """Force of the law on its settled loops, ``(n,)``: each point from the reversal before it.
+    """Return the force ``(n,)`` of the law on its steady loops, each from the last reversal on.
 
-    A displacement that noise has put before that reversal lies on the branch continued backwards:
-    cut off there, noise would be of one sign.
+    A displacement that lies before this reversal because of noise is on the branch extended
+    backwards. If it were cut off at the reversal, the noise would have only one sign.
     """
     given = dict(made.held) | {name: float(values[place]) for name, place in made.names.items()}
     chosen = list(chosen)
@@ -380,20 +429,20 @@ def _forces(made: LoopFit, chosen: Iterable[int], values: Array) -> Array:
     there, back = np.where(sense > 0.0, (upper, lower), (lower, upper))
     before = sense * (place - back) < 0.0
     loads = np.repeat([one.normal_load for one in data], counts)
-    # Branches alternate: each is settled once, and every sample goes on from there.
+    # Branches alternate: the steady loop of each is found once, and all samples start from it.
     first = np.flatnonzero(np.append(True, np.diff(sense) != 0.0))
     branch = np.repeat(np.arange(len(first)), np.diff(np.append(first, len(sense))))
-    way = np.stack([there, back] * SETTLING)[:, first, None]
+    path = np.stack([there, back] * SETTLING)[:, first, None]
     law = _law(made, given, loads[first])
-    settled = march_joints(law, law.rest(len(first)), np.zeros((len(first), 1)), way)
+    settled = march_joints(law, law.rest(len(first)), np.zeros((len(first), 1)), path)
     moved = np.where(before, back - place, place - back)[:, None]
-    gone = _law(made, given, loads).respond(settled.state[branch], moved)
-    start, force = settled.force[-1, branch, 0], gone.force[:, 0]
+    response = _law(made, given, loads).respond(settled.state[branch], moved)
+    start, force = settled.force[-1, branch, 0], response.force[:, 0]
     return np.asarray(np.where(before, 2.0 * start - force, force) + offset)
 
 
 def _law(made: LoopFit, given: Mapping[str, float], loads: Array) -> UniaxialLaw:
-    """The law of as many joints as there are normal ``loads``, which count if none is given."""
+    """Return the law for as many joints as ``loads``, which are used if no load is given."""
     parameters: dict[str, Any] = {name: given[name] for name in (*COMMON, *made.law.shape)}
     if np.isnan(parameters["normal_load"]):
         parameters["normal_load"] = loads
@@ -405,28 +454,28 @@ def _law(made: LoopFit, given: Mapping[str, float], loads: Array) -> UniaxialLaw
 
 
 def _slopes(made: LoopFit, values: Array) -> list[Array]:
-    """Slopes ``(n,)`` [N/mm] of the law's loops at the displacements of each of the data."""
+    """Return the slopes ``(n,)`` [N/mm] of the law at the displacements of each of the data."""
     found = []
     for number, one in enumerate(made.data):
         step = SLOPE_STEP * one.amplitude
         ends = [
-            _forces(replace(made, data=_moved(made.data, number, way * step)), [number], values)
-            for way in (1.0, -1.0)
+            _forces(replace(made, data=_moved(made.data, number, sign * step)), [number], values)
+            for sign in (1.0, -1.0)
         ]
         found.append((ends[0] - ends[1]) / (2.0 * step))
     return found
 
 
 def _moved(data: Sequence[LoopData], number: int, step: float) -> tuple[LoopData, ...]:
-    """The data with all displacements of one of them moved."""
+    """Return the data with all displacements of one of them moved by ``step``."""
     one = data[number]
     moved = replace(one, displacement=one.displacement + step)
     return (*data[:number], moved, *data[number + 1 :])
 
 
 def _starts(made: LoopFit) -> list[Array]:
-    """What the records say of themselves, with some shapes of the law."""
-    # The loop that slides most says most.
+    """Return initial values from the records, with several shapes of the law."""
+    # The loop with the largest amplitude slides most and is the most informative.
     first = max(made.data, key=lambda one: one.amplitude)
     load = made.held.get("normal_load", 1.0)
     load = first.normal_load if np.isnan(load) else load
@@ -441,10 +490,10 @@ def _starts(made: LoopFit) -> list[Array]:
     starts = []
     for shape in product(*(made.law.tried[name] for name in free)):
         values = {**begin, **dict(zip(free, shape, strict=True))}
-        begun = np.empty(len(made.problem.unknowns))
-        begun[list(made.names.values())] = [values[name] for name in made.names]
-        begun[made.offsets] = [one.force.mean() for one in made.data]
+        start = np.empty(len(made.problem.unknowns))
+        start[list(made.names.values())] = [values[name] for name in made.names]
+        start[made.offsets] = [one.force.mean() for one in made.data]
         for places, one in zip(made.turns, made.data, strict=True):
-            begun[places] = one.turns
-        starts.append(begun)
+            start[places] = one.turns
+        starts.append(start)
     return starts

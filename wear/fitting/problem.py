@@ -1,4 +1,4 @@
-"""What a fit is asked: free parameters, series of data, and the model between them."""
+"""Problem of a fit: free parameters, series of data, and the model between them."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from sa_solver.types import Array, Indices, Mask
 
 
 class FitError(InputError):
-    """Data or parameters that no fit can be made of."""
+    """Data or parameters that cannot be fitted."""
 
 
 def settle_columns(
@@ -52,15 +52,25 @@ def require_unlike(names: Sequence[str]) -> None:
 
 @dataclass(frozen=True)
 class Unknown:
-    """A free parameter, its ``name``, which lies from ``lower`` to ``upper``.
+    """Free parameter of a fit.
 
-    Known no better than to ``size`` or to its own value, whichever is larger, it is not determined.
-    A ``logarithmic`` one, above 0, is known by a factor instead. Of a ``nuisance`` nobody asks: it
-    is fitted with all others, which come before it, and told nowhere.
+    Parameters
+    ----------
+    name
+        Name of the parameter.
+    lower, upper
+        Bounds of its value.
+    size
+        Uncertainty at which the parameter counts as undetermined, if this is more than its value.
+    logarithmic
+        Whether the logarithm is fitted. The parameter is then above 0 and its uncertainty is a
+        factor.
+    nuisance
+        Whether the parameter is fitted but not reported. Nuisances come after all other parameters.
 
     Examples
     --------
-    A rate, known within powers of ten:
+    A rate that is known within powers of ten:
 
     >>> from wear.fitting import Unknown
     >>> rate = Unknown("rate", lower=1e-9, upper=1e-3, logarithmic=True)
@@ -89,10 +99,19 @@ class Unknown:
 
 @dataclass(frozen=True)
 class Series:
-    """Data of one kind, its ``name``.
+    """Data of one kind.
 
-    ``values`` ``(n,)``, and their standard ``deviations`` ``(n,)`` if they are known; without them
-    all have one, which the residuals tell, or ``shares`` ``(n,)`` of one.
+    Parameters
+    ----------
+    name
+        Name of the data.
+    values
+        Measured values ``(n,)``.
+    deviations
+        Standard deviations of the values ``(n,)``, if they are known. Otherwise a common standard
+        deviation is estimated from the residuals.
+    shares
+        Ratios ``(n,)`` of the deviations of the values to the estimated one; 1 by default.
 
     Examples
     --------
@@ -110,21 +129,30 @@ class Series:
         settle_columns(self, self.name, ("values",), ("deviations", "shares"))
 
     def scattered(self, deviation: float) -> Array:
-        """Deviations ``(n,)`` that are shares of one."""
+        """Return the deviations ``(n,)`` that are the ``shares`` of this ``deviation``."""
         ones = np.ones(len(self.values))
         return deviation * (ones if self.shares is None else self.shares)
 
 
 @dataclass(frozen=True)
 class FitProblem:
-    """What is free, what was measured, and the model between them.
+    """Problem of a fit.
 
-    ``predict`` takes the values ``(p,)`` of the ``unknowns`` to all data ``(n,)``, one of the
-    ``series`` after the other. ``starts`` are values ``(p,)`` to begin with, tried in their order.
+    Parameters
+    ----------
+    unknowns
+        Free parameters.
+    series
+        Measured data.
+    predict
+        Model that returns all data ``(n,)``, in the order of the series, for the values ``(p,)`` of
+        the unknowns.
+    starts
+        Initial values ``(p,)``, which are tried in this order.
 
     Examples
     --------
-    The mean of three values, as a problem:
+    The mean of three values as a problem:
 
     >>> import numpy as np
     >>> from wear.fitting import FitProblem, Series, Unknown, fit
@@ -150,30 +178,30 @@ class FitProblem:
 
     @cached_property
     def data(self) -> Array:
-        """All data ``(n,)``."""
+        """Data of all series ``(n,)``."""
         return np.concatenate([series.values for series in self.series])
 
     @cached_property
     def places(self) -> Indices:
-        """Number of the series that each datum is of ``(n,)``."""
+        """Number of the series of each datum ``(n,)``."""
         return np.repeat(np.arange(len(self.series)), [len(one.values) for one in self.series])
 
     @cached_property
     def logarithmic(self) -> Mask:
-        """Which unknowns are fitted as their logarithms ``(p,)``."""
+        """Mask of the unknowns that are fitted as logarithms ``(p,)``."""
         return np.array([unknown.logarithmic for unknown in self.unknowns], dtype=np.bool_)
 
     def inner(self, values: Array) -> Array:
-        """Values as they are fitted."""
+        """Return ``values`` as they are fitted: logarithms where these are fitted."""
         return np.where(self.logarithmic, np.log(np.where(self.logarithmic, values, 1.0)), values)
 
     def outer(self, inner: Array) -> Array:
-        """Fitted ones as values."""
+        """Return the values of the parameters from fitted ones."""
         return np.where(self.logarithmic, np.exp(np.where(self.logarithmic, inner, 0.0)), inner)
 
     @cached_property
     def bounds(self) -> tuple[Array, Array]:
-        """Lower and upper bounds as they are fitted, each ``(p,)``."""
+        """Lower and upper bounds of the fitted values, each ``(p,)``."""
         with np.errstate(divide="ignore"):
             lower = self.inner(np.array([unknown.lower for unknown in self.unknowns]))
             upper = self.inner(np.array([unknown.upper for unknown in self.unknowns]))

@@ -1,10 +1,11 @@
-"""Bounds of a parameter where the model bends: its profile.
+"""Bounds of a parameter of a nonlinear model, by its profile.
 
-A parameter is held at some value and all others are fitted anew. The root of what the sum of
-squares has risen by, in deviations, is z; where the model is straight z grows as the distance, and
-is the quantile at the linear bound. Where it is not, the bound is the value at which z is the
-quantile (Bates and Watts 1988, *Nonlinear Regression Analysis*, section 6.1). A parameter that
-others can make up for altogether has no such value: it is not determined, whatever its Jacobian.
+The parameter is held at a value and all others are fitted again. Let z be the square root of the
+increase of the sum of squares, in deviations. For a linear model z is proportional to the distance
+from the estimate and equals the quantile at the linear bound. For a nonlinear model the bound is
+the value at which z equals the quantile (Bates and Watts 1988, *Nonlinear Regression Analysis*,
+section 6.1). If other parameters can compensate for any change of a parameter there is no such
+value: the parameter is not determined, whatever its Jacobian.
 """
 
 from __future__ import annotations
@@ -15,24 +16,24 @@ from dataclasses import replace
 import numpy as np
 
 from sa_solver.types import Array
-from wear.fitting.estimates import Estimate, width_doubt
+from wear.fitting.estimates import Estimate, why_too_wide
 from wear.fitting.problem import FitProblem
 from wear.fitting.solving import solve
 
 STRAIGHT = 0.1
-"""Relative distance of z from the quantile up to which a bound stays."""
+"""Relative difference of z and the quantile up to which the linear bound is kept."""
 
 FOUND = 0.02
-"""The same for one that is looked for."""
+"""Relative difference of z and the quantile at which the search for another bound ends."""
 
 MOST_TRIED = 12
-"""Values tried for a bound."""
+"""Most values tried for a bound."""
 
 LONGEST = 3.0
-"""Distance of a value tried from the estimate, over that of the last."""
+"""Largest ratio of the distances of two successive values from the estimate."""
 
 PRECISE = 1e-8
-"""Relative tolerance of what is fitted anew: well below a part of the quantile."""
+"""Relative tolerance of the repeated fits, well below the tolerance of z."""
 
 
 def profiled(
@@ -42,12 +43,24 @@ def profiled(
     estimates: Sequence[Estimate],
     wider: Array,
 ) -> list[Estimate]:
-    """The estimates with bounds that their profiles bear out.
+    """Return the estimates with bounds that agree with their profiles.
 
-    ``inner`` ``(p,)`` are the best values as they are fitted, ``deviations`` ``(n,)`` those of the
-    data, and ``wider`` ``(p,)`` by how much those of the estimates are more than these make them.
-    What a profile passes within the quantile the data allow for the others too: where that is
-    beyond their bounds these are widened, or left if the profile has no end.
+    The values of other parameters on a profile within the quantile are also consistent with the
+    data. Where they are beyond the bounds of these parameters, the bounds are widened; if the
+    profile has no end, the parameters are not determined.
+
+    Parameters
+    ----------
+    problem
+        Problem that was fitted.
+    inner
+        Best fitted values ``(p,)``.
+    deviations
+        Standard deviations of the data ``(n,)``.
+    estimates
+        Estimates with linear bounds.
+    wider
+        Factors ``(p,)`` by which the deviations of the estimates are wider than these imply.
     """
     found, clouds = [], []
     for place, estimate in enumerate(estimates):
@@ -68,7 +81,10 @@ def _profiled(
     estimate: Estimate,
     quantile: float,
 ) -> tuple[Estimate, list[Array]]:
-    """The estimate at a ``place``, and all values ``(p,)`` met within the ``quantile``."""
+    """Return the estimate at ``place`` with profile bounds.
+
+    All values ``(p,)`` met within the ``quantile`` are returned as well.
+    """
     cloud: list[Array] = [inner]
     lower, upper = (
         _bound(problem, place, inner, deviations, bound, quantile, cloud)
@@ -80,10 +96,10 @@ def _profiled(
 def _with_bounds(
     problem: FitProblem, place: int, estimate: Estimate, bounds: tuple[float, float]
 ) -> Estimate:
-    """The estimate with other bounds, and left if they are too wide."""
+    """Return the estimate with other bounds, marked as undetermined if they are too wide."""
     if bounds == estimate.bounds:
         return estimate
-    doubt = width_doubt(problem.unknowns[place], estimate.value, bounds)
+    doubt = why_too_wide(problem.unknowns[place], estimate.value, bounds)
     if doubt:
         return replace(estimate, doubt=doubt, deviation=np.nan, bounds=(np.nan, np.nan))
     return replace(estimate, bounds=bounds, straight=False)
@@ -92,7 +108,7 @@ def _with_bounds(
 def _widened(
     problem: FitProblem, place: int, found: Sequence[Estimate], clouds: Sequence[Array]
 ) -> Estimate:
-    """The estimate at a ``place`` with what the profiles of others have passed."""
+    """Return the estimate at ``place`` with bounds that include its values on other profiles."""
     estimate = found[place]
     for other, cloud in zip(found, clouds, strict=True):
         if not estimate.determined or other is found[place]:
@@ -118,10 +134,11 @@ def _bound(
     quantile: float,
     cloud: list[Array],
 ) -> float:
-    """One bound: the ``linear`` one if it is right, else that of the profile.
+    """Return one bound: the ``linear`` one if it is right, otherwise that of the profile.
 
-    It is that of the unknown if the profile does not rise to the quantile before, and not finite
-    where nothing is found. ``cloud`` takes all values met within the quantile.
+    If the profile does not rise to the quantile within the bounds of the unknown, its bound is
+    returned; if the search fails, the result is infinite. All values met within the quantile are
+    added to ``cloud``.
     """
     unknown, best = problem.unknowns[place], inner[place]
     least = _squares(problem, inner, deviations)
@@ -152,7 +169,10 @@ def _squares(problem: FitProblem, inner: Array, deviations: Array) -> float:
 
 
 def _refitted(problem: FitProblem, place: int, at: float, near: Array, deviations: Array) -> Array:
-    """All values ``(p,)`` with one held ``at`` a fitted value, begun from those ``near``."""
+    """Return all fitted values ``(p,)`` with one held at the value ``at``.
+
+    The fit starts from the values ``near``.
+    """
     value = problem.outer(np.insert(np.delete(near, place), place, at))[place]
     others = problem.unknowns[:place] + problem.unknowns[place + 1 :]
     if not others:

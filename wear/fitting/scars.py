@@ -1,19 +1,21 @@
-"""Wear coefficients from worn depths and profiles, through a model that computes the scar.
+"""Wear coefficients from worn depths and profiles, with a model that computes the scar.
 
-What is measured along x is h = D(x - s; α) + c + t (x - x_m): the depth D that runs of a model have
-for a coefficient α, moved by a shift s, a height c and a tilt t of the scan, which nobody knows and
-which are fitted with α.
+The measured profile along x is h = D(x - s; α) + c + t (x - x_m), where D is the depth computed by
+runs of a model for a coefficient α. The shift s, the height c and the tilt t of the scan are
+unknown and are fitted together with α.
 
-Runs are few, so D has to be known between them. A scar has an area V, a middle m and a half width w
-(the root of its second moment about m); laid over each other by these, D = V/w g((x - m)/w), scars
-of different α hardly differ, while their edges at one x do. ln V, ln w, m and g are polynomials in
-ln α through the runs. A scar that stays similar to itself with V and w going as powers of α, as of
-a cylinder or a sphere that wears, is met exactly by two runs. One run makes D proportional to α.
+There are few runs, so that D must be interpolated between them. A scar has an area V, a middle m
+and a half width w (the root of its second moment about m). Scaled by these, D = V/w g((x - m)/w),
+scars of different α hardly differ, although their edges do. ln V, ln w, m and g are interpolated by
+polynomials in ln α through the runs. A scar that stays similar to itself, with V and w proportional
+to powers of α, as that of a worn cylinder or sphere, is interpolated exactly by two runs. With a
+single run D is proportional to α.
 
-The gap of a contact knows both bodies together: D is that of the sum of their coefficients, of
-which each body has lost its share. With a threshold E0 of energy before anything wears, a test that
-dissipates E at a constant rate ends as one without it whose coefficients are less by 1 - E0/E: the
-surfaces follow dh/dN = α f(h), in which α and the cycles after the threshold are one product.
+The gap of a contact depends on both bodies together: D is the depth for the sum of their
+coefficients, of which each body has lost its share. With a threshold E0 of energy before wear
+begins, a test that dissipates E at a constant rate ends like a test without threshold whose
+coefficients are smaller by the factor 1 - E0/E: the surfaces follow dh/dN = α f(h), which depends
+on the product of α and the cycles after the threshold only.
 """
 
 from __future__ import annotations
@@ -36,37 +38,48 @@ COEFFICIENT, THRESHOLD = "coefficient", "threshold"
 SHIFT, HEIGHT, TILT = "shift", "height", "tilt"
 
 BEYOND = 4.0
-"""Factor from the runs on beyond which their powers of the coefficient are a guess: it goes on as
-if depth were proportional to it."""
+"""Factor outside the range of the runs up to which the coefficient is extrapolated by powers.
+Beyond it the depth is taken as proportional to the coefficient."""
 
 LEAST, MOST = 1e-6, 1e3
-"""Coefficient of a body over the smallest and the largest of the runs: far beyond them, so that a
-fit that ends there says so of itself."""
+"""Bounds of the coefficient of a body over the smallest and the largest of the runs. They are so
+wide that a fit which ends there is visibly wrong."""
 
 LATEST = 0.999
-"""Threshold over the least energy of a test: all of them wear."""
+"""Largest threshold over the least energy of a test, so that all tests wear."""
 
 SHIFTS = 81
-"""Shifts tried to begin with, over the length of the scan to both sides: a few in each scar."""
+"""Number of initial shifts, over the length of the scan in both directions: several per scar."""
 
 THRESHOLDS = (0.0, 0.25, 0.5)
-"""Tried to begin with, over the least energy of a test."""
+"""Initial values of the threshold over the least energy of a test."""
 
 
 @dataclass(frozen=True)
 class ComputedScars:
-    """What runs of a model have worn along one line.
+    """Worn depths along one line, computed by runs of a model.
 
-    ``coefficients`` ``(r,)`` [1/MPa] of the runs, both bodies together, the places ``x`` ``(m,)``
-    [mm] in rising order, and ``depth`` ``(r, m)`` [mm] of both; nothing is worn beyond the ends.
-    Between places it is monotone cubic. Raises FitError for shapes that do not fit, coefficients
-    that are not above 0 or not different, places that do not rise, and depths that are not finite,
-    below 0, or 0 all along.
+    Between the points the depth is interpolated by monotone cubics; beyond the ends it is 0.
+
+    Parameters
+    ----------
+    coefficients
+        Wear coefficients of the runs, as the sum of both bodies ``(r,)`` [1/MPa].
+    x
+        Coordinates of the points in ascending order ``(m,)`` [mm].
+    depth
+        Worn depth of both bodies together ``(r, m)`` [mm].
+
+    Raises
+    ------
+    FitError
+        For shapes that do not agree, coefficients that are equal or not above 0, points that are
+        not in ascending order, and depths that are not finite, below 0, or 0 along the whole line.
 
     Examples
     --------
-    A cylinder that wears: eight times the coefficient is twice the width and four times the depth.
-    Two runs tell it between them.
+    For a worn cylinder, eight times the coefficient gives twice the width and four times the depth.
+    Two runs determine the scar for coefficients between theirs:
 
     >>> import numpy as np
     >>> from wear.fitting import ComputedScars
@@ -89,7 +102,7 @@ class ComputedScars:
         if self.depth.shape != (len(self.coefficients), len(self.x)) or len(self.x) < 2:
             raise FitError(
                 f"depths of shape {self.depth.shape}; allowed: ({len(self.coefficients)} runs, "
-                f"{len(self.x)} places), of which there are at least 2"
+                f"{len(self.x)} places), with at least 2 places"
             )
         if not (np.isfinite(self.depth).all() and (self.depth >= 0.0).all()):
             raise FitError("a computed depth is not finite or below 0; allowed: 0 or above")
@@ -97,24 +110,27 @@ class ComputedScars:
             raise FitError("computed places do not rise; allowed: rising order")
         known = self.coefficients
         if not (known > 0.0).all() or len(np.unique(known)) < len(known) or not len(known):
-            raise FitError("coefficients of runs: one is not above 0 or twice; allowed: unlike")
+            raise FitError(
+                "coefficients of runs: one is not above 0 or occurs twice; allowed: different "
+                "values above 0"
+            )
         if not (self.depth > 0.0).any(axis=1).all():
             raise FitError("a run has worn nothing along the line; allowed: a scar")
 
     @cached_property
     def _measures(self) -> tuple[Array, Array, Array]:
-        """Area, middle and half width of each scar, each ``(r,)``."""
+        """Area, middle and half width of the scars, each ``(r,)``."""
         area = trapezoid(self.depth, self.x)
         middle = trapezoid(self.depth * self.x, self.x) / area
-        away = (self.x - middle[:, None]) ** 2
-        return area, middle, np.sqrt(trapezoid(self.depth * away, self.x) / area)
+        squares = (self.x - middle[:, None]) ** 2
+        return area, middle, np.sqrt(trapezoid(self.depth * squares, self.x) / area)
 
     @cached_property
     def _profiles(self) -> list[PchipInterpolator]:
         return [PchipInterpolator(self.x, depth, extrapolate=False) for depth in self.depth]
 
     def depth_at(self, x: Array, coefficient: float) -> Array:
-        """Depth ``(n,)`` [mm] at places ``(n,)`` [mm] for a coefficient [1/MPa]."""
+        """Return the depth ``(n,)`` [mm] at points ``x`` [mm] for a ``coefficient`` [1/MPa]."""
         x = column("runs", "x", x, finite=True)
         checks.number("coefficient", coefficient, above=0.0, error=FitError)
         areas, middles, widths = self._measures
@@ -134,14 +150,14 @@ class ComputedScars:
         return np.asarray(area / width * shape)
 
     def without(self, run: int) -> ComputedScars:
-        """All but one of the runs."""
+        """Return all runs but one."""
         return ComputedScars(
             np.delete(self.coefficients, run), self.x, np.delete(self.depth, run, axis=0)
         )
 
 
 def _lagrange(nodes: Array, place: float) -> Array:
-    """Weights ``(r,)`` of values at nodes ``(r,)`` in their polynomial at a place."""
+    """Return the weights ``(r,)`` of values at ``nodes`` in their polynomial at ``place``."""
     own = np.eye(len(nodes), dtype=np.bool_)
     above = np.where(own, 1.0, place - nodes[None, :])
     below = np.where(own, 1.0, nodes[:, None] - nodes[None, :])
@@ -150,17 +166,33 @@ def _lagrange(nodes: Array, place: float) -> Array:
 
 @dataclass(frozen=True)
 class ScarData:
-    """A measured profile, its ``name``, and the ``runs`` that compute it.
+    """Measured profile of a scar, and the runs that compute it.
 
-    ``depth`` ``(n,)`` [mm], positive where something is worn, at ``x`` ``(n,)`` [mm], with standard
-    ``deviations`` ``(n,)`` if they are known. It is that of the ``body``: body_1, body_2, or both
-    together. Of an ``aligned`` one, such as depths against a face that did not wear, nothing is
-    moved: shift, height and tilt are 0. ``held`` [1/MPa] is the coefficient of the other body where
-    no profile tells it, ``energy`` [N mm] what the test dissipates, where a threshold is asked for.
+    Parameters
+    ----------
+    name
+        Name of the profile.
+    x
+        Coordinates of the points ``(n,)`` [mm].
+    depth
+        Depth ``(n,)`` [mm], positive where material is worn.
+    runs
+        Computed scars.
+    aligned
+        Whether the shift, height and tilt of the profile are 0, as for depths that are measured
+        from a face that did not wear.
+    deviations
+        Standard deviations of the depth ``(n,)`` [mm], if they are known.
+    body
+        Body of the profile: ``body_1``, ``body_2``, or ``both`` together.
+    held
+        Coefficient of the other body [1/MPa], if there is no profile of it.
+    energy
+        Energy that the test dissipates [N mm], required for a threshold.
 
     Examples
     --------
-    Two depths against a face that did not wear:
+    Two depths measured from a face that did not wear:
 
     >>> import numpy as np
     >>> from wear.fitting import ComputedScars, ScarData
@@ -187,16 +219,16 @@ class ScarData:
 
     @property
     def alignment(self) -> Array:
-        """What a height and a tilt add ``(n, 2)``, the tilt about the middle of the scan."""
+        """Depth ``(n, 2)`` due to unit height and unit tilt about the middle of the scan."""
         return np.stack([np.ones_like(self.x), self.x - 0.5 * (self.x[0] + self.x[-1])], axis=1)
 
 
 @dataclass(frozen=True)
 class ScarFit:
-    """The ``problem`` of some ``data``.
+    """Problem of a fit of :class:`ScarData`.
 
-    ``bodies`` are those whose coefficients are the first unknowns, in this order; with
-    ``threshold`` that is the next.
+    The first unknowns are the coefficients of the ``bodies``, in this order. If ``threshold`` is
+    true, the next one is the threshold.
     """
 
     problem: FitProblem
@@ -205,12 +237,13 @@ class ScarFit:
     threshold: bool
 
     def error_of_runs(self, fit: Fit) -> Array:
-        """How far the unknowns ``(p,)`` are off for want of runs, to first order.
+        """Return the error of the unknowns ``(p,)`` due to the small number of runs.
 
-        Relative for the coefficients. It is what they change by when each scar goes without the run
-        nearest to the fitted coefficient, with the alignment fitted anew: of few runs more than
-        their true error. NaN where a scar has one run. Add one at the fitted coefficient until this
-        is small beside the deviation.
+        It is the change of the unknowns, to first order, if the run nearest to the fitted
+        coefficient is removed from each scar and the alignment is fitted again. The errors of
+        coefficients are relative. For few runs the estimate is larger than the true error; for a
+        scar with a single run it is NaN. Add runs at the fitted coefficient until the error is
+        small compared with the deviation.
         """
         if any(len(one.runs.coefficients) < 2 for one in self.data):
             return np.full(len(fit.values), np.nan)
@@ -222,17 +255,17 @@ class ScarFit:
         return self.moved_by(fit, replace(self, data=tuple(fewer)).predict(fit.values) - fit.fitted)
 
     def moved_by(self, fit: Fit, change: Array) -> Array:
-        """What a ``change`` ``(n,)`` [mm] of the computed depths does to the unknowns ``(p,)``.
+        """Return the change of the unknowns ``(p,)`` by a ``change`` of computed depths [mm].
 
-        Relative for the coefficients, to first order: such as that from runs of other steps or
-        another grid.
+        ``change`` ``(n,)`` may come from runs with other steps or another grid. The result is of
+        first order, and relative for the coefficients.
         """
         slopes = fit.slopes(self.problem.predict) / fit.deviations[:, None]
         inverse, _ = inverse_of(slopes)
         return np.asarray(inverse @ (-change / fit.deviations))
 
     def effective(self, data: ScarData, values: Array) -> float:
-        """Coefficient [1/MPa] of both bodies that a run without a threshold would need."""
+        """Return the coefficient of both bodies [1/MPa] for an equal run without threshold."""
         alone = data.held if len(self.bodies) == 1 else 0.0
         total = float(values[: len(self.bodies)].sum()) + alone
         if not self.threshold:
@@ -241,7 +274,7 @@ class ScarFit:
         return total * (1.0 - float(values[len(self.bodies)]) / data.energy)
 
     def predict(self, values: Array) -> Array:
-        """All depths ``(n,)`` [mm] of the unknowns ``(p,)``."""
+        """Return the depths of all data ``(n,)`` [mm] for ``values`` of the unknowns ``(p,)``."""
         depths, place = [], len(self.bodies) + self.threshold
         for one in self.data:
             effective = self.effective(one, values)
@@ -259,17 +292,19 @@ class ScarFit:
 
 
 def scar_problem(data: Sequence[ScarData], threshold: bool = False) -> ScarFit:
-    """Wear coefficients of all profiles as a problem of :func:`fit`.
+    """Return a problem of :func:`fit` for the wear coefficients of profiles.
 
-    The coefficient of each body that has a profile comes first, fitted as its logarithm; then the
-    threshold [N mm], if it is asked for; shift [mm], height [mm] and tilt [1] of each profile
-    follow. Raises FitError for profiles that are not in rising order or not finite, have less than
-    five points or no scar, those of both together beside those of each, and a threshold without
-    energies that differ.
+    The first unknowns are the coefficients of the bodies with a profile, fitted as logarithms.
+    Then follow the threshold [N mm], if ``threshold`` is true, and the shift [mm], height [mm] and
+    tilt [1] of each profile.
+
+    Raises FitError for profiles that are not in ascending order or not finite, that have less than
+    five points or no scar, for profiles of both bodies together in addition to those of one, and
+    for a threshold without different energies.
 
     Examples
     --------
-    A parabola worn with 2e-9 /MPa, scanned 0.1 mm off its place and tilted:
+    A parabola worn with 2e-9 /MPa, from a scan that is 0.1 mm off and tilted:
 
     >>> import numpy as np
     >>> from wear.fitting import ComputedScars, ScarData, fit, scar_problem
@@ -286,8 +321,9 @@ def scar_problem(data: Sequence[ScarData], threshold: bool = False) -> ScarFit:
     _check_together(data, bodies, threshold)
     known = np.concatenate([one.runs.coefficients for one in data])
     lower, upper = LEAST * known.min(), MOST * known.max()
-    # The solver's difference step is 6e-6 for whatever is below 1: of 1e-9 /MPa as it is, far too
-    # long where depth is not proportional to it. A logarithm has the step of its own size.
+    # The difference step of the solver is 6e-6 for all values below 1. For a coefficient of 1e-9
+    # /MPa this is far too long where the depth is not proportional to it; for its logarithm it is
+    # right.
     unknowns = [Unknown(f"{b}.{COEFFICIENT}", lower, upper, logarithmic=True) for b in bodies]
     if threshold:
         largest = _largest_threshold(data)
@@ -314,7 +350,7 @@ def _largest_threshold(data: Sequence[ScarData]) -> float:
 
 
 def _alignment(data: ScarData) -> list[Unknown]:
-    """Shift, height and tilt of one profile."""
+    """Return the shift, height and tilt of one profile as unknowns."""
     if data.aligned:
         return []
     length, most = float(np.ptp(data.x)), float(np.ptp(data.depth))
@@ -330,20 +366,23 @@ def _check_together(data: Sequence[ScarData], bodies: Sequence[str], threshold: 
         _check(one)
     if "both" in bodies and len(bodies) > 1:
         raise FitError(
-            "profiles of both bodies together beside those of one; allowed: the former, or those "
-            "of each"
+            "profiles of both bodies together and of one of them; allowed: the former, or those of "
+            "each body"
         )
     energies = [one.energy for one in data]
     if threshold and (None in energies or len(set(energies)) < 2):
         raise FitError(
-            "a threshold of energy, and all tests have one energy; allowed: tests that have "
-            "dissipated more and less"
+            "a threshold of energy, and all tests have one energy; allowed: tests with different "
+            "energies"
         )
 
 
 def _check(data: ScarData) -> None:
     if len(data.x) < 1 or len(data.x) != len(data.depth):
-        raise FitError(f"{data.name}: places and depths do not fit; allowed: as many of both")
+        raise FitError(
+            f"{data.name}: {len(data.x)} places and {len(data.depth)} depths; allowed: the same "
+            "number of both, at least one"
+        )
     if not data.aligned and len(data.x) <= 4:
         raise FitError(
             f"{data.name}: {len(data.x)} points, which coefficient, shift, height and tilt meet; "
@@ -355,29 +394,35 @@ def _check(data: ScarData) -> None:
         raise FitError(f"{data.name}: places do not rise; allowed: rising order")
 
 
-# --- starts -------------------------------------------------------------------------------------
+# --- initial values -----------------------------------------------------------------------------
 
 
 def _starts(data: Sequence[ScarData], bodies: Sequence[str], threshold: bool) -> list[Array]:
-    """Values ``(p,)`` as if wear were linear: of each profile the best of some shifts."""
+    """Return initial values ``(p,)`` for linear wear, with the best of several shifts.
+
+    There is one for each initial threshold.
+    """
     found = [_best_shift(one) for one in data]
     rest = [number for _, level in found for number in level]
     starts = []
     for share in THRESHOLDS if threshold else (0.0,):
-        begun = share * _largest_threshold(data) if threshold else 0.0
+        begin = share * _largest_threshold(data) if threshold else 0.0
         whole = [
-            c / (1.0 - begun / (one.energy or 1.0)) for one, (c, _) in zip(data, found, strict=True)
+            c / (1.0 - begin / (one.energy or 1.0)) for one, (c, _) in zip(data, found, strict=True)
         ]
         coefficients = [
             np.mean([c for one, c in zip(data, whole, strict=True) if one.body == body])
             for body in bodies
         ]
-        starts.append(np.array([*coefficients, *[begun] * threshold, *rest]))
+        starts.append(np.array([*coefficients, *[begin] * threshold, *rest]))
     return starts
 
 
 def _best_shift(data: ScarData) -> tuple[float, list[float]]:
-    """Coefficient, and shift, height and tilt if it has them, of the best of some shifts."""
+    """Return the coefficient and the alignment of the best of several shifts.
+
+    The alignment is empty for aligned data.
+    """
     length = np.ptp(data.x)
     shifts = [0.0] if data.aligned else np.linspace(-length, length, SHIFTS)
     squares, coefficient, level = min(
@@ -385,21 +430,21 @@ def _best_shift(data: ScarData) -> tuple[float, list[float]]:
     )
     if not np.isfinite(squares):
         raise FitError(
-            f"{data.name}: no scar of the runs is in it, wherever they are laid; allowed: depth, "
-            "above 0 where something is worn"
+            f"{data.name}: no scar of the runs is in it at any shift; allowed: depth, above 0 "
+            "where material is worn"
         )
     return coefficient, level
 
 
 def _linear(data: ScarData, shift: float) -> tuple[float, float, list[float]]:
-    """Sum of squares, coefficient, and alignment of the best line in α at a shift."""
+    """Return the sum of squares, coefficient and alignment of the best linear fit at a shift."""
     middle = float(np.median(data.runs.coefficients))
     worn = data.runs.depth_at(data.x - shift, middle)[:, None]
     columns = worn if data.aligned else np.concatenate([worn, data.alignment], axis=1)
     lengths = np.linalg.norm(columns, axis=0)
     lengths = np.where(lengths > 0.0, lengths, 1.0)
     found = np.linalg.lstsq(columns / lengths, data.depth, rcond=None)[0] / lengths
-    # What is not worn but grown is no scar: such a shift has the sum of squares of all.
+    # A negative coefficient is no scar: such a shift is excluded.
     squares = np.sum((data.depth - columns @ found) ** 2) if found[0] > 0.0 else np.inf
     coefficient = max(float(found[0]), LEAST) * middle
     return float(squares), coefficient, [] if data.aligned else [shift, *map(float, found[1:])]

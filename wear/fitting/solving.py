@@ -1,4 +1,4 @@
-"""From a start to the nearest least squares: scipy's trust regions, with bounds."""
+"""Solution of a least squares problem from initial values, by scipy's bounded trust regions."""
 
 from __future__ import annotations
 
@@ -9,21 +9,23 @@ from sa_solver.types import Array
 from wear.fitting.problem import FitProblem
 
 TOLERANCE = 1e-12
-"""Of the solver, relative: the solution is then exact beside any bound of it."""
+"""Relative tolerance of the solver: its error is negligible compared with confidence bounds."""
 
 AT_BOUND = 1e-3
-"""Of its size, or of its range: a parameter so near to a bound may well be at it."""
+"""Distance of a parameter from a bound, relative to its size and its range, within which it may be
+at the bound."""
 
 ROUGH = 1e-10
-"""Tolerance from which on one-sided differences are good enough."""
+"""Tolerance above which one-sided differences are accurate enough."""
 
 
 def solve(
     problem: FitProblem, start: Array, deviations: Array, tolerance: float = TOLERANCE
 ) -> tuple[Array, float, Array] | None:
-    """Where one start leads: fitted values ``(p,)``, cost, Jacobian ``(n, p)`` of the residuals.
+    """Solve ``problem`` from initial fitted values ``start`` ``(p,)``.
 
-    None where it leads to what is not finite.
+    ``deviations`` ``(n,)`` are those of the data. The fitted values ``(p,)``, the cost and the
+    Jacobian ``(n, p)`` of the residuals are returned, or None if something is not finite.
     """
     lower, upper = problem.bounds
 
@@ -34,7 +36,7 @@ def solve(
     if not np.isfinite(residuals(inner)).all():
         return None
     try:
-        # Steps too far, which the solver takes back.
+        # Steps that are too long overflow, and the solver takes them back.
         with np.errstate(over="ignore", under="ignore", invalid="ignore", divide="ignore"):
             solved = least_squares(
                 residuals,
@@ -46,16 +48,16 @@ def solve(
                 xtol=tolerance,
                 gtol=tolerance,
             )
-    except (ValueError, np.linalg.LinAlgError):  # a Jacobian that is not finite
+    except (ValueError, np.linalg.LinAlgError):  # The Jacobian is not finite.
         return None
     return solved.x, float(solved.cost), solved.jac
 
 
 def pinned(problem: FitProblem, inner: Array, cost: float, deviations: Array) -> Array:
-    """Return fitted values ``(p,)`` with those nearly at a bound put there, if it costs no more.
+    """Return fitted values ``(p,)`` with those close to a bound set to it, if it costs no more.
 
-    The solver comes to a bound from within, ever more slowly: of data that a model meets exactly,
-    with a parameter at its bound, it leaves more than rounding does.
+    The solver approaches a bound from inside, more and more slowly. For data that the model meets
+    exactly with a parameter at its bound, the remaining error would be larger than rounding.
     """
     lower, upper = problem.bounds
     near = AT_BOUND * np.minimum(_sizes(problem, inner), upper - lower)
@@ -79,6 +81,6 @@ def pinned(problem: FitProblem, inner: Array, cost: float, deviations: Array) ->
 
 
 def _sizes(problem: FitProblem, inner: Array) -> Array:
-    """What a change of a parameter is measured by ``(p,)``."""
+    """Return the sizes ``(p,)`` to which changes of the parameters are relative."""
     sizes = np.maximum(np.abs(inner), [unknown.size for unknown in problem.unknowns])
     return np.where(problem.logarithmic | (sizes == 0.0), 1.0, sizes)

@@ -1,9 +1,9 @@
 """Wear coefficients from worn volumes against dissipated energy.
 
-V = α (δ/δ_ref)^m max(E - E0, 0) + V0, with α of each body, the amplitude δ of the slip to a power
-m (0: the energy law; 1: Gallego et al. 2007, eq. 2), and what a line through the data leaves on one
-of the axes: a threshold E0 of energy before anything wears (Fouvry et al. 2003, Wear 255, 287), or
-a volume V0 at no energy, as of a surface that wears faster at first.
+The law is V = α (δ/δ_ref)^m max(E - E0, 0) + V0, with a coefficient α of each body and a power m of
+the slip amplitude δ (0: the energy law; 1: Gallego et al. 2007, eq. 2). The line through the data
+may have an offset on one of the axes: a threshold E0 of energy before wear begins (Fouvry et al.
+2003, Wear 255, 287), or a volume V0 at zero energy, for surfaces that wear faster at first.
 """
 
 from __future__ import annotations
@@ -30,26 +30,35 @@ Offset = Literal["none", "threshold", "intercept"]
 COEFFICIENT, THRESHOLD, INTERCEPT, EXPONENT = "coefficient", "threshold", "intercept", "exponent"
 
 EXPONENTS = (0.0, 1.0)
-"""Of the amplitude, to begin with: those of the two laws."""
+"""Initial values of the exponent of the amplitude: those of the two laws."""
 
 LARGEST_EXPONENT = 10.0
-"""Of the amplitude, and less than which it may be known to."""
+"""Bound on the size of the exponent of the amplitude."""
 
 THRESHOLDS = 5
-"""Energies tried as a threshold, from none to the middle of the data."""
+"""Number of initial values of the threshold, from 0 to half of the largest energy."""
 
 
 @dataclass(frozen=True)
 class VolumeData:
-    """What one body, its ``name``, has lost in some tests.
+    """Worn volumes of one body in several tests.
 
-    ``energy`` ``(n,)`` [N mm] is that of each test, ``volume`` ``(n,)`` [mm^3] what it has worn,
-    with standard ``deviations`` ``(n,)`` if they are known, and ``amplitude`` ``(n,)`` [mm] that of
-    the slip, where it counts.
+    Parameters
+    ----------
+    name
+        Name of the body.
+    energy
+        Dissipated energy of each test ``(n,)`` [N mm].
+    volume
+        Worn volume of each test ``(n,)`` [mm^3].
+    amplitude
+        Slip amplitude of each test ``(n,)`` [mm], if the law depends on it.
+    deviations
+        Standard deviations of the volumes ``(n,)`` [mm^3], if they are known.
 
     Examples
     --------
-    What two bodies lost in the same tests:
+    Worn volumes of two bodies in the same tests:
 
     >>> import numpy as np
     >>> from wear.fitting import VolumeData
@@ -76,14 +85,20 @@ class VolumeData:
 
 @dataclass(frozen=True)
 class VolumeLaw:
-    """What of the law is asked for beside the coefficients.
+    """Form of the wear law.
 
-    ``offset`` is what the line leaves on an axis. ``exponent`` m of the amplitude over
-    ``reference`` [mm] is a number, or None if it is free.
+    Parameters
+    ----------
+    offset
+        Offset of the line: a ``threshold`` of energy, an ``intercept`` of volume, or ``none``.
+    exponent
+        Exponent m of the amplitude, or None if it is free.
+    reference
+        Reference amplitude [mm].
 
     Examples
     --------
-    With an exponent of 1 twice the amplitude wears twice as much for the same energy:
+    With an exponent of 1, twice the amplitude wears twice as much for the same energy:
 
     >>> import numpy as np
     >>> from wear.fitting import VolumeLaw
@@ -103,11 +118,14 @@ class VolumeLaw:
 
     @property
     def uses_amplitude(self) -> bool:
-        """Whether the amplitude of the tests counts."""
+        """Whether the law depends on the amplitude of the tests."""
         return self.exponent != 0.0
 
     def volume(self, energy: Array, amplitude: Array | None, values: Mapping[str, float]) -> Array:
-        """Volume ``(n,)`` [mm^3] at an energy and amplitude, with the parameters by name."""
+        """Return the volume ``(n,)`` [mm^3] at an energy and amplitude.
+
+        ``values`` are the parameters of the law by name.
+        """
         energy = checks.array("energies", energy, None, error=FitError)
         if amplitude is not None:
             amplitude = checks.array("amplitudes", amplitude, energy.shape, error=FitError)
@@ -122,10 +140,10 @@ class VolumeLaw:
 
 @dataclass(frozen=True)
 class VolumeFit:
-    """The problem of some :class:`VolumeData` under a law.
+    """Problem of a fit of :class:`VolumeData` to a law.
 
-    ``names`` has the place among the unknowns by body and parameter: the exponent of the amplitude
-    is one for all bodies.
+    ``names`` maps body and parameter to the index among the unknowns. All bodies have the same
+    exponent of the amplitude.
     """
 
     problem: FitProblem
@@ -134,27 +152,30 @@ class VolumeFit:
     names: Mapping[tuple[str, str], int]
 
     def values_of(self, data: VolumeData, values: Array) -> dict[str, float]:
-        """The parameters of one body by name, of all values ``(p,)``."""
+        """Return the parameters of one body by name, from all ``values`` ``(p,)``."""
         return _named(data, self.names, values)
 
     def curve(
         self, data: VolumeData, energy: Array, amplitude: Array | None
     ) -> Callable[[Array], Array]:
-        """What all values ``(p,)`` make of a body's volume at an ``energy`` ``(m,)`` [N mm]."""
+        """Return a function from all values ``(p,)`` to the volume of a body ``(m,)`` [mm^3].
+
+        The volume is that at an ``energy`` ``(m,)`` [N mm] and an ``amplitude``.
+        """
         return lambda values: self.law.volume(energy, amplitude, self.values_of(data, values))
 
 
 def volume_problem(data: Sequence[VolumeData], law: VolumeLaw) -> VolumeFit:
-    """Wear coefficients of bodies as a problem of :func:`fit`.
+    """Return a problem of :func:`fit` for the wear coefficients of bodies.
 
-    Volumes may be below 0, of a body that gains. Raises FitError for energies below 0, numbers
-    that are not finite, an amplitude that is needed and
-    missing or not above 0, and a free exponent without amplitudes that differ.
+    Volumes may be negative, for a body that gains material. Raises FitError for energies below 0,
+    numbers that are not finite, a required amplitude that is missing or not above 0, and a free
+    exponent with equal amplitudes.
 
     Examples
     --------
-    Fantetti et al. 2019, table 3.1, tests 3 to 5 of 22 µm: the slope of volume against energy, with
-    what wears early as an intercept.
+    Fantetti et al. 2019, table 3.1, tests 3 to 5 with 22 µm: the slope of volume against energy,
+    with early wear as an intercept.
 
     >>> import numpy as np
     >>> from wear.fitting import VolumeData, VolumeLaw, fit, volume_problem
@@ -217,7 +238,7 @@ def _check(data: VolumeData, law: VolumeLaw) -> None:
 
 
 def _unknowns(data: VolumeData, law: VolumeLaw) -> list[tuple[str, Unknown]]:
-    """The free parameters of one body."""
+    """Return the free parameters of one body with their names."""
     largest, most = float(data.energy.max()), float(np.abs(data.volume).max())
     unknowns = [(COEFFICIENT, Unknown(f"{data.name}.{COEFFICIENT}", lower=0.0))]
     if law.offset == THRESHOLD:
@@ -234,7 +255,10 @@ def _unknowns(data: VolumeData, law: VolumeLaw) -> list[tuple[str, Unknown]]:
 def _starts(
     data: Sequence[VolumeData], law: VolumeLaw, names: Mapping[tuple[str, str], int]
 ) -> list[Array]:
-    """Values ``(p,)`` for some thresholds and exponents, and the coefficients that go with them."""
+    """Return initial values ``(p,)`` for several thresholds and exponents.
+
+    The other parameters follow by linear least squares.
+    """
     shares = np.linspace(0.0, 0.5, THRESHOLDS) if law.offset == THRESHOLD else (0.0,)
     powers = EXPONENTS if law.exponent is None else (law.exponent,)
     starts = []
@@ -251,7 +275,7 @@ def _starts(
 
 
 def _linear(data: VolumeData, law: VolumeLaw, threshold: float) -> dict[str, float]:
-    """Coefficient and intercept where all else is known."""
+    """Return the parameters with the best coefficient and intercept for a ``threshold``."""
     one = law.volume(data.energy, data.amplitude, {COEFFICIENT: 1.0, THRESHOLD: threshold})
     columns = np.stack([one, np.full_like(one, float(law.offset == INTERCEPT))], axis=1)
     size = np.array([one.max(), 1.0])

@@ -1,4 +1,4 @@
-"""Residuals that speak against a fit are told, and those of good data are not."""
+"""Plausibility warnings: bad residuals raise them, good ones do not."""
 
 import numpy as np
 import pytest
@@ -22,18 +22,18 @@ def noise(seed=0, size=1e-4):
 def test_good_data_are_not_spoken_against():
     files = np.arange(len(ENERGY)) % 3
     spoken = sum(len(doubts_of(1e-9 * ENERGY + noise(seed), files=files)) for seed in range(40))
-    # Five tests at one in a thousand each, in 40 fits.
+    # Five tests with a rate of one in a thousand each, in 40 fits.
     assert spoken <= 2
 
 
-def test_two_materials_in_one_table_are_told_with_their_lines():
+def test_two_materials_in_one_table_are_reported_with_their_lines():
     odd = np.arange(len(ENERGY)) % 3 == 0
     ((text, data), *_) = doubts_of(np.where(odd, 2.2e-9, 1e-9) * ENERGY + noise())
     assert "two groups" in text
     assert set(data) == set(np.flatnonzero(odd))
 
 
-def test_an_outlier_is_told_with_its_line():
+def test_an_outlier_is_reported_with_its_line():
     volume = 1e-9 * ENERGY + noise()
     volume[7] += 1e-3
     assert [data for text, data in doubts_of(volume) if "outlier" in text] == [(7,)]
@@ -44,13 +44,13 @@ def test_a_function_that_does_not_follow_the_data_leaves_waves():
     assert any("waves" in text for text in texts)
 
 
-def test_files_that_lie_apart_are_told():
+def test_files_that_disagree_are_reported():
     files = np.random.default_rng(5).permutation(np.arange(len(ENERGY)) // 12)
     texts = [text for text, _ in doubts_of(1e-9 * ENERGY + noise() + 3e-4 * files, files=files)]
     assert any("files" in text for text in texts)
 
 
-def test_scatter_that_grows_is_told():
+def test_scatter_that_grows_is_reported():
     texts = [
         text
         for text, _ in doubts_of(
@@ -61,7 +61,7 @@ def test_scatter_that_grows_is_told():
 
 
 @pytest.mark.parametrize(("stated", "spoken"), [(1e-4, 0), (3e-5, 1)])
-def test_deviations_that_are_too_small_are_told(stated, spoken):
+def test_deviations_that_are_too_small_are_reported(stated, spoken):
     deviations = np.full(len(ENERGY), stated)
     texts = [text for text, _ in doubts_of(1e-9 * ENERGY + noise(), deviations)]
     assert sum("as much as their standard deviations" in text for text in texts) == spoken

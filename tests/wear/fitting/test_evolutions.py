@@ -1,4 +1,4 @@
-"""Wear functions come back from tables: those of both papers, with bounds that hold."""
+"""Wear functions fitted to the tables of two papers, with valid bounds."""
 
 import numpy as np
 import pytest
@@ -47,7 +47,7 @@ SINGLE = {"share": 1.0, "second_rate": 0.0}
 
 
 def fantetti_table(energy, scatter=0.0, rng=None):
-    """Their three functions at an energy, with a ``scatter`` relative to the initial values."""
+    """Return the three functions at an energy, with a ``scatter`` relative to initial values."""
     with np.errstate(divide="ignore"):
         stiffness = 27.3e3 * (1.0 + 1.32 * np.exp(-150e3 / energy))
     tables = {
@@ -62,7 +62,7 @@ def fantetti_table(energy, scatter=0.0, rng=None):
 
 
 def li_table(printed, energy, scatter=0.0, rng=None):
-    """Their three functions, as the paper has them."""
+    """Return the three functions of the paper at an energy."""
     first, second = (np.exp(-rate * energy) for rate in RATES.values())
     data = []
     for name in ("normal_load", "stiffness", "friction"):
@@ -108,7 +108,7 @@ def test_without_an_unworn_loop_the_logarithm_is_not_determined():
     energy = np.geomspace(1e2, 2.8e6, 40)
     (data, *_) = fantetti_table(energy, 0.05, np.random.default_rng(0))
     assert not any(one.determined for one in found_in([data]).values())
-    # The printed initial value, which is that of an unworn loop, makes both others known.
+    # The printed initial value, that of an unworn loop, determines both other parameters.
     (data, *_) = fantetti_table(energy, 0.01, np.random.default_rng(0))
     held = EvolutionData("friction", energy, data.values, "logarithmic", {"initial": 0.11})
     found = found_in([held])
@@ -136,7 +136,7 @@ def test_held_parameters_stay_and_nonsense_is_refused():
         evolution_problem([EvolutionData("kt", energy - 1.0, energy, "linear")])
     with pytest.raises(FitError, match="no energy above 0"):
         evolution_problem([EvolutionData("kt", 0.0 * energy, energy, "linear")])
-    with pytest.raises(FitError, match="shared, but free nowhere"):
+    with pytest.raises(FitError, match="shared, but not free in any data"):
         evolution_problem([held], ["second_rate"])
 
 
@@ -162,5 +162,5 @@ def test_true_parameters_are_within_their_bounds_in_95_of_100_trials(paper):
             hits[one.name] = hits.get(one.name, 0) + within
     assert hits.keys() == truth.keys()
     assert all(low <= count <= high for count in hits.values()), hits
-    # Four tests of three series at one in a thousand each.
+    # Four tests of three series with a rate of one in a thousand each.
     assert doubts <= 5

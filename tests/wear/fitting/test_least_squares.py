@@ -1,4 +1,4 @@
-"""Least squares: textbook bounds, coverage, and parameters that the data do not determine."""
+"""Least squares: textbook bounds, coverage, and parameters that are not determined."""
 
 import numpy as np
 import pytest
@@ -20,7 +20,7 @@ NOISE = np.array([0.3, -0.5, 0.1, 0.4, -0.2, -0.1])
 
 
 def line(values, deviations=None, x=X):
-    """A line through ``values`` of ``x``, as a problem."""
+    """Return the fit of a line through ``values`` at ``x`` as a problem."""
     return FitProblem(
         (Unknown("start", size=10.0), Unknown("slope", size=10.0)),
         (Series("y", values, deviations),),
@@ -40,7 +40,7 @@ def test_a_line_has_the_bounds_of_a_textbook():
     assert slope.bounds == pytest.approx([known.slope - half, known.slope + half], rel=1e-7)
     expected = -X.mean() / np.sqrt(np.mean(X**2))
     assert found.correlation[0, 1] == pytest.approx(expected, rel=1e-6)
-    # The band of a line is widest at the ends, and that of its start at 0.
+    # The band of a line is widest at the ends; at 0 it is that of the intercept.
     widths = found.band(lambda p: p[0] + p[1] * X)
     assert widths[0] == pytest.approx(t.ppf(0.975, len(X) - 2) * start.deviation, rel=1e-6)
 
@@ -54,13 +54,13 @@ def test_given_deviations_weigh_and_have_normal_bounds():
     assert slope.deviation == pytest.approx(np.sqrt(covariance[1, 1]), rel=1e-7)
     half = slope.bounds[1] - slope.value
     assert half == pytest.approx(norm.ppf(0.975) * slope.deviation, rel=1e-7)
-    # The exact points are what tells where the line starts.
+    # The accurate points determine the intercept of the line.
     assert found.estimates[0].shares == pytest.approx([1.0])
     assert found.estimates[0].heaviest in (0, 1)
 
 
 def test_series_with_a_common_parameter_find_their_own_scatter():
-    """One of them a hundred times as exact: it decides, with its degrees of freedom."""
+    """One series is a hundred times as accurate and determines the parameter and its freedom."""
     rng = np.random.default_rng(3)
     x = np.linspace(0.0, 1.0, 20)
     exact, rough = (2.0 * x + s * rng.standard_normal(20) for s in (0.001, 0.1))
@@ -101,7 +101,7 @@ def test_products_quotients_and_what_does_not_count_are_named():
     assert np.isnan([one.deviation for one in (a, b, c, d)]).all()
 
 
-def test_a_parameter_at_its_bound_is_told():
+def test_a_parameter_at_its_bound_is_reported():
     y = 1.0 - 0.5 * X
     held = FitProblem(
         (Unknown("start", size=1.0), Unknown("slope", lower=0.0)),
@@ -111,7 +111,7 @@ def test_a_parameter_at_its_bound_is_told():
     )
     start, slope = fit(held).estimates
     assert slope.doubt == "at its lower bound"
-    # The other one is as if there were no slope: a mean.
+    # The other parameter is estimated as without a slope: a mean.
     assert start.value == pytest.approx((y + NOISE).mean(), rel=1e-3)
     mean_error = np.std(y + NOISE, ddof=1) / np.sqrt(len(y))
     assert start.doubt or start.deviation == pytest.approx(mean_error, rel=1e-3)

@@ -1,4 +1,4 @@
-"""Joint laws come back from records of their loops, with noise and without."""
+"""Joint laws fitted to records of their loops, with noise and without."""
 
 import numpy as np
 import pytest
@@ -17,12 +17,15 @@ SHAPES = {
     "four_parameter_iwan": {"chi": -0.4, "beta": 0.8},
 }
 OFFSET = 1.5
-# Nothing is averaged and turning points are found: what is left is rounding of the solver.
+# Nothing is averaged and turning points are fitted, so that errors are rounding of the solver.
 EXACT = 1e-6
 
 
 def record(law, stroke, rng=None):
-    """A measured record of 6 cycles; noise is 1e-3 of the amplitude, 0.5 % of the force."""
+    """Return a measured record of 6 cycles.
+
+    The noise is 1e-3 of the amplitude and 0.5 % of the force.
+    """
     made = LAWS[law].law(normal_load=60.0, **COMMON, **SHAPES[law])
     motion = 0.5 * stroke * np.sin(2.0 * np.pi * np.arange(3601) / 600)
     history = march_joints(made, made.rest(1), np.zeros((1, 1)), motion[:, None, None])
@@ -37,7 +40,7 @@ def record(law, stroke, rng=None):
     "law", ["jenkins", "uniform_iwan", "bouc_wen", slow("four_parameter_iwan")]
 )
 def test_a_law_comes_back(law):
-    # Of an exponent, too, that the reversal of a loop hardly shows: sigma is held.
+    # An exponent that the reversal of a loop hardly shows is fitted too; sigma is held.
     held = {"normal_load": np.nan} | ({"sigma": 0.5} if law == "bouc_wen" else {})
     found = fit(loop_problem([record(law, 14e-3)], law, held).problem)
     values = {one.name: one.value for one in found.estimates}
@@ -61,7 +64,7 @@ def test_a_bouc_wen_curve_is_marched_once_for_all_but_its_shape():
 
 @pytest.mark.slow
 def test_deviations_of_a_noisy_record_are_those_of_its_repetition():
-    """Neighbours err alike where the displacement is smoothed, which stated ones do not know of."""
+    """Errors of neighbours are correlated by smoothing, which stated deviations do not include."""
     trials, found = 10, []
     for seed in range(trials):
         loop = record("jenkins", 14e-3, np.random.default_rng(seed))
@@ -70,7 +73,7 @@ def test_deviations_of_a_noisy_record_are_those_of_its_repetition():
         values = np.array([estimates[place].value for estimates in found])
         stated = np.mean([estimates[place].deviation for estimates in found])
         scatter = values.std(ddof=1)
-        # The scatter of ten is known to a quarter.
+        # The scatter of ten records is known to a quarter.
         assert 0.5 < scatter / stated < 1.75
         assert abs(values.mean() - truth) < 3.5 * scatter / np.sqrt(trials)
 
@@ -83,7 +86,7 @@ def test_several_strokes_are_fitted_together():
     found = fit(loop_problem(loops, "uniform_iwan", {"normal_load": 60.0}).problem)
     values = {one.name: one for one in found.estimates}
     assert values["friction"].value == pytest.approx(0.9, rel=EXACT)
-    # The loop that slides tells the friction; both tell the stiffness.
+    # The sliding loop determines the friction; both determine the stiffness.
     assert values["friction"].shares.sum() == pytest.approx(1.0)
     assert values["friction"].shares[1] > 0.5
 
@@ -92,7 +95,7 @@ STIFFNESS, LIMIT, LOAD = 20e3, 30.0, 60.0
 
 
 def swept(law, amplitudes, samples=100.0, residual=400.0, cycles=2):
-    """A record of so many cycles of each amplitude [µm], which begins at rest."""
+    """Return a record of several cycles of each amplitude [µm], which begins at rest."""
     phase = 2.0 * np.pi * np.arange(int(cycles * samples)) / samples
     motion = np.concatenate([*(1e-3 * a * np.sin(phase) for a in amplitudes), [0.0]])
     return motion, forces(law, motion, residual)
@@ -104,7 +107,7 @@ def forces(law, motion, residual=400.0):
 
 
 def fitted(law, motion, force):
-    """Estimates of stiffness, friction and residual stiffness."""
+    """Return the estimates of stiffness, friction and residual stiffness."""
     steps = measure_loops(motion, force, LOAD).steps
     data = [loop_data("force", step, 6 // len(steps) or 1) for step in steps]
     return fit(loop_problem(data, law, {"normal_load": LOAD}).problem).estimates[:3]
@@ -121,7 +124,7 @@ def holds(estimates, truth):
 @pytest.mark.parametrize("samples", [100.0, 61.3])
 @pytest.mark.parametrize("amplitudes", [(3.0, 6.0, 12.0), (12.0, 6.0, 3.0), (4.0, 9.0, 4.0)])
 def test_rising_falling_and_block_strokes_give_the_law_exactly(law, samples, amplitudes):
-    """Without noise bounds hold the truth and nothing else, be samples at the reversals or not."""
+    """Without noise the bounds shrink to the truth, with or without samples at the reversals."""
     found = fitted(law, *swept(law, amplitudes, samples))
     for one, truth in zip(found, (STIFFNESS, LIMIT / LOAD, 400.0), strict=True):
         assert one.value == pytest.approx(truth, rel=EXACT)
@@ -130,7 +133,7 @@ def test_rising_falling_and_block_strokes_give_the_law_exactly(law, samples, amp
 
 
 def test_digits_of_a_file_are_in_the_bounds():
-    """Displacements rounded to 1e-6 µm miss only where a loop is steep; no residual stiffness."""
+    """Displacements rounded to 1e-6 µm have errors only where a loop is steep."""
     motion, force = swept("jenkins", (2.0, 4.0, 6.0, 8.0), residual=0.0)
     stiffness, friction, residual = fitted("jenkins", motion.round(9), force.round(6))
     assert holds([stiffness, friction], (STIFFNESS, LIMIT / LOAD)) == [True, True]
@@ -140,7 +143,7 @@ def test_digits_of_a_file_are_in_the_bounds():
 
 @pytest.mark.parametrize("law", ["jenkins", "uniform_iwan"])
 def test_points_of_a_curve_without_its_reversals_give_the_law(law):
-    """Some points a branch at random, none near a reversal, which are as far out as they may be."""
+    """Branches have random points, none near a reversal, which may be far outside."""
     rng = np.random.default_rng(2)
     turns = 1e-3 * np.array([0.0, *[8.0, -8.0] * 2, *[14.0, -14.0] * 2, 0.0])
     shares = [np.append(np.sort(rng.uniform(0.03, 0.97, 16)), 1.0) for _ in turns[1:]]
@@ -163,5 +166,6 @@ def test_bounds_of_noisy_records_hold_the_truth_in_95_of_100(law, amplitudes):
         noise = np.random.default_rng(seed).standard_normal((2, len(motion)))
         found = fitted(law, motion + 2e-5 * noise[0], force + 0.3 * noise[1])
         held += holds(found, (STIFFNESS, LIMIT / LOAD, 400.0))
-    # Of 90, of which three each go together; 76 or fewer of independent ones in 3 of 10,000.
+    # There are 90 bounds in correlated groups of three. If they were independent, 76 or fewer would
+    # hold in 3 of 10,000 cases.
     assert np.count_nonzero(held) > 76

@@ -1,4 +1,4 @@
-"""Wear coefficients from worn profiles: closed forms of Archard's wear, alignment, coverage."""
+"""Wear coefficients from worn profiles: closed forms by Archard, alignment, coverage."""
 
 from dataclasses import replace
 
@@ -10,12 +10,15 @@ from wear.fitting import ComputedScars, FitError, ScarData, common_over, fit, sc
 
 PLACES = np.linspace(-1.0, 1.0, 201)
 RADIUS = 10.0
-# A cylinder that has worn to b = 0.5 mm: b³ goes with the coefficient.
+# A cylinder that has worn to b = 0.5 mm: b³ is proportional to the coefficient.
 UNIT, WIDTH = 5e-9, 0.5
 
 
 def cylinder(alpha, x=PLACES):
-    """Conforming cylinder [mm]: volume (2/3) b³/R = 2 α µ P s N, depth (b² - x²)/2R."""
+    """Return a conforming cylinder [mm].
+
+    Its volume is (2/3) b³/R = 2 α µ P s N, its depth (b² - x²)/2R.
+    """
     half = WIDTH * (alpha / UNIT) ** (1 / 3)
     return np.maximum(half**2 - x**2, 0.0) / (2.0 * RADIUS)
 
@@ -26,7 +29,7 @@ def runs(*factors):
 
 
 def scan(alpha, of, seed=None, scatter=0.0, name="scan", share=1.0, **more):
-    """A scan 0.13 mm off its place, raised and tilted, at places of its own."""
+    """Return a scan that is 0.13 mm off, raised and tilted, at its own points."""
     x = np.linspace(-0.97, 1.03, 160)
     noise = 0.0 if seed is None else scatter * np.random.default_rng(seed).standard_normal(len(x))
     if more.get("aligned"):
@@ -36,7 +39,7 @@ def scan(alpha, of, seed=None, scatter=0.0, name="scan", share=1.0, **more):
 
 
 def test_depths_of_a_flat_punch_are_archards():
-    """h = α µ p 2 s N: the coefficient is the mean depth over that of one run."""
+    """The depth is h = α µ p 2 s N: the coefficient is the mean depth over that of one run."""
     known, worn = 2e-9, 4e-3
     flat = ComputedScars(np.array([known]), np.array([-2.0, 2.0]), np.full((1, 2), worn))
     depth = worn * np.array([1.1, 1.2, 1.0, 1.15])
@@ -48,7 +51,7 @@ def test_depths_of_a_flat_punch_are_archards():
 
 
 def test_a_cylinder_between_two_runs_is_met_with_shift_height_and_tilt():
-    """Similar scars of powers of the coefficient: runs far to either side tell all between."""
+    """Similar scars are powers of the coefficient: two distant runs determine all between them."""
     scars = scar_problem([scan(UNIT, runs(0.5, 1.4))])
     found = fit(scars.problem)
     assert found.values[0] == pytest.approx(UNIT, rel=1e-3)
@@ -56,19 +59,19 @@ def test_a_cylinder_between_two_runs_is_met_with_shift_height_and_tilt():
     assert found.values[1:] == pytest.approx([0.13, 2e-3 + 1.5e-3 * middle, 1.5e-3], rel=2e-3)
 
 
-def test_the_error_of_few_runs_is_told():
-    """One run of twice the coefficient is far off, as without it two are; a third is near."""
-    told, errors = [], []
+def test_the_error_of_few_runs_is_reported():
+    """One run with twice the coefficient has a large error, a nearer third one a small error."""
+    estimated, errors = [], []
     for of in (runs(2.0), runs(1.6, 2.0), runs(1.05, 1.6, 2.0)):
         scars = scar_problem([scan(UNIT, of)])
         found = fit(scars.problem)
-        told.append(scars.error_of_runs(found)[0])
+        estimated.append(scars.error_of_runs(found)[0])
         errors.append(found.values[0] / UNIT - 1.0)
-    assert np.isnan(told[0])
+    assert np.isnan(estimated[0])
     assert abs(errors[0]) > 0.02
-    assert abs(errors[1]) < abs(told[1])
+    assert abs(errors[1]) < abs(estimated[1])
     assert abs(errors[2]) < 1e-3
-    assert abs(told[2]) < 0.02
+    assert abs(estimated[2]) < 0.02
 
 
 def test_a_change_of_the_depths_moves_the_coefficient_to_first_order():
@@ -83,7 +86,7 @@ def test_a_change_of_the_depths_moves_the_coefficient_to_first_order():
 
 
 def test_each_body_has_its_share_and_one_may_be_held():
-    """Both wear one scar, of the sum of their coefficients."""
+    """Both bodies wear one scar, by the sum of their coefficients."""
     of = runs(0.7, 1.2)
     first = scan(
         *(UNIT, of), name="first", share=0.25, body="body_1", held=0.75 * UNIT, aligned=True
@@ -137,7 +140,7 @@ def test_profiles_of_two_materials_contradict_each_other():
     [
         ({"x": PLACES[::-1]}, "scan: places do not rise"),
         ({"depth": np.full(201, np.nan)}, "scan: a place or depth is not finite"),
-        ({"x": PLACES[:9]}, "scan: places and depths do not fit"),
+        ({"x": PLACES[:9]}, "scan: 9 places and 201 depths"),
         ({"x": PLACES[:4], "depth": np.ones(4)}, "scan: 4 points, which coefficient, shift"),
     ],
 )
@@ -147,5 +150,5 @@ def test_scans_that_say_nothing_are_refused(change, words):
         scar_problem([ScarData(**{**entries, **change})])
     with pytest.raises(FitError, match="twice"):
         runs(1.0, 1.0)
-    with pytest.raises(FitError, match="both bodies together beside those of one"):
+    with pytest.raises(FitError, match="both bodies together and of one of them"):
         scar_problem([ScarData(**entries), ScarData(**entries, body="body_1")])
