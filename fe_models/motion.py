@@ -43,7 +43,7 @@ def deformation(
     Parameters
     ----------
     structure
-        The structure.
+        Structure whose contact has been solved.
     force
         Contact forces on body 2 ``(3, n)`` [N] over all interfaces, in their frames.
     relative
@@ -64,8 +64,16 @@ def structure_motion(
 ) -> StructureMotion:
     """Return the displacements in some ``increments``, and those of the faces in all increments.
 
-    ``force`` ``(t, 3, n)``, ``relative`` ``(t, 3, n)`` and ``amplitudes`` ``(t, cases)`` are those
-    of :func:`deformation` for each increment.
+    Parameters
+    ----------
+    structure
+        Structure whose contact has been solved.
+    force, relative
+        Contact forces and relative displacements ``(t, 3, n)``, as in :func:`deformation`.
+    amplitudes
+        Amplitudes of the load cases ``(t, cases)``.
+    increments
+        Numbers of the increments in which all displacements are returned.
     """
     forces, count = structure.on_faces(force), len(structure.held[0])
     axes = structure.mesh.bodies[0].axes

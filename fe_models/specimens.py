@@ -116,10 +116,25 @@ def reduced_specimens(
     """Return the reduced models of both specimens on pad and ring, body 1 first.
 
     The kept points are named ``pad 1``, ``pad 2``, ... in the interface's order, and ``ring 1``,
-    ... by angle from the X axis. With a ``target_distance`` [mm] there is also ``target 1``, at
-    which a laser looks along X: the vertex closest to the point at X = R on the cylinder's side, at
-    that distance from the contact plane. ``done`` is called after each of ``STEPS`` steps if there
-    are modes.
+    ... by angle from the X axis.
+
+    Parameters
+    ----------
+    specimen
+        Geometry of the specimens.
+    mesh
+        Their mesh.
+    materials
+        Materials of body 1 and body 2.
+    order
+        Order of the elements, 1 or 2.
+    modes
+        Number of fixed-interface modes of each.
+    target_distance
+        Distance from the contact plane [mm] of ``target 1``, at which a laser looks along X: the
+        vertex closest to the point at X = R on the cylinder's side. By default it is not kept.
+    done
+        Called after each of ``STEPS`` steps if there are modes.
     """
     (face,) = mesh.interfaces
     models = []

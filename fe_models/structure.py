@@ -350,7 +350,10 @@ class Structure:
     def histories(
         self, force: Array, displacement: Array, slip: Array, friction: float | Array
     ) -> tuple[InterfaceHistory, ...]:
-        """Return the interface histories from fields ``(t, components, n)`` over all interfaces."""
+        """Return the interface histories from fields ``(t, components, n)`` over all interfaces.
+
+        ``friction`` is µ, one value or by node ``(n,)``.
+        """
         histories = []
         nodal = np.broadcast_to(friction, force.shape[-1:])
         for interface, nodes in self.shares():

@@ -124,9 +124,9 @@ def test_texts_of_public_classes_speak_of_every_field(name):
 def _documented(text):
     """Return the names in double backquotes, and those that a section Attributes lists."""
     section = re.search(
-        r"^Attributes\n-+\n(.*?)(?=^\S.*\n-+\n|\Z)",
-        inspect.cleandoc(text),
-        re.MULTILINE | re.DOTALL,
+        r"^Attributes\n-+\n((?:.*\n)*?)(?=\S.*\n-+\n|\Z)",
+        inspect.cleandoc(text) + "\n",
+        re.MULTILINE,
     )
     listed = re.findall(r"^\S.*$", section[1], re.MULTILINE) if section else []
     return set(re.findall(r"\w+", " ".join([*listed, *text.split("``")[1::2]])))

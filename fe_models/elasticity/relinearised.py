@@ -99,10 +99,20 @@ def stress_stiffened(
 ) -> PrestressedStructure:
     """Return the structure with the stiffness K + K_σ - Ω² M, stressed and spinning.
 
-    This is the classical linear perturbation. The stress is that of the linear ``displacements``.
-    Loads, shape and frames are those of the linear structure: it includes the second-order effect
-    of stress on displacements across it, but not the change of geometry due to the displacements,
-    which :func:`relinearised` includes.
+    This is the classical linear perturbation. Loads, shape and frames are those of the linear
+    structure: it includes the second-order effect of stress on displacements across it, but not the
+    change of geometry due to the displacements, which :func:`relinearised` includes.
+
+    Parameters
+    ----------
+    structure
+        The linear structure.
+    displacements
+        Its displacements of both bodies at the load, which determine the stress.
+    amplitudes
+        Amplitudes of the load cases at that load ``(cases,)``.
+    softening
+        Spin softening of both bodies at that load.
     """
     changes = [
         (TotalLagrangian(body.elastic).stress_stiffened(displacement) - soft, body.loads)
@@ -119,9 +129,24 @@ def relinearised(
     """Return the linear structure that is tangent to the nonlinear one at given displacements.
 
     Both bodies have the total Lagrangian tangent stiffness less the spin softening, and loads that
-    are exact for ``displacements`` at the load ``amplitudes`` ``(cases,)``. At other loads they are
-    in proportion, so that the unloaded structure stays unloaded. The interface frames are turned
-    with body 1's faces. Raises ValueError if there is no load.
+    are exact for the displacements at the load. At other loads they are in proportion, so that the
+    unloaded structure stays unloaded. The interface frames are turned with body 1's faces.
+
+    Parameters
+    ----------
+    structure
+        The linear structure.
+    displacements
+        Displacements of both bodies at the load.
+    amplitudes
+        Amplitudes of the load cases at that load ``(cases,)``.
+    softening
+        Spin softening of both bodies at that load.
+
+    Raises
+    ------
+    ValueError
+        If there is no load, or if a temperature changes.
     """
     mesh = structure.mesh
     interfaces = tuple(turned_interface(i, mesh, displacements) for i in mesh.interfaces)
@@ -181,11 +206,11 @@ def _deflated(stiffness: Array, motions: Array) -> Array:
 
 
 def _share(structure: Structure, amplitudes: Array) -> Array:
-    """Return the share of the load at ``amplitudes`` of each load case, ``(cases,)``.
+    """Return the share of the load at ``amplitudes`` in a unit of each load case ``(cases,)``.
 
-    It is the projection of the cases' nodal forces on those of that load. The sum over the
-    amplitudes is one at that load and falls with it, whatever the order and the units of the cases.
-    Raises ValueError if there is no load, or if temperatures change.
+    It is the projection of the cases' nodal forces on those of that load. The product with the
+    amplitudes is one at that load and decreases with the load, and does not depend on the order and
+    the units of the cases. Raises ValueError if there is no load, or if temperatures change.
     """
     if any(body.expands for body in structure.bodies):
         raise ValueError(

@@ -37,7 +37,16 @@ def spin_softening(
 ) -> sp.csr_matrix:
     """Return Ω² M ``(size, size)`` [N/mm] of a body and the masses that it carries.
 
-    ``speed`` [rad/s] is the speed of rotation about the unit vector ``axis`` ``(3,)``.
+    Parameters
+    ----------
+    elastic
+        The elastic body.
+    speed
+        Speed of rotation [rad/s].
+    carried
+        Masses that it carries.
+    axis
+        Unit vector ``(3,)`` of the axis of rotation.
     """
     axes = elastic.body.axes
     across = sp.csr_matrix((np.eye(3) - np.outer(axis, axis))[np.ix_(axes, axes)])

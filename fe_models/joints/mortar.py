@@ -211,8 +211,19 @@ def frame_of_faces(
     """Return the interface frame of two faces, and the largest tilt of a facet from it [rad].
 
     The origin is the centroid of the part of body 2's face that body 1's covers; z is the mean
-    outward normal of body 1; x is the direction ``(3,)`` given, turned into the plane. Raises
-    :class:`MeshError` if the direction is normal to the face, or if a facet faces backwards.
+    outward normal of body 1; x is the direction ``(3,)`` given, turned into the plane.
+
+    Parameters
+    ----------
+    body_1, boundary_1, body_2, boundary_2
+        The two bodies, and the boundary of each that is its face.
+    x_direction
+        Direction ``(3,)`` close to x.
+
+    Raises
+    ------
+    MeshError
+        If the direction is normal to the face, or if a facet faces backwards.
     """
     normals_1, normals_2 = body_1.outward(boundary_1), body_2.outward(boundary_2)
     z = _unit(normals_1.sum(axis=0))

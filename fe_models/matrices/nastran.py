@@ -135,7 +135,7 @@ def _gathered(entries: list[Entry]) -> dict[str, _Dmig]:
     columns: defaultdict[str, list[Entry]] = defaultdict(list)
     for entry in entries:
         name = entry.text(0).upper()
-        # A header has 0 where a column has its point, and its form where a column may be empty.
+        # A header has 0 where a column has its point, followed by its form.
         if entry.text(1) == "0" and entry.text(FORM):
             if name in found:
                 raise entry.wrong(f"{name}: a second header; allowed: one")

@@ -44,7 +44,10 @@ def dimension_of(scope: Scope) -> int:
 
 
 class Flattened:
-    """Nodes of all ``scopes`` in one list; ``common`` has the names that belong to none of them."""
+    """Nodes of all ``scopes`` in one list.
+
+    ``common`` is the scope whose names need no prefix: the assembly, or the flat file itself.
+    """
 
     def __init__(self, scopes: list[Scope], common: Scope) -> None:
         self.scopes, self.common = scopes, common

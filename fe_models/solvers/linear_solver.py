@@ -111,12 +111,29 @@ def prepare(
 def condense(
     matrix: sp.csr_matrix, loads: Array, kept: Indices, memory: float | None = None
 ) -> tuple[Array, Array]:
-    """Condense a symmetric system onto the unknowns ``kept`` ``(c,)``, with ``loads`` ``(n, m)``.
+    """Condense a symmetric system onto the unknowns ``kept``.
 
     The results are K_cc - K_ci K_ii⁻¹ K_ic ``(c, c)``, dense, and f_c - K_ci K_ii⁻¹ f_i ``(c, m)``,
     in the order of ``kept``; ``i`` are all other unknowns. K_ii must be positive definite, K need
-    not be. Raises :class:`SolverError` if it is not, and :class:`FactorMemoryError` if it needs
-    more than ``memory`` [bytes], by default all that is free. There is no iterative alternative.
+    not be.
+
+    Parameters
+    ----------
+    matrix
+        K ``(n, n)``.
+    loads
+        Loads f ``(n, m)``.
+    kept
+        Numbers of the unknowns to keep ``(c,)``.
+    memory
+        Memory that it may use [bytes]; by default all that is free.
+
+    Raises
+    ------
+    SolverError
+        If K_ii is singular.
+    FactorMemoryError
+        If it needs more memory. There is no iterative alternative.
     """
     limit = _limit(memory)
     # The result is checked with one more load, whose displacements are known.

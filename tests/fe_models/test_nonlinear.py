@@ -245,7 +245,7 @@ def test_supported_body_keeps_its_stiffness(peak, tangent, monkeypatch):
 
 
 def test_path_goes_through_the_peak(peak, check, tangent):
-    """Check that rigid motions as loads or as stiffness agree at the load of exactness."""
+    """Check that rigid motions as loads or as stiffness agree at the load of both."""
     model, state = tangent
     (reached,) = peak.march(model.condense_path(peak.like))
     scale = np.abs(state.force).max()
@@ -254,9 +254,10 @@ def test_path_goes_through_the_peak(peak, check, tangent):
 
 @pytest.mark.slow
 def test_half_the_load(peak, check, tangent, coarse, dovetail, mission):
-    """Check the change of P at half the peak load: half as large, or as at peak.
+    """Check the relative change of P at half the peak load, half as large as at peak.
 
-    A few nodes that stick at only one of the loads are tolerated.
+    With the stiffness of the peak it is as large as there. A few nodes that stick at only one of
+    the loads are tolerated.
     """
     half = Peak(*coarse, dovetail, mission, share=0.5)
     exact = half.check()
