@@ -71,6 +71,8 @@ nb_merge_streams = True
 nb_render_markdown_format = "myst"
 
 autodoc_typehints = "signature"
+# Types of attributes stand in the signature; as text, names such as np.bool_ would be links.
+napoleon_attr_annotations = False
 autodoc_type_aliases = {name: name for name in ("Array", "Flags", "Indices", "Mask", "Parameter")}
 python_maximum_signature_line_length = 88
 python_use_unqualified_type_names = True

@@ -1,21 +1,21 @@
 """Structures: geometry and meshes, elasticity, reduction to the interfaces, structural friction.
 
-A structure is meshed (:mod:`fe_models.geometry`), becomes elastic, is condensed onto the nodes of
-its interfaces and marched through a load path with Coulomb friction there; how it vibrates with its
-joints is in :mod:`fe_models.dynamics`. What most uses begin with:
+A structure is meshed (:mod:`fe_models.geometry`), assembled as elastic bodies, condensed onto the
+nodes of its interfaces, and marched through a load path with Coulomb friction at the interfaces.
+Vibration with friction joints is in :mod:`fe_models.dynamics`. Most programs begin with these:
 
 - ``Body``, ``Interface``, ``StructureMesh``: meshed bodies and the faces where they meet
 - ``ElasticBody``: stiffness, mass, loads and stresses of one body
-- ``Constraints``: what supports hold of its displacements
+- ``Constraints``: the displacements of a body that supports hold
 - ``SupportedBody``: a supported, loaded body, condensed onto its interface nodes
-- ``Structure``: two of them, with the closed cycle of a load path
-- ``JointStiffness``, ``FrictionalJoint``: the joint of two condensed bodies, and friction in it
+- ``Structure``: supported bodies with their interfaces, and the closed cycle of a load path
+- ``JointStiffness``, ``FrictionalJoint``: the joint of condensed bodies, and friction in it
 - ``reduce_body``, ``ReducedModel``: Guyan and Craig-Bampton reduction
 - ``ReducedPair``, ``FrettingConditions``: two reduced specimens that fret
 - ``MeshError``, ``SolverError``: a mesh that cannot be used, a system that cannot be solved
 
-One node pressed with 10 N on springs of 100 N/mm, µ = 0.4, under 3 N and then 6 N along the face:
-it sticks, then slips where friction carries no more than 4 N.
+One node on springs of 100 N/mm is pressed with 10 N and then loaded along the face by 3 N and by
+6 N, with µ = 0.4. The node sticks under 3 N; it slips under 6 N, because friction carries only 4 N.
 
 >>> import numpy as np
 >>> from fe_models import FrictionalJoint, JointStiffness

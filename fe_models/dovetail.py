@@ -18,18 +18,30 @@ from fe_models.structure import Structure
 from fe_models.supported_body import SupportedBody, interface_nodes
 from sa_solver.types import Array, Material
 
-# The boundary of the blade that the airfoil pulls at.
+# Boundary of the blade on which the airfoil's pull acts.
 TOP = "shank_top"
 
 
 @dataclass(frozen=True)
 class Mission:
-    """One mission: the speed rises linearly to its peak and falls back to zero.
+    """Load history of one mission: the speed rises linearly to its peak and falls back to zero.
 
-    ``rotation_speed`` [rad/s] is reached at increment ``peak_at`` of ``increments``;
-    ``airfoil_mass`` [t] pulls with its centre at ``airfoil_radius`` [mm]; ``aerodynamic_moment``
-    [N mm] about the slot, at peak, presses on the intrados (X > 0). Both follow the square of the
-    speed.
+    The pull of the airfoil and the aerodynamic moment follow the square of the speed.
+
+    Attributes
+    ----------
+    increments
+        Number of increments.
+    peak_at
+        Increment at which the peak speed is reached.
+    rotation_speed
+        Peak speed [rad/s].
+    airfoil_mass
+        Mass of the airfoil [t].
+    airfoil_radius
+        Radius of the airfoil's centre of mass [mm].
+    aerodynamic_moment
+        Moment about the slot at peak [N mm], which presses on the intrados (X > 0).
 
     Examples
     --------
@@ -49,13 +61,13 @@ class Mission:
     aerodynamic_moment: float
 
     def speeds(self) -> Array:
-        """Rotation speed at the end of each increment, ``(increments,)`` [rad/s]."""
+        """Return the rotation speed at the end of each increment, ``(increments,)`` [rad/s]."""
         up = np.arange(1, self.peak_at + 1) / self.peak_at
         down = np.arange(self.increments - self.peak_at - 1, -1, -1)
         return self.rotation_speed * np.append(up, down / (self.increments - self.peak_at))
 
     def amplitudes(self) -> Array:
-        """Amplitudes of the load cases, ``(increments, 2)``: Ω² [1/s²] and the moment [N mm]."""
+        """Return the amplitudes ``(increments, 2)`` of the load cases: Ω² [1/s²], moment [N mm]."""
         squares = self.speeds() ** 2
         peak = self.rotation_speed**2
         return np.stack([squares, self.aerodynamic_moment * squares / peak], axis=1)
@@ -70,11 +82,25 @@ def dovetail_structure(
     order: int,
     cyclic: bool = False,
 ) -> Structure:
-    """The two supported, loaded bodies of a dovetail; ``order`` is that of the elements.
+    """Return the two supported, loaded bodies of a dovetail, disk and blade.
 
-    In the plane everything is per length of the slot, whose middle section it is. The sides of the
-    disk's sector slide on their planes, as a load does that is its own mirror image; ``cyclic``
-    ones do what those of the next sectors do.
+    In the plane all quantities are per length of the slot, and the model is its middle section.
+
+    Parameters
+    ----------
+    dovetail
+        Geometry of the joint.
+    mesh
+        Its mesh.
+    disk, blade
+        Materials of the disk and the blade.
+    mission
+        Speed and loads.
+    order
+        Order of the elements, 1 or 2.
+    cyclic
+        Whether the sides of the disk's sector are tied to each other as neighbouring sectors are.
+        Otherwise they slide on their planes, which suits a load that is its own mirror image.
     """
     elastic_1, elastic_2 = (
         ElasticBody(body, material, order)
@@ -111,13 +137,16 @@ def dovetail_structure(
 
 
 def dovetail_cuts(dovetail: Dovetail, disk: Body) -> Cuts:
-    """The sides of the disk's sector, beyond which the next ones are.
+    """Return the sides of the disk's sector as cyclic cuts.
 
-    Raises :class:`MeshError` if the slot is skewed: the sector's ends are planes, which a side that
-    goes round with a skewed slot does not meet where the other does.
+    Raises :class:`MeshError` if the slot is skewed: the ends of the sector are planes, so the two
+    sides of a skewed sector do not have the same edges.
     """
     if dovetail.skew != 0.0:
-        raise MeshError("a skewed slot: the sides of its sector are no images of each other")
+        raise MeshError(
+            "the slot is skewed, so the sides of the sector are not images of each other; "
+            "set the skew to 0, or do without cyclic sides"
+        )
     sides = disk.mesh.boundaries["sides"]
     along = disk.outward_of(sides)[:, 0]
     wheel = Cyclic(["the side at X < 0"], ["the side at X > 0"], ROTOR, ORIGIN, dovetail.blades)
@@ -127,7 +156,7 @@ def dovetail_cuts(dovetail: Dovetail, disk: Body) -> Cuts:
 def dovetail_softening(
     structure: Structure, dovetail: Dovetail, mission: Mission
 ) -> tuple[sp.csr_matrix, sp.csr_matrix]:
-    """Spin softening of disk and blade at peak speed, ``(size, size)`` [N/mm].
+    """Return the spin softening of disk and blade at peak speed, ``(size, size)`` [N/mm].
 
     The airfoil is rigid and moves with the top of the shank.
     """
@@ -140,19 +169,19 @@ def dovetail_softening(
 
 
 def _blade_loads(blade: ElasticBody, dovetail: Dovetail, mission: Mission) -> Array:
-    """Load cases ``(size, 2)``: rotation at 1 rad/s with the airfoil's pull, and a unit moment."""
+    """Return the load cases ``(size, 2)``: rotation at 1 rad/s with the airfoil; a moment."""
     axis = dovetail.load_axis
     length = dovetail.slot_length if blade.dimension == 2 else 1.0
     area = length * blade.boundary_integral(TOP, lambda x: np.ones_like(x[0]))
     lever = length * blade.boundary_integral(TOP, lambda x: _lever(x, dovetail) ** 2)
     pull = mission.airfoil_mass * mission.airfoil_radius / area
     rotation = blade.traction_load(TOP, lambda x: np.full_like(x[0], pull), axis)
-    # A moment about the slot, as a radial traction that is linear across the shank.
+    # The moment about the slot is applied as a radial traction that is linear across the shank.
     moment = blade.traction_load(TOP, lambda x: _lever(x, dovetail) / lever, axis)
     return np.stack([rotation + blade.centrifugal_load(), moment], axis=1)
 
 
 def _lever(points: Array, dovetail: Dovetail) -> Array:
-    """Distance from the plane through slot and load axis, of points ``(3, ...)``."""
+    """Return the distance of points ``(3, ...)`` from the plane through slot and load axis."""
     across = np.cross(dovetail.slot_direction, dovetail.load_axis)
     return np.einsum("a,a...->...", across, points)

@@ -8,7 +8,6 @@ from itertools import combinations
 
 import numpy as np
 import scipy.sparse as sp
-from scipy.spatial import cKDTree
 
 from fe_models.cyclic.cuts import Cuts, Cyclic, hold_normal
 from fe_models.cyclic.sector import (
@@ -40,7 +39,7 @@ from fe_models.loads.imposed import (
 from fe_models.loads.load_cases import LoadCases
 from fe_models.loads.nodal_force import shared
 from fe_models.loads.pretension import Pretension, check_pretension
-from fe_models.loads.rest import rigid_assemblies
+from fe_models.loads.rest import AXIS_NAMES, check_held_faces, check_rest
 from fe_models.meshes.curved_face import Surface, edges_of
 from fe_models.meshes.cut_face import cut_interface
 from fe_models.meshes.second_order import set_nodes
@@ -54,21 +53,27 @@ from fe_models.meshes.structure_mesh import (
 from fe_models.meshes.trace import LinearTrace
 from fe_models.readers.set_faces import facets_within
 from fe_models.structure import Structure
-from fe_models.supported_body import FREE_MOTION, SupportedBody, interface_nodes
-from sa_solver.ties import first_largest
+from fe_models.supported_body import SupportedBody, interface_nodes
 from sa_solver.types import Array, Frame, Indices, Material
 
-AXIS_NAMES = "xyz"
-# Supports do not depend on what bodies are made of.
+# Supports do not depend on the material of the bodies.
 ANY = Material(1.0, 0.0)
 
 
 @dataclass(frozen=True)
 class ContactPair:
-    """``face_1`` of body 1 meets ``face_2`` of body 2; their frame's x is near ``x_direction``.
+    """Contact between ``face_1`` of body 1 and ``face_2`` of body 2 of a user's mesh.
 
-    Each is one boundary or several, seams included, that are one face together. ``bodies`` are the
-    names of body 1 and body 2.
+    Attributes
+    ----------
+    name
+        Name of the contact.
+    bodies
+        Names of body 1 and body 2.
+    face_1, face_2
+        Boundaries, seams included, that together are the contact face of each body.
+    x_direction
+        Direction ``(3,)`` close to the x axis of the contact's frame.
     """
 
     name: str
@@ -78,11 +83,11 @@ class ContactPair:
     x_direction: Array
 
     def boundaries(self, number: int) -> Sequence[str]:
-        """Those that are the face of body ``number``, 1 or 2."""
+        """Return the boundaries that are the contact face of body ``number``, 1 or 2."""
         return (self.face_1, self.face_2)[number - 1]
 
     def boundary(self, number: int) -> str:
-        """What that face is called."""
+        """Return one name for the contact face of body ``number``, 1 or 2."""
         return " + ".join(self.boundaries(number))
 
 
@@ -90,8 +95,8 @@ class ContactPair:
 class Support:
     """Displacements held at a boundary or node set.
 
-    ``hold`` names the global axes, such as ``"xz"``, or is ``"normal"``, or the axis along which
-    only the mean over a boundary is held, such as ``"mean_y"``.
+    ``hold`` names the global axes, such as ``"xz"``, or is ``"normal"``, or names the axis along
+    which only the mean over a boundary is held, such as ``"mean_y"``.
     """
 
     group: str
@@ -104,11 +109,22 @@ def imported_mesh(
     pairs: Sequence[ContactPair],
     supports: Sequence[Support] = (),
 ) -> StructureMesh:
-    """The bodies of those names and the interfaces between them.
+    """Return the named bodies of a user's mesh with the interfaces between them.
 
-    The contact faces become boundaries named as their interface, whose nodes need not match;
-    ``supports`` on them may be planes of symmetry (:mod:`fe_models.meshes.cut_face`).
-    Raises :class:`MeshError` for names that are not in the file or faces that do not meet.
+    The contact faces become boundaries with the name of their interface; their nodes need not
+    match. Raises :class:`MeshError` for names that are not in the file or faces that do not meet.
+
+    Parameters
+    ----------
+    imported
+        The user's mesh.
+    names
+        Names of the bodies.
+    pairs
+        Contacts between the bodies.
+    supports
+        Supports, which may make planes of symmetry of the contacts
+        (:mod:`fe_models.meshes.cut_face`).
     """
     bodies = {name: _with_interfaces(imported, named_body(imported, name), pairs) for name in names}
     held = {
@@ -143,13 +159,31 @@ def imported_structure(
     order: int,
     cyclic: Sequence[Cyclic] = (),
 ) -> Structure:
-    """All bodies with their supports and a load case for each of the ``loads``.
+    """Return all bodies with their supports and a load case for each of the ``loads``.
 
-    They may be a sector of a wheel with ``cyclic`` cuts. Elements of ``order`` 2 are curved where
-    bodies have midsides, which :func:`fe_models.meshes.second_order.with_midsides` gives them.
+    Parameters
+    ----------
+    mesh
+        Bodies and interfaces from :func:`imported_mesh`.
+    imported
+        The user's mesh.
+    materials
+        Material of each body.
+    supports
+        Supports of all bodies.
+    loads
+        Loads, one load case each.
+    order
+        Order of the elements, 1 or 2. Elements of order 2 are curved where bodies have midside
+        nodes, which :func:`fe_models.meshes.second_order.with_midsides` gives them.
+    cyclic
+        Cyclic cuts, if the bodies are one sector of a wheel.
 
-    Raises :class:`MeshError` for groups that no body has, supports that let bodies move as rigid
-    ones though all faces stick, and ones on a contact face that no plane of symmetry explains.
+    Raises
+    ------
+    MeshError
+        If no body has a group, if supports leave a rigid motion although all faces stick, or if
+        they hold a contact face in a way that is no plane of symmetry.
     """
     for support in supports:
         check_support(imported, mesh.bodies, support)
@@ -165,22 +199,23 @@ def imported_structure(
         for number, material in enumerate(materials)
     ]
     structure = Structure(mesh.weighted(order), tuple(bodies))
-    _check_held(structure)
-    _check_rest(structure)
+    check_held_faces(structure)
+    check_rest(structure)
     return structure
 
 
 def named_body(imported: ImportedMesh, name: str) -> Body:
-    """The body of that name. Raises :class:`MeshError` if there is none."""
+    """Return the body of that name. Raises :class:`MeshError` if there is none."""
     if name not in imported.bodies:
         raise MeshError(f"no body {name}; allowed: {', '.join(imported.bodies)}")
     return imported.bodies[name]
 
 
 def contact_facets(imported: ImportedMesh, body: Body, boundary: str) -> Indices:
-    """Facets of a boundary of a body, or those that a node set has all vertices of.
+    """Return the facets of a boundary of a body, or those with all vertices in a node set.
 
-    Raises :class:`MeshError` if it is not on that body, or the nodes of a set are no face.
+    Raises :class:`MeshError` if the name is not on that body, or if the nodes of a set are not a
+    face.
     """
     boundaries, node_sets = body.mesh.boundaries or {}, imported.points[body.name]
     if boundary in boundaries:
@@ -203,7 +238,7 @@ def contact_facets(imported: ImportedMesh, body: Body, boundary: str) -> Indices
 
 
 def check_support(imported: ImportedMesh, bodies: Sequence[Body], support: Support) -> None:
-    """Raise :class:`MeshError` if no body has the group, or it cannot be held like that."""
+    """Raise :class:`MeshError` if no body has the group, or if it cannot be held that way."""
     boundaries, node_sets = _groups(imported, bodies)
     group, hold = support.group, support.hold
     if group not in boundaries | node_sets:
@@ -218,7 +253,7 @@ def check_support(imported: ImportedMesh, bodies: Sequence[Body], support: Suppo
 
 
 def check_load(imported: ImportedMesh, bodies: Sequence[Body], load: AppliedLoad) -> None:
-    """Raise :class:`MeshError` if no body has the boundary, or the plane not the direction."""
+    """Raise :class:`MeshError` if no body has the boundary, or if the plane lacks the direction."""
     if isinstance(load, Pretension):
         check_pretension(load, bodies)
     if isinstance(load, Temperature):
@@ -229,7 +264,7 @@ def check_load(imported: ImportedMesh, bodies: Sequence[Body], load: AppliedLoad
         _check_shared(imported, bodies, load)
     elif group is not None and group not in boundaries:
         wrong = (
-            f"{group} is a node set that is no face, and has no area: it takes forces alone"
+            f"{group} is a node set that is not a face, so it has no area and takes only forces"
             if group in node_sets
             else f"no boundary {group} on {_any_of(bodies)}"
         )
@@ -245,7 +280,7 @@ def check_load(imported: ImportedMesh, bodies: Sequence[Body], load: AppliedLoad
         return
     vector = vector_of(load)
     if vector is not None and vector[1] != 0.0:
-        raise MeshError("a load along y, across the plane; allowed: x and z")
+        raise MeshError("a load acts along y, across the plane; allowed: along x and z")
     turning = turning_of(load)
     if turning is not None and np.any(turning[[0, 2]]):
         what = "moment" if isinstance(load, BoundaryForce) else "rotation"
@@ -253,9 +288,12 @@ def check_load(imported: ImportedMesh, bodies: Sequence[Body], load: AppliedLoad
 
 
 def _check_shared(imported: ImportedMesh, bodies: Sequence[Body], load: BoundaryForce) -> None:
-    """Raise unless the nodes of a set that is no face can carry a force."""
+    """Raise :class:`MeshError` unless the nodes of a set that is not a face can carry a force."""
     if getattr(load, "rigid", False):
-        raise MeshError(f"{load.boundary} is a node set that is no face; allowed: a rigid boundary")
+        raise MeshError(
+            f"{load.boundary} is a node set that is not a face, so it cannot be made rigid; "
+            "allowed: a rigid boundary"
+        )
     for body in bodies:
         if load.boundary in imported.points[body.name]:
             shared(load, body.points[imported.points[body.name][load.boundary]])
@@ -266,10 +304,10 @@ def _any_of(bodies: Sequence[Body]) -> str:
 
 
 def _with_interfaces(imported: ImportedMesh, body: Body, pairs: Sequence[ContactPair]) -> Body:
-    """The body with its contact faces as boundaries of the interfaces' names as well.
+    """Return the body with its contact faces as boundaries that have the interfaces' names.
 
-    Those of several boundaries go by all of their names together, too; node sets that are faces
-    are boundaries.
+    A contact face of several boundaries is also a boundary under all their names joined together,
+    and node sets that are faces become boundaries.
     """
     named = dict(imported.set_faces[body.name])
     for pair in pairs:
@@ -281,7 +319,7 @@ def _with_interfaces(imported: ImportedMesh, body: Body, pairs: Sequence[Contact
 
 
 def _surface(imported: ImportedMesh, body: Body, boundary: str, frame: Frame) -> Surface:
-    """What the face on a boundary is a mesh of, in a frame."""
+    """Return the surface that the mesh of a boundary approximates, in a frame."""
     facets, midsides = body.facets(boundary), None
     if body.name in imported.midsides:
         edges = edges_of(facets)
@@ -292,64 +330,8 @@ def _surface(imported: ImportedMesh, body: Body, boundary: str, frame: Frame) ->
     return Surface.of(points, np.searchsorted(nodes, facets), midsides)
 
 
-def _check_held(structure: Structure) -> None:
-    """Raise unless what is held of body 2's contact faces is held of body 1's there as well.
-
-    Meshes that do not match hold it at other nodes, at most a facet away.
-    """
-    d, interfaces = structure.dimension, structure.mesh.interfaces
-    held_1, held_2 = (
-        np.split(held.reshape(-1, d), np.cumsum([len(i.nodes(side)) for i in interfaces])[:-1])
-        for side, held in enumerate(structure.held, start=1)
-    )
-    for interface, one, two in zip(interfaces, held_1, held_2, strict=True):
-        name_1, name_2 = (structure.mesh.bodies[k].name for k in interface.bodies)
-        if two[:, -1].any():
-            raise MeshError(
-                f"nodes of {interface.name} on body {name_2} are held along the contact's normal: "
-                "they cannot press; leave them out of the support or of the face"
-            )
-        face = interface.face(1)
-        corners = face.coordinates[face.facets]
-        reach = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max()
-        for axis in range(d - 1):
-            places = face.coordinates[one[:, axis]], interface.coordinates[two[:, axis]]
-            if not _are_near(*places, reach):
-                raise MeshError(
-                    f"nodes of {interface.name} are held along the face on body {name_2} and not "
-                    f"on {name_1}; hold both alike, as on a plane of symmetry, or neither"
-                )
-
-
-def _are_near(places: Array, points: Array, reach: float) -> bool:
-    """Whether each of the points ``(n, 2)`` has one of the places ``(m, 2)`` within reach."""
-    if not len(points):
-        return True
-    return len(places) > 0 and bool(cKDTree(places).query(points)[0].max() <= reach)
-
-
-def _check_rest(structure: Structure) -> None:
-    """Raise if bodies can move as rigid ones though all faces stick."""
-    motions = rigid_assemblies(structure)
-    if not len(motions):
-        return
-    # Of several, how much of each axis is among them, whatever basis they have been given in.
-    among = np.sum(motions**2, axis=0)
-    moving = [
-        body.elastic.body.name
-        for body, share in zip(structure.bodies, among.sum(axis=1), strict=True)
-        if share > FREE_MOTION * among.sum()
-    ]
-    motion = first_largest(among.sum(axis=0))
-    freely = f"{'shift along' if motion < 3 else 'turn about'} {AXIS_NAMES[motion % 3]}"
-    raise MeshError(
-        f"the supports let {' and '.join(moving)} {freely}, though all contacts stick; hold more, "
-        "or have a contact with what is held"
-    )
-
-
 def _groups(imported: ImportedMesh, bodies: Sequence[Body]) -> tuple[set[str], set[str]]:
-    """Names of the boundaries and of the node sets of the bodies."""
+    """Return the names of the boundaries and of the node sets of the bodies."""
     boundaries = {
         name
         for body in bodies
@@ -374,7 +356,7 @@ def _supported(
     free, supported_motions = constraints.free, constraints.transformation()
     thermal = thermal_strains(loads, elastic, imported.node_numbers[body.name])
     cases = LoadCases(elastic, thermal, groups, imported.points[body.name])
-    # Rigid faces first: few displacements are left of them for means.
+    # Rigid faces come first, because they leave few displacements for means.
     for case, load in sorted(enumerate(loads), key=lambda e: not getattr(e[1], "rigid", False)):
         cases.add(case, load, constraints)
     check_against_supports(loads, cases.imposed, supported_motions @ cases.imposed[free])
@@ -401,13 +383,13 @@ def _supported(
         raise MeshError(f"body {body.name}: {error}") from error
     if len(constraints.free) <= np.sum(~supported.held):
         raise MeshError(
-            f"body {body.name}: all its nodes are held or on contact faces; refine its mesh"
+            f"body {body.name}: every node is held or on a contact face; refine its mesh"
         )
     return supported
 
 
 def _check_separate(mesh: StructureMesh, number: int) -> None:
-    """Raise if a node of the body at a place ``number`` is on two of its contact faces."""
+    """Raise if a node of body ``number`` is on two of its contact faces."""
     for (one, side), (other, other_side) in combinations(mesh.faces_of(number), 2):
         if len(np.intersect1d(one.nodes(side), other.nodes(other_side))):
             raise MeshError(
@@ -423,7 +405,7 @@ def _held(
     supports: Sequence[Support],
     cuts: Sequence[Cuts] = (),
 ) -> Constraints:
-    """What supports hold of a body, and what ties its cuts."""
+    """Return the constraints of a body by supports and by the ties between its cyclic cuts."""
     body = elastic.body
     constraints = Constraints(len(elastic.nodes), elastic.dimension)
     for support in supports:
@@ -435,7 +417,7 @@ def _held(
 
 
 def _names(imported: ImportedMesh, body: Body) -> set[str]:
-    """Names of the boundaries and node sets of a body."""
+    """Return the names of the boundaries and node sets of a body."""
     return set[str]().union(*_groups(imported, [body]))
 
 
@@ -446,7 +428,7 @@ def _hold(
     support: Support,
     cuts: Sequence[Cuts],
 ) -> None:
-    """Add one support to a body's constraints."""
+    """Add one support to the constraints of a body."""
     group, hold = support.group, support.hold
     is_boundary = group in elastic.body.mesh.boundaries
     if hold == "normal":
@@ -463,14 +445,17 @@ def _hold(
 
 
 def _unit(axis: str, body: Body) -> Array:
-    """Unit vector of a named global axis in the body's components."""
+    """Return the unit vector of a named global axis in the body's components."""
     return np.eye(3)[AXIS_NAMES.index(axis), list(body.axes)]
 
 
 def imported_softening(
     structure: Structure, loads: Sequence[AppliedLoad], amplitudes: Array
 ) -> tuple[sp.csr_matrix, ...]:
-    """Spin softening of all bodies ``(size, size)`` [N/mm] at ``amplitudes`` of the loads."""
+    """Return the spin softening ``(size, size)`` [N/mm] of every body under the loads.
+
+    ``amplitudes`` are those of the loads; only rotations contribute.
+    """
     softening = []
     for body in structure.bodies:
         total = sp.csr_matrix(body.elastic.stiffness.shape)

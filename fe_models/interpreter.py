@@ -1,4 +1,4 @@
-"""A fresh Python beside this one, which finds our modules wherever this one has found them."""
+"""Command line of a fresh Python interpreter that finds the same modules as this one."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ ROOT = str(Path(__file__).parents[1])
 
 
 def fresh_python(code: str) -> list[str]:
-    """The command that runs ``code``, which imports modules of ours, in a process of its own.
+    """Return the command that runs ``code`` in a separate Python process.
 
-    That process looks for modules where this one does, but not in the folder where it is started:
-    there somebody may have a file with the name of one of our packages. It does not know the
-    ``__main__`` of this one, which may be a notebook, a script without a guard, or standard input.
+    The process searches modules where this one does, but not in its working directory: a file there
+    may have the name of one of our packages. It does not know the ``__main__`` of this process,
+    which may be a notebook, a script without a guard, or standard input.
     """
     places = [place for place in sys.path if isinstance(place, str) and place] + [ROOT]
     return [sys.executable, "-c", f"import sys; sys.path[:] = {places!r}; {code}"]

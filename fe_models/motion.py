@@ -1,9 +1,9 @@
-"""Displacements of all bodies of a structure, from what its contact says.
+"""Displacements of all bodies of a structure, from the solution of its contacts.
 
-A body that supports hold answers to its contact forces. One that only follows such bodies, as
-body 2 of all its interfaces, has their displacements and the relative ones at its faces. Any other
-answers to its forces but for rigid motions, which make it meet its neighbours at the relative
-displacements, by least squares over all interfaces.
+A body that supports hold is loaded by its contact forces. A body that is body 2 of all its
+interfaces, all on held bodies, follows them: its faces move with theirs plus the relative
+displacements. Any other body is loaded by its contact forces up to a rigid motion, which is found
+by least squares so that its faces meet their neighbours at the relative displacements.
 """
 
 from __future__ import annotations
@@ -20,11 +20,15 @@ from sa_solver.types import Array
 
 @dataclass(frozen=True)
 class StructureMotion:
-    """How a structure moves over the increments of a cycle.
+    """Motion of a structure over the increments of a cycle.
 
-    ``displacements`` ``(size, k)`` [mm] are those of each body in the increments asked for, and
-    ``faces`` ``(t, 3, n)`` [mm] those of body 1 and body 2 in all of them, by interface, in the
-    frame and at the nodes of that.
+    Attributes
+    ----------
+    displacements
+        Displacements of each body ``(size, k)`` [mm] in the requested increments.
+    faces
+        Displacements of body 1 and of body 2 ``(t, 3, n)`` [mm] at the nodes of each interface, in
+        its frame and in all increments.
     """
 
     displacements: tuple[Array, ...]
@@ -34,10 +38,18 @@ class StructureMotion:
 def deformation(
     structure: Structure, force: Array, relative: Array, amplitudes: Array
 ) -> tuple[Array, ...]:
-    """All displacements of each body ``(size,)`` [mm].
+    """Return the displacements of each body ``(size,)`` [mm].
 
-    ``force`` ``(3, n)`` on body 2 and ``relative`` displacement ``(3, n)`` are over all interfaces,
-    in their frames; ``amplitudes`` those of the load cases.
+    Parameters
+    ----------
+    structure
+        Structure whose contact has been solved.
+    force
+        Contact forces on body 2 ``(3, n)`` [N] over all interfaces, in their frames.
+    relative
+        Relative displacements ``(3, n)`` [mm] over all interfaces, in their frames.
+    amplitudes
+        Amplitudes of the load cases ``(cases,)``.
     """
     motion = structure_motion(structure, force[None], relative[None], amplitudes[None], [0])
     return tuple(displacement[:, 0] for displacement in motion.displacements)
@@ -50,10 +62,18 @@ def structure_motion(
     amplitudes: Array,
     increments: Sequence[int],
 ) -> StructureMotion:
-    """Displacements in some ``increments``, and of the faces in all.
+    """Return the displacements in some ``increments``, and those of the faces in all increments.
 
-    ``force`` ``(t, 3, n)``, ``relative`` ``(t, 3, n)`` and ``amplitudes`` ``(t, cases)`` as in
-    :func:`deformation`.
+    Parameters
+    ----------
+    structure
+        Structure whose contact has been solved.
+    force, relative
+        Contact forces and relative displacements ``(t, 3, n)``, as in :func:`deformation`.
+    amplitudes
+        Amplitudes of the load cases ``(t, cases)``.
+    increments
+        Numbers of the increments in which all displacements are returned.
     """
     forces, count = structure.on_faces(force), len(structure.held[0])
     axes = structure.mesh.bodies[0].axes
@@ -75,7 +95,7 @@ def structure_motion(
 
 
 def _followers(structure: Structure) -> set[int]:
-    """Bodies that are body 2 of all their interfaces, on bodies that supports hold."""
+    """Return the bodies that are body 2 of all their interfaces, and all of them on held bodies."""
     pairs = [interface.bodies for interface in structure.mesh.interfaces]
     held = {number for number, body in enumerate(structure.bodies) if body.is_held}
     leaders = {one for one, _ in pairs} | {two for one, two in pairs if one not in held}
@@ -90,9 +110,9 @@ def _leaders(
     amplitudes: Array,
     moved: Array,
 ) -> dict[int, Array]:
-    """All displacements ``(size, t)`` of the bodies that do not follow, by number.
+    """Return the displacements ``(size, t)`` of the bodies that do not follow, by number.
 
-    What their faces do is put into ``moved`` ``(places, t)``.
+    The displacements of their faces are written into ``moved`` ``(places, t)``.
     """
     found, rigid = {}, []
     for number, (body, place) in enumerate(zip(structure.bodies, structure.places, strict=True)):
@@ -106,25 +126,25 @@ def _leaders(
     free = np.zeros((len(moved), sum(on_faces.shape[1] for *_, on_faces in rigid)))
     ends = np.cumsum([on_faces.shape[1] for *_, on_faces in rigid])
     columns = [slice(end - on.shape[1], end) for (*_, on), end in zip(rigid, ends, strict=True)]
-    for (number, _, on_faces), own in zip(rigid, columns, strict=True):
-        free[structure.places[number], own] = on_faces
+    for (number, _, on_faces), mine in zip(rigid, columns, strict=True):
+        free[structure.places[number], mine] = on_faces
     known = _known(structure, followers)
     missing, by_motion = apart - _relative(structure, moved), _relative(structure, free)
     shares = np.linalg.lstsq(by_motion[known], missing[known], rcond=None)[0]
     moved += free @ shares
-    for (number, everywhere, _), own in zip(rigid, columns, strict=True):
-        found[number] += everywhere @ shares[own]
+    for (number, everywhere, _), mine in zip(rigid, columns, strict=True):
+        found[number] += everywhere @ shares[mine]
     return found
 
 
 def _relative(structure: Structure, moved: Array) -> Array:
-    """Relative displacements ``(d n, ...)`` of those of all faces ``(places, ...)``."""
+    """Return relative displacements ``(d n, ...)`` from those of all faces ``(places, ...)``."""
     count = len(structure.held[0])
     return moved[count:] - structure.carried(moved[:count])
 
 
 def _known(structure: Structure, followers: set[int]) -> np.ndarray:
-    """Which relative displacements ``(d n,)`` are of interfaces between two that do not follow."""
+    """Mark relative displacements ``(d n,)`` of interfaces whose two bodies both do not follow."""
     interfaces = structure.mesh.interfaces
     both = [not followers.intersection(interface.bodies) for interface in interfaces]
     return np.repeat(both, [structure.dimension * len(interface) for interface in interfaces])
@@ -133,7 +153,7 @@ def _known(structure: Structure, followers: set[int]) -> np.ndarray:
 def _by_interface(
     structure: Structure, under: Array, above: Array
 ) -> tuple[tuple[Array, Array], ...]:
-    """Motions ``(t, 3, n)`` of body 1 and body 2 at the nodes of each interface."""
+    """Return the motions ``(t, 3, n)`` of body 1 and body 2 at the nodes of each interface."""
     ends = np.cumsum([len(interface) for interface in structure.mesh.interfaces])[:-1]
     one, two = (
         np.split(

@@ -21,9 +21,9 @@ from sa_solver.types import Array, Indices, Material
 # Fixed-interface modes of each specimen ("Dynamics simulations of fretting wear for aero-engine
 # applications", thesis, section 4.2).
 MODES = 20
-# Of the reduction of both: the matrices of each, and what is done with them.
+# Number of steps in the reduction of both specimens: the matrices and the reduction of each.
 STEPS = 2 * (1 + reduction.STEPS)
-# Kinds of kept points.
+# Kinds of kept points, as named in the models.
 PAD, RING, TARGET = "pad", "ring", "target"
 
 NONE: Indices = np.empty(0, dtype=np.int64)
@@ -31,13 +31,20 @@ NONE: Indices = np.empty(0, dtype=np.int64)
 
 @dataclass(frozen=True)
 class SpecimenMatrices:
-    """The free specimen with the linear trace of its pad, its ring linear.
+    """Matrices of a free specimen with the linear trace of its pad and a ring that moves linearly.
 
-    ``stiffness`` and ``mass`` ``(n, n)`` on the displacements that are left, ``transformation``
-    ``(all, n)`` to those of all nodes; ``kept`` are the three displacements of each pad node, in
-    the interface's order, then of each ring node, and of further points. Those of the pad are the
-    last and massless, of its trace (:mod:`fe_models.meshes.trace`), where elements are of second
-    order.
+    With elements of second order, the displacements of the pad are those of its trace
+    (:mod:`fe_models.meshes.trace`); they come last and have no mass.
+
+    Attributes
+    ----------
+    stiffness, mass
+        Matrices ``(n, n)`` on the independent displacements.
+    transformation
+        Matrix ``(all, n)`` from the independent displacements to those of all nodes.
+    kept
+        The three displacements of each pad node, in the interface's order, then of each ring node,
+        and of further points.
     """
 
     stiffness: sp.csr_matrix
@@ -54,13 +61,26 @@ def specimen_matrices(
     order: int = 2,
     further: Indices = NONE,
 ) -> SpecimenMatrices:
-    """Matrices of one free specimen, ``pad`` its vertices in the interface's order.
-
-    ``further`` vertices are kept beside pad and ring.
+    """Return the matrices of one free specimen.
 
     The circumference moves linearly from each ring node to the next, so that held ring nodes hold a
-    line: 96.8, 96.0 and 95.6 N/µm for the pair with elements of 1.5, 1 and 0.6 mm. Held points
-    would give way the more the finer the mesh is, by 8, 11 and 13 N/µm.
+    line. The stiffness of the pair is then 96.8, 96.0 and 95.6 N/µm with elements of 1.5, 1 and 0.6
+    mm. Held points would yield more the finer the mesh is, and make it 8, 11 and 13 N/µm less.
+
+    Parameters
+    ----------
+    specimen
+        Geometry of the specimen.
+    body
+        Its mesh.
+    pad
+        Vertices of the pad in the interface's order.
+    material
+        Its material.
+    order
+        Order of the elements, 1 or 2.
+    further
+        Vertices that are kept in addition to pad and ring.
     """
     elastic = ElasticBody(body, material, order)
     ring = specimen.ring(body)
@@ -93,12 +113,28 @@ def reduced_specimens(
     target_distance: float | None = None,
     done: Callable[[], None] = lambda: None,
 ) -> tuple[ReducedModel, ReducedModel]:
-    """Both specimens on pad and ring, body 1 first.
+    """Return the reduced models of both specimens on pad and ring, body 1 first.
 
-    Their points are ``pad 1``, ``pad 2``, ... in the interface's order, and ``ring 1``, ... by
-    angle from the X axis; with a ``target_distance`` [mm] also ``target 1``, the vertex closest to
-    the point at X = R on the cylinder's side, so far from the contact plane: where a laser looks
-    along X. ``done`` is called after each of ``STEPS`` steps, if there are modes.
+    The kept points are named ``pad 1``, ``pad 2``, ... in the interface's order, and ``ring 1``,
+    ... by angle from the X axis.
+
+    Parameters
+    ----------
+    specimen
+        Geometry of the specimens.
+    mesh
+        Their mesh.
+    materials
+        Materials of body 1 and body 2.
+    order
+        Order of the elements, 1 or 2.
+    modes
+        Number of fixed-interface modes of each.
+    target_distance
+        Distance from the contact plane [mm] of ``target 1``, at which a laser looks along X: the
+        vertex closest to the point at X = R on the cylinder's side. By default it is not kept.
+    done
+        Called after each of ``STEPS`` steps if there are modes.
     """
     (face,) = mesh.interfaces
     models = []
@@ -123,6 +159,9 @@ def reduced_specimens(
 
 
 def pad_stiffness(model: ReducedModel, specimen: Specimen) -> Array:
-    """Stiffness ``(3 n, 3 n)`` [N/mm] of the pad's nodes with the ring held, nothing else kept."""
+    """Return the stiffness ``(3 n, 3 n)`` [N/mm] of the pad's nodes with the ring held.
+
+    No other displacements are kept.
+    """
     count = len(model.kept) - 3 * specimen.ring_nodes
     return model.static_stiffness[:count, :count]

@@ -1,4 +1,4 @@
-"""Supported bodies with their interfaces: condensation, contact history, equilibrium."""
+"""Supported bodies with their interfaces: condensation, contact history and equilibrium."""
 
 from __future__ import annotations
 
@@ -23,33 +23,35 @@ from sa_solver.types import Array, Indices, LoadHistory, Progress, Tally, result
 
 T = TypeVar("T")
 
-# Unknowns of all bodies up to which factors are found side by side: some 2 GB. Larger ones gain as
-# much from PARDISO's own threads, and each would count on all the memory that is free.
+# Number of unknowns of all bodies up to which they are factorised in parallel, which takes some
+# 2 GB. Larger bodies gain as much from PARDISO's own threads, and each factorisation would count
+# on all the free memory.
 MOST_AT_ONCE = 300_000
-# A face slides as a whole when nodes that stick carry less than this share of its load.
+# A face is in gross slip when its sticking nodes carry less than this share of its load.
 STICKING_SHARE = 1e-2
-# Below this share of the cycle's largest P the resultants are the friction solver's remainder.
+# Below this share of the cycle's largest P the resultants are errors of the friction solver.
 UNLOADED_SHARE = 1e-6
-# A cycle is closed when its contact forces are those of the one before within this share of the
-# largest: a tenth of what discretisation leaves of them, and a hundred times what friction's own
-# tolerance leaves. Dovetails close to 1e-5 in two cycles.
+# A cycle is closed when its contact forces differ from those of the previous cycle by less than
+# this share of the largest force: a tenth of the discretisation error, and a hundred times the
+# error due to the tolerance of the friction solver. Dovetails close to 1e-5 in two cycles.
 CLOSED = 1e-3
-# Slip that shakes down does so by a steady share in each cycle: a crowned pad took 12. One that
-# walks never closes.
+# Slip that shakes down decays by a constant factor per cycle; a crowned pad took 12 cycles. A
+# contact that ratchets never closes.
 MOST_CYCLES = 20
-# What a history holds of each increment, over the nodes of its interface.
+# Nodal fields that a history holds for each increment.
 FIELDS = ("force", "displacement", "slip")
-# A node slips when its shear reaches this share of Coulomb's limit.
+# A node slips when its shear reaches this share of the Coulomb limit.
 LIMIT_SHARE = 1.0 - 1e-6
 
 
 @dataclass(frozen=True)
 class InterfaceHistory:
-    """What one interface does over the increments of a cycle, in its frame.
+    """Loads and nodal fields of one ``interface`` over the increments of a cycle, in its frame.
 
-    ``loads`` are the resultants; ``force`` ``(t, 3, n)`` on body 2 [N], ``displacement`` ``(t, 3,
-    n)`` relative [mm], ``slip`` ``(t, 2, n)`` of each increment [mm], zero where a node sticks.
-    Loads and forces of a line contact are per length.
+    ``loads`` are the resultants and dissipated energies. ``force`` ``(t, 3, n)`` is that on body 2
+    [N], ``displacement`` ``(t, 3, n)`` that of body 2 relative to body 1 [mm], and ``slip``
+    ``(t, 2, n)`` that of each increment [mm], zero where a node sticks. Loads and forces of a line
+    contact are per length.
     """
 
     interface: Face
@@ -66,12 +68,14 @@ class InterfaceHistory:
 
 @dataclass(frozen=True)
 class CycleSolution:
-    """The closed cycle of a structure, with what the solver says of itself.
+    """Closed cycle of a structure, with the convergence measures of the solver.
 
-    ``states`` are the splitting's, by increment, and ``last_displacement`` ``(3, n)`` the one that
-    the next cycle starts from. ``closure`` is the largest difference of contact forces between the
-    last two of the ``cycles`` that were marched, relative to the largest force (0 if one was);
-    ``equilibrium`` ``(t,)`` the relative error of the balance of a body that is free to move.
+    ``histories`` are those of the interfaces and ``states`` those of the splitting, by increment.
+    The next cycle starts from ``last_displacement`` ``(3, n)`` [mm]. ``iterations`` is the sum of
+    the solver's, ``residual`` its largest, and ``converged`` whether all increments have converged.
+    ``closure`` is the largest change of the contact forces between the last two of the ``cycles``
+    that were marched, relative to the largest force, or 0 if only one was. ``equilibrium`` ``(t,)``
+    is the error that :meth:`Structure.equilibrium_errors` returns.
     """
 
     histories: tuple[InterfaceHistory, ...]
@@ -85,7 +89,7 @@ class CycleSolution:
     cycles: int = 2
 
     def fields(self) -> dict[str, Array]:
-        """Force, displacement and slip over all interfaces, to keep and to restore from."""
+        """Return force, displacement and slip over all interfaces, for storing and restoring."""
         return {
             name: np.concatenate([getattr(history, name) for history in self.histories], axis=-1)
             for name in FIELDS
@@ -94,14 +98,14 @@ class CycleSolution:
 
 @dataclass(frozen=True)
 class Structure:
-    """The ``bodies`` of a ``mesh``, supported and loaded.
+    """Assembly of supported and loaded ``bodies`` on a ``mesh``.
 
-    Supports hold them where all faces stick; contact alone may hold some of them.
+    The supports must prevent rigid motion when all faces stick; contact alone may hold some bodies.
 
     Examples
     --------
-    Two plane blocks on each other, the lower held, the upper pressed by 5 and 10 MPa over
-    1 mm: the contact carries as much.
+    Two plane blocks lie on each other. The lower one is held, the upper one is pressed by 5 and 10
+    MPa over 1 mm. The contact carries the applied loads.
 
     >>> import numpy as np
     >>> from skfem import MeshTri
@@ -136,14 +140,14 @@ class Structure:
 
     @property
     def dimension(self) -> int:
-        """Of the bodies, 2 or 3."""
+        """Dimension of the bodies, 2 or 3."""
         return self.bodies[0].elastic.dimension
 
     @cached_property
     def places(self) -> tuple[Indices, ...]:
-        """Where each body's interface displacements are among those of all faces.
+        """Positions of each body's interface displacements in the vector of all faces.
 
-        These are displacements of faces 1, interface by interface, and then of faces 2.
+        That vector holds the displacements of faces 1, interface by interface, and then of faces 2.
         """
         d, faces = self.dimension, self.mesh.interfaces
         order = [(i, side) for side in (1, 2) for i in range(len(faces))]
@@ -159,7 +163,7 @@ class Structure:
 
     @cached_property
     def held(self) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-        """Displacements of faces 1 and of faces 2 that supports hold at zero."""
+        """Flags of the displacements of faces 1 and of faces 2 that supports hold at zero."""
         held = np.zeros(sum(map(len, self.places)), bool)
         for body, place in zip(self.bodies, self.places, strict=True):
             held[place] = body.held
@@ -172,10 +176,16 @@ class Structure:
         progress: Progress = unseen,
         keep: Keep = made_anew,
     ) -> JointStiffness:
-        """Stiffness and loads of the joint on its interface displacements.
+        """Return stiffness and loads of the joint on the interface displacements.
 
-        ``like`` is a joint that differs little from this one and lends it its ρ. ``progress`` is
-        told the steps of it that are done, ``keep`` may know bodies that were condensed before.
+        Parameters
+        ----------
+        like
+            A joint that differs little from this one and whose ρ is used for this one.
+        progress
+            Called with the number of steps done and the total.
+        keep
+            Store that may return bodies condensed before.
         """
         held_1, held_2 = self.held
         projection, held = self.projection, held_1.any() or held_2.any()
@@ -196,11 +206,11 @@ class Structure:
         return joint
 
     def _steps(self, progress: Progress) -> Tally:
-        """Steps of a condensation: two of each body, and the joint of all."""
+        """Return the step counter of a condensation: two steps per body, and one for the joint."""
         return Tally(progress, 2 * len(self.bodies) + 1)
 
     def _condense_halves(self, progress: Progress, keep: Keep) -> JointStiffness | None:
-        """As :meth:`condense`, by a mirror symmetry of two bodies; None if there is none."""
+        """Condense by a mirror symmetry of two bodies, or return None if there is none."""
         body_1, body_2 = self.bodies
         for axis in body_1.elastic.body.axes:
             mirrors = body_1.mirror(axis), body_2.mirror(axis)
@@ -222,16 +232,16 @@ class Structure:
         return None
 
     def at_once(self, *jobs: Callable[[], T]) -> list[T]:
-        """What jobs give that each factorise such bodies: side by side if that surely fits."""
+        """Run jobs that each factorise a body, in parallel if memory surely suffices."""
         if sum(body.elastic.size for body in self.bodies) > MOST_AT_ONCE:
             return [job() for job in jobs]
         return at_once(sharing(jobs))
 
     @property
     def projection(self) -> sp.csr_matrix | None:
-        """Displacements of faces 1 to those at the nodes of faces 2, in the interface frames.
+        """Projection of displacements of faces 1 to the nodes of faces 2, in the interface frames.
 
-        None where all interfaces meet node to node.
+        None if all interfaces meet node to node.
         """
         interfaces = self.mesh.interfaces
         if all(i.projection is None for i in interfaces):
@@ -241,22 +251,26 @@ class Structure:
         return sp.kron(sp.block_diag(blocks), components, format="csr")
 
     def carried(self, moved: Array) -> Array:
-        """Displacements ``(d n, ...)`` of faces 1 at faces 2's nodes, from ``(d n_1, ...)``."""
+        """Return displacements ``(d n, ...)`` at the nodes of faces 2 that move with faces 1.
+
+        ``moved`` ``(d n_1, ...)`` are the displacements of faces 1.
+        """
         projection = self.projection
         return moved if projection is None else np.asarray(projection @ moved)
 
     @property
     def held_faces(self) -> dict[str, float]:
-        """Interfaces that supports hold along one direction, with the share of nodes they hold.
+        """Share of its nodes that supports hold along one direction, by name of the interface.
 
-        A plane of symmetry holds some of them, a slice in plane strain all.
+        A plane of symmetry holds some nodes; a slice in plane strain holds all of them. Interfaces
+        without held nodes are left out.
         """
         held = self.held[1].reshape(-1, self.dimension)
         shares = {i.name: float(held[nodes].mean(axis=0).max()) for i, nodes in self.shares()}
         return {name: share for name, share in shares.items() if share > 0.0}
 
     def gap(self) -> Array:
-        """Gaps of all interfaces one after the other, unworn ``(n,)`` [mm]."""
+        """Return the unworn gaps of all interfaces one after the other ``(n,)`` [mm]."""
         return np.concatenate([i.gap for i in self.mesh.interfaces])
 
     def solve_cycle(
@@ -269,18 +283,36 @@ class Structure:
         preload: Array | None = None,
         progress: Progress = unseen,
     ) -> CycleSolution:
-        """Solve one closed cycle of ``amplitudes`` ``(t, cases)``; ``friction`` is the joint's.
+        """Solve one closed cycle of a load path.
 
-        From rest and ``preload`` ``(s, cases)``, which is passed once, the first that repeats the
-        one before it; or one that follows ``after``, as many cycles on as that one had repeated.
-        Not closed after ``MOST_CYCLES``, it says so by its closure. ``progress`` is told the
-        increments that are solved, of those to the second end of the cycle or the next one.
+        The first cycle starts from rest and passes ``preload`` once. Cycles are then repeated until
+        one equals the previous one, at most ``MOST_CYCLES`` times; ``closure`` of the result tells
+        whether the cycle has closed. A cycle that follows ``after`` repeats as many cycles as that
+        solution had repeated.
+
+        Parameters
+        ----------
+        joint
+            The joint with friction.
+        amplitudes
+            Amplitudes of the load cases in every increment ``(t, cases)``.
+        gap
+            Gaps of all interfaces ``(n,)`` [mm].
+        friction
+            Friction coefficient of the joint, one or by node ``(n,)``.
+        after
+            Solution from whose last state this cycle starts.
+        preload
+            Amplitudes ``(s, cases)`` passed once before the first cycle.
+        progress
+            Called with the number of increments solved and the number up to the end of the second
+            cycle, or of the next one.
         """
         if after is None:
             once = amplitudes[:0] if preload is None else preload
             path = np.concatenate([once, amplitudes])
             first = joint.march(path, gap)
-            marched = [_told(first, 0, len(path) + len(amplitudes), progress)[len(once) :]]
+            marched = [_reported(first, 0, len(path) + len(amplitudes), progress)[len(once) :]]
             displacement, guess = marched[0][-1].displacement, [s.state for s in marched[0]]
             most = MOST_CYCLES
         else:
@@ -293,12 +325,12 @@ class Structure:
                 break
             done = len(amplitudes) * len(marched)
             cycle = joint.march(amplitudes, gap, displacement, guess)
-            marched.append(_told(cycle, done, done + len(amplitudes), progress))
+            marched.append(_reported(cycle, done, done + len(amplitudes), progress))
             displacement, guess = marched[-1][-1].displacement, [s.state for s in marched[-1]]
             if len(marched) > 1:
                 closure = _closure(*marched[-2:])
         states, last = [state for cycle in marched for state in cycle], marched[-1]
-        # As fields from the cache lie in memory: sums over them must have the same rounding.
+        # Fields from the cache are contiguous: sums over these must be rounded in the same way.
         fields = {
             name: np.ascontiguousarray(np.stack([getattr(s, name) for s in last]))
             for name in FIELDS
@@ -318,7 +350,10 @@ class Structure:
     def histories(
         self, force: Array, displacement: Array, slip: Array, friction: float | Array
     ) -> tuple[InterfaceHistory, ...]:
-        """Histories of the interfaces from the fields ``(t, components, n)`` over all of them."""
+        """Return the interface histories from fields ``(t, components, n)`` over all interfaces.
+
+        ``friction`` is µ, one value or by node ``(n,)``.
+        """
         histories = []
         nodal = np.broadcast_to(friction, force.shape[-1:])
         for interface, nodes in self.shares():
@@ -328,7 +363,7 @@ class Structure:
         return tuple(histories)
 
     def interface_resultants(self, state: FrictionState) -> Array:
-        """``(P, Qx, Qy, Mx, My, Mz)`` of every interface, ``(interfaces, 6)``."""
+        """Return ``(P, Qx, Qy, Mx, My, Mz)`` of every interface, ``(interfaces, 6)``."""
         return np.array(
             [
                 resultants(state.force[:, nodes], *interface.coordinates.T)
@@ -337,7 +372,10 @@ class Structure:
         )
 
     def on_faces(self, force: Array) -> Array:
-        """Contact forces on the bodies at all faces, ``(places, t)``, from ``(t, 3, n)``."""
+        """Return the contact forces on the bodies at all faces ``(places, t)``.
+
+        ``force`` ``(t, 3, n)`` are the forces on body 2 in the interface frames.
+        """
         axes = self.mesh.bodies[0].axes
         on_2 = np.asarray(force)[:, axes, :].transpose(2, 1, 0).reshape(-1, len(force))
         projection = self.projection
@@ -345,11 +383,13 @@ class Structure:
         return np.concatenate([-on_1, on_2])
 
     def equilibrium_errors(self, states: Sequence[FrictionState], amplitudes: Array) -> Array:
-        """Forces and moments on a body that neither contacts nor supports balance, ``(t,)``.
+        """Return the relative error of the force and moment balance in each state, ``(t,)``.
 
-        Those of the body that is worst off, relative to what is applied to it and what its nodes
-        carry, or to ``LOAD_FLOOR`` of the largest of all increments where there is hardly a load.
-        Moments are taken about the middle of its contacts and divided by their size.
+        The error is the part of the forces and moments along the motions that supports leave free;
+        the value of the worst body is returned. It is relative to the applied load plus the nodal
+        contact forces, or to ``LOAD_FLOOR`` of the largest of these over all increments where the
+        load is small. Moments are taken about the centre of the body's contacts and divided by
+        their size.
         """
         forces = self.on_faces(np.stack([state.force for state in states]))
         worst = np.zeros(len(states))
@@ -358,7 +398,7 @@ class Structure:
         return worst
 
     def _unbalanced(self, number: int, forces: Array, amplitudes: Array) -> Array:
-        """The errors of one body under ``forces`` ``(d n, t)`` in the frames of its faces."""
+        """Return the errors of one body under ``forces`` ``(d n, t)`` in its faces' frames."""
         body = self.bodies[number]
         faces = self.mesh.faces_of(number)
         points = np.concatenate([body.elastic.body.points[i.nodes(side)] for i, side in faces])
@@ -382,7 +422,7 @@ class Structure:
         return errors / np.maximum(scales, floor) if floor > 0.0 else errors
 
     def shares(self) -> list[tuple[Interface, slice]]:
-        """Every interface and its nodes' place among those of all of them."""
+        """Return every interface with the slice of its nodes among all interface nodes."""
         ends = np.cumsum([len(i) for i in self.mesh.interfaces]).tolist()
         return [
             (interface, slice(end - len(interface), end))
@@ -391,10 +431,10 @@ class Structure:
 
 
 def mixed(cycles: Sequence[CycleSolution], shares: Sequence[float]) -> CycleSolution:
-    """Closed ``cycles`` of one structure one after the other, each so large a share of all.
+    """Combine closed ``cycles`` of one structure, passed one after the other in given ``shares``.
 
-    Solvers' counts are sums, their errors the largest. A cycle that follows it must follow one of
-    ``cycles``.
+    Iterations are summed; of the errors the largest is taken. A later cycle must start from one of
+    ``cycles``, not from the combination.
     """
     if len(cycles) == 1:
         return cycles[0]
@@ -416,10 +456,10 @@ def mixed(cycles: Sequence[CycleSolution], shares: Sequence[float]) -> CycleSolu
     )
 
 
-def _told(
+def _reported(
     states: Iterable[FrictionState], before: int, total: int, progress: Progress
 ) -> list[FrictionState]:
-    """All states, each of them told: so many of the ``total`` were ``before`` them."""
+    """Return all states, and report each as increment ``before`` + 1, + 2, ... of ``total``."""
     solved = []
     for number, state in enumerate(states, before + 1):
         solved.append(state)
@@ -428,7 +468,7 @@ def _told(
 
 
 def _closure(one: Sequence[FrictionState], two: Sequence[FrictionState]) -> float:
-    """Largest difference of the contact forces of two cycles, relative to the largest force."""
+    """Return the largest change of contact forces between cycles, relative to the largest force."""
     largest = max(float(np.abs(state.force).max()) for state in two)
     pairs = zip(one, two, strict=True)
     change = max(float(np.abs(first.force - second.force).max()) for first, second in pairs)
@@ -438,10 +478,10 @@ def _closure(one: Sequence[FrictionState], two: Sequence[FrictionState]) -> floa
 def load_history(
     interface: Face, force: Array, slip: Array, friction: float | Array
 ) -> LoadHistory:
-    """Resultants and energies of nodal ``force`` ``(t, 3, n)`` and ``slip`` ``(t, 2, n)``.
+    """Return resultants and energies of nodal ``force`` ``(t, 3, n)`` and ``slip`` ``(t, 2, n)``.
 
-    Those of one closed cycle; energies are of second order (:mod:`sa_solver.cycles.increments`).
-    ``friction`` is µ, one or by node ``(n,)``.
+    The increments must form one closed cycle. Energies are accurate to second order
+    (:mod:`sa_solver.cycles.increments`). ``friction`` is µ, one value or by node ``(n,)``.
     """
     x, y = interface.coordinates.T
     columns = np.array([resultants(f, x, y) for f in force]).T

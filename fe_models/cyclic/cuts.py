@@ -1,15 +1,17 @@
-"""Cyclic symmetry of a sector: what one cut does, the other does too, turned about the axis.
+"""Cyclic symmetry of a sector: its two cuts have the same displacements, rotated about the axis.
 
-A wheel of N equal sectors under loads that are equal in each, all turned with it, deforms alike in
-each (nodal diameter 0). With R the turn by 360°/N that takes the low cut of one to its high cut,
+A wheel of N equal sectors under loads that are the same in each, rotated with it, deforms in the
+same way in each (nodal diameter 0). With R the rotation by 360°/N that takes the low cut of a
+sector to its high cut,
 
     u_high(R x) = R u_low(x),
 
-and the tractions of both are each other's reaction. Cuts whose meshes are images are tied node by
-node, others by a mortar with dual functions (:mod:`fe_models.joints.tied_faces`); nodes on the axis
-are on both and move along it alone. All of it goes into T, u = T u_free, behind the supports. Of
-the rigid motions, T leaves the turn about the axis and the shift along it. Thomas 1979,
-doi:10.1002/nme.1620140107 (all nodal diameters).
+and the tractions of the two cuts are each other's reaction. Cuts whose meshes are images of each
+other are tied node by node, others by a mortar with dual functions
+(:mod:`fe_models.joints.tied_faces`). Nodes on the axis are on both cuts and move along it only. The
+ties are included in T, u = T u_free, after the supports. Of the rigid motions, T leaves the
+rotation about the axis and the translation along it. Thomas 1979, doi:10.1002/nme.1620140107 (all
+nodal diameters).
 """
 
 from __future__ import annotations
@@ -27,21 +29,30 @@ from fe_models.loads.constraints import Constraints
 from fe_models.meshes.structure_mesh import Body, MeshError
 from sa_solver.types import Array, Frame, Indices, Mask
 
-# Nodes this share of the largest distance from the axis off their images are on them: mesh files
-# keep six digits.
+# Distance of a node from an image, as a share of the largest distance from the axis, up to which
+# they count as the same point: mesh files store six digits.
 IMAGE = 2e-6
-# Of cuts whose meshes do not match, what either may have beside the other: outlines that are curved
+# Share of either cut that the other may leave uncovered if the meshes do not match: curved outlines
 # differ by the sag of their edges.
-BESIDE = 0.02
-# Entries of a turn that are rounding: the cosine of 90° is 6e-17.
+MOST_UNCOVERED = 0.02
+# Entries of a rotation up to this are rounding errors: the cosine of 90° is 6e-17.
 ROUNDING = 1e-15
 
 
 @dataclass(frozen=True)
 class Cyclic:
-    """One of ``sectors`` equal ones about an ``axis`` ``(3,)`` ``through`` a point ``(3,)`` [mm].
+    """One of several equal sectors of a wheel.
 
-    ``low`` and ``high`` are the boundaries of its two cuts, of each one or several.
+    Attributes
+    ----------
+    low, high
+        Boundaries of its two cuts, one or several each.
+    axis
+        Direction of the axis ``(3,)``.
+    through
+        Point on the axis ``(3,)`` [mm].
+    sectors
+        Number of sectors.
 
     Examples
     --------
@@ -67,20 +78,20 @@ class Cyclic:
 
     @property
     def boundaries(self) -> tuple[str, ...]:
-        """Those of both cuts."""
+        """Boundaries of both cuts."""
         return *self.low, *self.high
 
     def radii(self, points: Array) -> Array:
-        """Distances of points ``(n, 3)`` from the axis ``(n,)`` [mm]."""
+        """Return the distances of points ``(n, 3)`` from the axis ``(n,)`` [mm]."""
         return np.asarray(np.linalg.norm(np.cross(points - self.through, self.direction), axis=1))
 
     def angle(self, one: Array, other: Array) -> float:
-        """Angle between two points ``(3,)`` seen from the axis [rad]."""
+        """Return the angle between two points ``(3,)`` seen from the axis [rad]."""
         first, second = (np.cross(self.direction, place - self.through) for place in (one, other))
         return float(np.arctan2(np.linalg.norm(np.cross(first, second)), first @ second))
 
     def turn(self, sectors: int = 1) -> Array:
-        """Rotation ``(3, 3)`` by so many ``sectors`` about the axis."""
+        """Return the rotation ``(3, 3)`` by a number of ``sectors`` about the axis."""
         angle, e = 2.0 * np.pi * sectors / self.sectors, self.direction
         along = np.outer(e, e)
         turn = along + np.cos(angle) * (np.eye(3) - along) + np.sin(angle) * np.cross(np.eye(3), e)
@@ -89,10 +100,22 @@ class Cyclic:
 
 @dataclass(frozen=True)
 class Cuts:
-    """The two cuts of a body: facets of its mesh, and the ``turn`` ``(3, 3)`` from low to high.
+    """Two cuts of a body: facets of its mesh, and the rotation from the low to the high cut.
 
-    ``through`` is a point of the axis and ``count`` how many sectors there are;
-    ``matched`` tells whether their meshes are images, and ``apart`` how far they are off [mm].
+    Attributes
+    ----------
+    low, high
+        Facets of the cuts.
+    turn
+        Rotation ``(3, 3)`` from low to high.
+    through
+        Point on the axis ``(3,)`` [mm].
+    count
+        Number of sectors.
+    matched
+        Whether the meshes of the cuts are images of each other.
+    apart
+        Largest distance of one cut from the image of the other [mm].
 
     Examples
     --------
@@ -120,19 +143,22 @@ class Cuts:
 
     @classmethod
     def of(cls, body: Body, cyclic: Cyclic) -> Cuts:
-        """Those of the boundaries named; raises as :meth:`between`."""
+        """Return the cuts at named boundaries. Raises as :meth:`between`."""
         return cls.between(
             body, cyclic, *(_facets(body, names) for names in (cyclic.low, cyclic.high))
         )
 
     @classmethod
     def between(cls, body: Body, cyclic: Cyclic, low: Indices, high: Indices) -> Cuts:
-        """The cuts of such facets, whatever their boundaries are called.
+        """Return the cuts with these facets, whatever their boundaries are called.
 
-        Raises :class:`MeshError` unless they are each other's image by the turn of one sector.
+        Raises :class:`MeshError` unless they are each other's image by the rotation of one sector.
         """
         if len(np.intersect1d(low, high)):
-            raise MeshError(f"{' and '.join(cyclic.boundaries)} share facets: they are one cut")
+            raise MeshError(
+                f"{' and '.join(cyclic.boundaries)} share facets; give boundaries without facets "
+                "in common as the two cuts"
+            )
         middles = [_middle(body, facets) for facets in (low, high)]
         through, turns = cyclic.through, (cyclic.turn(1), cyclic.turn(-1))
         turn = min(
@@ -140,7 +166,7 @@ class Cuts:
         )
         outward = [body.outward_of(facets).sum(axis=0) for facets in (low, high)]
         if outward[1] @ turn @ outward[0] >= 0.0:
-            raise MeshError(f"{_said(cyclic)}: the body lies on the same side of both")
+            raise MeshError(f"{_mismatch(cyclic)}: the body lies on the same side of both cuts")
         sector = cls(low, high, turn, through, cyclic.sectors, False, 0.0)
         reach = IMAGE * float(cyclic.radii(body.points).max())
         apart = sector._between_meshes(body)
@@ -149,34 +175,37 @@ class Cuts:
         flat = _plane_of(body, high)
         if np.abs(flat.coordinates(_corners(body, high))[..., 2]).max() > reach:
             raise MeshError(
-                f"{_said(cyclic)}: nodes are up to {apart:.3g} mm off; cuts that are not plane "
-                "must be meshed alike (in gmsh: setPeriodic)"
+                f"{_mismatch(cyclic)}: nodes are up to {apart:.3g} mm off; cuts that are not plane "
+                "must have matching meshes (in gmsh: setPeriodic)"
             )
         images = sector.images(_corners(body, low).reshape(-1, 3))
         level = float(np.abs(flat.coordinates(images)[:, 2]).max())
         if level > reach:
             angle = np.rad2deg(cyclic.angle(*middles))
             raise MeshError(
-                f"{_said(cyclic)}: it is up to {level:.3g} mm off; the middles of both are "
-                f"{angle:.6g}° apart, as of {360.0 / max(angle, 1e-9):.4g} sectors"
+                f"{_mismatch(cyclic)}: it is up to {level:.3g} mm off; the centres of both are "
+                f"{angle:.6g}° apart, as for {360.0 / max(angle, 1e-9):.4g} sectors"
             )
         return replace(sector, apart=level)
 
     def of_turn(self, body: Body) -> Array:
-        """The turn of a body's displacements ``(d, d)``."""
+        """Return the rotation of a body's displacements ``(d, d)``."""
         return self.turn[np.ix_(body.axes, body.axes)]
 
     def vertices(self, body: Body) -> Indices:
-        """Vertices of both cuts, each once."""
+        """Return the vertices of both cuts, each once."""
         return np.unique(body.mesh.facets[:, np.append(self.low, self.high)])
 
     def images(self, points: Array, sectors: int = 1) -> Array:
-        """Points ``(n, 3)`` turned by so many sectors, from the low cut to the high one."""
+        """Return points ``(n, 3)`` rotated by a number of sectors, from the low to the high cut."""
         turn = np.linalg.matrix_power(self.turn if sectors >= 0 else self.turn.T, abs(sectors))
         return (points - self.through) @ turn.T + self.through
 
     def _between_meshes(self, body: Body) -> float:
-        """How far corners of the high cut's facets are off the nearest facet's of the low one."""
+        """Return the largest distance of the high cut's facet corners from images of the low cut's.
+
+        It is infinite if the numbers of facets differ.
+        """
         if len(self.low) != len(self.high):
             return np.inf
         images = self.images(_corners(body, self.low).reshape(-1, 3)).reshape(len(self.low), -1, 3)
@@ -186,7 +215,7 @@ class Cuts:
         return float(apart.min(axis=1).max())
 
     def tie(self, constraints: Constraints, elastic: ElasticBody) -> None:
-        """Tie the nodes of the high cut to those of the low one, behind all supports."""
+        """Tie the nodes of the high cut to those of the low one, after all supports."""
         low, high = (np.unique(elastic.facet_nodes(facets)) for facets in (self.low, self.high))
         turn = self.of_turn(elastic.body)
         shared = np.intersect1d(low, high)
@@ -194,7 +223,7 @@ class Cuts:
         constraints.tie(high, low, self._shares(elastic, low, high), turn)
 
     def _shares(self, elastic: ElasticBody, low: Indices, high: Indices) -> sp.csr_matrix:
-        """What nodes ``high`` ``(n,)`` follow of the displacements of ``low`` ``(m,)``."""
+        """Return the matrix ``(n, m)`` by which the nodes ``high`` follow the nodes ``low``."""
         images = self.images(elastic.nodes[low])
         reach = IMAGE * float(np.linalg.norm(elastic.nodes - self.through, axis=1).max())
         if self.matched:
@@ -205,7 +234,7 @@ class Cuts:
         if elastic.curved and max(_bent(elastic, side) for side in (self.low, self.high)) > reach:
             raise MeshError(
                 f"body {elastic.body.name}: edges of the cuts are curved, and their meshes do not "
-                "match; mesh both alike (in gmsh: setPeriodic), or take elements of order 1"
+                "match; make both meshes match (in gmsh: setPeriodic), or use elements of order 1"
             )
         frame = _plane_of(elastic.body, self.high)
         follows, tied = tied_projection(
@@ -216,33 +245,33 @@ class Cuts:
             elastic.order,
         )
         sizes = [_sizes(elastic.body, facets).sum() for facets in (self.low, self.high)]
-        beside = max(1.0 - tied, 1.0 - tied * sizes[1] / sizes[0])
-        if beside > BESIDE or np.any(np.diff(follows.indptr) == 0):
+        uncovered = max(1.0 - tied, 1.0 - tied * sizes[1] / sizes[0])
+        if uncovered > MOST_UNCOVERED or np.any(np.diff(follows.indptr) == 0):
             raise MeshError(
-                f"body {elastic.body.name}: the cuts lie in planes that are images, and "
-                f"{beside:.3g} of the one is beside the other; name all boundaries of both cuts, "
-                "or refine their curved edges"
+                f"body {elastic.body.name}: the cuts lie in planes that are images of each other, "
+                f"but {uncovered:.3g} of one cut is not covered by the other; name all boundaries "
+                "of both cuts, or refine their curved edges"
             )
         return follows
 
     def _check_midsides(self, elastic: ElasticBody, apart: float, reach: float) -> None:
-        """Raise :class:`MeshError` where cuts match but for midside nodes, ``apart`` [mm]."""
+        """Raise :class:`MeshError` where cuts match except for midside nodes, ``apart`` [mm]."""
         if elastic.curved and apart > reach:
             raise MeshError(
                 f"body {elastic.body.name}: midside nodes of its cuts are up to {apart:.3g} mm off "
-                "each other's images; mesh both cuts alike (in gmsh: setPeriodic), or take "
-                "elements of order 1"
+                "each other's images; make the meshes of both cuts match (in gmsh: setPeriodic), "
+                "or use elements of order 1"
             )
 
     def whole_normals(self, elastic: ElasticBody, integrals: Array) -> Array:
-        """Integrals of normals ``(nodes, d)`` with what the next sectors add on the cuts."""
+        """Return integrals of normals ``(nodes, d)`` with the contribution of the next sectors."""
         turn, whole = self.of_turn(elastic.body), integrals.copy()
         low, high = (np.unique(elastic.facet_nodes(facets)) for facets in (self.low, self.high))
         of_low, of_high = self._images_of(elastic.nodes, low, high)
         whole[low] += integrals[of_low] @ turn
         whole[high] += integrals[of_high] @ turn.T
         axis = np.intersect1d(low, high)
-        # What N turns leave of a direction is its part along the axis.
+        # The mean of a direction over all sectors is its part along the axis.
         shares, directions = np.linalg.eigh(turn + turn.T)
         along = directions[:, shares > 2.0 - ROUNDING**0.5]
         shifted = integrals[axis] @ along @ along.T
@@ -250,7 +279,7 @@ class Cuts:
         return whole
 
     def off_images(self, body: Body, vectors: Array) -> float:
-        """Largest difference of ``vectors`` ``(nodes, d, ...)`` of cuts and of their images."""
+        """Return the largest difference of ``vectors`` ``(nodes, d, ...)`` of cuts and images."""
         low, high, of_low, of_high = self._nearest(body)
         turn = self.of_turn(body)
         one = np.einsum("ab,nb...->na...", turn, vectors[low]) - vectors[of_low]
@@ -258,9 +287,9 @@ class Cuts:
         return float(max(np.abs(one).max(), np.abs(other).max()))
 
     def unlike(self, body: Body, values: Array) -> float:
-        """How much ``values`` ``(vertices,)`` of both cuts differ, of their largest.
+        """Return the relative difference of ``values`` ``(vertices,)`` of both cuts.
 
-        Where meshes do not match, beyond what they do within a facet.
+        Where meshes do not match, the variation within a facet is subtracted.
         """
         low, high, of_low, of_high = self._nearest(body)
         apart = np.append(values[low] - values[of_low], values[high] - values[of_high])
@@ -272,14 +301,17 @@ class Cuts:
         return max(float(np.abs(apart).max()) - within, 0.0) / largest if largest else 0.0
 
     def on_both(self, body: Body, marked: Mask) -> Indices:
-        """Vertices of the cuts whose images are ``marked`` ``(nodes,)``, or they themselves."""
+        """Return vertices of the cuts that are ``marked`` ``(nodes,)``, or whose images are."""
         low, high, of_low, of_high = self._nearest(body)
         return np.concatenate(
             [low[marked[low] | marked[of_low]], high[marked[high] | marked[of_high]]]
         )
 
     def led(self, elastic: ElasticBody, nodes: Indices) -> Indices:
-        """Those of ``nodes`` on the high cut that a mortar leads, if some lead them on the low."""
+        """Return those of ``nodes`` on the high cut that follow the low cut through a mortar.
+
+        The result is empty if the cuts match or no nodes are on the low cut.
+        """
         low, high = (np.unique(elastic.facet_nodes(facets)) for facets in (self.low, self.high))
         leading = np.intersect1d(nodes, low)
         if self.matched or not len(leading):
@@ -287,12 +319,12 @@ class Cuts:
         return np.setdiff1d(np.intersect1d(nodes, high), low)
 
     def _nearest(self, body: Body) -> tuple[Indices, Indices, Indices, Indices]:
-        """Vertices of the low and of the high cut, and those of the other nearest their images."""
+        """Return the vertices of the low and the high cut, and the closest ones to their images."""
         low, high = (np.unique(body.mesh.facets[:, facets]) for facets in (self.low, self.high))
         return low, high, *self._images_of(body.points, low, high)
 
     def _images_of(self, points: Array, low: Indices, high: Indices) -> tuple[Indices, Indices]:
-        """Of ``points`` ``low`` and ``high`` of the cuts, those of the other nearest the images."""
+        """Return the nodes of the other cut closest to the images of ``low`` and of ``high``."""
         of_low = high[cKDTree(points[high]).query(self.images(points[low]))[1]]
         of_high = low[cKDTree(points[low]).query(self.images(points[high], -1))[1]]
         return of_low, of_high
@@ -301,10 +333,10 @@ class Cuts:
 def hold_normal(
     constraints: Constraints, elastic: ElasticBody, boundary: str, cuts: Sequence[Cuts]
 ) -> None:
-    """Let a boundary slide, which goes on in the next sectors where it meets cuts.
+    """Let a boundary slide that continues in the next sectors where it meets cuts.
 
-    Its normals there are those of both sectors. Where a mortar leads nodes they are not held too:
-    the nodes that lead them are.
+    Its normals there are those of both sectors. Nodes that follow others through a mortar are not
+    held, since those that they follow are.
     """
 
     def whole(integrals: Array) -> Array:
@@ -319,20 +351,20 @@ def hold_normal(
 
 
 def _facets(body: Body, names: Sequence[str]) -> Indices:
-    """Facets of boundaries of a body, each once."""
+    """Return the facets of boundaries of a body, each once."""
     return np.unique(np.concatenate([body.mesh.boundaries[name] for name in names]))
 
 
 def _bent(elastic: ElasticBody, facets: Indices) -> float:
-    """How far midsides of facets are beside the middle of their edges at most [mm]."""
+    """Return the largest distance of midside nodes of facets from their edges' middles [mm]."""
     nodes, corners = elastic.facet_nodes(facets), elastic.dimension
     middles = (elastic.nodes[nodes[:, [a, b]]].mean(axis=1) for a, b in ENDS[corners])
     off = np.stack(list(middles), axis=1) - elastic.nodes[nodes[:, corners:]]
     return float(np.linalg.norm(off, axis=2).max())
 
 
-def _said(cyclic: Cyclic) -> str:
-    """What is not so."""
+def _mismatch(cyclic: Cyclic) -> str:
+    """Return the message that the cuts are not images of each other."""
     low, high = (" + ".join(names) for names in (cyclic.low, cyclic.high))
     return (
         f"{high} is not {low} turned about the axis by 360°/{cyclic.sectors} = "
@@ -341,7 +373,7 @@ def _said(cyclic: Cyclic) -> str:
 
 
 def _corners(body: Body, facets: Indices) -> Array:
-    """Corners of facets of the surface ``(m, dim, 3)`` [mm]."""
+    """Return the corners of facets of the surface ``(m, dim, 3)`` [mm]."""
     return body.points[body.mesh.facets[:, facets].T]
 
 
@@ -350,17 +382,17 @@ def _distance(one: Array, other: Array) -> float:
 
 
 def _sizes(body: Body, facets: Indices) -> Array:
-    """Areas of facets, in the plane their lengths ``(m,)``."""
+    """Return the areas of facets ``(m,)``; in the plane their lengths."""
     return np.asarray(np.linalg.norm(body.outward_of(facets), axis=1))
 
 
 def _middle(body: Body, facets: Indices) -> Array:
-    """Centroid of facets ``(3,)`` [mm]."""
+    """Return the centroid of facets ``(3,)`` [mm]."""
     return np.average(_corners(body, facets).mean(axis=1), axis=0, weights=_sizes(body, facets))
 
 
 def _plane_of(body: Body, facets: Indices) -> Frame:
-    """Frame whose z is the mean normal of facets; of a line, x is along it."""
+    """Return a frame whose z is the mean normal of facets; on a line, x is along it."""
     total = body.outward_of(facets).sum(axis=0)
     z = total / np.linalg.norm(total)
     across = np.eye(3)[1] if body.mesh.dim() == 2 else np.eye(3)[int(np.argmin(np.abs(z)))]

@@ -1,9 +1,9 @@
-"""Stress of a sector at its cuts, where the next sectors go on: their displacements are known.
+"""Stress of a sector at its cuts, recovered with the known displacements of the next sectors.
 
-Patches of vertices near a cut take the elements of the next sectors that the turn makes of the
-body's own, as in the mesh of the whole wheel: the cut is no surface, and the edge where the body's
-surface meets it is none either. Cuts must match node to node; beside others patches end at the cut,
-and tractions on it stay as they are.
+Patches of vertices near a cut include elements of the next sectors, which are the body's elements
+rotated, as in the mesh of the whole wheel. The cut is therefore not a surface, and the line where
+the body's surface meets it is not an edge. Cuts must match node to node; at other cuts patches end
+at the cut, and tractions on it are not removed.
 """
 
 from __future__ import annotations
@@ -26,14 +26,15 @@ from sa_solver.types import Array, Indices, Mask
 if TYPE_CHECKING:
     from skfem import MeshTet, MeshTri
 
-# Rings of elements that the widest patches reach.
+# Number of rings of elements in the widest patches.
 RINGS = 3
-# Nodes this share of the body's size apart are one, beside what cuts are off.
+# Distance, as a share of the body's size, up to which nodes count as one; the mismatch of the cuts
+# is added to it.
 SAME = 1e-9
 
 
 class SectorRecovery(StressRecovery):
-    """As :class:`StressRecovery`, of a body whose ``cuts`` go on in the next sectors."""
+    """Recovery of the stress of a body that continues beyond its ``cuts``."""
 
     def __init__(self, elastic: ElasticBody, free: Indices, cuts: Sequence[Cuts]) -> None:
         super().__init__(elastic, free)
@@ -42,9 +43,11 @@ class SectorRecovery(StressRecovery):
     def stress(
         self, displacement: Array, thermal: Array | None = None, vertices: Indices | None = None
     ) -> Array:
-        every = np.arange(self._elastic.body.mesh.nvertices) if vertices is None else vertices
-        stress = super().stress(displacement, thermal, every)
-        here, there = self._beyond.find(every)
+        all_vertices = (
+            np.arange(self._elastic.body.mesh.nvertices) if vertices is None else vertices
+        )
+        stress = super().stress(displacement, thermal, all_vertices)
+        here, there = self._beyond.find(all_vertices)
         if len(here):
             seen = self._beyond.seen(displacement, thermal)
             stress[:, here] = self._beyond.recovery.stress(*seen, there)
@@ -78,30 +81,33 @@ class SectorRecovery(StressRecovery):
     def inward_edges(self) -> Indices:
         return self._joined(super().inward_edges, self._beyond.recovery.inward_edges)
 
-    def beside(self, vertices: Indices) -> Indices:
-        # Across a cut, too.
+    def with_neighbours(self, vertices: Indices) -> Indices:
+        # Elements across a cut count, too.
         beyond = self._beyond
         images = np.flatnonzero(np.isin(beyond.vertices, vertices))
-        near = beyond.vertices[beyond.recovery.beside(images)]
-        return np.union1d(super().beside(vertices), near)
+        near = beyond.vertices[beyond.recovery.with_neighbours(images)]
+        return np.union1d(super().with_neighbours(vertices), near)
 
     def _joined(self, within: Indices, beyond: Indices) -> Indices:
-        """Vertices found of the body, but near its cuts those found with the next sectors."""
+        """Return vertices found on the body, replaced near its cuts by those found beyond.
+
+        ``beyond`` are vertices found with the elements of the next sectors.
+        """
         near = self._beyond.own
         own = self._beyond.vertices[np.intersect1d(beyond, np.arange(len(near)))]
         return np.union1d(np.setdiff1d(within, near), own)
 
     @cached_property
     def _beyond(self) -> _Beyond:
-        return _Beyond(self._elastic, self._free, _alike(self._cuts), self._neighbours)
+        return _Beyond(self._elastic, self._free, _in_first_sense(self._cuts), self._neighbours)
 
 
 class _Beyond:
-    """The elements near cuts with those of the next sectors, and what is found there.
+    """Elements near cuts together with those of the next sectors, and the stress recovered there.
 
-    ``own`` ``(n,)`` are the body's vertices whose patches reach a cut. They are the first of all
-    vertices here, of which ``vertices`` ``(m,)`` are the body's own or those that they are images
-    of. ``near`` ``(v, v)`` tells which vertices of the body share an element.
+    ``own`` ``(n,)`` are the body's vertices whose patches reach a cut. They come first among all
+    vertices of this part; ``vertices`` ``(m,)`` are the body's vertices of which these are images.
+    ``near`` ``(v, v)`` marks vertices of the body that share an element.
     """
 
     def __init__(
@@ -124,20 +130,20 @@ class _Beyond:
         self._sources, self._turns = self._images(wide.nodes, list(parts))
 
     def find(self, vertices: Indices) -> tuple[Indices, Indices]:
-        """Which of the body's ``vertices`` are near a cut, and where they are among those here."""
+        """Return which ``vertices`` of the body are near a cut, and their positions here."""
         place = np.minimum(np.searchsorted(self.own, vertices), len(self.own) - 1)
         here = np.flatnonzero(self.own[place] == vertices)
         return here, place[here]
 
     def seen(self, own: Array, thermal: Array | None) -> tuple[Array, Array | None]:
-        """Displacements ``(size, ...)`` and expansions here, from all of the body's."""
+        """Return displacements ``(size, ...)`` and expansions here, from those of the body."""
         nodal = own.reshape(len(self._elastic.nodes), self._elastic.dimension, -1)
         turned = np.einsum("nab,nbt->nat", self._turns, nodal[self._sources])
         expanded = None if thermal is None else thermal[self.vertices]
         return np.asarray(turned.reshape(-1, *own.shape[1:])), expanded
 
     def _meshed(self, parts: dict[int, Indices], free: Indices) -> Body:
-        """The mesh of elements of the body, by the sectors that they are turned by."""
+        """Return the mesh of ``parts``: elements of the body, by the number of sectors turned."""
         mesh, points = self._elastic.body.mesh, self._elastic.body.points
         others = np.setdiff1d(mesh.t[:, parts[0]], self.own)
         self.vertices = np.append(self.own, others)
@@ -164,7 +170,10 @@ class _Beyond:
         return Body(self._elastic.body.name, joined, midsides=midsides)
 
     def _images(self, nodes: Array, sectors: Sequence[int]) -> tuple[Indices, Array]:
-        """Nodes that ``nodes`` ``(n, 3)`` are images of, and their turns ``(n, d, d)``."""
+        """Return the nodes of which ``nodes`` ``(n, 3)`` are images, and the rotations.
+
+        These are ``(n, d, d)``.
+        """
         tree, first = cKDTree(self._elastic.nodes), self._first
         sources = np.full(len(nodes), -1)
         turns = np.empty((len(nodes), self._elastic.dimension, self._elastic.dimension))
@@ -181,7 +190,7 @@ class _Beyond:
 
 
 def _curved_edges(body: Body, elements: Indices) -> tuple[Indices, Array]:
-    """Edges of some elements: their ends ``(m, 2)`` and midsides ``(m, 3)`` [mm]."""
+    """Return the edges of some elements: their ends ``(m, 2)`` and midside points ``(m, 3)``."""
     mesh = body.mesh
     ends = mesh.edges if mesh.dim() == 3 else mesh.facets
     used = np.unique(body.element_nodes[elements][:, mesh.t.shape[0] :]) - mesh.nvertices
@@ -189,7 +198,7 @@ def _curved_edges(body: Body, elements: Indices) -> tuple[Indices, Array]:
 
 
 def _midsides(mesh: MeshTet | MeshTri, edges: Sequence[tuple[Indices, Array]]) -> Array:
-    """Midsides ``(m, 3)`` of a mesh's edges, from those that some ends ``(n, 2)`` are known of."""
+    """Return the midside points ``(m, 3)`` of a mesh's edges from ``edges`` with known ones."""
     known = np.sort(np.concatenate([ends for ends, _ in edges]), axis=1)
     asked = np.sort((mesh.edges if mesh.dim() == 3 else mesh.facets).T, axis=1)
     key = np.array([mesh.nvertices, 1])
@@ -198,8 +207,8 @@ def _midsides(mesh: MeshTet | MeshTri, edges: Sequence[tuple[Indices, Array]]) -
     return np.asarray(middles[first[np.searchsorted(keys, asked @ key)]])
 
 
-def _alike(cuts: Sequence[Cuts]) -> list[Cuts]:
-    """All cuts turned in the sense of the first, low for high where they are not."""
+def _in_first_sense(cuts: Sequence[Cuts]) -> list[Cuts]:
+    """Return all cuts turned in the sense of the first, with low and high exchanged if needed."""
     turn = cuts[0].turn
     return [
         pair
@@ -210,7 +219,7 @@ def _alike(cuts: Sequence[Cuts]) -> list[Cuts]:
 
 
 def _reached(near: sp.csr_matrix, vertices: Indices) -> Mask:
-    """Vertices that the widest patches reach from some ``(v,)``."""
+    """Return flags of the vertices that the widest patches reach from given ones ``(v,)``."""
     reached = np.zeros(near.shape[0])
     reached[vertices] = 1.0
     for _ in range(RINGS):
@@ -219,16 +228,17 @@ def _reached(near: sp.csr_matrix, vertices: Indices) -> Mask:
 
 
 def _elements_at(cells: Indices, vertices: Mask) -> Indices:
-    """Elements with any of the marked vertices."""
+    """Return the elements with any of the marked vertices."""
     return np.flatnonzero(vertices[cells].any(axis=0))
 
 
 def _of_next_sectors(
     cells: Indices, near: sp.csr_matrix, cuts: tuple[Indices, Indices], sectors: int
 ) -> dict[int, Indices]:
-    """Elements of the sectors beyond the cuts, low and high, that patches reach; by their turns.
+    """Return the elements of next sectors that patches reach, by the number of sectors turned.
 
-    Of a sector so thin that patches reach through it, all elements near either cut, several times.
+    If a sector is so thin that patches reach through it, these are all elements near either cut,
+    from several sectors.
     """
     reached = [_reached(near, side) for side in cuts]
     thin = bool(np.any(reached[0][cuts[1]]))

@@ -1,4 +1,4 @@
-"""What must hold of a structure that is one sector of a wheel (:mod:`fe_models.cyclic.cuts`)."""
+"""Checks of a structure that is one sector of a wheel (:mod:`fe_models.cyclic.cuts`)."""
 
 from __future__ import annotations
 
@@ -20,17 +20,17 @@ from fe_models.loads.applied_loads import (
 from fe_models.meshes.structure_mesh import Body, MeshError, StructureMesh
 from sa_solver.types import Array, Indices
 
-# Directions and lines that differ by this share of a unit are not the same: a case's six digits.
+# Relative difference from which directions and lines differ: cases give six digits.
 ALONG = 1e-6
-# Temperatures that differ by this share of the largest are: files keep four digits.
+# Difference, as a share of the largest, from which temperatures differ: files store four digits.
 UNLIKE = 1e-3
 
 
 def sector_cuts(mesh: StructureMesh, cyclic: Sequence[Cyclic]) -> list[list[Cuts]]:
-    """The cuts of every body, by its place.
+    """Return the cuts of every body, in the order of the bodies.
 
-    Raises :class:`MeshError` if a body has one cut and not the other, if they are no images, if
-    entries are of different wheels, or a contact face meets a cut.
+    Raises :class:`MeshError` if a body has only one of two cuts, if the cuts are not images of each
+    other, if the entries belong to different wheels, or if a contact face meets a cut.
     """
     for entry in cyclic:
         check_cuts(mesh.bodies, entry, entry.boundaries)
@@ -42,18 +42,23 @@ def sector_cuts(mesh: StructureMesh, cyclic: Sequence[Cyclic]) -> list[list[Cuts
 
 
 def check_wheel(bodies: Sequence[Body], first: Cyclic, entry: Cyclic) -> None:
-    """Raise :class:`MeshError` unless both are of one wheel, and its axis across a plane body."""
+    """Raise :class:`MeshError` unless both entries are of one wheel.
+
+    In the plane the axis must also be normal to it.
+    """
     if bodies[0].mesh.dim() == 2 and np.abs(entry.direction[[0, 2]]).max() > ALONG:
         raise MeshError("an axis in the plane; allowed: [0, 1, 0], across the plane")
     size = max(float(np.linalg.norm(np.ptp(body.points, axis=0))) for body in bodies)
     if entry.sectors != first.sectors or not _same_axis(
         (first.direction, first.through), (entry.direction, entry.through), size
     ):
-        raise MeshError("another axis or number of sectors than the first; allowed: one wheel")
+        raise MeshError(
+            "the axis or the number of sectors differs from the first entry; allowed: one wheel"
+        )
 
 
 def check_cuts(bodies: Sequence[Body], entry: Cyclic, names: Sequence[str]) -> None:
-    """Raise :class:`MeshError` unless ``names`` of cuts are on bodies that have the others."""
+    """Raise :class:`MeshError` unless the boundaries ``names`` are on the bodies that are cut."""
     having = [body for body in bodies if _has(body, entry.low)]
     having = having or [body for body in bodies if _has(body, entry.high)] or [bodies[0]]
     for body in having:
@@ -61,7 +66,7 @@ def check_cuts(bodies: Sequence[Body], entry: Cyclic, names: Sequence[str]) -> N
         for name in names:
             if name not in known:
                 raise MeshError(
-                    f"no boundary {name} on body {body.name}, for both cuts of it; allowed: "
+                    f"no boundary {name} on body {body.name}, which needs both cuts; allowed: "
                     f"{', '.join(known) or 'none'}"
                 )
 
@@ -72,7 +77,7 @@ def check_temperatures(
     load: AppliedLoad,
     cuts: Sequence[Sequence[Cuts]],
 ) -> None:
-    """Raise :class:`MeshError` if temperatures of cuts differ, of nodes with ``numbers``."""
+    """Raise :class:`MeshError` if temperatures of two cuts differ, at nodes with ``numbers``."""
     if not isinstance(load, NodalTemperature):
         return
     for body, pairs in zip(mesh.bodies, cuts, strict=True):
@@ -82,28 +87,29 @@ def check_temperatures(
         unlike = max(pair.unlike(body, changes) for pair in pairs)
         if unlike > UNLIKE:
             raise MeshError(
-                f"temperatures of body {body.name} are not alike on both cuts, by {unlike:.2g} of "
-                "the largest change; allowed: those that are alike in all sectors"
+                f"temperatures of body {body.name} differ between both cuts by {unlike:.2g} of the "
+                "largest change; allowed: temperatures that are the same in all sectors"
             )
 
 
 def check_jumps(body: Body, jumps: Array, cuts: Sequence[Cuts]) -> None:
     """Raise :class:`MeshError` unless ``jumps`` ``(size, loads)`` of both cuts are images.
 
-    They are what bolts shift of a body (:mod:`fe_models.loads.pretension`).
+    They are the displacements that bolts impose on a part of a body
+    (:mod:`fe_models.loads.pretension`).
     """
     if not jumps.any():
         return
     nodal = jumps.reshape(-1, body.mesh.dim(), jumps.shape[1])
     if any(pair.off_images(body, nodal) > ALONG * np.abs(jumps).max() for pair in cuts):
         raise MeshError(
-            f"the pretension of body {body.name} shifts its cuts, and not alike in all sectors; "
-            "allowed: bolts within the sector, or along its axis"
+            f"the pretension of body {body.name} shifts its cuts by displacements that are not the "
+            "same in all sectors; allowed: bolts within the sector, or along its axis"
         )
 
 
 def check_alike(bodies: Sequence[Body], load: AppliedLoad, cyclic: Sequence[Cyclic]) -> None:
-    """Raise :class:`MeshError` if a load cannot be alike in all sectors, or is on a cut."""
+    """Raise :class:`MeshError` if a load cannot be the same in all sectors, or is on a cut."""
     if not cyclic:
         return
     axis = cyclic[0].direction
@@ -118,7 +124,7 @@ def check_alike(bodies: Sequence[Body], load: AppliedLoad, cyclic: Sequence[Cycl
 
 
 def check_off_cuts(bodies: Sequence[Body], group: str, cyclic: Sequence[Cyclic]) -> None:
-    """Raise :class:`MeshError` if a support or a load is on a cut, where there is no surface."""
+    """Raise :class:`MeshError` if a support or a load is on a cut, which is not a surface."""
     for body in bodies:
         boundaries = body.mesh.boundaries or {}
         for entry in cyclic:
@@ -126,30 +132,30 @@ def check_off_cuts(bodies: Sequence[Body], group: str, cyclic: Sequence[Cyclic])
             held = boundaries.get(group, [])
             if cuts and len(np.intersect1d(held, np.concatenate(cuts))):
                 raise MeshError(
-                    f"{group} is on a cut of structure.cyclic, where the next sector goes on; "
+                    f"{group} is on a cut of structure.cyclic, where the next sector begins; "
                     "allowed: boundaries of the surface"
                 )
 
 
 def _check_direction(bodies: Sequence[Body], load: AppliedLoad, wheel: Cyclic) -> None:
-    """Raise :class:`MeshError` for loads on masses that turned sectors do not have alike."""
+    """Raise :class:`MeshError` for inertia loads that differ between the sectors."""
     axis = wheel.direction
     if isinstance(load, Rotation):
         size = max(float(np.linalg.norm(np.ptp(body.points, axis=0))) for body in bodies)
         if not _same_axis((axis, wheel.through), (load.direction, load.through), size):
             raise MeshError(
-                "a rotation about another axis than structure.cyclic is not alike in all sectors; "
-                "allowed: about that axis"
+                "a rotation about another axis than structure.cyclic is not the same in all "
+                "sectors; allowed: about that axis"
             )
     if isinstance(load, Acceleration) and _crosses(axis, load.acceleration):
         raise MeshError(
-            "an acceleration across the axis of structure.cyclic is not alike in all sectors; "
+            "an acceleration across the axis of structure.cyclic is not the same in all sectors; "
             "allowed: along it"
         )
 
 
 def _check_within(bodies: Sequence[Body], group: str, cyclic: Sequence[Cyclic]) -> None:
-    """Raise :class:`MeshError` if what moves as a load says meets a cut."""
+    """Raise :class:`MeshError` if a boundary with an imposed motion meets a cut."""
     for body in bodies:
         known = body.mesh.boundaries or {}
         cuts = [body.vertices(n) for entry in cyclic for n in entry.boundaries if n in known]
@@ -158,42 +164,46 @@ def _check_within(bodies: Sequence[Body], group: str, cyclic: Sequence[Cyclic]) 
         if len(np.intersect1d(body.vertices(group), np.concatenate(cuts))):
             raise MeshError(
                 f"{group} meets a cut of structure.cyclic: a displacement across the axis, or a "
-                "point that it is tied to, is not alike in all sectors; allowed: a boundary within "
-                "the sector, or a displacement along the axis"
+                "point that it is tied to, is not the same in all sectors; allowed: a boundary "
+                "within the sector, or a displacement along the axis"
             )
 
 
 def _crosses(axis: Array, direction: Array) -> bool:
-    """Whether a direction is another than a unit axis."""
+    """Return whether a direction differs from a unit axis."""
     return bool(np.linalg.norm(np.cross(axis, direction)) > ALONG * np.linalg.norm(direction))
 
 
 def _has(body: Body, names: Sequence[str]) -> bool:
-    """Whether a body has a boundary of those names."""
+    """Return whether a body has a boundary of those names."""
     return any(name in (body.mesh.boundaries or {}) for name in names)
 
 
 def _of_body(mesh: StructureMesh, place: int, entries: Sequence[Cyclic]) -> list[Cuts]:
-    """The cuts of the body at a place."""
+    """Return the cuts of the body at a place."""
     body = mesh.bodies[place]
     found = [Cuts.of(body, entry) for entry in entries]
     vertices = [pair.vertices(body) for pair in found]
-    every = np.concatenate([np.empty(0, np.int64), *vertices])
-    if len(np.unique(every)) < len(every):
+    all_vertices = np.concatenate([np.empty(0, np.int64), *vertices])
+    if len(np.unique(all_vertices)) < len(all_vertices):
         raise MeshError(
             f"pairs of cuts of body {body.name} share nodes; make them one, low: [a, b]"
         )
     for interface, side in mesh.faces_of(place):
-        if len(np.intersect1d(interface.nodes(side), every)):
+        if len(np.intersect1d(interface.nodes(side), all_vertices)):
             raise MeshError(
                 f"the face of contact {interface.name} on body {body.name} meets a cut, beyond "
-                "which it would go on; allowed: faces within the sector, so cut the wheel elsewhere"
+                "which it would continue; allowed: faces within the sector, so cut the wheel "
+                "elsewhere"
             )
     return found
 
 
 def _same_axis(one: tuple[Array, Array], other: tuple[Array, Array], size: float) -> bool:
-    """Whether two lines, each a unit direction and a point, are one, for bodies of a ``size``."""
+    """Return whether two lines, each a unit direction and a point, coincide.
+
+    The tolerance is relative to the ``size`` of the bodies.
+    """
     apart = np.linalg.norm(np.cross(one[1] - other[1], one[0]))
     turned = np.linalg.norm(np.cross(one[0], other[0]))
     return bool(turned <= ALONG and apart <= ALONG * size)

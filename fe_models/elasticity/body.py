@@ -26,9 +26,9 @@ from sa_solver.half_space.stress import principal_stresses
 from sa_solver.half_space.subsurface_influence import INDICES
 from sa_solver.types import Array, Indices, Material
 
-# The rotor axis, the global Y, through the origin.
+# Direction of the rotor axis, the global Y, and the origin that it goes through.
 ROTOR, ORIGIN = np.array([0.0, 1.0, 0.0]), np.zeros(3)
-# By dimension and order.
+# Finite elements by dimension and order.
 ELEMENTS = {
     (3, 1): ElementTetP1,
     (3, 2): ElementTetP2,
@@ -38,16 +38,16 @@ ELEMENTS = {
 
 
 class ElasticBody:
-    """A body of one material, with displacements numbered ``dimension node + component``.
+    """Elastic body of one material, with displacements numbered ``dimension node + component``.
 
-    Triangles are in plane strain; their forces are per length. ``order`` is that of the elements,
-    1 or 2. Vertices are the first nodes; with order 2 the midsides follow. Elements of order 2 are
-    as curved as the midsides of the body say (:mod:`fe_models.meshes.isoparametric`).
+    Triangles are in plane strain; their forces are per length. Vertices are the first nodes; with
+    elements of ``order`` 2 the midside nodes follow. Elements of order 2 are curved if the body has
+    midside nodes (:mod:`fe_models.meshes.isoparametric`).
 
     Examples
     --------
-    A cube of 1 mm³ that is stretched by ε in one direction only: stress, and force on a face, are
-    (λ + 2 G) ε.
+    A cube of 1 mm³ is stretched by ε in one direction only. Its stress, and the force on a face,
+    are (λ + 2 G) ε.
 
     >>> import numpy as np
     >>> from skfem import MeshTet
@@ -73,13 +73,16 @@ class ElasticBody:
         self._basis = self.basis()
 
     def basis(self, degree: int | None = None) -> Basis:
-        """Of the displacements, with integration exact up to a ``degree`` on straight elements."""
+        """Return the basis of the displacements, with quadrature exact up to a ``degree``.
+
+        The degree holds on straight elements.
+        """
         if not self.curved:
             return Basis(self.body.mesh, self._element(), intorder=degree)
         mapping = mapping_of(self.body)
         intorder = max(INTEGRATED, degree or 0)
         basis = Basis(self.body.mesh, self._element(), mapping, intorder)
-        # Jacobians of all elements, which nothing asks for again.
+        # The cached Jacobians of all elements are not needed any more.
         vars(mapping).pop("_cache", None)
         return basis
 
@@ -90,7 +93,7 @@ class ElasticBody:
 
     @property
     def element_nodes(self) -> Indices:
-        """Nodes of the elements ``(k, elements)``, midsides included."""
+        """Nodes of the elements ``(k, elements)``, midside nodes included."""
         return np.asarray(self._basis.element_dofs)
 
     @property
@@ -102,16 +105,16 @@ class ElasticBody:
     def stiffness(self) -> sp.csr_matrix:
         """Stiffness matrix ``(size, size)`` [N/mm].
 
-        Its blocks of two nodes are λ F + G Fᵀ + G tr(F) with F_ab = ∫ ∂a φi ∂b φj. Summing these
-        pair by pair of nodes takes a third of the time of scikit-fem's scalar forms, and these a
-        tenth of that of its vector form.
-        Whatever the shape of the elements, it has entries between all components of their nodes.
+        Its blocks of two nodes are λ F + G Fᵀ + G tr(F) with F_ab = ∫ ∂a φi ∂b φj. Summing these by
+        pairs of nodes takes a third of the time of scikit-fem's scalar forms, which take a tenth of
+        the time of its vector form. The matrix has entries between all components of nodes that
+        share an element, whatever the shape of the elements.
         """
         sums, d = _NodePairs(self.element_nodes), self.dimension
         gradients = [np.asarray(field.grad) for (field,) in self._basis.basis]
         weights = self._basis.dx
         if self.order == 1:
-            # The same all over the element.
+            # Gradients are constant in the element, so one point is enough.
             gradients = [gradient[..., :1] for gradient in gradients]
             weights = weights.sum(axis=1, keepdims=True)
         forms = np.empty((d, d, len(sums.columns)))
@@ -134,7 +137,10 @@ class ElasticBody:
         return sp.kron(self.material.density * scalar, identity, format="csr")
 
     def body_load(self, force: Callable[[Array], Array]) -> Array:
-        """Forces ``(size,)`` of a force per volume ``(3, ...)`` at points ``(3, ...)`` [N/mm³]."""
+        """Return forces ``(size,)`` of a force per volume [N/mm³].
+
+        ``force`` maps points ``(3, ...)`` to values ``(3, ...)``.
+        """
         points = _spatial(np.asarray(self._basis.global_coordinates()))
         density = force(points)
         forms = [
@@ -144,7 +150,7 @@ class ElasticBody:
         return np.stack(forms, axis=1).ravel()
 
     def centrifugal_load(self, axis: Array = ROTOR, through: Array = ORIGIN) -> Array:
-        """Forces ``(size,)`` of 1 rad/s about a unit ``axis`` ``through`` a point [N s²]."""
+        """Return forces ``(size,)`` of 1 rad/s about a unit ``axis`` ``through`` a point [N s²]."""
         radial = self.material.density * (np.eye(3) - np.outer(axis, axis))
         return self.body_load(
             lambda x: np.einsum("ab,b...->a...", radial, x - through[:, None, None])
@@ -153,9 +159,10 @@ class ElasticBody:
     def traction_load(
         self, boundary: str, traction: Callable[[Array], Array], direction: Array
     ) -> Array:
-        """Forces ``(size,)`` of a traction on a named boundary.
+        """Return forces ``(size,)`` of a traction on a named boundary.
 
-        ``traction`` gives its size at points ``(3, ...)`` [MPa], ``direction`` ``(3,)`` its sense.
+        ``traction`` gives its magnitude at points ``(3, ...)`` [MPa], ``direction`` ``(3,)`` its
+        direction.
         """
         basis = self._facet_basis(boundary)
         size = traction(_spatial(np.asarray(basis.global_coordinates())))
@@ -163,9 +170,9 @@ class ElasticBody:
         return np.outer(load, direction[list(self.body.axes)]).ravel()
 
     def thermal_load(self, strain: Array) -> Array:
-        """Forces ``(size,)`` of an expansion ``(vertices,)``, linear between these.
+        """Return forces ``(size,)`` of an expansion ``(vertices,)``, linear between the vertices.
 
-        ∫ (3 λ + 2 G) θ div φ_i, in plane strain too (:mod:`fe_models.elasticity.thermal`).
+        They are ∫ (3 λ + 2 G) θ div φ_i, in plane strain too (:mod:`fe_models.elasticity.thermal`).
         """
         linear = self._basis.with_element(ELEMENTS[self.dimension, 1]())
         pressure = 3.0 * self.material.lame + 2.0 * self.material.shear_modulus
@@ -177,24 +184,24 @@ class ElasticBody:
         return np.stack(forms, axis=1).ravel()
 
     def pressure_load(self, boundary: str) -> Array:
-        """Forces ``(size,)`` of a pressure of 1 MPa on a named boundary, into the body."""
+        """Return forces ``(size,)`` of a pressure of 1 MPa on a named boundary, into the body."""
         return -_normal_integrals(self._facet_basis(boundary)).ravel()
 
     def boundary_integral(self, boundary: str, integrand: Callable[[Array], Array]) -> float:
-        """Integral over a named boundary of a function of points ``(3, ...)``."""
+        """Return the integral over a named boundary of a function of points ``(3, ...)``."""
         basis = self._facet_basis(boundary)
         points = _spatial(np.asarray(basis.global_coordinates()))
         return float(np.sum(integrand(points) * basis.dx))
 
     def boundary_weights(self, boundary: str) -> tuple[Indices, Array]:
-        """Nodes of a boundary and the area each stands for, so that Σ w u = ∫ u dA."""
+        """Return the nodes of a boundary and the area of each, so that Σ w u = ∫ u dA."""
         weights = LinearForm(lambda v, w: 1.0 * v).assemble(self._facet_basis(boundary))
         nodes = self.boundary_nodes(boundary)
         return nodes, weights[nodes]
 
     def boundary_nodes(self, boundary: str) -> Indices:
-        """Nodes on a named boundary, midsides included."""
-        # What scikit-fem has for it numbers the edges of the mesh, which take a second to find.
+        """Return the nodes on a named boundary, midside nodes included."""
+        # scikit-fem's method for this would number the edges of the mesh, which takes a second.
         mesh = self.body.mesh
         vertices = np.unique(mesh.facets[:, mesh.boundaries[boundary]])
         return np.append(vertices, np.sort(self.midsides(boundary)[0]))
@@ -202,11 +209,11 @@ class ElasticBody:
     def boundary_normals(
         self, boundary: str, whole: Callable[[Array], Array] = lambda integrals: integrals
     ) -> tuple[Indices, Array]:
-        """Nodes of a boundary and the outward unit normal at each, ``(n, dimension)``.
+        """Return the nodes of a boundary and the outward unit normal at each, ``(n, dimension)``.
 
-        ``whole`` makes of the integrals of normals ``(nodes, dimension)``, of which straight
-        elements have those of vertices alone, what they are of a boundary that goes on beyond the
-        body, as in the next sector of a wheel.
+        ``whole`` maps the integrals of normals ``(nodes, dimension)`` to those of a boundary that
+        continues beyond the body, as in the next sector of a wheel. For straight elements only the
+        vertices have integrals.
         """
         mesh = self.body.mesh
         normals = np.zeros((len(self.nodes), self.dimension))
@@ -225,9 +232,9 @@ class ElasticBody:
         return nodes, normals[nodes] / np.linalg.norm(normals[nodes], axis=1, keepdims=True)
 
     def facet_nodes(self, facets: Indices) -> Indices:
-        """Nodes of facets by their numbers, ``(m, k)``: corners, then midsides.
+        """Return the nodes of facets by their numbers, ``(m, k)``: corners, then midside nodes.
 
-        The midsides are those between corners 0 and 1, in space also 1 and 2, and 2 and 0.
+        The midside nodes are those between corners 0 and 1, in space also 1 and 2, and 2 and 0.
         """
         mesh = self.body.mesh
         corners: Indices = mesh.facets[:, facets].T
@@ -244,7 +251,7 @@ class ElasticBody:
         return np.column_stack([corners, *middles])
 
     def midsides(self, boundary: str) -> tuple[Indices, Indices]:
-        """Midside nodes of a boundary ``(n,)`` and the vertices beside each, ``(n, 2)``."""
+        """Return a boundary's midside nodes ``(n,)`` and the ends of their edges ``(n, 2)``."""
         if self.order == 1:
             return np.empty(0, np.int64), np.empty((0, 2), np.int64)
         mesh = self.body.mesh
@@ -257,16 +264,17 @@ class ElasticBody:
     def linear_moments(
         self, boundary: str, vertices: Indices
     ) -> tuple[sp.csr_matrix, sp.csr_matrix]:
-        """∫ φ_i φ_k dA and ∫ φ_i N_j dA, φ linear and N the elements' functions.
+        """Return ∫ φ_i φ_k dA and ∫ φ_i N_j dA, φ linear and N the elements' functions [mm²].
 
-        Over the facets of a boundary between such ``vertices`` ``(m,)``; of all vertices and of all
-        vertices and nodes, ``(v, v)`` and ``(v, n)`` [mm²].
+        They are integrated over the facets of a boundary whose corners are all among ``vertices``
+        ``(m,)``. The matrices are ``(v, v)`` for all vertices and ``(v, n)`` for all vertices and
+        nodes.
         """
         mesh = self.body.mesh
         facets = np.asarray(mesh.boundaries[boundary])
         facets = facets[np.isin(mesh.facets[:, facets], vertices).all(axis=0)]
         linear = ELEMENTS[self.dimension, 1]()
-        # Products of linear functions and the elements' own, exact.
+        # The degree makes products of linear functions and the elements' functions exact.
         tests, trials = (
             self._facet_basis(facets, element, 1 + self.order)
             for element in (linear, self._element())
@@ -275,9 +283,10 @@ class ElasticBody:
         return product.assemble(tests).tocsr(), product.assemble(trials, tests).tocsr()
 
     def stress(self, displacement: Array) -> Array:
-        """Cauchy stress of displacements ``(size,)``, element means, ``(6, elements)`` [MPa].
+        """Return the mean Cauchy stress of each element ``(6, elements)`` [MPa].
 
-        Ordered xx, yy, zz, xy, yz, zx of the global axes.
+        ``displacement`` is ``(size,)``. Components are ordered xx, yy, zz, xy, yz, zx of the global
+        axes.
         """
         weights = self._basis.dx / self._basis.dx.sum(axis=1, keepdims=True)
         gradient = np.zeros((3, 3, weights.shape[0]))
@@ -287,7 +296,7 @@ class ElasticBody:
         return self.cauchy(gradient)
 
     def cauchy(self, gradient: Array) -> Array:
-        """Cauchy stress ``(6, n)`` [MPa] of displacement gradients ``(3, 3, n)``, ∂u_a/∂x_b."""
+        """Return the Cauchy stress ``(6, n)`` [MPa] of gradients ∂u_a/∂x_b ``(3, 3, n)``."""
         strain = 0.5 * (gradient + gradient.transpose(1, 0, 2))
         trace = strain[0, 0] + strain[1, 1] + strain[2, 2]
         lame, shear = self.material.lame, self.material.shear_modulus
@@ -299,7 +308,10 @@ class ElasticBody:
         element: Element | None = None,
         degree: int | None = None,
     ) -> FacetBasis:
-        """On a boundary, named or by its facets, of displacements or of another ``element``."""
+        """Return the basis on a boundary, given by name or facets.
+
+        It is that of the displacements unless another ``element`` is given.
+        """
         mesh, mapping = self.body.mesh, None
         if self.curved:
             mapping, degree = mapping_of(self.body), max(INTEGRATED, degree or 0)
@@ -308,10 +320,10 @@ class ElasticBody:
 
 
 class _NodePairs:
-    """All pairs of nodes that share an element, row by row, and sums over the elements of each.
+    """Pairs of nodes that share an element, in row order, with sums over the elements of each pair.
 
-    ``nodes`` are those of the elements ``(k, m)``; ``columns`` and ``pointers`` as of a sparse
-    matrix of the nodes, which every one of them has a row in.
+    ``nodes`` are those of the elements ``(k, m)``. ``columns`` and ``pointers`` are those of a
+    sparse matrix in which every node has a row.
     """
 
     def __init__(self, nodes: Indices) -> None:
@@ -327,12 +339,12 @@ class _NodePairs:
         self._sum = sp.csr_matrix(added, shape=(len(first), k * k * elements))
 
     def of(self, values: Sequence[Array]) -> Array:
-        """Sums ``(pairs,)`` of ``k²`` values ``(m,)``, of each node with each in their order."""
+        """Return sums ``(pairs,)`` of ``k²`` arrays ``(m,)``, one per pair of element nodes."""
         return np.asarray(self._sum @ np.concatenate(values))
 
 
 def _normal_integrals(basis: FacetBasis) -> Array:
-    """∫ n φi dA ``(nodes, dimension)`` over the facets of a basis, n the outward normal."""
+    """Return ∫ n φi dA ``(nodes, dimension)`` over the facets of a basis, n the outward normal."""
     forms = [
         LinearForm(lambda v, w, axis=axis: w.n[axis] * v).assemble(basis)
         for axis in range(basis.mesh.dim())
@@ -341,21 +353,21 @@ def _normal_integrals(basis: FacetBasis) -> Array:
 
 
 def _spatial(points: Array) -> Array:
-    """Points ``(3, ...)`` from those ``(dimension, ...)`` of scikit-fem."""
+    """Return points ``(3, ...)`` from those of scikit-fem ``(dimension, ...)``."""
     return np.moveaxis(in_space(np.moveaxis(points, 0, -1)), -1, 0)
 
 
 def maximum_principal(stress: Array) -> Array:
-    """Largest principal stress of ``(6, ...)`` components."""
+    """Return the largest principal stress of components ``(6, ...)``."""
     return principal_stresses(stress)[0]
 
 
 def tensors(stress: Array) -> Array:
-    """Tensors ``(3, 3, n)`` of ``(6, n)`` components."""
+    """Return tensors ``(3, 3, n)`` of components ``(6, n)``."""
     xx, yy, zz, xy, yz, zx = stress
     return np.array([[xx, xy, zx], [xy, yy, yz], [zx, yz, zz]])
 
 
 def components(tensors: Array) -> Array:
-    """Components ``(6, n)`` of symmetric tensors ``(3, 3, n)``."""
+    """Return components ``(6, n)`` of symmetric tensors ``(3, 3, n)``."""
     return tensors[tuple(np.transpose(INDICES))]

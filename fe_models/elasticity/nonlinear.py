@@ -1,14 +1,15 @@
-"""How far geometric nonlinearity moves the contact forces and slips of a loaded structure.
+"""Effect of geometric nonlinearity on the contact forces and slips of a loaded structure.
 
 The linear model balances forces on the undeformed shape. Here both bodies are St. Venant-Kirchhoff
-in total Lagrangian form, the centrifugal force acts where the deformed mass is, and the contact
-faces are those of the deformed body 1: their frames turn by its mean rotation. Loads other than the
-centrifugal keep their direction. Sliding stays small: nodes keep their partners and gaps. Newton's
-method makes every iteration a linear structure with the same contact:
+in total Lagrangian form, the centrifugal force acts at the deformed position of the mass, and the
+contact faces are those of the deformed body 1: their frames turn by its mean rotation. Loads other
+than the centrifugal force keep their direction. Sliding is assumed to be small: nodes keep their
+partners and gaps. Every iteration of Newton's method solves a linear structure with the same
+contact:
 
     (K_T(u_k) - Ω² M) u = f + K_T(u_k) u_k - F(u_k) + contact forces.
 
-The frames are those of u_k too: they follow one iteration behind.
+The frames are also those of u_k, one iteration behind.
 """
 
 from __future__ import annotations
@@ -30,26 +31,43 @@ from fe_models.motion import deformation
 from fe_models.structure import Structure
 from sa_solver.types import Array, resultant_change
 
-# Nodal forces left out of balance relative to all, and turn of the frames left [rad]: ten times
-# what friction.TOLERANCE leaves, a thousandth of the changes that are reported.
+# Tolerated unbalanced nodal forces relative to all, and tolerated turn of the frames [rad]: ten
+# times the errors due to friction.TOLERANCE, and a thousandth of the changes that are reported.
 TOLERANCE = 1e-6
-# Two or three iterations lead from the linear solution; one that takes more has lost its way.
+# Two or three iterations usually suffice from the linear solution; one that takes more diverges.
 MAX_ITERATIONS = 12
 
 
 @dataclass(frozen=True)
 class NonlinearCheck:
-    """A load reached in one increment from rest, by the linear and the total Lagrangian model.
+    """Comparison of the linear and the total Lagrangian model at one load, reached from rest.
 
-    ``linear`` and ``nonlinear`` ``(interfaces, 6)`` are the resultants ``(P, Qx, Qy, Mx, My, Mz)``
-    in the frames of the undeformed and of the deformed faces [N, N mm], and ``change`` that of
-    :func:`~sa_solver.types.resultant_change`. ``slip`` ``(2, n)`` over all interfaces [mm] is
-    nonlinear, ``slip_change`` the largest change of a slip relative to the largest slip. ``slide``
-    is the largest slip relative to half the width of its face: the order of what small sliding
-    leaves out of the lever arms. ``displacements`` of both bodies are nonlinear; ``largest_strain``
-    (principal of Green's tensor, in size), ``largest_rotation`` and ``face_rotation`` [rad] tell
-    how large they are. ``residual`` is what Newton's method leaves out of balance relative to the
-    nodal forces, or to turn [rad].
+    Attributes
+    ----------
+    linear, nonlinear
+        Resultants ``(P, Qx, Qy, Mx, My, Mz)`` ``(interfaces, 6)`` in the frames of the undeformed
+        and of the deformed faces [N, N mm].
+    change
+        Change of the resultants by :func:`~sa_solver.types.resultant_change`.
+    slip
+        Slip of the nonlinear model ``(2, n)`` over all interfaces [mm].
+    slip_change
+        Largest change of a slip relative to the largest slip.
+    slide
+        Largest slip relative to half the width of its face: the order of the error that the
+        assumption of small sliding makes in lever arms.
+    displacements
+        Displacements of both bodies in the nonlinear model.
+    largest_strain
+        Largest absolute principal value of Green's strain.
+    largest_rotation, face_rotation
+        Largest rotation of the bodies and of the faces [rad].
+    iterations
+        Iterations of Newton's method.
+    residual
+        Unbalanced nodal forces relative to all, or remaining turn of the frames [rad].
+    converged
+        Whether both models converged.
     """
 
     linear: Array
@@ -77,8 +95,25 @@ def check_nonlinearity(
 ) -> NonlinearCheck:
     """Compare the linear structure with the total Lagrangian one at the loads ``amplitudes``.
 
-    ``like`` is the linear structure's condensed joint, ``softening`` the bodies' spin softening at
-    that load (:mod:`fe_models.elasticity.spin_softening`). Raises ValueError if there is no load.
+    Parameters
+    ----------
+    structure
+        The linear structure.
+    like
+        Its condensed joint.
+    friction
+        Friction coefficient, one or by node ``(n,)``.
+    amplitudes
+        Amplitudes of the load cases ``(cases,)``.
+    gap
+        Gaps of all interfaces ``(n,)`` [mm].
+    softening
+        Spin softening of the bodies at that load (:mod:`fe_models.elasticity.spin_softening`).
+
+    Raises
+    ------
+    ValueError
+        If there is no load.
     """
     (linear,) = FrictionalJoint(like, friction).march(amplitudes[None], gap)
     state, displacements, iterations, residual = _newton(
@@ -105,19 +140,19 @@ def check_nonlinearity(
 
 
 def slip_change(now: Array, then: Array) -> float:
-    """Largest change of a slip ``(2, n)`` relative to the largest slip."""
+    """Return the largest change of a slip ``(2, n)`` relative to the largest slip."""
     largest = float(np.linalg.norm(then, axis=0).max())
     change = float(np.linalg.norm(now - then, axis=0).max())
     return change / largest if largest > 0.0 else change
 
 
 def face_sizes(structure: Structure) -> Array:
-    """Extent of every interface along x and y, ``(interfaces, 2)`` [mm]."""
+    """Return the extent of every interface along x and y, ``(interfaces, 2)`` [mm]."""
     return np.array([np.ptp(i.coordinates, axis=0) for i in structure.mesh.interfaces])
 
 
 def _slide(structure: Structure, slip: Array) -> float:
-    """Largest slip relative to half the narrower extent of its face."""
+    """Return the largest slip relative to half the narrower extent of its face."""
     interfaces = structure.mesh.interfaces
     parts = np.split(np.linalg.norm(slip, axis=0), np.cumsum([len(i) for i in interfaces])[:-1])
     widths = [0.5 * size[size > 0.0].min() for size in face_sizes(structure)]
@@ -135,7 +170,8 @@ def _newton(
 ) -> tuple[FrictionState, Displacements, int, float]:
     """Re-linearise and solve the contact until the next linear structure would be the same.
 
-    Its state, the displacements of both bodies, the iterations and the residual at the end.
+    The result is the state, the displacements of both bodies, the number of iterations and the
+    final residual.
     """
     state = linear
     displacements = deformation(structure, linear.force, linear.displacement, amplitudes)
@@ -157,7 +193,10 @@ def _newton(
 def _remainder(
     tangent: Structure, before: Displacements, after: Displacements, softening: Softening
 ) -> float:
-    """Nodal forces that a linear step from ``before`` to ``after`` leaves out, by all of them."""
+    """Return the largest relative error of nodal forces after a linear step from ``before``.
+
+    It is the error of the linear prediction for ``after``, relative to the nodal forces there.
+    """
     shares = []
     for body, u, v, soft in zip(tangent.bodies, before, after, softening, strict=True):
         finite = TotalLagrangian(body.elastic)
@@ -169,7 +208,7 @@ def _remainder(
 
 
 def _turn(undeformed: Structure, framed: Structure, displacements: Displacements) -> float:
-    """Largest angle from the frames of ``framed`` to body 1's displaced faces [rad]."""
+    """Return the largest angle from the frames of ``framed`` to body 1's displaced faces [rad]."""
     pairs = zip(undeformed.mesh.interfaces, framed.mesh.interfaces, strict=True)
     turns = [
         turned_interface(face, undeformed.mesh, displacements).frame.axes @ other.frame.axes.T

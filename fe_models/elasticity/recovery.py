@@ -1,14 +1,14 @@
-"""Stress at the vertices of a body, recovered from the displacements of the nodes around each.
+"""Stress at the vertices of a body, recovered from the displacements of the surrounding nodes.
 
-Nodal displacements are more accurate than their derivatives in the elements. Round each vertex a
+Nodal displacements are more accurate than their derivatives in the elements. Around each vertex a
 polynomial of one degree more than the elements is fitted to them by least squares, and its gradient
 gives the stress (polynomial preserving recovery: Zhang and Naga 2005,
-doi:10.1137/S1064827503402837). A stress of the elements' degree is found exactly, on any mesh and
-at the boundary too, where the superconvergent patches of Zienkiewicz and Zhu (1992,
-doi:10.1002/nme.1620330702) have few points and no partner: at the rim of a hole, 24 elements round
-it, it leaves two thirds of their error with elements of order 1 and a fifth with those of order 2.
-On surfaces that nothing touches the tractions left are taken off. Curved elements have their nodes
-and normals where they are.
+doi:10.1137/S1064827503402837). A stress of the elements' degree is recovered exactly, on any mesh
+and also at the boundary, where the superconvergent patches of Zienkiewicz and Zhu (1992,
+doi:10.1002/nme.1620330702) have few points and are one-sided. At the rim of a hole with 24 elements
+around it, the error is two thirds of theirs with elements of order 1 and a fifth with those of
+order 2. On free surfaces the remaining tractions are removed. For curved elements the actual
+positions and normals are used.
 """
 
 from __future__ import annotations
@@ -26,25 +26,25 @@ from sa_solver.types import Array, Indices
 
 Flags = NDArray[np.bool_]
 
-# Vertices inside take the elements beside them if these have so many nodes per coefficient.
+# Inner vertices use the elements around them if these have this many nodes per coefficient.
 NODES_PER_COEFFICIENT = 1.5
-# Weight of a node, (REACH - r)^2 at a distance r relative to that of the farthest.
+# The weight of a node is (REACH - r)^2 at a distance r relative to that of the farthest node.
 REACH = 1.05
-# A degree is one too many for the nodes where it makes slopes so many times as uncertain as a plane
-# through them: through a single layer of elements 1e8 times and more, at a corner 300 times.
+# The degree of a fit is lowered where its slopes are this many times as uncertain as those of a
+# plane through the nodes. The factor is 1e8 or more in a single layer of elements, 300 at a corner.
 UNCERTAIN = 400.0
-# Share of the normal matrix's trace that keeps it regular there: a thousand times rounding.
+# Share of the normal matrix's trace that is added to keep it regular: a thousand times rounding.
 REGULAR = 1e-13
-# Numbers of the fits' matrices at a time: few enough to stay in a processor's cache.
+# Number of matrix entries of fits treated together: few enough to stay in a processor's cache.
 AT_ONCE = 200_000
-# A surface is smooth where its facets turn by no more than 20 degrees from the mean normal, as of a
-# fillet with nine round the circle; else it has an edge, of directions with more than such a share
-# of the normals' squares.
+# SMOOTH is the cosine of 20 degrees: a surface is smooth where its facets deviate by no more than
+# this from the mean normal, as on a fillet with nine facets around the circle. Otherwise it has an
+# edge, and stress is removed along directions with more than EDGE of the normals' squares.
 SMOOTH, EDGE = 0.94, 0.1
 
 
 class StressRecovery:
-    """The stress of a body at its vertices; ``free`` are facets on which nothing acts."""
+    """Recovery of the stress of a body at its vertices; ``free`` are facets without traction."""
 
     def __init__(self, elastic: ElasticBody, free: Indices) -> None:
         self._elastic = elastic
@@ -53,10 +53,11 @@ class StressRecovery:
     def stress(
         self, displacement: Array, thermal: Array | None = None, vertices: Indices | None = None
     ) -> Array:
-        """Cauchy stress of displacements ``(size,)`` at all vertices, ``(6, vertices)`` [MPa].
+        """Return the Cauchy stress at all vertices, ``(6, vertices)`` [MPa], or at some of them.
 
-        Or at some. Ordered xx, yy, zz, xy, yz, zx of the global axes. Of the strain an expansion
-        ``thermal`` ``(all vertices,)`` makes no stress (:mod:`fe_models.elasticity.thermal`).
+        Components are ordered xx, yy, zz, xy, yz, zx of the global axes. A thermal expansion
+        ``thermal`` ``(all vertices,)`` is subtracted from the strain of the displacements
+        ``(size,)`` (:mod:`fe_models.elasticity.thermal`).
         """
         if vertices is None:
             vertices = np.arange(self._elastic.body.mesh.nvertices)
@@ -66,10 +67,10 @@ class StressRecovery:
     def histories(
         self, displacements: Array, vertices: Indices, thermal: Array | None = None
     ) -> Array:
-        """The same of several displacements ``(size, t)`` at some vertices, ``(t, 6, n)`` [MPa].
+        """Return stresses ``(t, 6, n)`` [MPa] of several displacements ``(size, t)`` at vertices.
 
-        With expansions ``(vertices, t)`` of all vertices. The fits are those of the vertices,
-        whatever the displacements: all take them at once.
+        ``thermal`` ``(vertices, t)`` are expansions of all vertices. The fits depend on the
+        vertices only, so all displacements are treated together.
         """
         elastic, axes = self._elastic, list(self._elastic.body.axes)
         count, d = displacements.shape[1], self._elastic.dimension
@@ -85,14 +86,15 @@ class StressRecovery:
     def alternatives(
         self, displacement: Array, vertices: Indices, thermal: Array | None = None
     ) -> Array:
-        """The same at a few ``vertices`` by other fits, ``(k, 6, vertices)``: what is uncertain.
+        """Return the stress at a few ``vertices`` by other fits, as a measure of its uncertainty.
 
-        From patches that reach an element farther; of elements of order 1 also by a polynomial of
-        one degree less, since their displacements are of that order.
+        The result is ``(k, 6, vertices)``. The other patches reach one element farther. With
+        elements of order 1 there is also a fit with a polynomial of one degree less, since their
+        displacements are of that order.
         """
-        order, beside = self._elastic.order, self._elements_of_vertices
+        order, at_vertices = self._elastic.order, self._elements_of_vertices
         reached = self._neighbours[vertices]
-        near, wide = ((r @ beside).tocsr() for r in (reached, reached @ self._neighbours))
+        near, wide = ((r @ at_vertices).tocsr() for r in (reached, reached @ self._neighbours))
         found = [self._of(displacement, vertices, wide, order + 1, thermal)]
         if order == 1:
             found.append(self._of(displacement, vertices, near, order, thermal))
@@ -100,7 +102,7 @@ class StressRecovery:
 
     @cached_property
     def untouched(self) -> Indices:
-        """Vertices of the surface on whose facets nothing acts."""
+        """Vertices of the surface of which all facets are free."""
         mesh = self._elastic.body.mesh
         touched = mesh.facets[:, np.setdiff1d(mesh.boundary_facets(), self._free)]
         return np.setdiff1d(mesh.facets[:, self._free], touched)
@@ -113,7 +115,7 @@ class StressRecovery:
         degree: int,
         thermal: Array | None,
     ) -> Array:
-        """By a polynomial of a ``degree`` on so many rows of ``elements`` around ``vertices``."""
+        """Return the stress by polynomials of a ``degree`` on a row of ``elements`` per vertex."""
         points = self._elastic.nodes[:, list(self._elastic.body.axes)]
         values = displacement.reshape(-1, self._elastic.dimension)
         nodes = self._nodes_near(elements)
@@ -121,13 +123,13 @@ class StressRecovery:
         return self._of_slopes(slopes, 0.0 if thermal is None else thermal[vertices], vertices)
 
     def _nodes_near(self, elements: sp.csr_matrix) -> sp.csr_matrix:
-        """Nodes of each row of ``elements``, in their order."""
+        """Return the nodes of each row of ``elements``, sorted."""
         nodes = (elements @ self._nodes_of_elements).tocsr()
         nodes.sort_indices()
         return nodes
 
     def _of_slopes(self, slopes: Array, thermal: Array | float, vertices: Indices) -> Array:
-        """Stress ``(6, n)`` of derivatives ``(d, d, n)`` of the displacement and expansions."""
+        """Return the stress ``(6, n)`` of displacement derivatives ``(d, d, n)`` and expansions."""
         axes = self._elastic.body.axes
         gradient = np.zeros((3, 3, len(vertices)))
         gradient[np.ix_(axes, axes)] = slopes
@@ -148,12 +150,12 @@ class StressRecovery:
     @cached_property
     def _neighbours(self) -> sp.csr_matrix:
         """Vertices that share an element, ``(vertices, vertices)``."""
-        beside = self._elements_of_vertices
-        return (beside @ beside.T).tocsr()
+        elements = self._elements_of_vertices
+        return (elements @ elements.T).tocsr()
 
     @cached_property
     def _patches(self) -> sp.csr_matrix:
-        """Elements whose nodes each vertex takes: two rings, inside one if that has enough."""
+        """Elements in the patch of each vertex: two rings, or one inside if it has enough nodes."""
         mesh, near = self._elastic.body.mesh, self._elements_of_vertices
         reached = np.diff((near @ self._nodes_of_elements).tocsr().indptr)
         coefficients = len(_exponents(mesh.dim(), self._elastic.order + 1))
@@ -163,7 +165,7 @@ class StressRecovery:
         return (near + wide @ near).tocsr()
 
     def _without_tractions(self, stress: Array, thermal: Array | float, vertices: Indices) -> Array:
-        """P σ P with P along the surface, where nothing acts on it."""
+        """Return P σ P, with P the projector along the surface where it is free."""
         along = self._along_surface[vertices]
         tensor = np.moveaxis(along @ np.moveaxis(tensors(stress), -1, 0) @ along, 0, -1)
         if self._elastic.dimension == 2:
@@ -175,8 +177,8 @@ class StressRecovery:
     def _along_surface(self) -> Array:
         """Projectors on the surface ``(vertices, 3, 3)`` where it is free, else the identity.
 
-        On an edge that sticks out both its surfaces are free and nothing but the stress along it is
-        left; in one that goes inwards stress has no bound, and is left as it is.
+        On a convex edge both surfaces are free, and only the stress along the edge remains. On a
+        re-entrant edge stress is unbounded, and is left unchanged.
         """
         mean, smooth, inwards, squares = self._surface(self._free)
         along = np.tile(np.eye(3), (len(mean), 1, 1))
@@ -190,17 +192,17 @@ class StressRecovery:
 
     @cached_property
     def inward_edges(self) -> Indices:
-        """Vertices of edges and corners of the body that go inwards: stress there has no bound."""
+        """Vertices of re-entrant edges and corners of the body, where stress is unbounded."""
         return np.flatnonzero(self._surface(self._elastic.body.mesh.boundary_facets())[2])
 
-    def beside(self, vertices: Indices) -> Indices:
-        """The vertices and those that share an element with them."""
+    def with_neighbours(self, vertices: Indices) -> Indices:
+        """Return the vertices and those that share an element with them."""
         return np.unique(self._neighbours[vertices].indices)
 
     def _surface(self, facets: Indices) -> tuple[Array, Flags, Flags, Array]:
-        """Of a surface at all vertices: unit normals, smooth or not, going inwards or not.
+        """Return unit normals of a surface at all vertices, and flags: smooth, and re-entrant.
 
-        And the sums of the dyads of facet normals, ``(vertices, 3, 3)``.
+        The last result is the sums of the dyads of facet normals, ``(vertices, 3, 3)``.
         """
         body, count = self._elastic.body, self._elastic.body.mesh.nvertices
         corners, normals = body.mesh.facets[:, facets].T, body.outward_of(facets)
@@ -227,14 +229,14 @@ class StressRecovery:
 
 
 def _dyads(size: Array, normals: Array) -> Array:
-    """Of unit normals ``(m, 3)``, each times its size ``(m, 1)``: ``(m, 9)``."""
+    """Return the dyads ``(m, 9)`` of unit normals ``(m, 3)``, each times its size ``(m, 1)``."""
     return np.asarray(size[:, :, None] * normals[:, :, None] * normals[:, None, :]).reshape(-1, 9)
 
 
 def _curved_normals(corners: Indices, normals: Array, count: int) -> tuple[Array, Array]:
-    """Unit normals ``(count, 3)`` of curved facets at their vertices, and sums of their dyads.
+    """Return unit normals ``(count, 3)`` of curved facets at vertices, and sums of their dyads.
 
-    ``normals`` ``(m, corners, 3)`` are as long as the facets are large.
+    The length of ``normals`` ``(m, corners, 3)`` is the area of the facets.
     """
     mean, squares = np.zeros((count, 3)), np.zeros((count, 9))
     for k, corner in enumerate(corners.T):
@@ -246,7 +248,10 @@ def _curved_normals(corners: Indices, normals: Array, count: int) -> tuple[Array
 
 
 def _incidence(rows: Indices, count: int) -> sp.csr_matrix:
-    """``(m, count)`` with ones at the ``rows`` ``(k, m)`` of its columns."""
+    """Return a matrix ``(m, count)`` with ones in row j at the columns ``rows[:, j]``.
+
+    ``rows`` is ``(k, m)``.
+    """
     k, m = rows.shape
     places = np.tile(np.arange(m), k), rows.ravel()
     return sp.csr_matrix((np.ones(k * m), places), shape=(m, count))
@@ -255,9 +260,10 @@ def _incidence(rows: Indices, count: int) -> sp.csr_matrix:
 def _vertex_normals(
     points: Array, corners: Indices, normals: Array, area: Array, count: int
 ) -> Array:
-    """Unit normals ``(count, 3)`` of a faceted surface at its vertices, exact on a sphere.
+    """Return unit normals ``(count, 3)`` of a faceted surface at vertices, exact on a sphere.
 
-    Weights of Max (1999, doi:10.1080/10867651.1999.10487501): small facets count more.
+    The weights are those of Max (1999, doi:10.1080/10867651.1999.10487501), in which small facets
+    count more.
     """
     total = np.zeros((count, 3))
     for k in range(corners.shape[1]):
@@ -273,20 +279,21 @@ def _vertex_normals(
 
 
 def _exponents(dimension: int, degree: int) -> Indices:
-    """Exponents ``(m, dimension)`` of the monomials up to a degree."""
-    every = product(range(degree + 1), repeat=dimension)
-    # By degree: first the constant, then those of the axes in their order.
-    up = sorted((e for e in every if sum(e) <= degree), key=lambda e: (sum(e), e[::-1]))
+    """Return the exponents ``(m, dimension)`` of the monomials up to a degree."""
+    all_exponents = product(range(degree + 1), repeat=dimension)
+    # They are sorted by degree: first the constant, then the linear ones in the order of the axes.
+    up = sorted((e for e in all_exponents if sum(e) <= degree), key=lambda e: (sum(e), e[::-1]))
     return np.array(up)
 
 
 def _gradients(
     points: Array, values: Array, vertices: Indices, nodes: sp.csr_matrix, degree: int
 ) -> Array:
-    """``(k, d, len(vertices))``: derivatives along axis b, the second, of component a of values.
+    """Return the derivatives of ``values`` at ``vertices``, ``(k, d, len(vertices))``.
 
-    Fitted to the nodes in each row of ``nodes``, by as high a ``degree`` as they can tell;
-    ``points`` are ``(n, d)`` and ``values`` ``(n, k)``.
+    The second axis is the direction of the derivative. A polynomial is fitted to the nodes in each
+    row of ``nodes``, of the highest degree up to ``degree`` that they can determine. ``points`` are
+    ``(n, d)`` and ``values`` ``(n, k)``.
     """
     k, d, exponents = values.shape[1], points.shape[1], _exponents(points.shape[1], degree)
     regular = REGULAR * np.diag((exponents.sum(axis=1) > 1).astype(float))
@@ -294,15 +301,15 @@ def _gradients(
     poor = np.zeros(len(vertices), bool)
     counts = np.diff(nodes.indptr)
     gradient = np.empty((k, d, len(vertices)))
-    # Rows of like lengths together, filled up with nodes of no weight.
+    # Rows of similar lengths are treated together, filled up with nodes of zero weight.
     order = np.argsort(counts, kind="stable")
     per_chunk = max(AT_ONCE // (len(exponents) * int(counts.max(initial=1))), 1)
     for part in np.array_split(order, range(per_chunk, len(order), per_chunk)):
         places = np.arange(counts[part].max())
         real = places < counts[part, None]
         near = nodes.indices[np.where(real, nodes.indptr[part, None] + places, 0)]
-        own = vertices[part, None]
-        arms = points[near] - points[own]
+        centre = vertices[part, None]
+        arms = points[near] - points[centre]
         distance = np.where(real, np.linalg.norm(arms, axis=2), 0.0)
         size = distance.max(axis=1)[:, None]
         weight = np.where(real, (REACH - distance / size) ** 2, 0.0)
@@ -310,7 +317,7 @@ def _gradients(
         weighted = (weight[:, :, None] * terms).swapaxes(1, 2)
         normal = weighted @ terms
         normal += np.trace(normal, axis1=1, axis2=2)[:, None, None] * regular
-        right = weighted @ (values[near] - values[own])
+        right = weighted @ (values[near] - values[centre])
         unit = np.broadcast_to(np.eye(len(exponents))[:, slopes], (len(part), len(exponents), d))
         solved = np.linalg.solve(normal, np.concatenate([right, unit], axis=2))[:, slopes]
         gradient[:, :, part] = (solved[:, :, :k] / size[:, :, None]).transpose(2, 1, 0)
@@ -323,7 +330,7 @@ def _gradients(
 
 
 def _monomials(x: Array, exponents: Indices) -> Array:
-    """``(..., m)`` at points ``(..., d)``."""
+    """Return the monomials ``(..., m)`` at points ``(..., d)``."""
     powers = [np.ones_like(x)]
     for _ in range(exponents.max()):
         powers.append(powers[-1] * x)

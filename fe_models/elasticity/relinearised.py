@@ -1,9 +1,9 @@
-"""Linear structures that know their load: stress-stiffened, spin-softened, re-linearised.
+"""Linear structures with the stiffness at one load: stress-stiffened, spin-softened, re-linearised.
 
-Both keep every load of the linear structure in proportion, and the stiffness of one load, the peak,
-at all loads: approximations of the nonlinear structure that cost one more condensation. At a share
-a of the peak load nonlinearity moves the contact forces by a² of what it moves them at peak; here
-it moves them by a.
+Both approximate the nonlinear structure at the cost of one more condensation. They use the
+stiffness at one load, the peak, for all loads, and change every load in proportion. At a share a of
+the peak load nonlinearity changes the contact forces by a² of the change at peak; here the change
+is a times that at peak.
 """
 
 from __future__ import annotations
@@ -24,29 +24,29 @@ from fe_models.structure import Structure
 from fe_models.supported_body import SupportedBody, interface_nodes
 from sa_solver.types import Array, Frame
 
-# Displacements, or spin softening matrices, of each body.
+# Displacements of each body, and spin softening matrices of each body.
 Displacements = tuple[Array, ...]
 Softening = tuple[sp.csr_matrix, ...]
 
 
 @dataclass(frozen=True)
 class PrestressedStructure(Structure):
-    """A structure of two bodies, the first of them held, with the stiffness it has at one load.
+    """Structure of two bodies, the first of them held, with the stiffness it has at one load.
 
-    ``displacements`` of both bodies are those of that load, ``share`` ``(cases,)`` how much of it
-    an amplitude of each load case is.
+    ``displacements`` are those of both bodies at that load. ``share`` ``(cases,)`` is the share of
+    that load that a unit amplitude of each load case is.
     """
 
     displacements: Displacements
     share: Array
 
     def condense_path(self, like: JointResolvent) -> JointResolvent:
-        """The joint for a whole load path, ``like`` that of the linear structure.
+        """Return the joint for a whole load path; ``like`` is that of the linear structure.
 
-        What contact alone holds in a centrifugal field has a negative stiffness to rigid motions,
-        which would throw it out where nothing presses any more, though by then nothing spins. Here
-        they are free, as in the linear structure, under the forces that they bear at the one load,
-        in proportion to it.
+        A body held by contact alone has a negative stiffness to rigid motions in a centrifugal
+        field. On unloading this would throw it out where nothing presses it any more, although by
+        then nothing spins. Therefore rigid motions have no stiffness here, as in the linear
+        structure; the forces on them at the one load are applied as loads in proportion.
         """
         joint = self.condense(like)
         free = ~self.bodies[1].held
@@ -58,10 +58,10 @@ class PrestressedStructure(Structure):
         return replace(joint, stiffness=stiffness, loads=loads).resolvent()
 
     def equilibrium_errors(self, states: Sequence[FrictionState], amplitudes: Array) -> Array:
-        """As of any structure, with what the stiffness takes from rigid motions among the loads.
+        """Return the errors of the balance, with the stiffness forces of rigid motions as loads.
 
-        The forces -K u of the one load, in proportion, as in :meth:`condense_path`. They balance as
-        well as ``displacements`` are those of this structure.
+        These forces, -K u at the one load, are applied in proportion, as in :meth:`condense_path`.
+        They balance as accurately as ``displacements`` are those of this structure.
         """
         body_1, body_2 = self.bodies
         forces = -body_2.elastic.stiffness @ self.displacements[1]
@@ -71,7 +71,7 @@ class PrestressedStructure(Structure):
         return plain.equilibrium_errors(states, amplitudes)
 
     def _relative(self) -> Array:
-        """Displacements of body 2 relative to body 1 ``(d n,)`` at the load, in the frames."""
+        """Return relative displacements ``(d n,)`` of body 2 at the load, in the frames."""
         below, above = (
             body.at_interface(moved)
             for body, moved in zip(self.bodies, self.displacements, strict=True)
@@ -79,7 +79,7 @@ class PrestressedStructure(Structure):
         return above - self.carried(below)
 
     def _rigid_motions(self) -> Array:
-        """Orthonormal motions ``(d n, k)`` of the interfaces that body 2's supports leave free."""
+        """Return orthonormal interface motions ``(d n, k)`` that body 2's supports leave free."""
         faces, body_2 = self.mesh.interfaces, self.mesh.bodies[1]
         axes = body_2.axes
         points = np.concatenate([body_2.points[face.nodes_2] for face in faces])
@@ -97,11 +97,22 @@ class PrestressedStructure(Structure):
 def stress_stiffened(
     structure: Structure, displacements: Displacements, amplitudes: Array, softening: Softening
 ) -> PrestressedStructure:
-    """K + K_σ - Ω² M: stressed as by the linear ``displacements``, spinning, but not displaced.
+    """Return the structure with the stiffness K + K_σ - Ω² M, stressed and spinning.
 
-    The classical linear perturbation. Loads, shape and frames are those of the linear structure: it
-    has the second-order effect of the stress on displacements across it, and leaves out what the
-    displacements themselves change, which :func:`relinearised` does not.
+    This is the classical linear perturbation. Loads, shape and frames are those of the linear
+    structure: it includes the second-order effect of stress on displacements across it, but not the
+    change of geometry due to the displacements, which :func:`relinearised` includes.
+
+    Parameters
+    ----------
+    structure
+        The linear structure.
+    displacements
+        Its displacements of both bodies at the load, which determine the stress.
+    amplitudes
+        Amplitudes of the load cases at that load ``(cases,)``.
+    softening
+        Spin softening of both bodies at that load.
     """
     changes = [
         (TotalLagrangian(body.elastic).stress_stiffened(displacement) - soft, body.loads)
@@ -115,12 +126,27 @@ def stress_stiffened(
 def relinearised(
     structure: Structure, displacements: Displacements, amplitudes: Array, softening: Softening
 ) -> PrestressedStructure:
-    """The linear structure that is tangent to the nonlinear one at given displacements.
+    """Return the linear structure that is tangent to the nonlinear one at given displacements.
 
-    Both bodies take the total Lagrangian tangent stiffness less the spin softening, and loads that
-    are exact for ``displacements`` at the load ``amplitudes`` ``(cases,)``; at other loads they are
-    in proportion, so that the unloaded structure stays unloaded. The interface frames are turned
-    with body 1's faces. Raises ValueError if there is no load.
+    Both bodies have the total Lagrangian tangent stiffness less the spin softening, and loads that
+    are exact for the displacements at the load. At other loads they are in proportion, so that the
+    unloaded structure stays unloaded. The interface frames are turned with body 1's faces.
+
+    Parameters
+    ----------
+    structure
+        The linear structure.
+    displacements
+        Displacements of both bodies at the load.
+    amplitudes
+        Amplitudes of the load cases at that load ``(cases,)``.
+    softening
+        Spin softening of both bodies at that load.
+
+    Raises
+    ------
+    ValueError
+        If there is no load, or if a temperature changes.
     """
     mesh = structure.mesh
     interfaces = tuple(turned_interface(i, mesh, displacements) for i in mesh.interfaces)
@@ -138,7 +164,7 @@ def relinearised(
 def turned_interface(
     interface: Interface, mesh: StructureMesh, displacements: Displacements
 ) -> Interface:
-    """The interface with its frame turned by the mean rotation of body 1's face."""
+    """Return the interface with its frame turned by the mean rotation of body 1's face."""
     place = interface.bodies[0]
     body_1, moved = mesh.bodies[place], displacements[place]
     axes = body_1.axes
@@ -156,9 +182,9 @@ def turned_interface(
 
 
 def mean_rotation(before: Array, after: Array, weights: Array) -> Array:
-    """Rotation ``(d, d)`` that turns points ``(n, d)`` closest to where they are after.
+    """Return the rotation ``(d, d)`` that best maps points ``(n, d)`` to their positions ``after``.
 
-    Weighted least squares (Kabsch 1976, doi:10.1107/S0567739476001873).
+    The fit is by weighted least squares (Kabsch 1976, doi:10.1107/S0567739476001873).
     """
     centred = [points - weights @ points / weights.sum() for points in (before, after)]
     left, _, right = np.linalg.svd((weights[:, None] * centred[1]).T @ centred[0])
@@ -172,7 +198,7 @@ def _turned(frame: Frame, rotation: Array) -> Frame:
 
 
 def _deflated(stiffness: Array, motions: Array) -> Array:
-    """P H P, P taking the part in orthonormal ``motions`` ``(n, k)`` away."""
+    """Return P H P, where P removes the part in orthonormal ``motions`` ``(n, k)``."""
     forces = stiffness @ motions
     inner = motions.T @ forces
     half = (forces - 0.5 * motions @ inner) @ motions.T
@@ -180,17 +206,23 @@ def _deflated(stiffness: Array, motions: Array) -> Array:
 
 
 def _share(structure: Structure, amplitudes: Array) -> Array:
-    """How much of the load at ``amplitudes`` an amplitude of each load case is, ``(cases,)``.
+    """Return the share of the load at ``amplitudes`` in a unit of each load case ``(cases,)``.
 
-    The projection of the cases' nodal forces on those of that load: one at it, falling with it, and
-    whatever the order and the units of the cases. Raises ValueError for temperatures that change.
+    It is the projection of the cases' nodal forces on those of that load. The product with the
+    amplitudes is one at that load and decreases with the load, and does not depend on the order and
+    the units of the cases. Raises ValueError if there is no load, or if temperatures change.
     """
     if any(body.expands for body in structure.bodies):
-        raise ValueError("no temperature may change: its strains are those of linear structures")
+        raise ValueError(
+            "a temperature changes, and thermal strains are available in linear structures only; "
+            "leave it out or use the linear structure"
+        )
     forces = np.concatenate([b.nodal_loads() for b in structure.bodies])
     load = forces @ amplitudes
     if not load.any():
-        raise ValueError("a structure is re-linearised at a load: its amplitudes are all zero")
+        raise ValueError(
+            "a structure is re-linearised at a load, but all amplitudes are zero; give a load"
+        )
     return np.asarray((load @ forces) / (load @ load))
 
 
@@ -201,7 +233,7 @@ def _prestressed(
     share: Array,
     changes: Sequence[tuple[sp.csr_matrix, Array]],
 ) -> PrestressedStructure:
-    """Bodies supported as they are, with another stiffness, other loads and the mesh's frames."""
+    """Return the structure with another stiffness, other loads and the frames of ``mesh``."""
     bodies = []
     for number, (body, (stiffness, loads)) in enumerate(
         zip(structure.bodies, changes, strict=True)

@@ -1,8 +1,8 @@
 """Spin softening: the centrifugal force grows with the displacement away from the rotor axis.
 
-Where the material is, at X + u, its centrifugal force is Ω² M (X + u), M being the mass matrix of
-the displacements across the axis. The part Ω² M u acts as a negative stiffness; the part Ω² M X is
-a load like any other.
+Material at X + u has the centrifugal force Ω² M (X + u), with M the mass matrix of the
+displacements across the axis. The part Ω² M u acts as a negative stiffness; the part Ω² M X is an
+ordinary load.
 """
 
 from __future__ import annotations
@@ -19,9 +19,9 @@ from sa_solver.types import Array
 
 @dataclass(frozen=True)
 class CarriedMass:
-    """A rigid mass [t] that moves with a named boundary, its centre at ``centre`` ``(3,)`` [mm].
+    """Rigid mass [t] that moves with a named boundary.
 
-    In the plane it is a mass per length [t/mm].
+    Its centre is at ``centre`` ``(3,)`` [mm]. In the plane it is a mass per length [t/mm].
     """
 
     boundary: str
@@ -35,9 +35,18 @@ def spin_softening(
     carried: Sequence[CarriedMass] = (),
     axis: Array = ROTOR,
 ) -> sp.csr_matrix:
-    """Ω² M ``(size, size)`` [N/mm] of a body and what it carries.
+    """Return Ω² M ``(size, size)`` [N/mm] of a body and the masses that it carries.
 
-    ``speed`` [rad/s] is that about the direction ``axis`` ``(3,)``, a unit vector.
+    Parameters
+    ----------
+    elastic
+        The elastic body.
+    speed
+        Speed of rotation [rad/s].
+    carried
+        Masses that it carries.
+    axis
+        Unit vector ``(3,)`` of the axis of rotation.
     """
     axes = elastic.body.axes
     across = sp.csr_matrix((np.eye(3) - np.outer(axis, axis))[np.ix_(axes, axes)])
@@ -49,16 +58,17 @@ def spin_softening(
 
 
 def carried_motion(elastic: ElasticBody, carried: CarriedMass) -> sp.csr_matrix:
-    """Displacement of a carried mass by those of the body, ``(d, size)``, for small rotations.
+    """Return the matrix ``(d, size)`` from a body's displacements to that of a carried mass.
 
-    It follows the mean translation and, by least squares, the rotation of its boundary.
+    The mass follows the mean translation and, by least squares, the rotation of its boundary.
+    Rotations are small.
     """
     nodes, weights = elastic.boundary_weights(carried.boundary)
     shares = weights / weights.sum()
     middle = shares @ elastic.nodes[nodes]
     arms = _cross(elastic.nodes[nodes] - middle)
     inertia = np.einsum("n,nba,nbc->ac", shares, arms, arms)
-    # The points of a line in the plane say nothing of rotations out of it.
+    # The points of a line in the plane do not determine rotations out of it.
     rotation = np.linalg.pinv(inertia, hermitian=True) @ (shares[:, None, None] * arms)
     motion = shares[:, None, None] * np.eye(3) - _cross(carried.centre - middle) @ rotation
     axes = list(elastic.body.axes)
@@ -70,5 +80,5 @@ def carried_motion(elastic: ElasticBody, carried: CarriedMass) -> sp.csr_matrix:
 
 
 def _cross(arms: Array) -> Array:
-    """Matrices ``(..., 3, 3)`` of the vector product r ×."""
+    """Return matrices ``(..., 3, 3)`` of the vector product r ×."""
     return np.asarray(np.cross(arms[..., None, :], np.eye(3)).swapaxes(-1, -2))

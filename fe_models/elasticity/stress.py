@@ -23,29 +23,36 @@ from sa_solver.half_space.stress import von_mises
 from sa_solver.ties import first_largest
 from sa_solver.types import Array, Frame, Indices
 
-# A point this share of an element outside of it is on its border.
+# Distance outside an element, as a share of it, up to which a point is on its border.
 ON_BORDER = 1e-9
 
-# How much of what other fits change is missing from the largest stress, by the order of elements:
-# of notches in five dovetails with 10 to 40 nodes across the flank the median, and nine tenths (of
-# order 2 three quarters) within a factor of two. Least 0.37 of the true error, where that is over
-# 0.5 %.
+# Ratio of the error of the largest stress to its change by other fits, by the order of elements.
+# It is the median over the notches of five dovetails with 10 to 40 nodes across the flank. The
+# estimate is within a factor of two of the true error in nine cases of ten (order 2: three of
+# four), and at least 0.37 of it where the true error exceeds 0.5 %.
 MISSING = {1: 1.4, 2: 0.75}
 
 
-# Of the stress over a cycle: its motion, and the stress of each body.
 def steps(bodies: int) -> int:
-    """How many steps the stress of so many bodies over a cycle takes."""
+    """Return the number of steps of :func:`cycle_stress`: the motion, and one for each body."""
     return bodies + 1
 
 
 @dataclass(frozen=True)
 class PeakStress:
-    """Largest von Mises and principal stress of some vertices [MPa], and where the former is.
+    """Largest von Mises and largest principal stress at some vertices [MPa].
 
-    ``place`` is X, Y, Z [mm]; ``at_contact`` tells whether it is on a contact face. ``error`` is
-    what the mesh leaves of the less certain of both, estimated and relative to the larger: all of
-    it beside a sharp inward corner or the end of a clamped face, where stress has no bound.
+    Attributes
+    ----------
+    von_mises, maximum_principal
+        Largest values [MPa].
+    place
+        Position X, Y, Z [mm] of the largest von Mises stress.
+    at_contact
+        Whether it is on a contact face.
+    error
+        Estimated discretisation error of the less certain value, relative to the larger one. It is
+        1 next to a sharp re-entrant corner or the end of a clamped face, where stress is unbounded.
     """
 
     von_mises: float
@@ -56,17 +63,27 @@ class PeakStress:
 
     @property
     def bounded(self) -> bool:
-        """Whether stress there has a bound that finer meshes go to."""
+        """Whether the stress converges to a bounded value under mesh refinement."""
         return self.error < 1.0
 
 
 @dataclass(frozen=True)
 class StressField:
-    """At the vertices of one ``body``: ``displacement`` ``(n, 3)`` [mm], ``stress`` ``(6, n)``.
+    """Displacement and stress at the vertices of one ``body``.
 
-    Stress [MPa] is ordered xx, yy, zz, xy, yz, zx of the global axes. ``peak`` is the largest of
-    all and ``notch`` that of the surface on which nothing acts, which is what the mesh can resolve:
-    contact pressure has steep edges. None where there is no such surface.
+    Attributes
+    ----------
+    body
+        The meshed body.
+    displacement
+        Displacements ``(n, 3)`` [mm].
+    stress
+        Stress ``(6, n)`` [MPa], ordered xx, yy, zz, xy, yz, zx of the global axes.
+    peak
+        Largest stress of all vertices.
+    notch
+        Largest stress on the free surface, which the mesh can resolve; contact pressure has steep
+        edges. None if there is no free surface.
     """
 
     body: Body
@@ -86,9 +103,9 @@ class StressField:
         return maximum_principal(self.stress)
 
     def at(self, points: Array, frame: Frame) -> Array:
-        """Stress ``(6, n)`` along the axes of a ``frame`` at points ``(n, 3)`` there [MPa].
+        """Return stress ``(6, n)`` [MPa] along the axes of a ``frame`` at points ``(n, 3)`` in it.
 
-        Linear between the vertices, not a number outside the body.
+        It is linear between the vertices, and NaN outside the body.
         """
         corners, weights = _in_elements(self.body, frame.to_global(points) + frame.origin)
         return turned(np.einsum("cin,in->cn", self.stress[:, corners.T], weights), frame)
@@ -96,10 +113,18 @@ class StressField:
 
 @dataclass(frozen=True)
 class SurfaceHistory:
-    """What is seen of a body over some increments: its surface, or all of it in the plane.
+    """Surface of a body over some increments; in the plane, all of the body.
 
-    ``vertices`` ``(n,)`` are those of the body's mesh, ``triangles`` ``(m, 3)`` count among them;
-    ``displacement`` ``(t, n, 3)`` [mm], ``stress`` ``(t, 6, n)`` [MPa] as in :class:`StressField`.
+    Attributes
+    ----------
+    vertices
+        Vertices of the body's mesh ``(n,)``.
+    triangles
+        Triangles ``(m, 3)``, numbered in these vertices.
+    displacement
+        Displacements ``(t, n, 3)`` [mm].
+    stress
+        Stress ``(t, 6, n)`` [MPa], ordered as in :class:`StressField`.
     """
 
     vertices: Indices
@@ -110,12 +135,20 @@ class SurfaceHistory:
 
 @dataclass(frozen=True)
 class CycleStress:
-    """All bodies over a cycle: their ``fields`` at one increment, and how their faces move.
+    """Stress of all bodies over a cycle.
 
-    ``faces`` are displacements ``(t, 3, n)`` [mm] of body 1 and body 2, by interface, in the frame
-    and at the nodes of that; ``surfaces`` the bodies in the increments that are shown, if any are.
-    ``expansions`` ``(t, 2, n)`` are thermal strains of body 1 and body 2 there, and their slopes
-    along z of the frame [1/mm], None if no temperature changes.
+    Attributes
+    ----------
+    fields
+        Fields of the bodies at one increment.
+    faces
+        Displacements of body 1 and body 2 ``(t, 3, n)`` [mm] at the nodes of each interface, in its
+        frame.
+    surfaces
+        Surfaces of the bodies in the requested increments.
+    expansions
+        Thermal strains of body 1 and body 2 of each interface and their slopes along z of its frame
+        [1/mm], ``(t, 2, n)``. None if no temperature changes.
     """
 
     fields: tuple[StressField, ...]
@@ -133,12 +166,23 @@ def cycle_stress(
     shown: Sequence[int] = (),
     done: Callable[[], None] = lambda: None,
 ) -> CycleStress:
-    """Stress in increment ``at`` and on the surface in those ``shown``; how the faces move in all.
+    """Return the stress in increment ``at`` and surfaces in others; motions of faces in all.
 
-    ``force`` ``(t, 3, n)``, ``relative`` ``(t, 3, n)`` and ``amplitudes`` ``(t, cases)`` as in
-    :func:`fe_models.motion.deformation`. ``done`` is called after each of the :func:`steps`.
+    Parameters
+    ----------
+    structure
+        The structure.
+    force, relative, amplitudes
+        Contact forces ``(t, 3, n)``, relative displacements ``(t, 3, n)`` and load amplitudes ``(t,
+        cases)`` as in :func:`fe_models.motion.deformation`.
+    at
+        Increment of the stress fields.
+    shown
+        Increments in which the surfaces are returned.
+    done
+        Called after each of the :func:`steps`.
     """
-    # The first is that of the fields; all of them by one factorisation.
+    # The first increment is that of the fields; one factorisation serves all increments.
     increments = [at, *shown]
     motion = structure_motion(structure, force, relative, amplitudes, increments)
     done()
@@ -146,9 +190,9 @@ def cycle_stress(
     for body, displacement in zip(structure.bodies, motion.displacements, strict=True):
         elastic, free = body.elastic, body.free_facets
         thermal, recovery = body.thermal_strain(amplitudes[increments].T), body.recovery
-        seen = free, body.nodes, body.clamped
+        context = free, body.nodes, body.clamped
         straining = body.straining(displacement, amplitudes[increments].T)
-        field = stress_field(elastic, straining[:, 0], *seen, thermal[:, 0], recovery)
+        field = stress_field(elastic, straining[:, 0], *context, thermal[:, 0], recovery)
         (moved,) = _of_vertices(elastic, displacement[:, :1])
         fields.append(replace(field, displacement=moved))
         if shown:
@@ -162,7 +206,7 @@ def cycle_stress(
 
 
 def _face_expansions(structure: Structure, amplitudes: Array) -> tuple[tuple[Array, Array], ...]:
-    """Of :class:`CycleStress`; where meshes do not match, projected to the nodes of body 2."""
+    """Return the expansions of :class:`CycleStress`, projected to the nodes of body 2."""
     strains = [body.thermal_strain(amplitudes.T) for body in structure.bodies]
     found = []
     for interface in structure.mesh.interfaces:
@@ -188,32 +232,50 @@ def stress_field(
     thermal: Array | None = None,
     recovery: StressRecovery | None = None,
 ) -> StressField:
-    """Stress of a body from its displacements ``(size,)`` and expansions ``(vertices,)``.
+    """Return the stress of a body from its displacements.
 
-    ``free`` are the facets on which nothing acts, ``contact`` the vertices of contact faces and
-    ``clamped`` those that cannot move. ``recovery`` may see more than the body itself.
+    Parameters
+    ----------
+    elastic
+        The elastic body.
+    displacement
+        Displacements ``(size,)`` [mm].
+    free
+        Facets without traction.
+    contact
+        Vertices of contact faces.
+    clamped
+        Vertices that cannot move.
+    thermal
+        Thermal expansions ``(vertices,)``.
+    recovery
+        Recovery of the stress, which may use more than the body itself.
     """
     count = elastic.body.mesh.nvertices
     recovery = recovery or StressRecovery(elastic, free)
     clamped = np.intersect1d(clamped, elastic.body.mesh.facets[:, free])
-    unbounded = recovery.beside(np.append(recovery.inward_edges, clamped))
+    unbounded = recovery.with_neighbours(np.append(recovery.inward_edges, clamped))
     stress = recovery.stress(displacement, thermal)
     equivalent, principal = von_mises(stress), maximum_principal(stress)
 
     def largest(vertices: Indices) -> PeakStress:
-        """The largest stress of some vertices."""
+        """Return the largest stress of some vertices."""
         at = vertices[[first_largest(values[vertices]) for values in (equivalent, principal)]]
-        told = np.array([equivalent[at[0]], principal[at[1]]])
+        values_at = np.array([equivalent[at[0]], principal[at[1]]])
         others = recovery.alternatives(displacement, at, thermal)
-        apart = [(von_mises(s)[0] - told[0], maximum_principal(s)[1] - told[1]) for s in others]
+        apart = [
+            (von_mises(s)[0] - values_at[0], maximum_principal(s)[1] - values_at[1]) for s in others
+        ]
         change = MISSING[elastic.order] * np.abs(apart).max(axis=0)
-        # Under compression the largest principal stress is next to nothing.
-        size = np.maximum(np.abs(told), told[0])
+        # Under compression the largest principal stress is nearly zero, so do not divide by it.
+        size = np.maximum(np.abs(values_at), values_at[0])
         error = np.divide(change, size, out=np.zeros(2), where=size > 0.0)
         error[np.isin(at, unbounded) & (size > 0.0)] = 1.0
         place = tuple(elastic.body.points[at[0]].tolist())
         at_contact = bool(np.isin(at[0], contact))
-        return PeakStress(float(told[0]), float(told[1]), place, at_contact, float(error.max()))
+        return PeakStress(
+            float(values_at[0]), float(values_at[1]), place, at_contact, float(error.max())
+        )
 
     untouched = recovery.untouched
     return StressField(
@@ -231,9 +293,10 @@ def surface_history(
     recovery: StressRecovery,
     thermal: Array | None = None,
 ) -> SurfaceHistory:
-    """The surface of a body with displacements ``(size, t)`` and expansions ``(vertices, t)``.
+    """Return the surface of a body under displacements ``(size, t)``.
 
-    ``recovery`` finds its stress. In the plane all of the body is seen.
+    ``recovery`` recovers its stress, and ``thermal`` are expansions ``(vertices, t)``. In the plane
+    the result is all of the body.
     """
     mesh = elastic.body.mesh
     cells = mesh.t if elastic.dimension == 2 else mesh.facets[:, mesh.boundary_facets()]
@@ -247,20 +310,21 @@ def surface_history(
 
 
 def _of_vertices(elastic: ElasticBody, displacements: Array) -> Array:
-    """Of the vertices in space ``(t, n, 3)``, from all displacements ``(size, t)``."""
+    """Return displacements of the vertices ``(t, n, 3)`` from all displacements ``(size, t)``."""
     nodal = displacements.T.reshape(displacements.shape[1], -1, elastic.dimension)
     return np.array(in_space(nodal[:, : elastic.body.mesh.nvertices]))
 
 
 def turned(stress: Array, frame: Frame) -> Array:
-    """Stress ``(6, n)`` of the global axes along those of a ``frame``."""
+    """Return the stress ``(6, n)`` along the axes of a ``frame`` from that along global axes."""
     return components(np.einsum("ai,ijn,bj->abn", frame.axes, tensors(stress), frame.axes))
 
 
 def _in_elements(body: Body, points: Array) -> tuple[Indices, Array]:
-    """Vertices ``(n, d + 1)`` of the elements that hold ``points`` ``(n, 3)``, and their weights.
+    """Return the vertices ``(n, d + 1)`` of the elements that contain ``points``, and weights.
 
-    The weights ``(d + 1, n)`` are not numbers where no element does.
+    The points are ``(n, 3)``. The weights ``(d + 1, n)`` are NaN where no element contains the
+    point.
     """
     mesh, places = body.mesh, points[:, body.axes]
     low, high = (pick(mesh.p[:, mesh.t], axis=1) for pick in (np.min, np.max))
@@ -268,7 +332,7 @@ def _in_elements(body: Body, points: Array) -> tuple[Indices, Array]:
     near = np.flatnonzero(np.all((low <= last) & (high >= first), axis=0))
     corners = np.zeros((len(points), len(mesh.t)), dtype=np.int64)
     weights = np.full((len(mesh.t), len(points)), np.nan)
-    # Only points between an element's ends along the first axis can be in it.
+    # Only points within an element's range along the first axis can be in it.
     order = np.argsort(places[:, 0], kind="stable")
     margin = len(mesh.t) * ON_BORDER * (high[0] - low[0])
     ends = np.stack([low[0] - margin, high[0] + margin])[:, near]

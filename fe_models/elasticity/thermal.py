@@ -1,11 +1,11 @@
-"""Temperatures of bodies of a user's mesh, and the strain that their expansion makes of them.
+"""Temperatures of bodies of a user's mesh, and their thermal strains.
 
 A change ΔT from the temperature at which a body is free of stress expands it by θ = α ΔT in all
 directions. With the strain ε of its displacements the stress is
 
-    σ = λ tr(ε) 1 + 2 G ε - (3 λ + 2 G) θ 1,
+    σ = λ tr(ε) 1 + 2 G ε - (3 λ + 2 G) θ 1.
 
-of which the last part loads the nodes by ∫ (3 λ + 2 G) θ div φ_i and is taken off where stress is
+The last part loads the nodes by ∫ (3 λ + 2 G) θ div φ_i and is subtracted where stress is
 recovered. In plane strain θ acts across the plane as well: a section that is free in its plane has
 σ_yy = -E θ.
 """
@@ -25,22 +25,25 @@ from sa_solver.types import Array, Indices
 
 @dataclass(frozen=True)
 class TemperatureChange:
-    """Change of temperature [K] from the stress-free one, of a ``body``, of all without a name."""
+    """Uniform change of temperature [K] from the stress-free state, of one ``body`` or of all.
+
+    Without a body it applies to all bodies.
+    """
 
     change: float
     body: str | None = None
 
     def at(self, numbers: Indices) -> Array:
-        """Of a body whose vertices have such ``numbers`` ``(n,)`` in its file, ``(n,)`` [K]."""
+        """Return the changes ``(n,)`` [K] at vertices with ``numbers`` ``(n,)`` in their file."""
         return np.full(len(numbers), self.change)
 
 
 @dataclass(frozen=True)
 class NodalTemperature:
-    """Changes of temperature ``(m,)`` [K] of nodes, by their ``numbers`` ``(m,)`` in the mesh file.
+    """Changes of temperature ``(m,)`` [K] at nodes, by their ``numbers`` in the mesh file.
 
-    They are linear between vertices; nodes on edges, and of other bodies, count for nothing. Of a
-    ``body``, or of all without a name.
+    The temperature is linear between vertices; values at midside nodes, and at nodes of other
+    bodies, are ignored. It applies to one ``body``, or to all bodies if this is None.
     """
 
     numbers: Indices
@@ -48,7 +51,10 @@ class NodalTemperature:
     body: str | None = None
 
     def at(self, numbers: Indices) -> Array:
-        """As :meth:`TemperatureChange.at`. Raises :class:`MeshError` where a vertex has none."""
+        """Return the changes as :meth:`TemperatureChange.at`.
+
+        Raises :class:`MeshError` if a vertex has none.
+        """
         order = np.argsort(self.numbers)
         known = self.numbers[order]
         places = np.minimum(np.searchsorted(known, numbers), len(known) - 1)
@@ -65,19 +71,22 @@ Temperature = TemperatureChange | NodalTemperature
 
 
 def check_temperature(load: Temperature, numbers: Mapping[str, Indices]) -> None:
-    """Raise :class:`MeshError` unless a load fits the bodies of such node ``numbers``, by name."""
+    """Raise :class:`MeshError` unless a load fits the bodies.
+
+    ``numbers`` are the node numbers of each body, by its name.
+    """
     if load.body is not None and load.body not in numbers:
         raise MeshError(f"no body {load.body}; allowed: {', '.join(numbers)}")
-    for name, own in numbers.items():
+    for name, body_numbers in numbers.items():
         if load.body in (None, name):
-            load.at(own)
+            load.at(body_numbers)
 
 
 def thermal_strains(loads: Sequence[object], elastic: ElasticBody, numbers: Indices) -> Array:
-    """Expansion θ of a body's vertices under each of the loads, ``(vertices, loads)`` [1].
+    """Return the expansion θ of a body's vertices under each load, ``(vertices, loads)`` [1].
 
-    ``numbers`` ``(vertices,)`` are the nodes' own in their file. Loads that are no temperatures, or
-    those of other bodies, expand nothing.
+    ``numbers`` ``(vertices,)`` are the numbers of the vertices in their file. Loads that are not
+    temperatures, or are those of other bodies, cause no expansion.
     """
     strains = np.zeros((len(numbers), len(loads)))
     for case, load in enumerate(loads):
@@ -87,9 +96,10 @@ def thermal_strains(loads: Sequence[object], elastic: ElasticBody, numbers: Indi
 
 
 def thermal_gradient(elastic: ElasticBody, strains: Array, vertices: Indices) -> Array:
-    """Gradient ``(3, n, ...)`` [1/mm] of strains ``(vertices, ...)`` at some of these.
+    """Return the gradient ``(3, n, ...)`` [1/mm] of strains ``(vertices, ...)`` at some vertices.
 
-    The mean of the elements round each vertex, by their volumes; strains are linear in them.
+    It is the mean over the elements around each vertex, weighted by volume; strains are linear in
+    them.
     """
     mesh, axes = elastic.body.mesh, elastic.body.axes
     edges = (mesh.p[:, mesh.t[1:]] - mesh.p[:, mesh.t[:1]]).transpose(2, 1, 0)

@@ -2,10 +2,10 @@
 
 - ``Dovetail``: blade root and disk sector of a dovetail joint
 - ``Specimen``: the two cylinders with crossed strips of a friction rig
-- ``read_bodies``, ``ImportedMesh``: bodies from gmsh, Abaqus, CAD and what meshio reads
-- ``describe_bodies``: lines that list what such a file has
+- ``read_bodies``, ``ImportedMesh``: bodies from gmsh, Abaqus, CAD and all files that meshio reads
+- ``describe_bodies``: lines that list the content of such a file
 
-Two crossed strips of radii 100 mm touch like spheres, half a millimetre from the middle they are
+Two crossed strips of radii 100 mm touch like spheres. Half a millimetre from the centre they are
 0.5²/100 mm apart:
 
 >>> import numpy as np

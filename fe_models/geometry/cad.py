@@ -1,4 +1,4 @@
-"""CAD files through gmsh's OpenCASCADE kernel: every solid a body, every face a boundary."""
+"""CAD files through gmsh's OpenCASCADE kernel: every solid is a body, every face a boundary."""
 
 from __future__ import annotations
 
@@ -15,36 +15,37 @@ from fe_models.readers.length_unit import LengthUnit
 from fe_models.readers.reader_process import cpu_limited
 from fe_models.readers.text_files import unmarked
 
-# Its files state no unit.
+# Ending of files that do not state a unit.
 BREP = ".brep"
-# How files of each kind begin; without this OpenCASCADE writes its complaints to the terminal.
+# First bytes of files of each kind. They are checked because OpenCASCADE writes its errors to the
+# terminal.
 BEGINNINGS = {
     ".step": (b"ISO-10303-21",),
     ".stp": (b"ISO-10303-21",),
     BREP: (b"DBRep_DrawableShape", b"CASCADE Topology"),
 }
-# The name that OpenCASCADE writes for a shape without one.
+# Name that OpenCASCADE writes for a shape without a name.
 NO_NAME = "Open CASCADE STEP translator"
-# Enough to find the beginning after blank lines.
+# Number of bytes that are read to find the beginning after blank lines.
 HEAD_BYTES = 200
 
 
 def read_cad(path: Path, size: float, unit: LengthUnit | None = None) -> GroupedMesh:
     """Mesh the solids of a STEP or BREP file with tetrahedra of edge length ``size`` [mm].
 
-    A STEP file is converted to mm from the unit it states; BREP has none and is in ``unit``. A
-    solid goes by its name in the file (``solid_1``, ... without one; ``name_1``, ... if several
-    have it). Its faces are ``solid_1.face_1``, ... in the order of the file, and go by their own
-    names too where the file gives any. Solids that touch have their own nodes unless the file makes
-    them share a face. Raises :class:`MeshError`.
+    A STEP file is converted to mm from the unit it states; BREP states none and is in ``unit``. A
+    solid has its name in the file (``solid_1``, ... without one; ``name_1``, ... if several share
+    it). Its faces are ``solid_1.face_1``, ... in the order of the file, and also have their own
+    names if the file gives any. Solids that touch have separate nodes unless they share a face in
+    the file. Raises :class:`MeshError`.
     """
     if not size > 0.0:
         raise MeshError(f"{path}: the mesh size is {size:g} mm; allowed: more than 0")
     stated = path.suffix.lower() != BREP
     if stated and unit is not None:
         raise MeshError(
-            f"{path}: STEP files state their unit, from which it is converted; allowed: no unit of "
-            "length, or one in the file"
+            f"{path}: STEP files state their unit of length, from which they are converted; "
+            "allowed: no unit"
         )
     unit = unit or LengthUnit(source="converted from the unit of the file" * stated)
     with unmarked(path) as plain:
@@ -52,38 +53,38 @@ def read_cad(path: Path, size: float, unit: LengthUnit | None = None) -> Grouped
 
 
 def _meshed(path: Path, plain: Path, size: float, unit: LengthUnit) -> GroupedMesh:
-    """The solids of a file, which is ``plain`` without a byte order mark."""
+    """Mesh the solids of a file; ``plain`` is the file without a byte order mark."""
     with plain.open("rb") as file:
         if not file.read(HEAD_BYTES).lstrip().startswith(BEGINNINGS[path.suffix.lower()]):
-            raise MeshError(f"{path}: is no {path.suffix.lower()} file")
+            raise MeshError(f"{path}: is not a {path.suffix.lower()} file; export it again")
     with gmsh_model(path.stem) as gmsh:
         gmsh.option.setString("Geometry.OCCTargetUnit", "MM")
         gmsh.option.setNumber("Geometry.OCCScaling", unit.size)
-        # Both ends: by itself gmsh takes no more than a tenth of the model.
+        # Both limits are set, because by default gmsh limits sizes to a tenth of the model.
         gmsh.option.setNumber("Mesh.MeshSizeMin", size)
         gmsh.option.setNumber("Mesh.MeshSizeMax", size)
         try:
             with cpu_limited(plain):
                 gmsh.model.occ.importShapes(str(plain))
             gmsh.model.occ.synchronize()
-        except Exception as error:  # gmsh raises nothing more specific
+        except Exception as error:  # gmsh raises no more specific exception.
             raise MeshError(f"{path}: gmsh cannot read it: {first_line(error)}") from None
         groups = _groups(gmsh.model)
         if not groups:
             raise MeshError(f"{path}: has no solids; allowed: closed solids, not loose faces")
         try:
             gmsh.model.mesh.generate(3)
-            gmsh.model.mesh.setOrder(2)  # midsides on the surfaces, which facets leave
+            gmsh.model.mesh.setOrder(2)  # Midside nodes are on the surfaces, facets are not.
         except Exception as error:
             raise MeshError(
-                f"{path}: gmsh cannot mesh it at size {size:g} mm: {first_line(error)}; take a "
+                f"{path}: gmsh cannot mesh it at size {size:g} mm: {first_line(error)}; use a "
                 "smaller size or repair the solids"
             ) from None
         return replace(grouped_entities(gmsh, groups), unit=unit)
 
 
 def _groups(model: Any) -> list[EntityGroup]:
-    """Solids and their faces, by name."""
+    """Return the solids and their faces by name."""
     groups: list[EntityGroup] = []
     labelled: dict[str, list[int]] = {}
     solids = [tag for _, tag in model.getEntities(3)]
@@ -98,7 +99,7 @@ def _groups(model: Any) -> list[EntityGroup]:
 
 
 def _solid_names(model: Any, solids: list[int]) -> list[str]:
-    """A name for every solid, each once."""
+    """Return a unique name for every solid."""
     labels = [_label(model, 3, solid) for solid in solids]
     count, used = Counter(labels), Counter[str]()
     names = []
@@ -112,6 +113,6 @@ def _solid_names(model: Any, solids: list[int]) -> list[str]:
 
 
 def _label(model: Any, dimension: int, tag: int) -> str:
-    """The file's own name of an entity, without the assemblies above it; empty if it has none."""
+    """Return the file's own name of an entity without its assemblies; empty if it has none."""
     label = model.getEntityName(dimension, tag).rpartition("/")[2]
     return "" if label.startswith(NO_NAME) else label

@@ -1,4 +1,4 @@
-"""A body is made of elements that fill its volume once, and its boundaries are on its surface."""
+"""Checks that elements fill a body's volume once and that boundaries are on its surface."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from fe_models.readers.grouped import pieces
 from sa_solver.types import Array, Indices
 
 # An element is flat when its volume is below this share of the cube of its extent (the square in
-# the plane): meshers stop at slivers of 1e-4, rounding leaves 1e-16.
+# the plane): slivers of meshers have 1e-4, rounding errors are 1e-16.
 FLAT = 1e-10
 
 
 def checked_body(name: str, points: Array, cells: Indices, boundaries: dict[str, Indices]) -> Body:
-    """A body with boundaries given by the vertices of their facets.
+    """Return a body with boundaries given by the vertices of their facets.
 
-    Raises :class:`MeshError` if elements are flat, folded, duplicate or in separate pieces, or a
+    Raises :class:`MeshError` if elements are flat, folded, duplicate or in separate pieces, or if a
     boundary is not on the surface.
     """
     _check_cells(name, points, cells)
@@ -34,7 +34,7 @@ def checked_body(name: str, points: Array, cells: Indices, boundaries: dict[str,
 
 
 def _check_cells(name: str, points: Array, cells: Indices) -> None:
-    """Every element has distinct corners and a volume, and comes once; they are connected."""
+    """Raise unless elements have distinct corners, occur once and are connected."""
     ordered = np.sort(cells, axis=1)
     repeating = np.any(np.diff(ordered, axis=1) == 0, axis=1)
     if np.any(repeating):
@@ -44,7 +44,9 @@ def _check_cells(name: str, points: Array, cells: Indices) -> None:
         )
     _, count = np.unique(ordered, axis=0, return_counts=True)
     if np.any(count > 1):
-        raise MeshError(f"{np.sum(count > 1)} elements of body {name} come more than once")
+        raise MeshError(
+            f"{np.sum(count > 1)} elements of body {name} occur more than once; keep one of each"
+        )
     separate = 1 + int(pieces([("", cells)])[0].max())
     if separate > 1:
         raise MeshError(
@@ -54,7 +56,7 @@ def _check_cells(name: str, points: Array, cells: Indices) -> None:
 
 
 def _check_filling(body: Body) -> None:
-    """Elements have volume; those that share a facet are two, and lie on either side of it."""
+    """Raise unless elements have volume and at most two, on opposite sides, share a facet."""
     mesh, points = body.mesh, body.mesh.p.T
     corners = points[mesh.t.T]
     size = np.ptp(corners, axis=1).max(axis=1)
@@ -88,17 +90,17 @@ def _check_filling(body: Body) -> None:
 
 
 def _opposite(body: Body, facets: Indices, side: int) -> Indices:
-    """Vertex off the facet of the element on side 0 or 1 of each facet ``(n,)``."""
+    """Return the vertex off the facet of the element on side 0 or 1 of each facet ``(n,)``."""
     mesh = body.mesh
     return mesh.t[:, mesh.f2t[side, facets]].sum(axis=0) - mesh.facets[:, facets].sum(axis=0)
 
 
 def _near(points: Array, cells: Indices, chosen: NDArray[np.bool_]) -> str:
-    """Where the first chosen one is."""
+    """Return the position of the first chosen element or facet, for a message."""
     return f"the first near {vector(points[cells[np.argmax(chosen)]].mean(axis=0))} mm"
 
 
 def vector(components: Array) -> str:
-    """A vector, in mm or of length 1, for a message."""
+    """Return a vector, in mm or of length 1, as text for a message."""
     # Rounding is noise below the ninth decimal; adding zero turns -0 into 0.
     return "(" + ", ".join(f"{round(component, 9) + 0.0:.4g}" for component in components) + ")"

@@ -2,8 +2,8 @@
 
 Global axes: Z is radial (the load axis), Y the rotor axis, X completes them; the origin is on the
 rotor axis, in the middle of the slot. The section lies in planes Y = const and is extruded along
-the slot, which ``skew`` turns away from Y. It is mirrored about its middle, mesh included, so that
-a symmetric load gives a symmetric answer to rounding.
+the slot, which ``skew`` turns away from Y. The section and its mesh are mirrored about its middle,
+so that a symmetric load gives a result that is symmetric up to rounding.
 """
 
 from __future__ import annotations
@@ -28,16 +28,18 @@ from sa_solver import checks
 from sa_solver.surfaces.shapes import rounded_edge
 from sa_solver.types import Array, Frame
 
-# How fast the mesh size grows with the distance from the flanks, and from the fillets: pressure
-# moves with the former, of the latter only the stress there is asked for.
+# Growth of the mesh size per distance from the flanks, and from the fillets. The contact pressure
+# is sensitive to the former; the latter affects only the stress at the fillets.
 SIZE_GROWTH, FILLET_GROWTH = 0.25, 0.7
-# Points along a curve that distances are measured from: many more than it usually has nodes.
+# Number of points along a curve from which distances are measured: many more than it usually has
+# nodes.
 SAMPLES = 200
-# Elements round a full circle of a fillet unless more are asked for. Of 20 nodes across the flank
-# and order 1 they leave 6 % of the stress there, 24 left 11 %; of 40 and order 2 0.5 %.
+# Default number of elements around a full circle of a fillet. With 20 nodes across the flank and
+# order 1 the error of the stress there is 6 % (11 % with 24 elements); with 40 nodes and order 2 it
+# is 0.5 %.
 NOTCH = 48
 
-# Curves of a section that are no boundaries.
+# Curves of a section that are not boundaries.
 UNNAMED = ("", "middle", "fillet")
 
 SectionCurve = tuple[str, list[tuple[float, float]]]
@@ -47,14 +49,41 @@ SectionCurve = tuple[str, list[tuple[float, float]]]
 class Dovetail:
     """Parameters of the joint; lengths in mm, angles in radians.
 
-    ``flank_angle`` lies between flank and load axis. ``flank_length`` is the flat, ``edge_width``
-    the rounded part beyond it at either side (radius ``edge_radius``), ``end_width`` the rounded
-    part at the two slot ends (radius ``end_radius``), inside ``slot_length``; without them it is
-    straight to the ends. ``rim_radius`` is the radius of the top of the flanks; ``lug_height`` the
-    disk above it, ``disk_height`` below it; ``root_depth`` the blade below the flanks,
-    ``slot_clearance`` the play under the root. The blade's neck is ``neck_width`` wide, its shank
-    ``shank_height`` high; ``neck_fillet`` and ``slot_fillet`` are radii. The slots of ``blades``
-    blades lie at ``skew`` to the axis of rotation.
+    Attributes
+    ----------
+    flank_angle
+        Angle between flank and load axis.
+    flank_length
+        Length of the flat part of the flank.
+    edge_radius, edge_width
+        Radius and width of the rounded part at either side of the flat.
+    neck_width
+        Width of the blade's neck.
+    neck_fillet
+        Radius of the fillet between neck and flank.
+    root_depth
+        Depth of the blade below the flanks.
+    shank_height
+        Height of the blade's shank.
+    slot_length
+        Length of the slot.
+    slot_fillet
+        Radius of the fillets of the slot.
+    slot_clearance
+        Clearance under the root.
+    lug_height
+        Height of the disk above the top of the flanks.
+    disk_height
+        Height of the disk below the top of the flanks.
+    rim_radius
+        Radius of the top of the flanks from the rotor axis.
+    blades
+        Number of blades.
+    skew
+        Angle of the slots to the axis of rotation.
+    end_radius, end_width
+        Radius and width of the rounded part at the two slot ends, within ``slot_length``. Without
+        them the flank is straight up to the ends.
 
     Examples
     --------
@@ -101,7 +130,7 @@ class Dovetail:
 
     @property
     def flank_width(self) -> float:
-        """Flat and both rounded edges, along the flank [mm]."""
+        """Width of the flat and both rounded edges, along the flank [mm]."""
         return self.flank_length + 2.0 * self.edge_width
 
     @property
@@ -115,14 +144,14 @@ class Dovetail:
         return np.array([0.0, 0.0, 1.0])
 
     def flank_ends(self) -> tuple[Array, Array]:
-        """Top and bottom of the flank in the right half of the section, ``(X, Z)``."""
+        """Return the top and bottom of the flank in the right half of the section, ``(X, Z)``."""
         sine, cosine = np.sin(self.flank_angle), np.cos(self.flank_angle)
         tangent = self.neck_fillet * np.tan(0.5 * self.flank_angle)
         top = np.array([0.5 * self.neck_width + tangent * sine, self.rim_radius])
         return top, top + self.flank_width * np.array([sine, -cosine])
 
     def flank_frame(self, side: int) -> Frame:
-        """Frame of the flank at X > 0 (``side`` 1) or X < 0 (``side`` -1)."""
+        """Return the frame of the flank at X > 0 (``side`` 1) or X < 0 (``side`` -1)."""
         if side not in (1, -1):
             raise MeshError(f"side {side!r} of a dovetail: give 1 or -1")
         top, bottom = self.flank_ends()
@@ -137,11 +166,14 @@ class Dovetail:
         return Frame(np.array([side * middle[0], 0.0, middle[1]]), np.array([x, along, normal]))
 
     def _uphill(self, side: int) -> Array:
-        """Unit vector up the flank, within the section."""
+        """Return the unit vector up the flank, within the section."""
         return np.array([-side * np.sin(self.flank_angle), 0.0, np.cos(self.flank_angle)])
 
     def flank_size(self, side: int = 1) -> tuple[float, float]:
-        """Extent of the flank along x and y of its frame [mm]; it is a parallelogram if skewed."""
+        """Return the extent of the flank along x and y of its frame [mm].
+
+        The flank is a parallelogram if it is skewed.
+        """
         frame = self.flank_frame(side)
         edges = np.array(
             [self.flank_width * self._uphill(side), self.slot_length * self.slot_direction]
@@ -150,14 +182,15 @@ class Dovetail:
         return float(extent[0]), float(extent[1])
 
     def flank_gap(self, x: Array, y: Array, side: int) -> Array:
-        """Distance of the unloaded, unworn faces at ``x``, ``y`` of the flank's frame [mm].
+        """Return the distance of the unloaded, unworn faces at ``x``, ``y`` of the frame [mm].
 
-        Zero on the flat, circular arcs on the rounded edges and ends, a slope beyond them.
+        It is zero on the flat, follows circular arcs on the rounded edges and ends, and slopes
+        beyond them.
         """
         x, y = places(x, y)
         frame = self.flank_frame(side)
         up = frame.components(self._uphill(side))
-        # Oblique coordinates: along the section and along the slot.
+        # These are oblique coordinates, along the section and along the slot.
         across, along = x / up[0], y - x * up[1] / up[0]
         slant = abs(up[0])
         edges = rounded_edge(
@@ -189,7 +222,7 @@ class Dovetail:
         if wall >= slot * tangent or top[0] >= (self.rim_radius + self.lug_height) * tangent:
             raise MeshError(
                 f"the slot is wider ({2 * wall:.4g} mm) than the sector at its bottom "
-                f"({2 * slot * tangent:.4g} mm): take fewer blades, a larger rim_radius or a "
+                f"({2 * slot * tangent:.4g} mm): use fewer blades, a larger rim_radius or a "
                 "narrower root"
             )
         if (
@@ -206,13 +239,26 @@ class Dovetail:
         dimension: Literal[2, 3] = 3,
         notch: int = NOTCH,
     ) -> StructureMesh:
-        """Mesh both bodies: ``flank_nodes`` across and along each flank, ``size`` [mm] far away.
+        """Mesh both bodies: the disk is body 1, the blade body 2.
 
-        ``notch`` is the number of elements round a full circle of a fillet.
-        With ``dimension`` 2 it is the section in the middle of the slot, which must not be skewed;
-        nodes along the flank then count for nothing. The disk is body 1, the blade body 2.
-        Boundaries: ``intrados`` (X > 0) and ``extrados`` on both; ``inner``, ``sides`` of the disk;
-        ``root_bottom``, ``shank_top`` of the blade.
+        Boundaries are ``intrados`` (X > 0) and ``extrados`` on both bodies; ``inner`` and ``sides``
+        of the disk; ``root_bottom`` and ``shank_top`` of the blade.
+
+        Parameters
+        ----------
+        flank_nodes
+            Numbers of nodes across and along each flank; in 2 dimensions the second has no effect.
+        size
+            Size of elements far from flanks and fillets [mm].
+        dimension
+            3, or 2 for the section in the middle of the slot, which must not be skewed.
+        notch
+            Number of elements around a full circle of a fillet.
+
+        Raises
+        ------
+        MeshError
+            If the section cannot be drawn, or if a skewed slot is to be meshed in 2 dimensions.
         """
         self.check()
         nodes = checks.array("nodes of a flank", flank_nodes, (2,), error=MeshError)
@@ -241,7 +287,7 @@ class Dovetail:
         return StructureMesh((disk, blade), tuple(interfaces))
 
     def blade_section(self) -> list[SectionCurve]:
-        """Named curves round the right half of the blade; arcs are (start, centre, end)."""
+        """Return named curves around the right half of the blade; arcs are (start, centre, end)."""
         top, bottom = self.flank_ends()
         neck = 0.5 * self.neck_width
         tangent = self.neck_fillet * np.tan(0.5 * self.flank_angle)
@@ -260,7 +306,7 @@ class Dovetail:
         )
 
     def disk_section(self) -> list[SectionCurve]:
-        """Named curves round the right half of the disk sector; arcs are (start, centre, end)."""
+        """Return named curves around the right half of the disk; arcs are (start, centre, end)."""
         top, bottom = self.flank_ends()
         radius = self.slot_fillet
         sine, cosine = np.sin(self.flank_angle), np.cos(self.flank_angle)
@@ -268,7 +314,8 @@ class Dovetail:
         slot = bottom[1] - self.root_depth - self.slot_clearance
         inner, outer = self.rim_radius - self.disk_height, self.rim_radius + self.lug_height
         tangent = np.tan(np.pi / self.blades)
-        # Up the flank, as the blade's section: gmsh then splits both faces along equal diagonals.
+        # The curves run up the flank, as in the blade's section: gmsh then splits both faces along
+        # the same diagonals.
         return _chain(
             [
                 ("", (0.0, slot)),
@@ -290,11 +337,14 @@ class Dovetail:
 
 
 def _chain(corners: list[Any]) -> list[SectionCurve]:
-    """Curves between consecutive corners; a third entry is the centre of the arc that follows."""
+    """Return the curves between consecutive corners; a third entry is the centre of an arc.
+
+    The arc follows the corner.
+    """
     following = corners[1:] + corners[:1]
     return [
-        (corner[0], [corner[1], *corner[2:], after[1]])
-        for corner, after in zip(corners, following, strict=True)
+        (corner[0], [corner[1], *corner[2:], following_corner[1]])
+        for corner, following_corner in zip(corners, following, strict=True)
     ]
 
 
@@ -306,10 +356,11 @@ def _mesh_body(
     sizes: tuple[float, float],
     dimension: int,
 ) -> Body:
-    """Mesh one body in a gmsh model of its own; ``sizes`` are those far away and on its fillets.
+    """Mesh one body in a separate gmsh model.
 
-    Two bodies in one model would share the nodes of their flanks: gmsh finds the nodes of an
-    extruded mesh by their place.
+    ``sizes`` are the element sizes far away and on the fillets. Two bodies in one model would share
+    the nodes of their flanks, because gmsh identifies the nodes of an extruded mesh by their
+    position.
     """
     slot = dovetail.slot_length * dovetail.slot_direction if dimension == 3 else np.zeros(3)
     with gmsh_model(name) as gmsh:
@@ -375,7 +426,7 @@ def _mirror_mesh(model: Any, surfaces: list[int], middle: float) -> None:
 
 
 def _swept(model: Any, curves: list[int], sections: list[int]) -> list[int]:
-    """The faces that section curves have swept, curve after curve."""
+    """Return the faces that section curves have swept, curve after curve."""
     return [
         int(surface)
         for curve in curves
@@ -384,7 +435,7 @@ def _swept(model: Any, curves: list[int], sections: list[int]) -> list[int]:
 
 
 def _sided(named: dict[str, list[int]]) -> dict[str, list[int]]:
-    """The named entities with the two flanks told apart; the first one is the right one."""
+    """Return the named entities with the right flank as intrados and the left as extrados."""
     right, left = named["flank"]
     others = {label: tags for label, tags in named.items() if label != "flank"}
     return {"intrados": [right], "extrados": [left]} | others

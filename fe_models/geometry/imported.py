@@ -1,4 +1,4 @@
-"""Bodies from a mesh or a CAD file of the user's."""
+"""Bodies from a user's mesh or CAD file."""
 
 from __future__ import annotations
 
@@ -33,25 +33,38 @@ from sa_solver.types import Array, Indices
 
 # A mesh is plane when it is thinner than this share of its size.
 PLANE = 1e-9
-# Closed surfaces have no mean normal: theirs is rounding, below this share of the area.
+# A surface is closed when its total normal is below this share of the area, which is rounding.
 CLOSED = 1e-9
-# Lines by which a ``.dat`` is Nastran's.
+# Lines that identify a ``.dat`` as Nastran's.
 BULK_DATA = re.compile(r"\s*(GRID|BEGIN\s+BULK|CEND)\b", re.IGNORECASE)
-# Why lengths are in a unit that was asked for.
+# Source of a unit that the user has given.
 GIVEN = "as given"
 
 
 @dataclass(frozen=True)
 class ImportedMesh:
-    """``bodies`` by name, each with its own nodes and named boundaries.
+    """Bodies of a file by name, each with its own nodes and named boundaries.
 
-    ``node_numbers`` ``(n,)`` are the file's own numbers of each body's vertices; ``points`` the
-    vertices in each named node set of the file that has any on that body. ``midsides`` are points
-    in the middle of edges, of bodies for which the file has them, and ``middles`` the edges
-    ``(k, 2)`` whose midside nodes are in each of these node sets; ``left`` lines of the file that
-    say more than a mesh and are not taken over, ``scene`` what a case could have of them; ``axes``
-    are those of the file that the bodies have, all or the two of a plane; ``unit`` is that of
-    lengths in the file, which are in mm here.
+    Attributes
+    ----------
+    bodies
+        The bodies by name.
+    node_numbers
+        The file's own numbers ``(n,)`` of each body's vertices.
+    points
+        Vertices in each named node set of the file that has any on that body.
+    midsides
+        Points in the middle of edges, for bodies for which the file has them.
+    middles
+        Edges ``(k, 2)`` whose midside nodes are in each of the node sets.
+    left
+        Lines of the file that describe more than a mesh and are not imported.
+    scene
+        Materials, contacts, supports and loads of the file.
+    axes
+        Axes of the file that the bodies have: all, or the two of a plane.
+    unit
+        Unit of length of the file; lengths here are in mm.
 
     Examples
     --------
@@ -94,7 +107,7 @@ class ImportedMesh:
 
 @dataclass(frozen=True)
 class Patch:
-    """Size and place of a boundary: area [mm²], centroid ``(3,)`` [mm] and normal ``(3,)``.
+    """Size and position of a boundary: area [mm²], centroid ``(3,)`` [mm] and normal ``(3,)``.
 
     The normal is the outward one, averaged over the area and of length 1, or zero if the boundary
     is closed. In the plane the area is a length [mm].
@@ -108,24 +121,37 @@ class Patch:
 def read_bodies(path: Path, size: float | None = None, unit: str | None = None) -> ImportedMesh:
     """Read the bodies of a mesh file, or mesh those of a CAD file at ``size`` [mm].
 
-    Reads gmsh's ``.msh`` (:func:`read_msh`), Abaqus ``.inp`` (:func:`read_abaqus`), Nastran's
+    Formats are gmsh's ``.msh`` (:func:`read_msh`), Abaqus ``.inp`` (:func:`read_abaqus`), Nastran's
     ``.bdf``, ``.dat`` and ``.nas`` (:func:`read_nastran`), ``.unv`` (:func:`read_unv`), Exodus
-    (:func:`read_exodus`), ``.step``, ``.stp`` and ``.brep`` (:func:`read_cad`) and what meshio
-    reads (:func:`read_meshio`). Lengths are in ``unit``, one of ``SIZES``; without it in the unit
-    that the file states, and in mm where it states none. Elements are straight between their
-    corners, whatever nodes they have on
-    their edges: these tell the form of contact faces, and that of elements of second order
-    (:func:`fe_models.meshes.second_order.with_midsides`). Quadrilaterals, pyramids, wedges and
-    hexahedra are split into triangles or tetrahedra. A plane mesh keeps the
-    two coordinates that vary, in their order, as X and Z; whether its elements are of plane strain
-    or stress is not read.
+    (:func:`read_exodus`), ``.step``, ``.stp`` and ``.brep`` (:func:`read_cad`), and those that
+    meshio reads (:func:`read_meshio`).
 
-    Raises :class:`MeshError` if the file cannot be read; a body has flat, folded or duplicate
-    elements or falls into pieces; bodies share nodes; or a boundary is not on the surface of one.
+    Elements are straight between their corners. Midside nodes on their edges determine the form of
+    contact faces, and of elements of second order
+    (:func:`fe_models.meshes.second_order.with_midsides`). Quadrilaterals, pyramids, wedges and
+    hexahedra are split into triangles or tetrahedra. A plane mesh keeps the two coordinates that
+    vary, in their order, as X and Z; whether its elements are of plane strain or plane stress is
+    not read.
+
+    Parameters
+    ----------
+    path
+        The file.
+    size
+        Edge length of the mesh of a CAD file [mm]; None for a mesh file.
+    unit
+        Unit of length, one of ``SIZES``. By default it is the unit that the file states, or mm if
+        it states none.
+
+    Raises
+    ------
+    MeshError
+        If the file cannot be read; if a body has flat, folded or duplicate elements or is in
+        several pieces; if bodies share nodes; or if a boundary is not on the surface of one.
 
     Examples
     --------
-    A plane quadrilateral of 4 mm by 3 mm becomes two triangles; an edge of it is named:
+    A plane quadrilateral of 4 mm by 3 mm becomes two triangles, and an edge of it is named:
 
     >>> import tempfile
     >>> from pathlib import Path
@@ -175,7 +201,7 @@ def _grouped(path: Path, size: float | None, unit: str | None) -> GroupedMesh:
             )
         return read_apart(read_cad, path, size, unit and given)
     if size is not None:
-        raise MeshError(f"{path}: is a mesh already; a mesh size is for {', '.join(CAD)}")
+        raise MeshError(f"{path}: is a mesh already; a mesh size is for {', '.join(CAD)} only")
     if suffix == ".msh":
         mesh = read_apart(read_msh, path)
     else:
@@ -184,7 +210,7 @@ def _grouped(path: Path, size: float | None, unit: str | None) -> GroupedMesh:
 
 
 def _read_dat(path: Path) -> GroupedMesh:
-    """Read a ``.dat`` of Nastran; files of many other programs end so, too."""
+    """Read a ``.dat`` of Nastran, an ending that many other programs use, too."""
     with open_text(path) as file:
         if any(BULK_DATA.match(line) for line in file):
             return read_nastran(path)
@@ -201,7 +227,7 @@ _READERS: dict[str, Callable[[Path], GroupedMesh]] = {
 
 
 def describe_bodies(imported: ImportedMesh) -> list[str]:
-    """Lines that list bodies, boundaries and node sets with their size and place.
+    """Return lines that list bodies, boundaries and node sets with their sizes and positions.
 
     Examples
     --------
@@ -254,12 +280,12 @@ def describe_bodies(imported: ImportedMesh) -> list[str]:
 
 
 def extent(points: Array) -> str:
-    """Return the sides of a box round points ``(dim, n)`` [mm], as they are told."""
+    """Return the sides of a box around points ``(dim, n)`` [mm], as text."""
     return f"{' x '.join(f'{side:.4g}' for side in np.ptp(points, axis=1))} mm"
 
 
 def patch(body: Body, boundary: str) -> Patch:
-    """Area, centroid and mean outward normal of a named boundary."""
+    """Return area, centroid and mean outward normal of a named boundary."""
     normals = body.outward(boundary)
     areas = np.linalg.norm(normals, axis=1)
     area, total = float(areas.sum()), normals.sum(axis=0)
@@ -323,7 +349,7 @@ def _separated(grouped: GroupedMesh) -> ImportedMesh:
 
 
 def _axes(grouped: GroupedMesh) -> Indices:
-    """Coordinates that count: three, or the two of a plane mesh that vary."""
+    """Return the axes of the coordinates: all three, or the two of a plane mesh that vary."""
     dimensions = {DIMENSION[shape] for blocks in grouped.bodies.values() for shape, _ in blocks}
     if dimensions not in ({2}, {3}):
         raise MeshError(
@@ -333,7 +359,7 @@ def _axes(grouped: GroupedMesh) -> Indices:
         )
     used = nodes_of([block for blocks in grouped.bodies.values() for block in blocks])
     if not np.all(np.isfinite(grouped.points[used])):
-        raise MeshError("has nodes whose coordinates are no numbers")
+        raise MeshError("has nodes whose coordinates are not finite numbers")
     if dimensions == {3}:
         return np.arange(3)
     extent = np.ptp(grouped.points[used], axis=0)
@@ -347,7 +373,7 @@ def _axes(grouped: GroupedMesh) -> Indices:
 
 
 def _owners(cells: dict[str, Indices], count: int) -> Indices:
-    """Number of the body that each node belongs to ``(n,)``, -1 of those that none uses."""
+    """Return the number of the body that each node belongs to ``(n,)``, or -1 for unused nodes."""
     owner = np.full(count, -1)
     names = list(cells)
     for number, (name, body) in enumerate(cells.items()):
@@ -365,7 +391,7 @@ def _owners(cells: dict[str, Indices], count: int) -> Indices:
 
 
 def _facets(name: str, blocks: Blocks, owner: Indices) -> Indices:
-    """Distinct facets of a surface; each is on one body."""
+    """Return the distinct facets of a surface. Raises unless each is on one body."""
     facets = np.unique(np.sort(split_blocks(blocks), axis=1), axis=0)
     owners = owner[facets]
     loose = np.sum((owners != owners[:, :1]).any(axis=1) | (owners[:, 0] < 0))

@@ -1,13 +1,13 @@
-"""The two cylindrical specimens of a friction rig, end to end with crossed strips.
+"""Two cylindrical specimens of a friction rig, end to end with crossed strips.
 
 Each specimen is a cylinder whose end face narrows, by a chamfer on either side, to a flat strip.
-The specimens stand end to end along Z and are turned 90° to each other, so that the strips touch
-over a square, the pad. Body 1 is below (Z < 0) with its strip along X; body 2 is body 1 turned by
-180° about the line X = Y in the contact plane, which swaps X with Y and up with down: pads and
-their triangles match node to node. A quarter is meshed and mirrored twice, so that symmetric loads
-give symmetric answers to rounding.
+The specimens stand end to end along Z and are rotated by 90° to each other, so that the strips
+touch over a square, the pad. Body 1 is below (Z < 0) with its strip along X. Body 2 is body 1
+rotated by 180° about the line X = Y in the contact plane, which exchanges X with Y and up with
+down, so that pads and their triangles match node to node. A quarter is meshed and mirrored twice,
+so that symmetric loads give results that are symmetric up to rounding.
 
-The form of the strips is a gap of the interface and not in the mesh.
+The form of the strips is a gap of the interface and not part of the mesh.
 
 Source: the specimens of the friction rig at Imperial College, "Dynamics simulations of fretting
 wear for aero-engine applications" (thesis), section 4.2; Fantetti et al. 2019, Tribology
@@ -38,27 +38,40 @@ from sa_solver.types import Array, Frame, Indices
 
 # Name of the interface, and of the boundary of both bodies that it joins.
 CONTACT = "contact"
-# Largest elements [mm]. With quadratic tetrahedra of 1.5, 1.0, 0.8 and 0.6 mm the first free-free
-# frequency is 29465, 29592, 29631 and 29656 Hz: what is left is the circle drawn as a polygon.
+# Size of the largest elements [mm]. With quadratic tetrahedra of 1.5, 1.0, 0.8 and 0.6 mm the first
+# free-free frequency is 29465, 29592, 29631 and 29656 Hz; the remaining error is due to the circle
+# drawn as a polygon.
 SIZE = 1.0
-# How fast the mesh size grows with the distance from the pad. With quadratic tetrahedra 0.25 and
-# 0.5 give frequencies within 2e-4 and a tangential stiffness within 3e-3 of each other.
+# Growth of the mesh size per distance from the pad. With quadratic tetrahedra 0.25 and 0.5 give
+# frequencies within 2e-4 and a tangential stiffness within 3e-3 of each other.
 SIZE_GROWTH = 0.5
 # Two points are one node when they are closer than this share of the diameter.
 SAME_POINT = 1e-9
-# A bounding box of gmsh's is 1e-7 mm too wide; no two entities are as close as this [mm].
+# Tolerance for bounding boxes of gmsh, which are 1e-7 mm too wide; no two entities are this close.
 BOX_MARGIN = 1e-5
 
 
 @dataclass(frozen=True)
 class Specimen:
-    """Dimensions of one specimen [mm], a cylinder of ``diameter`` and ``length``; both are alike.
+    """Dimensions of one specimen [mm]; both specimens are the same.
 
-    ``strip_width`` is the width of the flat strip and the side of the pad; the chamfers fall
-    ``chamfer_depth`` from the strip's edge to the cylinder's side (not printed: assumed).
-    ``ring_nodes`` points are kept on the circumference where the holder ends, ``ring_distance``
-    from the contact plane. The pad has ``pad_elements`` squares along each side. ``radii`` are
-    those of the strip's form along and across the strip, None if it is flat.
+    Attributes
+    ----------
+    diameter, length
+        Diameter and length of the cylinder.
+    strip_width
+        Width of the flat strip and side of the pad.
+    chamfer_depth
+        Depth by which the chamfers fall from the strip's edge to the cylinder's side (not given in
+        the source: assumed).
+    ring_distance
+        Distance from the contact plane of the ring, the circumference where the holder ends.
+    ring_nodes
+        Number of points that are kept on the ring.
+    pad_elements
+        Number of squares along each side of the pad.
+    radii
+        Radii of the strip's form along and across the strip; None if it is flat.
 
     Examples
     --------
@@ -109,10 +122,10 @@ class Specimen:
             raise MeshError(f"radii {self.radii}: each must exceed half of strip_width")
 
     def gap(self, x: Array, y: Array) -> Array:
-        """Distance of the unloaded faces at points of the contact plane [mm].
+        """Return the distance of the unloaded faces at points of the contact plane [mm].
 
-        Body 1's strip lies along x, body 2's along y: with radii R_1 along and R_2 across the
-        crossed strips touch like spheres, at the relative radius R_1 R_2/(R_1 + R_2). Raises
+        Body 1's strip lies along x, body 2's along y: with radii R_1 along and R_2 across, the
+        crossed strips touch like spheres, at the relative radius R_1 R_2/(R_1 + R_2). Raise
         :class:`MeshError` for points beyond a radius, where there is no face.
         """
         x, y = places(x, y)
@@ -124,10 +137,10 @@ class Specimen:
         return gap
 
     def mesh(self, size: float = SIZE, growth: float = SIZE_GROWTH) -> StructureMesh:
-        """Mesh both specimens, elements growing from the pad's to ``size`` [mm].
+        """Mesh both specimens with elements that grow from the pad's size to ``size`` [mm].
 
-        Boundaries of both bodies: ``contact`` (the pad), ``gripped`` (the far end), ``holder`` (the
-        side from there to the ring). The interface is ``contact``.
+        Boundaries of both bodies are ``contact`` (the pad), ``gripped`` (the far end) and
+        ``holder`` (the side from there to the ring). The interface is ``contact``.
         """
         self.check()
         for name, value in (("size", size), ("growth", growth)):
@@ -141,7 +154,7 @@ class Specimen:
         return StructureMesh((body_1, body_2), (face,))
 
     def ring(self, body: Body) -> Indices:
-        """Vertices of the ring, ``(ring_nodes,)``, by angle from the X axis."""
+        """Return the vertices of the ring, ``(ring_nodes,)``, by angle from the X axis."""
         angle = 2.0 * np.pi * np.arange(self.ring_nodes) / self.ring_nodes
         side = np.sign(body.mesh.p[2].mean())
         points = 0.5 * self.diameter * np.stack([np.cos(angle), np.sin(angle), 0.0 * angle], axis=1)
@@ -154,9 +167,10 @@ class Specimen:
         return nodes.astype(np.int64)
 
     def target(self, body: Body, distance: float) -> Indices:
-        """The vertex ``(1,)`` closest to X = R, Y = 0, so far from the contact plane [mm].
+        """Return the vertex ``(1,)`` closest to X = R, Y = 0 at a distance from the contact plane.
 
-        Vertices on the boundary of the body lie there; the ring's own are left out.
+        ``distance`` is in mm. Only vertices on the boundary of the body, and not on the ring, are
+        considered.
         """
         side = np.sign(body.mesh.p[2].mean())
         place = np.array([0.5 * self.diameter, 0.0, side * distance])
@@ -165,7 +179,7 @@ class Specimen:
         return free[[away.argmin()]].astype(np.int64)
 
     def _mesh(self, size: float, growth: float) -> Any:
-        """Mesh of body 1: a quarter, mirrored about X = 0 and Y = 0."""
+        """Return the mesh of body 1: a quarter, mirrored about X = 0 and Y = 0."""
         with gmsh_model("specimen") as gmsh:
             surfaces = _draw_quarter(gmsh.model, self)
             half = 0.5 * self.strip_width
@@ -183,7 +197,7 @@ class Specimen:
 
 
 def _sagitta(distance: Array, radius: float) -> Array:
-    """Drop of a circular arc at a distance from its top, without cancellation."""
+    """Return the drop of a circular arc at a distance from its top, without cancellation."""
     return distance**2 / (radius + np.sqrt(radius**2 - distance**2))
 
 
@@ -209,9 +223,9 @@ def _draw_quarter(model: Any, specimen: Specimen) -> dict[str, int]:
 
 
 def _chamfer(occ: Any, specimen: Specimen) -> list[tuple[int, int]]:
-    """The wedge that a chamfer removes; it reaches beyond the cylinder."""
+    """Return the wedge that a chamfer removes; it extends beyond the cylinder."""
     half, radius = 0.5 * specimen.strip_width, 0.5 * specimen.diameter
-    # Twice as far from the strip's edge as the side of the cylinder, and twice as deep there.
+    # The wedge ends twice as far from the strip's edge as the cylinder's side, and twice as deep.
     far, deep = 2.0 * radius - half, -2.0 * specimen.chamfer_depth
     corners = ((half, 0.0), (far, deep), (far, radius), (half, radius))
     points = [occ.addPoint(-radius, y, z) for y, z in corners]
@@ -222,7 +236,7 @@ def _chamfer(occ: Any, specimen: Specimen) -> list[tuple[int, int]]:
 
 
 def _entity(model: Any, dim: int, low: Sequence[float], high: Sequence[float]) -> int:
-    """The only entity of that dimension with the bounding box ``low``, ``high``."""
+    """Return the only entity of that dimension with the bounding box ``low``, ``high``."""
     box = np.array([*low, *high])
     tags = [
         tag
@@ -235,9 +249,9 @@ def _entity(model: Any, dim: int, low: Sequence[float], high: Sequence[float]) -
 
 
 def _mesh_pad(model: Any, pad: int, half: float, squares: int) -> None:
-    """Squares on a quarter of the pad, split along diagonals towards the pad's centre.
+    """Mesh a quarter of the pad with squares, split along diagonals towards the pad's centre.
 
-    Mirrored, the pattern is the same after a swap of X and Y.
+    After mirroring, the pattern is unchanged by an exchange of X and Y.
     """
     corners = [(0.0, 0.0), (half, 0.0), (half, half), (0.0, half)]
     for start, end in pairwise([*corners, corners[0]]):
@@ -249,7 +263,7 @@ def _mesh_pad(model: Any, pad: int, half: float, squares: int) -> None:
 
 
 def _mesh_ring(model: Any, specimen: Specimen) -> None:
-    """One element round the ring from each kept node to the next."""
+    """Mesh the ring with one element from each kept node to the next."""
     radius, level = 0.5 * specimen.diameter, -specimen.ring_distance
     arc = _entity(model, 1, (0.0, 0.0, level), (radius, radius, level))
     model.mesh.setTransfiniteCurve(arc, specimen.ring_nodes // 4 + 1)
@@ -258,7 +272,7 @@ def _mesh_ring(model: Any, specimen: Specimen) -> None:
 def _mirrored(
     points: Array, tets: Indices, faces: dict[str, Indices], axis: int, same: float
 ) -> tuple[Array, Indices, dict[str, Indices]]:
-    """A mesh and its mirror image about the plane through zero across an axis, as one."""
+    """Return a mesh together with its mirror image about the plane through zero across an axis."""
     on_plane = np.abs(points[:, axis]) < same
     points = points.copy()
     points[on_plane, axis] = 0.0

@@ -1,4 +1,4 @@
-"""Bodies condensed one by one, each of which may have been condensed before."""
+"""Condensation of single bodies, with a store for bodies that were condensed before."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from sa_solver.types import Array, Indices
 
 # Stiffness and loads of a condensed body.
 Condensed = tuple[Array, Array]
-# Takes all arrays that a condensation is made from, and what makes it: gives it made, or as it was
-# kept when it was made from the same arrays.
+# Store of condensed bodies: called with all arrays that a condensation is computed from and the
+# function that computes it, it returns the stored result for these arrays or computes it.
 Keep = Callable[[Sequence[np.ndarray], Callable[[], Condensed]], Condensed]
 
 
 def made_anew(made_from: Sequence[np.ndarray], make: Callable[[], Condensed]) -> Condensed:
-    """Make it: nothing is kept."""
+    """Compute the condensation with ``make``, since nothing is stored."""
     return make()
 
 
@@ -29,22 +29,32 @@ def condense_body(
 ) -> Condensed:
     """Condense a body onto ``kept`` ``(c,)``: stiffness ``(c, c)`` and loads ``(c, cases)``.
 
-    As :func:`fe_models.solvers.linear_solver.condense`, which says what it raises. Load cases in
-    which nothing acts on the body take no part in it: what was kept of a body serves other
-    structures, whatever acts on their other bodies.
+    Raises what :func:`fe_models.solvers.linear_solver.condense` raises. Load cases that do not act
+    on the body are left out of the computation, so a stored body also serves in structures with
+    other loads on their other bodies.
     """
     acting = loads.any(axis=0)
-    own = np.ascontiguousarray(loads[:, acting])
-    # PARDISO's last bits depend on the threads that share the work.
-    made_from = stiffness.data, stiffness.indices, stiffness.indptr, own, kept, np.array(threads())
-    static, some = keep(made_from, partial(condense, stiffness, own, kept))
-    every = np.zeros((len(kept), loads.shape[1]))
-    every[:, acting] = some
-    return static, every
+    own_loads = np.ascontiguousarray(loads[:, acting])
+    # The last bits of PARDISO's results depend on the number of threads.
+    made_from = (
+        stiffness.data,
+        stiffness.indices,
+        stiffness.indptr,
+        own_loads,
+        kept,
+        np.array(threads()),
+    )
+    static, condensed_loads = keep(made_from, partial(condense, stiffness, own_loads, kept))
+    all_loads = np.zeros((len(kept), loads.shape[1]))
+    all_loads[:, acting] = condensed_loads
+    return static, all_loads
 
 
 def renamed(condensed: Condensed, names: sp.csr_matrix) -> Condensed:
-    """A condensed body in other coordinates: each row of ``names`` has one entry, 1 or -1."""
+    """Return a condensed body in other coordinates.
+
+    Each row of ``names`` has one entry, 1 or -1.
+    """
     static, loads = condensed
     old, sign = names.indices, np.round(names.data)
     static, loads = static[np.ix_(old, old)], sign[:, None] * loads[old]

@@ -1,9 +1,9 @@
 """Incremental Coulomb friction between two condensed bodies: stick, slip, separation per node.
 
-At each increment find the relative displacements w and the contact forces f = H w + f0 on body 2
+Each increment determines the relative displacements w and the contact forces f = H w + f0 on body 2
 that obey, node by node, unilateral contact with the gap g + w_z and Coulomb's law for the slip
-since the previous increment. Solved by splitting: its only parameter ρ comes from the extreme
-eigenvalues of H, and there is no penalty.
+since the previous increment. The problem is solved by operator splitting without a penalty; the
+only parameter ρ of the splitting comes from the extreme eigenvalues of H.
 """
 
 from __future__ import annotations
@@ -24,28 +24,39 @@ from sa_solver.errors import InputError
 from sa_solver.splitting import SplittingResult, douglas_rachford
 from sa_solver.types import Array
 
-# Out-of-balance forces left, relative to the forces of the load at hand.
+# Out-of-balance forces that are tolerated, relative to the forces of the increment's load.
 TOLERANCE = 1e-7
 # An unloaded increment is measured against this share of the largest load of the path.
 LOAD_FLOOR = 1e-3
-# An increment needs 5 to 100 iterations; one that takes more than this walks in circles.
+# An increment needs 5 to 100 iterations; one that takes more than this does not converge.
 MAX_ITERATIONS = 1000
-# A first increment, which may be a leap, that takes more than this gets on better from the heaviest
-# load: rounding decides whether some thousand iterations are enough for worn faces to meet.
-LEAP = 200
-# On the way to a light load what is left of the heaviest falls by this factor from one solution to
-# the next, which takes 50 iterations each.
-LIGHTENED = 0.1
+# Iterations allowed for a first increment, which may be far from the start. If it needs more, it is
+# started from the solution under the heaviest load instead: otherwise rounding decides whether some
+# thousand iterations are enough for worn faces to meet.
+FIRST_ITERATIONS = 200
+# Factor by which the excess over a light first load is reduced from one auxiliary solution to the
+# next. Each of them takes about 50 iterations.
+UNLOADING_FACTOR = 0.1
 
 
 @dataclass(frozen=True)
 class FrictionState:
-    """State at the end of one increment, components in the interface frames.
+    """State at the end of one increment, with components in the interface frames.
 
-    ``force`` ``(3, n)`` on body 2 [N]; ``displacement`` ``(3, n)`` of body 2 relative to body 1 and
-    ``slip`` ``(2, n)`` its tangential part since the previous increment [mm]; ``state``
-    ``(d n,)`` is the splitting's, to start from again. In plane strain forces are per length and
-    have no y component.
+    In plane strain forces are per length and have no y component.
+
+    Attributes
+    ----------
+    force
+        Force on body 2 ``(3, n)`` [N].
+    displacement
+        Displacement of body 2 relative to body 1 ``(3, n)`` [mm].
+    slip
+        Change of its tangential part since the previous increment ``(2, n)`` [mm].
+    state
+        State of the splitting ``(d n,)``, from which it can start again.
+    residual, iterations, converged
+        Final residual of the splitting, its iterations, and whether it converged.
     """
 
     force: Array
@@ -58,7 +69,7 @@ class FrictionState:
 
 
 class FrictionalJoint:
-    """A joint with friction coefficient µ, one or by node ``(n,)``, for any gaps and loads.
+    """Joint with a friction coefficient µ, one or by node ``(n,)``, for any gaps and loads.
 
     Examples
     --------
@@ -75,7 +86,7 @@ class FrictionalJoint:
     """
 
     def __init__(self, joint: JointResolvent, friction: float | Array) -> None:
-        """Take the joint and its friction. Raises InputError for a µ below 0 or not finite."""
+        """Store the joint and its friction. Raises InputError for a µ below 0 or not finite."""
         if np.ndim(friction) == 0:
             friction = checks.number("friction", friction, least=0.0)
         else:
@@ -90,12 +101,25 @@ class FrictionalJoint:
         previous: Array | None = None,
         guess: Sequence[Array] = (),
     ) -> Iterator[FrictionState]:
-        """States along a load path ``(increments, cases)``.
+        """Yield the state of each increment along a load path.
 
-        ``gap`` ``(n,)`` is the distance of the unloaded faces [mm]; ``previous`` the displacement
-        ``(3, n)`` that the path starts from, unslipped unless it is given. ``guess`` are the
-        ``state`` of every increment of a similar path: they save iterations and change nothing
-        else. Raises InputError for loads and gaps of another number, or not finite.
+        Parameters
+        ----------
+        amplitudes
+            Amplitudes of the load cases ``(increments, cases)``.
+        gap
+            Distance of the unloaded faces ``(n,)`` [mm].
+        previous
+            Displacement ``(3, n)`` [mm] from which the path starts; by default an undeformed joint
+            without slip.
+        guess
+            The ``state`` of every increment of a similar path. They save iterations and do not
+            change the solution otherwise.
+
+        Raises
+        ------
+        InputError
+            If the number of loads or gaps is wrong, or a value is not finite.
         """
         size, cases = self._joint.loads.shape
         amplitudes = checks.array("amplitudes", amplitudes, (None, cases))
@@ -123,9 +147,9 @@ class FrictionalJoint:
             yield state
 
     def _with_images(self, vectors: Array) -> Array:
-        """``vectors`` ``(m, d n)``, and what the resolvent makes of each: ``(m, 2, d n)``.
+        """Return ``vectors`` ``(m, d n)`` with the resolvent's product of each: ``(m, 2, d n)``.
 
-        Of sums of them it makes the sums: no product is needed to look at a start.
+        The image of a sum is the sum of the images, so no product is needed to assess a start.
         """
         with one_thread(self._joint.widest):
             return np.stack([vectors, self._joint.product(vectors.T).T], axis=1)
@@ -133,36 +157,41 @@ class FrictionalJoint:
     def _first(
         self, increment: _Increment, heaviest: Array, starts: list[Array]
     ) -> tuple[FrictionState, Array]:
-        """The first increment: in a short leap, from the heaviest load, or in a long leap."""
-        solved = self._solve(increment, starts, LEAP)
+        """Solve the first increment.
+
+        It is solved in few iterations, or else from the solution under the heaviest load, or else
+        in many iterations.
+        """
+        solved = self._solve(increment, starts, FIRST_ITERATIONS)
         if not solved[0].converged:
-            solved = self._lightened(increment, heaviest, starts)
+            solved = self._unloaded_from(increment, heaviest, starts)
         if not solved[0].converged:
             solved = self._solve(increment, starts)
         return solved
 
-    def _lightened(
+    def _unloaded_from(
         self, increment: _Increment, heaviest: Array, starts: list[Array]
     ) -> tuple[FrictionState, Array]:
-        """An increment from where the heaviest load takes the bodies, by ever lighter ones.
+        """Solve an increment from the solution under the heaviest load, by ever lighter loads.
 
-        A light load would take a body long to where worn faces meet: pressed hard it is there at
-        once, and what a tenth of the load does is always near.
+        From rest a light load would need many iterations to move a body until worn faces meet. A
+        heavy load closes them at once, and each tenth of the excess leads to a nearby solution.
         """
         load = increment.load
-        more = heaviest - load
+        excess = heaviest - load
         _, ended = self._solve(increment._replace(load=heaviest), starts)
-        while np.linalg.norm(more[0]) > np.linalg.norm(load[0]) > 0.0:
-            more = LIGHTENED * more
-            _, ended = self._solve(increment._replace(load=load + more), [ended])
+        while np.linalg.norm(excess[0]) > np.linalg.norm(load[0]) > 0.0:
+            excess = UNLOADING_FACTOR * excess
+            _, ended = self._solve(increment._replace(load=load + excess), [ended])
         return self._solve(increment, [ended])
 
     def _solve(
         self, increment: _Increment, starts: list[Array], most: int | None = None
     ) -> tuple[FrictionState, Array]:
-        """One increment, and the splitting's state with its image; ``starts`` have theirs.
+        """Solve one increment; return its state, and the state of the splitting with its image.
 
-        It takes as many iterations as all starts may, unless told how many at ``most``.
+        ``starts`` have their images. The number of iterations is at most ``most``, or by default as
+        many as all starts together may take.
         """
         with one_thread(self._joint.widest):
             problem = _Problem(self._joint, self._friction, increment)
@@ -171,10 +200,10 @@ class FrictionalJoint:
 
 
 class _Increment(NamedTuple):
-    """One increment: its ``load`` with the image ``(2, d n)``, and whence it leads.
+    """One increment: its ``load`` with its image ``(2, d n)``, and the state that it starts from.
 
-    ``gap`` ``(n,)`` and ``previous`` ``(3, n)`` as of :meth:`FrictionalJoint.march`. Residuals are
-    relative to the load, which counts as ``floor`` at least [N].
+    ``gap`` ``(n,)`` and ``previous`` ``(3, n)`` are as in :meth:`FrictionalJoint.march`. Residuals
+    are relative to the load, which counts as at least ``floor`` [N].
     """
 
     load: Array
@@ -184,15 +213,15 @@ class _Increment(NamedTuple):
 
     @property
     def scale(self) -> float:
-        """The force that residuals are relative to [N]."""
+        """Force that residuals are relative to [N]."""
         return max(float(np.linalg.norm(self.load[0])), self.floor)
 
 
 class _Problem:
-    """One increment: the two steps of the splitting under one load.
+    """Splitting problem of one increment: its two steps under one load.
 
-    Products are of single precision with how far the splitting has moved since the last one of
-    double precision: in half the time, and exact where it ends.
+    Products are computed in single precision for the change of the splitting's state since the last
+    product in double precision. This takes half the time, and the final result is exact.
     """
 
     def __init__(
@@ -206,10 +235,11 @@ class _Problem:
         self._exact = np.zeros_like(increment.load)
 
     def solve(self, starts: list[Array], most: int) -> tuple[FrictionState, Array]:
-        """Split from the most promising start, and from the others should it fail.
+        """Run the splitting from the most promising start, and from the others if it fails.
 
-        First so that no extrapolation throws a body off, then so that one may fly to its contacts,
-        in ``most`` iterations together. The state is given with its image.
+        The first attempts do not extrapolate, so that no body is thrown off; the later ones do, so
+        that a body can quickly reach its contacts. All attempts together take at most ``most``
+        iterations. The state is returned with its image.
         """
         iterations = 0
         promising = sorted(starts, key=self._distance)
@@ -248,20 +278,21 @@ class _Problem:
         return admissible[self._axes, :].T.ravel()
 
     def _nodal(self, values: Array) -> Array:
-        """Components x, y, z at each node ``(3, n)``."""
+        """Return components x, y, z at each node ``(3, n)``."""
         return in_space(values.reshape(len(self._gap), -1)).T
 
     def _sticking_force(self, trial: Array) -> Array:
-        """Force ``(3, n)`` that would close the gap and undo the slip, whatever its size.
+        """Return the unlimited force ``(3, n)`` that would close the gap and undo the slip.
 
-        Within the law it brings a trial displacement ``(3, n)`` back to it, at stiffness ρ.
+        The contact law limits this force, and it brings a trial displacement ``(3, n)`` back at
+        stiffness ρ.
         """
         stick = self._rho * (self._previous - trial)
         stick[2] = -self._rho * (self._gap + trial[2])
         return stick
 
     def _distance(self, start: Array) -> float:
-        """How far a start is from a solution: the splitting's first step."""
+        """Return the distance of a start from a solution: the length of a splitting step."""
         state, image = start
         elastic = self._rho * image - self._offset
         return float(np.linalg.norm(self._law(2.0 * elastic - state) - elastic))
@@ -272,7 +303,8 @@ class _Problem:
         return FrictionState(
             force=force,
             displacement=self._nodal(split.solution),
-            # The difference of displacements, but 0 where a node sticks and never along the force.
+            # This is the change of displacement, but exactly 0 where a node sticks and never in
+            # the direction of the force.
             slip=(force - stick)[:2] / self._rho,
             state=split.state,
             residual=split.residual,
@@ -282,10 +314,11 @@ class _Problem:
 
 
 def _starts(states: list[Array], guesses: Array, loads: Array) -> list[Array]:
-    """Where the next increment, whose load is the last of ``loads`` ``(t, d n)``, may start from.
+    """Return states from which the next increment, under the last of ``loads``, may start.
 
-    The previous state; the change that the guess makes there; and the change in proportion to the
-    load, as long as that goes on in the same sense. States have their images.
+    They are the previous state; that state plus the change of the guess; and, while the load
+    continues in the same direction, that state plus the last change in proportion to the load. The
+    loads are ``(t, d n)``. States have their images.
     """
     increment = len(states)
     starts = [states[-1]]
@@ -300,9 +333,10 @@ def _starts(states: list[Array], guesses: Array, loads: Array) -> list[Array]:
 
 
 def _at_rest(gap: Array, load: Array) -> Array:
-    """Where the first increment may start from ``(1, d n)``: rest or, where no node touches, all.
+    """Return the state ``(1, d n)`` from which the first increment starts.
 
-    A body that floats would be long on its way there.
+    It is rest or, where no node touches, the state with all gaps closed: a floating body would take
+    many iterations to reach its contact.
     """
     rest = np.zeros((len(gap), load.shape[-1] // len(gap)))
     if gap.min() > 0.0:

@@ -1,10 +1,10 @@
-"""The joint that condensed bodies form.
+"""Joint of condensed bodies.
 
-Each body is condensed onto its interface nodes, S u = r + f, with f the contact forces on it. Of
+Each body is condensed onto its interface nodes, S u = r + f, with f the contact forces on it. For
 all bodies together S is block-diagonal; u_1 are the displacements of bodies 1 of the interfaces at
 their faces, u_2 those of bodies 2. With N the projection of u_1 onto the nodes of faces 2,
-w = u_2 - N u_1 is the relative displacement and forces f on bodies 2 are -Nᵀf on bodies 1. They
-form one joint
+w = u_2 - N u_1 is the relative displacement, and forces f on bodies 2 are -Nᵀf on bodies 1. The
+bodies form one joint
 
     f = H w + f0,   H = S_22 - K C⁻¹ Kᵀ,   f0 = K C⁻¹ (r_1 + Nᵀr_2) - r_2,
     K = S_21 + S_22 N,   C = S_11 + S_12 N + NᵀS_21 + NᵀS_22 N,
@@ -14,7 +14,7 @@ are body 1 of one interface and body 2 of another. N is the identity where faces
 H is symmetric; the rigid motions of bodies that are held by contact alone are its null space.
 
 A plane of symmetry through a contact holds displacements u_1 and u_2 of its nodes at zero. They are
-left out of S and N, and so is their w, which no force acts on: supports carry it.
+left out of S and N, and so is their w: the supports carry the forces along them.
 """
 
 from __future__ import annotations
@@ -39,9 +39,9 @@ from sa_solver.types import Array, Indices
 
 T = TypeVar("T")
 
-# Eigenvalues below this share of the largest are rigid motions; elastic ones start near 1e-3.
+# Eigenvalues below this share of the largest are rigid motions; elastic ones start near 1e-3 of it.
 RIGID_LIMIT = 1e-7
-# Residual of eigenvectors over their eigenvalue: eigenvalues are exact to its square.
+# Tolerated residual of eigenvectors over their eigenvalue: eigenvalues are exact to its square.
 RITZ_RESIDUAL = 1e-9
 # Share of the largest eigenvalue that makes the singular joint invertible for the Lanczos search.
 SPECTRUM_SHIFT = 1e-5
@@ -49,19 +49,30 @@ SPECTRUM_SHIFT = 1e-5
 
 @dataclass(frozen=True)
 class JointStiffness:
-    """The joint ``f = H w + Σ_c amplitude_c loads_c`` in the interface frames.
+    """Stiffness and loads of a joint ``f = H w + Σ_c amplitude_c loads_c`` in the interface frames.
 
-    ``stiffness`` ``(d n, d n)`` [N/mm] and ``loads`` ``(d n, cases)`` [N], numbered ``d node +
-    component`` over all interfaces in d dimensions, per length in the plane; ``rigid_modes`` counts
-    H's null space; ``smallest`` and ``largest`` are its extreme elastic eigenvalues. Of the
-    displacements that ``held`` ``(d n,)`` marks, which stay zero, there are no rows and columns. A
-    joint with a mirror symmetry, which holds none, is split into its symmetric and antisymmetric
-    parts.
+    A joint with a mirror symmetry, and without held displacements, is split into its symmetric and
+    antisymmetric parts.
+
+    Attributes
+    ----------
+    stiffness
+        H ``(d n, d n)`` [N/mm], numbered ``d node + component`` over all interfaces in d
+        dimensions, per length in the plane.
+    loads
+        Load cases ``(d n, cases)`` [N].
+    rigid_modes
+        Dimension of H's null space.
+    smallest, largest
+        Extreme elastic eigenvalues of H [N/mm].
+    held
+        Flags ``(d n,)`` of displacements that stay zero; the stiffness and the loads have no rows
+        and columns for these.
 
     Examples
     --------
-    A node on springs of 100 N/mm: with the splitting's ρ, the mean of the extreme eigenvalues, its
-    resolvent is 1 / (100 + 100).
+    A node is on springs of 100 N/mm. With the splitting's ρ, the geometric mean of the extreme
+    eigenvalues, its resolvent is 1 / (100 + 100).
 
     >>> import numpy as np
     >>> from fe_models import JointStiffness
@@ -86,33 +97,33 @@ class JointStiffness:
             checks.settle(self, stiffness=stiffness)
 
     def resolvent(self) -> JointResolvent:
-        """(H + ρ)⁻¹ with ρ the geometric mean of the extreme elastic eigenvalues.
+        """Return (H + ρ)⁻¹ with ρ the geometric mean of the extreme elastic eigenvalues.
 
         It is zero for displacements that are held, as if H were infinite there.
         """
         rho = float(np.sqrt(self.smallest * self.largest))
         if isinstance(self.stiffness, SplitMatrix):
             jobs = [partial(_shifted_inverse, block, rho) for block in self.stiffness.blocks]
-            symmetric, antisymmetric = _side_by_side(jobs)
+            symmetric, antisymmetric = _in_single_threads(jobs)
             split = SplitMatrix(self.stiffness.mirror, (symmetric, antisymmetric))
             return JointResolvent(split, rho, self.loads, self.rigid_modes)
         inverse = _shifted_inverse(self.stiffness, rho)
         loads = self.loads
         if self.held is not None and self.held.any():
             free = np.flatnonzero(~self.held)
-            every = np.zeros((len(self.held),) * 2)
-            every[np.ix_(free, free)] = inverse
-            inverse, loads = every, np.zeros((len(every), loads.shape[1]))
+            whole = np.zeros((len(self.held),) * 2)
+            whole[np.ix_(free, free)] = inverse
+            inverse, loads = whole, np.zeros((len(whole), loads.shape[1]))
             loads[free] = self.loads
         return JointResolvent(inverse, rho, loads, self.rigid_modes)
 
 
 @dataclass(frozen=True)
 class JointResolvent:
-    """What structural friction needs of a joint.
+    """Resolvent of a joint, with all that the friction solver needs of the joint.
 
     ``inverse`` ``(d n, d n)`` is (H + ρ)⁻¹ [mm/N] with ``rho`` ρ [N/mm]; ``loads`` and
-    ``rigid_modes`` are the joint's.
+    ``rigid_modes`` are those of the joint.
     """
 
     inverse: Array | SplitMatrix
@@ -121,11 +132,11 @@ class JointResolvent:
     rigid_modes: int
 
     def product(self, vectors: Array) -> Array:
-        """(H + ρ)⁻¹ times ``vectors`` ``(d n,)`` or ``(d n, m)``."""
+        """Return (H + ρ)⁻¹ times ``vectors`` ``(d n,)`` or ``(d n, m)``."""
         return _product(self.inverse, vectors)
 
     def rounded_product(self, vector: Array) -> Array:
-        """The same in single precision, of one vector ``(d n,)``: in half the time."""
+        """Return the product with one vector ``(d n,)`` in single precision, in half the time."""
         return _product(self._rounded, vector)
 
     @cached_property
@@ -136,17 +147,20 @@ class JointResolvent:
 
     @property
     def widest(self) -> int:
-        """Unknowns of the largest matrix that a product with the inverse takes."""
+        """Number of unknowns of the largest matrix in a product with the inverse."""
         if isinstance(self.inverse, SplitMatrix):
             return max(map(len, self.inverse.blocks))
         return len(self.inverse)
 
     def normal_stiffness(self, nodes: int) -> Array:
-        """H between the normal displacements of so many nodes ``(nodes, nodes)`` [N/mm]."""
-        every = np.asarray(self.inverse)
-        free = np.flatnonzero(np.diag(every))
-        stiffness = np.zeros_like(every)
-        stiffness[np.ix_(free, free)] = np.linalg.inv(every[np.ix_(free, free)])
+        """Return H between the normal displacements of the ``nodes`` ``(nodes, nodes)`` [N/mm].
+
+        ``nodes`` is their number.
+        """
+        inverse = np.asarray(self.inverse)
+        free = np.flatnonzero(np.diag(inverse))
+        stiffness = np.zeros_like(inverse)
+        stiffness[np.ix_(free, free)] = np.linalg.inv(inverse[np.ix_(free, free)])
         stiffness[free, free] -= self.rho
         normal = slice(len(self.loads) // nodes - 1, None, len(self.loads) // nodes)
         return np.asarray(stiffness[normal, normal])
@@ -159,14 +173,24 @@ def join(
     held: NDArray[np.bool_] | None = None,
     like: JointResolvent | None = None,
 ) -> JointStiffness:
-    """Join condensed ``bodies``, which need not be held but where all faces stick.
+    """Join condensed ``bodies``, which need to be held only when all faces stick.
 
-    ``projection`` ``(d n, d n_1)`` is N on displacements, None where all faces meet node to node;
-    ``places`` ``(k,)`` are those of each body's displacements among u_1 followed by u_2, by default
-    of two bodies, the first below and the second above all faces. Of those that ``held`` ``(d n,)``
-    marks neither the projection nor u_2 has rows. A joint that differs little from ``like`` may
-    take its ρ as extreme eigenvalues: the search for its own fails where contact alone holds a body
-    in a centrifugal field, which makes H slightly indefinite.
+    Parameters
+    ----------
+    bodies
+        Stiffness and loads of each condensed body.
+    projection
+        N on displacements ``(d n, d n_1)``; None where all faces meet node to node. It has no rows
+        and columns for held displacements.
+    places
+        Positions ``(k,)`` of each body's displacements in u_1 followed by u_2. By default there are
+        two bodies, the first below and the second above all faces.
+    held
+        Flags ``(d n,)`` of displacements u_2 that are held.
+    like
+        A joint that differs little from this one and whose ρ is used as both extreme eigenvalues.
+        The search for the joint's own fails where contact alone holds a body in a centrifugal
+        field, which makes H slightly indefinite.
     """
     stiffness, loads = _joined(_faces(bodies, projection, places), projection)
     if like is None:
@@ -181,7 +205,7 @@ def join_halves(
 ) -> JointStiffness:
     """Join two bodies that meet node to node, condensed in halves of the same ``mirror``."""
     jobs = [partial(_joined_half, *pair) for pair in zip(halves_1, halves_2, strict=True)]
-    joined = _side_by_side(jobs)
+    joined = _in_single_threads(jobs)
     (symmetric, symmetric_loads), (antisymmetric, antisymmetric_loads) = (
         half for half, _ in joined
     )
@@ -194,19 +218,22 @@ def join_halves(
 def _joined_half(
     half_1: Condensed, half_2: Condensed
 ) -> tuple[Condensed, tuple[int, float, float]]:
-    """H and f0 of a half, and the spectrum of H."""
+    """Return H and f0 of a half, and the spectrum of H."""
     stiffness, loads = _joined(_Faces(half_1, half_2, None), None)
     return (stiffness, loads), _spectrum(stiffness, 1)
 
 
-def _side_by_side(jobs: Sequence[Callable[[], T]]) -> list[T]:
-    """What jobs of dense algebra give, by one thread each: as fast as one by one by all."""
+def _in_single_threads(jobs: Sequence[Callable[[], T]]) -> list[T]:
+    """Run jobs of dense algebra in parallel, with one BLAS thread each.
+
+    This is as fast as running them one by one with all threads.
+    """
     with one_thread():
         return at_once(jobs)
 
 
 def _product(matrix: Matrix | SplitMatrix, vectors: Array) -> Array:
-    """A symmetric matrix times ``vectors`` ``(n,)`` or ``(n, m)``."""
+    """Return a symmetric matrix times ``vectors`` ``(n,)`` or ``(n, m)``."""
     if isinstance(matrix, SplitMatrix):
         return matrix @ vectors
     return symmetric_product(matrix, vectors)
@@ -225,30 +252,30 @@ def _faces(
     projection: sp.csr_matrix | None,
     places: Sequence[Indices] | None,
 ) -> _Faces:
-    """Faces 1 and faces 2 of ``bodies`` whose displacements are at ``places`` among all."""
-    every = sum(len(stiffness) for stiffness, _ in bodies)
+    """Assemble ``bodies``, whose displacements have ``places`` among all, into faces 1 and 2."""
+    total = sum(len(stiffness) for stiffness, _ in bodies)
     if places is None or (
-        len(bodies) == 2 and np.array_equal(np.concatenate(places), np.arange(every))
+        len(bodies) == 2 and np.array_equal(np.concatenate(places), np.arange(total))
     ):
         return _Faces(bodies[0], bodies[1], None)
-    count = every // 2 if projection is None else projection.shape[1]
+    count = total // 2 if projection is None else projection.shape[1]
     cases = bodies[0][1].shape[1]
     first = np.zeros((count, count)), np.zeros((count, cases))
-    second = np.zeros((every - count,) * 2), np.zeros((every - count, cases))
+    second = np.zeros((total - count,) * 2), np.zeros((total - count, cases))
     coupling = None
     for (stiffness, loads), place in zip(bodies, places, strict=True):
         one, two = np.flatnonzero(place < count), np.flatnonzero(place >= count)
-        for (matrix, forces), own, start in ((first, one, 0), (second, two, count)):
-            matrix[np.ix_(place[own] - start, place[own] - start)] = stiffness[np.ix_(own, own)]
-            forces[place[own] - start] = loads[own]
+        for (matrix, forces), mine, start in ((first, one, 0), (second, two, count)):
+            matrix[np.ix_(place[mine] - start, place[mine] - start)] = stiffness[np.ix_(mine, mine)]
+            forces[place[mine] - start] = loads[mine]
         if len(one) and len(two):
-            coupling = np.zeros((every - count, count)) if coupling is None else coupling
+            coupling = np.zeros((total - count, count)) if coupling is None else coupling
             coupling[np.ix_(place[two] - count, place[one])] = stiffness[np.ix_(two, one)]
     return _Faces(first, second, coupling)
 
 
 def _joined(faces: _Faces, projection: sp.csr_matrix | None) -> tuple[Array, Array]:
-    """H and f0 of the load cases."""
+    """Return H and f0 of the load cases."""
     (stiffness_1, loads_1), (stiffness_2, loads_2), between = faces
     if projection is None:
         coupling, carried, transferred = stiffness_2, stiffness_2, loads_2
@@ -271,21 +298,21 @@ def _joined(faces: _Faces, projection: sp.csr_matrix | None) -> tuple[Array, Arr
 
 
 def _by_columns(symmetric: Matrix) -> Matrix:
-    """The same matrix as LAPACK takes it without a copy."""
+    """Return the same symmetric matrix in column order, which LAPACK takes without a copy."""
     return symmetric if symmetric.flags.f_contiguous else symmetric.T
 
 
 def _shifted(stiffness: Matrix, shift: float) -> Array:
-    """H + shift, by columns."""
+    """Return H + shift in column order."""
     shifted = np.array(_by_columns(stiffness), np.float64, order="K")
     shifted[np.diag_indices_from(shifted)] += shift
     return shifted
 
 
 def _shifted_inverse(stiffness: Matrix, rho: float) -> Array:
-    """(H + ρ)⁻¹, symmetric to the last bit."""
+    """Return (H + ρ)⁻¹, symmetric to the last bit."""
     factor = sl.cholesky(_shifted(stiffness, rho), lower=True, overwrite_a=True, check_finite=False)
-    # Nothing is above the diagonal of either.
+    # Both matrices are zero above the diagonal.
     lower, _ = sl.lapack.dpotri(factor, lower=1, overwrite_c=1)
     inverse = lower + lower.T
     inverse[np.diag_indices_from(inverse)] = np.diag(lower)
@@ -293,11 +320,11 @@ def _shifted_inverse(stiffness: Matrix, rho: float) -> Array:
 
 
 def _spectrum(stiffness: Array, free: int) -> tuple[int, float, float]:
-    """Number of zero eigenvalues, smallest other one and largest one, by Lanczos iterations.
+    """Return the number of zero eigenvalues, the smallest other one and the largest one.
 
-    So many bodies may be ``free``. Lanczos iterations owe it to rounding how many copies they find
-    of an eigenvalue that there is several times. What they have found is therefore taken out, and
-    looked for again, until no zero is left.
+    ``free`` is the number of bodies that may be free. Rounding decides how many copies of a
+    multiple eigenvalue Lanczos iterations find. Eigenvectors that were found are therefore
+    projected out, and the search is repeated until no zero eigenvalue is left.
     """
     start = np.random.default_rng(0).standard_normal(len(stiffness))
     extreme = partial(eigsh, v0=start, tol=RITZ_RESIDUAL)
@@ -329,7 +356,7 @@ def _spectrum(stiffness: Array, free: int) -> tuple[int, float, float]:
 
 
 def _without(operator: LinearOperator, vectors: Array) -> LinearOperator:
-    """Return a symmetric operator that takes orthonormal ``vectors`` ``(n, k)`` to zero."""
+    """Return a symmetric operator that maps orthonormal ``vectors`` ``(n, k)`` to zero."""
 
     def outside(vector: Array) -> Array:
         return vector - vectors @ (vectors.T @ vector)

@@ -1,18 +1,18 @@
-"""Faces that do not meet node to node, tied by a mortar with dual shape functions.
+"""Mortar tie with dual shape functions, for faces that do not meet node to node.
 
-Pressure and shear live on body 2's face (the slave's). With φ its linear shape functions, φᵐ those
-of body 1's face (the master's) and ψ the dual functions, biorthogonal to φ over the part A of the
-slave that the master covers,
+Pressure and shear are defined on body 2's face, the slave. With φ its linear shape functions, φᵐ
+those of body 1's face, the master, and ψ the dual functions, biorthogonal to φ over the part A of
+the slave that the master covers,
 
     D_ij = ∫_A ψ_i φ_j = δ_ij ∫_A φ_i,   M_ik = ∫_A ψ_i φᵐ_k,   N = D⁻¹M,
 
 so N gives a master field at the slave's nodes, the relative displacement is u_2 - N u_1, and forces
-f on body 2 are -Nᵀf on body 1. Rows of N add up to one and carry linear fields: resultants and
-moments of both sides are equal, and a uniform pressure passes.
+f on body 2 are -Nᵀf on body 1. Rows of N add up to one and reproduce linear fields, so the
+resultants and moments of both sides are equal, and a uniform pressure is transmitted exactly.
 
-Everything is projected along the normal z of the interface frame, and integrated exactly on the
-polygons that the facets of both faces share. The ψ are built facet by facet on what is covered, so
-that an edge where one face ends inside a facet of the other needs nothing more.
+All points are projected along the normal z of the interface frame. Integration is exact on the
+polygons that the facets of both faces share. The ψ are built facet by facet on the covered part, so
+that an edge where one face ends inside a facet of the other needs no special treatment.
 
 Wohlmuth 2000, doi:10.1137/S0036142999350929; Popp, Gitterle, Gee & Wall 2010, doi:10.1002/nme.2866;
 covered parts: Cichosz & Bischoff 2011, doi:10.1016/j.cma.2010.11.004.
@@ -32,18 +32,19 @@ from fe_models.meshes.curved_face import TURNED, Surface, bulge_of
 from fe_models.meshes.structure_mesh import Body, Face, Interface, MeshError
 from sa_solver.types import Array, Frame, Indices, Mask
 
-# Share of a facet's area below which an overlap is rounding: neighbours that only share an edge.
+# Share of a facet's area below which an overlap is a rounding error: facets share only an edge.
 ROUNDING_AREA = 1e-12
-# A facet covered by a smaller share of its area is left out: its ψ would have to tell apart
-# displacements at three corners from what they do to a sliver.
+# A facet covered by a smaller share of its area is left out: the displacements at its three corners
+# can hardly be told apart from their values on a sliver, so its ψ would be ill-conditioned.
 SLIVER_SHARE = 1e-6
-# A node covered by a smaller share of its area drops out: N would extrapolate to it over more than
-# ten times the width of what is covered.
+# A node covered by a smaller share of its area is dropped: N would extrapolate to it over more than
+# ten times the width of the covered part.
 COVERED_SHARE = 1e-2
 # Facets of one face overlap, seen along the normal, when they cover more than this of another.
 FOLDED_SHARE = 1.0 + 1e-6
-# Gauss points of triangles by the degree they are exact for: shares of the corners, and of the area
-# (of degree 4: Strang & Fix 1973, in closed form as Dunavant 1985, doi:10.1002/nme.1620210612).
+# Gauss points of triangles by the degree for which they are exact: barycentric coordinates, and
+# weights as shares of the area (degree 4: Strang & Fix 1973, in closed form as in Dunavant 1985,
+# doi:10.1002/nme.1620210612).
 _ROOT_10, _OUTER = np.sqrt(10.0), np.sqrt(38.0 - 44.0 * np.sqrt(0.4))
 _NEAR, _FAR = ((8.0 - _ROOT_10 + sign * _OUTER) / 18.0 for sign in (1.0, -1.0))
 _OF_NEAR, _OF_FAR = (
@@ -62,14 +63,24 @@ EDGE_ON = 1e-6
 
 @dataclass(frozen=True)
 class Mortar:
-    """The tie of ``n`` slave and ``n_master`` master nodes, for scalar fields.
+    """Tie of ``n`` slave and ``n_master`` master nodes, for scalar fields.
 
-    ``projection`` ``(n, n_master)`` is N; ``areas`` ``(n,)`` is D, the covered area that belongs to
-    each slave node [mm²], in the plane its length [mm], and ``covered`` ``(n,)`` its share of all
-    the node's area; ``gap`` ``(n,)`` the distance of the faces along z, weighted by ψ [mm].
-    ``bulged`` ``(n,)`` is what surfaces add to it between vertices, and in it.
-    ``kept`` ``(n,)`` marks the nodes that the master covers enough to carry a pressure: the others
-    have no row in N and an infinite gap.
+    Attributes
+    ----------
+    projection
+        N ``(n, n_master)``.
+    areas
+        D ``(n,)``: the covered area that belongs to each slave node [mm²], in the plane its length
+        [mm].
+    covered
+        Covered share of each slave node's area ``(n,)``.
+    gap
+        Distance of the faces along z, weighted by ψ ``(n,)`` [mm]; it includes ``bulged``.
+    kept
+        Flags ``(n,)`` of the nodes that the master covers enough to carry a pressure. The others
+        have no row in N and an infinite gap.
+    bulged
+        Part of the gap ``(n,)`` [mm] due to the form of the surfaces between vertices.
     """
 
     projection: sp.csr_matrix
@@ -89,16 +100,25 @@ def mortar_projection(
 ) -> Mortar:
     """Tie two faces that lie on each other, seen along z.
 
-    Points ``(n, 3)`` are in the interface frame [mm]; facets are triangles ``(m, 3)``, or segments
-    ``(m, 2)`` in the plane y = 0; ``surfaces`` are what both are meshes of, which the gap knows.
-    Raises :class:`MeshError` if the faces miss each other, have facets edge-on, or fold over
-    themselves.
+    Parameters
+    ----------
+    slave_points, master_points
+        Points ``(n, 3)`` in the interface frame [mm].
+    slave_facets, master_facets
+        Triangles ``(m, 3)``, or segments ``(m, 2)`` in the plane y = 0.
+    surfaces
+        Surfaces that the slave's and the master's mesh approximate; they contribute to the gap.
+
+    Raises
+    ------
+    MeshError
+        If the faces miss each other, have facets edge-on, or fold over themselves.
     """
     slave, master = (
         ProjectedFace(slave_points, slave_facets),
         ProjectedFace(master_points, master_facets),
     )
-    # Bulges are of degree 2, and ψ of degree 1.
+    # Bulges are of degree 2 and ψ of degree 1, so their product needs a rule of degree 4.
     overlap = overlap_of(slave, master, 2 if surfaces is None else 4)
     dual, integrals = _dual_functions(slave, overlap)
     areas = slave.scatter(integrals)
@@ -110,7 +130,7 @@ def mortar_projection(
     gap = np.where(kept, slave_points[:, 2] - projection @ master_points[:, 2], np.inf)
     bulged = None
     if surfaces is not None:
-        bulged = scale * _between(slave, master, overlap, dual, surfaces)
+        bulged = scale * _bulge_integrals(slave, master, overlap, dual, surfaces)
         gap += bulged
     return Mortar(projection, areas, covered, gap, kept, bulged)
 
@@ -124,11 +144,26 @@ def mortar_interface(
     frame: Frame,
     surfaces: tuple[Surface, Surface] | None = None,
 ) -> Interface:
-    """Interface of two faces with meshes of their own, of ``surfaces`` 1 and 2 if they are known.
+    """Return the interface of two faces whose meshes do not match.
 
-    Its nodes are those of body 2 that body 1 covers, its facets those with such nodes alone; a node
-    without a facet is left out. Of body 1 it has the facets that meet these. Raises
-    :class:`MeshError` as :func:`mortar_projection` does, and if body 1 covers no facet.
+    Its nodes are those of body 2 that body 1 covers, and its facets those with only such nodes; a
+    node without a facet is left out. Of body 1 it has the facets that touch these.
+
+    Parameters
+    ----------
+    name
+        Name of the interface.
+    body_1, boundary_1, body_2, boundary_2
+        The two bodies, and the boundary of each that is its contact face.
+    frame
+        Frame of the interface.
+    surfaces
+        Surfaces that the faces of bodies 1 and 2 approximate, if they are known.
+
+    Raises
+    ------
+    MeshError
+        As :func:`mortar_projection`, and if body 1 covers no facet completely.
     """
     nodes_1, points_1, facets_1 = _face(body_1, boundary_1, frame)
     nodes_2, points_2, facets_2 = _face(body_2, boundary_2, frame)
@@ -142,7 +177,8 @@ def mortar_interface(
             f"the faces of interface {name} share less than a facet of {boundary_2}: refine it"
         )
     kept = np.unique(facets)
-    # Of a face that goes on beyond body 2, what is beside it alone: it stays as free as elsewhere.
+    # If body 1's face extends beyond body 2, keep only the part that body 2 touches; the rest of
+    # the face stays free.
     met = np.zeros(len(nodes_1), bool)
     met[mortar.projection[kept].indices] = True
     near: Mask = np.any(met[facets_1], axis=1)
@@ -172,11 +208,22 @@ def mortar_interface(
 def frame_of_faces(
     body_1: Body, boundary_1: str, body_2: Body, boundary_2: str, x_direction: Array
 ) -> tuple[Frame, float]:
-    """Interface frame of two faces, and the largest angle of their facets to its plane [rad].
+    """Return the interface frame of two faces, and the largest tilt of a facet from it [rad].
 
-    The origin is the centroid of the part of body 2's face that body 1's covers; z the mean outward
-    normal of body 1; x the direction ``(3,)`` given, turned into the plane. Raises
-    :class:`MeshError` if the direction is normal to the face, or a facet faces backwards.
+    The origin is the centroid of the part of body 2's face that body 1's covers; z is the mean
+    outward normal of body 1; x is the direction ``(3,)`` given, turned into the plane.
+
+    Parameters
+    ----------
+    body_1, boundary_1, body_2, boundary_2
+        The two bodies, and the boundary of each that is its face.
+    x_direction
+        Direction ``(3,)`` close to x.
+
+    Raises
+    ------
+    MeshError
+        If the direction is normal to the face, or if a facet faces backwards.
     """
     normals_1, normals_2 = body_1.outward(boundary_1), body_2.outward(boundary_2)
     z = _unit(normals_1.sum(axis=0))
@@ -205,7 +252,7 @@ def frame_of_faces(
 
 
 class ProjectedFace:
-    """A face seen along z: its facets in the plane (x, y), or on the line x."""
+    """Face seen along z: its facets in the plane (x, y), or on the line x."""
 
     def __init__(self, points: Array, facets: Indices) -> None:
         self.facets = facets
@@ -219,7 +266,7 @@ class ProjectedFace:
                 "a contact face has a facet that is seen edge-on along the contact's normal or has "
                 "no area: leave it out of the face, turn the frame or mend the mesh"
             )
-        # Corners anticlockwise, segments from left to right.
+        # Order corners anticlockwise, and segments from left to right.
         clockwise = determinants < 0.0
         self.clockwise = clockwise
         self.facets = facets.copy()
@@ -242,21 +289,22 @@ class ProjectedFace:
         return np.asarray(np.linalg.inv(self._edges), dtype=np.float64)
 
     def shapes(self, facet: Indices, points: Array) -> Array:
-        """Shape functions ``(q, corners)`` of the facets ``(q,)`` at points in their plane."""
+        """Return shape functions ``(q, corners)`` of facets ``(q,)`` at points in their plane."""
         local = np.einsum("qa,qab->qb", points - self.corners[facet, 0], self._inverses[facet])
         return np.column_stack([1.0 - local.sum(axis=1), local])
 
     def scatter(self, values: Array) -> Array:
-        """Sums at the nodes of values ``(m, corners)`` at the corners of the facets."""
+        """Return sums at the nodes of values ``(m, corners)`` at the corners of the facets."""
         total = np.bincount(self.facets.ravel(), values.ravel(), minlength=self.nodes)
         return np.asarray(total, dtype=np.float64)
 
 
 @dataclass(frozen=True)
 class Overlap:
-    """Gauss points of what facets of both faces share.
+    """Gauss points on the parts that facets of both faces share.
 
-    ``slave`` and ``master`` ``(q,)`` are the facets, ``points`` ``(q, d)``, ``weights`` ``(q,)``.
+    ``slave`` and ``master`` ``(q,)`` are the facets, ``points`` ``(q, d)`` the positions and
+    ``weights`` ``(q,)`` the weights.
     """
 
     slave: Indices
@@ -266,9 +314,10 @@ class Overlap:
 
 
 def overlap_of(slave: ProjectedFace, master: ProjectedFace, degree: int = 2) -> Overlap:
-    """Points that integrate a polynomial of a ``degree``, 2 or 4, over what faces share.
+    """Return points that integrate polynomials exactly over the part that the faces share.
 
-    Raises :class:`MeshError` if the faces have nothing in common.
+    The polynomials are of a ``degree`` 2 or 4. Raises :class:`MeshError` if the faces have nothing
+    in common.
     """
     first, second = _neighbours(slave.corners, master.corners)
     share = _shared_segments if slave.corners.shape[2] == 1 else _shared_triangles
@@ -281,7 +330,7 @@ def overlap_of(slave: ProjectedFace, master: ProjectedFace, degree: int = 2) -> 
 
 
 def _neighbours(first: Array, second: Array) -> tuple[Indices, Indices]:
-    """Pairs of facets ``(m, corners, d)`` whose bounding boxes touch."""
+    """Return pairs of facets ``(m, corners, d)`` whose bounding boxes touch."""
     centres = [corners.mean(axis=1) for corners in (first, second)]
     radii = [
         np.linalg.norm(corners - centre[:, None], axis=2).max(axis=1)
@@ -297,7 +346,7 @@ def _neighbours(first: Array, second: Array) -> tuple[Indices, Indices]:
 
 
 def _shared_segments(first: Array, second: Array, degree: int) -> tuple[Indices, Array, Array]:
-    """Gauss points of the intersections of segments ``(n, 2, 1)``: pair, point, weight."""
+    """Return Gauss points of the intersections of segments ``(n, 2, 1)``: pair, point, weight."""
     low, high = np.maximum(first[:, 0], second[:, 0]), np.minimum(first[:, 1], second[:, 1])
     middle, half = 0.5 * (low + high), 0.5 * (high - low)
     places, shares = np.polynomial.legendre.leggauss(degree // 2 + 1)
@@ -307,9 +356,9 @@ def _shared_segments(first: Array, second: Array, degree: int) -> tuple[Indices,
 
 
 def _shared_triangles(first: Array, second: Array, degree: int) -> tuple[Indices, Array, Array]:
-    """Gauss points of the intersections of triangles ``(n, 3, 2)``: pair, point, weight.
+    """Return Gauss points of the intersections of triangles ``(n, 3, 2)``: pair, point, weight.
 
-    The polygons are cut into triangles, each with Gauss points of its own.
+    The intersections are polygons, which are divided into triangles with Gauss points of their own.
     """
     polygons = first
     for corner in range(3):
@@ -326,7 +375,7 @@ def _shared_triangles(first: Array, second: Array, degree: int) -> tuple[Indices
 
 
 def _clip(polygons: Array, start: Array, end: Array) -> Array:
-    """What convex polygons ``(n, k, 2)`` have on the left of the lines from start to end.
+    """Return the part of convex polygons ``(n, k, 2)`` on the left of lines from start to end.
 
     Polygons with fewer corners than others repeat their last one (Sutherland & Hodgman 1974).
     """
@@ -345,13 +394,13 @@ def _clip(polygons: Array, start: Array, end: Array) -> Array:
     order = np.argsort(~valid, axis=1, kind="stable")
     place = np.minimum(np.arange(max(3, count.max(initial=0))), np.maximum(count - 1, 0)[:, None])
     clipped = np.take_along_axis(corners, np.take_along_axis(order, place, 1)[..., None], axis=1)
-    # Nothing left: a point.
+    # A polygon of which no part is left becomes a point.
     clipped[count == 0] = 0.0
     return clipped
 
 
 def _dual_functions(slave: ProjectedFace, overlap: Overlap) -> tuple[Array, Array]:
-    """ψ at the Gauss points ``(q, corners)``, and ∫φ over what is covered ``(m, corners)``.
+    """Return ψ at the Gauss points ``(q, corners)``, and ∫φ over the covered part ``(m, corners)``.
 
     On each facet ψ_i = Σ_j A_ij φ_j with A = diag(∫φ) (∫φφᵀ)⁻¹. Raises :class:`MeshError` if a
     facet is covered more than once.
@@ -376,7 +425,7 @@ def _dual_functions(slave: ProjectedFace, overlap: Overlap) -> tuple[Array, Arra
 def _coupling(
     slave: ProjectedFace, master: ProjectedFace, overlap: Overlap, dual: Array
 ) -> sp.csr_matrix:
-    """M ``(n, n_master)`` of the dual functions' values ``(q, corners)``."""
+    """Return M ``(n, n_master)`` from the values of the dual functions ``(q, corners)``."""
     shapes = master.shapes(overlap.master, overlap.points)
     values = np.einsum("q,qi,qk->qik", overlap.weights, dual, shapes)
     rows = np.broadcast_to(slave.facets[overlap.slave][:, :, None], values.shape)
@@ -385,14 +434,14 @@ def _coupling(
     return sp.csr_matrix((values.ravel(), places), shape=(slave.nodes, master.nodes))
 
 
-def _between(
+def _bulge_integrals(
     slave: ProjectedFace,
     master: ProjectedFace,
     overlap: Overlap,
     dual: Array,
     surfaces: tuple[Surface, Surface],
 ) -> Array:
-    """∫ψ times what bulges of the slave and the master add to their distance ``(n,)`` [mm³]."""
+    """Return ∫ψ times the distance that bulges add between the faces ``(n,)`` [mm³]."""
     added = np.zeros(len(overlap.points))
     for side, facet, given, sign in (
         (slave, overlap.slave, surfaces[0].bulges, 1.0),
@@ -407,7 +456,10 @@ def _between(
 
 
 def _face(body: Body, boundary: str, frame: Frame) -> tuple[Indices, Array, Indices]:
-    """Vertices of a boundary, their coordinates in the frame, and the facets numbered in them."""
+    """Return the vertices of a boundary, their coordinates in the frame, and the facets.
+
+    The facets are numbered in these vertices.
+    """
     nodes = body.vertices(boundary)
     points = frame.coordinates(body.points[nodes])
     return nodes, points, np.searchsorted(nodes, body.facets(boundary))

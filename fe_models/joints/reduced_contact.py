@@ -6,12 +6,14 @@ nodes, rings held, D body 2's translation and f the forces on it, the relative d
 
     w = D + A f.
 
-Normal and tangential problem are solved one after the other, uncoupled: A_zz f_z with no shear,
-then A_xx f_x at those f_z. A_zz⁻¹ is the K_z = K_zz - K_zx K_xx⁻¹ K_xz of the source, without its
-misprints. The loop follows from first loading by Masing's rule. :meth:`ReducedPair.coupled_cycle`
-makes none of these assumptions. On flat and curved, new and worn pads under 17 to 250 N the two
-methods differ by up to 0.4 % of the largest tangential force, 4e-4 in the energy of a cycle of
-gross slip, 0.2 % of the largest in that of a node, and 4.5 % of the largest in its normal force.
+The normal and the tangential problem are solved one after the other, uncoupled: A_zz f_z without
+shear, then A_xx f_x at these f_z. A_zz⁻¹ is the K_z = K_zz - K_zx K_xx⁻¹ K_xz of the source,
+without its misprints. The loop follows from first loading by Masing's rule.
+
+:meth:`ReducedPair.coupled_cycle` makes none of these assumptions. For flat and curved, new and worn
+pads under 17 to 250 N the two methods differ by up to 0.4 % of the largest tangential force, 4e-4
+of the energy of a cycle of gross slip, 0.2 % of the largest nodal energy, and 4.5 % of the largest
+nodal normal force.
 
 Source: the quasi-static method of "Dynamics simulations of fretting wear for aero-engine
 applications" (thesis), section 4.1, eqs. 18 to 30, whose distant nodes are the rings.
@@ -38,11 +40,22 @@ X, Y, Z = range(3)
 
 @dataclass(frozen=True)
 class NormalSolution:
-    """Frictionless contact under an imposed force.
+    """Solution of frictionless contact under a given force.
 
-    ``force`` ``(n,)`` on each node of body 2 [N], ``pressure`` [MPa], ``gap`` under load [mm],
-    ``approach`` of the rings [mm], 0 where faces without gap would just touch; ``area`` in contact
-    [mm²].
+    Attributes
+    ----------
+    force
+        Force on each node of body 2 ``(n,)`` [N].
+    pressure
+        Nodal pressure ``(n,)`` [MPa].
+    gap
+        Gap under load ``(n,)`` [mm].
+    approach
+        Approach of the rings [mm], 0 where faces without gap would just touch.
+    area
+        Area in contact [mm²].
+    converged
+        Whether the solver converged.
     """
 
     force: Array
@@ -54,17 +67,26 @@ class NormalSolution:
 
     @property
     def touching(self) -> Flags:
-        """Nodes that carry force, ``(n,)``."""
+        """Flags of the nodes that carry force, ``(n,)``."""
         return self.force > 0.0
 
 
 @dataclass(frozen=True)
 class TangentialSolution:
-    """First loading: body 2's ring moved by ``displacement`` along x [mm].
+    """Solution of first loading, with body 2's ring moved by ``displacement`` along x [mm].
 
-    ``shear`` ``(n,)`` is the force on each node of body 2 along it [N], against the motion;
-    ``slip`` ``(n,)`` that of body 2 over body 1 [mm], never against it; ``force`` what moves the
-    ring [N].
+    Attributes
+    ----------
+    displacement
+        Displacement of the ring [mm].
+    force
+        Force that moves the ring [N].
+    shear
+        Force along x on each node of body 2 ``(n,)`` [N], against the motion.
+    slip
+        Slip of body 2 over body 1 ``(n,)`` [mm], never against the motion.
+    converged
+        Whether the solver converged and no node slides backwards.
     """
 
     displacement: float
@@ -76,10 +98,10 @@ class TangentialSolution:
 
 @dataclass(frozen=True)
 class VirginCurve:
-    """First loading: ``force`` [N] over ``displacement`` [mm] of the ring, both ``(k,)``.
+    """Curve of first loading: ``force`` [N] over ``displacement`` [mm] of the ring, both ``(k,)``.
 
-    ``stick_stiffness`` is its slope at the origin, where all that touches sticks [N/mm];
-    ``friction`` its last force over the normal force.
+    ``states`` are the solutions at its points. ``stick_stiffness`` is its slope at the origin,
+    where all nodes in contact stick [N/mm]; ``friction`` is its last force over the normal force.
     """
 
     displacement: Array
@@ -93,14 +115,17 @@ class VirginCurve:
         return all(state.converged for state in self.states)
 
     def secant_stiffness(self, share: float) -> float:
-        """Slope from the origin to where the force is ``share`` of its last value [N/mm]."""
+        """Return the secant slope at the force that is ``share`` of the last one [N/mm]."""
         force = share * self.force[-1]
         return float(force / np.interp(force, self.force, self.displacement))
 
 
 @dataclass(frozen=True)
 class Loop:
-    """A closed loop of ``force`` [N] over ``displacement`` [mm], ``(k,)``, first point repeated."""
+    """Closed loop of ``force`` [N] over ``displacement`` [mm], both ``(k,)``.
+
+    The first point is repeated at the end.
+    """
 
     displacement: Array
     force: Array
@@ -113,13 +138,15 @@ class Loop:
 
 @dataclass(frozen=True)
 class FrettingConditions:
-    """What is done to the pair in every cycle.
+    """Load on the pair in every cycle.
 
-    ``force`` normal [N], ``stroke`` of body 2's ring along x, peak to peak [mm], ``friction`` µ.
+    ``force`` is the normal force [N], ``stroke`` the motion of body 2's ring along x, peak to peak
+    [mm], and ``friction`` is µ.
 
     Examples
     --------
-    17 N, a stroke of 20 µm, µ = 0.8: where nothing gives a cycle dissipates 2 µ F times the stroke.
+    Under 17 N with a stroke of 20 µm and µ = 0.8, a cycle of rigid bodies dissipates 2 µ F times
+    the stroke.
 
     >>> from fe_models import FrettingConditions
     >>> conditions = FrettingConditions(force=17.0, stroke=0.02, friction=0.8)
@@ -138,11 +165,22 @@ class FrettingConditions:
 
 @dataclass(frozen=True)
 class FrettingCycle:
-    """One cycle on a given shape.
+    """One fretting cycle on a given shape.
 
-    ``tangential`` is first loading to half the stroke; ``stick_stiffness`` [N/mm]; ``friction`` the
-    largest tangential over the normal force; ``cycle_slip`` ``(n,)`` the length each node slides in
-    a cycle [mm]; ``energy`` of a cycle [N mm].
+    Attributes
+    ----------
+    normal
+        Solution of the normal contact.
+    tangential
+        Solution of first loading to half the stroke.
+    stick_stiffness
+        Tangential stiffness while all nodes in contact stick [N/mm].
+    friction
+        Largest tangential force over the normal force.
+    cycle_slip
+        Distance that each node slides in a cycle ``(n,)`` [mm].
+    energy
+        Energy dissipated in a cycle [N mm].
     """
 
     normal: NormalSolution
@@ -159,10 +197,10 @@ class FrettingCycle:
 
 @dataclass(frozen=True)
 class CoupledCycle:
-    """A closed cycle, marched with pressure and both shears together.
+    """Closed cycle, marched with pressure and both shears coupled.
 
     ``loading`` are the states on the way to it, from rest; ``states`` those at each point of the
-    ``loop``; ``energy`` ``(n,)`` is what each node dissipates in the cycle [N mm].
+    ``loop``; ``energy`` ``(n,)`` is the energy that each node dissipates in the cycle [N mm].
     """
 
     loop: Loop
@@ -183,8 +221,8 @@ class ReducedPair:
 
     Examples
     --------
-    Three nodes on springs, 500 N/mm each for both bodies together, pressed by 30 N, that fret by
-    ±0.05 mm with µ = 0.5: they dissipate 4 µF (A - µF/k).
+    Three nodes are on springs, 500 N/mm each for both bodies together. They are pressed by 30 N and
+    fret by ±0.05 mm with µ = 0.5, and so dissipate 4 µF (A - µF/k).
 
     >>> import numpy as np
     >>> from fe_models import FrettingConditions, ReducedPair
@@ -203,7 +241,10 @@ class ReducedPair:
 
     @classmethod
     def from_stiffness(cls, face: Face, stiffness_1: Array, stiffness_2: Array) -> ReducedPair:
-        """From each body's stiffness ``(3 n, 3 n)`` on the pad's nodes, its ring held [N/mm]."""
+        """Build the pair from each body's stiffness on its pad nodes with its ring held [N/mm].
+
+        The matrices are ``(3 n, 3 n)``.
+        """
         count = len(face)
         total = _inverse(stiffness_1) + _inverse(stiffness_2)
         return cls(face, total.reshape(count, 3, count, 3))
@@ -214,13 +255,13 @@ class ReducedPair:
         return self.face.nodal_areas
 
     def block(self, axis: int) -> Array:
-        """A_xx, A_yy or A_zz, ``(n, n)`` [mm/N]."""
+        """Return A_xx, A_yy or A_zz, ``(n, n)`` [mm/N]."""
         return self.compliance[:, axis, :, axis]
 
     def normal(self, gap: Array, force: float, guess: Flags | None = None) -> NormalSolution:
         """Press the pads of ``gap`` ``(n,)`` [mm] together with ``force`` > 0 [N].
 
-        ``guess`` ``(n,)`` says which nodes are likely to touch.
+        ``guess`` ``(n,)`` marks the nodes that are likely to touch.
         """
         force = checks.number("normal force [N]", force, above=0.0)
         gap = checks.array("gaps", gap, (len(self.face),))
@@ -243,7 +284,7 @@ class ReducedPair:
         touching = np.flatnonzero(normal.touching)
         A = self.block(X)
         limit = friction * normal.force[touching]
-        # Unknown is how far each node's shear stays below its limit; slip is what it meets.
+        # The unknown is how far each node's shear stays below its limit; its complement is slip.
         offset = displacement - A[np.ix_(touching, touching)] @ limit
         stick = complementary(A[np.ix_(touching, touching)], offset)
         shear = np.zeros(len(self.face))
@@ -261,11 +302,14 @@ class ReducedPair:
         )
 
     def stick_stiffness(self, normal: NormalSolution, axis: int = X) -> float:
-        """Tangential stiffness at the ring while all that touches sticks [N/mm]."""
+        """Return the tangential stiffness at the ring while all nodes in contact stick [N/mm]."""
         return -float(self.stuck_shear(normal, axis).sum())
 
     def stuck_shear(self, normal: NormalSolution, axis: int = X) -> Array:
-        """Forces ``(n,)`` [N] on body 2 per mm along ``axis`` while all that touches sticks."""
+        """Return the forces on body 2 per mm along ``axis`` while all nodes in contact stick.
+
+        They are ``(n,)`` [N].
+        """
         touching = np.flatnonzero(normal.touching)
         shear = np.zeros(len(self.face))
         A = self.block(axis)[np.ix_(touching, touching)]
@@ -275,7 +319,7 @@ class ReducedPair:
     def virgin_curve(
         self, normal: NormalSolution, displacements: Array, friction: float
     ) -> VirginCurve:
-        """First loading at rising ``displacements`` ``(k,)`` [mm]; give 0 for the origin."""
+        """Solve first loading at rising ``displacements`` ``(k,)`` [mm], which include 0."""
         states = tuple(self.tangential(normal, d, friction) for d in displacements)
         force = np.array([state.force for state in states])
         return VirginCurve(
@@ -289,10 +333,10 @@ class ReducedPair:
     def fretting_cycle(
         self, gap: Array, conditions: FrettingConditions, guess: Flags | None = None
     ) -> FrettingCycle:
-        """One cycle on the shape ``gap`` ``(n,)``.
+        """Solve one cycle on the shape ``gap`` ``(n,)``.
 
-        By Masing's rule a cycle slides four times the slip of first loading to half the stroke, at
-        the full Coulomb shear.
+        By Masing's rule the slip of a cycle is four times that of first loading to half the stroke,
+        at the full Coulomb shear. ``guess`` ``(n,)`` marks the nodes that are likely to touch.
         """
         normal = self.normal(gap, conditions.force, guess)
         tangential = self.tangential(normal, 0.5 * conditions.stroke, conditions.friction)
@@ -308,18 +352,19 @@ class ReducedPair:
         )
 
     def stable_cycles(self, normal: NormalSolution, depth_per_force: Array) -> float:
-        """Cycles of constant shape beyond which errors of the worn shape grow.
+        """Return the number of cycles of constant shape beyond which errors of the worn shape grow.
 
-        ``depth_per_force`` ``(n,)``, c, is what both bodies lose per cycle and nodal force [mm/N].
-        A change of gap changes the forces by δf = -K' δg: with K the inverse of A_zz on the nodes
-        in contact, K' = K - K 1 1ᵀK/(1ᵀK 1), which leaves the imposed force as it is. A cycle block
-        of ΔN cycles turns δg into (I - ΔN C K') δg, C = diag(c): stable while ΔN < 2/λ, with λ the
-        largest eigenvalue of C^½ K' C^½. The change of slip with the forces is neglected. A single
-        node carries all of the force, whatever its gap, and any number of cycles.
+        ``depth_per_force`` ``(n,)``, c, is the worn depth of both bodies per cycle and nodal force
+        [mm/N]. A change of gap changes the forces by δf = -K' δg: with K the inverse of A_zz on the
+        nodes in contact, K' = K - K 1 1ᵀK/(1ᵀK 1), which leaves the imposed force unchanged. A
+        cycle block of ΔN cycles turns δg into (I - ΔN C K') δg, C = diag(c). This is stable while
+        ΔN < 2/λ, with λ the largest eigenvalue of C^½ K' C^½. The change of slip with the forces is
+        neglected. A single node carries all of the force whatever its gap, so its number of cycles
+        is infinite.
         """
         touching = np.flatnonzero(normal.touching)
         if len(touching) < 2:
-            return np.inf  # K' is 0, or what rounding leaves of it
+            return np.inf  # K' is 0 up to rounding.
         K = _inverse(self.block(Z)[np.ix_(touching, touching)])
         sums = K.sum(axis=1)
         K -= np.outer(sums, sums) / sums.sum()
@@ -330,9 +375,9 @@ class ReducedPair:
     def coupled_cycle(
         self, gap: Array, conditions: FrettingConditions, steps: int, first: float | None = None
     ) -> CoupledCycle:
-        """The cycle after first loading, ``steps`` increments to each quarter of the stroke.
+        """Solve the cycle after first loading, in ``steps`` increments per quarter of the stroke.
 
-        ``first`` [mm] is a motion within the first of them at which loading halts as well.
+        ``first`` [mm] adds an increment of first loading, at a motion smaller than the first step.
         """
         amplitude = 0.5 * conditions.stroke
         rise = amplitude * np.arange(steps + 1) / steps
@@ -341,7 +386,7 @@ class ReducedPair:
         fall = np.linspace(amplitude, -amplitude, 2 * steps + 1)[1:]
         path = np.concatenate([rise, fall, -fall])
         amplitudes = np.stack([np.full(len(path), conditions.force), path, 0.0 * path], axis=1)
-        # The ring is free along z, so the gap's datum is too: from here it is closed already.
+        # The ring is free along z, so the gap may be shifted: this one is closed from the start.
         closed = gap - self.normal(gap, conditions.force).approach
         joint = FrictionalJoint(self.joint().resolvent(), conditions.friction)
         marched = tuple(joint.march(amplitudes, closed))
@@ -352,10 +397,10 @@ class ReducedPair:
         return CoupledCycle(Loop(path[begin:], force), loading, states, np.asarray(energy))
 
     def joint(self) -> JointStiffness:
-        """The coupled joint, to march along amplitudes ``(F, D_x, D_y)`` [N, mm, mm].
+        """Return the coupled joint, with load cases for ``(F, D_x, D_y)`` [N, mm, mm].
 
-        Forces are f = H (w - D), H = A⁻¹. D_z follows from 1ᵀf_z = F: with h = H e_z,
-        f = H' (w - D_x e_x - D_y e_y) + F h/(e_zᵀh), H' = H - h hᵀ/(e_zᵀh).
+        Forces are f = H (w - D), H = A⁻¹. D_z follows from 1ᵀf_z = F: with h = H e_z, f = H' (w -
+        D_x e_x - D_y e_y) + F h/(e_zᵀh), H' = H - h hᵀ/(e_zᵀh).
         """
         count = len(self.face)
         H = _inverse(self.compliance.reshape(3 * count, 3 * count))
@@ -370,10 +415,10 @@ class ReducedPair:
 
 
 def masing_loop(curve: VirginCurve) -> Loop:
-    """The loop between ± the curve's last displacement (the source's eq. 30).
+    """Return the loop between ± the curve's last displacement (the source's eq. 30).
 
-    Down and up again at twice the displacements of the curve, which is read linearly between its
-    points and should start at 0.
+    The loop runs down and up again through twice the displacements of the curve, which is
+    interpolated linearly and should start at 0.
     """
     amplitude = float(curve.displacement[-1])
 
@@ -387,6 +432,6 @@ def masing_loop(curve: VirginCurve) -> Loop:
 
 
 def _inverse(matrix: Array) -> Array:
-    """Inverse of a symmetric positive definite matrix, symmetric to rounding."""
+    """Return the inverse of a symmetric positive definite matrix, symmetric to the last bit."""
     inverse = sl.inv(matrix)
     return 0.5 * (inverse + inverse.T)

@@ -5,9 +5,9 @@ The displacements are split into kept ones c and inner ones i, and u = T q with
     T = [ I  0 ]     Ψ = -K_ii⁻¹ K_ic,     K_ii Φ = M_ii Φ Λ,  Φᵀ M_ii Φ = I:
         [ Ψ  Φ ]
 
-the kept displacements with what they do to the rest statically, and the lowest modes with the kept
-displacements fixed. The reduced stiffness is block diagonal, the Schur complement and Λ; without
-modes it is the static condensation, exact as long as nothing moves.
+the kept displacements with the static response of the inner ones to them, and the lowest modes with
+the kept displacements fixed. The reduced stiffness is block diagonal, with the Schur complement and
+Λ as blocks. Without modes it is the static condensation, which is exact in statics.
 
 Sources: Guyan 1965, AIAA J. 3, 380, doi:10.2514/3.2874; Craig & Bampton 1968, AIAA J. 6, 1313,
 doi:10.2514/3.4741.
@@ -32,11 +32,12 @@ from sa_solver import checks
 from sa_solver.errors import InputError
 from sa_solver.types import Array, Indices
 
-# The shift of a free body's search over the median of K_jj/M_jj, which no choice of coordinates
-# changes: small enough to separate rigid motions, and large enough that K - σ M is not singular.
+# Shift of the eigenvalue search for a free body over the median of K_jj/M_jj, which does not depend
+# on the coordinates. It is small enough to separate rigid motions, and large enough that K - σ M is
+# not singular.
 SHIFT_SHARE = 1e-7
 
-# Of a reduction with mass and modes: condensation, factors, modes, mass.
+# Steps of a reduction with mass and modes: condensation, factorisation, modes, mass.
 STEPS = 4
 
 # Unit and description of every dataset of a stored model.
@@ -51,24 +52,38 @@ DATASETS = {
     "names": ("1", "of the kept displacements: point and direction, such as pad 17 x"),
     "places": ("mm", "x, y, z of the point of each kept displacement"),
 }
-# Those that a stored model may lack.
+# Datasets that a stored model may lack.
 OPTIONAL = "mass", "damping", "names", "places"
 
 
 @dataclass(frozen=True)
 class ReducedModel:
-    """A body on its ``kept`` displacements ``(c,)`` and its ``m`` lowest fixed-interface modes.
+    """Model of a body on ``c`` kept displacements and its ``m`` lowest fixed-interface modes.
 
-    ``stiffness`` and ``mass`` ``(c + m, c + m)`` (no mass: None), ``loads`` ``(c + m, cases)``;
-    ``mode_shapes`` ``(n, m)`` of unit modal mass, zero where kept; their ``frequencies`` [Hz]. With
-    mm, N, s and t a modal coordinate has the unit t^0.5 mm. Where they are known, ``names``
-    ``(c,)`` of the kept displacements, point and direction as in ``pad 17 x``, and ``places``
-    ``(c, 3)`` of their points [mm]. ``damping`` ``(c + m, c + m)`` is there if the body has a
-    matrix of it.
+    With mm, N, s and t a modal coordinate has the unit t^0.5 mm.
+
+    Attributes
+    ----------
+    kept
+        Numbers of the kept displacements in the full model ``(c,)``.
+    stiffness, mass
+        Matrices ``(c + m, c + m)``; the mass may be None.
+    loads
+        Load cases ``(c + m, cases)``.
+    mode_shapes
+        Modes ``(n, m)`` of unit modal mass, zero at the kept displacements.
+    frequencies
+        Natural frequencies of the modes ``(m,)`` [Hz].
+    names
+        Names of the kept displacements ``(c,)``, point and direction as in ``pad 17 x``, if known.
+    places
+        Positions of their points ``(c, 3)`` [mm], if known.
+    damping
+        Damping matrix ``(c + m, c + m)``, if the body has one.
 
     Examples
     --------
-    Ten equal springs in a row, pulled apart by 5 mm at the ends: each is stretched by 0.5 mm.
+    Ten equal springs in a row are pulled apart by 5 mm at the ends. Each is stretched by 0.5 mm.
 
     >>> import numpy as np
     >>> import scipy.sparse as sp
@@ -93,14 +108,14 @@ class ReducedModel:
 
     @property
     def static_stiffness(self) -> Array:
-        """The Schur complement ``(c, c)``: stiffness on the kept displacements [N/mm]."""
+        """Schur complement ``(c, c)``: stiffness on the kept displacements [N/mm]."""
         return self.stiffness[: len(self.kept), : len(self.kept)]
 
     def recover(self, stiffness: sp.csr_matrix, coordinates: Array) -> Array:
-        """Displacements ``(n, ...)`` of the full model of ``coordinates`` ``(c + m, ...)``.
+        """Return displacements ``(n, ...)`` of the full model for ``coordinates`` ``(c + m, ...)``.
 
-        ``stiffness`` is the full one; loads between the kept displacements act through the modes
-        only.
+        ``stiffness`` is that of the full model. Loads on inner displacements have an effect only
+        through the modes.
         """
         static, modal = np.split(coordinates, [len(self.kept)])
         inner = _others(stiffness.shape[0], self.kept)
@@ -122,12 +137,27 @@ def reduce_body(
 ) -> ReducedModel:
     """Reduce a body to its ``kept`` displacements and ``modes`` fixed-interface modes.
 
-    ``stiffness``, ``mass`` and ``damping`` ``(n, n)`` are symmetric; the mass may be left out where
-    there are no modes, damping always. ``loads`` ``(n, cases)``. The order of ``kept`` is that of
-    the result. With mass and modes ``done`` is called after each of ``STEPS`` steps. Raises
-    InputError if modes are asked for that the body does not have, modes or damping without mass, or
-    for ``kept`` that are not numbers of different displacements, and
-    :class:`~fe_models.solvers.linear_solver.SolverError` if the body can move while they are held.
+    Parameters
+    ----------
+    stiffness, mass, damping
+        Symmetric matrices ``(n, n)`` of the full model. The mass may be None without modes and
+        damping; the damping may always be None.
+    kept
+        Numbers of the kept displacements, in the order of the result.
+    modes
+        Number of fixed-interface modes.
+    loads
+        Load cases ``(n, cases)``.
+    done
+        Called after each of ``STEPS`` steps if there are mass and modes.
+
+    Raises
+    ------
+    InputError
+        If the body has fewer modes than requested, if modes or damping are given without a mass, or
+        if ``kept`` are not the numbers of different displacements.
+    SolverError
+        If the body can move while the kept displacements are held.
 
     Examples
     --------
@@ -149,13 +179,16 @@ def reduce_body(
     kept = checks.places("kept displacements", kept, size)
     if kept.ndim != 1 or len(np.unique(kept)) < len(kept):
         raise InputError(
-            "kept displacements that are no list, or not all different: give each once"
+            "the kept displacements are not a list of different numbers: give each number once"
         )
     inner = _others(size, kept)
     if (modes > 0 or damping is not None) and mass is None:
         raise InputError("fixed-interface modes, and damping, need a mass matrix")
     if modes >= len(inner) > 0 or modes < 0:
-        raise InputError(f"{modes} modes of {len(inner)} inner displacements: take 0 to fewer")
+        raise InputError(
+            f"{modes} modes requested of {len(inner)} inner displacements: ask for at least 0 and "
+            "fewer than there are inner displacements"
+        )
     full_loads = np.zeros((size, 0))
     if loads is not None:
         full_loads = checks.array("loads", loads, (size, None), order="K")
@@ -169,12 +202,12 @@ def reduce_body(
         if modes > 0:
             values, shapes[inner] = _lowest_modes(stiffness, mass, inner, modes, solve)
             done()
-        following = _following(stiffness, kept, inner, solve)
-        reduced_mass = _projected(mass, kept, inner, following, shapes)
-        # The modes have unit mass, and rounding would leave a little between them.
+        static_shapes = _static_shapes(stiffness, kept, inner, solve)
+        reduced_mass = _projected(mass, kept, inner, static_shapes, shapes)
+        # The modes have unit mass; this removes the rounding errors off the diagonal.
         reduced_mass[len(kept) :, len(kept) :] = np.eye(modes)
         if damping is not None:
-            reduced_damping = _projected(damping, kept, inner, following, shapes)
+            reduced_damping = _projected(damping, kept, inner, static_shapes, shapes)
         done()
     return ReducedModel(
         kept=kept,
@@ -190,17 +223,21 @@ def reduce_body(
 def free_frequencies(
     stiffness: sp.csr_matrix | Array, mass: sp.csr_matrix | Array, count: int
 ) -> Array:
-    """The ``count`` lowest natural frequencies ``(count,)`` [Hz], rigid motions included.
+    """Return the ``count`` lowest natural frequencies ``(count,)`` [Hz], rigid motions included.
 
-    The body may be free. Dense matrices are those of a reduced model. What rounding leaves of a
-    rigid motion is the root of its |ω²|. Raises ``ValueError`` if there are not as many.
+    The body may be free. Dense matrices are taken as those of a reduced model. Due to rounding a
+    rigid motion has a small frequency, the root of its |ω²|. Raises ``ValueError`` if there are
+    fewer frequencies.
     """
     size = stiffness.shape[0]
-    # Lanczos finds fewer than all.
+    # Lanczos iterations cannot find all of them.
     if not 0 < count < size + isinstance(stiffness, np.ndarray):
-        raise ValueError(f"{count} frequencies of {size} displacements: take 1 to fewer than those")
-    # A shift below zero makes a free body's K - σ M definite, and keeps rigid motions exact beside
-    # frequencies that are higher by many orders.
+        raise ValueError(
+            f"{count} frequencies requested of {size} displacements: ask for at least 1 and fewer "
+            "than there are displacements"
+        )
+    # A shift below zero makes a free body's K - σ M definite, and keeps rigid motions exact next to
+    # frequencies that are many orders higher.
     moved = mass.diagonal() > 0.0
     shift = -SHIFT_SHARE * float(np.median(stiffness.diagonal()[moved] / mass.diagonal()[moved]))
     shifted = stiffness - shift * mass
@@ -218,7 +255,10 @@ def free_frequencies(
 
 
 def save_reduced(path: Path | RawIOBase, model: ReducedModel) -> None:
-    """Write a model to HDF5, a path or an open file, with unit and description of every dataset."""
+    """Write a model to HDF5, with unit and description of every dataset.
+
+    ``path`` may be an open file.
+    """
     with h5py.File(path, "w") as file:
         for name, (unit, description) in DATASETS.items():
             values = getattr(model, name)
@@ -239,7 +279,7 @@ def load_reduced(path: Path) -> ReducedModel:
         }
     missing = [name for name in DATASETS if name not in datasets and name not in OPTIONAL]
     if missing:
-        raise ValueError(f"{path}: no dataset {missing[0]}: not a reduced model")
+        raise ValueError(f"{path} is not a reduced model: it has no dataset {missing[0]}")
     _check_shapes(path, datasets)
     if "names" in datasets:
         datasets["names"] = tuple(name.decode() for name in datasets["names"])
@@ -247,7 +287,7 @@ def load_reduced(path: Path) -> ReducedModel:
 
 
 def _check_shapes(path: Path, datasets: Mapping[str, Any]) -> None:
-    """Raise ValueError unless arrays fit together and their numbers are finite."""
+    """Raise ValueError unless the arrays fit together and their numbers are finite."""
     kept, modes = datasets["kept"].size, datasets["frequencies"].size
     size, names = kept + modes, datasets.get("names", np.empty(0)).ravel()
     shapes: dict[str, tuple[int, ...]] = {
@@ -272,7 +312,7 @@ def _check_shapes(path: Path, datasets: Mapping[str, Any]) -> None:
 
 
 def _sparse(matrix: sp.csr_matrix | None, size: int) -> sp.csr_matrix | None:
-    """A matrix ``(size, size)`` in rows, however it is given."""
+    """Return a matrix ``(size, size)`` in compressed rows, from any format."""
     if matrix is None or sp.issparse(matrix):
         found = matrix
     else:
@@ -287,7 +327,10 @@ def _others(size: int, kept: Indices) -> Indices:
 
 
 def _start(size: int) -> Array:
-    """The same start for every Lanczos search, without a symmetry that would hide modes."""
+    """Return the same start vector for every Lanczos search.
+
+    It has no symmetry that would hide modes.
+    """
     return np.random.default_rng(0).standard_normal(size)
 
 
@@ -298,10 +341,11 @@ def _lowest_modes(
     modes: int,
     solve: Factorisation,
 ) -> tuple[Array, Array]:
-    """The lowest ω² ``(m,)`` and modes ``(i, m)`` of unit modal mass, kept displacements fixed.
+    """Return the lowest ω² ``(m,)`` and modes ``(i, m)`` of unit modal mass.
 
-    Each mode's sign is that of its product with one fixed random vector: the largest entry would
-    not do, since a symmetric body has it several times, with either sign.
+    The kept displacements are fixed. Each mode has the sign for which its product with one fixed
+    random vector is positive. The sign of its largest entry would not be unique, because a
+    symmetric body has several largest entries of either sign.
     """
     K, M = (matrix[inner][:, inner].tocsr() for matrix in (stiffness, mass))
     inverse = LinearOperator(K.shape, matvec=solve, dtype=np.float64)
@@ -313,10 +357,10 @@ def _lowest_modes(
     return values, shapes / np.sqrt(np.einsum("im,im->m", shapes, M @ shapes))
 
 
-def _following(
+def _static_shapes(
     stiffness: sp.csr_matrix, kept: Indices, inner: Indices, solve: Factorisation
 ) -> Array:
-    """The static shapes Ψ, held in full: ``(i, c)``."""
+    """Return the static shapes Ψ ``(i, c)`` as a dense matrix."""
     coupling = stiffness[inner][:, kept].tocsc()
     static = np.empty((len(inner), len(kept)))
     for start in range(0, len(kept), COLUMNS_AT_ONCE):
@@ -328,7 +372,7 @@ def _following(
 def _projected(
     matrix: sp.csr_matrix, kept: Indices, inner: Indices, static: Array, shapes: Array
 ) -> Array:
-    """Tᵀ M T of a mass, or a damping, with the static shapes Ψ ``(i, c)``."""
+    """Return Tᵀ M T of a mass or damping matrix, with the static shapes Ψ ``(i, c)``."""
     within, coupling = matrix[inner][:, inner], matrix[inner][:, kept]
     half = coupling.T @ static
     on_kept = matrix[kept][:, kept].toarray() + half + half.T + static.T @ (within @ static)

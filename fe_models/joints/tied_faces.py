@@ -1,16 +1,16 @@
-"""Plane faces of elements of either order, tied for good where their meshes do not match.
+"""Permanent tie of plane faces whose meshes do not match, for elements of either order.
 
-As :mod:`fe_models.joints.mortar` for contact, with the elements' own functions on both sides: ψ
-dual to the slave's φ carries the traction, and the slave follows the master, u = N u_master. A
-traction that is constant passes, and so does a displacement that the slave's functions hold,
-exactly.
+The method is that of :mod:`fe_models.joints.mortar` for contact, with the elements' own functions
+on both sides: ψ dual to the slave's φ carries the traction, and the slave follows the master,
+u = N u_master. A constant traction is transmitted exactly, and so is every displacement that the
+slave's functions can represent.
 
-Of second order ∫φ of a corner is nothing or less, and has no dual. So corners take a share α of the
-midsides beside them,
+For second order ∫φ of a corner is zero or negative, so φ has no dual. Corners therefore take a
+share α of the neighbouring midsides,
 
     φ̃_corner = φ_corner + α Σ φ_midside,   φ̃_midside = (1 - 2α) φ_midside,
 
-which span the same displacements: those of the nodes are T ũ, and N = T D⁻¹ M.
+which span the same displacements. The nodal displacements are T ũ, and N = T D⁻¹ M.
 Popp, Wohlmuth, Gee & Wall 2012, doi:10.1137/110848190.
 """
 
@@ -22,12 +22,12 @@ import scipy.sparse as sp
 from fe_models.joints.mortar import Overlap, ProjectedFace, overlap_of
 from sa_solver.types import Array, Indices
 
-# What corners take of midsides (Popp et al. 2012).
+# Share α of a midside's function that corners take (Popp et al. 2012).
 SHIFTED = 0.2
-# A facet of which less is covered is left out: its ψ would have to tell apart displacements at all
-# its nodes from what they do to a sliver.
+# A facet covered by a smaller share of its area is left out: the displacements at its nodes can
+# hardly be told apart from their values on a sliver, so its ψ would be ill-conditioned.
 SLIVER_SHARE = 0.05
-# Corners at the ends of the edges whose midsides follow them.
+# Corners at the ends of each edge, in the order of the midsides, by the number of corners.
 ENDS = {2: ((0, 1),), 3: ((0, 1), (1, 2), (2, 0))}
 
 
@@ -38,11 +38,20 @@ def tied_projection(
     master_facets: Indices,
     order: int,
 ) -> tuple[sp.csr_matrix, float]:
-    """N ``(n, m)`` of two faces in one plane z = const, and the share of the slave that is tied.
+    """Return N ``(n, m)`` of two faces in one plane z = const, and the tied share of the slave.
 
-    Points ``(n, 3)`` and ``(m, 3)`` [mm]; facets of an ``order`` list their corners, triangles or
-    segments along x, then their midsides (:meth:`ElasticBody.facet_nodes`). Rows of nodes that the
-    master does not cover are empty. Raises :class:`MeshError` if the faces have nothing in common.
+    Rows of nodes that the master does not cover are empty. Raises :class:`MeshError` if the faces
+    have nothing in common.
+
+    Parameters
+    ----------
+    slave_points, master_points
+        Points ``(n, 3)`` and ``(m, 3)`` [mm].
+    slave_facets, master_facets
+        Nodes of the facets: first their corners, of triangles or of segments along x, then their
+        midsides (:meth:`ElasticBody.facet_nodes`).
+    order
+        Order of the elements, 1 or 2.
 
     Examples
     --------
@@ -78,19 +87,19 @@ def tied_projection(
 
 
 def _face(points: Array, facets: Indices, order: int) -> tuple[ProjectedFace, Indices]:
-    """A face, and the nodes of its facets in the order that it has their corners in."""
+    """Return a face, and the nodes of its facets with the corners in the face's order."""
     corners = facets.shape[1] if order == 1 else {3: 2, 6: 3}[facets.shape[1]]
     face = ProjectedFace(points, facets[:, :corners])
     turned = facets.copy()
     turned[:, :corners] = face.facets
     if facets.shape[1] == 6:
-        # Corners 0, 1, 2 in the other order: the midsides of the first two edges change places.
+        # The corners are reversed, so the midsides of the first two edges change places.
         turned[face.clockwise, 3:5] = facets[face.clockwise, 4:2:-1]
     return face, turned
 
 
 def _functions(linear: Array, order: int) -> Array:
-    """The elements' functions ``(q, k)`` from those of the corners ``(q, corners)``."""
+    """Return the elements' functions ``(q, k)`` from those of the corners ``(q, corners)``."""
     if order == 1:
         return linear
     middles = [4.0 * linear[:, a] * linear[:, b] for a, b in ENDS[linear.shape[1]]]
@@ -98,7 +107,7 @@ def _functions(linear: Array, order: int) -> Array:
 
 
 def _mixing(corners: int, order: int) -> Array:
-    """What the functions φ ``(k,)`` of a facet are multiplied with to be φ̃, ``(k, k)``."""
+    """Return the matrix ``(k, k)`` that turns the functions φ ``(k,)`` of a facet into φ̃."""
     if order == 1:
         return np.eye(corners)
     ends = ENDS[corners]
@@ -110,21 +119,21 @@ def _mixing(corners: int, order: int) -> Array:
 
 
 def _nodal(facet_nodes: Indices, mixing: Array, count: int) -> sp.csr_matrix:
-    """T ``(count, count)``: displacements of nodes from the factors of φ̃."""
+    """Return T ``(count, count)``: displacements of nodes from the coefficients of φ̃."""
     shape = (len(facet_nodes), *mixing.shape)
     rows = np.broadcast_to(facet_nodes[:, :, None], shape)
     columns = np.broadcast_to(facet_nodes[:, None, :], shape)
     places = np.stack([rows.ravel(), columns.ravel()])[:, np.tile(mixing.ravel() != 0.0, shape[0])]
     values = np.tile(mixing.ravel()[mixing.ravel() != 0.0], shape[0])
-    # Facets that share an edge say the same of it.
+    # Facets that share an edge have the same values for it, which must count once.
     places, first = np.unique(places, axis=1, return_index=True)
     return sp.csr_matrix((values[first], places), shape=(count, count))
 
 
 def _dual(shapes: Array, overlap: Overlap, sizes: Array) -> tuple[Array, Array]:
-    """ψ at the Gauss points ``(q, k)``, and ∫φ̃ over what is covered ``(m, k)``.
+    """Return ψ at the Gauss points ``(q, k)``, and ∫φ̃ over the covered part ``(m, k)``.
 
-    ``shapes`` are φ̃ ``(q, k)``, ``sizes`` ``(m,)`` those of the slave's facets.
+    ``shapes`` are φ̃ ``(q, k)``, ``sizes`` ``(m,)`` the areas of the slave's facets.
     """
     mass = np.zeros((len(sizes), shapes.shape[1], shapes.shape[1]))
     np.add.at(mass, overlap.slave, np.einsum("q,qi,qj->qij", overlap.weights, shapes, shapes))

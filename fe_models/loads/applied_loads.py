@@ -1,4 +1,4 @@
-"""Loads on bodies of a user's mesh: on boundaries, named by them, and on their mass."""
+"""Loads on bodies of a user's mesh: on named boundaries, and on their mass."""
 
 from __future__ import annotations
 
@@ -12,33 +12,43 @@ from fe_models.elasticity.thermal import Temperature
 from fe_models.loads.pretension import Pretension
 from sa_solver.types import Array, Mask
 
-# Second moments below this share of the largest are none: a boundary in the plane has no depth.
+# Second moments below this share of the largest count as 0: a boundary in the plane has no depth.
 FLAT = 1e-12
 
 
 @dataclass(frozen=True)
 class Pressure:
-    """Pressure [MPa] on a boundary, into the body."""
+    """Pressure [MPa] on a boundary, directed into the body."""
 
     boundary: str
     pressure: float
 
     def forces(self, elastic: ElasticBody) -> Array:
-        """Nodal forces ``(size,)``."""
+        """Return the nodal forces ``(size,)``."""
         return self.pressure * elastic.pressure_load(self.boundary)
 
 
 @dataclass(frozen=True)
 class BoundaryForce:
-    """Force ``(3,)`` [N] ``at`` a point ``(3,)`` [mm] and ``moment`` ``(3,)`` [N mm] on a boundary.
+    """Force and moment that are distributed over a boundary.
 
-    The point is the boundary's centroid unless given. In the plane both are per length, N/mm and N,
-    and the moment is one about y.
+    They act as the traction t = F/A + ω x r about the centroid, so that the boundary stays free to
+    deform. The mean motions of the boundary are those of a point tied to it by least squares (a
+    distributing coupling, RBE3). A ``rigid`` boundary keeps its shape instead, and then the
+    distribution does not matter.
 
-    They are spread as the traction t = F/A + ω x r about the centroid, so that the boundary stays
-    free to deform: its mean motions are those of a point tied to it by least squares (a
-    distributing coupling, RBE3). A ``rigid`` boundary keeps its form instead: there it does not
-    matter how they are spread.
+    Attributes
+    ----------
+    boundary
+        Name of the boundary.
+    force
+        Force ``(3,)`` [N], per length [N/mm] in the plane.
+    at
+        Point ``(3,)`` [mm] at which the force acts; by default the boundary's centroid.
+    moment
+        Moment ``(3,)`` [N mm]; in the plane per length [N], and about y.
+    rigid
+        Whether the boundary is rigid.
     """
 
     boundary: str
@@ -48,7 +58,7 @@ class BoundaryForce:
     rigid: bool = False
 
     def forces(self, elastic: ElasticBody) -> Array:
-        """Nodal forces ``(size,)``."""
+        """Return the nodal forces ``(size,)``."""
         area, centroid, second = _moments(elastic, self.boundary)
         arm = np.zeros(3) if self.at is None else self.at - centroid
         turning = self.moment + np.cross(arm, self.force)
@@ -66,7 +76,7 @@ class BoundaryForce:
 
 @dataclass(frozen=True)
 class Displacement:
-    """Displacement ``(3,)`` [mm] imposed on a boundary along its own direction; free across it."""
+    """Displacement ``(3,)`` [mm] imposed on a boundary along its direction, and free across it."""
 
     boundary: str
     displacement: Array
@@ -74,11 +84,23 @@ class Displacement:
 
 @dataclass(frozen=True)
 class RemoteDisplacement:
-    """``motion`` ``(6,)`` of a point ``at`` ``(3,)`` tied to a boundary: displacement, rotation.
+    """Motion of a point that is tied to a boundary.
 
-    Along and about the global axes [mm, rad]; components that are ``free`` ``(6,)`` are not given.
-    The boundary is ``rigid`` and moves with the point, or stays free to deform and has its motion
-    on average, by least squares. In the plane there are three components, x, z and about y.
+    In the plane the motion has three components: along x and z, and about y.
+
+    Attributes
+    ----------
+    boundary
+        Name of the boundary.
+    at
+        Position of the point ``(3,)`` [mm].
+    motion
+        Displacement along and rotation about the global axes ``(6,)`` [mm, rad].
+    free
+        Flags ``(6,)`` of components that are not imposed.
+    rigid
+        Whether the boundary is rigid and moves with the point. Otherwise it stays free to deform,
+        and the motion is imposed on its average by least squares.
     """
 
     boundary: str
@@ -90,9 +112,9 @@ class RemoteDisplacement:
 
 @dataclass(frozen=True)
 class Rotation:
-    """Rotation of both bodies at ``speed`` [rad/s] about an axis ``(3,)`` through a point ``(3,)``.
+    """Rotation of all bodies at ``speed`` [rad/s] about an axis ``(3,)`` through a point ``(3,)``.
 
-    Its forces go with the square of the speed.
+    Its forces are proportional to the square of the speed.
     """
 
     axis: Array
@@ -105,18 +127,21 @@ class Rotation:
         return self.axis / np.linalg.norm(self.axis)
 
     def forces(self, elastic: ElasticBody) -> Array:
-        """Nodal forces ``(size,)``."""
+        """Return the nodal forces ``(size,)``."""
         return self.speed**2 * elastic.centrifugal_load(self.direction, self.through)
 
 
 @dataclass(frozen=True)
 class Acceleration:
-    """Acceleration ``(3,)`` [mm/s²] of the frame of reference: bodies are pulled against it."""
+    """Acceleration ``(3,)`` [mm/s²] of the frame of reference.
+
+    The inertia forces on the bodies are opposite to it.
+    """
 
     acceleration: Array
 
     def forces(self, elastic: ElasticBody) -> Array:
-        """Nodal forces ``(size,)``."""
+        """Return the nodal forces ``(size,)``."""
         pull = -elastic.material.density * self.acceleration
         return elastic.body_load(lambda x: np.broadcast_to(pull[:, None, None], x.shape))
 
@@ -134,12 +159,12 @@ AppliedLoad = (
 
 
 def boundary_of(load: object) -> str | None:
-    """The boundary a load acts on, if on one."""
+    """Return the boundary that a load acts on, or None if it acts on none."""
     return getattr(load, "boundary", None)
 
 
 def vector_of(load: AppliedLoad) -> Array | None:
-    """The direction of a load that has one."""
+    """Return the force, displacement or acceleration of a load, or None if it has none."""
     match load:
         case BoundaryForce():
             return load.force
@@ -153,7 +178,7 @@ def vector_of(load: AppliedLoad) -> Array | None:
 
 
 def turning_of(load: AppliedLoad) -> Array | None:
-    """The moment or rotation of a load that has one."""
+    """Return the moment or rotation of a load, or None if it has none."""
     match load:
         case BoundaryForce():
             return load.moment
@@ -163,7 +188,7 @@ def turning_of(load: AppliedLoad) -> Array | None:
 
 
 def _moments(elastic: ElasticBody, boundary: str) -> tuple[float, Array, Array]:
-    """Area of a boundary, its centroid ``(3,)`` and second moments about that ``(3, 3)``."""
+    """Return a boundary's area, centroid ``(3,)`` and second moments about it ``(3, 3)``."""
     axes = range(3)
     area = elastic.boundary_integral(boundary, _product(np.zeros(3), ()))
     first = [elastic.boundary_integral(boundary, _product(np.zeros(3), (i,))) for i in axes]
@@ -176,7 +201,10 @@ def _moments(elastic: ElasticBody, boundary: str) -> tuple[float, Array, Array]:
 
 
 def _product(origin: Array, axes: Sequence[int]) -> Callable[[Array], Array]:
-    """Of coordinates of points ``(3, ...)`` about an origin."""
+    """Return a function that multiplies the coordinates of points ``(3, ...)`` along ``axes``.
+
+    The coordinates are relative to ``origin``.
+    """
 
     def product(points: Array) -> Array:
         value = np.ones_like(points[0])
@@ -188,7 +216,7 @@ def _product(origin: Array, axes: Sequence[int]) -> Callable[[Array], Array]:
 
 
 def _linear(constant: float, slope: Array, origin: Array) -> Callable[[Array], Array]:
-    """``constant + slope · (x - origin)`` at points x ``(3, ...)``."""
+    """Return the function ``constant + slope · (x - origin)`` of points x ``(3, ...)``."""
 
     def linear(points: Array) -> Array:
         value: Array = constant + np.einsum("a,a...->...", slope, points)

@@ -11,18 +11,18 @@ from sa_solver import checks
 from sa_solver.ties import first_largest
 from sa_solver.types import Array, Indices
 
-# An equation whose coefficients shrink to this share, once others are put in, says nothing new.
+# An equation is redundant if substituting the others shrinks its coefficients to this share.
 ALREADY_MET = 1e-9
-# Motions whose share of what constraints hold is less are left free by them.
+# Constraints leave a motion free if the part of it that they hold is less than this share.
 NULL = 1e-9
 
 
 class Constraints:
-    """Collects constraints on displacements, numbered ``dimension node + component``.
+    """Collection of constraints on displacements, numbered ``dimension node + component``.
 
     Where supports meet, each adds what the earlier ones leave free: a node that slides on two
-    planes moves along their edge, one that is held stays held. Only displacements that nothing
-    constrains yet can be averaged: tie nodes last.
+    planes moves along their edge, and a node that is held stays held. Only displacements that are
+    not constrained yet can be averaged, so tie nodes last.
 
     Examples
     --------
@@ -43,9 +43,9 @@ class Constraints:
         self._size = dimension * nodes
         self._eliminated: dict[int, tuple[Indices, Array]] = {}
         self._by_ties: set[int] = set()
-        # Displacements that combinations stand for, numbered after those of all nodes.
+        # Displacements and the combinations that replace them, numbered after those of all nodes.
         self._combined: list[tuple[Indices, sp.csr_matrix]] = []
-        # Displacements that follow motions, by which combinations, and how.
+        # Displacements that follow motions, the numbers of their combinations, and these.
         self._following: list[tuple[Indices, Indices, Array]] = []
 
     def hold(self, nodes: Indices) -> None:
@@ -63,7 +63,7 @@ class Constraints:
         self._equation(self._dofs(nodes), (weights[:, None] * direction).ravel())
 
     def average(self, nodes: Indices, parents: Indices) -> None:
-        """Tie each node to the mean of its parents ``(n, k)``: a linear trace."""
+        """Tie each node to the mean of its parents ``(n, k)``, as on a linear trace."""
         share = np.full(parents.shape[1], 1.0 / parents.shape[1])
         for node, row in zip(nodes, parents, strict=True):
             for dof, masters in zip(
@@ -72,17 +72,17 @@ class Constraints:
                 self._eliminated.setdefault(int(dof), (masters, share))
 
     def no_work(self, forces: Array, points: Array) -> None:
-        """Hold what each of the ``forces`` ``(k, size)`` would do work on: Σ f u = 0.
+        """Allow only displacements on which none of the ``forces`` ``(k, size)`` does work.
 
-        The nodes' ``points`` ``(n, 3)`` say which are near each other: those under the forces move
-        by local combinations that do no work (:mod:`fe_models.loads.averages`), which are free
-        displacements in the place of theirs.
+        The displacements under the forces are replaced by local combinations on which the forces do
+        no work (:mod:`fe_models.loads.averages`). The nodes' ``points`` ``(n, 3)`` determine which
+        nodes are near each other.
         """
         found = [self._in_free(np.flatnonzero(row), row[row != 0.0]) for row in forces]
-        dofs = np.unique(np.concatenate([own for own, _ in found]))
+        dofs = np.unique(np.concatenate([numbers for numbers, _ in found]))
         means = np.zeros((len(found), len(dofs)))
-        for row, (own, shares) in zip(means, found, strict=True):
-            row[np.searchsorted(dofs, own)] = shares
+        for row, (numbers, shares) in zip(means, found, strict=True):
+            row[np.searchsorted(dofs, numbers)] = shares
         means = means[np.linalg.norm(means, axis=1) > ALREADY_MET * np.linalg.norm(forces, axis=1)]
         if not len(means):
             return
@@ -94,28 +94,28 @@ class Constraints:
             self._eliminated[dof] = added[basis.indices[entries]], basis.data[entries]
 
     def values(self, displacements: Array) -> Array:
-        """The free displacements ``(free, ...)`` of such ``displacements`` ``(size, ...)``."""
-        every = np.asarray(displacements)
+        """Return the free displacements ``(free, ...)`` of ``displacements`` ``(size, ...)``."""
+        extended = np.asarray(displacements)
         for dofs, basis in self._combined:
-            every = np.concatenate([every, basis.T @ every[dofs]])
-        return every[self.free]
+            extended = np.concatenate([extended, basis.T @ extended[dofs]])
+        return extended[self.free]
 
     @property
     def rigid(self) -> Indices:
-        """Nodes that follow motions."""
+        """Nodes that follow motions, as those of rigid faces."""
         parts = [dofs // self._dimension for dofs, *_ in self._following]
         return np.unique(np.concatenate(parts)) if parts else np.empty(0, np.int64)
 
     @property
     def _total(self) -> int:
-        """Displacements of nodes and combinations of them."""
+        """Number of displacements of nodes and of combinations of them."""
         return self._size + sum(basis.shape[1] for _, basis in self._combined)
 
     def follow(self, nodes: Indices, motions: Array) -> None:
-        """Let nodes move by combinations of ``motions`` ``(dimension n, k)``, and by no others.
+        """Let nodes move only by combinations of ``motions`` ``(dimension n, k)``.
 
-        By those that earlier constraints leave; what is left of the motions are free displacements
-        in the place of the nodes'.
+        The motions are restricted to those that earlier constraints allow. They become free
+        displacements that replace those of the nodes.
         """
         dofs = self._dofs(nodes)
         for same, added, basis in self._following:
@@ -136,12 +136,12 @@ class Constraints:
         for dof, row in zip(place, basis, strict=True):
             if dof not in entries:
                 self._eliminated[dof] = added, row
-        # Those that earlier constraints tie to other nodes take these along.
+        # Displacements that earlier constraints tie to other nodes move these with them.
         for dof in entries.keys() - inner.keys():
             self._equation(np.append(added, dof), np.append(-basis[place[dof]], 1.0))
 
     def _follow_too(self, added: Indices, basis: Array, motions: Array) -> None:
-        """Leave of the motions that nodes follow already those that are among others, too."""
+        """Restrict motions that nodes already follow to those that are also among ``motions``."""
         also = orth(motions, NULL) if motions.size else motions
         lost = basis - also @ (also.T @ basis)
         _, sizes, shapes = np.linalg.svd(lost, full_matrices=False)
@@ -149,20 +149,31 @@ class Constraints:
             self._equation(added, shape)
 
     def _combine(self, dofs: Indices, basis: sp.csr_matrix) -> Indices:
-        """Number combinations of displacements ``dofs`` after all others."""
+        """Assign numbers after all others to the combinations of displacements ``dofs``."""
         added = self._total + np.arange(basis.shape[1])
         self._combined.append((dofs, basis))
         return added
 
     def __contains__(self, dof: int) -> bool:
-        """Whether a displacement is constrained."""
+        """Return whether a displacement is constrained."""
         return dof in self._eliminated
 
     def tie(self, nodes: Indices, parents: Indices, shares: sp.csr_matrix, turn: Array) -> None:
-        """Let nodes do what parents do, turned: u = R Σ s u_parent, as far as nothing holds them.
+        """Let nodes move as their parents do, rotated: u = R Σ s u_parent, as far as they are free.
 
-        ``shares`` ``(n, m)`` are s of the ``parents`` ``(m,)``, ``turn`` ``(dimension, dimension)``
-        is R. A node may be its own parent: then it keeps what the turn leaves as it is.
+        A node may be its own parent; then it is restricted to the displacements that the rotation
+        does not change.
+
+        Parameters
+        ----------
+        nodes
+            Nodes ``(n,)`` that are tied.
+        parents
+            Nodes ``(m,)`` that they follow.
+        shares
+            Coefficients s ``(n, m)``.
+        turn
+            Rotation R ``(dimension, dimension)``.
         """
         shares = shares.tocsr()
         for row, own in enumerate(self._dofs(nodes).reshape(-1, self._dimension)):
@@ -177,13 +188,16 @@ class Constraints:
                     self._by_ties.add(next(reversed(self._eliminated)))
 
     def _dofs(self, nodes: Indices) -> Indices:
-        """Displacements of nodes, one node after the other."""
+        """Return the displacement numbers of nodes, one node after the other."""
         nodes = checks.places("nodes", nodes, self._size // self._dimension).reshape(-1, 1)
         dofs: Indices = (self._dimension * nodes + np.arange(self._dimension)).ravel()
         return dofs
 
     def _equation(self, dofs: Indices, coefficients: Array) -> None:
-        """Impose Σ c u = 0 by the free displacement that counts most in it, if there is one."""
+        """Impose Σ c u = 0 by eliminating the free displacement with the largest coefficient.
+
+        A redundant equation is ignored.
+        """
         free, shares = self._in_free(dofs, coefficients)
         if np.abs(shares).max(initial=0.0) <= ALREADY_MET * np.abs(coefficients).max():
             return
@@ -194,7 +208,7 @@ class Constraints:
         self._eliminated.setdefault(int(free[pivot]), entry)
 
     def _in_free(self, dofs: Indices, coefficients: Array) -> tuple[Indices, Array]:
-        """Σ c u in the displacements that are not constrained yet: so no chain is ever closed."""
+        """Return Σ c u in displacements that are not constrained yet, which prevents cycles."""
         terms: dict[int, float] = {}
         pending = list(zip(dofs.tolist(), coefficients.tolist(), strict=True))
         while pending:
@@ -209,16 +223,16 @@ class Constraints:
 
     @property
     def free(self) -> Indices:
-        """The displacements that nothing eliminates, ascending: the columns of T.
+        """Displacements that are not eliminated, ascending: the columns of T.
 
-        After those of nodes, below ``size``, come combinations of them (:meth:`no_work`,
+        Those of nodes, below ``size``, are followed by combinations of them (:meth:`no_work`,
         :meth:`follow`).
         """
         return np.setdiff1d(np.arange(self._total), np.fromiter(self._eliminated, np.int64))
 
     @property
     def supported(self) -> Indices:
-        """Nodes ``(n,)`` whose displacements are held or averaged, by more than :meth:`tie`."""
+        """Nodes ``(n,)`` whose displacements are held or averaged by more than :meth:`tie`."""
         entries = [
             np.append(masters, dof)
             for dof, (masters, _) in self._eliminated.items()
@@ -228,11 +242,11 @@ class Constraints:
         return np.unique(dofs[dofs < self._size] // self._dimension)
 
     def places(self, nodes: Indices) -> Indices:
-        """Where the displacements of unconstrained nodes are among :attr:`free`."""
+        """Return the positions of the displacements of unconstrained nodes in :attr:`free`."""
         return np.searchsorted(self.free, self._dofs(nodes))
 
     def transformation(self) -> sp.csr_matrix:
-        """T, ``(displacements, free)``; eliminated masters are followed to the end."""
+        """Return T, ``(displacements, free)``, with chains of eliminated displacements resolved."""
         slaves = np.setdiff1d(np.arange(self._total), self.free)
         entries = [self._eliminated[dof] for dof in slaves.tolist()]
         counts = [len(masters) for masters, _ in entries]

@@ -1,4 +1,4 @@
-"""What the loads on a user's mesh do to one of its bodies."""
+"""Forces, displacements and constraints of the loads on a user's mesh, for one of its bodies."""
 
 from __future__ import annotations
 
@@ -17,16 +17,33 @@ from sa_solver.types import Array, Indices
 
 
 class LoadCases:
-    """What loads do to a body with such ``groups``, each a column.
+    """Load cases of a body, one column for each load.
 
-    ``forces`` on its nodes, ``straining`` ones that are the body's own, ``imposed`` displacements
-    and ``jumps``, ``(size, cases)``; ``loaded`` are boundaries with tractions, ``moved`` the loads
-    that impose something. ``sets`` are the vertices of its node sets.
+    Attributes
+    ----------
+    forces
+        Nodal forces ``(size, cases)``.
+    straining
+        Nodal forces of thermal expansion and pretension ``(size, cases)``, which do not act from
+        outside.
+    imposed
+        Imposed displacements ``(size, cases)``.
+    jumps
+        Displacements of a part of the body that cause no strain ``(size, cases)``.
+    loaded
+        Boundaries with tractions.
+    moved
+        Loads that impose displacements.
     """
 
     def __init__(
         self, elastic: ElasticBody, thermal: Array, groups: set[str], sets: Mapping[str, Indices]
     ) -> None:
+        """Start without loads.
+
+        ``thermal`` ``(vertices, cases)`` are expansions, ``groups`` the names of the body's
+        boundaries and node sets, and ``sets`` the vertices of its node sets.
+        """
         self._elastic, self._thermal, self._groups, self._sets = elastic, thermal, groups, sets
         shape = elastic.size, thermal.shape[1]
         self.forces, self.straining, self.imposed, self.jumps = np.zeros((4, *shape))
@@ -34,7 +51,7 @@ class LoadCases:
         self.moved: list[Imposing] = []
 
     def add(self, case: int, load: AppliedLoad, constraints: Constraints) -> None:
-        """A load, with what it holds and ties among the ``constraints``."""
+        """Add a load as a case, and its constraints and ties to ``constraints``."""
         elastic, boundary = self._elastic, boundary_of(load)
         if boundary is not None and boundary not in self._groups:
             return

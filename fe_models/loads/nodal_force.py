@@ -1,4 +1,4 @@
-"""Forces on node sets of a user's mesh that are no faces: their nodes share them."""
+"""Forces on node sets of a user's mesh that are not faces: the nodes share them."""
 
 from __future__ import annotations
 
@@ -12,12 +12,15 @@ from fe_models.meshes.structure_mesh import MeshError
 from sa_solver.types import Array, Indices
 
 Forcing = Pressure | BoundaryForce | Rotation | Acceleration
-# Nodes carry a moment when their forces have it to this share of it: the rest is rounding.
+# Relative error of the moment of nodal forces up to which the nodes carry it; it covers rounding.
 CARRIED = 1e-6
 
 
 def forces_of(load: Forcing, elastic: ElasticBody, points: Mapping[str, Indices]) -> Array:
-    """Nodal forces ``(size,)`` of a load: on its boundary, or on a node set that is no face."""
+    """Return the nodal forces ``(size,)`` of a load on a boundary or on a node set.
+
+    ``points`` are the vertices of the node sets that are not faces.
+    """
     boundaries = elastic.body.mesh.boundaries or {}
     if not isinstance(load, BoundaryForce) or load.boundary in boundaries:
         return load.forces(elastic)
@@ -28,11 +31,12 @@ def forces_of(load: Forcing, elastic: ElasticBody, points: Mapping[str, Indices]
 
 
 def shared(load: BoundaryForce, places: Array) -> Array:
-    """Forces ``(n, 3)`` [N] of a force and a moment that nodes at places ``(n, 3)`` share alike.
+    """Return the forces ``(n, 3)`` [N] by which nodes at ``places`` ``(n, 3)`` share a load.
 
-    f = F/n + ω x r about their mean place: their mean motions are those of a point tied to them by
-    least squares, each counting the same (a distributing coupling, RBE3). Raises
-    :class:`MeshError` for a moment that they cannot carry, such as one about the line they are on.
+    The forces are f = F/n + ω x r about the nodes' mean position. The mean motions of the nodes are
+    those of a point tied to them by least squares with equal weights (a distributing coupling,
+    RBE3). Raises :class:`MeshError` for a moment that they cannot carry, such as one about the line
+    they are on.
     """
     middle = places.mean(axis=0)
     arms = places - middle

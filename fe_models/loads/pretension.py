@@ -1,17 +1,17 @@
-"""Bolts that are tightened: cut through their shanks, shortened and held so.
+"""Pretension of bolts, whose shanks are cut and shortened.
 
-Across the cut the displacement of a shank jumps by its shortening δ along the bolt's axis: u = ũ +
-δ e, with ũ continuous and e the unit shift of what lies beyond the cut. Strain is that of ũ, so
-that the jump loads the nodes by K e δ and is taken off where stress is recovered. Wherever a shank
-is cut, what it does is the same: a shift strains nothing. The tension is the work of all forces on
-the part beyond the cut in a shift of it,
+Across the cut the displacement of a shank jumps by its shortening δ along the bolt's axis:
+u = ũ + δ e, with ũ continuous and e the unit shift of the part beyond the cut. The strain is that
+of ũ, so the jump loads the nodes by K e δ and is subtracted where stress is recovered. The result
+does not depend on the position of the cut, because a shift causes no strain. The tension is the
+work of all forces on the part beyond the cut in a unit shift of it,
 
     F = e · f,
 
-e away from the cut, contact forces and loads f together, as long as no support resists it. Bolts
-that are given by their force are shortened until they have it; from then on the shortening stays,
-and with what the clamped faces lose goes the force (Bickford, Introduction to the Design and
-Behavior of Bolted Joints, 4th ed. 2007, joint diagrams).
+with e away from the cut and f the contact forces and loads together, as long as no support resists
+the shift. Bolts that are given by their force are shortened until they have it. From then on the
+shortening is constant, and the force falls as the clamped faces wear (Bickford, Introduction to the
+Design and Behavior of Bolted Joints, 4th ed. 2007, joint diagrams).
 """
 
 from __future__ import annotations
@@ -32,20 +32,21 @@ if TYPE_CHECKING:
     from fe_models.structure import Structure
     from fe_models.supported_body import SupportedBody
 
-# What supports leave of a shift of the part beyond a cut that they do not resist.
+# Change of a unit shift by supports up to which they do not resist it.
 UNRESISTED = 1e-9
-# A bolt is tight when its force is that asked for but for this share.
+# Relative error up to which a bolt has the force that was requested.
 TIGHT = 1e-6
-# A bolt that has less of its force at the first trial is still loose: the next one pulls it by at
-# most ten times as much.
+# A bolt with less than this share of its force at the first trial is still loose: the slope is
+# limited so that the next trial is at most ten times as large. MOST_TRIALS limits the trials.
 LOOSE, MOST_TRIALS = 0.1, 30
 
 
 @dataclass(frozen=True)
 class Pretension:
-    """The bolt ``body``, shortened by ``shortening`` [mm] where a plane cuts its shank.
+    """Pretension of the bolt ``body`` by a ``shortening`` [mm] where a plane cuts its shank.
 
-    The plane goes ``through`` a point ``(3,)`` [mm] across the ``axis`` ``(3,)`` of the bolt.
+    The plane goes ``through`` a point ``(3,)`` [mm] and is normal to the ``axis`` ``(3,)`` of the
+    bolt.
     """
 
     body: str
@@ -54,7 +55,7 @@ class Pretension:
     shortening: float = 1.0
 
     def jump(self, elastic: ElasticBody) -> Array:
-        """Shift of the nodes beyond the cut ``(size,)`` [mm], towards it.
+        """Return the shift of the nodes beyond the cut ``(size,)`` [mm], towards it.
 
         Raises :class:`MeshError` if the plane leaves all elements on one side.
         """
@@ -64,13 +65,19 @@ class Pretension:
         return np.asarray(shift.ravel())
 
     def beyond(self, elastic: ElasticBody) -> Mask:
-        """Nodes of the elements beyond the cut alone, ``(nodes,)``. Raises as :meth:`jump`."""
+        """Return flags ``(nodes,)`` of nodes of only the elements beyond the cut.
+
+        Raises :class:`MeshError` as :meth:`jump` does.
+        """
         beyond = np.ones(len(elastic.nodes), bool)
         beyond[elastic.element_nodes[:, ~self.far(elastic.body)]] = False
         return beyond
 
     def far(self, body: Body) -> Mask:
-        """Elements beyond the cut ``(elements,)``. Raises as :meth:`jump`."""
+        """Return flags ``(elements,)`` of the elements beyond the cut.
+
+        Raises :class:`MeshError` as :meth:`jump` does.
+        """
         middles = in_space(body.mesh.p[:, body.mesh.t].mean(axis=1).T)
         far: Mask = (middles - self.through) @ self.axis > 0.0
         if far.all() or not far.any():
@@ -83,11 +90,16 @@ class Pretension:
 
 @dataclass(frozen=True)
 class BoltSection:
-    """What acts along a bolt on the part of it on one side of its cut.
+    """Coefficients of the force along a bolt on the part of it on one side of its cut.
 
-    ``shares`` ``(interfaces, 3)`` are what P, Qx and Qy of each interface have of that, ``loads``
-    ``(cases,)`` is that of the load cases [N]; ``compliance`` [mm/N] that of a bar of its length
-    and volume, from which to begin.
+    Attributes
+    ----------
+    shares
+        Coefficients of P, Qx and Qy of each interface in the force ``(interfaces, 3)``.
+    loads
+        Force due to each load case ``(cases,)`` [N].
+    compliance
+        Compliance of a bar of the bolt's length and volume [mm/N], used for the first trial.
     """
 
     shares: Array
@@ -95,10 +107,10 @@ class BoltSection:
     compliance: float
 
     def tension(self, resultants: Array, amplitudes: Array) -> Array:
-        """Of the bolt as far as it is meshed ``(t,)`` [N].
+        """Return the tension of the bolt as far as it is meshed ``(t,)`` [N].
 
-        From P, Qx, Qy and more of the meshed parts of all interfaces, ``(t, interfaces, 6)``, and
-        ``amplitudes`` ``(t, cases)`` of the loads.
+        ``resultants`` ``(t, interfaces, 6)`` are P, Qx, Qy and the moments of the meshed parts of
+        all interfaces, and ``amplitudes`` ``(t, cases)`` those of the loads.
         """
         carried = np.einsum("tic,ic->t", resultants[:, :, :3], self.shares)
         return np.asarray(carried + amplitudes @ self.loads)
@@ -106,9 +118,10 @@ class BoltSection:
 
 @dataclass(frozen=True)
 class Bolt:
-    """The bolt ``name``, load case ``case``, of a ``section``; with a ``force`` [N], or as short.
+    """Bolt ``name`` with its load case and ``section``, and a ``force`` [N] if it is given.
 
-    What a case without force says is its shortening; with one it is found (:func:`tightened`).
+    Without a force, the amplitude of its load case is its shortening. With a force, the shortening
+    is found by :func:`tightened`.
     """
 
     name: str
@@ -118,7 +131,7 @@ class Bolt:
 
 
 def check_pretension(load: Pretension, bodies: Sequence[Body]) -> None:
-    """Raise :class:`MeshError` unless a plane cuts the body that a bolt is."""
+    """Raise :class:`MeshError` unless the bolt's body exists and the plane cuts it."""
     found = [body for body in bodies if body.name == load.body]
     if not found:
         allowed = ", ".join(body.name for body in bodies)
@@ -127,7 +140,7 @@ def check_pretension(load: Pretension, bodies: Sequence[Body]) -> None:
 
 
 def bolt_section(structure: Structure, bolt: Pretension) -> BoltSection:
-    """The section of a bolt, by the part that no support holds along it.
+    """Return the section of a bolt, from the part that no support holds along it.
 
     Raises :class:`MeshError` where supports resist both parts, or the plane cuts a contact face.
     """
@@ -155,8 +168,8 @@ def bolt_section(structure: Structure, bolt: Pretension) -> BoltSection:
     ]
     if not free:
         raise MeshError(
-            f"supports hold body {bolt.body} along its axis on both sides of the cut, so that its "
-            "tension is not known; hold one side at most"
+            f"supports hold body {bolt.body} along its axis on both sides of the cut, so its "
+            "tension cannot be determined; hold one side at most"
         )
     is_far, outwards, shift = free[0]
     shares = np.zeros((len(structure.mesh.interfaces), 3))
@@ -173,7 +186,7 @@ def bolt_section(structure: Structure, bolt: Pretension) -> BoltSection:
 
 
 def _is_free(body: SupportedBody, shift: Array) -> bool:
-    """Whether supports leave a ``shift`` ``(size,)`` of a part of a body as it is."""
+    """Return whether supports do not change a ``shift`` ``(size,)`` of a part of a body."""
     constraints = body.constraints
     left = constraints.transformation() @ shift[constraints.free] - shift
     return bool(np.abs(left).max() <= UNRESISTED)
@@ -185,11 +198,22 @@ def tightened(
     path: Array,
     bolts: Sequence[Bolt],
 ) -> Array:
-    """Shortenings ``(bolts,)`` [mm] by which bolts have their forces at the end of a ``path``.
+    """Return shortenings ``(bolts,)`` [mm] that give the bolts their forces at the end of a path.
 
-    ``path`` ``(t, cases)`` are amplitudes from rest in which those of the bolts are shares of
-    their shortenings. All are found together by Broyden's method, from those that would stretch
-    the bolts alone. Raises :class:`MeshError` where none are found.
+    All are found together by Broyden's method, starting from those that would stretch the bolts
+    alone. Raises :class:`MeshError` if it does not converge.
+
+    Parameters
+    ----------
+    structure
+        The structure with the bolts.
+    joint
+        Its joint with friction.
+    path
+        Amplitudes ``(t, cases)`` from rest, in which those of the bolts are shares of their
+        shortenings.
+    bolts
+        Bolts with given forces.
     """
     columns, sections = [bolt.case for bolt in bolts], [bolt.section for bolt in bolts]
     forces = np.array([bolt.force for bolt in bolts], dtype=np.float64)
@@ -199,12 +223,12 @@ def tightened(
         amplitudes[:, columns] *= shortenings
         *_, end = joint.march(amplitudes, structure.gap())
         resultants = structure.interface_resultants(end)[None]
-        told = [section.tension(resultants, amplitudes[-1:])[0] for section in sections]
-        return np.array(told) - forces
+        tensions = [section.tension(resultants, amplitudes[-1:])[0] for section in sections]
+        return np.array(tensions) - forces
 
     tried = forces * [section.compliance for section in sections]
     left = missing(tried)
-    # What is still loose is pulled on by more.
+    # The limit on the slope gives bolts that are still loose a larger, but bounded, next step.
     slopes = np.diag(np.maximum(left + forces, LOOSE * forces) / tried)
     for _ in range(MOST_TRIALS):
         if np.all(np.abs(left) <= TIGHT * forces):
@@ -214,6 +238,7 @@ def tightened(
         slopes += np.outer(after - left - slopes @ step, step) / (step @ step)
         tried, left = tried + step, after
     raise MeshError(
-        f"no shortening of the bolts gives their forces: {', '.join(f'{f:.4g} N' for f in left)} "
-        "are missing; see that all that a bolt clamps is in contact"
+        "no shortening was found that gives the bolts their forces: "
+        f"{', '.join(f'{f:.4g} N' for f in left)} are missing; check that all parts that a bolt "
+        "clamps are in contact"
     )

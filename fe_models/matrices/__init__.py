@@ -1,14 +1,14 @@
-"""Structures that other programs have made matrices of, and reduced models for other programs.
+r"""Matrices of structures from other programs, and reduced models for other programs.
 
 - ``own_matrices``, ``OwnMatrices``: stiffness, mass, damping and loads from files, in base units
-- ``Unknown``, ``GivenUnknowns``, ``FileUnits``: what their rows are, and in which units they are
-- ``read_matrix_file``, ``MatrixFile``: what a single file has
-- ``on_retained``, ``on_all``: the reduced model that they are, on some points or on all
-- ``without_massless``, ``with_light_motions``, ``check_definite``: what such a model must be to
-  vibrate
-- ``lowest_frequencies``: those of the matrices, rigid motions first
+- ``Unknown``, ``GivenUnknowns``, ``FileUnits``: meaning and units of their rows
+- ``read_matrix_file``, ``MatrixFile``: content of a single file
+- ``on_retained``, ``on_all``: reduced model of the matrices, on some points or on all
+- ``without_massless``, ``with_light_motions``, ``check_definite``: preparation of such a model for
+  vibration
+- ``lowest_frequencies``: natural frequencies of the matrices, rigid motions first
 - ``write_matrices``: a reduced model as ``.npz``, ``.mat`` or Matrix Market
-- ``MatrixError``: matrices that cannot be taken
+- ``MatrixError``: error of matrices that cannot be used
 
 A mass of 2 kg on 1 N/µm in two files of Matrix Market, in m and N:
 
@@ -17,7 +17,7 @@ A mass of 2 kg on 1 N/µm in two files of Matrix Market, in m and N:
 >>> from fe_models.matrices import FileUnits, GivenUnknowns, Unknown, own_matrices
 >>> folder = Path(tempfile.mkdtemp())
 >>> for name, value in (("k", "1e6"), ("m", "2")):
-...     text = f"%%MatrixMarket matrix array real general\\n1 1\\n{value}\\n"
+...     text = f"%%MatrixMarket matrix array real general\n1 1\n{value}\n"
 ...     _ = (folder / f"{name}.mtx").write_text(text)
 >>> sources = {"stiffness": (folder / "k.mtx", ""), "mass": (folder / "m.mtx", "")}
 >>> given = GivenUnknowns((Unknown("mass", "x"),))

@@ -1,4 +1,4 @@
-"""A reduced model in the formats of other programs, which :func:`own_matrices` reads back."""
+"""Reduced models in the formats of other programs, which :func:`own_matrices` can read."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from fe_models.matrices.unknowns import MODAL, MatrixError, Unknown, unknown_of
 from sa_solver import checks
 from sa_solver.types import Array
 
-# Digits that leave nothing of a number out.
+# Number of digits that represent a number exactly.
 DIGITS = 17
 NPZ, MAT, MTX = "npz", "mat", "mtx"
 
@@ -23,14 +23,14 @@ NPZ, MAT, MTX = "npz", "mat", "mtx"
 def write_matrices(model: ReducedModel, folder: Path, stem: str, formats: tuple[str, ...]) -> None:
     """Write a model with names as ``npz``, ``mat`` or ``mtx``, in N, mm and t.
 
-    The first two hold ``stiffness``, ``mass``, ``loads`` and where there is one ``damping`` on kept
+    The first two contain ``stiffness``, ``mass``, ``loads`` and if present ``damping`` on kept
     displacements, then modes; ``names`` of all of them, and ``places`` of the kept ones. ``mtx`` is
     a file of each matrix in the Matrix Market format, and one of the unknowns in CSV. Raises
     :class:`MatrixError` for a model without names, and for another format.
 
     Examples
     --------
-    Matrices come back as they were:
+    Matrices are read back unchanged:
 
     >>> import tempfile
     >>> from pathlib import Path
@@ -59,7 +59,7 @@ def write_matrices(model: ReducedModel, folder: Path, stem: str, formats: tuple[
 
 
 def _matrices(model: ReducedModel) -> dict[str, Array]:
-    """The matrices by the names of their parts."""
+    """Return the matrices by the names of their parts."""
     given = {"stiffness": model.stiffness, "mass": model.mass, "damping": model.damping}
     loads = {"loads": model.loads} if model.loads.size else {}
     return {name: matrix for name, matrix in given.items() if matrix is not None} | loads
@@ -83,7 +83,7 @@ def _write_npz(model: ReducedModel, folder: Path, stem: str) -> None:
 
 def _write_mat(model: ReducedModel, folder: Path, stem: str) -> None:
     described = _described(model)
-    # A cell of texts, which have lengths of their own.
+    # Texts of different lengths are stored as a cell array.
     described["names"] = described["names"].astype(object)
     scipy.io.savemat(folder / f"{stem}.mat", _matrices(model) | described, do_compression=True)
 
@@ -97,7 +97,7 @@ def _write_mtx(model: ReducedModel, folder: Path, stem: str) -> None:
 
 
 def _rows(model: ReducedModel) -> Iterator[str]:
-    """A line for each unknown, as a case reads them."""
+    """Yield a line for each unknown, as a case reads them."""
     places = model.places
     yield "point,direction" + ("" if places is None else ",x [mm],y [mm],z [mm]")
     for k, (point, direction) in enumerate(_unknowns(model)):

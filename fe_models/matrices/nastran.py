@@ -1,7 +1,7 @@
 """Matrices of Nastran: ``DMIG`` entries of punch and bulk data files, and ``.op4``.
 
-``DMIG`` has the points and components of its rows and columns in it, ``.op4`` has none. The latter
-is read by pyYeti, where it is installed (Nastran Quick Reference Guide: DMIG).
+``DMIG`` includes the points and components of its rows and columns, ``.op4`` does not. The latter
+is read by pyYeti if it is installed (Nastran Quick Reference Guide: DMIG).
 """
 
 from __future__ import annotations
@@ -27,17 +27,17 @@ from fe_models.meshes.structure_mesh import MeshError
 from fe_models.readers.nastran.cards import Entry, bulk_data
 
 DMIG = "DMIG"
-# Forms of a matrix: whole, rectangular with numbered columns, and symmetric with one triangle.
+# Forms of a matrix: square, rectangular with numbered columns, and symmetric with one triangle.
 SQUARE, RECTANGULAR, SYMMETRIC = 1, (2, 9), 6
 REAL = (1, 2)
-# Fields behind the name: of the header, and of a column, and how many make an entry of it.
+# Positions of form and type in the header after the name, and number of fields of an entry.
 FORM, TYPE, ENTRIES = 2, 3, 4
 
 Label = tuple[int, int]
 
 
 def read_punch(path: Path) -> MatrixFile:
-    """All ``DMIG`` matrices of a punch or bulk data file, on the unknowns of all of them.
+    """Read all ``DMIG`` matrices of a punch or bulk data file, on the unknowns of all of them.
 
     Raises :class:`MatrixError` with file and line.
     """
@@ -55,7 +55,7 @@ def read_punch(path: Path) -> MatrixFile:
 
 
 def read_op4(path: Path) -> MatrixFile:
-    """The matrices of an ``.op4`` file, text or binary. Raises :class:`MatrixError`."""
+    """Read the matrices of an ``.op4`` file, text or binary. Raises :class:`MatrixError`."""
     try:
         from pyyeti.nastran import op4
     except ImportError:
@@ -64,7 +64,7 @@ def read_op4(path: Path) -> MatrixFile:
             "'fretscale[nastran]', or write the matrices as DMIG (.pch)"
         ) from None
     with warnings.catch_warnings():
-        # Of damage that it passes over.
+        # pyYeti only warns about damage that it ignores.
         warnings.simplefilter("error", RuntimeWarning)
         names, values, _, _ = op4.load(str(path), into="list", sparse=None)
     return MatrixFile(path, {n: _plain(v) for n, v in zip(names, values, strict=True)})
@@ -79,7 +79,7 @@ def _later(matrix: _Dmig, row: dict[Label, int]) -> Callable[[], Values]:
 
 
 class _Dmig:
-    """A matrix: its header, and its entries by row and column."""
+    """Matrix in DMIG entries: its header, and its values by row and column."""
 
     def __init__(self, header: Entry) -> None:
         self.header, self.form = header, header.whole(FORM)
@@ -90,7 +90,7 @@ class _Dmig:
         self.entries: dict[tuple[Label, Label], float] = {}
 
     def take(self, column: Entry) -> None:
-        """The entries of a column."""
+        """Add the entries of a column."""
         to = _label(column, 1)
         for first in range(ENTRIES, len(column.fields), ENTRIES):
             if not any(column.fields[first : first + ENTRIES]):
@@ -103,12 +103,12 @@ class _Dmig:
             self.entries[row, to] = column.real(first + 2)
 
     def labels(self) -> set[Label]:
-        """Those of its rows, and of its columns where these are unknowns too."""
+        """Return the labels of its rows, and of its columns where these are unknowns, too."""
         rows = {row for row, _ in self.entries}
         return rows if self.form in RECTANGULAR else rows | {to for _, to in self.entries}
 
     def values(self, row: dict[Label, int]) -> Values:
-        """The matrix, its rows by their labels; columns of loads by their numbers."""
+        """Return the matrix with rows by their labels; columns of loads are sorted by number."""
         ends, size = list(self.entries), len(row)
         rows = [row[end] for end, _ in ends]
         if self.form in RECTANGULAR:
@@ -124,18 +124,18 @@ class _Dmig:
 
 
 def _label(entry: Entry, first: int) -> Label:
-    """Point and component; that of a scalar point may be left out."""
+    """Return point and component; the component of a scalar point may be left out."""
     component = entry.text(first + 1)
     return entry.whole(first), entry.whole(first + 1) if component else 0
 
 
 def _gathered(entries: list[Entry]) -> dict[str, _Dmig]:
-    """The matrices by name, each with its columns."""
+    """Return the matrices by name, each with its columns."""
     found: dict[str, _Dmig] = {}
     columns: defaultdict[str, list[Entry]] = defaultdict(list)
     for entry in entries:
         name = entry.text(0).upper()
-        # A header has 0 where a column has its point, and more behind it than a component.
+        # A header has 0 where a column has its point, followed by its form.
         if entry.text(1) == "0" and entry.text(FORM):
             if name in found:
                 raise entry.wrong(f"{name}: a second header; allowed: one")

@@ -1,4 +1,4 @@
-"""The matrices of a structure in files: found by their names, and looked at one by one."""
+"""Matrices of a structure in files: found by their names, and checked one by one."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from sa_solver import checks
 
 AnyRead = TypeVar("AnyRead")
 
-# Endings of files, and what reads them.
+# Reader of files with each ending.
 READERS: dict[str, Callable[[Path], MatrixFile]] = {
     ".npz": read_npz,
     ".mat": read_mat,
@@ -29,10 +29,10 @@ READERS: dict[str, Callable[[Path], MatrixFile]] = {
     ".bdf": read_punch,
     ".op4": read_op4,
 }
-# Those of files that may hold several matrices, each with a name.
+# Endings of files that may contain several named matrices.
 SEVERAL = tuple(ending for ending in READERS if ending != ".mtx")
-# Names that a matrix is looked for by, in any case, where none is given; Nastran's as PARAM,EXTOUT
-# and EXTSEOUT write them.
+# Names by which a matrix is found if none is given, in upper or lower case. Those of Nastran are as
+# PARAM,EXTOUT and EXTSEOUT write them.
 STIFFNESS, MASS, DAMPING, LOADS = "stiffness", "mass", "damping", "loads"
 USUAL_NAMES = {
     STIFFNESS: (STIFFNESS, "k", "kaax", "kaa", "kgg", "k2gg"),
@@ -42,20 +42,20 @@ USUAL_NAMES = {
 }
 PARTS = tuple(USUAL_NAMES)
 NEEDED = STIFFNESS, MASS
-# Of models that fretscale reduces: what is no matrix of theirs.
+# Datasets of fretscale's reduced models that are not matrices of the structure.
 DESCRIBING = "kept", "mode_shapes", "frequencies"
-# More unknowns than any machine with this program condenses: a slip, or a damaged file.
+# Limit of the number of unknowns: a larger one is a mistake or damage, and cannot be condensed.
 MOST_UNKNOWNS = 5_000_000
-# Entries on either side of the diagonal may differ by so much of the largest in their rows: what
-# single precision leaves, in which some programs write. Their mean is taken.
+# Tolerated asymmetry relative to the largest entries in the rows: rounding to single precision, in
+# which some programs write. The mean of both entries is used.
 SYMMETRIC = 1e-6
-# Names that fit into a message.
+# Largest number of names listed in a message.
 MOST_LISTED = 12
 
 
 @dataclass(frozen=True)
 class Part:
-    """A matrix of a file that is taken for a part."""
+    """Matrix of a file that is used as stiffness, mass, damping or loads."""
 
     part: str
     file: MatrixFile
@@ -68,19 +68,19 @@ class Part:
 
 
 def read_matrix_file(path: Path) -> MatrixFile:
-    """What a file of matrices has, by its ending.
+    r"""Return the content of a file of matrices, read according to its ending.
 
-    Raises :class:`MatrixError` for a file that cannot be read: damage ends in a dozen ways.
+    Raises :class:`MatrixError` for a file that cannot be read.
 
     Examples
     --------
-    What Abaqus writes by ``*MATRIX OUTPUT, STIFFNESS``: one triangle, with nodes and components
+    Abaqus writes by ``*MATRIX OUTPUT, STIFFNESS`` one triangle, with nodes and components:
 
     >>> import tempfile
     >>> from pathlib import Path
     >>> from fe_models.matrices import read_matrix_file
     >>> path = Path(tempfile.mkdtemp()) / "job_STIF1.mtx"
-    >>> _ = path.write_text("1,1, 1,1, 2.0e+03\\n2,1, 1,1, -1.0e+03\\n2,1, 2,1, 1.0e+03\\n")
+    >>> _ = path.write_text("1,1, 1,1, 2.0e+03\n2,1, 1,1, -1.0e+03\n2,1, 2,1, 1.0e+03\n")
     >>> file = read_matrix_file(path)
     >>> print([unknown.name for unknown in file.unknowns])
     ['1 x', '2 x']
@@ -91,7 +91,7 @@ def read_matrix_file(path: Path) -> MatrixFile:
     path = Path(path)
     reader = READERS.get(path.suffix.lower())
     if reader is None:
-        raise MatrixError(f"{path}: no file of matrices; allowed: {', '.join(READERS)}")
+        raise MatrixError(f"{path}: not a file of matrices; allowed: {', '.join(READERS)}")
     return _reading(path, lambda: reader(path))
 
 
@@ -101,10 +101,10 @@ def read_matrix_file(path: Path) -> MatrixFile:
 def found(
     sources: Mapping[str, tuple[Path, str]], file: Path | None
 ) -> tuple[dict[str, Part], tuple[str, ...], dict[str, tuple[str, ...]]]:
-    """The matrices by their parts, the names of those that are none, and what these could be.
+    """Return the matrices by their parts, the names of unused ones, and suggestions for these.
 
-    The last are, for damping and loads that are missing, matrices of the right shape, each as a
-    case names it.
+    The suggestions are, for damping and loads that are missing, unused matrices of the right shape,
+    written as in a case.
     """
     files: dict[Path, MatrixFile] = {}
     parts = {}
@@ -137,13 +137,13 @@ def found(
 def _offered(
     parts: Mapping[str, Part], left: Sequence[tuple[MatrixFile, str]]
 ) -> dict[str, tuple[str, ...]]:
-    """Return the matrices not used so far whose shapes fit a missing damping or load."""
+    """Return the unused matrices whose shapes fit a missing damping or load."""
     size = parts[STIFFNESS].values.shape[0]
     offered: dict[str, tuple[str, ...]] = {}
     for file, name in left if {DAMPING, LOADS} - set(parts) else ():
         try:
             values = file.matrices[name]()
-        except Exception:  # nothing depends on it
+        except Exception:  # A suggestion is optional, so unreadable matrices are skipped.
             continue
         shape = values.shape if min(values.shape, default=0) > 1 else (values.size, 1)
         part = DAMPING if shape == (size, size) else LOADS
@@ -158,7 +158,11 @@ def _offered(
 
 
 def _chosen(file: MatrixFile, part: str, name: str, own: bool) -> str | None:
-    """The name in the file of the matrix for a part: the one given, the only one, a usual one."""
+    """Return the name in the file of the matrix for a part.
+
+    It is the name given, the only name, or a usual name. ``own`` tells whether the file was given
+    for this part.
+    """
     known = list(file.matrices)
     if name:
         matching = [k for k in known if k.lower() == name.lower()]
@@ -187,15 +191,15 @@ def _listed(names: Sequence[str]) -> str:
 
 
 def _reading(path: Path, read: Callable[[], AnyRead]) -> AnyRead:
-    """What reads a file or a matrix of it, its errors in one line."""
+    """Read a file or a matrix of it, with any error in one line."""
     try:
         return read()
     except MatrixError:
         raise
-    except Exception as error:  # libraries end damage in a dozen ways
-        said = " ".join(str(error).split())[:120] or type(error).__name__
+    except Exception as error:  # Libraries raise many kinds of errors for damaged files.
+        message = " ".join(str(error).split())[:120] or type(error).__name__
         raise MatrixError(
-            f"{path}: cannot be read ({said}); allowed: a file as its program leaves it"
+            f"{path}: cannot be read ({message}); allowed: a file as its program writes it"
         ) from error
 
 
@@ -203,7 +207,7 @@ def _reading(path: Path, read: Callable[[], AnyRead]) -> AnyRead:
 
 
 def _checked(part: Part) -> Part:
-    """The matrix as rows and columns of finite real numbers; a load may be a single list."""
+    """Return the matrix as rows and columns of finite real numbers; a load may be a single list."""
     values = part.values
     if values.dtype.kind == "c":
         raise part.refuse("complex; allowed: real numbers, structural damping apart")
@@ -232,7 +236,7 @@ def _checked(part: Part) -> Part:
 
 
 def shape_of(values: Values) -> str:
-    """Rows and columns, as they are told."""
+    """Return the numbers of rows and columns as text."""
     return " x ".join(map(str, values.shape))
 
 
@@ -260,13 +264,16 @@ def symmetric_matrix(name: str, values: object, size: int) -> sp.csr_matrix:
 
 
 def symmetric(part: Part, matrix: sp.csr_matrix, unknowns: Sequence[Unknown]) -> sp.csr_matrix:
-    """The matrix without what rounding leaves of an asymmetry. Raises MatrixError for more."""
+    """Return the symmetric part of a matrix that is symmetric up to rounding.
+
+    Raises :class:`MatrixError` for a larger asymmetry.
+    """
     apart = abs(matrix - matrix.T).tocoo()
     if not apart.nnz:
         return matrix
     largest = np.sqrt(np.asarray(abs(matrix).max(axis=1).todense()).ravel())
     sizes = largest[apart.row] * largest[apart.col]
-    # A row of nothing beside a column of something is as far apart as it can be.
+    # An entry whose counterpart's row or column is empty has the largest relative asymmetry.
     relative = apart.data / np.where(sizes > 0.0, sizes, apart.data)
     worst = int(np.argmax(relative))
     if relative[worst] > SYMMETRIC:

@@ -1,4 +1,4 @@
-"""Own matrices as a reduced model: on retained points and modes, or all unknowns as they are."""
+"""Reduced models of own matrices: on retained points and modes, or on all unknowns."""
 
 from __future__ import annotations
 
@@ -15,23 +15,25 @@ from fe_models.solvers.linear_solver import FactorMemoryError, SolverError
 from sa_solver import checks
 from sa_solver.types import Array, Indices
 
-# Masses that are nothing, over the largest of their kind (displacements, rotations, modes).
+# Masses below this share of the largest of their kind (displacements, rotations) count as 0.
 MASSLESS = 1e-13
 NOTHING: Mapping[str, float] = {}
-# Eigenvalues below zero, and those of a mass that is not definite, of the matrix scaled to 1 on its
-# diagonal: what single precision leaves of the rigid motions of a free body.
+# For matrices scaled to 1 on their diagonal: a stiffness has negative eigenvalues below -NEGATIVE
+# (rounding to single precision gives rigid motions smaller ones), and a mass with eigenvalues up to
+# SINGULAR is not definite.
 NEGATIVE, SINGULAR = 1e-6, 1e-10
-# Rigid motions that a body may have: their frequencies are below this share of the next, and their
-# squares below this one of the median of K_jj/M_jj, which nine digits of a stiffness leave.
+# A body has at most MOST_RIGID rigid motions. Their frequencies are below the share RIGID of the
+# next one, and the squares of these below the share ROUNDING of the median of K_jj/M_jj, as for a
+# stiffness with nine digits.
 MOST_RIGID, RIGID, ROUNDING = 6, 1e-3, 1e-8
-# Unknowns up to which all frequencies are found.
+# Number of unknowns up to which all frequencies are computed.
 DENSE = 600
-# Names that fit into a message.
+# Largest number of names listed in a message.
 MOST_LISTED = 12
 
 
 def on_all(matrices: OwnMatrices) -> ReducedModel:
-    """The matrices as they are, dense, coordinates of modes behind all others.
+    """Return the matrices unchanged as a dense model, with coordinates of modes after all others.
 
     Examples
     --------
@@ -74,15 +76,16 @@ def on_retained(
     modes: int,
     done: Callable[[], None] = lambda: None,
 ) -> ReducedModel:
-    """The matrices on the unknowns of ``points`` and so many modes, by Craig and Bampton.
+    """Return the reduced model on the unknowns of ``points`` and ``modes``, by Craig and Bampton.
 
     Damping and loads are projected onto the same shapes. ``done`` is called as by
-    :func:`~fe_models.joints.reduction.reduce_body`. Raises :class:`MatrixError` for modes that
-    there are not, and where what is not retained can move while the points are held.
+    :func:`~fe_models.joints.reduction.reduce_body`. Raises :class:`MatrixError` if there are fewer
+    modes, and if other unknowns can move while the points are held.
 
     Examples
     --------
-    Eleven masses and ten springs in a row, on its ends and one mode: 2 √(k/m) sin(π/22)
+    Eleven masses and ten springs in a row are reduced to the ends and one mode, whose frequency is
+    that of 2 √(k/m) sin(π/22):
 
     >>> import numpy as np
     >>> import scipy.sparse as sp
@@ -111,7 +114,7 @@ def on_retained(
     if modes >= max(moving, 1):
         raise MatrixError(
             f"{modes} modes of {moving} displacements with mass that are not retained; allowed: "
-            "fewer",
+            "fewer modes than displacements",
             "modes",
         )
     try:
@@ -128,8 +131,8 @@ def on_retained(
         raise
     except SolverError as error:
         raise MatrixError(
-            f"what is not retained moves while the points are held ({error}); allowed: points that "
-            "hold it, and no unknowns without stiffness",
+            f"unknowns that are not retained can move while the points are held ({error}); "
+            "allowed: points that hold them, and no unknowns without stiffness",
             "retained",
         ) from error
     return replace(
@@ -150,11 +153,11 @@ def require_names(model: ReducedModel) -> None:
 def without_massless(
     model: ReducedModel, laden: Sequence[str] = ()
 ) -> tuple[ReducedModel, tuple[str, ...]]:
-    """The model without kept unknowns that have no mass, and their names.
+    """Return the model without kept unknowns that have no mass, and the names of these.
 
-    They follow the others statically, which is exact: no force of inertia acts on them, and none
-    of joints or dampers once they are none of the model. Those ``laden`` with added mass stay.
-    Raises :class:`MatrixError` where they move freely, or have damping.
+    They follow the others statically. This is exact, because no inertia force acts on them, and no
+    joint or damper once they are no longer part of the model. Unknowns that are ``laden`` with
+    added mass stay. Raises :class:`MatrixError` if they move freely or have damping.
 
     Examples
     --------
@@ -178,31 +181,31 @@ def without_massless(
     dropped &= ~np.isin(names, list(laden))
     if not dropped.any():
         return model, ()
-    gone = np.pad(dropped, (0, len(model.mass) - count))
-    if gone.all():
+    removed = np.pad(dropped, (0, len(model.mass) - count))
+    if removed.all():
         raise MatrixError("no mass at all; allowed: masses, or masses added to points", "mass")
-    told = tuple(name for name, is_gone in zip(names, dropped, strict=True) if is_gone)
-    followed = _following(model, gone, told)
-    stays = ~gone
-    square = np.ix_(stays, stays)
+    removed_names = tuple(name for name, is_gone in zip(names, dropped, strict=True) if is_gone)
+    followed = _following(model, removed, removed_names)
+    kept = ~removed
+    square = np.ix_(kept, kept)
     damping = None if model.damping is None else model.damping[square]
     return (
         replace(
             model,
             kept=model.kept[~dropped],
-            stiffness=model.stiffness[square] + model.stiffness[np.ix_(stays, gone)] @ followed,
+            stiffness=model.stiffness[square] + model.stiffness[np.ix_(kept, removed)] @ followed,
             mass=model.mass[square],
-            loads=model.loads[stays] + followed.T @ model.loads[gone],
-            names=tuple(name for name in names if name not in told),
+            loads=model.loads[kept] + followed.T @ model.loads[removed],
+            names=tuple(name for name in names if name not in removed_names),
             places=None if model.places is None else model.places[~dropped],
             damping=damping,
         ),
-        told,
+        removed_names,
     )
 
 
 def _massless(masses: Array, names: Sequence[str]) -> np.ndarray:
-    """Which unknowns ``(c,)`` have no mass beside those of their kind."""
+    """Return flags of the unknowns ``(c,)`` whose mass is zero relative to their kind."""
     turning = np.array([name.rpartition(" ")[2] in ROTATIONS for name in names], dtype=bool)
     massless = np.zeros(len(masses), dtype=bool)
     for kind in (turning, ~turning):
@@ -212,43 +215,44 @@ def _massless(masses: Array, names: Sequence[str]) -> np.ndarray:
     return massless
 
 
-def _following(model: ReducedModel, gone: np.ndarray, names: tuple[str, ...]) -> Array:
-    """How unknowns without mass follow the others ``(a, b)``: -K_aa⁻¹ K_ab."""
+def _following(model: ReducedModel, removed: np.ndarray, names: tuple[str, ...]) -> Array:
+    """Return how unknowns without mass follow the others ``(a, b)``: -K_aa⁻¹ K_ab."""
     listed = listed_names(names)
-    if model.damping is not None and model.damping[gone].any():
+    if model.damping is not None and model.damping[removed].any():
         raise MatrixError(
             f"no mass but damping at {listed}; allowed: masses added there, or no damping",
             "mass",
         )
-    K = model.stiffness[gone]
-    # What nothing holds and nothing loads is not there at all.
-    loose = ~K.any(axis=1) & ~model.loads[gone].any(axis=1)
-    followed = np.zeros((len(K), int((~gone).sum())))
+    K = model.stiffness[removed]
+    # Unknowns without stiffness and load have no effect and are left out.
+    loose = ~K.any(axis=1) & ~model.loads[removed].any(axis=1)
+    followed = np.zeros((len(K), int((~removed).sum())))
     bound = np.flatnonzero(~loose)
     try:
-        factors = sl.cho_factor(K[bound][:, np.flatnonzero(gone)[bound]])
+        factors = sl.cho_factor(K[bound][:, np.flatnonzero(removed)[bound]])
     except np.linalg.LinAlgError:
         raise MatrixError(
             f"no mass at {listed}, and nothing that holds them; allowed: masses added there",
             "mass",
         ) from None
-    followed[bound] = -sl.cho_solve(factors, K[bound][:, ~gone])
+    followed[bound] = -sl.cho_solve(factors, K[bound][:, ~removed])
     return followed
 
 
 def with_light_motions(
     model: ReducedModel, frequency: float
 ) -> tuple[ReducedModel, tuple[str, ...]]:
-    """The model with mass in every motion, and what moves most in those that had none.
+    """Return the model with mass in every motion, and the unknowns that move most in added ones.
 
-    Motions without mass are the null space N of the mass scaled to 1 on its diagonal. To them
-    alone comes N Nᵀ K N Nᵀ / ω², with which they vibrate at ``frequency`` [Hz] where the others
-    are held. Statics stay as they were; at a frequency f the flexibility of these motions is
-    (f / ``frequency``)² too large. Raises :class:`MatrixError` where nothing holds one of them.
+    Motions without mass are the null space N of the mass scaled to 1 on its diagonal. The mass N Nᵀ
+    K N Nᵀ / ω² is added to them alone. With it they vibrate at ``frequency`` [Hz] where the others
+    are held. The static response is unchanged; at a frequency f the flexibility of these motions is
+    (f / ``frequency``)² too large. Raises :class:`MatrixError` if one of them has no stiffness.
 
     Examples
     --------
-    A mass of 1 kg and two points that move it together, on springs: as two have no mass apart,
+    A mass of 1 kg is moved by two points together, each on a spring; their relative motion has no
+    mass:
 
     >>> import numpy as np
     >>> import scipy.sparse as sp
@@ -266,7 +270,7 @@ def with_light_motions(
     checks.number("frequency", frequency, above=0.0, error=MatrixError)
     diagonal = np.diag(model.mass)
     scale = 1.0 / np.sqrt(np.where(diagonal > 0.0, diagonal, np.inf))
-    # What has no mass at all is scaled by its stiffness: it is in the null space alone.
+    # Unknowns without any mass are in the null space alone, and are scaled by their stiffness.
     bare = diagonal <= 0.0
     scale[bare] = 1.0 / np.sqrt(np.abs(np.diag(model.stiffness)[bare]))
     values, shapes = sl.eigh(scale[:, None] * model.mass * scale)
@@ -289,20 +293,20 @@ def with_light_motions(
 
 
 def _most(shape: Array) -> int:
-    """The first of those that move most, to what rounding leaves."""
+    """Return the first of the unknowns that move most, up to rounding."""
     sizes = np.abs(shape)
     return int(np.argmax(sizes > (1.0 - 1e-6) * sizes.max()))
 
 
 def check_definite(model: ReducedModel, laden: Mapping[str, float] = NOTHING) -> int:
-    """How many rigid motions a model has. Raises :class:`MatrixError` for what no structure is.
+    """Return the number of rigid motions of a model, and raise if it is no valid structure.
 
-    Stiffness must have no eigenvalue below zero, mass all above it, with what is added to
-    displacements by their names, ``laden`` [t].
+    The stiffness must have no negative eigenvalue, and the mass only positive ones, with ``laden``
+    masses [t] added to displacements by name. Raises :class:`MatrixError` otherwise.
 
     Examples
     --------
-    Two masses that a spring joins move as one:
+    Two masses that are joined by a spring move as one:
 
     >>> import numpy as np
     >>> import scipy.sparse as sp
@@ -337,15 +341,15 @@ def check_definite(model: ReducedModel, laden: Mapping[str, float] = NOTHING) ->
 
 
 def lowest_frequencies(matrices: OwnMatrices, count: int) -> Array:
-    """The lowest natural frequencies [Hz]: 0 of rigid motions, and up to ``count`` above them.
+    """Return the lowest natural frequencies [Hz]: 0 for rigid motions, and up to ``count`` above.
 
-    Raises :class:`MatrixError` for what has no mass or no stiffness, and
-    :class:`~fe_models.solvers.linear_solver.SolverError` where large matrices have no such
+    Raises :class:`MatrixError` for motions without mass or stiffness, and
+    :class:`~fe_models.solvers.linear_solver.SolverError` if large matrices have no such
     frequencies.
 
     Examples
     --------
-    Two masses of 1 kg that a spring of 1 N/µm joins: 0 and √(2 k/m)
+    Two masses of 1 kg that are joined by a spring of 1 N/µm: 0 and √(2 k/m)
 
     >>> import numpy as np
     >>> import scipy.sparse as sp
@@ -377,9 +381,9 @@ def lowest_frequencies(matrices: OwnMatrices, count: int) -> Array:
 
 
 def _lowest(matrix: Array, names: Sequence[str], part: str) -> tuple[str, Array]:
-    """The unknown that moves most in the lowest eigenvector, and the eigenvalues.
+    """Return the unknown that moves most in the lowest eigenvector, and the eigenvalues.
 
-    Those of the matrix scaled to 1 on its diagonal, on which units have no influence.
+    The matrix is scaled to 1 on its diagonal, so that units have no influence.
     """
     diagonal = np.diag(matrix)
     wrong = np.flatnonzero((diagonal < 0.0) | ((diagonal == 0.0) & matrix.any(axis=1)))
@@ -399,6 +403,6 @@ def _all_names(model: ReducedModel) -> list[str]:
 
 
 def listed_names(names: Sequence[str]) -> str:
-    """Names as they fit into a line."""
+    """Return names as text that fits into one line."""
     more = f" and {len(names) - MOST_LISTED} more" if len(names) > MOST_LISTED else ""
     return ", ".join(names[:MOST_LISTED]) + more

@@ -1,10 +1,10 @@
-"""A structure as matrices from files: put together, in base units, and looked at.
+"""Structure given by matrices from files: assembled, converted to base units, and checked.
 
-Energies do not depend on units, which makes the change of them one rule for all kinds of unknown.
-With x = S x_file the stiffness is K = e S⁻¹ K_file S⁻¹ and so are mass and damping, e being the
-energy that the file's units make of one (force times length; of the mass, mass times length² over
-s²). S is the file's length in mm for displacements, 1 for rotations, and for coordinates of modes
-the length times the root of the mass, so that modal masses of 1 stay 1.
+The conversion preserves energy, which gives one rule for all kinds of unknowns. With x = S x_file
+the stiffness is K = e S⁻¹ K_file S⁻¹, and mass and damping likewise, where e is the file's unit of
+energy in base units (force times length; for the mass, mass times length² over s²). S is the file's
+length in mm for displacements, 1 for rotations, and for coordinates of modes the length times the
+root of the mass, so that modal masses of 1 stay 1.
 """
 
 from __future__ import annotations
@@ -37,11 +37,11 @@ from sa_solver.types import Array, Indices
 class FileUnits:
     """Units of matrices by their size: ``length`` in mm, ``force`` in N, and ``mass`` in t.
 
-    Without a ``mass`` it is that which the force moves by a length in s².
+    Without a ``mass`` the unit is the mass that the force accelerates by one length per s².
 
     Examples
     --------
-    In m and N masses are kg:
+    With m and N the unit of mass is kg:
 
     >>> from fe_models.matrices import FileUnits
     >>> print(FileUnits(length=1000.0, force=1.0).mass)
@@ -59,7 +59,7 @@ class FileUnits:
             object.__setattr__(self, "mass", self.force / self.length)
 
     def scales(self, unknowns: Sequence[Unknown]) -> Array:
-        """S ``(n,)``: unknowns in base units over those of the file."""
+        """Return S ``(n,)``: unknowns in base units over those of the file."""
         modal = self.length * np.sqrt(self.mass)
         sizes = dict.fromkeys(TRANSLATIONS, self.length) | {MODAL: modal}
         return np.array([sizes.get(unknown.direction, 1.0) for unknown in unknowns])
@@ -67,17 +67,30 @@ class FileUnits:
 
 @dataclass(frozen=True)
 class OwnMatrices:
-    """A structure of ``n`` unknowns: ``stiffness``, ``mass`` and ``damping`` ``(n, n)`` or None.
+    """Structure of ``n`` unknowns, given by its matrices.
 
-    ``loads`` ``(n, cases)`` are the forces of a load of 1 N; ``unknowns`` ``(n,)`` say what the
-    rows are, ``places`` ``(n, 3)`` where their points are [mm], if known. ``held`` are those that a
-    file holds and that are none of these, ``taken`` the matrices by the parts they are taken for,
-    ``left`` those of the files that nothing is made of, ``offered`` which of these a missing
-    damping or load could be, as ``plant.mat:D``.
+    Attributes
+    ----------
+    stiffness, mass, damping
+        Matrices ``(n, n)``; the damping may be None.
+    loads
+        Forces of a load of 1 N ``(n, cases)``.
+    unknowns
+        Unknowns of the rows ``(n,)``.
+    places
+        Positions of their points ``(n, 3)`` [mm], if known.
+    held
+        Unknowns that a file holds and that are left out.
+    taken
+        Name of the matrix used for each part.
+    left
+        Names of the matrices in the files that are not used.
+    offered
+        Unused matrices that a missing damping or load could be, as ``plant.mat:D``.
 
     Examples
     --------
-    Made without files, and the mass that moves along x:
+    Matrices without files, and the mass that moves along x:
 
     >>> import numpy as np
     >>> import scipy.sparse as sp
@@ -114,7 +127,10 @@ class OwnMatrices:
             checks.settle(self, places=places)
 
     def moved_mass(self) -> dict[str, float]:
-        """Mass [t] along x, y and z of what moves as one with all points: of a free body, all."""
+        """Return the mass [t] that moves along x, y and z if all points move together.
+
+        For a free body it is the whole mass.
+        """
         shares = {}
         for axis in TRANSLATIONS:
             along = np.array([float(unknown.direction == axis) for unknown in self.unknowns])
@@ -125,10 +141,16 @@ class OwnMatrices:
 
 @dataclass(frozen=True)
 class GivenUnknowns:
-    """What is said of unknowns beside the files.
+    """Information on unknowns in addition to the files.
 
-    Either ``rows`` ``(n,)`` of matrices in files that say nothing of them, or the names of points
-    by their ``nodes``; ``places`` ``(n, 3)`` of the rows, or by point [mm].
+    Attributes
+    ----------
+    rows
+        Unknowns of the rows ``(n,)`` of matrices in files that do not give them.
+    nodes
+        Names of points by node, as an alternative.
+    places
+        Positions of the rows ``(n, 3)``, or by point [mm].
 
     Examples
     --------
@@ -158,13 +180,25 @@ def own_matrices(
     given: GivenUnknowns | None = None,
     units: FileUnits | None = None,
 ) -> OwnMatrices:
-    """Matrices from files, in mm, N, s and t.
+    """Return matrices from files, in mm, N, s and t.
 
-    ``sources`` are file and name of each of the parts stiffness, mass, damping and loads (a name
-    may be empty where the file has one matrix, or usual names); what is not among them is looked
-    for in ``file`` by the usual names. Raises :class:`MatrixError` where stiffness or mass are
-    missing, where matrices do not fit each other, are not real, finite and symmetric, or where
-    their unknowns are not known.
+    Parameters
+    ----------
+    sources
+        File and matrix name for each of the parts stiffness, mass, damping and loads. The name may
+        be empty if the file has one matrix or uses usual names.
+    file
+        File in which other parts are looked for by the usual names.
+    given
+        Information on the unknowns in addition to the files.
+    units
+        Units of the files.
+
+    Raises
+    ------
+    MatrixError
+        If stiffness or mass are missing, if matrices do not fit each other or are not real, finite
+        and symmetric, or if their unknowns are not known.
 
     Examples
     --------
@@ -207,7 +241,7 @@ def own_matrices(
             _there(square(STIFFNESS, energy)),
             _there(square(MASS, units.mass * units.length**2)),
             square(DAMPING, energy),
-            # Those of a load of one of the file's forces: of 1 N as much.
+            # Loads are per unit force, so the file's unit of force cancels.
             units.length * (scale @ loads),
             kept,
             None if places is None else places[free],
@@ -231,13 +265,13 @@ def _there(matrix: sp.csr_matrix | None) -> sp.csr_matrix:
 def _unknowns(
     parts: Mapping[str, Part], given: GivenUnknowns
 ) -> tuple[tuple[Unknown, ...], Array | None]:
-    """What the rows are, and the places of their points."""
-    told = [part for part in parts.values() if part.file.unknowns is not None]
+    """Return the unknowns of the rows, and the positions of their points if known."""
+    naming = [part for part in parts.values() if part.file.unknowns is not None]
     if given.rows is not None:
-        if told:
+        if naming:
             raise MatrixError(
-                f"{told[0].file.path} says itself what its rows are; allowed: columns node and "
-                "point, which name its nodes",
+                f"{naming[0].file.path} names its rows itself; allowed: columns node and point, "
+                "which name its nodes",
                 "unknowns",
             )
         for part in parts.values():
@@ -249,17 +283,17 @@ def _unknowns(
                 )
         assert not isinstance(given.places, Mapping)
         return once("unknowns", given.rows), given.places
-    if len(told) < len(parts):
-        silent = next(part for part in parts.values() if part.file.unknowns is None)
+    if len(naming) < len(parts):
+        nameless = next(part for part in parts.values() if part.file.unknowns is None)
         raise MatrixError(
-            f"{silent.file.path} does not say what its {silent.values.shape[0]} rows are; allowed: "
-            "unknowns, a CSV file with columns point and direction and a row for each",
+            f"{nameless.file.path} does not say what its {nameless.values.shape[0]} rows are; "
+            "allowed: unknowns, a CSV file with columns point and direction and a row for each",
             "unknowns",
         )
-    every = dict.fromkeys(u for part in told for u in (*_rows(part), *part.file.held))
-    files = {part.file.path for part in told}
-    unknowns = tuple(every) if len(files) == 1 else tuple(sorted(every, key=_order))
-    places = next((part.file.places for part in told if part.file.places is not None), None)
+    all_unknowns = dict.fromkeys(u for part in naming for u in (*_rows(part), *part.file.held))
+    files = {part.file.path for part in naming}
+    unknowns = tuple(all_unknowns) if len(files) == 1 else tuple(sorted(all_unknowns, key=_order))
+    places = next((part.file.places for part in naming if part.file.places is not None), None)
     return unknowns, places if places is not None and len(places) == len(unknowns) else None
 
 
@@ -274,14 +308,17 @@ def _rows(part: Part) -> tuple[Unknown, ...]:
 
 
 def _order(unknown: Unknown) -> tuple:
-    """By node, then by direction."""
+    """Return the key that sorts unknowns by node, then by direction."""
     point, direction = unknown.point, DIRECTIONS.index(unknown.direction)
     numbered = point.lstrip("-").isdecimal()
     return (0, int(point), "", direction) if numbered else (1, 0, point, direction)
 
 
 def _aligned(part: Part, unknowns: tuple[Unknown, ...]) -> sp.csr_matrix:
-    """The matrix on all unknowns, in their order. Raises MatrixError where it does not fit."""
+    """Return the matrix on all unknowns, in their order.
+
+    Raises :class:`MatrixError` if it does not fit.
+    """
     rows, size = part.file.unknowns, len(unknowns)
     if rows is None:
         if part.values.shape[0] != size:
@@ -300,7 +337,7 @@ def _aligned(part: Part, unknowns: tuple[Unknown, ...]) -> sp.csr_matrix:
 
 
 def _named(matrices: OwnMatrices, given: GivenUnknowns | None) -> OwnMatrices:
-    """The same with the names, and the places, that nodes are given."""
+    """Return the matrices with the names and positions that are given for nodes."""
     if given is None or given.nodes is None:
         return matrices
     known = {unknown.point for unknown in matrices.unknowns}

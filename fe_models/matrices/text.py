@@ -1,8 +1,8 @@
-"""Matrices in text: Matrix Market, and what Abaqus writes into ``.mtx``.
+"""Matrices in text: Matrix Market, and the ``.mtx`` files of Abaqus.
 
-Abaqus' ``*MATRIX OUTPUT`` writes one matrix to a file: ``FORMAT=MATRIX INPUT`` node, degree of
-freedom, node, degree of freedom, value; ``FORMAT=COORDINATE`` row, column, value; of a load node,
-degree of freedom, value. A symmetric matrix is there with one triangle or with both.
+Abaqus' ``*MATRIX OUTPUT`` writes one matrix to a file: with ``FORMAT=MATRIX INPUT`` node, degree of
+freedom, node, degree of freedom, value; with ``FORMAT=COORDINATE`` row, column, value; for a load
+node, degree of freedom, value. A symmetric matrix has one triangle or both in the file.
 ``*SUBSTRUCTURE MATRIX OUTPUT, OUTPUT FILE=USER DEFINED`` and CalculiX write a linear
 ``*USER ELEMENT``: nodes, degrees of freedom, and the lower triangles of stiffness and mass, row by
 row (Abaqus Keywords Guide: MATRIX INPUT, USER ELEMENT, MATRIX).
@@ -34,16 +34,16 @@ from sa_solver.types import Array, Indices
 
 MATRIX_MARKET, USER_ELEMENT = "%%MatrixMarket", "*USERELEMENT"
 NODES = "ELEMENT NODES"
-# What Abaqus adds on the diagonal of a displacement that a *BOUNDARY holds.
+# Diagonal values from this mark displacements that a *BOUNDARY holds: Abaqus adds 1e36.
 PENALTY = 1e35
-# Room for a degree of freedom beside its node in one whole number.
+# Number of bits for a degree of freedom next to its node in one whole number.
 DOF_BITS = 6
 
 Line = tuple[int, str]
 
 
 def read_mtx(path: Path) -> MatrixFile:
-    """A file of one matrix, or a substructure with its stiffness and mass.
+    """Read a file of one matrix, or a substructure with its stiffness and mass.
 
     Raises :class:`MatrixError` with file and line.
     """
@@ -67,7 +67,7 @@ def _matrix_market(path: Path) -> Values:
 
 
 def _entries(path: Path, lines: list[Line]) -> MatrixFile:
-    """Lines of places and a value each, all of one kind."""
+    """Read lines of labels and a value each, all of one kind."""
     if not lines:
         raise MatrixError(f"{path}: empty; allowed: a matrix")
     separator = "," if "," in lines[0][1] else None
@@ -87,7 +87,7 @@ def _entries(path: Path, lines: list[Line]) -> MatrixFile:
 
 
 def _table(path: Path, lines: list[Line], separator: str | None) -> Array:
-    """All numbers ``(lines, k)``; one by one where one is in the way, to say which."""
+    """Return all numbers ``(lines, k)``; invalid ones are reported with their line."""
     try:
         return np.loadtxt([text for _, text in lines], delimiter=separator, ndmin=2, comments=None)
     except ValueError:
@@ -104,17 +104,17 @@ def _table(path: Path, lines: list[Line], separator: str | None) -> Array:
 
 
 def _wholes(path: Path, columns: Array) -> Indices:
-    """Labels and places. Raises :class:`MatrixError` where one is no whole number."""
+    """Return labels as whole numbers. Raises :class:`MatrixError` if one is not whole."""
     rounded = np.rint(columns)
     if not (np.abs(columns) < 2**52).all() or (columns != rounded).any():
-        raise MatrixError(f"{path}: labels that are no whole numbers; allowed: these")
+        raise MatrixError(f"{path}: labels that are not whole numbers; allowed: whole numbers")
     return rounded.astype(np.int64)
 
 
 def _labelled(path: Path, lines: list[Line], table: Array) -> MatrixFile:
-    """Node, degree of freedom, node, degree of freedom, value."""
+    """Read lines of node, degree of freedom, node, degree of freedom, value."""
     labels = _wholes(path, table[:, :4]).reshape(-1, 2)
-    # Node and degree of freedom in one number: a hundred times faster than by rows.
+    # Node and degree of freedom are combined in one number, a hundred times faster than by rows.
     _, first, place = np.unique(
         labels[:, 0] * 2**DOF_BITS + labels[:, 1], return_index=True, return_inverse=True
     )
@@ -128,14 +128,14 @@ def _labelled(path: Path, lines: list[Line], table: Array) -> MatrixFile:
 
 
 def _labelled_load(path: Path, table: Array) -> MatrixFile:
-    """Node, degree of freedom, value."""
+    """Read lines of node, degree of freedom, value."""
     labels = _wholes(path, table[:, :2]).tolist()
     unknowns = once(path, [by_number(path, *label) for label in labels])
     return MatrixFile(path, {"": lambda: table[:, 2:]}, unknowns)
 
 
 def _coordinates(path: Path, lines: list[Line], table: Array) -> Values:
-    """Row, column, value; of a load row, value, or all in column 1."""
+    """Read lines of row, column, value; for a load row, value, or all in column 1."""
     places = _wholes(path, table[:, :-1]) - 1
     if places.min() < 0:
         raise MatrixError(f"{path}: a row or column below 1; allowed: counted from 1")
@@ -148,8 +148,8 @@ def _coordinates(path: Path, lines: list[Line], table: Array) -> Values:
     if (values.diagonal() >= PENALTY).any():
         row = int(np.argmax(values.diagonal() >= PENALTY)) + 1
         raise MatrixError(
-            f"{path}: row {row} is held by 1e36 on its diagonal; allowed: FORMAT=MATRIX INPUT, of "
-            "which held displacements are left out, or matrices without *BOUNDARY"
+            f"{path}: row {row} is held by 1e36 on its diagonal; allowed: FORMAT=MATRIX INPUT, "
+            "from which held displacements are left out, or matrices without *BOUNDARY"
         )
     return values
 
@@ -157,7 +157,7 @@ def _coordinates(path: Path, lines: list[Line], table: Array) -> Values:
 def _whole_matrix(
     path: Path, lines: list[Line], ends: Indices, values: Array, size: int
 ) -> sp.csr_matrix:
-    """The matrix of its entries: both triangles, or one that is mirrored."""
+    """Return the matrix of its entries: both triangles, or one that is mirrored."""
     matrix = sp.coo_matrix((values, (ends[:, 0], ends[:, 1])), shape=(size, size))
     once_each = matrix.tocsr()
     if once_each.nnz < len(values):
@@ -172,7 +172,7 @@ def _whole_matrix(
 
 
 def _substructure(path: Path, lines: list[Line]) -> MatrixFile:
-    """A linear user element: its unknowns, and its matrices by their type."""
+    """Read a linear user element: its unknowns, and its matrices by their type."""
     blocks = list(_blocks(lines))
     head = next(block for block in blocks if _keyword(block[0][1]).startswith(USER_ELEMENT))
     if "UNSYM" in _keyword(head[0][1]):
@@ -196,12 +196,12 @@ def _known(values: Array) -> Callable[[], Values]:
 
 
 def _keyword(text: str) -> str:
-    """A line of a keyword without blanks, upper case; comments are none."""
+    """Return a keyword line without blanks in upper case; empty for a comment."""
     return "" if text.startswith("**") else "".join(text.split()).upper()
 
 
 def _blocks(lines: list[Line]) -> Iterator[list[Line]]:
-    """A keyword and all that follows it, comments included."""
+    """Yield each keyword with all lines that follow it, comments included."""
     block: list[Line] = []
     for line in lines:
         if line[1].startswith("*") and not line[1].startswith("**"):
@@ -215,9 +215,10 @@ def _blocks(lines: list[Line]) -> Iterator[list[Line]]:
 
 
 def _user_element(path: Path, block: list[Line]) -> tuple[Unknown, ...]:
-    """Node by node its degrees of freedom: those of the line of its position, or the last before.
+    """Return the unknowns of a user element, node by node.
 
-    The nodes are in the comment below ``** ELEMENT NODES``.
+    A node has the degrees of freedom of the line for its position, or of the last one before. The
+    nodes are in the comment below ``** ELEMENT NODES``.
     """
     nodes: list[int] = []
     active: dict[int, list[int]] = {}
@@ -237,15 +238,15 @@ def _user_element(path: Path, block: list[Line]) -> tuple[Unknown, ...]:
             f"{path}:{block[0][0]}: nodes or degrees of freedom of the element are missing; "
             f"allowed: as Abaqus writes them, nodes in a comment below ** {NODES}"
         )
-    unknowns, now = [], active[1]
+    unknowns, current = [], active[1]
     for position, node in enumerate(nodes, start=1):
-        now = active.get(position, now)
-        unknowns += [by_number(path, node, component) for component in now]
+        current = active.get(position, current)
+        unknowns += [by_number(path, node, component) for component in current]
     return once(path, unknowns)
 
 
 def _lower_triangle(path: Path, line: int, rows: Sequence[Line], size: int) -> Array:
-    """The symmetric matrix ``(n, n)`` of its lower triangle, row by row."""
+    """Return the symmetric matrix ``(n, n)`` of its lower triangle, given row by row."""
     given = [
         number(SourceLine(path, k), cell)
         for k, text in rows

@@ -1,4 +1,4 @@
-"""Unknowns of a matrix by name, the error of its readers, and what a file of matrices has."""
+"""Unknowns of a matrix by name, the error of its readers, and the content of a matrix file."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from sa_solver.errors import InputError
 from sa_solver.types import Array
 
 TRANSLATIONS, ROTATIONS, MODAL = ("x", "y", "z"), ("rx", "ry", "rz"), "modal"
-# Those that nodes have by their numbers 1 to 6, in Abaqus and in Nastran.
+# Directions in the order of their numbers 1 to 6 in Abaqus and in Nastran.
 BY_NUMBER = (*TRANSLATIONS, *ROTATIONS)
 DIRECTIONS = (*BY_NUMBER, MODAL)
 
@@ -23,7 +23,10 @@ Values: TypeAlias = Array | sp.csr_matrix
 
 
 class MatrixError(InputError):
-    """Matrices that cannot be taken; ``part`` says which entry they were asked for by, if one."""
+    """Error of matrices that cannot be used.
+
+    ``part`` is the entry by which they were requested, if any.
+    """
 
     def __init__(self, message: str, part: str = "") -> None:
         super().__init__(message)
@@ -31,11 +34,11 @@ class MatrixError(InputError):
 
 
 class Unknown(NamedTuple):
-    """A displacement of a ``point``: along x, y or z, about them (rx, ry, rz), or of a mode.
+    """Displacement of a ``point``: along x, y or z, about them (rx, ry, rz), or of a mode.
 
     Examples
     --------
-    The rotation of node 17 about z, and a coordinate of a superelement that is no displacement:
+    The rotation of node 17 about z, and a coordinate of a superelement that is not a displacement:
 
     >>> from fe_models.matrices import Unknown
     >>> print(Unknown("17", "rz").name, "|", Unknown("mode 1", "modal").name)
@@ -53,11 +56,20 @@ class Unknown(NamedTuple):
 
 @dataclass(frozen=True)
 class MatrixFile:
-    """What a file at ``path`` has of matrices, each read when it is asked for.
+    """Content of a file of matrices at ``path``, each of which is read on demand.
 
-    ``matrices`` by name, "" where the format has no names. Where the file says them, ``unknowns``
-    are those of the rows of all of them, ``places`` ``(n, 3)`` of their points, and ``held`` those
-    that the file holds.
+    Attributes
+    ----------
+    path
+        The file.
+    matrices
+        Functions that read the matrices, by name; "" if the format has no names.
+    unknowns
+        Unknowns of the rows of all matrices, if the file gives them.
+    places
+        Positions of their points ``(n, 3)``, if the file gives them.
+    held
+        Unknowns that the file holds.
 
     Examples
     --------
@@ -78,18 +90,18 @@ class MatrixFile:
 
 
 def unknown_of(name: str) -> Unknown:
-    """What a name such as ``pad 17 x`` says. Raises :class:`MatrixError`."""
+    """Return the unknown with a name such as ``pad 17 x``. Raises :class:`MatrixError`."""
     point, _, direction = name.strip().rpartition(" ")
     if not point or direction not in DIRECTIONS:
         raise MatrixError(
-            f"{name!r}: no name of an unknown; allowed: a point and one of "
+            f"{name!r}: not the name of an unknown; allowed: a point and one of "
             f"{', '.join(DIRECTIONS)}, such as 'pad 17 x'"
         )
     return Unknown(point, direction)
 
 
 def by_number(place: object, node: int, component: int) -> Unknown:
-    """The unknown of a component 1 to 6 of a node; 0 is that of a scalar point, a mode."""
+    """Return the unknown of a component 1 to 6 of a node; 0 stands for a scalar point, a mode."""
     if component == 0:
         return Unknown(str(node), MODAL)
     if not 1 <= component <= len(BY_NUMBER):
@@ -101,7 +113,7 @@ def by_number(place: object, node: int, component: int) -> Unknown:
 
 
 def once(place: object, unknowns: Sequence[Unknown]) -> tuple[Unknown, ...]:
-    """The same unknowns. Raises :class:`MatrixError` where one is there twice."""
+    """Return the unknowns. Raises :class:`MatrixError` if one occurs twice."""
     seen: set[Unknown] = set()
     for unknown in unknowns:
         if unknown in seen:
@@ -111,27 +123,27 @@ def once(place: object, unknowns: Sequence[Unknown]) -> tuple[Unknown, ...]:
 
 
 def number(place: object, text: str) -> float:
-    """A number as Fortran writes it. Raises :class:`MatrixError`."""
+    """Return a number in Fortran's forms. Raises :class:`MatrixError`."""
     try:
         value = fortran_real(text)
     except ValueError:
-        raise MatrixError(f"{place}: {text.strip()!r} is no number; allowed: numbers") from None
+        raise MatrixError(f"{place}: {text.strip()!r} is not a number; allowed: numbers") from None
     if not np.isfinite(value):
         raise MatrixError(f"{place}: {text.strip()!r}; allowed: finite numbers")
     return value
 
 
 def whole(place: object, text: str) -> int:
-    """A whole number of a label or a place. Raises :class:`MatrixError`."""
+    """Return a whole number of a label or a position. Raises :class:`MatrixError`."""
     try:
         return int(text)
     except ValueError:
         raise MatrixError(
-            f"{place}: {text.strip()!r} is no whole number; allowed: whole numbers"
+            f"{place}: {text.strip()!r} is not a whole number; allowed: whole numbers"
         ) from None
 
 
 def mirrored(given: sp.coo_matrix) -> sp.csr_matrix:
-    """A symmetric matrix of entries in either triangle, of each pair one."""
+    """Return the symmetric matrix of entries in either triangle, one of each pair."""
     both = given + given.T
     return (both - sp.diags(given.diagonal())).tocsr()

@@ -1,13 +1,13 @@
-"""The form of meshed contact faces between their nodes, where facets are straight.
+"""Form of meshed contact faces between their nodes, where facets are straight.
 
-A contact may be narrower than an element, and the sagitta of a facet larger than the bodies yield:
-what a fine grid sees must be the surface that was meshed, not its facets. On each facet the height
-over the frame's plane is quadratic: linear between the vertices, and off the chord of each edge in
-its middle by a *bulge*. Bulges come from midside nodes, which a mesh of second order has and gmsh
-puts on the surfaces of a CAD file, or else from quadratics fitted to the heights of the vertices
-around (least squares over two rings, as in the recovery of Zienkiewicz and Zhu 1992,
-doi:10.1002/nme.1620330702). Edges whose surroundings are no quadratic, as at a corner or where a
-flat goes over into a radius, stay straight.
+A contact may be narrower than an element, and the sagitta of a facet larger than the deformation of
+the bodies. A fine grid must therefore use the surface that was meshed, not its facets. On each
+facet the height over the frame's plane is quadratic: linear between the vertices, plus a *bulge* in
+the middle of each edge. Bulges come from midside nodes, which a mesh of second order has and gmsh
+puts on the surfaces of a CAD file, or else from quadratics fitted to the heights of the surrounding
+vertices (least squares over two rings, as in the recovery of Zienkiewicz and Zhu 1992,
+doi:10.1002/nme.1620330702). Edges stay straight where a quadratic does not fit their surroundings,
+as at a corner or at the transition from a flat to a radius.
 """
 
 from __future__ import annotations
@@ -20,25 +20,26 @@ from sa_solver.types import Array, Indices, Mask
 
 # Corners of the edges of a segment and of a triangle, by the number of their corners.
 EDGES = {2: ((0, 1),), 3: ((0, 1), (1, 2), (2, 0))}
-# Edges of a facet whose corners are listed in the other order, by how many it has.
+# Order of the edges of a facet whose corners are listed in reverse, by the number of its edges.
 TURNED = {1: [0], 3: [1, 0, 2]}
-# What a fit may leave of the heights, over the bulge that it gives: at a corner and where a flat
-# goes over into a radius it leaves 3 times that, on a circle of ten edges a quadrant 0.1.
+# Tolerated residual of a fit over the bulge that it gives. The ratio is 3 at a corner and at the
+# transition from a flat to a radius, and 0.1 on a circle with ten edges per quadrant.
 SMOOTH = 1.0
-# Heights this share of an edge off a fit are the rounding of a file.
+# Residual of a fit, as a share of the edge, up to which it is due to the rounding of a file.
 ROUNDING = 1e-6
-# Singular values of a fit below this share of the largest are none: too few vertices around.
+# Singular values of a fit below this share of the largest count as 0: there are too few vertices.
 RANK = 1e-6
-# A point is still on a facet when it is off by this share of it: edges belong to both sides.
+# Distance, as a share of a facet, up to which a point outside is still on it, so that edges belong
+# to both sides.
 INSIDE = 1e-9
 
 
 @dataclass(frozen=True)
 class Midsides:
-    """Points of a surface in the middle of edges, whose ends are vertices ``edges`` ``(k, 2)``.
+    """Midside points of edges, whose ends are the vertices ``edges`` ``(k, 2)``.
 
-    ``points`` ``(k, 3)`` [mm]; ``rows`` ``(k,)`` are those of their nodes among the file's, -1 of
-    points that are none. An edge may be there more than once.
+    ``points`` are ``(k, 3)`` [mm]; ``rows`` ``(k,)`` are the rows of their nodes in the file, or -1
+    for points that are not nodes. An edge may occur more than once.
     """
 
     edges: Indices
@@ -46,7 +47,7 @@ class Midsides:
     rows: Indices | None = None
 
     def at(self, edges: Indices) -> Array:
-        """Those of ``edges`` ``(m, 2)``, ``(m, 3)`` [mm]; NaN where there is none."""
+        """Return the points of ``edges`` ``(m, 2)``, ``(m, 3)`` [mm]; NaN where there is none."""
         count = 1 + max(self.edges.max(initial=0), edges.max(initial=0))
         known, wanted = (np.sort(e, axis=1) @ (count, 1) for e in (self.edges, edges))
         order = np.argsort(known, kind="stable")
@@ -60,11 +61,11 @@ class Midsides:
 
 @dataclass(frozen=True)
 class Surface:
-    """Heights over the frame of a face [mm]: of nodes ``(n,)`` and bulges of facets ``(m, edges)``.
+    """Heights of a face over its frame [mm]: of nodes ``(n,)``, and bulges ``(m, edges)``.
 
-    Bulges at a node are off by up to about what the fit through the nodes around it has ``left`` of
-    their heights ``(n,)`` [mm], None where midsides say; ``straight`` edges have none because their
-    surroundings are no quadratic.
+    ``left`` ``(n,)`` [mm] is the residual of the heights in the fit around each node, which
+    estimates the error of the bulges there; None if midside nodes give the bulges. ``straight`` is
+    the number of edges without a bulge because no quadratic fits their surroundings.
     """
 
     heights: Array
@@ -74,14 +75,15 @@ class Surface:
 
     @classmethod
     def flat(cls, nodes: int, facets: Indices) -> Surface:
-        """So many nodes in the plane of the frame, and facets that are straight."""
+        """Return a plane surface with a number of ``nodes`` and straight facets."""
         return cls(np.zeros(nodes), np.zeros(edges_of(facets).shape[:2]))
 
     @classmethod
     def of(cls, points: Array, facets: Indices, midsides: Array | None) -> Surface:
-        """From points ``(n, 3)`` in the frame, facets ``(m, corners)`` and maybe midsides.
+        """Return the surface of points ``(n, 3)`` in the frame and facets ``(m, corners)``.
 
-        These are ``(m, edges, 3)`` in the frame [mm], NaN where there is none.
+        ``midsides`` ``(m, edges, 3)`` are in the frame [mm], NaN where there is none. Bulges are
+        fitted to the vertices unless all midsides are given.
         """
         if midsides is None or np.isnan(midsides).any():
             return _fitted(points, facets)
@@ -89,15 +91,18 @@ class Surface:
 
     @property
     def error(self) -> float:
-        """How far bulges are off anywhere, as far as the vertices tell [mm]."""
+        """Largest estimated error of the bulges [mm]."""
         return 0.0 if self.left is None else float(self.left.max(initial=0.0))
 
     def part(self, nodes: Indices, facets: Mask) -> Surface:
-        """On some nodes and facets alone."""
+        """Return the surface on some nodes and facets."""
         return self._with(nodes, self.bulges[facets])
 
     def mirrored(self, nodes: Indices, facets: int) -> Surface:
-        """With its images: all ``nodes``, and so many facets, every image turned round."""
+        """Return the surface with its images: all ``nodes``, and the number of ``facets``.
+
+        Every image has the reverse orientation.
+        """
         bulges = self.bulges
         while len(bulges) < facets:
             bulges = np.concatenate([bulges, bulges[:, TURNED[bulges.shape[1]]]])
@@ -108,9 +113,10 @@ class Surface:
         return replace(self, heights=self.heights[nodes], bulges=bulges, left=left)
 
     def over(self, coordinates: Array, facets: Indices, x: Array, y: Array) -> Array:
-        """Height ``(nx, ny)`` [mm] at rising ``x`` ``(nx, 1)`` and ``y`` ``(1, ny)``; else NaN.
+        """Return the height ``(nx, ny)`` [mm] at grid points, NaN beside the face.
 
-        ``coordinates`` ``(n, 2)`` and ``facets`` are those of the face.
+        The points have rising ``x`` ``(nx, 1)`` and ``y`` ``(1, ny)``; ``coordinates`` ``(n, 2)``
+        and ``facets`` are those of the face.
         """
         height = np.full((x.size, y.size), np.nan)
         for facet, bulges in zip(facets, self.bulges, strict=True):
@@ -122,14 +128,15 @@ class Surface:
 
 
 def edges_of(facets: Indices) -> Indices:
-    """Ends of the edges ``(m, edges, 2)`` of facets ``(m, corners)``."""
+    """Return the ends of the edges ``(m, edges, 2)`` of facets ``(m, corners)``."""
     return np.asarray(facets[:, EDGES[facets.shape[1]]])
 
 
 def _shares(corners: Array, x: Array, y: Array) -> tuple[tuple[slice, slice], Array]:
-    """Cells about a facet, and their barycentric coordinates ``(..., corners)`` on it.
+    """Return the window of cells around a facet, and their barycentric coordinates on it.
 
-    ``corners`` are ``(corners, 2)``; ``x`` ``(nx,)`` and ``y`` ``(ny,)`` rise.
+    ``corners`` are ``(corners, 2)``; ``x`` ``(nx,)`` and ``y`` ``(ny,)`` rise. The coordinates are
+    ``(..., corners)``.
     """
     if len(corners) == 2:
         window = slice(None), slice(None)
@@ -145,13 +152,19 @@ def _shares(corners: Array, x: Array, y: Array) -> tuple[tuple[slice, slice], Ar
 
 
 def bulge_of(shares: Array, bulges: Array) -> Array:
-    """What bulges ``(..., edges)`` add at barycentric coordinates ``(..., corners)``."""
+    """Return the height that bulges ``(..., edges)`` add at barycentric coordinates.
+
+    These are the ``shares`` ``(..., corners)``.
+    """
     first, second = np.array(EDGES[shares.shape[-1]]).T
     return np.asarray(4.0 * (shares[..., first] * shares[..., second] * bulges).sum(axis=-1))
 
 
 def _from_midsides(points: Array, facets: Indices, midsides: Array) -> Array:
-    """How far midsides are above the planes of their facets, along z; of two facets the mean."""
+    """Return the heights of midside points above their facets, along z.
+
+    Where two facets share an edge, it is their mean.
+    """
     corners = points[facets]
     bulges = np.empty(midsides.shape[:2])
     first, second = corners[:, 1] - corners[:, 0], corners[:, -1] - corners[:, 0]
@@ -163,7 +176,7 @@ def _from_midsides(points: Array, facets: Indices, midsides: Array) -> Array:
 
 
 def _shared(facets: Indices, values: Array) -> Array:
-    """The mean over the facets beside each edge of ``values`` ``(m, edges)``."""
+    """Return the mean over the facets that share each edge of ``values`` ``(m, edges)``."""
     pairs = np.sort(edges_of(facets), axis=2).reshape(-1, 2)
     _, edge, count = np.unique(pairs, axis=0, return_inverse=True, return_counts=True)
     total = np.bincount(edge.ravel(), values.ravel())
@@ -171,7 +184,7 @@ def _shared(facets: Indices, values: Array) -> Array:
 
 
 def _fitted(points: Array, facets: Indices) -> Surface:
-    """From quadratics through the heights of the vertices around."""
+    """Return the surface with bulges from quadratics through the surrounding vertices."""
     curvature, left = _quadratics(points, facets)
     pairs = edges_of(facets)
     along = points[pairs[..., 1], :2] - points[pairs[..., 0], :2]
@@ -185,14 +198,14 @@ def _fitted(points: Array, facets: Indices) -> Surface:
 
 
 def _quadratics(points: Array, facets: Indices) -> tuple[Array, Array]:
-    """Second derivatives ``(n, 2, 2)`` of the fits at the vertices, and the most they leave."""
-    # A tenth of a second to import, which `fretscale check` need not wait for.
+    """Return second derivatives ``(n, 2, 2)`` of the fits at the vertices, and their residuals."""
+    # The import takes a tenth of a second, for which `fretscale check` need not wait.
     import scipy.sparse as sp
 
     count, corners = len(points), facets.shape[1]
     pairs = np.concatenate([facets[:, [a, b]] for a in range(corners) for b in range(corners)])
-    beside = sp.csr_matrix((np.ones(len(pairs)), pairs.T), shape=(count, count))
-    around = (beside @ beside).tocsr()
+    adjacency = sp.csr_matrix((np.ones(len(pairs)), pairs.T), shape=(count, count))
+    around = (adjacency @ adjacency).tocsr()
     powers = [(0, 0), (1, 0), (2, 0)]
     if corners == 3:
         powers += [(0, 1), (1, 1), (0, 2)]

@@ -1,11 +1,12 @@
-"""Contact faces that planes of symmetry cut: which, and the whole that they are a part of.
+"""Contact faces that are cut by planes of symmetry, and the whole faces that they are a part of.
 
-A half-space ends nowhere: the contact of a part of a face is that of the whole. A plane that holds
-the normal displacements of both bodies, and on which nothing else acts, is a mirror: with S the
-reflection across it, displacements, slips and forces on one side are u(Sx) = S u(x), tensors
-σ(Sx) = S σ S. Components along the plane's normal are odd, the others even, so that of resultants
-about a point of the plane the shear along the normal and the moments of what is odd vanish, and the
-rest is twice that of the part. A node on the plane has the forces of both sides.
+A half-space has no boundary beside the contact, so its contact must be that of the whole face. A
+plane on which the normal displacements of both bodies are held, and on which nothing else acts, is
+a mirror. With S the reflection across it, displacements, slips and forces on the other side are
+u(Sx) = S u(x), and tensors are σ(Sx) = S σ S. Components along the plane's normal are odd, the
+others even. Of the resultants about a point of the plane, the shear along the normal and the
+moments of odd components therefore vanish, and the others are twice those of the part. A node on
+the plane has the forces of both sides.
 """
 
 from __future__ import annotations
@@ -18,26 +19,37 @@ import scipy.sparse as sp
 import scipy.sparse.linalg as spl
 
 from fe_models.elasticity.stress import StressField
+from fe_models.interface_frames import ALONG_AXIS
 from fe_models.meshes.structure_mesh import Body, Face, Interface
 from fe_models.structure import InterfaceHistory
-from fe_models.supported_body import ALONG_AXIS
 from sa_solver.types import Array, Frame, Indices, LoadHistory, Mask
 
-# Vertices this share of the largest coordinate off a plane are on it: mesh files keep six digits.
+# Distance, as a share of the largest coordinate, up to which a vertex counts as on a plane: mesh
+# files store six digits.
 ON_PLANE = 2e-6
-# What a reflection across an axis x or y does to P, Qx, Qy, Mx, My and Mz.
+# Signs of P, Qx, Qy, Mx, My and Mz under a reflection across an axis x or y.
 PARITY = {0: (1.0, -1.0, 1.0, 1.0, -1.0, -1.0), 1: (1.0, 1.0, -1.0, -1.0, 1.0, -1.0)}
 
 
 def cut_interface(
     interface: Interface, bodies: Sequence[Body], supports: Sequence[sp.csr_matrix]
 ) -> Interface:
-    """The interface with its planes of symmetry and its origin on them; as it is without any.
+    """Return the interface with its planes of symmetry, or unchanged if it has none.
 
-    ``bodies`` are the two that meet in it, and ``supports`` what displacements ``(d n, ...)`` those
-    of the vertices of either are made of. A plane across an axis of the frame is one where neither
-    body goes beyond it, all their vertices on it are held along its normal, and no others of body
-    2's face are. Where supports hold that face in any other way, there is none.
+    The origin of its frame is moved onto the planes. A plane normal to an axis of the frame is one
+    of symmetry if neither body extends beyond it, if all their vertices on it are held along its
+    normal, and if no other vertices of body 2's face are. If supports hold that face in any other
+    way, there is no plane of symmetry.
+
+    Parameters
+    ----------
+    interface
+        The interface.
+    bodies
+        The two bodies that meet in it.
+    supports
+        For each body, the matrix from its free displacements to those of its vertices ``(d n,
+        ...)``.
     """
     planes, origin = [], interface.frame.origin
     for axis in (0,) if interface.line else (0, 1):
@@ -70,10 +82,11 @@ def cut_interface(
 
 @dataclass(frozen=True)
 class WholeFace(Face):
-    """A face of which planes of symmetry leave a ``part``, whose nodes come first.
+    """Whole face, of which planes of symmetry leave a ``part``, whose nodes come first.
 
-    ``nodes`` ``(N,)`` are those of the part, or those whose images they are, ``signs`` ``(3, N)``
-    what reflections do to components there, and ``sides`` ``(N,)`` how many images meet in a node.
+    ``nodes`` ``(N,)`` are the nodes of the part of which the nodes of the whole are images,
+    ``signs`` ``(3, N)`` the signs of the components there, and ``sides`` ``(N,)`` the number of
+    images that meet in a node.
     """
 
     part: Interface
@@ -97,12 +110,15 @@ class WholeFace(Face):
         return replace(other, coordinates=coordinates, facets=facets, surface=surface)
 
     def components(self, part: Array) -> Array:
-        """Components along x, y and maybe z ``(..., c, N)`` of those of the part's nodes."""
+        """Return components ``(..., c, N)`` of the whole from those ``part`` of its part.
+
+        They are along x, y and maybe z.
+        """
         return np.ascontiguousarray(part[..., self.nodes] * self.signs[: part.shape[-2]])
 
 
 def whole_face(interface: Interface) -> Face:
-    """The face of which planes of symmetry leave a part; the interface itself if none cut it."""
+    """Return the whole face of an interface, or the interface itself if no plane cuts it."""
     if not interface.planes:
         return interface
     coordinates, facets, nodes, signs, sides = _mirrored(interface, interface.planes)
@@ -116,19 +132,19 @@ def whole_face(interface: Interface) -> Face:
 
 
 def whole_values(interface: Interface, part: Array) -> Array:
-    """Values ``(..., N)`` at the nodes of the whole face from those of the part's."""
+    """Return values ``(..., N)`` at the nodes of the whole face from those of the part's."""
     face = whole_face(interface)
     return np.ascontiguousarray(part[..., face.nodes]) if isinstance(face, WholeFace) else part
 
 
 def whole_components(interface: Interface, part: Array) -> Array:
-    """Components ``(..., c, N)`` at the nodes of the whole face from those of the part's."""
+    """Return components ``(..., c, N)`` at the nodes of the whole face from those of the part's."""
     face = whole_face(interface)
     return face.components(part) if isinstance(face, WholeFace) else part
 
 
 def whole_history(history: InterfaceHistory) -> InterfaceHistory:
-    """What the whole face does over a cycle."""
+    """Return the history of the whole face from that of the part."""
     interface = history.interface
     face = whole_face(interface) if isinstance(interface, Interface) else interface
     if not isinstance(face, WholeFace):
@@ -141,7 +157,7 @@ def whole_history(history: InterfaceHistory) -> InterfaceHistory:
 
 
 def whole_resultants(interface: Interface, resultants: Array) -> Array:
-    """``(P, Qx, Qy, Mx, My, Mz)`` ``(..., 6)`` of the whole face from those of the part."""
+    """Return ``(P, Qx, Qy, Mx, My, Mz)`` ``(..., 6)`` of the whole face from those of the part."""
     whole = resultants
     for axis in interface.planes:
         whole = whole * (1.0 + np.array(PARITY[axis]))
@@ -160,7 +176,7 @@ class WholeStress:
         return self.field.body
 
     def at(self, points: Array, frame: Frame) -> Array:
-        """As :meth:`StressField.at`, of both sides of the planes."""
+        """Return the stress as :meth:`StressField.at`, on both sides of the planes."""
         points, signs = points.copy(), np.ones((3, len(points)))
         for axis in self.part.planes:
             side = np.sign(self.part.coordinates[:, axis].sum())
@@ -172,7 +188,10 @@ class WholeStress:
 
 
 def _mirrored(face: Face, planes: Sequence[int]) -> tuple[Array, Indices, Indices, Array, Array]:
-    """Coordinates and facets of the whole of a face; nodes, signs and sides: :class:`WholeFace`."""
+    """Return coordinates and facets of the whole of a face, and nodes, signs and sides.
+
+    The last three are those of :class:`WholeFace`.
+    """
     coordinates, facets = face.coordinates, face.facets
     nodes, signs, sides = np.arange(len(face)), np.ones((3, len(face))), np.ones(len(face))
     for axis in planes:
@@ -181,10 +200,10 @@ def _mirrored(face: Face, planes: Sequence[int]) -> tuple[Array, Indices, Indice
         off, on_plane = np.flatnonzero(coordinates[:, axis]), coordinates[:, axis] == 0.0
         image = np.arange(len(coordinates))
         image[off] = len(coordinates) + np.arange(len(off))
-        # Images of facets turn round: their corners in the other order.
+        # Reflection reverses the orientation of facets, so their corners are listed in reverse.
         facets = np.concatenate([facets, image[facets][:, ::-1]])
         sides = np.where(on_plane, 2.0, 1.0) * sides
-        signs[axis, on_plane] = 0.0  # where faces do not match, one side alone says otherwise
+        signs[axis, on_plane] = 0.0  # If faces do not match, one side alone gives a value here.
         coordinates = np.concatenate([coordinates, coordinates[off] * turned[:2]])
         nodes, sides = np.append(nodes, nodes[off]), np.append(sides, sides[off])
         signs = np.concatenate([signs, signs[:, off] * turned[:, None]], axis=1)
@@ -192,7 +211,7 @@ def _mirrored(face: Face, planes: Sequence[int]) -> tuple[Array, Indices, Indice
 
 
 def _held_along(normal: Array, displacements: sp.csr_matrix) -> Mask:
-    """Vertices whose displacements ``(d n, ...)`` along a ``normal`` ``(d,)`` are held."""
+    """Return flags of vertices whose displacements along a ``normal`` ``(d,)`` are held."""
     count = displacements.shape[0] // len(normal)
     along = sp.kron(sp.identity(count), normal[None], format="csr") @ displacements
     return np.asarray(spl.norm(along, axis=1) <= ALONG_AXIS)
@@ -201,28 +220,32 @@ def _held_along(normal: Array, displacements: sp.csr_matrix) -> Mask:
 def _is_mirror(
     plane: float, levels: Sequence[Array], held: Sequence[Mask], rounding: float, nodes_2: Indices
 ) -> bool:
-    """Whether a plane at such a level is one of symmetry, by the levels of both bodies' vertices.
+    """Return whether a plane at a level is one of symmetry, from the levels of all vertices.
 
-    ``nodes_2`` are those of body 2's face.
+    ``levels`` and ``held`` are those of both bodies' vertices, ``nodes_2`` the nodes of body 2's
+    face.
     """
     heights = [level - plane for level in levels]
     on_plane = [np.abs(height) <= rounding for height in heights]
-    every = np.concatenate(heights)
-    one_sided = np.all(every >= -rounding) or np.all(every <= rounding)
+    all_heights = np.concatenate(heights)
+    one_sided = np.all(all_heights >= -rounding) or np.all(all_heights <= rounding)
     all_held = all(mask[on].all() for mask, on in zip(held, on_plane, strict=True))
     elsewhere = held[1][nodes_2] & ~on_plane[1][nodes_2]
     return bool(one_sided and all_held and not elsewhere.any())
 
 
 def _rounding(bodies: Sequence[Body]) -> float:
-    """How far vertices of a plane may lie off it [mm]."""
+    """Return the distance up to which vertices of a plane may lie off it [mm]."""
     return ON_PLANE * max(float(np.abs(body.points).max()) for body in bodies)
 
 
 def _about(
     face: Face, origin: Array, planes: Sequence[int], rounding: float
 ) -> tuple[Frame, Array]:
-    """Frame and coordinates of a face about an origin on ``planes``; nodes on these are at 0."""
+    """Return frame and coordinates of a face about an origin on ``planes``.
+
+    Nodes on these planes have the coordinate 0.
+    """
     coordinates = face.coordinates - face.frame.components(origin - face.frame.origin)[:2]
     for axis in planes:
         coordinates[np.abs(coordinates[:, axis]) <= rounding, axis] = 0.0

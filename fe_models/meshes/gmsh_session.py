@@ -1,4 +1,4 @@
-"""A gmsh model that is always closed again, and sizes that grow away from its faces."""
+"""Sessions of gmsh that are always closed, and mesh sizes that grow away from faces."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any, Literal
 
-# Signals that gmsh's libraries give back to the system, which ends the process at each: a pipe that
-# nobody reads any more, a terminal that is closed in spite of `nohup`, a batch system.
-GIVEN_BACK = ("SIGPIPE", "SIGHUP", "SIGQUIT", "SIGTERM")
+# Signals whose handlers gmsh's libraries reset to the system's default, which ends the process: on
+# a pipe without a reader, a terminal closed despite `nohup`, or a batch system's stop request.
+RESET_BY_GMSH = ("SIGPIPE", "SIGHUP", "SIGQUIT", "SIGTERM")
 
 
 @contextmanager
@@ -20,10 +20,10 @@ def gmsh_model(name: str) -> Iterator[Any]:
 
     # Signals stay with Python, so that Ctrl-C during meshing ends the run tidily.
     gmsh.initialize(interruptible=False)
-    _take_signals()
+    _restore_signals()
     try:
         gmsh.option.setNumber("General.Terminal", 0)
-        # One thread: the same mesh, node for node, on every machine.
+        # With one thread the mesh is the same, node for node, on every machine.
         gmsh.option.setNumber("General.NumThreads", 1)
         gmsh.model.add(name)
         yield gmsh
@@ -31,11 +31,11 @@ def gmsh_model(name: str) -> Iterator[Any]:
         gmsh.finalize()
 
 
-def _take_signals() -> None:
-    """Handle signals as before, as far as Python knows how; only its main thread may say so."""
+def _restore_signals() -> None:
+    """Restore Python's signal handlers; only its main thread may set them."""
     if threading.current_thread() is not threading.main_thread():
         return
-    for name in GIVEN_BACK:
+    for name in RESET_BY_GMSH:
         number = getattr(signal, name, None)
         if number is not None and (handler := signal.getsignal(number)) is not None:
             signal.signal(number, handler)
@@ -47,10 +47,10 @@ def grow_from(
     sources: Sequence[tuple[list[int], float, float]],
     coarse: float,
 ) -> list[int]:
-    """Mesh size: the least of what the sources ask for, up to ``coarse``.
+    """Set the mesh size to the smallest one that the sources require, at most ``coarse``.
 
-    Each source is entities, the size on them, and the share of the distance from them by which it
-    grows. Returns the numbers of the distance fields, for further settings of them.
+    Each source is a list of entities, the size on them, and the growth of the size per distance
+    from them. The numbers of the distance fields are returned, for further settings of them.
     """
     field = gmsh.model.mesh.field
     distances, growing = [], []

@@ -1,10 +1,10 @@
 """Elements of second order whose midside nodes are off the middle of their edges.
 
-Their places are quadratic in the element as their displacements are, x = Σ N_k(ξ) x_k:
-isoparametric elements (Zienkiewicz, Taylor & Zhu 2013, ch. 6). Linear displacement fields stay
-exact, since they are Σ N_k u(x_k), on any midsides that do not fold an element. Integrals of
-polynomials in ξ up to a degree of ``INTEGRATED`` are exact: those of constant stress, of pressure
-over a face and its moments, of volume, and of what weight and centrifugal forces add up to.
+Positions are quadratic in the element as the displacements are, x = Σ N_k(ξ) x_k: the elements are
+isoparametric (Zienkiewicz, Taylor & Zhu 2013, ch. 6). Linear displacement fields stay exact, since
+they are Σ N_k u(x_k), for any midside nodes that do not fold an element. Integrals of polynomials
+in ξ up to a degree of ``INTEGRATED`` are exact: those of constant stress, of pressure over a face
+and its moments, of volume, and of the resultants of weight and centrifugal forces.
 """
 
 from __future__ import annotations
@@ -19,19 +19,22 @@ from skfem.mapping import MappingIsoparametric
 from fe_models.meshes.structure_mesh import Body, numbered_as
 from sa_solver.types import Array, Indices
 
-# Degree in the coordinates of an element: constant stress takes 3, a centrifugal force 5.
+# Degree in the coordinates of an element: constant stress needs 3, a centrifugal force 5.
 INTEGRATED = 6
-# Newton's method for a point's coordinates in its element ends after a step this small: another one
-# leaves rounding, since it is quadratic.
+# Newton's method for a point's coordinates in its element ends after a step this small: since it
+# converges quadratically, only rounding errors are left.
 FOUND = 1e-8
 MOST_STEPS = 20
-# Corners of a triangle and the middles of its edges, whose nodes gmsh and scikit-fem order alike.
+# Corners of a triangle and middles of its edges, in the order of both gmsh and scikit-fem.
 TRIANGLE = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [0.5, 0.0], [0.5, 0.5], [0.0, 0.5]]).T
 SEGMENT = np.array([[0.0, 1.0, 0.5]])
 
 
 class QuadraticMapping(MappingIsoparametric):  # type: ignore[misc]
-    """From the reference element to those of a body with ``midsides``; its inverse by Newton."""
+    """Mapping from the reference element to those of a body with ``midsides``.
+
+    Its inverse is found by Newton's method.
+    """
 
     def __init__(self, body: Body) -> None:
         assert body.midsides is not None
@@ -43,9 +46,10 @@ class QuadraticMapping(MappingIsoparametric):  # type: ignore[misc]
         super().__init__(mesh, element(), mesh.bndelem)
 
     def invF(self, x: Array, tind: Indices | None = None, *settings: Any) -> Array:
-        """Coordinates in the elements ``tind`` of points ``x`` ``(d, elements, points)``.
+        """Return coordinates in the elements ``tind`` of points ``x`` ``(d, elements, points)``.
 
-        scikit-fem's own asks for less than rounding leaves of points far from the origin.
+        scikit-fem's method demands more accuracy than rounding allows for points far from the
+        origin.
         """
         local = np.full(x.shape, 1.0 / (1 + len(x)))
         for _ in range(MOST_STEPS):
@@ -59,14 +63,14 @@ class QuadraticMapping(MappingIsoparametric):  # type: ignore[misc]
 
 
 def mapping_of(body: Body) -> QuadraticMapping | None:
-    """The mapping of a body with midsides; None of one whose edges are straight."""
+    """Return the mapping of a body with midside nodes, or None if its edges are straight."""
     return None if body.midsides is None else QuadraticMapping(body)
 
 
 def facet_normals(body: Body, facets: Indices) -> Array:
-    """Outward normals ``(m, nodes, 3)`` at the nodes of facets, as long as the facet is large.
+    """Return outward normals ``(m, nodes, 3)`` at the nodes of facets, as long as their area.
 
-    At the nodes of :meth:`Body.facet_nodes`; in the plane a facet goes on along Y for 1 mm.
+    The nodes are those of :meth:`Body.facet_nodes`. In the plane a facet extends by 1 mm along Y.
     """
     corners = body.nodes[body.facet_nodes(facets)]
     slopes = _slopes(body.mesh.dim() - 1)
@@ -79,9 +83,10 @@ def facet_normals(body: Body, facets: Indices) -> Array:
 
 
 def folded(body: Body) -> NDArray[np.bool_]:
-    """Elements ``(m,)`` that their midsides turn inside out, at a node or where it is integrated.
+    """Return flags ``(m,)`` of the elements that their midside nodes turn inside out.
 
-    Elsewhere in them they may be folded still.
+    This is checked at the nodes and at the integration points; elsewhere an element may still be
+    folded.
     """
     from skfem.quadrature import get_quadrature
 
@@ -96,7 +101,10 @@ def folded(body: Body) -> NDArray[np.bool_]:
 
 
 def _slopes(dimension: int) -> Array:
-    """Derivatives ``(nodes, d, nodes)`` of a facet's functions, the first, at its nodes."""
+    """Return the derivatives of a facet's functions at its nodes.
+
+    The shape is ``(nodes, d, nodes)``, with the functions along the first axis.
+    """
     from skfem import ElementLineP2
 
     element, points = (ElementTriP2(), TRIANGLE) if dimension == 2 else (ElementLineP2(), SEGMENT)

@@ -1,4 +1,4 @@
-"""How large the elements of a mesh are, and how far they are from regular ones."""
+"""Sizes of the elements of a mesh, and their quality."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from sa_solver.types import Array
 
 
 def element_sizes(mesh: MeshTet | MeshTri) -> Array:
-    """The longest edge of each element, ``(m,)`` [mm].
+    """Return the longest edge of each element, ``(m,)`` [mm].
 
     Examples
     --------
@@ -27,14 +27,15 @@ def element_sizes(mesh: MeshTet | MeshTri) -> Array:
 
 
 def radius_ratios(mesh: MeshTet | MeshTri) -> Array:
-    """Inscribed over circumscribed radius of each element, ``(m,)``, 1 for a regular one, 0 flat.
+    """Return the inscribed over the circumscribed radius of each element, ``(m,)``.
 
-    That is ``gamma`` of gmsh: d r / R in d dimensions (Liu and Joe, Relationship between
-    tetrahedron shape measures, BIT 34, 1994, doi:10.1007/BF01955874).
+    The ratio is normalised: 1 for a regular element, 0 for a flat one. It is gmsh's ``gamma``, d r
+    / R in d dimensions (Liu and Joe, Relationship between tetrahedron shape measures, BIT 34, 1994,
+    doi:10.1007/BF01955874).
 
     Examples
     --------
-    A right-angled triangle of 3, 4 and 5 mm, with radii of 1 and 2.5 mm:
+    A right-angled triangle of 3, 4 and 5 mm has radii of 1 and 2.5 mm:
 
     >>> import numpy as np
     >>> from skfem import MeshTri
@@ -62,7 +63,7 @@ def radius_ratios(mesh: MeshTet | MeshTri) -> Array:
 
 
 def elements_across(face: Face, width: float) -> float:
-    """How many elements of a face a ``width`` along its x takes, by the median of their extents.
+    """Return the number of elements of a face over a ``width`` along its x, by the median extent.
 
     Examples
     --------
@@ -82,7 +83,7 @@ def elements_across(face: Face, width: float) -> float:
 
 
 def _edges(mesh: MeshTet | MeshTri) -> Array:
-    """Lengths of the edges of each element, ``(edges, m)`` [mm]."""
+    """Return the lengths of the edges of each element, ``(edges, m)`` [mm]."""
     corners = np.moveaxis(mesh.p[:, mesh.t], 0, -1)
     pairs = combinations(range(len(corners)), 2)
     return np.array([np.linalg.norm(corners[i] - corners[j], axis=1) for i, j in pairs])

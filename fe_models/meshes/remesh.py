@@ -1,6 +1,6 @@
-"""Shapes put into the mesh: worn faces, and the form that bodies have beside their flat faces.
+"""Meshes moved to another shape: worn faces, and the form of faces that are meshed flat.
 
-Nodes of the faces move along the normal of the interface, the inside follows a harmonic field.
+Nodes of the faces move along the normal of the interface; the interior follows a harmonic field.
 """
 
 from __future__ import annotations
@@ -27,20 +27,30 @@ from fe_models.meshes.structure_mesh import (
 from fe_models.solvers.linear_solver import prepare
 from sa_solver.types import Array
 
-# An element that keeps less than this share of its volume is too flat to trust its stress.
+# An element that keeps less than this share of its volume is too flat for its stress to be trusted.
 SMALLEST_VOLUME_SHARE = 0.1
-# Boundaries beside a face follow its form over so many times its depth: no steeper than 1 in 5.
+# Boundaries beside a face follow its form over this multiple of its depth: no steeper than 1 in 5.
 FOLLOWING = 5.0
 
 
 def worn_mesh(mesh: StructureMesh, depths: list[tuple[Array, Array]]) -> StructureMesh:
-    """Lower the faces of every interface by the nodal depths of its body 1 and body 2 [mm].
+    """Return the mesh with the faces of every interface lowered by nodal depths.
 
-    Each is ``(n,)`` at the nodes of that body's own face.
+    Interior nodes follow a harmonic field, all other boundaries stay. The gaps of the interfaces
+    are unchanged, because they are kept separately from the mesh.
 
-    Nodes inside follow a harmonic field, all other boundaries stay. The gaps of the interfaces are
-    left alone: they are carried apart from the mesh. Raises :class:`MeshError` if an element is
-    crushed, when the depth is no longer small against the elements at the flank.
+    Parameters
+    ----------
+    mesh
+        The unworn mesh.
+    depths
+        Depths of body 1 and body 2 of each interface, ``(n,)`` [mm] each, at the nodes of that
+        body's own face.
+
+    Raises
+    ------
+    MeshError
+        If an element is crushed because the depth is not small against the elements at the face.
     """
     bodies = []
     by_name = dict(zip((i.name for i in mesh.interfaces), depths, strict=True))
@@ -62,12 +72,13 @@ def worn_mesh(mesh: StructureMesh, depths: list[tuple[Array, Array]]) -> Structu
 
 
 def form_of(mesh: StructureMesh) -> tuple[Array, ...]:
-    """Displacements ``(n, dim)`` of each body's vertices that give it the form of its faces [mm].
+    """Return the displacements ``(n, dim)`` [mm] of each body that give it the form of its faces.
 
-    What the gaps of the interfaces are wider than the meshed faces are apart, such as rounded
-    edges: body 2 has it and body 1 is as it is meshed, as in :class:`wear.surfaces.Surfaces`. Where
-    body 1 covers nothing of a face its form goes on as at the nearest node; boundaries beside it
-    follow over a few times its depth, and stay farther away.
+    The form is the part of the interfaces' gaps, such as rounded edges, that the meshed faces do
+    not have. Body 2 receives all of it and body 1 stays as it is meshed, as in
+    :class:`wear.surfaces.Surfaces`. Where body 1 does not cover a face, its form is that of the
+    nearest covered node. Boundaries beside it follow over a few times its depth, and stay unchanged
+    farther away.
     """
     return tuple(_form_of_body(mesh, number) for number in range(len(mesh.bodies)))
 
@@ -88,46 +99,49 @@ def _form_of_body(mesh: StructureMesh, number: int) -> Array:
     reach = FOLLOWING * float(np.linalg.norm(form, axis=1).max())
     if reach == 0.0:
         return form[:, body.axes]
-    every = np.unique(np.concatenate(held))
-    beside = np.setdiff1d(body.mesh.boundary_nodes(), every)
-    distance, nearest = cKDTree(points[every]).query(points[beside])
-    form[beside] = np.maximum(1.0 - distance / reach, 0.0)[:, None] * form[every[nearest]]
+    all_held = np.unique(np.concatenate(held))
+    others = np.setdiff1d(body.mesh.boundary_nodes(), all_held)
+    distance, nearest = cKDTree(points[all_held]).query(points[others])
+    form[others] = np.maximum(1.0 - distance / reach, 0.0)[:, None] * form[all_held[nearest]]
     return _followed(body.mesh, form[:, body.axes])
 
 
 def formed_mesh(mesh: StructureMesh, form: Sequence[Array]) -> StructureMesh:
-    """The mesh with its bodies in their ``form``, of :func:`form_of` or 0 [mm].
+    """Return the mesh with its bodies in their ``form`` from :func:`form_of`, or 0 [mm].
 
-    Raises :class:`MeshError` if that crushes an element.
+    Raises :class:`MeshError` if an element is crushed.
     """
     bodies = []
     for body, moved in zip(mesh.bodies, form, strict=True):
         formed = _moved(body, moved) if moved.any() else body
         if _crushed(body, formed):
-            raise MeshError(f"elements of the {body.name} are too small for the form of its faces")
+            raise MeshError(
+                f"elements of the {body.name} are too small for the form of its faces: use larger "
+                "elements at its faces"
+            )
         bodies.append(formed)
     return replace(mesh, bodies=tuple(bodies))
 
 
 def worn_volume(before: Body, after: Body, interface: Interface, number: int) -> float:
-    """Volume between the faces of an interface before and after, of body ``number`` 1 or 2 [mm³].
+    """Return the volume between the faces of an interface before and after, of one body [mm³].
 
-    Each facet sweeps a prism: its area times the mean distance of its corners; per length in the
-    plane [mm²].
+    ``number`` is 1 or 2. Each facet sweeps a prism: its area times the mean distance of its
+    corners. In the plane the result is per length [mm²].
     """
     moved = (after.points - before.points)[interface.nodes(number)] @ interface.frame.axes[2]
     return float(interface.face(number).nodal_areas @ np.abs(moved))
 
 
 def element_volumes(mesh: MeshTet | MeshTri) -> Array:
-    """Signed volumes of the elements ``(m,)`` [mm³]; areas in the plane [mm²]."""
+    """Return signed volumes of the elements ``(m,)`` [mm³]; areas in the plane [mm²]."""
     corners = mesh.p[:, mesh.t]
     edges = np.moveaxis(corners[:, 1:] - corners[:, :1], -1, 0)
     return np.linalg.det(edges) / factorial(mesh.dim())
 
 
 def _unmeshed_gap(mesh: StructureMesh, interface: Interface) -> Array:
-    """What of its gap ``(n,)`` [mm] the meshed faces of an interface do not have."""
+    """Return the part of an interface's gap ``(n,)`` [mm] that the meshed faces do not have."""
     height_1, height_2 = (
         interface.frame.coordinates(body.points[interface.nodes(number)])[:, 2]
         for number, body in enumerate((mesh.bodies[k] for k in interface.bodies), start=1)
@@ -140,7 +154,7 @@ def _unmeshed_gap(mesh: StructureMesh, interface: Interface) -> Array:
 
 
 def _followed(mesh: MeshTet | MeshTri, prescribed: Array) -> Array:
-    """Displacements ``(n, dim)``, inside a harmonic field of those prescribed on the boundary."""
+    """Return displacements ``(n, dim)``, harmonic inside, from those prescribed on the boundary."""
     boundary = mesh.boundary_nodes()
     inner = np.setdiff1d(np.arange(mesh.nvertices), boundary)
     displacement = prescribed.copy()
@@ -157,7 +171,7 @@ def _moved(body: Body, displacement: Array) -> Body:
     mesh = replace(body.mesh, doflocs=body.mesh.p + displacement.T)
     midsides = body.midsides
     if midsides is not None:
-        # What moves is linear between vertices: edges keep their bulges.
+        # The displacement is linear between vertices, so edges keep their bulges.
         ends = body.mesh.edges if mesh.dim() == 3 else body.mesh.facets
         midsides = midsides + displacement[ends].mean(axis=0)
     return replace(body, mesh=numbered_as(body.mesh, mesh), midsides=midsides)

@@ -1,4 +1,4 @@
-"""Bodies as curved as the midside nodes of their file."""
+"""Bodies whose elements of second order are as curved as the midside nodes of their file."""
 
 from __future__ import annotations
 
@@ -13,16 +13,17 @@ from fe_models.meshes.curved_face import Midsides, edges_of
 from fe_models.meshes.structure_mesh import Body, Interface, MeshError, StructureMesh, in_space
 from sa_solver.types import Array, Indices
 
-# Midside nodes this share of their edge off its middle are in it: files round.
+# Distance from the middle of an edge, as a share of its length, up to which a midside node counts
+# as in the middle: coordinates in files are rounded.
 MIDDLE = 1e-6
 
 
 @dataclass(frozen=True)
 class Curvature:
-    """Of a body's ``edges``, how many ``given`` have midside nodes and how many are ``curved``.
+    """Numbers of a body's ``edges``, of those ``given`` midside nodes, and of those ``curved``.
 
-    Nodes are up to ``off`` [mm] beside the middle of their edges. ``straightened`` edges are none
-    of these in the body: they would fold an element.
+    Midside nodes are up to ``off`` [mm] away from the middle of their edges. ``straightened`` edges
+    are straight in the body, because their midside nodes would fold an element.
     """
 
     edges: int
@@ -33,17 +34,18 @@ class Curvature:
 
 
 def with_midsides(mesh: StructureMesh, imported: ImportedMesh) -> StructureMesh:
-    """The same with bodies whose elements of second order have the file's midside nodes.
+    """Return the mesh with the file's midside nodes in bodies with elements of second order.
 
-    Bodies whose midside nodes are all in the middle of their edges, or that have none, stay as they
-    are. Edges of elements that their midside nodes fold are straight: :func:`curvature` counts
-    them. Raises :class:`MeshError` if elements beside an edge do not share its node.
+    Bodies whose midside nodes are all in the middle of their edges, or that have none, are
+    unchanged. Edges of elements that their midside nodes would fold are made straight;
+    :func:`curvature` counts them. Raises :class:`MeshError` if elements that share an edge do not
+    share its midside node.
     """
     return replace(mesh, bodies=tuple(_curved(body, imported) for body in mesh.bodies))
 
 
 def curvature(body: Body, imported: ImportedMesh) -> Curvature | None:
-    """How curved a body's edges are; None if the file has no midside nodes for it."""
+    """Return how curved a body's edges are, or None if the file has no midside nodes for it."""
     if body.name not in imported.midsides:
         return None
     edges = _edges(body)
@@ -62,7 +64,7 @@ def curvature(body: Body, imported: ImportedMesh) -> Curvature | None:
 
 
 def distance_of_midsides(interface: Interface, bodies: Sequence[Body]) -> float:
-    """How far midside nodes of faces that meet node to node are apart at most [mm]."""
+    """Return the largest distance between midside nodes of faces that meet node to node [mm]."""
     if interface.projection is not None or all(body.midsides is None for body in bodies):
         return 0.0
     facets = interface.facets
@@ -75,9 +77,10 @@ def distance_of_midsides(interface: Interface, bodies: Sequence[Body]) -> float:
 
 
 def set_nodes(elastic: ElasticBody, imported: ImportedMesh, group: str) -> Indices:
-    """Nodes of a body in a node set: its vertices, and midside nodes of elements of second order.
+    """Return the nodes of a body in a node set, with midside nodes for elements of second order.
 
-    Where the file has none they are those of the facets of the surface with all corners in the set.
+    If the file has no midside nodes, they are those of the facets of the surface with all corners
+    in the set.
     """
     body = elastic.body
     vertices = imported.points[body.name][group]
@@ -105,7 +108,7 @@ def _curved(body: Body, imported: ImportedMesh) -> Body:
 
 
 def _unfolded(body: Body) -> Body:
-    """The body with the edges of folded elements straight: those inside first, then all."""
+    """Return the body with straight edges in folded elements: inner edges first, then all."""
     from fe_models.meshes.isoparametric import folded
 
     mesh, corners = body.mesh, len(body.mesh.t)
@@ -130,7 +133,7 @@ def _unfolded(body: Body) -> Body:
 
 
 def _edges(body: Body) -> Indices:
-    """Vertices of the edges ``(m, 2)`` in the order of :attr:`Body.midsides`."""
+    """Return the vertices of the edges ``(m, 2)`` in the order of :attr:`Body.midsides`."""
     mesh = body.mesh
     return np.asarray((mesh.edges if mesh.dim() == 3 else mesh.facets).T)
 
@@ -140,9 +143,10 @@ def _lengths(body: Body, edges: Indices) -> Array:
 
 
 def _places(body: Body, edges: Indices, midsides: Midsides) -> tuple[Array, Array, Array]:
-    """Places ``(m, 3)`` of the midsides of edges, whether the file has them, how far off they are.
+    """Return the midside points of edges, whether the file has them, and their offsets.
 
-    Edges without one have it in their middle.
+    The points are ``(m, 3)``, the offsets from the middle ``(m,)`` [mm]. Without a midside node in
+    the file the point is the middle of the edge.
     """
     middle = body.points[edges].mean(axis=1)
     found = midsides.at(edges)
@@ -153,7 +157,7 @@ def _places(body: Body, edges: Indices, midsides: Midsides) -> tuple[Array, Arra
 
 
 def _check_shared(body: Body, midsides: Midsides) -> None:
-    """Raise if elements beside an edge have nodes of their own in its middle: a crack."""
+    """Raise if elements that share an edge have different nodes in its middle, as at a crack."""
     spread = np.linalg.norm(midsides.points - midsides.at(midsides.edges), axis=1)
     torn = spread > MIDDLE * _lengths(body, midsides.edges)
     if torn.any():
@@ -165,12 +169,12 @@ def _check_shared(body: Body, midsides: Midsides) -> None:
 
 
 def _sides(facets: Indices) -> Indices:
-    """Ends of the edges of facets, ``(m, 2)``."""
+    """Return the ends of the edges of facets, ``(m, 2)``."""
     return edges_of(facets).reshape(-1, 2)
 
 
 def _middles(body: Body, ends: Indices) -> Array:
-    """Midsides ``(m, 3)`` of edges of a body between vertices ``ends`` ``(m, 2)``."""
+    """Return the midside points ``(m, 3)`` of edges of a body between vertices ``(m, 2)``."""
     if body.midsides is None:
         return np.asarray(body.points[ends].mean(axis=1))
     return Midsides(_edges(body), in_space(body.midsides)).at(ends)

@@ -21,39 +21,47 @@ if TYPE_CHECKING:
 
 # Two nodes are the same point when they are closer than this share of the interface's size.
 MATCHING_TOLERANCE = 1e-9
-# Global axes that the coordinates and displacements of a mesh of each dimension run along.
+# Global axes of the coordinates and displacements of a mesh, by its dimension.
 AXES = {2: (0, 2), 3: (0, 1, 2)}
-# gmsh's numbers for cells and their facets, by dimension: of first order, of second order.
+# gmsh's type numbers of cells and of their facets, by dimension: first order, then second order.
 GMSH_CELL, GMSH_FACET = {2: 2, 3: 4}, {2: 1, 3: 2}
 GMSH_CURVED_CELL, GMSH_CURVED_FACET = {2: 9, 3: 11}, {2: 8, 3: 9}
-# gmsh lists the last two edges of a tetrahedron the other way round than scikit-fem.
+# gmsh and scikit-fem list the last two edges of a tetrahedron in opposite order.
 GMSH_NODES = {2: range(6), 3: (0, 1, 2, 3, 4, 5, 6, 7, 9, 8)}
-# What a mesh of scikit-fem keeps, once asked for, of how its elements are connected.
+# Attributes in which a scikit-fem mesh caches the connectivity of its elements.
 NUMBERED = frozenset({"_facets", "_t2f", "_f2t", "_edges", "_t2e", "_f2e"})
-# How a file of gmsh ends that is whole.
+# Last line of a complete gmsh file.
 MSH_END = b"$EndElements\n"
 
 
 class MeshError(InputError):
-    """The geometry or its mesh cannot be used; the message says what to change."""
+    """Error of a geometry or mesh that cannot be used; the message says what to change."""
 
 
 class MatchError(MeshError):
-    """Two faces do not meet node to node."""
+    """Error of two faces that do not meet node to node."""
 
 
 @dataclass(frozen=True)
 class Body:
-    """One meshed body: tetrahedra, or triangles in the plane (X, Z) for plane strain.
+    """Meshed body: tetrahedra, or triangles in the plane (X, Z) for plane strain.
 
-    ``name`` is its own, ``mesh`` scikit-fem's [mm]; its named boundaries are those of the mesh.
-    ``midsides`` ``(edges, dim)`` [mm] are where the midside nodes of elements of second order are,
-    by the mesh's edges (in the plane: its facets). Without them they are in the middle. What this
-    class tells of sizes and normals is that of the straight elements between the vertices.
+    Sizes and normals from this class are those of the straight elements between the vertices.
+
+    Attributes
+    ----------
+    name
+        Name of the body.
+    mesh
+        Mesh of scikit-fem [mm], with named boundaries.
+    midsides
+        Positions of the midside nodes of elements of second order ``(edges, dim)`` [mm], in the
+        order of the mesh's edges (in the plane: its facets). If None, they are in the middle of the
+        edges.
 
     Examples
     --------
-    A cube of 2 mm and its top, whose facets are as large as the face together:
+    A cube of 2 mm has a top whose facets together have the area of the face:
 
     >>> import numpy as np
     >>> from skfem import MeshTet
@@ -81,37 +89,37 @@ class Body:
 
     @property
     def nodes(self) -> Array:
-        """Vertices in space ``(n, 3)`` [mm], and the midsides after them if it has any."""
+        """Vertices in space ``(n, 3)`` [mm], followed by the midside nodes if it has any."""
         if self.midsides is None:
             return self.points
         return np.concatenate([self.points, in_space(self.midsides)])
 
     @property
     def element_nodes(self) -> Indices:
-        """Vertices and midsides of the elements ``(m, 10 or 6)``, as scikit-fem orders them."""
+        """Vertices and midside nodes of the elements ``(m, 10 or 6)``, in scikit-fem's order."""
         mesh = self.mesh
-        beside = mesh.t2f if mesh.dim() == 2 else mesh.t2e
-        return np.asarray(np.vstack([mesh.t, mesh.nvertices + beside]).T)
+        middles = mesh.t2f if mesh.dim() == 2 else mesh.t2e
+        return np.asarray(np.vstack([mesh.t, mesh.nvertices + middles]).T)
 
     def facet_nodes(self, facets: Indices) -> Indices:
-        """Vertices and midsides of facets of the mesh, by their numbers, ``(m, 6 or 3)``."""
+        """Return the vertices and midside nodes of facets, by facet number, ``(m, 6 or 3)``."""
         mesh = self.mesh
-        beside = facets[None] if mesh.dim() == 2 else mesh.f2e[:, facets]
-        return np.asarray(np.vstack([mesh.facets[:, facets], mesh.nvertices + beside]).T)
+        middles = facets[None] if mesh.dim() == 2 else mesh.f2e[:, facets]
+        return np.asarray(np.vstack([mesh.facets[:, facets], mesh.nvertices + middles]).T)
 
     def facets(self, boundary: str) -> Indices:
-        """Vertices of the triangles (in the plane: edges) of a named boundary, ``(n, dim)``."""
+        """Return the vertices of a boundary's triangles (in the plane: edges), ``(n, dim)``."""
         return self.mesh.facets[:, self.mesh.boundaries[boundary]].T
 
     def outward(self, boundary: str) -> Array:
-        """Outward normals ``(n, 3)`` of the facets of a boundary, as long as the facet is large.
+        """Return outward normals ``(n, 3)`` of the facets of a boundary, each as long as its area.
 
-        In the plane a facet goes on along Y for 1 mm.
+        In the plane a facet extends by 1 mm along Y.
         """
         return self.outward_of(self.mesh.boundaries[boundary])
 
     def outward_of(self, facets: Indices) -> Array:
-        """The same of facets of the surface, by their numbers."""
+        """Return outward normals as :meth:`outward`, of facets of the surface given by number."""
         corners = self.points[self.mesh.facets[:, facets].T]
         edge = corners[:, 1] - corners[:, 0]
         other = 0.5 * (corners[:, 2] - corners[:, 0]) if corners.shape[1] == 3 else [0.0, 1.0, 0.0]
@@ -120,7 +128,7 @@ class Body:
         return normals * np.sign(np.einsum("ma,ma->m", normals, out))[:, None]
 
     def depth(self, boundary: str) -> float:
-        """How deep the elements of a boundary usually reach below it [mm]."""
+        """Return the median depth to which the elements of a boundary reach below it [mm]."""
         normals = self.outward(boundary)
         normals /= np.linalg.norm(normals, axis=1, keepdims=True)
         corners = self.points[self.facets(boundary)]
@@ -128,26 +136,37 @@ class Body:
         return float(np.median(np.einsum("mia,ma->mi", below, normals).max(axis=1)))
 
     def _behind(self, facets: Indices) -> Indices:
-        """Vertices of the elements that facets of the surface belong to, ``(m, dim + 1)``."""
+        """Return the vertices ``(m, dim + 1)`` of the elements behind facets of the surface."""
         cells: Indices = self.mesh.t[:, self.mesh.f2t[0, facets]].T
         return cells
 
     def vertices(self, boundary: str) -> Indices:
-        """Vertices on a named boundary, sorted, ``(n,)``."""
+        """Return the vertices on a named boundary, sorted, ``(n,)``."""
         return np.unique(self.facets(boundary))
 
 
 @dataclass(frozen=True)
 class Face:
-    """A contact face: ``coordinates`` ``(n, 2)`` of its nodes in the frame [mm] and their facets.
+    """Contact face, on which fields are linear between the nodes.
 
-    It is called ``name`` and lies in ``frame``.
-    ``facets`` are triangles ``(m, 3)``, or segments ``(m, 2)`` of a line contact, whose nodes have
-    y = 0. Fields on it are linear between nodes. Forces of nodes are pressures times areas and
-    displacements those of the nodes, unless it is ``weighted``: then they are integrals of a linear
-    traction, ∫ φ_i t dA, and values of the linear field next to the displacement (least squares).
+    Nodal forces are pressures times areas, and nodal displacements those of the nodes. If the face
+    is ``weighted``, nodal forces are integrals of a linear traction, ∫ φ_i t dA, and nodal
+    displacements the values of the linear field closest to the displacement (least squares).
 
-    ``surface`` is what it is a mesh of, if that is known (:mod:`fe_models.meshes.curved_face`).
+    Attributes
+    ----------
+    name
+        Name of the face.
+    frame
+        Frame in which it lies.
+    coordinates
+        Coordinates of its nodes in the frame ``(n, 2)`` [mm].
+    facets
+        Triangles ``(m, 3)``, or segments ``(m, 2)`` of a line contact, whose nodes have y = 0.
+    weighted
+        Whether nodal values are weighted, as for elements of second order.
+    surface
+        Surface that its mesh approximates, if known (:mod:`fe_models.meshes.curved_face`).
     """
 
     name: str
@@ -161,12 +180,15 @@ class Face:
         return len(self.coordinates)
 
     def face(self, number: int) -> Face:
-        """The face of body ``number``, 1 or 2, with its own nodes; one for both unless it says."""
+        """Return the face of body ``number``, 1 or 2, with its own nodes.
+
+        By default both bodies have the same face.
+        """
         return self
 
     @property
     def line(self) -> bool:
-        """Whether the face is that of a line contact, and all it carries is per length."""
+        """Whether it is the face of a line contact, where forces are per length."""
         return self.facets.shape[1] == 2
 
     @property
@@ -176,7 +198,7 @@ class Face:
 
     @property
     def facet_shares(self) -> Array:
-        """Each node's equal share of its facets ``(n,)`` [mm²]; in a line contact [mm]."""
+        """Equal share of its facets' area at each node ``(n,)`` [mm²]; in a line contact [mm]."""
         total = np.zeros(len(self))
         np.add.at(total, self.facets, self.facet_sizes[:, None] / self.facets.shape[1])
         return total
@@ -192,17 +214,30 @@ class Face:
 
 @dataclass(frozen=True)
 class Interface(Face):
-    """Two faces that meet; as a face it is body 2's.
+    """Two faces that meet; as a face it is that of body 2.
 
-    ``nodes_1`` and ``nodes_2`` are vertices of body 1 and body 2; ``gap`` ``(n,)`` the distance of
-    the unloaded, unworn faces [mm]. Faces that meet node to node list their nodes in the same
-    order. Otherwise ``projection`` ``(n, n_1)`` gives a field of body 1's nodes at those of body 2,
-    ``face_1`` is body 1's own face and ``areas`` ``(n,)`` what it covers of each node's area [mm²];
-    ``bulged`` ``(n,)`` is what of the gap is due to the form of the faces between vertices [mm].
-    Planes of symmetry may cut it: ``planes`` are the axes of the frame that are normal to them, and
-    the frame's origin is on them (:mod:`fe_models.meshes.cut_face`).
+    Faces that meet node to node list their nodes in the same order. Otherwise ``projection``,
+    ``face_1`` and ``areas`` are given.
 
-    Its body 1 and body 2 are those of a :class:`StructureMesh` at the places ``bodies``, from 0.
+    Attributes
+    ----------
+    nodes_1, nodes_2
+        Vertices of body 1 and of body 2.
+    gap
+        Distance of the unloaded, unworn faces ``(n,)`` [mm].
+    projection
+        Matrix ``(n, n_1)`` that gives a field of body 1's nodes at those of body 2.
+    face_1
+        Face of body 1.
+    areas
+        Area of each node that body 1 covers ``(n,)`` [mm²].
+    bulged
+        Part of the gap due to the form of the faces between vertices ``(n,)`` [mm].
+    planes
+        Axes of the frame that are normal to planes of symmetry; the frame's origin is on these
+        planes (:mod:`fe_models.meshes.cut_face`).
+    bodies
+        Positions of body 1 and body 2 among the bodies of a :class:`StructureMesh`, from 0.
 
     Examples
     --------
@@ -233,24 +268,24 @@ class Interface(Face):
 
     @property
     def nodal_areas(self) -> Array:
-        """What is in contact of the area of each node ``(n,)`` [mm²]; in a line contact [mm]."""
+        """Area of contact that belongs to each node ``(n,)`` [mm²]; in a line contact [mm]."""
         return self.facet_shares if self.areas is None else self.areas
 
     def face(self, number: int) -> Face:
         return self.face_1 if number == 1 and self.face_1 is not None else self
 
     def nodes(self, number: int) -> Indices:
-        """Vertices of body ``number``, 1 or 2, on its own face."""
+        """Return the vertices of body ``number``, 1 or 2, on its own face."""
         return (self.nodes_1, self.nodes_2)[number - 1]
 
     def carried(self, field: Array) -> Array:
-        """A field ``(n_1, ...)`` of body 1's nodes at those of body 2 ``(n, ...)``."""
+        """Return a field ``(n_1, ...)`` of body 1's nodes at those of body 2 ``(n, ...)``."""
         return field if self.projection is None else np.asarray(self.projection @ field)
 
 
 @dataclass(frozen=True)
 class StructureMesh:
-    """``bodies`` and the ``interfaces`` between them, each of which names its two by their places.
+    """Meshed ``bodies`` and the ``interfaces`` between them, which give their bodies by position.
 
     Examples
     --------
@@ -274,11 +309,11 @@ class StructureMesh:
     interfaces: tuple[Interface, ...]
 
     def faces_of(self, place: int) -> list[tuple[Interface, int]]:
-        """Contact faces of the body at a ``place``: interfaces, and which body of each it is."""
+        """Return the interfaces of the body at ``place``, each with its number there, 1 or 2."""
         return [(self.interfaces[number], side) for number, side in self.sides_of(place)]
 
     def sides_of(self, place: int) -> list[tuple[int, int]]:
-        """As :meth:`faces_of`, the interfaces by their numbers from 0."""
+        """Return the same as :meth:`faces_of`, with the interfaces given by number from 0."""
         return [
             (number, side)
             for number, interface in enumerate(self.interfaces)
@@ -287,7 +322,7 @@ class StructureMesh:
         ]
 
     def weighted(self, order: int) -> StructureMesh:
-        """With faces that are ``weighted`` where elements are of second order."""
+        """Return the mesh with faces that are ``weighted`` if elements are of second order."""
         faces = (
             replace(
                 face,
@@ -299,7 +334,7 @@ class StructureMesh:
         return replace(self, interfaces=tuple(faces))
 
     def node_count(self, order: int) -> int:
-        """Nodes of all bodies, with elements of order 2 midsides included."""
+        """Return the number of nodes of all bodies, with midside nodes for elements of order 2."""
         count = 0
         for mesh in (body.mesh for body in self.bodies):
             count += mesh.nvertices
@@ -309,7 +344,7 @@ class StructureMesh:
 
 
 def in_space(components: Array) -> Array:
-    """Vectors ``(..., 3)`` from ones ``(..., dim)``: those of the plane (X, Z) have no Y."""
+    """Return vectors ``(..., 3)`` from components ``(..., dim)``; in the plane (X, Z) Y is 0."""
     if components.shape[-1] == 3:
         return components
     spatial = np.zeros((*components.shape[:-1], 3))
@@ -318,12 +353,23 @@ def in_space(components: Array) -> Array:
 
 
 def named_mesh(points: Array, cells: Indices, boundaries: dict[str, Indices]) -> MeshTet | MeshTri:
-    """A mesh whose boundaries are given by the vertices of their facets.
+    """Return a mesh whose boundaries are given by the vertices of their facets.
 
-    Tetrahedra: ``points`` ``(n, 3)``, ``cells`` ``(m, 4)``, each boundary ``(k, 3)``; triangles in
-    the plane (X, Z): ``(n, 2)``, ``(m, 3)`` and ``(k, 2)``.
+    Parameters
+    ----------
+    points
+        Coordinates ``(n, 3)``, or ``(n, 2)`` in the plane (X, Z).
+    cells
+        Vertices of tetrahedra ``(m, 4)`` or triangles ``(m, 3)``.
+    boundaries
+        Vertices of the facets of each boundary, ``(k, 3)`` or ``(k, 2)``.
+
+    Raises
+    ------
+    MeshError
+        If a boundary has a facet that is no facet of the mesh.
     """
-    # Finite elements take a second to load: where they are used.
+    # Importing finite elements takes a second, so they are imported only where they are used.
     from scipy.spatial import cKDTree
     from skfem import MeshTet, MeshTri
 
@@ -335,22 +381,25 @@ def named_mesh(points: Array, cells: Indices, boundaries: dict[str, Indices]) ->
     for name, facets in boundaries.items():
         distance, index = lookup.query(np.sort(facets, axis=1))
         if np.any(distance > 0):
-            raise MeshError(f"boundary {name} has facets that are no faces of the mesh")
+            raise MeshError(
+                f"boundary {name} has facets that are not faces of the mesh's elements; "
+                "leave them out of the boundary"
+            )
         named[name] = index
     return numbered_as(mesh, mesh.with_boundaries(named))
 
 
 def numbered_as(mesh: MeshTet | MeshTri, same: MeshTet | MeshTri) -> MeshTet | MeshTri:
-    """The mesh of the ``same`` elements, with what is known of how those of ``mesh`` are connected.
+    """Return the ``same`` mesh with the cached connectivity of ``mesh``, whose elements are equal.
 
-    Facets and edges hang on the elements alone; scikit-fem would number them again.
+    Facets and edges depend on the elements alone, and scikit-fem would number them again.
     """
     vars(same).update({name: vars(mesh)[name] for name in NUMBERED & vars(mesh).keys()})
     return same
 
 
 def _number_facets(mesh: MeshTet | MeshTri) -> None:
-    """Number the facets as scikit-fem does, which sorts columns and takes ten times as long."""
+    """Find and store the numbers of the facets in scikit-fem's order, ten times as fast."""
     corners = np.sort(mesh.t[np.array(mesh.elem.refdom.facets)], axis=1).astype(np.int64)
     if mesh.nvertices ** corners.shape[1] > np.iinfo(np.int64).max:
         return
@@ -366,7 +415,7 @@ def _number_facets(mesh: MeshTet | MeshTri) -> None:
 def matched_interface(
     name: str, body_1: Body, body_2: Body, boundary: str, frame: Frame
 ) -> Interface:
-    """Pair the vertices of the boundary of that name on both bodies; their gap is zero.
+    """Pair the vertices of a boundary that has the same name on both bodies; their gap is zero.
 
     Raises :class:`MatchError` if a vertex of one face has no partner on the other.
     """
@@ -397,9 +446,8 @@ def matched_interface(
 def write_msh(path: Path, structure: StructureMesh) -> None:
     """Write all bodies and all their named boundaries to one gmsh 4.1 file (text).
 
-    Elements of bodies with midsides are of second order.
-
-    Raises OSError where the disk is full, which gmsh does not notice.
+    Elements of bodies with midside nodes are of second order. Raises OSError if the disk is full,
+    which gmsh does not notice.
     """
     with gmsh_model("structure") as gmsh:
         offset = 0
@@ -427,7 +475,7 @@ def write_msh(path: Path, structure: StructureMesh) -> None:
 def _listed(
     body: Body,
 ) -> tuple[Array, Indices, dict[str, Indices], tuple[dict[int, int], dict[int, int]]]:
-    """Nodes of a body, those of its elements and of the facets of boundaries, and gmsh's kinds."""
+    """Return a body's nodes, those of its elements and boundary facets, and gmsh's type numbers."""
     boundaries = body.mesh.boundaries
     if body.midsides is None:
         faces = {name: body.facets(name) for name in boundaries}

@@ -1,16 +1,16 @@
-"""Files of meshes and shapes by their endings: those that are read, and what to do about others."""
+"""Endings of mesh and CAD files: those that are read, and advice about the others."""
 
 from __future__ import annotations
 
-# Shapes, which are meshed here.
+# CAD files, whose shapes are meshed here.
 CAD = (".step", ".stp", ".brep")
-# Nastran's bulk data; ``.dat`` is by what is in it.
+# Nastran's bulk data; the content decides whether a ``.dat`` is one.
 NASTRAN = (".bdf", ".nas", ".fem", ".dat")
 EXODUS = (".e", ".exo", ".ex2", ".exii", ".g", ".gen")
-# Formats of meshio with solid elements, by far not all that it knows.
+# Formats of meshio with solid elements, only some of all those that it reads.
 MESHIO = (".vtu", ".vtk", ".xdmf", ".med", ".mesh", ".meshb", ".vol", ".su2", ".avs")
 READ = (".msh", ".inp", *NASTRAN, ".unv", *EXODUS, *MESHIO, *CAD)
-# Files of programs whose own formats nothing here reads.
+# Formats of other programs that are not read.
 OWN_FORMATS = {
     ".cdb": "Ansys", ".db": "Ansys", ".mechdb": "Ansys", ".rst": "Ansys", ".rth": "Ansys",
     ".agdb": "Ansys", ".wbpj": "Ansys", ".odb": "Abaqus", ".cae": "Abaqus", ".mph": "COMSOL",
@@ -21,7 +21,7 @@ OWN_FORMATS = {
     ".catproduct": "CATIA", ".x_t": "Parasolid", ".sat": "ACIS", ".iges": "CAD", ".igs": "CAD",
 }  # fmt: skip
 EXPORT = "export it as .inp, .bdf, .unv, .msh, .e, .vtu or .step"
-# Shapes without a mesh, for which there is another way than an export as a mesh.
+# Files with shapes but no mesh, which can be exported as shapes instead of as a mesh.
 SHAPES = frozenset({".agdb", ".prt", ".sldprt", ".sldasm", ".ipt", ".iam", ".catpart",
                     ".catproduct", ".x_t", ".sat", ".iges", ".igs", ".fcstd"})  # fmt: skip
 

@@ -1,8 +1,8 @@
 """Meshes in Exodus II files (``.e``, ``.exo``, ``.g``), as Cubit, Sierra, MOOSE and others write.
 
 An Exodus file is a NetCDF file, either of HDF5 (netCDF-4) or of the classic format (netCDF-3): h5py
-reads the one, scipy the other. Variables, and the numbers of sides, as in Schoof and Yarberry,
-EXODUS II: A Finite Element Data Model, SAND92-2137, with the later ``coordx`` and names.
+reads the former, scipy the latter. Variables and the numbers of sides are as in Schoof and
+Yarberry, EXODUS II: A Finite Element Data Model, SAND92-2137, with the later ``coordx`` and names.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from fe_models.readers.scope import Element, Scope, extend
 from sa_solver.types import Indices
 
 CLASSIC, WIDE = b"CDF", b"CDF\x05"
-# Shape of element types by the letters they begin with, and of what are points.
+# Shape of element types by their first letters, and first letters of types that are points.
 SHAPES = {
     "SHELL3": "triangle", "TET": "tetra", "PYR": "pyramid", "WED": "wedge", "HEX": "hexahedron",
     "TRI": "triangle", "QUA": "quad", "SHE": "quad", "BAR": "line", "BEA": "line", "TRU": "line",
@@ -51,9 +51,9 @@ BEAM = "a beam: mesh its volume with solid elements, or leave it out"
 def read_exodus(path: Path) -> GroupedMesh:
     """Read the mesh of an Exodus file.
 
-    Each connected piece of solids is a body by the name of its element block, or by those of its
-    blocks with a plus between them; side sets are boundaries. Names are the file's, or else
-    ``block_1``, ``side_set_1`` and ``node_set_1`` by their numbers. Blocks of shells and beams on
+    Each connected piece of solids is a body with the name of its element block, or with those of
+    its blocks joined by plus signs; side sets are boundaries. Names are those of the file, or else
+    ``block_1``, ``side_set_1`` and ``node_set_1`` with their numbers. Blocks of shells and beams on
     solids name faces and edges, and have no stiffness. Raises :class:`MeshError`.
     """
     with path.open("rb") as file:
@@ -63,28 +63,28 @@ def read_exodus(path: Path) -> GroupedMesh:
             f"{path}: NetCDF of 64-bit data (CDF-5) is not read; allowed: netCDF-4, classic"
         )
     if head.startswith(CLASSIC):
-        # Takes a tenth of a second to load: where it is used.
+        # The import takes a tenth of a second, so it is done only where it is needed.
         from scipy.io import netcdf_file
 
         with netcdf_file(path, mmap=False) as classic:
             types = {n: getattr(v, "elem_type", b"") for n, v in classic.variables.items()}
             return _Read(path, {n: v.data for n, v in classic.variables.items()}, types).mesh()
     if not h5py.is_hdf5(path):
-        raise MeshError(f"{path}: is no Exodus file; allowed: NetCDF, of HDF5 or classic")
+        raise MeshError(f"{path}: is not an Exodus file; allowed: NetCDF, of HDF5 or classic")
     with h5py.File(path, "r") as wide:
         types = {n: v.attrs.get("elem_type", b"") for n, v in wide.items()}
         return _Read(path, {n: v[()] for n, v in wide.items()}, types).mesh()
 
 
 class _Read:
-    """A mesh as the variables of a file define it; they count nodes and elements from one."""
+    """Mesh defined by the variables of a file, which count nodes and elements from one."""
 
     def __init__(self, path: Path, variables: Mapping[str, Any], types: dict[str, Any]) -> None:
         self.scope = Scope("", SourceLine(path, 0))
         self._path, self._variables = path, variables
         self._types = {name: _text(kind) for name, kind in types.items()}
         self._numbers = self._nodes()
-        # What bodies do not have of the blocks that name faces and edges.
+        # Shape and message of each block that may name faces or edges and has no stiffness then.
         self._caveats: list[tuple[str, str]] = []
         self._blocks()
         self._sets()
@@ -93,41 +93,41 @@ class _Read:
         flat = FlatFile(self.scope, joins=True)
         mesh = flat.mesh()
         lower = (text for shape, text in self._caveats if DIMENSION[shape] < flat.top)
-        told = (*flat.told, *lower)
-        return replace(mesh, left=told, scene=Scene(ignored=told))
+        notes = (*flat.notes, *lower)
+        return replace(mesh, left=notes, scene=Scene(ignored=notes))
 
     def _wrong(self, what: str) -> MeshError:
         return MeshError(f"{self._path}: {what}")
 
     def _array(self, name: str) -> Any:
         if name not in self._variables:
-            raise self._wrong(f"has no {name}: damaged, or no Exodus file?")
+            raise self._wrong(f"has no {name}: it is damaged or not an Exodus file")
         return np.asarray(self._variables[name])
 
     def _nodes(self) -> Indices:
-        """Take the nodes; return the file's own number of each."""
+        """Read the nodes and return the file's own number of each."""
         if "coord" in self._variables:
             rows = self._array("coord")
         else:
             axes = [f"coord{axis}" for axis in "xyz" if f"coord{axis}" in self._variables]
             rows = np.array([self._array(axis) for axis in axes])
         if rows.ndim != 2 or len(rows) not in (2, 3):
-            raise self._wrong("has no coordinates in space or in a plane: damaged?")
+            raise self._wrong("has no coordinates in space or in a plane: it may be damaged")
         points = np.zeros((rows.shape[1], 3))
         points[:, : len(rows)] = rows.T
         numbers = np.arange(1, len(points) + 1)
         if "node_num_map" in self._variables:
             numbers = self._array("node_num_map").astype(np.int64)
         if numbers.shape != points.shape[:1] or len(np.unique(numbers)) < len(numbers):
-            raise self._wrong("nodes have not a number each: damaged?")
+            raise self._wrong("the nodes do not have one number each: it may be damaged")
         for number, (x, y, z) in zip(numbers.tolist(), points.tolist(), strict=True):
             self.scope.nodes[number] = (x, y, z)
         return numbers
 
     def _own(self, counted: Any, what: str) -> list[Any]:
-        """The file's own numbers of nodes that it counts from one."""
+        """Return the file's own numbers of nodes that are counted from one."""
         if counted.size and not 1 <= counted.min() <= counted.max() <= len(self._numbers):
-            raise self._wrong(f"{what} has nodes that are not in the file: damaged?")
+            raise self._wrong(f"{what} has nodes that are not in the file: it may be damaged")
         return self._numbers[counted.astype(np.int64) - 1].tolist()
 
     def _blocks(self) -> None:
@@ -136,7 +136,9 @@ class _Read:
             shape = self._shape(name, kind)
             corners = CORNERS[shape]
             if cells.ndim != 2 or cells.shape[1] < corners:
-                raise self._wrong(f"block {name} has not the nodes of a {shape}: damaged?")
+                raise self._wrong(
+                    f"block {name} does not have the nodes of a {shape}: it may be damaged"
+                )
             first = len(self.scope.elements) + 1
             for number, nodes in enumerate(self._own(cells, f"block {name}"), start=first):
                 self.scope.elements[number] = Element(
@@ -150,8 +152,8 @@ class _Read:
                 )
             numbers: list[int | range] = list(range(first, first + len(cells)))
             extend(self.scope.element_sets.add(name, {}), {"": numbers})
-            told = f"{self._path.name}: stiffness of {kind}, which names faces or edges {name}"
-            self._caveats.append((shape, told))
+            note = f"{self._path.name}: stiffness of {kind}, which names faces or edges {name}"
+            self._caveats.append((shape, note))
         if not self.scope.elements:
             raise self._wrong("has no elements")
 
@@ -175,7 +177,7 @@ class _Read:
             extend(self.scope.node_sets.add(name, {}), {"": nodes})
         space = "coordz" in self._variables or len(self._variables.get("coord", ())) == 3
         sides_of = SIDES | SHELL_SIDES if space else SIDES
-        # Facets that are no elements of the file have numbers below zero.
+        # Facets that are not elements of the file have negative numbers.
         facet, elements = 0, len(self.scope.elements)
         for key, name in self._named("elem_ss", "ss", "side_set"):
             sides = self._array(key.replace("elem", "side")).tolist()
@@ -199,18 +201,18 @@ class _Read:
                 extend(into, {"": [facet]})
 
     def _named(self, variable: str, names: str, kind: str) -> Iterator[tuple[str, str]]:
-        """Variables of all blocks or sets of a kind that have any, with the name of each."""
+        """Yield the variables of all blocks or sets of a kind that are not empty, and names."""
         given = [_text(row) for row in self._variables.get(f"{names}_names", ())]
         numbers = np.ravel(self._variables.get(f"{names}_prop1", ())).tolist()
         found = (re.fullmatch(rf"{variable}(\d+)", name) for name in self._variables)
         for place in sorted(int(match[1]) for match in found if match):
-            own = given[place - 1] if place <= len(given) else ""
+            given_name = given[place - 1] if place <= len(given) else ""
             number = numbers[place - 1] if place <= len(numbers) else place
             if np.size(self._variables[f"{variable}{place}"]):
-                yield f"{variable}{place}", own or f"{kind}_{number}"
+                yield f"{variable}{place}", given_name or f"{kind}_{number}"
 
 
 def _text(letters: Any) -> str:
-    """Text of letters, or of bytes, that ends where these are zero."""
+    """Return text from characters or bytes, up to the first zero."""
     raw = letters if isinstance(letters, bytes) else np.asarray(letters).astype("S").tobytes()
     return raw.split(b"\0")[0].decode("utf-8", "replace").strip()

@@ -1,4 +1,4 @@
-"""The bodies, surfaces and node sets of a file that says its mesh by numbers and names."""
+"""Bodies, surfaces and node sets of a file that defines its mesh by numbers and names."""
 
 from __future__ import annotations
 
@@ -29,7 +29,10 @@ _Value = TypeVar("_Value")
 
 
 def dimension_of(scope: Scope) -> int:
-    """That of the bodies of a scope; raises :class:`MeshError` if it has facets and edges alone."""
+    """Return the dimension of the bodies of a scope.
+
+    Raises :class:`MeshError` if it has only facets and edges.
+    """
     standing = [e for e in scope.elements.values() if e.stands_alone]
     if not standing:
         first = next(iter(scope.elements.values()))
@@ -41,12 +44,15 @@ def dimension_of(scope: Scope) -> int:
 
 
 class Flattened:
-    """The nodes of all ``scopes`` in one list; ``common`` has the names that stand above them."""
+    """Nodes of all ``scopes`` in one list.
+
+    ``common`` is the scope whose names need no prefix: the assembly, or the flat file itself.
+    """
 
     def __init__(self, scopes: list[Scope], common: Scope) -> None:
         self.scopes, self.common = scopes, common
         self.instances: Names[Scope] = Names()
-        # Row of each node of each scope.
+        # Row of each node, by scope and number.
         self.row: dict[str, dict[int, int]] = {}
         offset = 0
         for scope in scopes:
@@ -73,7 +79,7 @@ class Flattened:
         )
 
     def _second_order(self) -> Iterator[tuple[str, Indices]]:
-        """Elements that have nodes on their edges, with these."""
+        """Yield the elements with midside nodes, these included."""
         for scope in self.scopes:
             numbers = [n for n, element in scope.elements.items() if element.midsides]
             yield from self.blocks(scope, numbers, midsides=True)
@@ -82,7 +88,7 @@ class Flattened:
         return {scope.name: self.blocks(scope, scope.elements) for scope in self.scopes}
 
     def surfaces(self) -> dict[str, Blocks]:
-        """Facets of the element surfaces."""
+        """Return the facets of the element surfaces."""
         return {
             name: self._faces(scope, card)
             for name, scope, _, card in self._named("surfaces")
@@ -90,7 +96,7 @@ class Flattened:
         }
 
     def node_sets(self) -> dict[str, Indices]:
-        """Rows of the nodes of node sets and node surfaces."""
+        """Return the rows of the nodes of node sets and node surfaces."""
         sets = {
             name: self._rows(name, scope, members)
             for name, scope, _, members in self._named("node_sets")
@@ -106,7 +112,7 @@ class Flattened:
         return sets
 
     def blocks(self, scope: Scope, numbers: Iterable[int], midsides: bool = False) -> Blocks:
-        """Elements of a scope by shape: their corners, and their ``midsides`` if asked for."""
+        """Return elements of a scope by shape: their corners, and their ``midsides`` on request."""
         by_shape: dict[str, list[list[int]]] = {}
         for number in numbers:
             element = scope.elements[number]
@@ -123,7 +129,10 @@ class Flattened:
             raise MeshError(f"{place}: node {error.args[0]} is not defined") from None
 
     def _named(self, kind: str) -> Iterator[tuple[str, Scope, str, Any]]:
-        """What all scopes name, with the instance before a name that is not the only one."""
+        """Yield the named entries of all scopes with their final names.
+
+        A name that is not unique gets its instance as a prefix.
+        """
         scopes = [self.common, *(scope for _, scope in self.instances.items())]
         count = Counter(
             name.upper() for scope in scopes for name, _ in getattr(scope, kind).items()
@@ -134,7 +143,7 @@ class Flattened:
                 yield (prefix + name if count[name.upper()] > 1 else name), scope, name, value
 
     def names_of_groups(self) -> dict[tuple[str, str], str]:
-        """Names of sets and surfaces by the instance they are of and their own, upper case."""
+        """Return the final names of sets and surfaces by instance and own name, in upper case."""
         return {
             (scope.name.upper(), own.upper()): name
             for kind in ("node_sets", "surfaces")
@@ -142,7 +151,7 @@ class Flattened:
         }
 
     def _rows(self, name: str, scope: Scope, members: Members) -> Indices:
-        """Rows of the nodes of a set; the assembly's own nodes (reference points) have none."""
+        """Return the rows of the nodes of a set, without the assembly's own reference points."""
         rows: list[int] = []
         for instance, numbers in members.items():
             known = self.row.get(instance or scope.name)
@@ -152,7 +161,7 @@ class Flattened:
         return np.unique(np.array(rows, dtype=np.int64))
 
     def _faces(self, scope: Scope, card: Card) -> Blocks:
-        """Facets of an element surface."""
+        """Return the facets of an element surface."""
         by_shape: dict[str, list[list[int]]] = {}
         for place, fields in card.rows:
             named = resolve(place, fields[0], "element_sets", scope, self.instances)
@@ -174,7 +183,7 @@ def _is_node_surface(card: Card) -> bool:
 
 
 def _face(element: Element, number: int, side: str, place: SourceLine) -> list[int]:
-    """Nodes of the face of an element that goes by S1, S2, ..."""
+    """Return the nodes of the face S1, S2, ... of an element."""
     faces = FACES.get(element.shape, ())
     sides = [f"S{face}" for face in range(1, len(faces) + 1)]
     if side not in sides:
@@ -186,25 +195,25 @@ def _face(element: Element, number: int, side: str, place: SourceLine) -> list[i
 
 
 def _loose(element: Element, where: str) -> MeshError:
-    """A facet or an edge that is on no body."""
-    told = f" is {element.advice}" if element.advice else "; allowed: bodies of one kind"
-    return MeshError(f"{element.place}: {element.kind} {where}{told}")
+    """Return the error for a facet or an edge that is on no body."""
+    remedy = f" is {element.advice}" if element.advice else "; allowed: bodies of one kind"
+    return MeshError(f"{element.place}: {element.kind} {where}{remedy}")
 
 
 class FlatFile(Flattened):
-    """A file without parts.
+    """File without parts.
 
-    Where it ``joins``, sets that divide a body between them name it together: in formats that have
-    no set of all of them. ``told`` are lines on that.
+    With ``joins``, sets that divide a body between them name it together, as in formats that have
+    no set of all its elements. ``notes`` are lines about such bodies.
     """
 
     def __init__(self, scope: Scope, joins: bool = False) -> None:
         super().__init__([scope], scope)
         self.top, self.joins = dimension_of(scope), joins
-        self.told: list[str] = []
+        self.notes: list[str] = []
 
     def bodies(self) -> dict[str, Blocks]:
-        """Connected pieces, each by the name of its element set."""
+        """Return the connected pieces, each by the name of its element set."""
         numbers = sorted(
             (n for n, element in self.common.elements.items() if self._level(element) == 0),
             key=lambda number: self.common.elements[number].shape,
@@ -226,7 +235,7 @@ class FlatFile(Flattened):
         return _united(super().node_sets(), edges)
 
     def _check_facets(self, numbers: list[int]) -> None:
-        """Facets and edges are on the bodies: those apart from them would be bodies themselves."""
+        """Raise unless all facets and edges are on bodies; others would be bodies themselves."""
         elements = self.common.elements
         used = {node for number in numbers for node in elements[number].nodes}
         for element in elements.values():
@@ -246,7 +255,7 @@ class FlatFile(Flattened):
                 raise _loose(element, "on no edge of a solid")
 
     def _level(self, element: Element) -> int:
-        """0 for an element of a body, 1 for a facet, 2 for an edge beside solids."""
+        """Return 0 for an element of a body, 1 for a facet, and 2 for an edge on solids."""
         return self.top - DIMENSION[element.shape]
 
     def _members(self, name: str) -> list[int]:
@@ -255,7 +264,7 @@ class FlatFile(Flattened):
         return existing(members, self.common.elements, what)
 
     def _sets_of_level(self, level: int) -> dict[str, Blocks]:
-        """Element sets all of whose elements are of a level."""
+        """Return the element sets whose elements are all of one level."""
         sets = {}
         for name, _ in self.common.element_sets.items():
             numbers = self._members(name)
@@ -264,9 +273,10 @@ class FlatFile(Flattened):
         return sets
 
     def _piece_names(self, piece_of: dict[int, int]) -> dict[int, str]:
-        """The element set that is just one piece; sets that divide one between them are refused.
+        """Return the name of the element set that is exactly one piece, by number of the piece.
 
-        Sets that the user has named come before those of ``*Element`` lines.
+        Sets that divide a piece between them are refused or joined. Sets that the user has named
+        take precedence over those of ``*Element`` lines.
         """
         size = Counter(piece_of.values())
         names: dict[int, str] = {}
@@ -286,7 +296,7 @@ class FlatFile(Flattened):
             if piece not in names and len(set().union(*divided.values())) == size[piece]:
                 if self.joins:
                     names[piece] = "+".join(divided)
-                    self.told.append(
+                    self.notes.append(
                         f"{self.common.place.path.name}: {', '.join(divided)} share nodes: one "
                         f"body {names[piece]}, of one material"
                     )

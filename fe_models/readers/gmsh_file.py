@@ -1,4 +1,4 @@
-"""Gmsh's meshes, from a ``.msh`` file or just generated: groups of entities become named groups."""
+"""Meshes of gmsh, from a ``.msh`` file or just generated, with entity groups as named groups."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from fe_models.readers.grouped import (
 from fe_models.readers.text_files import unmarked
 from sa_solver.types import Array, Indices
 
-# First word of gmsh's name of an element and the shape it is; corner nodes come first in all.
+# Shape of an element by the first word of its name in gmsh; corner nodes come first in all.
 SHAPES = {
     "Point": "vertex", "Line": "line", "Triangle": "triangle", "Quadrilateral": "quad",
     "Tetrahedron": "tetra", "Pyramid": "pyramid", "Prism": "wedge", "Hexahedron": "hexahedron",
@@ -30,7 +30,7 @@ SHAPES = {
 
 @dataclass(frozen=True)
 class EntityGroup:
-    """A named group of entities of one dimension."""
+    """Named group of entities of one dimension."""
 
     name: str
     dimension: int
@@ -40,20 +40,21 @@ class EntityGroup:
 def read_msh(path: Path) -> GroupedMesh:
     """Read a gmsh file (2.2 or 4.1, text or binary).
 
-    Physical volumes are bodies, physical surfaces their boundaries, lower groups node sets; in a
-    plane mesh surfaces and curves. A group without a name goes by its number, and in a file without
-    physical groups every entity does. Raises :class:`MeshError`.
+    Physical volumes are bodies, physical surfaces their boundaries, and physical curves and points
+    node sets; in a plane mesh surfaces are bodies and curves boundaries. A group without a name is
+    named by its number, and in a file without physical groups every entity is a group named by its
+    number. Raises :class:`MeshError`.
     """
     with unmarked(path) as plain, gmsh_model(path.stem) as gmsh:
         with plain.open("rb") as file:
-            # Anything else would be run as a script in gmsh's own language.
+            # gmsh would run any other file as a script in its own language.
             if file.read(1) != b"$":
                 raise MeshError(
-                    f"{path}: is no gmsh mesh; allowed: .msh files of format 2.2 or 4.1"
+                    f"{path}: is not a gmsh mesh; allowed: .msh files of format 2.2 or 4.1"
                 )
         try:
             gmsh.merge(str(plain))
-        except Exception as error:  # gmsh raises nothing more specific
+        except Exception as error:  # gmsh raises no more specific exception.
             raise MeshError(f"{path}: gmsh cannot read it: {first_line(error)}") from None
         try:
             return grouped_entities(gmsh, _groups(gmsh.model))
@@ -62,7 +63,10 @@ def read_msh(path: Path) -> GroupedMesh:
 
 
 def grouped_entities(gmsh: Any, groups: list[EntityGroup]) -> GroupedMesh:
-    """The mesh of the open gmsh model; ``groups`` of its highest dimension are the bodies."""
+    """Return the mesh of the open gmsh model.
+
+    ``groups`` of its highest dimension are the bodies.
+    """
     model = gmsh.model
     tags, coordinates, _ = model.mesh.getNodes()
     numbers = np.asarray(tags, dtype=np.int64)
@@ -73,7 +77,7 @@ def grouped_entities(gmsh: Any, groups: list[EntityGroup]) -> GroupedMesh:
     _refuse_ungrouped(model, top, groups)
     named: list[dict[str, Blocks]] = [{}, {}, {}, {}]
     points, second = np.asarray(coordinates).reshape(-1, 3)[order], []
-    every: dict[str, Indices] = {}
+    node_sets: dict[str, Indices] = {}
     for group in groups:
         if group.name in named[group.dimension]:
             raise MeshError(
@@ -87,13 +91,13 @@ def grouped_entities(gmsh: Any, groups: list[EntityGroup]) -> GroupedMesh:
         if group.dimension == top:
             second += blocks
         if blocks and group.dimension < top - 1:
-            every[group.name] = nodes_of(blocks)
+            node_sets[group.name] = nodes_of(blocks)
     return GroupedMesh(
         points=points,
         numbers=numbers[order],
         bodies=named[top],
         surfaces=named[top - 1] if top > 0 else {},
-        node_sets=every,
+        node_sets=node_sets,
         midsides=midsides_of(points, second),
     )
 
@@ -101,9 +105,10 @@ def grouped_entities(gmsh: Any, groups: list[EntityGroup]) -> GroupedMesh:
 def generated_body(
     gmsh: Any, body: EntityGroup, boundaries: list[EntityGroup]
 ) -> tuple[Array, Indices, dict[str, Indices]]:
-    """A body just meshed in the open gmsh model: points ``(n, 3)``, simplices, boundaries by name.
+    """Return a body that was just meshed in the open gmsh model.
 
-    Its nodes are numbered from zero, in gmsh's order; others are left out.
+    The result is its points ``(n, 3)``, simplices, and boundaries by name. Nodes are numbered from
+    zero in gmsh's order; unused nodes are left out.
     """
     grouped = grouped_entities(gmsh, [body, *boundaries])
     cells = split_blocks(grouped.bodies[body.name])
@@ -116,7 +121,7 @@ def generated_body(
 
 
 def _groups(model: Any) -> list[EntityGroup]:
-    """The physical groups; without any, every entity by its number."""
+    """Return the physical groups, or every entity named by its number if there are none."""
     physical = [
         EntityGroup(
             model.getPhysicalName(dim, tag) or str(tag),
@@ -131,7 +136,7 @@ def _groups(model: Any) -> list[EntityGroup]:
 
 
 def _refuse_ungrouped(model: Any, top: int, groups: list[EntityGroup]) -> None:
-    """No element of the highest dimension is left out."""
+    """Raise :class:`MeshError` if an element of the highest dimension is in no group."""
     grouped = {tag for group in groups if group.dimension == top for tag in group.entities}
     for dim, tag in model.getEntities(top):
         if tag not in grouped and len(model.mesh.getElements(dim, tag)[0]):
@@ -142,7 +147,7 @@ def _refuse_ungrouped(model: Any, top: int, groups: list[EntityGroup]) -> None:
 
 
 def _blocks(model: Any, group: EntityGroup, numbers: Indices) -> Blocks:
-    """Elements of a group with all their nodes, which are rows of the sorted ``numbers``."""
+    """Return the elements of a group with all their nodes, as rows of the sorted ``numbers``."""
     blocks = []
     for entity in group.entities:
         types, _, nodes = model.mesh.getElements(group.dimension, entity)
@@ -159,5 +164,5 @@ def _blocks(model: Any, group: EntityGroup, numbers: Indices) -> Blocks:
 
 
 def first_line(error: Exception) -> str:
-    """The first line of a message."""
+    """Return the first line of an error's message."""
     return (str(error).splitlines() or [type(error).__name__])[0]

@@ -1,7 +1,7 @@
-"""A mesh as a file gives it: nodes, elements of any shape, and their named groups.
+"""Mesh as given in a file: nodes, elements of any shape, and their named groups.
 
-The elements of a shape are split into triangles or tetrahedra so that neighbours agree on the
-diagonals of the quadrilaterals between them, whatever they are split from.
+Elements are split into triangles or tetrahedra in such a way that neighbours of any shape agree on
+the diagonals of the quadrilaterals between them.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from fe_models.readers.length_unit import LengthUnit
 from fe_models.readers.scene import Scene
 from sa_solver.types import Array, Indices
 
-# Corner nodes of every shape that is read, and its dimension.
+# Number of corner nodes of every shape that is read, and its dimension.
 CORNERS = {
     "vertex": 1, "line": 2, "triangle": 3, "quad": 4, "tetra": 4, "pyramid": 5, "wedge": 6,
     "hexahedron": 8,
@@ -44,7 +44,8 @@ FACES: dict[str, tuple[tuple[int, ...], ...]] = {
 
 HEXAHEDRON_DIAGONALS = ((0, 6), (1, 7), (2, 4), (3, 5))
 
-# Midside nodes are this share of their edge off its middle at most; a quarter where cracks begin.
+# Largest distance of a midside node from the middle of its edge, as a share of the edge. At crack
+# tips it is a quarter.
 MIDDLE = 0.3
 
 # Elements of one shape and their corner nodes ``(m, corners)``, as rows of the file's points.
@@ -53,13 +54,24 @@ Blocks = list[tuple[str, Indices]]
 
 @dataclass(frozen=True)
 class GroupedMesh:
-    """Nodes and named groups of a file; nothing of it is checked.
+    """Nodes and named groups of a file, without any checks.
 
-    ``points`` ``(n, 3)`` [mm], from a reader in ``unit``, which is the file's, and ``numbers``
-    ``(n,)``, the file's own node numbers; per name the elements of a body, the facets of a surface
-    and the rows of a node set. ``midsides`` are the points in the middle of edges that elements of
-    second order have, ``left`` lines of the file that say more than a mesh and are not taken over,
-    ``scene`` what a case could have of them.
+    Attributes
+    ----------
+    points
+        Nodes ``(n, 3)`` [mm]; a reader gives them in ``unit``.
+    numbers
+        The file's own node numbers ``(n,)``.
+    bodies, surfaces, node_sets
+        Elements of each body, facets of each surface, and rows of each node set, by name.
+    midsides
+        Points in the middle of edges, if there are elements of second order.
+    left
+        Lines of the file that describe more than a mesh and are not imported.
+    scene
+        Materials, contacts, supports and loads of the file.
+    unit
+        Unit of length of the file.
     """
 
     points: Array
@@ -73,7 +85,7 @@ class GroupedMesh:
     unit: LengthUnit = field(default_factory=LengthUnit)
 
     def in_millimetres(self) -> GroupedMesh:
-        """Return a mesh with lengths in its ``unit`` in mm, and what it says in N, mm and t."""
+        """Return the mesh with lengths in mm, and its scene in N, mm and t."""
         size, midsides = self.unit.size, self.midsides
         if size == 1.0:
             return self
@@ -84,19 +96,20 @@ class GroupedMesh:
 
 
 def midsides_of(points: Array, blocks: Iterable[tuple[str, Indices]]) -> Midsides | None:
-    """Midsides of elements ``(m, nodes)`` of second order by shape; None where all are of first.
+    """Return the midside points of elements ``(m, nodes)`` of second order, by shape.
 
-    Programs list midside nodes in different orders, all elements of a shape alike: they are given
-    to the edges whose middles they are nearest to. Quadrilaterals have one in their middle too,
-    on both diagonals, since they are split along one: where the eight nodes of their edges put it;
-    hexahedra have one in their middle.
+    Programs list midside nodes in different orders, but in the same order for all elements of a
+    shape. They are assigned to the edges with the closest middles. Quadrilaterals also have a point
+    in their middle, on both diagonals, since they are split along one of them; its position follows
+    from the eight nodes of their edges. Hexahedra also have one in their centre. The result is None
+    if all elements are of first order.
     """
     edges, middles, rows = [], [], []
     for shape, cells in blocks:
         corners, pairs = CORNERS[shape], edges_of_shape(shape)
         if cells.shape[1] < corners + len(pairs) or not len(pairs):
             continue
-        # Takes a tenth of a second to load: where it is used.
+        # The import takes a tenth of a second, so it is done only where it is needed.
         from scipy.optimize import linear_sum_assignment
 
         chords = 0.5 * (points[cells[:, pairs[:, 0]]] + points[cells[:, pairs[:, 1]]])
@@ -118,7 +131,7 @@ def midsides_of(points: Array, blocks: Iterable[tuple[str, Indices]]) -> Midside
             diagonals = (face[0::2], face[1::2])
             inner += [(diagonal, middle) for diagonal in diagonals]
         if shape == "hexahedron":
-            # One of its diagonals is an edge of the tetrahedra it is split into.
+            # One of its diagonals is an edge of the tetrahedra that it is split into.
             centre = 0.25 * (given.sum(axis=1) - points[cells[:, :corners]].sum(axis=1))
             inner += [(diagonal, centre) for diagonal in HEXAHEDRON_DIAGONALS]
         for diagonal, middle in inner:
@@ -131,14 +144,14 @@ def midsides_of(points: Array, blocks: Iterable[tuple[str, Indices]]) -> Midside
 
 
 def edges_of_shape(shape: str) -> Indices:
-    """Corners of the edges of a shape, ``(k, 2)``."""
+    """Return the corners of the edges of a shape, ``(k, 2)``."""
     rings = FACES[shape] if DIMENSION[shape] > 1 else ((0, 1),) * (shape == "line")
     pairs = {tuple(sorted(pair)) for ring in rings for pair in pairwise([*ring, ring[0]])}
     return np.array(sorted(pairs), dtype=np.int64).reshape(-1, 2)
 
 
 def _quadrilaterals(shape: str) -> list[tuple[int, ...]]:
-    """Corners of the faces of a solid that have four, or those of a plane shape that has."""
+    """Return the quadrilateral faces of a solid shape, or of a plane shape itself."""
     faces = FACES[shape] if DIMENSION[shape] == 3 else (tuple(range(CORNERS[shape])),)
     return [face for face in faces if len(face) == 4]
 
@@ -146,10 +159,10 @@ def _quadrilaterals(shape: str) -> list[tuple[int, ...]]:
 def simplices(shape: str, cells: Indices) -> Indices:
     """Split elements of a shape ``(m, corners)`` into lines, triangles or tetrahedra.
 
-    Every quadrilateral is cut by the diagonal from its lowest node, so that the two elements beside
-    it agree, and every element is a fan of tetrahedra round its lowest node: 2 in a pyramid, 3 in a
-    wedge, 6 in a hexahedron (Dompierre, Labbé, Vallet and Camarero, 8th International Meshing
-    Roundtable, 1999).
+    Every quadrilateral is cut by the diagonal from its lowest node, so that the two elements that
+    share it agree, and every element is a fan of tetrahedra around its lowest node: 2 in a pyramid,
+    3 in a wedge, 6 in a hexahedron (Dompierre, Labbé, Vallet and Camarero, 8th International
+    Meshing Roundtable, 1999).
     """
     if shape == "quad":
         return _halved(cells)
@@ -162,24 +175,24 @@ def simplices(shape: str, cells: Indices) -> Indices:
 
 
 def split_blocks(blocks: Blocks) -> Indices:
-    """The elements of all blocks, each split by :func:`simplices`."""
+    """Return the elements of all blocks, each split by :func:`simplices`."""
     return np.concatenate([simplices(shape, cells) for shape, cells in blocks])
 
 
 def nodes_of(blocks: Blocks) -> Indices:
-    """Nodes of the elements of all blocks, sorted, each once."""
+    """Return the nodes of the elements of all blocks, sorted, each once."""
     return np.unique(np.concatenate([cells.ravel() for _, cells in blocks]))
 
 
 def _halved(quads: Indices) -> Indices:
-    """Two triangles of each quadrilateral, beside the diagonal from its lowest node."""
+    """Return two triangles of each quadrilateral, split by the diagonal from its lowest node."""
     cyclic = (np.argmin(quads, axis=1)[:, None] + np.arange(4)) % 4
     quads = np.take_along_axis(quads, cyclic, axis=1)
     return np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
 
 
 def _fan(shape: str, cells: Indices, apex: int) -> Indices:
-    """Tetrahedra from the corner ``apex`` to all faces that do not touch it."""
+    """Return the tetrahedra from the corner ``apex`` to all faces that do not touch it."""
     fan = []
     for face in FACES[shape]:
         if apex not in face:
@@ -190,16 +203,17 @@ def _fan(shape: str, cells: Indices, apex: int) -> Indices:
 
 
 def pieces(blocks: Blocks) -> list[Indices]:
-    """Number of the piece that each element of each block belongs to, ``(m,)`` per block.
+    """Return the number of the piece that each element belongs to, ``(m,)`` per block.
 
-    Elements that share a node are in one piece; pieces are numbered as the blocks name them first.
+    Elements that share a node are in one piece; pieces are numbered in the order of their first
+    elements.
     """
-    # Sparse matrices take a fifth of a second to load: where they are used.
+    # The import takes a fifth of a second, so it is done only where it is needed.
     import scipy.sparse as sp
     from scipy.sparse.csgraph import connected_components
 
     count = 1 + max(int(cells.max()) for _, cells in blocks)
-    # Every element's corners with its first.
+    # Link every corner of an element with its first one.
     links = np.concatenate([cells[:, [0, k]] for _, cells in blocks for k in range(cells.shape[1])])
     graph = sp.coo_matrix((np.ones(len(links)), links.T), shape=(count, count))
     _, label = connected_components(graph, directed=False)
@@ -210,7 +224,7 @@ def pieces(blocks: Blocks) -> list[Indices]:
 
 
 def piece_blocks(blocks: Blocks) -> list[Blocks]:
-    """The elements of each piece: see :func:`pieces`."""
+    """Return the elements of each piece, as numbered by :func:`pieces`."""
     labels = pieces(blocks)
     return [
         [

@@ -1,10 +1,10 @@
-"""The unit of length of a mesh file."""
+"""Unit of length of a mesh file."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
-# Units of length by their size in mm, and forces in N that go with them in a consistent system.
+# Size of the units of length in mm, and the forces in N that belong to them in a consistent system.
 SIZES = {"mm": 1.0, "um": 1e-3, "cm": 10.0, "m": 1000.0, "in": 25.4, "ft": 304.8}
 POUND_FORCE = 4.4482216152605
 FORCES = dict.fromkeys(SIZES, 1.0) | dict.fromkeys(("in", "ft"), POUND_FORCE)
@@ -12,9 +12,9 @@ FORCES = dict.fromkeys(SIZES, 1.0) | dict.fromkeys(("in", "ft"), POUND_FORCE)
 
 @dataclass(frozen=True)
 class LengthUnit:
-    """A unit of length: its ``name``, its ``size`` in mm, and why it is that one, in words.
+    """Unit of length: its ``name``, its ``size`` in mm, and in words where it comes from.
 
-    There is no ``source`` where nothing says it.
+    ``source`` is empty if the file states no unit.
 
     Examples
     --------
@@ -36,5 +36,5 @@ class LengthUnit:
 
     @property
     def force(self) -> float:
-        """Size in N of the unit of force that forces of the file are taken to have."""
+        """Size in N of the unit of force that forces of the file are assumed to have."""
         return FORCES.get(self.name, 1.0)

@@ -23,9 +23,9 @@ from fe_models.readers.grouped import (
 from fe_models.readers.text_files import unmarked
 from sa_solver.types import Indices
 
-# Cell data that number groups, by the format they come from; taken before any other integers.
+# Cell data that number groups in different formats, used before any other integer data.
 TAG_FIELDS = ("gmsh:physical", "medit:ref", "cell_tags", "nastran:ref", "tetgen:ref", "su2:tag")
-# Of these the number 0 means no group.
+# Cell data in which the number 0 means no group.
 ZERO_IS_NO_GROUP = ("gmsh:physical", "cell_tags")
 
 # Names of the groups that each element of a block is in, and its rows.
@@ -35,9 +35,9 @@ CellGroups = dict[str, Indices]
 def read_meshio(path: Path) -> GroupedMesh:
     """Read a mesh through meshio.
 
-    Groups are the file's cell sets, or the values of one field of integers on its cells, by their
-    names or else as ``1``, ``2``, ...; without either the connected pieces are bodies ``body_1``,
-    ... with no boundaries. Nodes are numbered from zero as they stand in the file. Raises
+    Groups are the file's cell sets, or the values of one integer field on its cells, by their names
+    or else as ``1``, ``2``, .... Without either, the connected pieces are bodies ``body_1``, ...
+    without boundaries. Nodes are numbered from zero in the order of the file. Raises
     :class:`MeshError`.
     """
     mesh = _read(path)
@@ -74,16 +74,16 @@ def read_meshio(path: Path) -> GroupedMesh:
 
 
 def _read(path: Path) -> Any:
-    """The file as meshio sees it; what meshio says meanwhile becomes the error or a warning."""
+    """Return meshio's mesh of the file; meshio's output becomes the error or a warning."""
     import meshio
 
-    for kind in ("wedge15", "pyramid13"):  # which it has readers for, but no dimension
+    for kind in ("wedge15", "pyramid13"):  # meshio reads these but lacks their dimension.
         meshio._mesh.topological_dimension.setdefault(kind, 3)
     output = io.StringIO()
     try:
         with redirect_stdout(output), redirect_stderr(output), unmarked(path) as plain:
             mesh = meshio.read(plain)
-    # Its readers let anything through, and its dispatch ends the process.
+    # Its readers raise any exception, and its dispatch exits.
     except (Exception, SystemExit) as error:
         reason = output.getvalue() if isinstance(error, SystemExit) else str(error)
         reason = " ".join(reason.split()) or type(error).__name__
@@ -94,7 +94,7 @@ def _read(path: Path) -> Any:
 
 
 def _shape(path: Path, kind: str) -> str:
-    """The shape of meshio's kind of element, whose corners come first in all it has."""
+    """Return the shape of meshio's element type; corners come first in all types."""
     match = re.fullmatch(r"([a-z]+)\d*", kind)
     if match is None or match[1] not in CORNERS:
         raise MeshError(f"{path}: has elements {kind}; allowed: {', '.join(CORNERS)}")
@@ -102,7 +102,7 @@ def _shape(path: Path, kind: str) -> str:
 
 
 def _members(path: Path, mesh: Any, dimensions: list[int]) -> list[CellGroups]:
-    """The groups of every block of cells."""
+    """Return the groups of every block of cells."""
     sets = {name: rows for name, rows in mesh.cell_sets.items() if not name.startswith("gmsh:")}
     if sets:
         return [
@@ -131,7 +131,7 @@ def _members(path: Path, mesh: Any, dimensions: list[int]) -> list[CellGroups]:
 
 
 def _tag_field(path: Path, mesh: Any) -> str | None:
-    """The cell data that number the groups."""
+    """Return the name of the cell data that number the groups."""
     integers = [
         name
         for name, data in mesh.cell_data.items()
@@ -147,7 +147,7 @@ def _tag_field(path: Path, mesh: Any) -> str | None:
 
 
 def _names(mesh: Any, tag: int, dimension: int) -> list[str]:
-    """Names of a group: a MED family has several, other formats one or a number."""
+    """Return the names of a group: a MED family has several, other formats one or a number."""
     families = getattr(mesh, "cell_tags", {})
     if tag in families:
         return list(families[tag])
@@ -156,20 +156,23 @@ def _names(mesh: Any, tag: int, dimension: int) -> list[str]:
 
 
 def _refuse_ungrouped(path: Path, count: int, groups: CellGroups) -> None:
-    """All elements of a body's block are in a group."""
+    """Raise :class:`MeshError` if an element in a block of a body is in no group."""
     left = count - len(np.unique(np.concatenate(list(groups.values()))))
     if left:
         raise MeshError(f"{path}: {left} elements are in no group; put them into one")
 
 
 def _refuse_missing(path: Path, count: int, nodes: list[Indices]) -> None:
-    """All nodes that are named are among the file's ``count``."""
+    """Raise :class:`MeshError` if a node that is used is not among the file's ``count`` nodes."""
     if any(some.size and not 0 <= some.min() <= some.max() < count for some in nodes):
-        raise MeshError(f"{path}: has elements or sets of nodes that are not in it: damaged?")
+        raise MeshError(
+            f"{path}: has elements or sets of nodes that are not in it; it may be damaged, export "
+            "it again"
+        )
 
 
 def _node_sets(mesh: Any, lower: list[dict[str, Blocks]]) -> dict[str, Indices]:
-    """The file's point sets and the nodes of groups below the boundaries."""
+    """Return the file's point sets and the nodes of groups below the boundaries."""
     sets: dict[str, list[Indices]] = {}
     for groups in lower:
         for name, blocks in groups.items():

@@ -1,7 +1,7 @@
-"""Files of other programs are read in a process of their own.
+"""Reading of files in a separate process.
 
-A damaged one can end the process that reads it: gmsh and OpenCASCADE follow what a file says. The
-process ends with whoever started it, and leaves Ctrl-C to it.
+A damaged file can crash the process that reads it, because gmsh and OpenCASCADE trust its content.
+The separate process ends when the process that started it ends, and ignores Ctrl-C.
 """
 
 from __future__ import annotations
@@ -23,43 +23,46 @@ from fe_models.meshes.structure_mesh import MeshError
 from fe_models.readers.grouped import GroupedMesh
 
 COMMAND = "from fe_models.readers.reader_process import main; main()"
-# Exit code of a process that got signal 9, as the system sends it where memory runs out.
+# Exit code after signal 9, which the system sends if memory runs out.
 KILLED = -9
-# Processor time of reading a shape [s], and of each megabyte of it: ten times what it takes.
+# Limit of the processor time for reading a shape [s], and per megabyte: ten times the usual time.
 LONGEST_READ, LONGEST_READ_OF_A_MB = 20.0, 50.0
-# Letters of what a library says of a file that it cannot read.
+# Number of characters shown of a library's error message.
 LONGEST = 160
 
 
 @contextmanager
 def reading(path: Path) -> Iterator[None]:
-    """Turn whatever reading a file raises into a :class:`MeshError` of one line with its name.
+    """Turn any error in reading a file into a :class:`MeshError` of one line with its name.
 
-    Damage ends in a dozen ways: numbers that are none, arrays that do not fit, names in no code.
+    Damaged files raise many kinds of errors, such as for invalid numbers, arrays that do not fit,
+    or names in an unknown encoding.
     """
     try:
         yield
     except MeshError:
         raise
     except MemoryError as error:
-        raise MeshError(f"{path}: needs more memory than there is: damaged?") from error
+        raise MeshError(f"{path}: needs more memory than is available: is it damaged?") from error
     except UnicodeDecodeError as error:
         raise MeshError(
-            f"{path}: has names that are not in UTF-8: damaged? otherwise save it as UTF-8, or "
-            "export it again with names of plain letters"
+            f"{path}: has names that are not in UTF-8: is it damaged? Otherwise save it as UTF-8, "
+            "or export it again with names of plain letters"
         ) from error
     except Exception as error:
-        said = " ".join(str(error).split())[:LONGEST]
-        why = f"{type(error).__name__}{f': {said}' * bool(said)}"
-        raise MeshError(f"{path}: cannot be read ({why}): damaged? export it again") from error
+        message = " ".join(str(error).split())[:LONGEST]
+        why = f"{type(error).__name__}{f': {message}' * bool(message)}"
+        raise MeshError(
+            f"{path}: cannot be read ({why}): it may be damaged; export it again"
+        ) from error
 
 
 def read_apart(read: Callable[..., GroupedMesh], path: Path, *arguments: Any) -> GroupedMesh:
-    """Return what ``read`` makes of a file and of the ``arguments`` behind it, in another process.
+    """Return the mesh that ``read`` returns for a file and further ``arguments``, in a new process.
 
-    Raises :class:`MeshError` where it raises anything, or the process dies of the file.
+    Raises :class:`MeshError` if it raises anything, or if the file crashes the process.
     """
-    # Its stdin stays open as long as this process lives; what it says besides is no answer.
+    # Its stdin stays open as long as this process lives. Its other output is discarded.
     with subprocess.Popen(
         fresh_python(COMMAND),
         bufsize=0,
@@ -89,9 +92,9 @@ def read_apart(read: Callable[..., GroupedMesh], path: Path, *arguments: Any) ->
 
 @contextmanager
 def cpu_limited(path: Path) -> Iterator[None]:
-    """End the process where a file takes far more of its processor time than files of its size do.
+    """End the process if a file takes far more processor time than its size warrants.
 
-    Damage may send a library round in circles. Only POSIX systems have such a limit.
+    A damaged file may send a library into an endless loop. Only POSIX systems have such a limit.
     """
     try:
         import resource
@@ -111,16 +114,16 @@ def cpu_limited(path: Path) -> Iterator[None]:
 
 
 def _ending(code: int) -> str:
-    """What became of a process that has given no answer."""
+    """Return why a process has ended without an answer."""
     if code == KILLED:
-        return "the process that read it was killed: for its memory?"
+        return "the process that read it was killed, perhaps because memory ran out"
     how = signal.strsignal(-code) if code < 0 else f"exit code {code}"
-    return f"gmsh broke down as it read it ({how}): damaged? repair it, or export it again"
+    return f"gmsh crashed as it read it ({how}): it may be damaged; repair it, or export it again"
 
 
 def main() -> None:
-    """Read the file that stdin names, and write what was read, or raised, to stdout."""
-    # Whatever a library prints is no part of the answer.
+    """Read the file that stdin names, and write the mesh or the error to stdout."""
+    # Redirect what libraries print, so that it does not mix with the answer.
     answer = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)
     read, path, arguments = pickle.load(sys.stdin.buffer)
@@ -136,6 +139,6 @@ def main() -> None:
 
 
 def _end_with_parent() -> None:
-    """End when the other end of stdin closes: nothing more is written to it."""
+    """End this process when the other end of stdin closes; nothing more is ever written to it."""
     os.read(0, 1)
     os._exit(1)

@@ -1,4 +1,4 @@
-"""What a file of another program says besides its mesh, as far as a case can say it too."""
+"""Materials, contacts, supports and loads in files of other programs, as far as a case has them."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ Vector = tuple[float, float, float]
 
 @dataclass(frozen=True)
 class SaidContact:
-    """Two faces that touch, and friction between them if the file gives any."""
+    """Two faces in contact, with friction if the file gives any."""
 
     faces: tuple[str, str]
     friction: float | None
@@ -20,7 +20,7 @@ class SaidContact:
 
 @dataclass(frozen=True)
 class SaidSupport:
-    """A group whose displacements are held along the axes of the file, such as ``xz``."""
+    """Group whose displacements are held along axes of the file, such as ``xz``."""
 
     group: str
     axes: str
@@ -29,11 +29,23 @@ class SaidSupport:
 
 @dataclass(frozen=True)
 class SaidLoad:
-    """A load on a group, or on the mass of all bodies, and its factors at the ends of the steps.
+    """Load on a group, or on the mass of all bodies, with its factors at the ends of the steps.
 
-    ``kind`` is that of a case's load. ``value`` is a pressure [MPa], or a vector along the axes of
-    the file: a force or, as a ``traction``, a force per area; a displacement, an acceleration; of a
-    rotation it is the axis times the speed, ``through`` a point.
+    Attributes
+    ----------
+    kind
+        Kind of the load in a case.
+    group
+        Name of the group; empty for loads on the mass.
+    value
+        A pressure [MPa], or a vector along the axes of the file: a force, a force per area
+        (``traction``), a displacement, an acceleration, or for a rotation the axis times the speed.
+    path
+        Factors at the end of every step.
+    line
+        Line of the file.
+    through
+        Point on the axis of a rotation.
     """
 
     kind: str
@@ -46,11 +58,18 @@ class SaidLoad:
 
 @dataclass(frozen=True)
 class Scene:
-    """Materials by body, contacts, supports and loads of a file, and lines that are neither.
+    """Materials by body, contacts, supports and loads of a file, and lines that are ignored.
 
-    ``materials`` have ``young`` and ``poisson``, and ``density`` and ``expansion`` where these are
-    given, as the file has them, and the line of each. ``steps`` is how many the file goes through;
-    ``ignored`` are lines with why a case does not have them.
+    Attributes
+    ----------
+    materials
+        ``young`` and ``poisson`` of each body, and ``density`` and ``expansion`` if they are given.
+    contacts, supports, loads
+        As given in the file.
+    steps
+        Number of steps in the file.
+    ignored
+        Lines that are ignored, each with the reason.
     """
 
     materials: dict[str, dict[str, float]] = field(default_factory=dict)
@@ -61,7 +80,7 @@ class Scene:
     ignored: tuple[str, ...] = ()
 
     def converted(self, length: float, force: float) -> Scene:
-        """Return it in N, mm and t, where it is in units of that ``length`` [mm] and ``force`` [N].
+        """Return the scene in N, mm, t and s, from units of ``length`` [mm] and ``force`` [N].
 
         Times are in s.
         """
@@ -90,4 +109,4 @@ def _times(factor: float, vector: Vector) -> Vector:
 
 
 class NotTakenError(InputError):
-    """Why a line of a file is ignored."""
+    """Reason for which a line of a file is ignored."""

@@ -1,4 +1,4 @@
-"""What a mesh file defines, by its numbers and names: nodes, elements, sets and surfaces."""
+"""Definitions in a mesh file, by numbers and names: nodes, elements, sets and surfaces."""
 
 from __future__ import annotations
 
@@ -12,14 +12,17 @@ from fe_models.meshes.structure_mesh import MeshError
 from fe_models.readers.abaqus.cards import Card, SourceLine
 from sa_solver.types import Array
 
-# Numbers of nodes or elements, or ranges of which those that exist are meant, by the instance they
-# belong to; those of the scope itself are under "".
+# Numbers of nodes or elements, by the instance that they belong to; those of the scope itself are
+# under "". A range stands for those of its numbers that exist.
 Members = dict[str, list[int | range]]
 _Value = TypeVar("_Value")
 
 
 class Names(Generic[_Value]):
-    """Values by name. Abaqus reads upper and lower case alike; the first spelling is kept."""
+    """Values by name, where upper and lower case are the same, as in Abaqus.
+
+    The first spelling is kept.
+    """
 
     def __init__(self) -> None:
         self._entries: dict[str, tuple[str, _Value]] = {}
@@ -37,7 +40,7 @@ class Names(Generic[_Value]):
         return ", ".join(name for name, _ in self.items())
 
     def add(self, name: str, value: _Value) -> _Value:
-        """Keep the value unless the name has one; return the one kept."""
+        """Store the value unless the name has one, and return the stored value."""
         return self._entries.setdefault(name.upper(), (name, value))[1]
 
     def items(self) -> Iterator[tuple[str, _Value]]:
@@ -46,10 +49,24 @@ class Names(Generic[_Value]):
 
 @dataclass(frozen=True)
 class Element:
-    """Shape, corner nodes, nodes on its edges, of second order, place and type of an element.
+    """Element of a mesh file.
 
-    One whose ``stands_alone`` is false is a facet or an edge of a body, and none itself; ``advice``
-    says what it is and what to do where it is taken for neither.
+    Attributes
+    ----------
+    shape
+        Name of its shape.
+    nodes
+        Corner nodes.
+    midsides
+        Midside nodes of elements of second order.
+    place
+        Line that defines it.
+    kind
+        Type in the file.
+    stands_alone
+        Whether it is an element of a body, and not a facet or an edge of one.
+    advice
+        What it is and what to do if it is neither of a body nor on one.
     """
 
     shape: str
@@ -63,10 +80,10 @@ class Element:
 
 @dataclass
 class Scope:
-    """A part, an instance, the assembly, or a flat file: nodes, elements, sets and surfaces.
+    """Part, instance, assembly or flat file, with its nodes, elements, sets and surfaces.
 
-    ``blocks`` are the element sets named on an ``*Element`` line only, as programs name them;
-    ``placing`` takes points ``(n, 3)`` to where an instance has them.
+    ``blocks`` are the element sets that are named only on ``*Element`` lines, as programs name
+    them. ``placing`` maps points ``(n, 3)`` to their positions in an instance.
     """
 
     name: str
@@ -80,7 +97,7 @@ class Scope:
     placing: Callable[[Array], Array] = lambda points: points
 
     def instance(self, name: str, place: SourceLine, placing: Callable[[Array], Array]) -> Scope:
-        """An instance of this part."""
+        """Return an instance of this part."""
         return Scope(
             name=name,
             place=place,
@@ -93,7 +110,7 @@ class Scope:
         )
 
     def is_empty(self) -> bool:
-        """Whether nothing is defined in it."""
+        """Return whether nothing is defined in it."""
         return not (
             self.nodes or self.elements or self.node_sets or self.element_sets or self.surfaces
         )
@@ -102,7 +119,7 @@ class Scope:
 def resolve(
     place: SourceLine, text: str, kind: str, scope: Scope, instances: Names[Scope]
 ) -> Members:
-    """What a data line means by a number, the name of a set, or ``Instance.`` and either.
+    """Return the members that a data line names by number, set name, or ``Instance.`` and either.
 
     ``kind`` is ``node_sets`` or ``element_sets``.
     """
@@ -112,7 +129,7 @@ def resolve(
     sets: Names[Members] = getattr(scope, kind)
     if text in sets:
         return sets[text]
-    # Names may have dots in them, too.
+    # Names may themselves contain dots.
     for dot in (match.start() for match in re.finditer(r"\.", text)):
         if text[:dot] in instances:
             inner = instances[text[:dot]]
@@ -131,7 +148,10 @@ def extend(members: Members, more: Members) -> None:
 
 
 def existing(members: list[int | range], known: Collection[int], what: str) -> list[int]:
-    """All numbers meant, of ranges those that exist; raises if any other does not."""
+    """Return all numbers of ``members``, and of ranges those in ``known``.
+
+    Raises :class:`MeshError` if a single number is not in ``known``.
+    """
     numbers: list[int] = []
     for member in members:
         if isinstance(member, range):

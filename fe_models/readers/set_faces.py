@@ -1,4 +1,4 @@
-"""Node sets that are faces: CAE programs name surfaces by their nodes."""
+"""Node sets that are faces, since CAE programs often name surfaces by their nodes."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from sa_solver.types import Indices
 
 
 def facets_within(body: Body, vertices: Indices) -> Indices:
-    """Facets of the surface of a body all of whose corners are among the vertices."""
+    """Return the facets of the surface of a body whose corners are all among the vertices."""
     surface = body.mesh.boundary_facets()
     return np.asarray(surface[np.isin(body.mesh.facets[:, surface], vertices).all(axis=0)])
 
 
 def faces_of_sets(body: Body, node_sets: Mapping[str, Indices]) -> dict[str, Indices]:
-    """Facets of those node sets that are faces: each of their nodes is a corner of one."""
+    """Return the facets of those node sets that are faces: each node is a corner of a facet."""
     known = body.mesh.boundaries or {}
     faces = {}
     for name, vertices in node_sets.items():

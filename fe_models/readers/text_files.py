@@ -1,6 +1,6 @@
-"""Text of mesh files, whatever marks its beginning.
+"""Text of mesh files, with or without a byte order mark.
 
-Windows programs put a byte order mark before UTF-8, and write UTF-16 where that is asked for.
+Windows programs put a byte order mark before UTF-8, and write UTF-16 on request.
 """
 
 from __future__ import annotations
@@ -16,15 +16,15 @@ MARKS = {BOM_UTF8: "utf-8-sig", BOM_UTF16_LE: "utf-16", BOM_UTF16_BE: "utf-16"}
 
 
 def open_text(path: Path) -> TextIO:
-    """Open a text file for reading; what is no text in it becomes replacement characters."""
+    """Open a text file for reading; invalid bytes become replacement characters."""
     return path.open(encoding=_marked(path) or "utf-8", errors="replace")
 
 
 @contextmanager
 def unmarked(path: Path) -> Iterator[Path]:
-    """Yield the file, or a copy in UTF-8 without a byte order mark where it begins with one.
+    """Yield the file, or a copy in UTF-8 without a byte order mark if the file begins with one.
 
-    For readers of libraries, which take a mark for damage.
+    Readers in libraries take a byte order mark for damage.
     """
     if not _marked(path):
         yield path
@@ -36,7 +36,7 @@ def unmarked(path: Path) -> Iterator[Path]:
 
 
 def _marked(path: Path) -> str:
-    """Return the encoding that a byte order mark names; empty if there is none."""
+    """Return the encoding that a byte order mark indicates; empty if there is none."""
     with path.open("rb") as file:
         head = file.read(len(BOM_UTF8))
     return next((name for mark, name in MARKS.items() if head.startswith(mark)), "")

@@ -1,7 +1,7 @@
 """Meshes in I-DEAS universal files (``.unv``), as Salome, gmsh, NX and others write them.
 
-Datasets by their numbers: 2411 (781) nodes, 2412 elements, 2435, 2452, 2467 and 2477 groups
-(Structural Dynamics Research Laboratory, University of Cincinnati, Universal File Formats).
+Dataset numbers are: 2411 (781) nodes, 2412 elements, 2435, 2452, 2467 and 2477 groups (Structural
+Dynamics Research Laboratory, University of Cincinnati, Universal File Formats).
 """
 
 from __future__ import annotations
@@ -26,17 +26,22 @@ DELIMITER = "-1"
 NODES, ELEMENTS, GROUPS = ("781", "2411"), ("2412",), ("2435", "2452", "2467", "2477")
 HEADER, UNITS, SYSTEMS = "151", "164", "2420"
 OLD = {"15": NODES[1], "780": ELEMENTS[0]}
-# What other datasets hold that a case says.
-SAID = {"757": "boundary conditions", "790": "loads", "791": "supports", "1710": "materials"}
-# Units of length of systems of units by their codes; of others the factor says it.
+# Content of datasets that a case would have to describe.
+DESCRIBED_IN_CASES = {
+    "757": "boundary conditions",
+    "790": "loads",
+    "791": "supports",
+    "1710": "materials",
+}
+# Unit of length by the code of the system of units; for other codes the factor determines it.
 LENGTHS = {
     "1": "m", "2": "ft", "3": "m", "4": "ft", "5": "mm", "6": "cm", "7": "in", "8": "mm",
     "10": "mm",
 }  # fmt: skip
-# Factors are rounded: a length is a unit to this share.
+# Relative difference up to which a rounded factor is that of a unit.
 ROUNDED = 1e-3
-# Shape of finite elements by their number, and where their corners are among their nodes: those of
-# second order go round their faces, midsides between corners.
+# Shape of finite elements by their type number, and positions of the corners among their nodes. In
+# those of second order the nodes go around the faces, with midside nodes between corners.
 TET, WEDGE, HEX = (0, 2, 4, 9), (0, 2, 4, 9, 11, 13), (0, 2, 4, 6, 12, 14, 16, 18)
 SHAPES: dict[int, tuple[str, tuple[int, ...]]] = {
     11: ("line", (0, 1)), 21: ("line", (0, 1)), 22: ("line", (0, 1)), 24: ("line", (0, 2)),
@@ -66,7 +71,7 @@ NODE, ELEMENT = "7", "8"
 
 @dataclass(frozen=True)
 class Dataset:
-    """A dataset: its number, where it begins, and its lines."""
+    """Dataset of a universal file: its number, the place where it begins, and its lines."""
 
     number: str
     place: SourceLine
@@ -76,9 +81,9 @@ class Dataset:
 def read_unv(path: Path) -> GroupedMesh:
     """Read the mesh of a universal file.
 
-    Each connected piece of solids, or of plane elements, is a body by the name of the group of just
-    its elements, or else ``body_1``, ...; groups of facets on solids are boundaries, those of edges
-    and of nodes node sets. Raises :class:`MeshError` with file and line.
+    Each connected piece of solids, or of plane elements, is a body with the name of the group that
+    is exactly its elements, or else ``body_1``, .... Groups of facets on solids are boundaries,
+    those of edges and of nodes are node sets. Raises :class:`MeshError` with file and line.
     """
     scope, left = Scope("", SourceLine(path, 1)), []
     groups, unit = [], LengthUnit()
@@ -93,18 +98,18 @@ def read_unv(path: Path) -> GroupedMesh:
             _refuse_other_systems(dataset)
         elif dataset.number == UNITS:
             unit = _unit(dataset)
-        elif line := _left(dataset):
+        elif line := _unread(dataset):
             left.append(line)
     if not scope.elements:
         raise MeshError(f"{path}: has no elements; allowed: dataset {ELEMENTS[0]}")
     for dataset in groups:
         _groups(scope, dataset)
-    told = (*left, *_plane_kinds(scope))
-    return replace(FlatFile(scope).mesh(), left=told, scene=Scene(ignored=told), unit=unit)
+    notes = (*left, *_plane_kinds(scope))
+    return replace(FlatFile(scope).mesh(), left=notes, scene=Scene(ignored=notes), unit=unit)
 
 
 def _datasets(path: Path) -> Iterator[Dataset]:
-    """Datasets between lines of -1."""
+    """Yield the datasets, which stand between lines of -1."""
     inside: list[tuple[SourceLine, str]] | None = None
     with open_text(path) as file:
         for number, line in enumerate(file, start=1):
@@ -116,9 +121,13 @@ def _datasets(path: Path) -> Iterator[Dataset]:
             elif inside is not None:
                 inside.append((place, text))
             elif text:
-                raise MeshError(f"{place}: is no universal file; allowed: datasets between -1")
+                raise MeshError(
+                    f"{place}: is not a universal file; allowed: datasets between lines of -1"
+                )
     if inside:
-        raise MeshError(f"{inside[0][0]}: dataset {inside[0][1].strip()} has no end: damaged?")
+        raise MeshError(
+            f"{inside[0][0]}: dataset {inside[0][1].strip()} has no end: it may be damaged"
+        )
 
 
 def _nodes(scope: Scope, dataset: Dataset) -> None:
@@ -133,10 +142,10 @@ def _nodes(scope: Scope, dataset: Dataset) -> None:
 
 
 def _fields(place: SourceLine, text: str) -> list[str]:
-    """Fields of a line that is not blank."""
+    """Return the fields of a line. Raises :class:`MeshError` if the line is blank."""
     fields = text.split()
     if not fields:
-        raise MeshError(f"{place}: a blank line in a dataset: damaged?")
+        raise MeshError(f"{place}: a blank line in a dataset: it may be damaged")
     return fields
 
 
@@ -144,7 +153,7 @@ def _in_groups(
     dataset: Dataset, count: int
 ) -> Iterator[tuple[tuple[SourceLine, str], tuple[SourceLine, str]]]:
     if len(dataset.lines) % count:
-        raise MeshError(f"{dataset.lines[-1][0]}: the dataset ends early: damaged?")
+        raise MeshError(f"{dataset.lines[-1][0]}: the dataset ends early: it may be damaged")
     return zip(dataset.lines[0::count], dataset.lines[1::count], strict=True)
 
 
@@ -156,12 +165,14 @@ def _elements(scope: Scope, dataset: Dataset) -> None:
             raise MeshError(f"{place}: {len(head)} numbers; allowed: the 6 of an element")
         number, kind, count = head[0], head[1], head[5]
         if kind in BEAMS:
-            next(rows, None)  # its orientation and sections
+            next(rows, None)  # Skip the line with its orientation and sections.
         nodes: list[int] = []
         while len(nodes) < count:
             below, line = next(rows, (place, ""))
             if not line:
-                raise MeshError(f"{place}: element {number} has not its {count} nodes: damaged?")
+                raise MeshError(
+                    f"{place}: element {number} has fewer than its {count} nodes: it may be damaged"
+                )
             nodes += [integer(below, field) for field in line.split()]
         if number in scope.elements:
             raise MeshError(f"{place}: element {number} is defined twice")
@@ -171,11 +182,14 @@ def _elements(scope: Scope, dataset: Dataset) -> None:
 def _element(place: SourceLine, kind: int, nodes: list[int]) -> Element:
     advice = _advice(kind)
     if kind not in SHAPES:
-        told = f"is {advice}" if advice else f"is not read; allowed: {', '.join(map(str, SHAPES))}"
-        raise MeshError(f"{place}: element type {kind} {told}")
+        why = f"is {advice}" if advice else f"is not read; allowed: {', '.join(map(str, SHAPES))}"
+        raise MeshError(f"{place}: element type {kind} {why}")
     shape, corners = SHAPES[kind]
     if len(nodes) <= max(corners):
-        raise MeshError(f"{place}: {len(nodes)} nodes of a {shape} of type {kind}")
+        raise MeshError(
+            f"{place}: {len(nodes)} nodes are too few for a {shape} of type {kind}; allowed: "
+            f"more than {max(corners)}"
+        )
     midsides = [node for k, node in enumerate(nodes) if k not in corners]
     return Element(
         shape=shape,
@@ -193,9 +207,9 @@ def _advice(kind: int) -> str:
 
 
 def _groups(scope: Scope, dataset: Dataset) -> None:
-    """Groups with their members, two to a line; a name may come once only.
+    """Read groups with their members, two to a line; a name may occur only once.
 
-    Salome leaves a blank line for the members of a group that has none.
+    Salome writes a blank line for the members of an empty group.
     """
     rows = iter(dataset.lines)
     for place, text in rows:
@@ -208,7 +222,9 @@ def _groups(scope: Scope, dataset: Dataset) -> None:
         while len(members) < 4 * count:
             below, line = next(rows, (place, ""))
             if not line:
-                raise MeshError(f"{place}: group {name} has not its {count} members: damaged?")
+                raise MeshError(
+                    f"{place}: group {name} has fewer than its {count} members: it may be damaged"
+                )
             members += line.split()
         for sets, kind, known in (
             (scope.node_sets, NODE, scope.nodes),
@@ -225,7 +241,10 @@ def _groups(scope: Scope, dataset: Dataset) -> None:
 
 
 def _refuse_other_systems(dataset: Dataset) -> None:
-    """All coordinate systems are the global one: type 0 with a matrix of one."""
+    """Raise :class:`MeshError` unless all coordinate systems are the global one.
+
+    That is one of type 0 with a unit matrix.
+    """
     rows = dataset.lines[2:]
     for first in range(0, len(rows) - 5, 6):
         place, text = rows[first]
@@ -243,11 +262,12 @@ def _refuse_other_systems(dataset: Dataset) -> None:
 
 
 def _unit(dataset: Dataset) -> LengthUnit:
-    """The unit of lengths: metres are lengths over the factor of the dataset's second line.
+    """Return the unit of length, from the factor on the dataset's second line.
 
-    Where there is none, the code of the system of units says it.
+    A length divided by the factor is in metres. Without a factor, the code of the system of units
+    determines the unit.
     """
-    # A code of ten columns, and its name right behind it.
+    # The code has ten columns, and its name follows immediately.
     match = re.match(r"\s*(\d+)", dataset.lines[0][1]) if dataset.lines else None
     code, factor = match[1] if match else "", 0.0
     if len(dataset.lines) > 1 and (factors := dataset.lines[1][1].split()):
@@ -261,10 +281,10 @@ def _unit(dataset: Dataset) -> LengthUnit:
     return LengthUnit(*((near[0], SIZES[near[0]]) if near else (f"{size:g} mm", size)), source)
 
 
-def _left(dataset: Dataset) -> str:
-    """Describe in a line what a dataset says that is not read; empty if it says nothing.
+def _unread(dataset: Dataset) -> str:
+    """Describe in one line a dataset that is not read; empty if there is nothing to describe.
 
-    Raises :class:`MeshError` if it is one of an old form, which would be the mesh.
+    Raises :class:`MeshError` for a dataset of an old form that contains the mesh.
     """
     place = dataset.place.short
     if dataset.number in OLD:
@@ -274,11 +294,13 @@ def _left(dataset: Dataset) -> str:
         )
     if dataset.number == HEADER:
         return ""
-    return f"{place}: dataset {dataset.number}, {SAID.get(dataset.number, 'not read')}"
+    return (
+        f"{place}: dataset {dataset.number}, {DESCRIBED_IN_CASES.get(dataset.number, 'not read')}"
+    )
 
 
 def _plane_kinds(scope: Scope) -> Iterator[str]:
-    """A line if the bodies are plane elements of another kind than plane strain."""
+    """Yield a line if the bodies are plane elements of another kind than plane strain."""
     if any(DIMENSION[element.shape] == 3 for element in scope.elements.values()):
         return
     strain = {f"element type {kind}" for kind in PLANE_STRAIN}

@@ -1,9 +1,9 @@
-"""Small dense algebra by one thread of OpenBLAS, which gains nothing from more.
+"""Restriction of OpenBLAS to one thread for small dense algebra, which gains nothing from more.
 
-A product of a symmetric matrix and a vector waits for memory, and small ones are done before
-another thread has woken up. OpenBLAS shares them among all its threads even so, which wait for each
-other without leaving their cores: a product of 2000 unknowns takes ten times as long beside another
-process, and alone no less than with one thread.
+A product of a symmetric matrix and a vector is limited by memory, and small ones are finished
+before another thread has woken up. OpenBLAS nevertheless distributes them over all its threads,
+which wait for each other without releasing their cores. A product of 2000 unknowns then takes ten
+times as long while another process runs, and alone no less than with one thread.
 """
 
 from __future__ import annotations
@@ -17,9 +17,9 @@ from pathlib import Path
 import numpy
 import scipy
 
-# Unknowns up to which one thread multiplies: of a matrix that a processor's caches may hold.
+# Number of unknowns up to which one thread is used: the matrix may fit into a processor's caches.
 SMALL = 4000
-# What sets the number of threads, and what tells it, in the libraries of the wheels of both.
+# Functions that set and get the number of threads, in the OpenBLAS libraries of both wheels.
 CALLS = {
     scipy: ("scipy_openblas_set_num_threads", "scipy_openblas_get_num_threads"),
     numpy: ("scipy_openblas_set_num_threads64_", "scipy_openblas_get_num_threads64_"),
@@ -28,30 +28,30 @@ CALLS = {
 
 @contextmanager
 def one_thread(unknowns: int = 0) -> Iterator[None]:
-    """OpenBLAS takes one thread, where matrices of so many ``unknowns`` are small.
+    """Restrict OpenBLAS to one thread if matrices of so many ``unknowns`` are small.
 
-    It does nothing to NumPy and SciPy where other libraries than those of their wheels are below.
-    The number is that of the whole process: not to be changed in threads side by side.
+    It has no effect if NumPy and SciPy use other libraries than those of their wheels. The number
+    of threads applies to the whole process, so do not use this in parallel threads.
     """
     libraries = _openblas() if unknowns <= SMALL else ()
-    before = [told() for _, told in libraries]
-    for choose, _ in libraries:
-        choose(1)
+    before = [get() for _, get in libraries]
+    for set_number, _ in libraries:
+        set_number(1)
     try:
         yield
     finally:
-        for (choose, _), number in zip(libraries, before, strict=True):
-            choose(number)
+        for (set_number, _), number in zip(libraries, before, strict=True):
+            set_number(number)
 
 
 @cache
 def _openblas() -> tuple[tuple[Callable[[int], None], Callable[[], int]], ...]:
-    """Of each library that is there: what sets the number of its threads, and what tells it."""
+    """Return the functions that set and get the number of threads, of each library found."""
     found = []
-    for package, (choose, told) in CALLS.items():
-        beside = Path(package.__file__).parents[1] / f"{package.__name__}.libs"
-        for path in sorted(beside.glob("libscipy_openblas*")):
+    for package, (set_number, get) in CALLS.items():
+        folder = Path(package.__file__).parents[1] / f"{package.__name__}.libs"
+        for path in sorted(folder.glob("libscipy_openblas*")):
             library = ctypes.CDLL(str(path))
-            if hasattr(library, choose) and hasattr(library, told):
-                found.append((getattr(library, choose), getattr(library, told)))
+            if hasattr(library, set_number) and hasattr(library, get):
+                found.append((getattr(library, set_number), getattr(library, get)))
     return tuple(found)

@@ -1,4 +1,7 @@
-"""Contact as a linear complementarity: forces and gaps, neither negative, one of them zero."""
+"""Contact as a linear complementarity problem of forces and gaps.
+
+Neither is negative, and one of them is zero.
+"""
 
 from __future__ import annotations
 
@@ -12,17 +15,21 @@ from sa_solver.types import Array, Indices
 
 Flags = NDArray[np.bool_]
 
-# Forces and gaps below this share of the largest are rounding, whose sign says nothing.
+# Forces and gaps below this share of the largest are rounding errors, whose sign means nothing.
 ROUNDING = 1e-12
-# Exchanges of all wrong nodes at once that may fail to lower their number, before one at a time.
+# Number of exchanges of all wrong nodes that may fail to reduce their number, before nodes are
+# exchanged one at a time.
 PATIENCE = 3
-# Exchanges that a contact needs are a few, one at a time at most some per node.
+# Limit of the exchanges: a contact needs a few, or some per node if nodes are exchanged singly.
 EXCHANGES_PER_NODE = 20
 
 
 @dataclass(frozen=True)
 class Complementary:
-    """``force >= 0``, ``gap = offset + A force - level >= 0`` and ``force · gap = 0``, ``(n,)``."""
+    """Solution of ``force >= 0``, ``gap = offset + A force - level >= 0`` and ``force · gap = 0``.
+
+    ``force`` and ``gap`` are ``(n,)``.
+    """
 
     force: Array
     gap: Array
@@ -33,12 +40,23 @@ class Complementary:
 def complementary(
     compliance: Array, offset: Array, total: float | None = None, guess: Flags | None = None
 ) -> Complementary:
-    """Solve 0 <= f ⊥ offset + A f - level >= 0, with Σ f = ``total`` if it is given, else level 0.
+    """Solve 0 <= f ⊥ offset + A f - level >= 0, with Σ f = ``total`` or else with level 0.
 
-    ``compliance`` A ``(n, n)`` is symmetric positive definite. Status iteration: all nodes whose
-    force or gap is negative change their status, as long as their number falls; after that the last
-    of them alone, which ends for any A if the level is given (block principal pivoting: Júdice &
-    Pires 1994, Computers & Operations Research 21, 587). A result that has not converged says so.
+    The status iteration exchanges the status of all nodes whose force or gap is negative as long as
+    their number falls, and after that of the last of them alone. It ends for any A if the level is
+    given (block principal pivoting: Júdice & Pires 1994, Computers & Operations Research 21, 587).
+    ``converged`` of the result is False if the number of exchanges reached its limit.
+
+    Parameters
+    ----------
+    compliance
+        A ``(n, n)``, symmetric positive definite.
+    offset
+        Gaps without force ``(n,)``.
+    total
+        Sum of the forces, for which the level is found. If None, the level is 0.
+    guess
+        Flags ``(n,)`` of the nodes that are likely to carry force.
     """
     active = np.ones(len(offset), dtype=np.bool_) if guess is None else guess.copy()
     fewest, patience = len(offset) + 1, PATIENCE
@@ -61,7 +79,10 @@ def complementary(
 
 
 def _wrong_nodes(force: Array, gap: Array, active: Flags, size: float) -> Indices:
-    """Active nodes that pull, others that overlap, by more than rounding; gaps are of ``size``."""
+    """Return active nodes with negative force and others with negative gap, beyond rounding.
+
+    ``size`` is the magnitude of the gaps.
+    """
     pulls = force < -ROUNDING * np.abs(force).max(initial=0.0)
     return np.flatnonzero(np.where(active, pulls, gap < -ROUNDING * size))
 
@@ -69,7 +90,7 @@ def _wrong_nodes(force: Array, gap: Array, active: Flags, size: float) -> Indice
 def _at_status(
     compliance: Array, offset: Array, total: float | None, active: Flags
 ) -> tuple[Array, Array, float]:
-    """Forces on the active nodes that close their gaps, the gaps of the others, and the level."""
+    """Return forces that close the gaps of active nodes, the other gaps, and the level."""
     force, level = np.zeros(len(offset)), 0.0
     nodes = np.flatnonzero(active)
     if len(nodes):

@@ -1,9 +1,9 @@
 """Sparse symmetric linear systems: factorised, condensed, or solved by multigrid.
 
-Direct: MKL PARDISO (pypardiso) where it is installed, SuperLU otherwise. PARDISO is never trusted
-blindly: every solution's residual is checked and a bad one is solved again with SuperLU. The
-memory of a factorisation is estimated before it begins. Iterative, for a few right-hand sides of a
-system whose factors do not fit: conjugate gradients with multigrid.
+The direct solver is MKL PARDISO (pypardiso) where it is installed, and SuperLU otherwise. The
+residual of every solution of PARDISO is checked, and a bad one is solved again with SuperLU. The
+memory of a factorisation is estimated before it begins. For a few right-hand sides of a system
+whose factors do not fit, conjugate gradients with multigrid are used.
 """
 
 from __future__ import annotations
@@ -21,16 +21,18 @@ from fe_models.solvers.pardiso import Pardiso, PardisoError
 from sa_solver.errors import ConvergenceError
 from sa_solver.types import Array, Indices
 
-# A backward-stable factorisation leaves about 1e-13; anything above this is a wrong answer.
+# Relative residual above which a solution is wrong; stable factorisations have about 1e-13.
 RESIDUAL_LIMIT = 1e-9
-# |K| |u| / |f|, at most the condition number: 1e2 to 1e4 if a body is held, 1e16 if it is not.
+# Limit of |K| |u| / |f|, which is at most the condition number: 1e2 to 1e4 if a body is held, 1e16
+# if it is not.
 GROWTH_LIMIT = 1e12
-# Right-hand sides solved at once, where there may be thousands: enough to amortise, little memory.
+# Number of right-hand sides solved together where there may be thousands: enough for efficiency,
+# with little memory.
 COLUMNS_AT_ONCE = 256
-# Inner unknowns from which PARDISO condenses: its analysis has crashed the process with one.
+# Fewest inner unknowns for which PARDISO condenses: its analysis has crashed the process with one.
 FEWEST_INNER = 8
 BYTES = 8
-# Residual over the load at which iterations end, and how many of them are an error.
+# Residual over the load at which iterations end, and the number of iterations that is an error.
 ITERATED = 1e-10
 MOST_ITERATIONS = 500
 
@@ -44,11 +46,11 @@ SINGULAR = (
 
 
 class SolverError(ConvergenceError):
-    """A linear system could not be solved; the message says what is likely wrong with it."""
+    """Error of a linear system that could not be solved; the message gives the likely cause."""
 
 
 class FactorMemoryError(SolverError, MemoryError):
-    """A factorisation needs more memory than there is; nothing was allocated.
+    """Error of a factorisation that needs more memory than is free; nothing was allocated.
 
     ``needed`` and ``available`` are in bytes.
     """
@@ -56,7 +58,7 @@ class FactorMemoryError(SolverError, MemoryError):
     def __init__(self, task: str, needed: float, available: float) -> None:
         super().__init__(
             f"{task} needs about {needed / 1e9:.2g} GB of memory, {available / 1e9:.2g} GB are "
-            "free: take a coarser mesh or fewer interface nodes; a few right-hand sides, but no "
+            "free: use a coarser mesh or fewer interface nodes; a few right-hand sides, but not a "
             "condensation, can be solved iteratively"
         )
         self.needed, self.available = needed, available
@@ -65,9 +67,9 @@ class FactorMemoryError(SolverError, MemoryError):
 def factorise(matrix: sp.csr_matrix, memory: float | None = None) -> Factorisation:
     """Factorise a sparse symmetric positive definite matrix.
 
-    ``memory`` is what it may take [bytes]; None stands for all that is free. Raises
+    ``memory`` is the memory that it may use [bytes]; None means all that is free. Raises
     :class:`FactorMemoryError` before anything large is allocated, and :class:`SolverError` if the
-    matrix is singular, which one random load shows.
+    matrix is singular, which is tested with one random load.
     """
     solve = _Checked(matrix, _limit(memory))
     load = np.random.default_rng(0).standard_normal(matrix.shape[0])
@@ -79,14 +81,26 @@ def factorise(matrix: sp.csr_matrix, memory: float | None = None) -> Factorisati
 def prepare(
     matrix: sp.csr_matrix, near_nullspace: Array | None = None, memory: float | None = None
 ) -> Factorisation:
-    """Solver of a sparse symmetric positive definite matrix for a few right-hand sides.
+    """Return a solver of a sparse symmetric positive definite matrix for a few right-hand sides.
 
-    It is factorised where the factors fit into ``memory`` [bytes], all that is free unless given,
-    and iterated by conjugate gradients with multigrid elsewhere.
-    ``near_nullspace`` ``(n, k)`` are motions of little energy, for the iterative solver: those of
-    :func:`fe_models.loads.rigid_motions.rigid_body_modes` if the matrix is an elastic body's.
-    Raises :class:`SolverError`, here if the matrix is singular, or when called if the iterations do
-    not converge.
+    The matrix is factorised if the factors fit into memory. Otherwise systems are solved by
+    conjugate gradients with multigrid.
+
+    Parameters
+    ----------
+    matrix
+        The matrix ``(n, n)``.
+    near_nullspace
+        Motions of little energy ``(n, k)`` for the iterative solver: those of
+        :func:`fe_models.loads.rigid_motions.rigid_body_modes` if the matrix is an elastic body's.
+    memory
+        Memory for the factors [bytes]; by default all that is free.
+
+    Raises
+    ------
+    SolverError
+        If the matrix is singular; or later, when the solver is called, if the iterations do not
+        converge.
     """
     try:
         return factorise(matrix, memory)
@@ -97,25 +111,42 @@ def prepare(
 def condense(
     matrix: sp.csr_matrix, loads: Array, kept: Indices, memory: float | None = None
 ) -> tuple[Array, Array]:
-    """Condense a symmetric system onto the unknowns ``kept`` ``(c,)``, with ``loads`` ``(n, m)``.
+    """Condense a symmetric system onto the unknowns ``kept``.
 
-    K_cc - K_ci K_ii⁻¹ K_ic ``(c, c)``, dense, and f_c - K_ci K_ii⁻¹ f_i ``(c, m)``, in the order of
-    ``kept``; ``i`` are all other unknowns. K_ii must be positive definite, K need not be. Raises
-    :class:`SolverError` if it is not, and :class:`FactorMemoryError` if it needs more than
-    ``memory`` [bytes], by default all that is free: no iteration replaces it.
+    The results are K_cc - K_ci K_ii⁻¹ K_ic ``(c, c)``, dense, and f_c - K_ci K_ii⁻¹ f_i ``(c, m)``,
+    in the order of ``kept``; ``i`` are all other unknowns. K_ii must be positive definite, K need
+    not be.
+
+    Parameters
+    ----------
+    matrix
+        K ``(n, n)``.
+    loads
+        Loads f ``(n, m)``.
+    kept
+        Numbers of the unknowns to keep ``(c,)``.
+    memory
+        Memory that it may use [bytes]; by default all that is free.
+
+    Raises
+    ------
+    SolverError
+        If K_ii is singular.
+    FactorMemoryError
+        If it needs more memory. There is no iterative alternative.
     """
     limit = _limit(memory)
-    # A load whose displacements are known tells whether the result is right.
+    # The result is checked with one more load, whose displacements are known.
     displacement = np.random.default_rng(0).standard_normal(matrix.shape[0])
-    every = np.column_stack([loads, matrix @ displacement])
-    condensed = _condense_by_pardiso(matrix, every, kept, limit)
+    all_loads = np.column_stack([loads, matrix @ displacement])
+    condensed = _condense_by_pardiso(matrix, all_loads, kept, limit)
     if condensed is None or not _is_condensed(*condensed, displacement[kept]):
-        condensed = _condense_by_columns(matrix, every, kept, limit)
+        condensed = _condense_by_columns(matrix, all_loads, kept, limit)
     return condensed[0], condensed[1][:, :-1]
 
 
 class _Iterative:
-    """Conjugate gradients whose end is looked at."""
+    """Solver by conjugate gradients that checks convergence."""
 
     def __init__(self, matrix: sp.csr_matrix, near_nullspace: Array | None) -> None:
         soft = np.ones((matrix.shape[0], 1)) if near_nullspace is None else near_nullspace
@@ -132,19 +163,19 @@ class _Iterative:
         if not result.converged:
             raise SolverError(
                 f"conjugate gradients did not converge: residual {result.residual:.1e} of the load "
-                f"after {result.iterations} iterations; factorise, allow more iterations, or see "
-                "that all bodies are held and no element is degenerate"
+                f"after {result.iterations} iterations; check that all bodies are held and no "
+                "element is degenerate, or free memory for a factorisation"
             )
         return result.solution
 
 
 def _limit(memory: float | None) -> float:
-    """The memory allowed: what is free, unless given."""
+    """Return the memory allowed: what is free unless it is given."""
     return available_bytes() if memory is None else memory
 
 
 class _Checked:
-    """Solutions whose residual has been looked at."""
+    """Direct solver that checks the residual of every solution."""
 
     def __init__(self, matrix: sp.csr_matrix, limit: float) -> None:
         self._matrix, self._limit = matrix, limit
@@ -157,7 +188,7 @@ class _Checked:
         except PardisoError:
             solution = np.full(rhs.shape, np.nan)
         if not self._is_good(rhs, solution):
-            self._solve = None  # gives its memory back
+            self._solve = None  # Release the memory of the factors before the next ones.
             self._solve = _superlu(self._matrix, self._limit)
             solution = self._solve(rhs)
             if not self._is_good(rhs, solution):
@@ -165,7 +196,7 @@ class _Checked:
         return solution
 
     def _is_good(self, rhs: Array, solution: Array) -> bool:
-        """Whether the residual of every column is that of rounding; NaN is not."""
+        """Return whether the residual of every column is of the size of rounding; NaN is not."""
         scale = self._largest * np.abs(solution).max(axis=0, initial=0.0)
         error = np.abs(self._matrix @ solution - rhs).max(axis=0, initial=0.0)
         load = np.abs(rhs).max(axis=0, initial=0.0)
@@ -181,7 +212,7 @@ def _superlu(matrix: sp.csr_matrix, limit: float) -> Any:
 
 
 def _pardiso(matrix: sp.csr_matrix, limit: float) -> Pardiso | None:
-    """PARDISO's factors; None where it is not installed, or refuses the matrix."""
+    """Return PARDISO's factors, or None if it is not installed or refuses the matrix."""
     try:
         analysed = Pardiso(matrix)
         _require(analysed.factor_bytes, limit, f"factorising {matrix.shape[0]} unknowns")
@@ -194,10 +225,10 @@ def _pardiso(matrix: sp.csr_matrix, limit: float) -> Pardiso | None:
 def _condense_by_pardiso(
     matrix: sp.csr_matrix, loads: Array, kept: Indices, limit: float
 ) -> tuple[Array, Array] | None:
-    """PARDISO's own Schur complement; None where it is not installed, fails, or hardly pays.
+    """Return PARDISO's Schur complement, or None if it is not installed, fails or hardly pays.
 
-    That of the matrix bordered by the loads as if they were more unknowns to keep: its entries
-    between these and the others are the condensed loads.
+    The matrix is bordered by the loads, as if they were further unknowns to keep. The entries of
+    the Schur complement between these and the others are then the condensed loads.
     """
     size, cases = loads.shape
     if size - len(kept) < FEWEST_INNER:
@@ -206,7 +237,7 @@ def _condense_by_pardiso(
     bordered = sp.bmat([[matrix, border], [border.T, sp.identity(cases)]], format="csr")
     try:
         analysed = Pardiso(bordered, np.append(kept, np.arange(size, size + cases)))
-        # Its result and the same in the order asked for.
+        # The memory includes the result and its copy in the requested order.
         needed = analysed.factor_bytes + 2 * BYTES * (len(kept) + cases) ** 2
         _require(needed, limit, f"condensing {size} unknowns onto {len(kept)}")
         schur = analysed.schur()
@@ -221,7 +252,7 @@ def _require(needed: float, limit: float, task: str) -> None:
 
 
 def _is_condensed(stiffness: Array, loads: Array, displacement: Array) -> bool:
-    """Whether the last of the loads is that of the ``displacement``."""
+    """Return whether the last of the loads is that of the ``displacement``."""
     expected = stiffness @ displacement
     return bool(np.abs(loads[:, -1] - expected).max() < RESIDUAL_LIMIT * np.abs(expected).max())
 
@@ -230,7 +261,7 @@ def _condense_by_columns(
     matrix: sp.csr_matrix, loads: Array, kept: Indices, limit: float
 ) -> tuple[Array, Array]:
     inner = np.setdiff1d(np.arange(matrix.shape[0]), kept)
-    # The result and its symmetric part; right-hand sides and solutions of one block.
+    # Memory of the result and its symmetric part, and of one block of right-hand sides.
     dense = 2 * len(kept) ** 2 + 3 * len(inner) * min(COLUMNS_AT_ONCE, len(kept))
     _require(BYTES * dense, limit, f"condensing {matrix.shape[0]} unknowns onto {len(kept)}")
     solve = factorise(matrix[inner][:, inner].tocsr(), limit)

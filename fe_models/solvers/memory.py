@@ -1,4 +1,4 @@
-"""Memory this process may still take."""
+"""Memory that this process may still use."""
 
 from __future__ import annotations
 
@@ -6,14 +6,14 @@ from pathlib import Path
 
 import psutil
 
-# A container's own limit and use (Linux control groups, version 2).
+# Folder with a container's memory limit and use (Linux control groups, version 2).
 CONTAINER = Path("/sys/fs/cgroup")
 
 
 def available_bytes() -> float:
-    """Free memory, reclaimable caches included.
+    """Return the free memory, reclaimable caches included.
 
-    In a container with a limit of its own, what that leaves if it is less.
+    In a container with a memory limit, it is the part of the limit that is free, if that is less.
     """
     machine, container = float(psutil.virtual_memory().available), _container()
     return machine if container is None else min(machine, container)
@@ -27,5 +27,5 @@ def _container() -> float | None:
         caches = dict(line.split() for line in statistics if line)
         return limit - used + float(caches["inactive_file"])
     except (OSError, KeyError, ValueError):
-        # No such file, or the limit is the word "max".
+        # There is no such file, or the limit is the word "max".
         return None

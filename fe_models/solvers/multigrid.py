@@ -1,8 +1,9 @@
-"""Conjugate gradients with smoothed aggregation (pyamg): little memory, no factors.
+"""Conjugate gradients with smoothed aggregation (pyamg), which needs little memory and no factors.
 
-The motions that take next to no energy, an elastic body's six rigid ones, must be on the coarse
-grids exactly. Then the iterations hardly grow with the mesh. Sources: Vaněk, Mandel and Brezina
-1996, doi:10.1007/BF02238511; Bell, Olson and Schroder 2022, doi:10.21105/joss.04142.
+The motions with almost no energy, the six rigid ones of an elastic body, must be represented
+exactly on the coarse grids. Then the number of iterations hardly grows with the mesh. Sources:
+Vaněk, Mandel and Brezina 1996, doi:10.1007/BF02238511; Bell, Olson and Schroder 2022,
+doi:10.21105/joss.04142.
 """
 
 from __future__ import annotations
@@ -18,17 +19,21 @@ from scipy.sparse.linalg import cg
 
 from sa_solver.types import Array
 
-# Interpolation of least energy: Jacobi's takes a third more iterations, and they grow.
+# Interpolation of least energy. Jacobi's needs a third more iterations, whose number grows with the
+# mesh.
 INTERPOLATION = ("energy", {"degree": 2})
-# Unknowns of the coarsest grid, which is inverted as a dense matrix.
+# Number of unknowns of the coarsest grid, which is inverted as a dense matrix.
 COARSEST = 200
-# Conjugate gradients update their residual; the true one may end above it by this factor.
+# Conjugate gradients update their residual; the true one may exceed it by this factor at the end.
 DRIFT = 10.0
 
 
 @dataclass(frozen=True)
 class Iterated:
-    """A solution ``(n,)``, its iterations, its residual |f - K u| / |f|, and if that will do."""
+    """Solution ``(n,)`` of an iterative solver, with its convergence.
+
+    ``residual`` is |f - K u| / |f|; ``converged`` tells whether it is within the tolerance.
+    """
 
     solution: Array
     iterations: int
@@ -37,9 +42,9 @@ class Iterated:
 
 
 def softness(matrix: sp.csr_matrix, modes: Array) -> float:
-    """Least energy u'Ku / u'u among the ``modes`` ``(n, k)``, as a share of the largest entry.
+    """Return the least energy u'Ku / u'u among ``modes`` ``(n, k)``, over the largest entry.
 
-    It is of rounding's size for a body that is not held.
+    It is of the size of rounding errors for a body that is not held.
     """
     basis = scipy.linalg.orth(modes)
     energies = np.linalg.eigvalsh(basis.T @ (matrix @ basis))
@@ -47,7 +52,7 @@ def softness(matrix: sp.csr_matrix, modes: Array) -> float:
 
 
 class MultigridSolver:
-    """The coarse grids of a symmetric positive definite matrix, ready for right-hand sides.
+    """Coarse grids of a symmetric positive definite matrix, ready for right-hand sides.
 
     ``near_nullspace`` ``(n, k)`` are motions of little energy, by default the constants.
     """
@@ -63,7 +68,7 @@ class MultigridSolver:
             self._preconditioner = grids.aspreconditioner()
 
     def solve(self, rhs: Array, tolerance: float, cap: int) -> Iterated:
-        """Iterate until |f - K u| ≤ ``tolerance`` |f| or ``cap`` iterations are done."""
+        """Iterate until |f - K u| ≤ ``tolerance`` |f|, or until ``cap`` iterations are done."""
         count = 0
 
         def counted(_: Array) -> None:
@@ -81,7 +86,7 @@ class MultigridSolver:
 
 @contextmanager
 def _repeatable() -> Iterator[None]:
-    """Give pyamg, which draws from numpy's global generator, the same numbers every time."""
+    """Seed NumPy's global generator, from which pyamg draws, so that results are repeatable."""
     before = np.random.get_state()  # noqa: NPY002
     np.random.seed(0)  # noqa: NPY002
     try:

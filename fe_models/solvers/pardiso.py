@@ -1,8 +1,9 @@
 """MKL PARDISO for sparse symmetric positive definite matrices: factors, Schur complement.
 
-pypardiso finds the library. Its own solver compares the whole matrix before every solve, and gives
-neither the memory PARDISO announces nor the Schur complement, so the routine is called here.
-Source: Schenk and Gärtner 2004, doi:10.1016/j.future.2003.07.011; oneMKL's reference, "pardiso".
+pypardiso finds the library. Its solver compares the whole matrix before every solve, and provides
+neither the memory that PARDISO predicts nor the Schur complement, so the routine is called here
+directly. Source: Schenk and Gärtner 2004, doi:10.1016/j.future.2003.07.011; oneMKL's reference,
+"pardiso".
 """
 
 from __future__ import annotations
@@ -26,29 +27,33 @@ from sa_solver.types import Array, Indices
 T = TypeVar("T")
 
 ANALYSE, FACTORISE, SOLVE, RELEASE = 11, 22, 33, -1
-# Places in PARDISO's table of parameters, counted from zero; the last three are answers.
+# Positions in PARDISO's table of parameters, counted from zero; the last three are outputs.
 NO_DEFAULTS, ORDERING, ZERO_BASED, SCHUR = 0, 1, 34, 35
 ANALYSIS_PEAK, ANALYSIS_KEPT, FACTORS = 14, 15, 16
 NESTED_DISSECTION = 2
-# MKL's mode of reproducible results with its fastest kernels: two solutions with two threads
-# differ in the last bits otherwise. MKL's own variable chooses another, say that which gives the
-# same bits on every processor; what is set by a call would win over it.
+# MKL's mode of reproducible results with its fastest kernels; otherwise two solutions with two
+# threads differ in the last bits. MKL's environment variable can choose another mode, such as the
+# one with the same bits on every processor, so the mode is set only if the variable is not.
 REPRODUCIBLE = 2
 MODE_VARIABLE = "MKL_CBWR"
-# Where pypardiso looks for MKL first; without it, through every folder of the environment.
+# Variable with the path where pypardiso looks for MKL first; without it, pypardiso searches every
+# folder of the environment.
 PLACE_VARIABLE = "PYPARDISO_MKL_RT"
-# Its number for real symmetric positive definite matrices.
+# PARDISO's number for real symmetric positive definite matrices.
 POSITIVE_DEFINITE = 2
 KILOBYTE = 1024
 
 
 class PardisoError(ConvergenceError):
-    """PARDISO is not installed or refuses a matrix: indefinite, an empty row, no memory."""
+    """Error if PARDISO is not installed or refuses a matrix.
+
+    It refuses indefinite matrices and those with an empty row or too little memory.
+    """
 
 
 @cache
 def library() -> Any | None:
-    """The loaded MKL, or None where it is not installed."""
+    """Return the loaded MKL, or None if it is not installed."""
     installed = sorted(map(str, Path(sys.prefix).glob("lib*/libmkl_rt.so*")), key=len)
     if installed:
         os.environ.setdefault(PLACE_VARIABLE, installed[0])
@@ -63,16 +68,16 @@ def library() -> Any | None:
 
 
 def threads() -> int:
-    """Threads that MKL shares the work of a call from here among; 1 without it."""
+    """Return the number of threads that MKL uses for a call from here; 1 without MKL."""
     mkl = library()
     return 1 if mkl is None else int(mkl.MKL_Get_Max_Threads())
 
 
 def sharing(jobs: Sequence[Callable[[], T]]) -> list[Callable[[], T]]:
-    """Jobs for threads side by side, which share those that MKL takes.
+    """Return jobs to run in parallel threads, among which MKL's threads are divided.
 
-    A factorisation of 50,000 unknowns gains little from a second thread, two of them beside each
-    other nearly all of it.
+    A factorisation of 50,000 unknowns gains little from a second thread, but two of them in
+    parallel run almost twice as fast.
     """
 
     def with_share(job: Callable[[], T]) -> T:
@@ -85,15 +90,15 @@ def sharing(jobs: Sequence[Callable[[], T]]) -> list[Callable[[], T]]:
         finally:
             mkl.MKL_Set_Num_Threads_Local(before)
 
-    library()  # here, which is the main thread
+    library()  # Load MKL here, in the main thread.
     return [partial(with_share, job) for job in jobs]
 
 
 class Pardiso:
-    """A matrix analysed by PARDISO; its memory is given back with the object.
+    """Matrix analysed by PARDISO, whose memory is released with the object.
 
-    After :meth:`factorise` call it with right-hand sides. With ``kept`` unknowns, their Schur
-    complement is what :meth:`schur` gives, and there are no factors to solve with.
+    After :meth:`factorise`, call the object with right-hand sides. With ``kept`` unknowns,
+    :meth:`schur` returns their Schur complement, and there are no factors to solve with.
     """
 
     def __init__(self, matrix: sp.csr_matrix, kept: Indices | None = None) -> None:
@@ -101,7 +106,7 @@ class Pardiso:
         if mkl is None:
             raise PardisoError("PARDISO is not installed")
         if not np.diff(matrix.indptr).all():
-            raise PardisoError("the matrix has an empty row")  # PARDISO would crash
+            raise PardisoError("the matrix has an empty row")  # PARDISO would crash.
         upper = _upper(matrix)
         self._size = matrix.shape[0]
         self._values = upper.data.astype(float)
@@ -113,9 +118,10 @@ class Pardiso:
             parameters[SCHUR] = 1
             self._marked[kept] = 1
         self._kept, self._parameters = kept, parameters
-        # Looked up by item: the attribute is pypardiso's, with its types of arguments.
+        # The function is looked up by item, because the attribute has the argument types that
+        # pypardiso has set.
         self._state = (mkl["pardiso"], np.zeros(64, np.int64), parameters)
-        # Unlike __del__ this also comes in time when the interpreter ends.
+        # Unlike __del__, this is also called in time when the interpreter ends.
         weakref.finalize(self, _release, self._state)
         self._call(ANALYSE)
 
@@ -132,22 +138,22 @@ class Pardiso:
         return max(analysis, kept + factors)
 
     def factorise(self) -> None:
-        """Compute the factors. Raises :class:`PardisoError`, if not positive definite say."""
+        """Compute the factors. Raises :class:`PardisoError` if PARDISO refuses the matrix."""
         self._call(FACTORISE)
 
     def __call__(self, rhs: Array) -> Array:
-        """Solve for ``(n,)`` or ``(n, m)``."""
+        """Solve for right-hand sides ``(n,)`` or ``(n, m)``."""
         columns = np.asfortranarray(rhs, dtype=float).reshape(self._size, -1, order="F")
         solution = np.zeros_like(columns)
         self._call(SOLVE, columns, solution)
         return np.ascontiguousarray(solution).reshape(rhs.shape)
 
     def schur(self) -> Array:
-        """Factorise, and the Schur complement of the ``kept`` unknowns in their order, dense."""
+        """Factorise and return the dense Schur complement of the ``kept`` unknowns, in order."""
         assert self._kept is not None
         condensed = np.zeros((len(self._kept),) * 2)
         self._call(FACTORISE, np.zeros((self._size, 1)), condensed)
-        # PARDISO orders the marked unknowns by their number, not as they were given.
+        # PARDISO orders the marked unknowns by number, not in the order given.
         if np.all(np.diff(self._kept) > 0):
             return condensed
         place = np.argsort(np.argsort(self._kept))
@@ -159,7 +165,7 @@ class Pardiso:
 
 
 def _upper(matrix: sp.csr_matrix) -> sp.csr_matrix:
-    """Upper triangle with sorted rows and every diagonal entry stored, as PARDISO expects."""
+    """Return the upper triangle with sorted rows and every diagonal entry, as PARDISO expects."""
     upper = sp.triu(matrix, format="coo")
     diagonal = np.arange(matrix.shape[0])
     rows, columns = np.append(upper.row, diagonal), np.append(upper.col, diagonal)
@@ -177,7 +183,7 @@ def _pardiso(
     rhs: Array | None = None,
     result: Array | None = None,
 ) -> None:
-    """One call of the routine, which takes every argument by its address."""
+    """Call the routine, which takes every argument by its address."""
     routine, handle, parameters = state
     error = ctypes.c_int32(0)
     columns = 1 if rhs is None else rhs.shape[1]

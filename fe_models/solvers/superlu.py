@@ -1,4 +1,4 @@
-"""SuperLU for sparse symmetric matrices: where PARDISO is not installed, or errs."""
+"""SuperLU for sparse symmetric matrices, used if PARDISO is not installed or fails."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ import scipy.sparse as sp
 from scipy.sparse.csgraph import reverse_cuthill_mckee
 from scipy.sparse.linalg import splu
 
-# An entry of a factor with its share of the indices: 9.7 to 10.8 bytes measured.
+# Bytes per entry of a factor with its share of the indices: 9.7 to 10.8 measured.
 BYTES_PER_ENTRY = 10.3
 
 
 def factors(matrix: sp.csr_matrix) -> Any:
-    """Factors of a symmetric positive definite matrix, the diagonal its pivots.
+    """Return the factors of a symmetric positive definite matrix, with pivots on the diagonal.
 
     Raises :class:`RuntimeError` if the matrix is exactly singular.
     """
@@ -27,12 +27,12 @@ def factors(matrix: sp.csr_matrix) -> Any:
 
 
 def factor_bytes(matrix: sp.csr_matrix) -> float:
-    """Memory of the factors, from the pattern alone [bytes].
+    """Return the memory of the factors, estimated from the pattern alone [bytes].
 
-    SuperLU gives no count before it factorises. What is counted here is the envelope in reverse
-    Cuthill-McKee order, which shows whether a body is slender or compact. Minimum degree leaves
-    less in it on irregular meshes and more on regular ones: the estimate was 0.5 to 3.2 times the
-    truth for 26 matrices of boxes, bars, plates and dovetails (900 to 57 000 unknowns).
+    SuperLU gives no count before it factorises. The estimate is the envelope in reverse
+    Cuthill-McKee order, which shows whether a body is slender or compact. Minimum degree has less
+    fill than this on irregular meshes and more on regular ones: the estimate was 0.5 to 3.2 times
+    the truth for 26 matrices of boxes, bars, plates and dovetails (900 to 57 000 unknowns).
     """
     order = reverse_cuthill_mckee(matrix, symmetric_mode=True)
     place = np.empty(len(order), np.int64)

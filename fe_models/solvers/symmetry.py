@@ -1,13 +1,12 @@
 """Systems with a mirror symmetry, solved as two of half the size.
 
-A symmetric matrix K that a mirror leaves as it is does not couple displacements that are symmetric
-about it with antisymmetric ones. With an orthonormal basis Q₊ of the first and Q₋ of the second
+A symmetric matrix K that is invariant under a mirror does not couple symmetric displacements with
+antisymmetric ones. With an orthonormal basis Q₊ of the first and Q₋ of the second
 
     K = Q₊ K₊ Q₊ᵀ + Q₋ K₋ Q₋ᵀ,   K± = Q±ᵀ K Q±,
 
-and so do its inverse and its Schur complements, for any loads: a factorisation takes half the work
-or less, a dense product half the memory.
-A mirror is the simplest group.
+and the same holds for its inverse and its Schur complements, for any loads. A factorisation takes
+half the work or less, a dense product half the memory. The mirror is the simplest symmetry group.
 Source: Zingoni 2005, Finite Elements in Analysis and Design 41, 615.
 """
 
@@ -25,21 +24,23 @@ from scipy.spatial import cKDTree
 
 from sa_solver.types import Array, Indices
 
-# Of double or single precision.
+# Dense matrix of double or single precision.
 Matrix = NDArray[np.float64] | NDArray[np.float32]
 
-# Nodes are each other's mirror images when they are within this share of the body's size: meshes
-# built as mirror images are so to rounding.
+# Distance, as a share of the body's size, up to which a node is a mirror image: meshes that are
+# built as mirror images are so up to rounding.
 SAME_PLACE = 1e-9
-# Decimals of the entries of a mirror in rotated frames: they are 0, 1 or -1, or there is none.
+# Decimals to which entries of a mirror in rotated frames are rounded: if it is a mirror, they are
+# 0, 1 or -1.
 ROUNDED = 9
-# What couples the two parts may be this share of the largest entry: assembly's rounding is 1e-15.
+# Coupling of the two parts that is ignored, relative to the largest entry; rounding errors of the
+# assembly are 1e-15.
 UNCOUPLED = 1e-12
 
 
 @dataclass(frozen=True, eq=False)
 class Mirror:
-    """A mirror of unknowns: entry ``i`` of the image is ``sign[i]`` times entry ``partner[i]``.
+    """Mirror of unknowns: entry ``i`` of the image is ``sign[i]`` times entry ``partner[i]``.
 
     ``partner`` ``(n,)`` is a permutation that is its own inverse.
     """
@@ -49,7 +50,7 @@ class Mirror:
 
     @classmethod
     def of(cls, matrix: sp.csr_matrix) -> Mirror | None:
-        """The mirror that a matrix ``(n, n)`` describes; None if it describes none."""
+        """Return the mirror that a matrix ``(n, n)`` describes, or None if it describes none."""
         permutation = matrix.tocsr()
         permutation.data = np.round(permutation.data, ROUNDED)
         permutation.eliminate_zeros()
@@ -60,7 +61,7 @@ class Mirror:
         return cls(partner, permutation.data) if np.array_equal(partner[partner], rows) else None
 
     def matrix(self) -> sp.csr_matrix:
-        """What takes unknowns to their image ``(n, n)``."""
+        """Return the matrix ``(n, n)`` that maps unknowns to their image."""
         rows = np.arange(len(self.partner))
         return sp.csr_matrix((self.sign, (rows, self.partner)), (len(rows), len(rows)))
 
@@ -76,25 +77,25 @@ class Mirror:
         return both, both.T.tocsr()
 
     def restricted(self, unknowns: Indices) -> Mirror | None:
-        """The same mirror of some unknowns, in their order; None if it leads out of them."""
+        """Return the mirror of some unknowns, in their order, or None if it maps any elsewhere."""
         place = np.full(len(self.partner), -1)
         place[unknowns] = np.arange(len(unknowns))
         partner = place[self.partner[unknowns]]
         return None if np.any(partner < 0) else Mirror(partner, self.sign[unknowns])
 
     def _basis(self, parity: float) -> sp.csr_matrix:
-        every = np.arange(len(self.partner))
-        pairs = np.flatnonzero(every < self.partner)
-        alone = np.flatnonzero((every == self.partner) & (self.sign == parity))
+        numbers = np.arange(len(self.partner))
+        pairs = np.flatnonzero(numbers < self.partner)
+        alone = np.flatnonzero((numbers == self.partner) & (self.sign == parity))
         columns = np.arange(len(pairs) + len(alone))
         rows = np.concatenate([pairs, alone, self.partner[pairs]])
         half = np.full(len(pairs), np.sqrt(0.5))
         values = np.concatenate([half, np.ones(len(alone)), parity * self.sign[pairs] * half])
-        shape = (len(every), len(columns))
+        shape = (len(numbers), len(columns))
         return sp.csr_matrix((values, (rows, np.append(columns, columns[: len(pairs)]))), shape)
 
     def __eq__(self, other: object) -> bool:
-        # That of a dataclass cannot compare arrays.
+        # The method of a dataclass cannot compare arrays.
         return (
             isinstance(other, Mirror)
             and np.array_equal(self.partner, other.partner)
@@ -104,7 +105,7 @@ class Mirror:
 
 @dataclass(frozen=True, eq=False)
 class SplitMatrix:
-    """The symmetric matrix ``(n, n)`` Q₊ A₊ Q₊ᵀ + Q₋ A₋ Q₋ᵀ of dense ``blocks`` A₊ and A₋."""
+    """Symmetric matrix ``(n, n)`` Q₊ A₊ Q₊ᵀ + Q₋ A₋ Q₋ᵀ with dense ``blocks`` A₊ and A₋."""
 
     mirror: Mirror
     blocks: tuple[Matrix, Matrix]
@@ -123,16 +124,16 @@ class SplitMatrix:
         return np.asarray(self @ np.eye(len(self)), dtype)
 
     def in_single_precision(self) -> SplitMatrix:
-        """The matrix with its blocks rounded, which takes half the memory."""
+        """Return the matrix with its blocks in single precision, which takes half the memory."""
         symmetric, antisymmetric = (block.astype(np.float32) for block in self.blocks)
         return SplitMatrix(self.mirror, (symmetric, antisymmetric))
 
 
 def symmetric_product(matrix: Matrix, vectors: Array) -> Array:
-    """A symmetric ``matrix`` ``(n, n)`` times ``vectors`` ``(n,)`` or ``(n, m)``.
+    """Return a symmetric ``matrix`` ``(n, n)`` times ``vectors`` ``(n,)`` or ``(n, m)``.
 
-    Of a large one, a product waits for memory: for one vector half of the matrix is read. One of
-    single precision has such products.
+    A product with a large matrix is limited by memory, so for one vector only half of the matrix is
+    read. The product has the precision of the matrix for one vector.
     """
     if vectors.ndim == 2:
         return np.asarray(matrix @ vectors)
@@ -142,10 +143,10 @@ def symmetric_product(matrix: Matrix, vectors: Array) -> Array:
 
 
 def mirror_of_nodes(nodes: Array, axes: tuple[int, ...], axis: int) -> Mirror | None:
-    """The mirror of displacements along ``axes`` ``(d,)`` of ``nodes`` ``(n, 3)``, node by node.
+    """Return the mirror of displacements along ``axes`` ``(d,)`` of ``nodes`` ``(n, 3)``.
 
-    Its plane is across the global ``axis`` in the middle of the nodes. None unless every node has
-    an image.
+    The displacements are numbered node by node. The plane of the mirror is normal to the global
+    ``axis``, in the middle of the nodes. The result is None unless every node has an image.
     """
     low, high = nodes.min(axis=0), nodes.max(axis=0)
     images = nodes.copy()
@@ -161,14 +162,18 @@ def mirror_of_nodes(nodes: Array, axes: tuple[int, ...], axis: int) -> Mirror | 
 
 
 def halves(matrix: sp.csr_matrix, mirror: Mirror) -> tuple[sp.csr_matrix, ...] | None:
-    """K₊ and K₋ of a symmetric sparse matrix; None if the mirror does not leave it as it is."""
+    """Return K₊ and K₋ of a symmetric sparse matrix, or None if the mirror changes it."""
     if not _is_mirrored(matrix, mirror):
         return None
     return tuple(_half(matrix, mirror, basis) for basis in mirror.bases)
 
 
 def _is_mirrored(matrix: sp.csr_matrix, mirror: Mirror) -> bool:
-    """Whether the forces of a random displacement's image are the image of its forces."""
+    """Return whether the mirror leaves the matrix unchanged.
+
+    This is tested with a random displacement: the forces of its image must be the image of its
+    forces.
+    """
     displacement = np.random.default_rng(0).standard_normal(matrix.shape[0])
     image = mirror.matrix()
     apart = np.abs(matrix @ (image @ displacement) - image @ (matrix @ displacement))
@@ -177,11 +182,15 @@ def _is_mirrored(matrix: sp.csr_matrix, mirror: Mirror) -> bool:
 
 
 def _half(matrix: sp.csr_matrix, mirror: Mirror, basis: sp.csr_matrix) -> sp.csr_matrix:
-    """QᵀKQ from the rows of K of one unknown of each pair: those of its image say the same."""
+    """Return QᵀKQ from the rows of K of one unknown of each pair.
+
+    The rows of its image contain the same information.
+    """
     columns = basis.tocsc()
     first = columns.indices[columns.indptr[:-1]]
     alone = np.diff(columns.indptr) == 1
     half = (matrix[first] @ basis).tocsr()
-    # Of a pair q = (e ± e')/√2 the row of e is half of √2 qᵀK; one alone is all of its own.
+    # For a pair q = (e ± e')/√2 the row of e, times √2, is that of q in the half; an unknown
+    # without a partner has its own row.
     half.data *= np.repeat(np.where(alone, 1.0, np.sqrt(2.0)), np.diff(half.indptr))
     return half

@@ -1,4 +1,4 @@
-"""Abaqus input files as CAE writes them, by hand."""
+"""Handwritten Abaqus input files in the style of CAE."""
 
 from fe_models.geometry.imported import read_bodies
 

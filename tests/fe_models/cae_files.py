@@ -1,4 +1,4 @@
-"""Two small blocks as several programs write them, for tests: one on the other, 2 x 1 x 1 mm."""
+"""Files of two small blocks, one on the other, as several programs write them (2 x 1 x 1 mm)."""
 
 from itertools import pairwise
 
@@ -17,10 +17,10 @@ EDGES = {
 
 
 def mixed_column():
-    """Points and cells by shape of a column of hexahedra, wedges, pyramids and tetrahedra.
+    """Return points and cells, by shape, of a column of hexahedra, wedges, pyramids and tetrahedra.
 
-    2 x 2 x 3 cells of 1 mm: hexahedra below, then pairs of wedges, then pyramids round the middle
-    of each cell, of which the uppermost is two tetrahedra.
+    It has 2 x 2 x 3 cells of 1 mm: hexahedra below, then pairs of wedges, then pyramids around the
+    middle of each cell, of which the uppermost is two tetrahedra.
     """
     points = [(x, y, z) for z in range(4) for y in range(3) for x in range(3)]
     at = {point: number for number, point in enumerate(points)}
@@ -46,7 +46,7 @@ def mixed_column():
 
 
 def mixed_plate():
-    """Points and cells by shape of a plate of quadrilaterals and triangles, 2 x 2 mm."""
+    """Return points and cells, by shape, of a plate of quadrilaterals and triangles, 2 x 2 mm."""
     points = [(x, y, 0.0) for y in range(3) for x in range(3)]
     quads = [[0, 1, 4, 3], [4, 5, 8, 7]]
     triangles = [[1, 2, 4], [2, 5, 4], [3, 4, 7], [3, 7, 6]]
@@ -54,7 +54,7 @@ def mixed_plate():
 
 
 def second_order(points, cells):
-    """The same with midside nodes, those of each edge once, in the order of ``EDGES``."""
+    """Return the mesh with midside nodes, one for each edge, in the order of ``EDGES``."""
     places, middle = list(points), {}
     full = {}
     for shape, block in cells.items():
@@ -86,7 +86,7 @@ UNIVERSAL = {
 
 
 def abaqus(points, cells):
-    """A flat Abaqus file."""
+    """Return a flat Abaqus file."""
     lines = ["*Heading", " mixed", "*Node"]
     lines += [f"{n:7d}, {x:.6f}, {y:.6f}, {z:.6f}" for n, (x, y, z) in enumerate(points, 1)]
     number = 0
@@ -101,7 +101,7 @@ def abaqus(points, cells):
 
 
 def nastran(points, cells, form="small"):
-    """A bulk data file in small, large or free fields."""
+    """Return a bulk data file in small, large or free fields."""
     lines = ["SOL 101", "CEND", "BEGIN BULK", "$ nodes"]
     number = 0
     for n, place in enumerate(points, 1):
@@ -127,7 +127,10 @@ def nastran(points, cells, form="small"):
 
 
 def universal(points, cells):
-    """A universal file: of second order nodes go round the faces, midsides between corners."""
+    """Return a universal file.
+
+    In elements of second order the nodes go around the faces, with midside nodes between corners.
+    """
     rings = {
         "tetra": (0, 4, 1, 5, 2, 6, 7, 8, 9, 3),
         "wedge": (0, 6, 1, 7, 2, 8, 12, 13, 14, 3, 9, 4, 10, 5, 11),

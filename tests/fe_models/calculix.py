@@ -1,7 +1,7 @@
-"""CalculiX on meshes of ours: its input from elastic bodies, its answers from the .dat file.
+"""CalculiX on our meshes: its input from elastic bodies, and its results from the .dat file.
 
-Nodes and elements are numbered from 1, those of all bodies one after the other. Numbers in the
-.dat file have seven digits.
+Nodes and elements are numbered from 1, those of all bodies one after the other. Numbers in the .dat
+file have seven digits.
 """
 
 from __future__ import annotations
@@ -29,17 +29,17 @@ EDGES = {
 }
 # xx, yy, zz, xy, xz, yz of CalculiX to xx, yy, zz, xy, yz, zx.
 COMPONENTS = [0, 1, 2, 3, 5, 4]
-# What CalculiX leaves of balance, and of the last correction: by itself 0.5 and 1 %.
+# CalculiX's tolerances of balance and of the last correction; its defaults are 0.5 and 1 %.
 BALANCED = "1.e-6, 1.e-6"
-# Tension that its penalty leaves far from contact [MPa].
+# Tension due to its penalty far from contact [MPa].
 TENSION = 1e-4
-# A coefficient of an equation below this share of its largest is rounding.
+# Coefficients of an equation below this share of the largest are rounding errors.
 NO_COEFFICIENT = 1e-12
 
 
 @dataclass
 class Step:
-    """Loads at the end of a step of so many ``increments``, whose own ``loads`` are cards."""
+    """Loads at the end of a step of so many ``increments``; its own ``loads`` are cards."""
 
     increments: int = 1
     loads: list[str] = field(default_factory=list)
@@ -47,7 +47,7 @@ class Step:
 
 @dataclass
 class Job:
-    """Bodies, cards of the model such as what holds them, and the steps of their loads."""
+    """Bodies, cards of the model such as supports, and the steps of their loads."""
 
     bodies: Sequence[ElasticBody]
     model: list[str] = field(default_factory=list)
@@ -55,7 +55,7 @@ class Job:
 
     @property
     def offsets(self) -> Indices:
-        """Nodes before those of each body."""
+        """Number of nodes before those of each body."""
         return np.cumsum([0] + [len(body.nodes) for body in self.bodies])
 
     def hold(self, number: int, nodes: Indices, axes: Sequence[int] = (0, 1, 2)) -> None:
@@ -65,7 +65,7 @@ class Job:
             self.model += [f"{node}, {axis + 1}, {axis + 1}" for axis in axes]
 
     def tie(self, relation: Array) -> None:
-        """Σ_j C_ij u_j = 0 in every direction, C ``(m, all nodes)``."""
+        """Impose Σ_j C_ij u_j = 0 in every direction, C ``(m, all nodes)``."""
         for row, dependent in zip(*_eliminated(relation), strict=True):
             others = np.flatnonzero(np.abs(row) > NO_COEFFICIENT * np.abs(row).max())
             terms = [dependent, *others[others != dependent]]
@@ -75,14 +75,14 @@ class Job:
                 self.model += [", ".join(told[k : k + 4]) for k in range(0, len(told), 4)]
 
     def load(self, number: int, forces: Array) -> None:
-        """Nodal forces ``(size,)`` on a body at the end of the last step."""
+        """Add nodal forces ``(size,)`` on a body at the end of the last step."""
         cards = self.steps[-1].loads
         cards.append("*CLOAD")
         for node, force in enumerate(forces.reshape(-1, 3), start=self.offsets[number] + 1):
             cards += [f"{node}, {axis + 1}, {f:.12e}" for axis, f in enumerate(force) if f]
 
     def touch(self, boundary: str, stiffness: float, friction: float) -> None:
-        """Contact of a boundary of the second body's nodes on that of the first.
+        """Add contact of the nodes of a boundary of the second body with one of the first.
 
         Its penalty is a ``stiffness`` [MPa/mm], across the faces and along them.
         """
@@ -99,7 +99,7 @@ class Job:
         self.model += ["*FRICTION", f"{friction:.12e}, {stiffness:.12e}"]
 
     def press(self, number: int, boundary: str, pressure: float) -> None:
-        """A pressure on a boundary, as CalculiX integrates it."""
+        """Add a pressure on a boundary, as CalculiX integrates it."""
         mesh = self.bodies[number].body.mesh
         first = 1 + sum(body.body.mesh.nelements for body in self.bodies[:number])
         cards = self.steps[-1].loads
@@ -108,7 +108,7 @@ class Job:
             cards.append(f"{first + element}, P{side}, {pressure:.12e}")
 
     def run(self, folder: Path) -> Answer:
-        """Solve it; displacements and stresses at the end of the last increment."""
+        """Solve the job; return displacements and stresses at the end of the last increment."""
         file = folder / "job.inp"
         file.write_text("\n".join(self._lines()) + "\n")
         done = subprocess.run(
@@ -151,9 +151,9 @@ class Job:
 
 @dataclass(frozen=True)
 class Answer:
-    """``displacements`` ``(n, 3)`` [mm] of each body, ``stresses`` ``(6, elements, points)``.
+    """Displacements ``(n, 3)`` [mm] of each body, and stresses ``(6, elements, points)``.
 
-    Stress is that at the integration points, near the corners of the element in its own order.
+    Stress is that at the integration points, near the corners of the element in CalculiX's order.
     """
 
     displacements: list[Array]
@@ -161,7 +161,7 @@ class Answer:
 
     @classmethod
     def read(cls, text: str, job: Job) -> Answer:
-        """The last of each table."""
+        """Read the last of each table."""
         tables: dict[str, Array] = {}
         parts = re.split(r"\n\s*(displacements|stresses)[^\n]*?(?:set (\S+))[^\n]*\n", text)
         for kind, name, rows in zip(parts[1::3], parts[2::3], parts[3::3], strict=True):
@@ -178,9 +178,9 @@ class Answer:
 
 
 def ordered(body: ElasticBody) -> tuple[Indices, Indices]:
-    """Nodes of the elements ``(m, 4 or 10)`` as CalculiX lists them, and their corners' places.
+    """Return the nodes of elements ``(m, 4 or 10)`` in CalculiX's order, and their corners' places.
 
-    Its elements are right-handed: the others are listed with two corners in each other's place.
+    CalculiX's elements are right-handed, so two corners of the others are exchanged.
     """
     mesh = body.body.mesh
     corners = mesh.p[:, mesh.t]
@@ -200,7 +200,7 @@ def ordered(body: ElasticBody) -> tuple[Indices, Indices]:
 
 
 def element_sides(body: ElasticBody, facets: Indices) -> list[tuple[int, int]]:
-    """Elements of facets and CalculiX's numbers of their faces there, counted from 1."""
+    """Return the elements of facets and CalculiX's numbers of their faces there, counted from 1."""
     nodes, _ = ordered(body)
     mesh, sides = body.body.mesh, []
     faces = [(0, 1, 2), (0, 1, 3), (1, 2, 3), (0, 2, 3)]
@@ -213,7 +213,10 @@ def element_sides(body: ElasticBody, facets: Indices) -> list[tuple[int, int]]:
 
 
 def stresses_of(body: ElasticBody, displacement: Array) -> Array:
-    """Stress ``(6, elements, points)`` at CalculiX's integration points from displacements."""
+    """Return stress ``(6, elements, points)`` at CalculiX's integration points.
+
+    It is computed from our displacements.
+    """
     basis = body.basis(2) if body.order == 2 else body.basis(1)
     gradient = np.stack(
         [np.asarray(basis.interpolate(u).grad) for u in displacement.reshape(-1, 3).T]
@@ -228,7 +231,7 @@ def stresses_of(body: ElasticBody, displacement: Array) -> Array:
 
 
 def _at_own_corners(body: ElasticBody, found: Array) -> Array:
-    """Of points ``(m, points, 6)`` near CalculiX's corners those near the mesh's."""
+    """Return values near the mesh's corners from those near CalculiX's, ``(m, points, 6)``."""
     if found.shape[1] == 1:
         return found
     _, places = ordered(body)
@@ -238,7 +241,7 @@ def _at_own_corners(body: ElasticBody, found: Array) -> Array:
 
 
 def _eliminated(relation: Array) -> tuple[Array, Indices]:
-    """The same equations, each with an unknown of its own, and these."""
+    """Return equivalent equations that each have an unknown of their own, and these unknowns."""
     _, _, order = sl.qr(relation, mode="economic", pivoting=True)
     dependent = order[: len(relation)]
     return np.linalg.solve(relation[:, dependent], relation), dependent

@@ -18,14 +18,14 @@ from fe_models.meshes.structure_mesh import Body, StructureMesh
 from fe_models.structure import CycleSolution, Structure
 from sa_solver.types import Array, Material
 
-# Coarse: the laws tested here hold on any mesh.
+# The mesh is coarse, because the laws tested here hold on any mesh.
 FLANK_NODES, SIZE, NOTCH = (8, 10), 8.0, 16
 
 
 def stress_state(
     structure: Structure, force: Array, relative: Array, amplitudes: Array
 ) -> tuple[StressField, StressField]:
-    """Stress fields of both bodies in one state, a cycle of a single increment."""
+    """Return the stress fields of both bodies in one state, a cycle of a single increment."""
     return cycle_stress(structure, force[None], relative[None], amplitudes[None], 0).fields
 
 
@@ -36,7 +36,7 @@ def titanium() -> Material:
 
 @pytest.fixture(scope="session")
 def dovetail() -> Dovetail:
-    """The joint of the default case."""
+    """Return the joint of the default case."""
     return Dovetail(
         flank_angle=np.deg2rad(45.0),
         flank_length=8.0,
@@ -60,13 +60,13 @@ def dovetail() -> Dovetail:
 
 @pytest.fixture(scope="session")
 def mission() -> Mission:
-    """The mission of the default case."""
+    """Return the mission of the default case."""
     return Mission(22, 8, 6000 * 2 * np.pi / 60, 0.8e-3, 400.0, 30e3)
 
 
 @pytest.fixture(scope="session")
 def symmetric(mission: Mission) -> Mission:
-    """The same without the aerodynamic moment: both flanks do the same."""
+    """Return the mission without the aerodynamic moment, for which both flanks behave the same."""
     return replace(mission, aerodynamic_moment=0.0)
 
 
@@ -79,9 +79,9 @@ def coarse_mesh(dovetail: Dovetail) -> StructureMesh:
 def structure_of(
     dovetail: Dovetail, titanium: Material, mission: Mission
 ) -> Callable[..., tuple[Structure, JointStiffness]]:
-    """Coarse structure and condensed joint of the default dovetail with some fields changed.
+    """Return the coarse structure and condensed joint of the default dovetail with changed fields.
 
-    Of the mission only the airfoil is built in; speeds and moment are amplitudes.
+    Of the mission only the airfoil is part of the structure; speeds and moment are amplitudes.
     """
 
     @cache
@@ -97,7 +97,7 @@ def structure_of(
 
 @pytest.fixture(scope="session")
 def solved(structure_of) -> Callable[..., CycleSolution]:
-    """Closed cycle of ``structure_of`` with a friction coefficient on a mission."""
+    """Return the closed cycle of ``structure_of`` with a friction coefficient on a mission."""
 
     @cache
     def solve(friction: float, mission: Mission, **changes) -> CycleSolution:
@@ -125,7 +125,7 @@ def make_box(
     material: Material,
     order: int,
 ) -> ElasticBody:
-    """A box of tetrahedra with boundaries x0, x1, y0, y1, z0, z1."""
+    """Return a box of tetrahedra with boundaries x0, x1, y0, y1, z0, z1."""
     steps = [np.linspace(a, b, n + 1) for a, b, n in zip(low, high, counts, strict=True)]
     mesh = MeshTet.init_tensor(*steps)
     faces = {

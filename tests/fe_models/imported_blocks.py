@@ -1,4 +1,4 @@
-"""Two bodies as a mesh file has them: a pad on a block."""
+"""Two bodies as in a user's mesh file: a pad on a block."""
 
 import numpy as np
 from skfem import MeshTet
@@ -17,7 +17,7 @@ def imported(lower, upper, points=None):
 
 
 def block_and_pad(full, match):
-    """A pad on a wider block, half of it (y > 0) or all; meshes match on the face or do not."""
+    """Return a pad on a wider block, half of it (y > 0) or all; meshes may match on the face."""
     x, z = along((-2, -1, 1), (-1, 1, 4), (1, 2, 1)), along((-2, 0, 2))
     lower = MeshTet.init_tensor(x, along((0, 1, 2), (1, 2, 1)), z)
     across = along((-1, 1, 4)) if match else along((-1, 1, 3))

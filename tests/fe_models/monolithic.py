@@ -1,4 +1,4 @@
-"""Frictional contact of two whole bodies in one matrix: the check on the condensed joint.
+"""Frictional contact of two whole bodies in one matrix, to check the condensed joint.
 
 It shares nothing with ``fe_models`` but the mesh and the closed form of Coulomb's law: stiffness
 from scikit-fem's own vector forms, supports and linear traces as equations with multipliers, both
@@ -9,9 +9,9 @@ bodies whole, and a method of multipliers with Newton's method inside instead of
 with w = B u the relative displacement of body 2 in the interface frames, f the force on it, w0 =
 (last wx, last wy, -gap), and C(·; g) the law where a given g bounds the shear: pressure max(0, ·),
 shear within g. These are the augmented equations of Alart and Curnier 1991, Comput. Methods Appl.
-Mech. Eng. 92, 353, doi:10.1016/0045-7825(91)90022-X. Newton's method on all of them at once may
-walk in circles, and rounding decides whether it does. As in Kunisch and Stadler 2005, M2AN 39, 827,
-doi:10.1051/m2an:2005036, they are solved one within the other, none of which can walk in circles:
+Mech. Eng. 92, 353, doi:10.1016/0045-7825(91)90022-X. Newton's method on all of them together may
+cycle, depending on rounding. As in Kunisch and Stadler 2005, M2AN 39, 827,
+doi:10.1051/m2an:2005036, they are therefore solved in nested loops, none of which can cycle:
 
 - u, with f and g held, has least energy: the elastic one, less the work of F, plus |C|² / 2r.
   That is convex and has a continuous slope, so Newton's steps, cut where a whole one does not help,
@@ -39,9 +39,9 @@ from skfem.models.elasticity import lame_parameters, linear_elasticity
 from sa_solver.types import Array, Material
 
 ELEMENTS = {1: ElementTetP1, 2: ElementTetP2}
-# Out-of-balance forces left, relative to the load: little more than rounding.
+# Tolerated out-of-balance forces relative to the load, little more than rounding.
 TOLERANCE = 1e-12
-# A smaller share of the residual out of balance would not make the next forces any better.
+# Share of the residual to which the balance is solved; less would not improve the next forces.
 BALANCED = 0.1
 MAX_RENEWALS = 200
 MAX_NEWTON_STEPS = 200
@@ -51,14 +51,14 @@ REGULARISATION = 1e-8
 
 
 def whole_stiffness(mesh: MeshTet, material: Material, order: int) -> sp.csr_matrix:
-    """Stiffness ``(3 n, 3 n)`` by scikit-fem's linear elasticity, numbered 3 node + component."""
+    """Return the stiffness ``(3 n, 3 n)`` by scikit-fem, numbered 3 node + component."""
     basis = Basis(mesh, ElementVector(ELEMENTS[order]()))
     form = linear_elasticity(*lame_parameters(material.young, material.poisson))
     return form.assemble(basis).tocsr()
 
 
 def rows(size: int, dofs: Array, coefficients: Array) -> sp.csr_matrix:
-    """Equations Σ c u = 0, one per row of ``dofs`` and ``coefficients``, both ``(m, k)``."""
+    """Return equations Σ c u = 0, one per row of ``dofs`` and ``coefficients``, both ``(m, k)``."""
     count = np.repeat(np.arange(len(dofs)), dofs.shape[1])
     shape = (len(dofs), size)
     return sp.csr_matrix((coefficients.ravel(), (count, dofs.ravel())), shape=shape)
@@ -79,7 +79,7 @@ def mean_held(size: int, nodes: Array, weights: Array, direction: Array) -> sp.c
 
 
 def linear_trace(size: int, middle: Array, parents: Array) -> sp.csr_matrix:
-    """Midsides that stay halfway between the vertices beside them."""
+    """Return the equations of midside nodes that stay halfway between their vertices."""
     nodes = np.column_stack([middle, parents])
     dofs = (3 * nodes[:, None, :] + np.arange(3)[:, None]).reshape(-1, 3)
     return rows(size, dofs, np.tile([1.0, -0.5, -0.5], (len(dofs), 1)))
@@ -100,7 +100,11 @@ class Part:
 
 @dataclass(frozen=True)
 class WholeState:
-    """``force`` on body 2 and relative ``displacement`` ``(3, n)`` in the frames; all ``u``."""
+    """State at the end of an increment.
+
+    It has the ``force`` on body 2 and the relative ``displacement`` ``(3, n)`` in the frames, and
+    all ``u``.
+    """
 
     force: Array
     displacement: Array
@@ -110,7 +114,7 @@ class WholeState:
 
 
 class Monolith:
-    """Body 1 and body 2 with the contact between them; ``frames`` ``(n, 3, 3)``."""
+    """Body 1 and body 2 with the contact between them; ``frames`` are ``(n, 3, 3)``."""
 
     def __init__(self, part_1: Part, part_2: Part, frames: Array, friction: float) -> None:
         parts = (part_1, part_2)
@@ -120,9 +124,9 @@ class Monolith:
         self.jump = sp.hstack([-first, second], format="csr")
         self.friction = friction
         typical_stiffness = float(np.median(abs(self.jump) @ self.stiffness.diagonal()))
-        # Any positive number will do; some times the contact's own stiffness is quick.
+        # Any positive number is valid; a few times the contact's stiffness converges quickly.
         self.augmentation = 10.0 * typical_stiffness
-        # Equations in displacements are multiplied to weigh as much as those in forces.
+        # Equations in displacements are scaled to the weight of those in forces.
         self.equations = typical_stiffness * sp.block_diag(
             [p.equations for p in parts], format="csr"
         )
@@ -134,7 +138,7 @@ class Monolith:
         return blocks @ rows(part.stiffness.shape[0], dofs, np.ones(dofs.shape))
 
     def march(self, amplitudes: Array, gap: Array) -> Iterator[WholeState]:
-        """States along a load path ``(increments, cases)`` from the unslipped state."""
+        """Return states along a load path ``(increments, cases)`` from the unslipped state."""
         u, multipliers = np.zeros(len(self.loads)), np.zeros(self.equations.shape[0])
         start = _Guess(u, multipliers, np.zeros((len(gap), 3)))
         previous = np.zeros((3, len(gap)))
@@ -148,7 +152,7 @@ class Monolith:
             yield WholeState(start.force.T, displacement, slip, start.u, renewals)
 
     def tied(self, amplitude: Array, closed: Array) -> tuple[Array, Array]:
-        """Forces ``(3, n)`` on body 2 and u with the ``closed`` nodes bonded, the others free."""
+        """Return forces ``(3, n)`` on body 2, and u, with the ``closed`` nodes bonded."""
         bond = self.jump[np.repeat(closed, 3)]
         system = sp.bmat(
             [
@@ -176,7 +180,7 @@ class _Guess:
 
 
 class _Increment:
-    """One increment: the whole bodies under ``load``, nodes measured from ``datum`` ``(n, 3)``."""
+    """One increment of the bodies under ``load``, with nodes relative to ``datum`` ``(n, 3)``."""
 
     def __init__(self, whole: Monolith, load: Array, datum: Array) -> None:
         self.whole, self.load, self.datum = whole, load, datum
@@ -186,7 +190,7 @@ class _Increment:
         self.regularised = whole.stiffness + REGULARISATION * diagonal
 
     def solve(self, start: _Guess) -> tuple[_Guess, int]:
-        """The state at the end of the increment, and how often its forces were renewed."""
+        """Return the state at the end of the increment, and the number of updates of its forces."""
         guess, residual = start, float(np.linalg.norm(self.load))
         bound = np.full(len(self.datum), np.inf)
         self._factorise(guess, bound)
@@ -201,7 +205,7 @@ class _Increment:
         raise AssertionError("the forces of the whole bodies did not converge")
 
     def _residual(self, guess: _Guess) -> float:
-        """How far the increment's equations are from fulfilled, in forces."""
+        """Return the residual of the increment's equations, in forces."""
         whole, (u, multipliers, force) = self.whole, (guess.u, guess.multipliers, guess.force)
         elastic = whole.stiffness @ u + whole.equations.T @ multipliers
         balance = elastic - whole.jump.T @ force.ravel() - self.load
@@ -211,9 +215,9 @@ class _Increment:
         )
 
     def _minimise(self, guess: _Guess, bound: Array, enough: float) -> _Guess:
-        """The least augmented energy: Newton's steps, cut where a whole one does not help.
+        """Minimise the augmented energy by Newton steps, which are shortened if needed.
 
-        A derivative serves until a step with it no longer halves the imbalance.
+        A derivative is kept until a step with it no longer halves the imbalance.
         """
         smallest = np.inf
         for _ in range(MAX_NEWTON_STEPS):
@@ -231,7 +235,7 @@ class _Increment:
         raise AssertionError("the energy of the whole bodies was not minimised")
 
     def _lowest(self, guess: _Guess, ahead: _Guess, bound: Array) -> _Guess:
-        """Where the energy is least between two guesses: the slope from one to the other is 0."""
+        """Return the point of least energy between two guesses, where the slope is 0."""
         step = ahead.u - guess.u
 
         def between(length: float) -> _Guess:
@@ -253,7 +257,7 @@ class _Increment:
         self._factors = splu(sp.bmat(matrix, format="csc"), permc_spec="MMD_AT_PLUS_A")
 
     def _ahead(self, guess: _Guess, bound: Array) -> _Guess:
-        """A whole step from the guess."""
+        """Return the guess after a full Newton step."""
         imbalance = np.concatenate([self._slope(guess, bound), self.whole.equations @ guess.u])
         step, multipliers = np.split(self._factors.solve(-imbalance), [len(guess.u)])
         return _Guess(guess.u + step, multipliers, guess.force)
@@ -266,7 +270,7 @@ class _Increment:
         return guess.force - self.whole.augmentation * (relative - self.datum)
 
     def _slope(self, guess: _Guess, bound: Array) -> Array:
-        """Slope ``(3 n,)`` of the augmented energy with the displacements."""
+        """Return the derivative ``(3 n,)`` of the augmented energy by the displacements."""
         force = law(self._trial(guess), bound)
         return self.whole.stiffness @ guess.u - self.whole.jump.T @ force.ravel() - self.load
 
@@ -276,14 +280,17 @@ class _Increment:
 
 
 def law(trial: Array, bound: Array) -> Array:
-    """Admissible forces ``(n, 3)`` nearest to ``trial``: no pull, no shear beyond ``bound``."""
+    """Return admissible forces ``(n, 3)`` nearest to ``trial``.
+
+    They do not pull, and their shear is within ``bound``.
+    """
     size = np.linalg.norm(trial[:, :2], axis=1)
     share = np.minimum(1.0, bound / np.where(size > 0.0, size, 1.0))
     return np.column_stack([share[:, None] * trial[:, :2], np.maximum(trial[:, 2], 0.0)])
 
 
 def law_slopes(trial: Array, bound: Array) -> Array:
-    """Derivatives ``(n, 3, 3)`` of :func:`law`: open, stuck or sliding."""
+    """Return derivatives ``(n, 3, 3)`` of :func:`law` for open, stuck or sliding nodes."""
     size = np.linalg.norm(trial[:, :2], axis=1)
     slides = size > bound
     direction = trial[:, :2] / np.where(size > 0.0, size, 1.0)[:, None]

@@ -1,4 +1,4 @@
-"""Two blocks whose meshes have nothing in common, pressed on each other."""
+"""Two blocks with meshes that have nothing in common, pressed on each other."""
 
 import numpy as np
 import scipy.sparse as sp
@@ -18,7 +18,7 @@ LINE, SURFACE = 2, 3
 DIMENSIONS = [LINE, SURFACE]
 ORDERS = [1, 2]
 STEEL, TITANIUM = Material(200e3, 0.3), Material(115e3, 0.3)
-# What the friction solver leaves of the forces; the projection itself is exact to rounding.
+# Error of the forces due to the friction solver; the projection is exact to rounding.
 SOLVER = 1e-6
 
 # Two blocks pressed on each other, with meshes that have nothing in common.
@@ -26,7 +26,7 @@ LOW, MIDDLE, HIGH = (0.0, 0.0, 0.0), 1.5, (2.0, 3.0, 4.0)
 
 
 def block(counts, low, high, material, order, shake, seed):
-    """A box, or a rectangle in the plane (X, Z), of irregular elements; boundaries x0 ... z1."""
+    """Return a box, or a plane rectangle (X, Z), of irregular elements; boundaries x0 ... z1."""
     axes = AXES[len(counts)]
     steps = [
         np.linspace(low[axis], high[axis], n + 1) for axis, n in zip(axes, counts, strict=True)
@@ -47,7 +47,7 @@ def block(counts, low, high, material, order, shake, seed):
 
 
 def isostatic(elastic):
-    """Constraints that only keep the body from moving as a whole."""
+    """Return constraints that only prevent the rigid motions of the body."""
     low, high = elastic.nodes.min(axis=0), elastic.nodes.max(axis=0)
     corners = [low] + [np.where(np.arange(3) == axis, high, low) for axis in range(2)]
     origin, along_x, along_y = (
@@ -64,7 +64,7 @@ def isostatic(elastic):
 
 
 def boundary_load(elastic, stress, contact):
-    """Forces ``(size,)`` of a stress field ``(3, 3)`` on all faces but the contact.
+    """Return forces ``(size,)`` of a stress field ``(3, 3)`` on all faces except the contact.
 
     ``stress`` gives it at points ``(3, ...)``.
     """
@@ -84,7 +84,7 @@ def boundary_load(elastic, stress, contact):
 
 
 class Pressed:
-    """A held block, one that floats on it, and their interface; both under a stress field."""
+    """A held block, a floating one on it, and their interface, both under a stress field."""
 
     def __init__(
         self, dimension, order, materials, stress, cells=((2, 3, 2), (3, 4, 3)), shake=0.2
@@ -114,11 +114,11 @@ class Pressed:
         return len(self.elastic[number].nodes)
 
     def glued(self):
-        """Contact forces ``(n, d)`` on body 2 without relative displacement."""
+        """Return contact forces ``(n, d)`` on body 2 without relative displacement."""
         return self.joint.loads[:, 0].reshape(-1, self.dimension)
 
     def rubbing(self, friction):
-        """Contact forces and relative displacements ``(n, d)`` with Coulomb friction."""
+        """Return contact forces and relative displacements ``(n, d)`` with Coulomb friction."""
         frictional = FrictionalJoint(self.joint.resolvent(), friction)
         (state,) = frictional.march(np.ones((1, 1)), self.interface.gap)
         assert state.converged
@@ -126,7 +126,7 @@ class Pressed:
         return state.force[axes].T, state.displacement[axes].T
 
     def stresses(self, force, relative):
-        """Stresses ``(6, elements)`` of both bodies."""
+        """Return stresses ``(6, elements)`` of both bodies."""
         one = np.ones(1)
         first, at_1 = self.bodies[0].respond(-self.projection.T @ force.ravel(), one)
         at_2 = self.projection @ at_1 + relative.ravel()
@@ -135,5 +135,5 @@ class Pressed:
 
     @property
     def areas(self):
-        """Nodal areas of body 2's face; it is covered whole."""
+        """Nodal areas of body 2's face, which is covered completely."""
         return self.interface.nodal_areas

@@ -1,4 +1,4 @@
-"""Abaqus input files: parts, instances, surfaces and sets, flat files."""
+"""Abaqus input files: parts, instances, surfaces and sets, and flat files."""
 
 import meshio
 import numpy as np
@@ -32,7 +32,7 @@ def test_every_instance_is_a_body_with_its_part_s_numbers(assembled):
 
 
 def test_instance_is_translated_and_then_turned(assembled):
-    """(x, y, z) goes to (3 + z, y, 5 - x)."""
+    """Check that (x, y, z) goes to (3 + z, y, 5 - x)."""
     x, y, z = assembled.bodies["Block-1"].points.T
     expected = np.column_stack([3.0 + z, y, 5.0 - x])
     np.testing.assert_allclose(assembled.bodies["Block-2"].points, expected, atol=1e-12)
@@ -66,7 +66,7 @@ def test_surfaces_are_where_they_should_be(assembled, body, boundary, area, cent
 
 
 def test_node_sets_are_those_of_each_body(assembled):
-    """A range means the nodes that exist; the reference point is on no body."""
+    """Check that a range means existing nodes, and that the reference point is on no body."""
     numbers = {
         body: {
             name: assembled.node_numbers[body][vertices].tolist() for name, vertices in sets.items()
@@ -97,7 +97,7 @@ def test_node_set_of_an_element_set_and_node_surface(tmp_path):
 
 
 def test_independent_instance_has_its_own_mesh(tmp_path):
-    """CAE writes the mesh of an independent instance inside it and leaves the part empty."""
+    """Check a mesh inside an independent instance, whose part CAE leaves empty."""
     body = PARTS[PARTS.index("*Node") : PARTS.index("*End Part")]
     text = (
         "*Part, name=Block\n*End Part\n*Assembly, name=A\n*Instance, name=B, part=Block\n"
@@ -121,7 +121,7 @@ def test_included_file_is_followed_and_named(tmp_path):
     text = "*Node\n*Include, input=mesh/nodes.inc\n*Element, type=C3D4, elset=Tip\n1, 1, 2, 3, 4\n"
     assert volume(read(tmp_path, text).bodies["Tip"]) == pytest.approx(1 / 6)
     path.write_text("1, 0., 0., 0.\n2, x, 0., 0.\n")
-    with pytest.raises(MeshError, match=r"nodes\.inc:2: 'x' is no number"):
+    with pytest.raises(MeshError, match=r"nodes\.inc:2: 'x' is not a number"):
         read(tmp_path, text)
     path.write_text("*Include, input=nodes.inc\n")
     with pytest.raises(MeshError, match=r"nodes\.inc:1: the included file nodes\.inc includes its"):
@@ -152,7 +152,7 @@ VOLUMES = {"C3D4": 1 / 6, "C3D5": 1 / 3, "C3D6": 0.5, "C3D8": 1.0, "CPE3": 0.5, 
 
 @pytest.mark.parametrize("kind", UNIT)
 def test_faces_of_every_element_are_those_of_the_manual(tmp_path, kind):
-    """Y of a plane file is our Z."""
+    """Check face numbers; Y of a plane file is our Z."""
     nodes = "".join(f"{k}, {x}, {y}, {z}\n" for k, (x, y, z) in enumerate(UNIT[kind], start=1))
     count = len(NORMALS[kind])
     surfaces = "".join(f"*Surface, name=F{k}\nOne, S{k}\n" for k in range(1, count + 1))
@@ -165,7 +165,7 @@ def test_faces_of_every_element_are_those_of_the_manual(tmp_path, kind):
 
 
 def test_midside_nodes_are_dropped_and_lines_go_on(tmp_path):
-    """A C3D20 over two lines, as CAE writes it."""
+    """Check a C3D20 over two lines, as CAE writes it."""
     corners = np.array(UNIT["C3D8"], dtype=float)
     pairs = [(0, 1), (1, 2), (2, 3), (3, 0), (4, 5), (5, 6), (6, 7), (7, 4)]
     pairs += [(k, k + 4) for k in range(4)]
@@ -180,7 +180,7 @@ def test_midside_nodes_are_dropped_and_lines_go_on(tmp_path):
 
 
 def two_boxes():
-    """Boxes of tetrahedra from x = 0 to 1 and from 2 to 4; each face x = const to the left."""
+    """Return boxes of tetrahedra from x = 0 to 1 and from 2 to 4, with named faces x = const."""
     points, cells, facets = [], [], []
     for low, high in ((0.0, 1.0), (2.0, 4.0)):
         mesh = MeshTet.init_tensor(np.linspace(low, high, 3), *[np.linspace(0.0, 1.0, 3)] * 2)
@@ -269,7 +269,7 @@ def test_edges_beside_solids_are_a_node_set(tmp_path):
 
 
 def test_plane_part(tmp_path):
-    """Two coordinates a node; the second is our Z."""
+    """Check a part with two coordinates per node, of which the second is our Z."""
     text = (
         "*Part, name=Sheet\n*Node\n1, 0., 0.\n2, 2., 0.\n3, 2., 1.\n4, 0., 1.\n"
         "*Element, type=CPE4R\n1, 1, 2, 3, 4\n*Surface, name=Top\n1, S3\n*End Part\n"
@@ -286,7 +286,7 @@ def test_plane_part(tmp_path):
 
 
 def test_bonded_sets_of_a_flat_file_are_refused(tmp_path):
-    """Unless a set holds both."""
+    """Check that bonded sets are refused unless one set holds both."""
     sets = "*Elset, elset=A\n7\n*Elset, elset=B\n8\n"
     with pytest.raises(MeshError, match="element sets A, B share nodes: they are bonded"):
         read(tmp_path, CUBES + sets)

@@ -1,4 +1,4 @@
-"""Abaqus input files that are not carried over: what is refused, and where."""
+"""Abaqus input files that are refused: the reason, and the line."""
 
 import pytest
 
@@ -68,7 +68,7 @@ def test_keyword_is_refused_where_it_stands(tmp_path, keyword, reason):
         (" 7, 8, 1", " 7, 8, 0", " 7, 8, 0", "allowed: first number, last number, step"),
         (" 3., 0., 5.\n", " 3., 0.\n 1.\n", " 3., 0.", "allowed: a line of 3 numbers"),
         ("3., 1., 5., 90.", "3., 0., 5., 90.", " 3., 0., 5., 3.", "axis of rotation has no length"),
-        (" 1, 1, 2, 3, 4", " 1, 1, 2, 3, x", " 1, 1, 2", "'x' is no whole number"),
+        (" 1, 1, 2, 3, 4", " 1, 1, 2, 3, x", " 1, 1, 2", "'x' is not a whole number"),
     ],
 )
 def test_wrong_line_is_refused_where_it_stands(tmp_path, old, new, at, message):
@@ -101,7 +101,7 @@ def test_wrong_line_is_refused_where_it_stands(tmp_path, old, new, at, message):
             "T3D2 is a truss: mesh its volume",
         ),
         ("*Heading\n", "has no elements"),
-        ("1, 2, 3\n", "is no Abaqus input"),
+        ("1, 2, 3\n", "is not Abaqus input"),
         ("** nothing\n", "has no keywords"),
         (CUBES + "*Nset, nset=A\n 1\n", "node set A names number 1, which is not defined"),
         (

@@ -1,4 +1,4 @@
-"""Damaged files end the process that reads them at most, and leave one line."""
+"""Damaged files crash at most the process that reads them, and give one line of error."""
 
 import os
 import signal
@@ -37,7 +37,7 @@ def test_what_is_read_apart_is_what_is_read_here(boxes, reads_here, monkeypatch)
 
 
 def test_a_damaged_solid_is_one_line(boxes, tmp_path):
-    """OpenCASCADE follows an entity that is none, into the end of its process."""
+    """Check a file with an invalid entity, which crashes OpenCASCADE."""
     damaged = tmp_path / "damaged.step"
     damaged.write_text(boxes.read_text().replace("FACE_BOUND", "FACE_BO ND", 1))
     with pytest.raises(MeshError) as told:
@@ -50,9 +50,13 @@ def test_a_damaged_solid_is_one_line(boxes, tmp_path):
 @pytest.mark.parametrize(
     ("ending", "number", "words"),
     [
-        (signal.raise_signal, 11, r"gmsh broke down as it read it \(Segmentation fault\): damaged"),
-        (signal.raise_signal, 9, "the process that read it was killed: for its memory"),
-        (os._exit, 3, r"gmsh broke down as it read it \(exit code 3\)"),
+        (signal.raise_signal, 11, r"gmsh crashed as it read it \(Segmentation fault\)"),
+        (
+            signal.raise_signal,
+            9,
+            "the process that read it was killed, perhaps because memory ran out",
+        ),
+        (os._exit, 3, r"gmsh crashed as it read it \(exit code 3\)"),
     ],
 )
 def test_the_end_of_the_process_is_told(ending, number, words):
@@ -63,7 +67,7 @@ def test_the_end_of_the_process_is_told(ending, number, words):
 @posix_only
 @pytest.mark.skipif(not Path("/proc").exists(), reason="looks for processes in /proc")
 def test_the_process_ends_with_whoever_reads():
-    """However that one ends."""
+    """Check that the reading process ends with its parent, however that ends."""
     reading = "from fe_models.readers.reader_process import read_apart; read_apart(time.sleep, 99)"
     with subprocess.Popen([sys.executable, "-c", f"import time; {reading}"]) as process:
         below = Path(f"/proc/{process.pid}/task/{process.pid}/children")
@@ -72,7 +76,7 @@ def test_the_process_ends_with_whoever_reads():
             time.sleep(0.01)
         (child,) = children
         process.kill()
-    # One that nobody has waited for yet is a zombie.
+    # A process that nobody has waited for yet is a zombie.
     state = Path(f"/proc/{child}/stat")
     while time.monotonic() < end and state.exists() and ") Z " not in state.read_text():
         time.sleep(0.01)

@@ -1,4 +1,4 @@
-"""Combinations of displacements that change no mean: all of them, orthonormal, few entries."""
+"""Combinations of displacements that change no mean: complete, orthonormal and sparse."""
 
 import numpy as np
 import pytest
@@ -34,7 +34,10 @@ def test_means_that_say_the_same_count_once():
 
 
 def test_constraints_beside_means():
-    """Held and rigid before, sliding after: means stay zero, and what is free is found again."""
+    """Check means with held and rigid nodes before, and sliding ones after.
+
+    The means stay zero, and the free displacements are found again.
+    """
     rng = np.random.default_rng(2)
     points = rng.random((50, 3))
     constraints = Constraints(50)

@@ -1,4 +1,4 @@
-"""One thread of OpenBLAS for small matrices, and as many as before afterwards."""
+"""One thread of OpenBLAS for small matrices, and the previous number afterwards."""
 
 import numpy as np
 import pytest
@@ -30,7 +30,7 @@ def test_large_matrices_keep_all_threads():
 
 
 def test_threads_are_set_and_told():
-    """That the calls do what their names say."""
+    """Check that the calls set and get the number of threads."""
     for choose, told in blas_threads._openblas():
         before = told()
         choose(1)

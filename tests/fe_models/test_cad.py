@@ -19,7 +19,7 @@ def volume(body):
 
 @pytest.fixture(scope="module")
 def write(tmp_path_factory, request):
-    """Write what a function draws with gmsh's OpenCASCADE kernel; its chatter is dropped."""
+    """Write what a function draws with gmsh's OpenCASCADE kernel; discard its output."""
 
     def to_file(name, draw):
         path = tmp_path_factory.mktemp("cad") / name
@@ -33,7 +33,7 @@ def write(tmp_path_factory, request):
 
 
 def draw_two_boxes(occ):
-    """Two boxes of the same width, one on the other."""
+    """Draw two boxes of the same width, one on the other."""
     occ.addBox(0.0, 0.0, 0.0, 2.0, 1.0, 1.0)
     occ.addBox(0.0, 0.0, 1.0, 2.0, 1.0, 0.5)
 
@@ -72,18 +72,18 @@ def test_boxes_that_touch_have_their_own_nodes(write, name):
 
 
 def test_a_brep_is_in_the_unit_that_is_given(write):
-    """Boxes of 2 x 1 x 1 and 2 x 1 x 0.5 cm, by elements of 5 mm; a STEP file says its unit."""
+    """Check boxes of 2 x 1 x 1 and 2 x 1 x 0.5 cm with elements of 5 mm."""
     path = write("boxes.brep", draw_two_boxes)
     lower, upper = read_bodies(path, 5.0, "cm").bodies.values()
     assert [volume(lower), volume(upper)] == pytest.approx([2000.0, 1000.0], rel=1e-12)
     edges = np.linalg.norm(np.diff(lower.mesh.p[:, lower.mesh.edges], axis=1)[:, 0], axis=0)
     assert np.median(edges) == pytest.approx(5.0, rel=0.4)
-    with pytest.raises(MeshError, match="STEP files state their unit, from which it is converted"):
+    with pytest.raises(MeshError, match="STEP files state their unit of length"):
         read_bodies(write("boxes.step", draw_two_boxes), 5.0, "cm")
 
 
 def test_volume_of_a_cylinder_converges(write):
-    """Chords cut off a share of the section that falls with the square of the size."""
+    """Check that the part of the section cut off by chords falls with the square of the size."""
     path = write("cylinder.step", lambda occ: occ.addCylinder(0, 0, 0, 0, 0, 2.0, 1.0))
     exact = 2.0 * np.pi
     errors = []
@@ -118,7 +118,7 @@ def test_solids_go_by_their_names(write, products, names):
     text = path.read_text()
     for number, product in enumerate(products, start=1):
         if product:
-            # OpenCASCADE's own name ends in the number of the file it writes and that of the solid.
+            # OpenCASCADE's own name ends in the numbers of the file and of the solid.
             anonymous = rf"'Open CASCADE STEP translator [\d.]+ \d+\.{number}'"
             text, count = re.subn(anonymous, f"'{product}'", text)
             assert count

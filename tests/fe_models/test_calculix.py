@@ -29,7 +29,7 @@ PRESSURE, PULL = 40.0, 25.0
 
 
 def blocks(order, curved=False, matching=True, shake=0.15):
-    """A block on another, of irregular tetrahedra whose edges may be bent by 5 % of them."""
+    """Return a block on another, of irregular tetrahedra with edges bent by up to 5 %."""
     rng = np.random.default_rng(5)
     if matching:
         bodies = split(box((4, 4, 6), (0.0, 3.5), rng, shake), 1.5)
@@ -50,13 +50,13 @@ def blocks(order, curved=False, matching=True, shake=0.15):
 
 
 def box(counts, heights, rng, shake):
-    """2 mm x 2 mm between two heights; nodes inside it and inside its faces are off their grid."""
+    """Return a box of 2 mm x 2 mm between two heights, with inner nodes off their grid."""
     ends = ((0.0, 2.0), (0.0, 2.0), heights)
     steps = [np.linspace(*end, n + 1) for end, n in zip(ends, counts, strict=True)]
     mesh = MeshTet.init_tensor(*steps)
     points = mesh.p.copy()
     for axis, step in enumerate(steps):
-        # A plane at 1.5 mm stays plane: the bodies may be cut there.
+        # A plane at 1.5 mm stays plane, so that the bodies can be cut there.
         flat = np.isin(mesh.p[axis], (step[0], step[-1], 1.5 if axis == 2 else np.nan))
         points[axis, ~flat] += rng.uniform(-shake, shake, (~flat).sum()) * (step[1] - step[0])
     if len(steps[2]) == 7:
@@ -66,7 +66,7 @@ def box(counts, heights, rng, shake):
 
 
 def split(mesh, height):
-    """The parts of a mesh below and above a height that its elements do not cross."""
+    """Return the parts of a mesh below and above a height that its elements do not cross."""
     below = mesh.p[2, mesh.t].mean(axis=0) < height
     parts = []
     for chosen in (below, ~below):
@@ -76,13 +76,13 @@ def split(mesh, height):
 
 
 def bent(body):
-    """Midsides off the middle of their edges by a smooth field of both bodies."""
+    """Return midside points moved off their edges' middles by a smooth field of both bodies."""
     middle = body.mesh.p[:, body.mesh.edges].mean(axis=1).T
     return middle + 0.03 * np.sin(5.0 * middle[:, [1, 2, 0]] + [0.3, 1.1, 2.0])
 
 
 def structure_of(bodies, matching):
-    """Both bodies: the lower held at its end, the upper pressed, pulled and pressed at a side."""
+    """Return both bodies: the lower one held at its end, the upper one loaded."""
     lower, upper = bodies
     order = lower.order
     if matching:
@@ -114,7 +114,7 @@ def applied(upper):
 
 
 def bonded(structure):
-    """Displacements of both bodies with no relative displacement anywhere."""
+    """Return displacements of both bodies without any relative displacement."""
     joint = structure.condense()
     loads = joint.resolvent().loads[:, 0]
     force, nothing = loads.reshape(-1, 3).T, np.zeros((3, len(loads) // 3))
@@ -122,7 +122,7 @@ def bonded(structure):
 
 
 def relation(structure):
-    """C of what bonds the bodies: Σ_j C_ij u_j = 0 over the nodes of both."""
+    """Return C of the bond between the bodies: Σ_j C_ij u_j = 0 over the nodes of both."""
     (face,) = structure.mesh.interfaces
     parts = []
     for side, body in enumerate(structure.bodies, start=1):
@@ -138,7 +138,7 @@ def relation(structure):
 
 
 def compare(bodies, displacements, answer):
-    """Largest differences of displacements and of stresses, relative to the largest."""
+    """Return the largest differences of displacements and stresses, relative to the largest."""
     ours = np.concatenate([u.reshape(-1, 3) for u in displacements])
     theirs = np.concatenate(answer.displacements)
     moved = np.abs(ours - theirs).max() / np.abs(theirs).max()
@@ -152,18 +152,18 @@ def compare(bodies, displacements, answer):
 
 @pytest.fixture
 def as_calculix(monkeypatch):
-    """Four integration points in curved tetrahedra too, as C3D10 has."""
+    """Use four integration points in curved tetrahedra, too, as C3D10 does."""
     monkeypatch.setattr(fe_models.elasticity.body, "INTEGRATED", 2)
 
 
-# Displacements in a .dat file have seven digits, the largest of them here a 2 before the point.
+# Displacements in a .dat file have seven digits, and the largest one here is about 2.
 DIGITS = 1e-6
 
 
 @pytest.mark.parametrize("matching", [True, False])
 @pytest.mark.parametrize(("order", "curved"), [(1, False), (2, False), (2, True)])
 def test_bonded_bodies(tmp_path, as_calculix, order, curved, matching):
-    """A condensed joint that does not open or slide, and its equations given to CalculiX."""
+    """Compare a condensed joint that does not open or slide with the same ties in CalculiX."""
     bodies = blocks(order, curved, matching)
     structure = structure_of(bodies, matching)
     job = Job(bodies)
@@ -176,7 +176,7 @@ def test_bonded_bodies(tmp_path, as_calculix, order, curved, matching):
 
 
 def one_body(bodies):
-    """Displacements of both bodies, which share the nodes of their faces, midsides too."""
+    """Return displacements of both bodies with shared nodes on their faces."""
     lower, upper = bodies
     nodes = [body.boundary_nodes("joint") for body in bodies]
     distance, partner = cKDTree(lower.nodes[nodes[0]]).query(upper.nodes[nodes[1]])
@@ -202,7 +202,7 @@ def held_of(lower):
 
 
 def shared(bodies):
-    """C of nodes that are one, midsides too."""
+    """Return C of nodes that coincide, midside nodes included."""
     lower, upper = bodies
     nodes = [body.boundary_nodes("joint") for body in bodies]
     partner = cKDTree(lower.nodes[nodes[0]]).query(upper.nodes[nodes[1]])[1]
@@ -214,7 +214,7 @@ def shared(bodies):
 
 @pytest.mark.parametrize("curved", [False, True])
 def test_second_order_bodies_of_shared_nodes(tmp_path, as_calculix, curved):
-    """Elements alone, with no joint of ours; pressure on straight faces is CalculiX's own."""
+    """Compare the elements alone, without a joint; the pressure is CalculiX's own."""
     bodies = blocks(2, curved)
     job = Job(bodies)
     job.hold(0, bodies[0].boundary_nodes("end"))
@@ -232,9 +232,10 @@ def test_second_order_bodies_of_shared_nodes(tmp_path, as_calculix, curved):
 
 
 def test_what_differs_by_choice(monkeypatch):
-    """More integration points than C3D10 has, and faces tied by means of linear functions.
+    """Measure the effect of our integration points and of ties by linear functions.
 
-    On four elements across a face, with edges bent by 5 %; of the largest displacement.
+    The values are for four elements across a face, with edges bent by 5 %, relative to the largest
+    displacement.
     """
     bodies = blocks(2, curved=True)
     whole, tied = (

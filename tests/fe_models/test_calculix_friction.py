@@ -1,4 +1,4 @@
-"""Friction of two bodies by CalculiX's penalty, which goes to ours as it stiffens."""
+"""Friction of two bodies by CalculiX's penalty, which converges to ours as it stiffens."""
 
 import numpy as np
 import pytest
@@ -17,11 +17,11 @@ pytestmark = [pytest.mark.slow, needs_ccx]
 FRICTION = 0.4
 # Shear over pressure on the upper end, there and back, with increments: CalculiX cuts longer ones.
 TURNS = ((0.18, 16), (-0.18, 32))
-PENALTIES = (1e6, 1e7, 1e8)  # [MPa/mm]; stiffer ones leave what CalculiX does not converge to
+PENALTIES = (1e6, 1e7, 1e8)  # [MPa/mm]; CalculiX does not converge with stiffer ones.
 
 
 def pressed():
-    """The structure of both bodies, and the load cases on the upper: pressed, pulled along x."""
+    """Return the structure of both bodies, and the load cases: pressed, and pulled along x."""
     lower, upper = blocks(1)
     face = matched_interface("joint", lower.body, upper.body, "joint", FRAME)
     pull = upper.traction_load("end", lambda x: np.ones(x.shape[1:]), np.eye(3)[0])
@@ -38,7 +38,7 @@ def pressed():
 
 
 def path():
-    """Amplitudes of the load cases: pressed, and then at the end of every increment."""
+    """Return amplitudes of the load cases after pressing and at the end of every increment."""
     amplitudes, last = [(1.0, 0.0)], 0.0
     for end, count in TURNS:
         amplitudes += [(1.0, last + (end - last) * k / count) for k in range(1, count + 1)]
@@ -47,7 +47,7 @@ def path():
 
 
 def by_calculix(folder, structure, cases, stiffness):
-    """Displacements ``(n, 3)`` of both bodies at the end of the path."""
+    """Return displacements ``(n, 3)`` of both bodies at the end of the path."""
     lower, upper = (body.elastic for body in structure.bodies)
     job = Job([lower, upper])
     job.hold(0, lower.boundary_nodes("end"))
@@ -60,7 +60,7 @@ def by_calculix(folder, structure, cases, stiffness):
 
 
 def test_forces_go_to_those_of_a_stiff_penalty(tmp_path):
-    """Node by node: a tenth of the difference for ten times the stiffness.
+    """Check that the difference at each node falls tenfold for ten times the stiffness.
 
     At the end of the path some nodes stick, some slide and some are open.
     """

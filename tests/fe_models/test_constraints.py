@@ -1,4 +1,4 @@
-"""T u_free must satisfy every constraint, and reach every displacement that does."""
+"""Constraints: T u_free satisfies them all, and reaches every displacement that does."""
 
 import numpy as np
 import pytest
@@ -15,7 +15,7 @@ def rng():
 
 
 def spans_null_space(constraints, equations):
-    """Whether the columns of T are a basis of the solutions of ``equations @ u = 0``."""
+    """Return whether the columns of T are a basis of the solutions of ``equations @ u = 0``."""
     transformation = constraints.transformation().toarray()
     free = 3 * NODES - np.linalg.matrix_rank(equations)
     assert transformation.shape == (3 * NODES, free)
@@ -43,7 +43,7 @@ def test_hold():
 
 @pytest.mark.parametrize("nodes", [[-1], [NODES], [0.5], [True, False], "all"])
 def test_nodes_that_there_are_not(nodes):
-    """Counted from the end, they were held nowhere."""
+    """Check that node numbers out of range, negative ones included, are refused."""
     with pytest.raises(InputError, match="nodes"):
         Constraints(NODES).hold(nodes)
 
@@ -76,7 +76,7 @@ def test_zero_mean(rng):
 
 
 def test_average():
-    """A node between its parents has the linear trace."""
+    """Check that a node between its parents has the linear trace."""
     constraints = Constraints(NODES)
     constraints.average(np.array([2, 5]), np.array([[0, 1], [3, 4]]))
     equations = [
@@ -89,7 +89,7 @@ def test_average():
 
 @pytest.mark.parametrize("slide_first", [True, False])
 def test_chain_of_constraints_is_followed_to_the_end(rng, slide_first):
-    """Node 5 between 4 and 3, 4 between 0 and 1, of which 0 slides and 3 is held."""
+    """Check node 5 between 4 and 3, 4 between 0 and 1, where 0 slides and 3 is held."""
     constraints = Constraints(NODES)
     normal = rng.standard_normal((1, 3))
     steps = [
@@ -108,7 +108,7 @@ def test_chain_of_constraints_is_followed_to_the_end(rng, slide_first):
 
 
 def test_first_support_wins():
-    """A held node on a sliding face stays held."""
+    """Check that a held node on a sliding face stays held."""
     constraints = Constraints(NODES)
     constraints.hold(np.array([0]))
     constraints.slide(np.array([0, 1]), np.array([[0.0, 1.0, 0.0], [0.0, 1.0, 0.0]]))
@@ -130,7 +130,7 @@ def test_three_planes_hold_a_node(rng):
 
 
 def test_mean_over_nodes_that_are_constrained_in_part(rng):
-    """Its equation holds all the same."""
+    """Check that the equation of the mean still holds."""
     constraints = Constraints(NODES)
     constraints.hold(np.array([0]))
     normal = np.array([[0.0, 0.0, 1.0]])

@@ -1,4 +1,4 @@
-"""Surfaces between the nodes of a mesh, against circles and spheres in closed form."""
+"""Surfaces between the nodes of a mesh, compared with circles and spheres in closed form."""
 
 from dataclasses import replace
 
@@ -19,12 +19,12 @@ ROW = np.zeros((1, 1))
 
 
 def sunk(x, y=0.0):
-    """Height of a sphere, or of a circle, of that radius that touches the plane."""
+    """Return the height of a sphere, or a circle, of ``RADIUS`` that touches the plane."""
     return RADIUS - np.sqrt(RADIUS**2 - x**2 - y**2)
 
 
 def circle(count=9, ends=(-1.3, 1.7)):
-    """Nodes at uneven distances on a circle, and the segments between them."""
+    """Return unevenly spaced nodes on a circle, and the segments between them."""
     x = np.linspace(*ends, count)
     x[1:-1] += 0.1 * np.diff(x).min() * np.random.default_rng(2).uniform(-1.0, 1.0, count - 2)
     points = np.stack([x, np.zeros(count), sunk(x)], axis=1)
@@ -32,14 +32,14 @@ def circle(count=9, ends=(-1.3, 1.7)):
 
 
 def sphere(count=3):
-    """A disk of triangles, each as it comes, on a sphere."""
+    """Return a disk of irregular triangles on a sphere."""
     mesh = MeshTri.init_circle(count)
     x, y = mesh.p
     return np.stack([x, y, sunk(x, y)], axis=1), mesh.t.T.copy()
 
 
 def on_sphere(points, facets):
-    """Midsides of the facets on it, not over the middles of their chords."""
+    """Return midside points of the facets on the sphere, not above the middles of their chords."""
     corners = points[facets]
     middles = np.stack([corners[:, [a, b]].mean(axis=1) for a, b in ((0, 1), (1, 2), (2, 0))], 1)
     middles[..., :2] *= 1.01
@@ -48,7 +48,7 @@ def on_sphere(points, facets):
 
 
 def straight(points, facets):
-    """The facets as they are."""
+    """Return the surface with straight facets."""
     return replace(Surface.flat(len(points), facets), heights=points[:, 2])
 
 
@@ -87,7 +87,7 @@ def test_beside_the_face_nothing_is_known():
 
 
 def test_corners_stay_corners():
-    """A wedge of plane flanks: the edges beside its ridge are no quadratic, the others are flat."""
+    """Check a wedge: its ridge does not fit a quadratic, and its flanks are flat."""
     x = np.linspace(-1.0, 1.0, 21)
     points = np.stack([x, 0.0 * x, 0.2 * abs(x)], axis=1)
     facets = np.stack([np.arange(20), np.arange(1, 21)], axis=1)
@@ -98,7 +98,7 @@ def test_corners_stay_corners():
 
 
 def test_rounded_coordinates_are_no_corners():
-    """A flat whose heights a file has rounded."""
+    """Check a flat face whose heights were rounded in a file."""
     x = np.linspace(-1.0, 1.0, 21)
     points = np.stack([x, 0.0 * x, 1e-8 * np.sin(40.0 * x)], axis=1)
     facets = np.stack([np.arange(20), np.arange(1, 21)], axis=1)
@@ -120,7 +120,7 @@ def test_images_are_images():
 
 @pytest.mark.parametrize("turned", [False, True])
 def test_the_gap_knows_what_facets_leave(turned: bool):
-    """The volume between a disk and a sphere's cap: exact to what quadratics leave of it."""
+    """Check the volume between a disk and a spherical cap, up to the error of quadratics."""
     points, facets = sphere()
     surface = Surface.of(points, facets, on_sphere(points, facets))
     if turned:
@@ -145,7 +145,10 @@ def test_the_gap_knows_what_facets_leave(turned: bool):
 
 
 def test_the_bulge_of_an_edge_at_each_corner_in_closed_form():
-    """∫ψ_i 4 b λ_1 λ_2 with ψ_i = 4 λ_i - 1, over a third of the area: 0.6 b, 0.6 b and -0.2 b."""
+    """Check ∫ψ_i 4 b λ_1 λ_2 with ψ_i = 4 λ_i - 1 over a third of the area.
+
+    The values are 0.6 b, 0.6 b and -0.2 b.
+    """
     corners, facet = np.array([[0.0, 0.0, 0.0], [1.0, 0.2, 0.0], [0.3, 0.9, 0.0]]), np.arange(3)
     around = np.array([[-9.0, -9.0, 0.0], [9.0, -9.0, 0.0], [0.0, 9.0, 0.0]])
     bulging = Surface(np.zeros(3), np.array([[0.01, 0.0, 0.0]]))
@@ -166,7 +169,7 @@ def test_edges_are_found_in_any_order():
 
 @pytest.mark.parametrize("order", [(0, 1, 2, 3, 4, 5), (0, 1, 2, 3, 5, 4), (5, 4, 3, 2, 1, 0)])
 def test_midsides_of_any_program(order: tuple[int, ...]):
-    """Gmsh and others number the edges of a tetrahedron differently."""
+    """Check that different numberings of a tetrahedron's edges are recognised."""
     corners = np.array([[0.0, 0, 0], [2, 0, 0], [0, 2, 0], [0, 0, 2]])
     pairs = np.array([(0, 1), (1, 2), (2, 0), (3, 0), (3, 1), (3, 2)])[list(order)]
     middles = corners[pairs].mean(axis=1) + 0.1
@@ -184,7 +187,7 @@ def test_midsides_that_are_elsewhere_are_refused():
 
 
 def test_quadrilaterals_are_split_along_their_surface():
-    """A face with eight nodes on a paraboloid: its serendipity functions have the middle, too."""
+    """Check a face with eight nodes on a paraboloid: its functions include the middle."""
     corners = np.array([[-1.0, -1], [1, -1], [1, 1], [-1, 1]])
     plane = np.concatenate([corners, 0.5 * (corners + np.roll(corners, -1, axis=0))])
     points = np.column_stack([plane, 1.0 + 0.1 * plane[:, 0] ** 2 + 0.3 * plane[:, 1] ** 2])
@@ -202,7 +205,7 @@ def test_elements_of_first_order_have_none():
 @pytest.mark.usefixtures("reads_here")
 @pytest.mark.parametrize("ending", ["msh", "step", "inp", "vtu"])
 def test_a_ball_of_any_file_is_round(ending: str, tmp_path):
-    """Of its midsides, on facets that are 3 % of the radius off."""
+    """Check that midside nodes make a ball round whose facets are 3 % of the radius off."""
     path, size = tmp_path / f"ball.{ending}", 0.5 * RADIUS
     with gmsh_model("ball") as gmsh:
         tag = gmsh.model.occ.addSphere(0.0, 0.0, 0.0, RADIUS)

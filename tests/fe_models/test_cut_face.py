@@ -1,4 +1,4 @@
-"""Contact faces cut by planes of symmetry: which they are, and the whole that they stand for."""
+"""Contact faces cut by planes of symmetry, and the whole faces that they represent."""
 
 from dataclasses import replace
 
@@ -31,7 +31,7 @@ PLANES = [Support("cut_x", "x"), Support("cut_y", "normal")]
 
 
 def meshed(bodies, supports, points=None, x=(1.0, 0.0, 0.0)):
-    """The file's content, and the two bodies with their interface."""
+    """Return the file's content, and the two bodies with their interface."""
     named = {body.name: body for body in bodies}
     numbers = {name: np.arange(body.mesh.nvertices) for name, body in named.items()}
     imported = ImportedMesh(named, numbers, {"block": {}, "pad": {}} | (points or {}))
@@ -40,7 +40,7 @@ def meshed(bodies, supports, points=None, x=(1.0, 0.0, 0.0)):
 
 
 def solved(planes, match, push, order):
-    """A cycle pressed on and pushed along x by so much in all; the structure and its history."""
+    """Return structure and history of a cycle that presses and then pushes along x."""
     supports = [BASE, *(PLANES[axis] for axis in planes)]
     imported, mesh = meshed(pad_on_block(planes, match), supports)
     share = np.array([push * 0.5 ** len(planes), 0.0, 0.0])
@@ -63,7 +63,7 @@ def solved(planes, match, push, order):
     ],
 )
 def test_part_with_its_images_is_the_whole(planes, match, order, monkeypatch):
-    """Node by node, and in all resultants, as the same bodies meshed whole."""
+    """Check fields at nodes and all resultants against the same bodies meshed whole."""
     monkeypatch.setattr(friction, "TOLERANCE", 1e-12)
     monkeypatch.setattr(structure, "CLOSED", -1.0)
     monkeypatch.setattr(structure, "MOST_CYCLES", 3)
@@ -82,7 +82,7 @@ def test_part_with_its_images_is_the_whole(planes, match, order, monkeypatch):
     for name in ("force", "displacement", "slip"):
         expected = getattr(theirs, name)[..., twins]
         largest = np.abs(expected).max()
-        # Slips of 1e-10 mm are differences of displacements, whose rounding they have.
+        # Slips of 1e-10 mm are differences of displacements and have their rounding errors.
         within = 2e-8 * largest + 1e-14
         np.testing.assert_allclose(getattr(mine, name), expected, atol=within, err_msg=name)
     largest = np.abs(theirs.loads.resultants).max()
@@ -95,14 +95,14 @@ def test_part_with_its_images_is_the_whole(planes, match, order, monkeypatch):
         one, two = mine.interface.face(number), theirs.interface.face(number)
         assert len(one) == len(two)
         assert one.nodal_areas.sum() == pytest.approx(4.0, rel=1e-12)
-    # Its own nodes come first.
+    # The nodes of the part come first.
     np.testing.assert_array_equal(
         mine.interface.coordinates[: len(interface)], interface.coordinates
     )
 
 
 def test_resultants_of_the_whole():
-    """Two forces that are each other's images across x, then four across x and y."""
+    """Check two forces that are images across x, then four across x and y."""
     x, y, force = 0.7, 0.4, np.array([2.0, -3.0, 5.0])
     for planes, signs in (
         ((0,), [(1, 1), (-1, 1)]),
@@ -116,7 +116,7 @@ def test_resultants_of_the_whole():
 
 
 def test_stress_beyond_the_plane_is_the_image_of_the_stress_before_it():
-    """Of displacements of second degree, which elements of first order have at their nodes."""
+    """Check displacements of second degree, which first-order elements interpolate at nodes."""
     frame = Frame(
         np.array([0.0, 0.0, 0.5]), np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0, 0, 1]])
     )
@@ -130,7 +130,7 @@ def test_stress_beyond_the_plane_is_the_image_of_the_stress_before_it():
         return stress_field(elastic, 1e-4 * moved.ravel(), none, none, none)
 
     mesh = meshed(pad_on_block((1,)), [BASE, PLANES[1]])[1]
-    # The frame's x is the global y, across which the plane is.
+    # The frame's x is the global y, and the plane is across it.
     part = replace(mesh.interfaces[0], planes=(0,), frame=frame)
     part = replace(part, coordinates=part.coordinates[:, ::-1])
     found, exact = WholeStress(under((1,)), part).at(points, frame), under(()).at(points, frame)
@@ -176,7 +176,7 @@ def test_plane_askew_to_the_contacts_axes_is_none():
 
 
 def test_plane_anywhere_with_the_digits_of_a_file():
-    """Shifted, so that its level is no round number, and rounded to six digits."""
+    """Check a plane at an arbitrary level, with coordinates rounded to six digits."""
     bodies = []
     for body in pad_on_block((1,)):
         points = np.round(body.mesh.p + np.array([[10.0], [17.123457], [0.0]]), 5)

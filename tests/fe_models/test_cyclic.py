@@ -1,4 +1,4 @@
-"""A sector with its cuts tied is the whole wheel."""
+"""Cyclic symmetry: a sector with its cuts tied equals the whole wheel."""
 
 from dataclasses import replace
 
@@ -26,7 +26,7 @@ NONE = np.empty(0, np.int64)
 
 
 def supported(body, order, cuts, hold):
-    """The body with its supports, ``hold`` called with constraints, body and cuts, and no loads."""
+    """Return the body with supports that ``hold`` adds to constraints, and no loads."""
     elastic = ElasticBody(body, STEEL, order)
     constraints = Constraints(len(elastic.nodes), elastic.dimension)
     hold(constraints, elastic, cuts)
@@ -44,14 +44,14 @@ def sliding_bore(constraints, elastic, cuts):
 
 
 def solved(elastic, constraints, load):
-    """Displacements ``(n, d)`` under a load, the nearest to none of those that supports leave."""
+    """Return displacements ``(n, d)`` under a load, with the least rigid motion that is free."""
     t = constraints.transformation()
     stiffness, forces = (t.T @ elastic.stiffness @ t).tocsc(), t.T @ load
     return (t @ spsolve(stiffness, forces)).reshape(-1, elastic.dimension)
 
 
 def of_wheel(part, cyclic, order, hold, load):
-    """Displacements of sector and wheel, each with its elastic body."""
+    """Return displacements of sector and wheel, each with its elastic body."""
     answers, whole = [], wheel(part, cyclic)
     if part.midsides is not None:
         whole = curved(whole)
@@ -62,14 +62,14 @@ def of_wheel(part, cyclic, order, hold, load):
 
 
 def same_places(elastic, whole):
-    """Nodes of the wheel where those of the sector are."""
+    """Return the nodes of the wheel at the positions of the sector's nodes."""
     distance, place = cKDTree(whole.nodes).query(elastic.nodes)
     assert distance.max() < 1e-9
     return place
 
 
 def pressed(axis, through):
-    """Centrifugal forces, pressure on pads, and what a pad's shear along the axis does."""
+    """Return centrifugal forces, pressure on pads, and shear of a pad along the axis."""
 
     def load(elastic):
         forces = 1e3**2 * elastic.centrifugal_load(axis, through) + 30.0 * elastic.pressure_load(
@@ -93,19 +93,19 @@ CASES = [
 
 @pytest.mark.parametrize(("dimension", "sectors", "order", "inner", "axis", "through"), CASES)
 def test_sector_is_the_wheel(dimension, sectors, order, inner, axis, through):
-    """Displacements and stresses, on the cuts and their edges too."""
+    """Compare displacements and stresses, on the cuts and their edges, too."""
     part = sector(sectors, dimension=dimension, axis=axis, through=through)
     check_wheel(part, about(axis, through, sectors), order)
 
 
 @pytest.mark.parametrize("dimension", [2, slow(3)])
 def test_curved_sector_is_the_curved_wheel(dimension):
-    """Elements of second order that go round as circles do."""
+    """Compare elements of second order whose edges follow circles."""
     check_wheel(curved(sector(5, dimension=dimension)), about(sectors=5), 2)
 
 
 def check_wheel(part, cyclic, order):
-    """Displacements and recovered stresses of a sector are those of its wheel."""
+    """Check that displacements and recovered stresses of a sector are those of its wheel."""
     load = pressed(cyclic.direction, cyclic.through)
     mine, theirs = of_wheel(part, cyclic, order, held_bore, load)
     place = same_places(mine[0], theirs[0])
@@ -136,7 +136,7 @@ def unchanged(body):
 
 @pytest.mark.parametrize(("dimension", "order"), [(2, 1), (2, 2), (3, 1)])
 def test_rigid_bore_turns_as_that_of_the_wheel(dimension, order):
-    """Under a moment, and a force along the axis in space; its motions are those of all sectors."""
+    """Check a rigid bore under a moment and, in space, a force along the axis."""
     sectors, through = 4, np.zeros(3)
     part, cyclic = sector(sectors, dimension=dimension), about(Y, (0.0, 0.0, 0.0), sectors)
     push = np.zeros(3) if dimension == 2 else 500.0 * np.array(Y)
@@ -158,7 +158,7 @@ def test_rigid_bore_turns_as_that_of_the_wheel(dimension, order):
 
 
 def free_motions(elastic, constraints, cuts=()):
-    """Of a body with its pad as a contact face."""
+    """Return the free rigid motions of a body with its pad as a contact face."""
     nodes = elastic.body.vertices("pad")
     frames = np.tile(np.eye(elastic.dimension), (len(nodes), 1, 1))
     body = SupportedBody(
@@ -168,7 +168,7 @@ def free_motions(elastic, constraints, cuts=()):
 
 
 def squeezed(elastic):
-    """Centrifugal forces about Y and pressure on pads, which turn and shift nothing."""
+    """Return centrifugal forces about Y and pressure on pads, without any resultant."""
     return 1e3**2 * elastic.centrifugal_load() + 30.0 * elastic.pressure_load("pad")
 
 
@@ -183,7 +183,7 @@ def squeezed(elastic):
     ],
 )
 def test_sliding_boundary_goes_on_beyond_the_cuts(dimension, order, shape):
-    """Normals are those of the wheel where a curved boundary meets a cut: it turns freely."""
+    """Check that normals at cuts are those of the wheel, so that it turns freely."""
     part, cyclic = shape(sector(5, dimension=dimension)), about(sectors=5)
     rim = np.setdiff1d(part.vertices("rim"), Cuts.of(part, cyclic).vertices(part))
     place = part.points[rim[0]]
@@ -191,7 +191,7 @@ def test_sliding_boundary_goes_on_beyond_the_cuts(dimension, order, shape):
     answers = []
     for body, cuts in ((part, [Cuts.of(part, cyclic)]), (shape(wheel(part, cyclic)), [])):
         elastic, constraints = supported(body, order, cuts, sliding_bore)
-        # Facets of a bore in space have normals of their own, which hold the turn.
+        # The different normals of a bore's facets in space prevent the rotation.
         turns = dimension == 2
         assert len(free_motions(elastic, constraints)) == dimension - 2 + turns
         node = np.array([np.argmin(np.linalg.norm(elastic.nodes - place, axis=1))])
@@ -204,7 +204,7 @@ def test_sliding_boundary_goes_on_beyond_the_cuts(dimension, order, shape):
 
 @pytest.mark.parametrize("dimension", [2, 3])
 def test_rigid_motions_that_cuts_leave(dimension):
-    """The turn about the axis, and in space the shift along it: nothing else, without supports."""
+    """Check that only the rotation about the axis and, in space, the shift along it remain."""
     axis, through = (OBLIQUE, THROUGH) if dimension == 3 else (Y, (0.0, 0.0, 0.0))
     part, cyclic = (
         sector(7, dimension=dimension, axis=axis, through=through),
@@ -231,7 +231,7 @@ def test_rigid_motions_that_cuts_leave(dimension):
 @pytest.mark.parametrize("order", [1, 2])
 @pytest.mark.parametrize("dimension", [2, 3])
 def test_solid_wheel(dimension, order):
-    """Nodes on the axis are on both cuts, and move along it alone."""
+    """Check that nodes on the axis are on both cuts, and move along it only."""
     part, cyclic = sector(4, dimension=dimension, inner=0.0, counts=(4, 4, 2)), about(sectors=4)
     mine, theirs = of_wheel(part, cyclic, order, no_drift, squeezed)
     place = same_places(mine[0], theirs[0])
@@ -243,7 +243,7 @@ def test_solid_wheel(dimension, order):
 
 
 def no_drift(constraints, elastic, cuts):
-    """Hold what a wheel without supports may do, on its axis."""
+    """Hold the free motions of a wheel without supports at its axis."""
     points = elastic.nodes
     middle = np.flatnonzero(np.linalg.norm(points[:, [0, 2]], axis=1) < 1e-9)
     constraints.hold(middle[:1])
@@ -257,7 +257,7 @@ def no_drift(constraints, elastic, cuts):
 @pytest.mark.parametrize("order", [1, 2])
 @pytest.mark.parametrize("dimension", [2, 3])
 def test_cuts_that_do_not_match_pass_a_uniform_stress(dimension, order):
-    """Patch test: what a linear displacement strains everywhere, across the cuts too."""
+    """Run the patch test across cuts: a linear displacement gives uniform strain."""
     part = sector(6, dimension=dimension, moved=0.3)
     cuts = Cuts.of(part, about(sectors=6))
     assert not cuts.matched
@@ -267,7 +267,7 @@ def test_cuts_that_do_not_match_pass_a_uniform_stress(dimension, order):
     t = constraints.transformation()
     free = constraints.free
     np.testing.assert_allclose(t @ exact.ravel()[free], exact.ravel(), atol=1e-14)
-    # Tractions of that stress on all of the surface but the cuts: then nothing is left to balance.
+    # Tractions of that stress act on all of the surface except the cuts, in balance.
     stress = elastic.cauchy(np.repeat(strain[:, :, None], 1, axis=2))[:, 0]
     forces = np.zeros(elastic.size)
     for name in {"bore", "rim", "front", "back"} & set(part.mesh.boundaries):
@@ -277,7 +277,7 @@ def test_cuts_that_do_not_match_pass_a_uniform_stress(dimension, order):
 
 
 def surface_forces(elastic, name, stress):
-    """Forces of a uniform ``stress`` ``(6,)`` on a boundary of facets with one normal each."""
+    """Return forces of a uniform ``stress`` ``(6,)`` on a boundary of plane facets."""
     mesh, total = elastic.body.mesh, np.zeros(elastic.size)
     facets = mesh.boundaries[name]
     normals = elastic.body.outward_of(facets)
@@ -305,7 +305,7 @@ def surface_forces(elastic, name, stress):
 
 @pytest.mark.parametrize("order", [1, 2])
 def test_vertices_near_and_far_from_cuts(order):
-    """Asked for alone, they are told as among all: near a cut, far from it, on both sides."""
+    """Check that stress at single vertices equals that of all, near cuts and far from them."""
     part = sector(3, (3, 16, 1))
     elastic = ElasticBody(part, STEEL, order)
     cuts = Cuts.of(part, about(sectors=3))
@@ -330,7 +330,7 @@ def test_vertices_near_and_far_from_cuts(order):
 
 @pytest.mark.parametrize("order", [1, 2])
 def test_cuts_that_do_not_match_converge(order):
-    """A ring under pressure in its bore, by Lamé: as good as with cuts that match."""
+    """Compare a ring under internal pressure with Lamé: as accurate as with matching cuts."""
     errors = {}
     for moved in (0.0, 0.3):
         for fine in (1, 2, 4):
@@ -354,7 +354,7 @@ def test_cuts_that_do_not_match_converge(order):
 
 @pytest.mark.parametrize("moved", [0.0, 0.3])
 def test_curved_elements_converge(moved):
-    """A ring under pressure in its bore, by Lamé: a twentieth of what straight sides leave."""
+    """Compare a ring under internal pressure with Lamé: a twentieth of the straight error."""
     part = curved(sector(6, (8, 8, 1), moved=moved))
     cuts = [Cuts.of(part, about(sectors=6))]
     elastic, constraints = supported(part, 2, cuts, lambda *_: None)
@@ -370,7 +370,7 @@ def test_curved_elements_converge(moved):
 
 
 def test_curved_cuts_of_other_meshes():
-    """Refused for elements of second order, as their edges would part."""
+    """Check that cuts with curved edges that do not match are refused for second order."""
     part = bend(sector(6))
     middles = part.points[part.mesh.facets.T].mean(axis=1)[:, [0, 2]]
     rng = np.random.default_rng(0)
@@ -386,7 +386,7 @@ def test_curved_cuts_of_other_meshes():
 
 @pytest.mark.parametrize("moved", [0.0, 0.3])
 def test_stress_of_cuts_is_as_good_as_elsewhere(moved):
-    """A ring under pressure in its bore, by Lamé; without a tie tractions would be taken off."""
+    """Compare a ring under internal pressure with Lamé: tractions at tied cuts remain."""
     part = sector(6, (8, 8, 1), moved=moved)
     cuts = [Cuts.of(part, about(sectors=6))]
     elastic, constraints = supported(part, 2, cuts, lambda *_: None)
@@ -412,7 +412,7 @@ def test_stress_of_cuts_is_as_good_as_elsewhere(moved):
 @pytest.mark.parametrize(
     ("cyclic", "changed", "said"),
     [
-        (about(sectors=5), {}, "the middles of both are 60° apart, as of 6 sectors"),
+        (about(sectors=5), {}, "the centres of both are 60° apart, as for 6 sectors"),
         (about(sectors=7), {"moved": 0.3}, "is not low turned about the axis by 360°/7"),
         (about(sectors=6, through=(0.5, 0.0, 0.0)), {}, "up to 0.25 mm off"),
         (about(sectors=6, high=("rim",)), {}, "rim is not low turned"),
@@ -425,28 +425,30 @@ def test_cuts_that_are_no_images(cyclic, changed, said):
 
 
 def test_cuts_of_which_a_part_is_named():
-    """Both in their planes, and not on each other."""
+    """Check two cuts in image planes that do not cover each other."""
     part = sector(6)
     low = part.mesh.boundaries["low"]
     body = Body("wheel", part.mesh.with_boundaries({"half": low[:2]}))
     cyclic = about(low=("half",))
-    with pytest.raises(MeshError, match="of the one is beside the other; name all boundaries"):
+    with pytest.raises(
+        MeshError, match="of one cut is not covered by the other; name all boundaries"
+    ):
         supported(body, 1, [Cuts.of(body, cyclic)], lambda *_: None)
     every = about(low=("half", "low"))
     assert Cuts.of(body, every).matched
 
 
 def test_cuts_that_are_not_plane():
-    """Tied node by node, as meshes that are images are; refused if they are none."""
+    """Check that they are tied node by node if they are images, and refused otherwise."""
     part = sector(6, counts=(4, 5, 2))
     bent = bend(part)
     assert Cuts.of(bent, about(sectors=6)).matched
-    with pytest.raises(MeshError, match="must be meshed alike"):
+    with pytest.raises(MeshError, match="must have matching meshes"):
         Cuts.of(bend(sector(6, moved=0.3)), about(sectors=6))
 
 
 def bend(part):
-    """The sector with its cuts bent, by a turn about the axis that depends on the radius."""
+    """Return the sector with its cuts bent by a rotation that depends on the radius."""
     radius = np.linalg.norm(part.points, axis=1)
     angle = 0.01 * (radius - INNER) ** 2 / INNER
     x, _, z = part.points.T

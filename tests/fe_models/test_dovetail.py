@@ -19,12 +19,12 @@ DEGREES = np.pi / 180.0
 COMPLIANT = {"disk_height": 200.0, "blades": 16, "airfoil_mass": 0.4e-3}
 PEAK = 7
 
-# Between the steepest and the flattest flanks the rest is for `make test-full`.
+# Angles between the steepest and the flattest flanks are run by `make test-full`.
 ANGLES = [35, *(slow(angle) for angle in (45, 55, 65))]
 
 
 def pull(structure, amplitudes):
-    """Total force on the blade along the load axis at every increment [N]."""
+    """Return the total force on the blade along the load axis at every increment [N]."""
     axis = np.array([0.0, 0.0, 1.0])
     return np.array(
         [structure.bodies[1].load_resultants(a, 0.0 * axis)[0] @ axis for a in amplitudes]
@@ -41,7 +41,7 @@ def test_speed_rises_and_falls(mission):
 
 
 def test_blade_carries_its_mass_the_airfoil_and_the_moment(structure, mission):
-    """F = Ω² (ρ V r + m R); the moment acts about the slot and along it."""
+    """Check F = Ω² (ρ V r + m R), and the moment about and along the slot."""
     amplitudes = mission.amplitudes()[PEAK]
     mesh = structure.mesh.bodies[1].mesh
     moments = mesh.p[:, mesh.t].mean(axis=1) @ np.abs(element_volumes(mesh))
@@ -61,7 +61,7 @@ def test_moment_presses_on_the_intrados(solved, mission):
 @pytest.mark.parametrize("mu", [0.0, 0.2, 0.4, 0.8])
 @pytest.mark.parametrize("angle", ANGLES)
 def test_flanks_carry_the_pull(structure_of, solved, symmetric, angle, mu):
-    """F = 2 (P sin θ - Qx cos θ) at every increment, on both flanks alike."""
+    """Check F = 2 (P sin θ - Qx cos θ) at every increment, the same on both flanks."""
     theta = angle * DEGREES
     structure, _ = structure_of(flank_angle=theta)
     cycle = solved(mu, symmetric, flank_angle=theta)
@@ -72,12 +72,12 @@ def test_flanks_carry_the_pull(structure_of, solved, symmetric, angle, mu):
     np.testing.assert_allclose(total, force, atol=1e-6 * force.max())
     for name in ("P", "Qx"):
         one, two = (getattr(load, name) for load in both)
-        # Mirrored problems, each solved to friction.TOLERANCE.
+        # The problems are mirror images, each solved to friction.TOLERANCE.
         np.testing.assert_allclose(one, two, atol=1e-6 * force.max())
 
 
 def test_flanks_are_alike_to_the_last_digits(structure, joint, symmetric, monkeypatch):
-    """The mesh is its own mirror image, so what differs is the solver's remainder."""
+    """Check both flanks on a mirrored mesh, which differ only by the solver's error."""
     monkeypatch.setattr(friction, "TOLERANCE", 1e-12)
     frictional = FrictionalJoint(joint.resolvent(), 0.4)
     cycle = structure.solve_cycle(frictional, symmetric.amplitudes(), structure.gap(), 0.4)
@@ -86,7 +86,7 @@ def test_flanks_are_alike_to_the_last_digits(structure, joint, symmetric, monkey
     largest = intrados.P.max()
     for name, sign in (("P", 1), ("Qx", 1), ("Qy", -1), ("Mx", -1), ("My", 1), ("Mz", -1)):
         one, two = getattr(intrados, name), getattr(extrados, name)
-        # y points opposite ways on the two flanks.
+        # The axis y has opposite directions on the two flanks.
         np.testing.assert_allclose(one, sign * two, atol=1e-9 * largest)
     for name in ("Edx", "Edy"):
         one, two = getattr(intrados, name), getattr(extrados, name)
@@ -96,9 +96,9 @@ def test_flanks_are_alike_to_the_last_digits(structure, joint, symmetric, monkey
 @pytest.mark.parametrize("mu", [0.2, 0.4, 0.6])
 @pytest.mark.parametrize("angle", [*(slow(angle) for angle in (40, 60)), 50])
 def test_gross_slip_up_and_reversed(structure_of, solved, symmetric, angle, mu):
-    """P = F / 2 (sin θ + µ cos θ) as the load rises, with - once the flanks slide back.
+    """Check P = F / 2 (sin θ ± µ cos θ), with minus once the flanks slide back.
 
-    What is left, well below 1 %, is friction along y: the flanks also lengthen along the slot.
+    The rest, well below 1 %, is friction along y: the flanks also lengthen along the slot.
     """
     theta = angle * DEGREES
     changes = COMPLIANT | {"flank_angle": theta}
@@ -127,18 +127,18 @@ def test_gross_slip_up_and_reversed(structure_of, solved, symmetric, angle, mu):
 
 
 def test_self_locking_joint_stays_loaded(structure_of, solved, symmetric):
-    """tan 35° < 0.8: without pull the flanks hold each other by friction, and the blade stays."""
+    """Check that with tan 35° < 0.8 the blade stays locked by friction without pull."""
     changes = {"flank_angle": 35.0 * DEGREES}
     cycle = solved(0.8, symmetric, **changes)
     assert cycle.converged
     loads = cycle.histories[0].loads
     assert loads.P[-1] > 0.1 * loads.P.max()
-    # What is left balances itself: P sin θ = Qx cos θ.
+    # The remaining forces are in balance: P sin θ = Qx cos θ.
     assert loads.Qx[-1] == pytest.approx(loads.P[-1] * np.tan(35.0 * DEGREES), rel=1e-5)
 
 
 def test_unloaded_end_leaves_nothing(solved, mission):
-    """At rest the flanks neither push nor rub, to the digit: no remainders of the solver."""
+    """Check that at rest the flanks carry exactly nothing, not even solver errors."""
     for history in solved(0.4, mission).histories:
         for name in ("P", "Qx", "Qy", "Mx", "My", "Mz"):
             assert getattr(history.loads, name)[-1] == 0.0
@@ -146,10 +146,10 @@ def test_unloaded_end_leaves_nothing(solved, mission):
 
 
 def test_energy_is_never_negative_and_adds_up(solved, mission):
-    """Work of the shears over the slips: at the ends of increments that of each node.
+    """Compare energies with the work of the shears over the slips at each node.
 
-    In all, the mean pressure of both ends does a share less while the load grows, and more while it
-    falls.
+    In total, the mean pressure of both ends gives a little less while the load grows, and more
+    while it falls.
     """
     for history in solved(0.4, mission).histories:
         total = history.loads.Edx + history.loads.Edy
@@ -160,7 +160,7 @@ def test_energy_is_never_negative_and_adds_up(solved, mission):
         slid = np.hypot(history.slip[:, 0], history.slip[:, 1])
         lost = 0.5 * 0.4 * np.sum(pressing * slid, axis=1)
         np.testing.assert_allclose(total[:-1], lost[:-1], rtol=1e-12)
-        assert total[-1] == 0.0  # the bodies part
+        assert total[-1] == 0.0  # The bodies separate.
         slides = total > 0.0
         more = slides & (np.roll(history.loads.P, 1) < history.loads.P)
         assert (total[more] < nodal.sum(axis=1)[more]).all()
@@ -179,7 +179,7 @@ def test_frictionless_joint_dissipates_nothing(structure, solved, symmetric):
 
 
 def test_resultants_are_those_of_the_forces(structure, solved, mission):
-    """Moments of the nodal forces about the face's centre, from cross products in space."""
+    """Compare moments about the face's centre with cross products in space."""
     for history in solved(0.4, mission).histories:
         face = history.interface
         at = structure.mesh.bodies[1].mesh.p[:, face.nodes_2].T - face.frame.origin
@@ -187,7 +187,7 @@ def test_resultants_are_those_of_the_forces(structure, solved, mission):
         moment = face.frame.components(np.cross(at, forces).sum(axis=0))
         force = face.frame.components(forces.sum(axis=0))
         loads = history.loads
-        # Mx, My of the sign convention are those of the pressure: those of r × f.
+        # By the sign convention Mx, My are moments of the pressure, those of r × f.
         expected = [loads.Qx[PEAK], loads.Qy[PEAK], loads.P[PEAK]]
         np.testing.assert_allclose(force, expected, rtol=1e-9)
         expected = [loads.Mx[PEAK], loads.My[PEAK], loads.Mz[PEAK]]
@@ -195,7 +195,7 @@ def test_resultants_are_those_of_the_forces(structure, solved, mission):
 
 
 def test_equilibrium_error_sees_a_wrong_force(structure, joint, mission):
-    """1 % more pressure on all nodes is about 1 % of the load out of balance."""
+    """Check that 1 % more pressure on all nodes is about 1 % of imbalance."""
     frictional = FrictionalJoint(joint.resolvent(), 0.4)
     amplitudes = mission.amplitudes()
     state = list(frictional.march(amplitudes[:8], structure.gap()))[-1]
@@ -216,9 +216,9 @@ def test_equilibrium_error_sees_a_wrong_force(structure, joint, mission):
 
 
 def test_skewed_joint(structure_of, solved, symmetric):
-    """A slot turned by 15°: half a turn about the load axis brings it back onto itself.
+    """Check a slot turned by 15°, which half a turn about the load axis maps to itself.
 
-    The mesh does not quite come back, so the flanks are alike to discretisation.
+    The mesh is not exactly symmetric, so the flanks agree up to discretisation.
     """
     changes = {"skew": 15.0 * DEGREES}
     cycle = solved(0.4, symmetric, **changes)
@@ -231,9 +231,10 @@ def test_skewed_joint(structure_of, solved, symmetric):
 
 
 def test_load_history_of_one_node(coarse_mesh):
-    """All load on one node: moments are its coordinates times its pressure.
+    """Check that with all load on one node the moments are coordinates times pressure.
 
-    That rises evenly from none while the node slides, and where bodies part nothing is counted.
+    The pressure rises linearly from zero while the node slides; nothing is counted while the bodies
+    are apart.
     """
     face = coarse_mesh.interfaces[0]
     force, slip = np.zeros((2, 3, len(face))), np.zeros((2, 2, len(face)))

@@ -27,7 +27,7 @@ SIDES = about(sectors=BLADES, low=("sides",), high=("sides",))
 
 
 def ring_of(dovetail, mesh, material, sector, order):
-    """The whole disk with all its blades, each loaded as the one of a ``sector``, turned."""
+    """Return the whole disk with all its blades, each loaded as that of a ``sector``."""
     part, blade = mesh.bodies
     disk = wheel(part, SIDES, ("intrados", "extrados"))
     blades = [turned(blade, SIDES, k) for k in range(BLADES)]
@@ -61,13 +61,13 @@ def ring_of(dovetail, mesh, material, sector, order):
 
 
 def turned_loads(loads, turn):
-    """Forces ``(size, cases)`` turned in the plane, node by node."""
+    """Return forces ``(size, cases)`` rotated in the plane, node by node."""
     by_node = loads.reshape(-1, 2, loads.shape[1])
     return np.einsum("ab,nbc->nac", turn, by_node).reshape(loads.shape)
 
 
 def test_contacts_are_those_of_the_whole_disk(dovetail, titanium, mission, monkeypatch):
-    """Of all blades in a disk that is meshed whole, each under the moment."""
+    """Compare with all blades of a disk that is meshed whole, each under the moment."""
     monkeypatch.setattr(friction, "TOLERANCE", 1e-13)
     monkeypatch.setattr(structure, "CLOSED", -1.0)
     monkeypatch.setattr(structure, "MOST_CYCLES", 2)
@@ -92,7 +92,7 @@ def test_contacts_are_those_of_the_whole_disk(dovetail, titanium, mission, monke
 
 @pytest.fixture(scope="module")
 def cycles(dovetail, titanium, mission):
-    """The section's cycle with guided and with cyclic sides, under a moment."""
+    """Return the section's cycle with guided and with cyclic sides, under a moment."""
 
     def solve(moment, cyclic, order=2):
         load = replace(mission, aerodynamic_moment=moment)
@@ -107,7 +107,7 @@ def cycles(dovetail, titanium, mission):
 
 @pytest.mark.parametrize("dimension", [2, 3])
 def test_sides_are_images(dovetail, dimension):
-    """Node by node, and all of them."""
+    """Check that all nodes of the sides are images of each other."""
     mesh = dovetail.mesh(FLANK_NODES, SIZE, dimension=dimension, notch=NOTCH)
     disk = mesh.bodies[0]
     cuts = dovetail_cuts(dovetail, disk)
@@ -117,7 +117,7 @@ def test_sides_are_images(dovetail, dimension):
 
 
 def test_neighbours_of_a_symmetric_joint_are_its_images(cycles, monkeypatch):
-    """Without a moment the sides of the sector slide on their planes: both ways are the same."""
+    """Check that without a moment guided and cyclic sides give the same result."""
     monkeypatch.setattr(friction, "TOLERANCE", 1e-12)
     guided, cyclic = (cycles(0.0, way) for way in (False, True))
     for one, two in zip(guided.histories, cyclic.histories, strict=True):
@@ -125,7 +125,7 @@ def test_neighbours_of_a_symmetric_joint_are_its_images(cycles, monkeypatch):
 
 
 def test_neighbours_move_with_a_moment(cycles):
-    """The force that a moment puts into the disk goes on round the wheel: a small difference."""
+    """Check the small difference due to the force that a moment passes around the wheel."""
     guided, cyclic = (cycles(30e3, way) for way in (False, True))
     changes = [
         np.abs(one.loads.P - two.loads.P).max() / one.loads.P.max()
@@ -138,5 +138,5 @@ def test_neighbours_move_with_a_moment(cycles):
 def test_sides_of_a_skewed_slot(dovetail, titanium, mission):
     skewed = replace(dovetail, skew=0.1)
     mesh = skewed.mesh(FLANK_NODES, SIZE, notch=NOTCH)
-    with pytest.raises(MeshError, match="no images of each other"):
+    with pytest.raises(MeshError, match="not images of each other"):
         dovetail_structure(skewed, mesh, titanium, titanium, mission, 1, cyclic=True)

@@ -13,15 +13,15 @@ from sa_solver.errors import InputError
 from tests.marks import slow
 
 NODES = 4
-# What the solver imposes: TOLERANCE of the load, which these problems carry over to the forces.
+# Error due to the solver's TOLERANCE of the load, which carries over to the forces here.
 FORCES = 1e-5
 
-# Between the steepest and the flattest flanks the rest is for `make test-full`.
+# Angles between the steepest and the flattest flanks are run by `make test-full`.
 ANGLES = [35, *(slow(angle) for angle in (45, 55, 65))]
 
 
 def small_joint(rng, nodes=NODES, plane=False):
-    """A random positive definite joint, pressed together at most nodes and pulled sideways."""
+    """Return a random positive definite joint, pressed at most nodes and pulled sideways."""
     factor = rng.standard_normal((3 * nodes, 3 * nodes))
     stiffness = factor @ factor.T / (3 * nodes) + np.eye(3 * nodes)
     loads = rng.standard_normal((nodes, 3))
@@ -42,9 +42,9 @@ def one_increment(joint, mu, gap, previous=None):
 
 
 def enumerated(joint, mu, gap):
-    """All solutions of a problem in the plane (x, z), by trying every status of every node.
+    """Return all solutions in the plane (x, z), found by trying every status of every node.
 
-    Statuses: separated, stuck, sliding to +x, sliding to -x.
+    Statuses are separated, stuck, sliding to +x, and sliding to -x.
     """
     nodes = len(gap)
     solutions = []
@@ -95,7 +95,7 @@ def test_against_every_combination_of_statuses(seed, mu):
 
 
 def gauss_seidel(joint, mu, gap, previous, sweeps=4000):
-    """Forces by projected Gauss-Seidel on the compliance, node after node."""
+    """Return forces by projected Gauss-Seidel on the compliance, node after node."""
     compliance = np.linalg.inv(joint.stiffness)
     load = joint.loads[:, 0]
     force = np.zeros_like(load)
@@ -118,7 +118,7 @@ def gauss_seidel(joint, mu, gap, previous, sweeps=4000):
 @pytest.mark.parametrize("seed", range(6))
 @pytest.mark.parametrize("mu", [0.0, 0.2, 0.6])
 def test_against_projected_gauss_seidel(seed, mu):
-    """In three dimensions, from a displaced state."""
+    """Compare in three dimensions, from a displaced state."""
     rng = np.random.default_rng(100 + seed)
     joint = small_joint(rng)
     gap, previous = 0.2 * rng.random(NODES), 0.1 * rng.standard_normal((3, NODES))
@@ -128,7 +128,7 @@ def test_against_projected_gauss_seidel(seed, mu):
 
 
 def test_single_node_in_closed_form():
-    """A spring k pressed by N and pulled sideways by T: stuck below µN, sliding (T - µN)/k."""
+    """Check a spring k under N and T: stuck below µN, else sliding by (T - µN)/k."""
     k, normal, mu = 1000.0, 10.0, 0.5
     for pull in (3.0, -3.0, 8.0, -8.0):
         loads = np.array([[pull], [0.0], [normal]])
@@ -141,7 +141,7 @@ def test_single_node_in_closed_form():
 
 
 def test_loaded_and_unloaded_node_keeps_its_shear():
-    """Hysteresis of one node: after sliding under T and release, the spring holds min(T-µN, µN)."""
+    """Check hysteresis of one node: after release the spring holds min(T-µN, µN)."""
     k, normal, mu, pull = 1000.0, 10.0, 0.5, 8.0
     loads = np.array([[0.0, pull], [0.0, 0.0], [normal, 0.0]])
     joint = JointStiffness(k * np.eye(3), loads, 0, k, 2 * k)
@@ -153,7 +153,7 @@ def test_loaded_and_unloaded_node_keeps_its_shear():
 
 
 def test_constant_and_absent_load():
-    """Without load nothing happens, and a load that stays leaves everything as it is."""
+    """Check that without load nothing happens, and that a constant load changes nothing."""
     joint = small_joint(np.random.default_rng(0))
     path = np.array([[0.0], [0.0], [1.0], [1.0], [1.0]])
     states = list(FrictionalJoint(joint.resolvent(), 0.3).march(path, np.zeros(NODES)))
@@ -166,7 +166,7 @@ def test_constant_and_absent_load():
 
 
 def check_coulomb(state, mu, gap):
-    """Complementarity and Coulomb's law, as the local step of the splitting leaves them: exact."""
+    """Check complementarity and Coulomb's law, which the splitting satisfies exactly."""
     shear, pressure = state.force[:2], state.force[2]
     opening = gap + state.displacement[2]
     length = np.abs(state.displacement).max()
@@ -187,7 +187,7 @@ def check_coulomb(state, mu, gap):
 @pytest.mark.parametrize("mu", [0.0, 0.2, 0.4, 0.8])
 @pytest.mark.parametrize("angle", ANGLES)
 def test_dovetail_obeys_every_law(structure_of, solved, mission, angle, mu):
-    """At every node of every increment; at 35° and µ 0.8 the joint locks itself."""
+    """Check every node of every increment; at 35° and µ 0.8 the joint locks itself."""
     changes = {"flank_angle": np.deg2rad(angle)}
     structure, joint = structure_of(**changes)
     cycle = solved(mu, mission, **changes)
@@ -211,7 +211,7 @@ def test_dovetail_obeys_every_law(structure_of, solved, mission, angle, mu):
 
 
 def test_previous_continues_a_path(structure, joint, mission):
-    """A path in one go is the path in two parts."""
+    """Check that a path in one go equals the path in two parts."""
     frictional = FrictionalJoint(joint.resolvent(), 0.4)
     amplitudes, gap = mission.amplitudes(), structure.gap()
     whole = list(frictional.march(amplitudes, gap))
@@ -223,7 +223,7 @@ def test_previous_continues_a_path(structure, joint, mission):
 
 
 def test_guess_changes_nothing(structure, joint, mission):
-    """Not a bad one either."""
+    """Check that even a bad guess does not change the solution."""
     frictional = FrictionalJoint(joint.resolvent(), 0.4)
     amplitudes, gap = mission.amplitudes(), structure.gap()
     plain = list(frictional.march(amplitudes, gap))
@@ -237,7 +237,7 @@ def test_guess_changes_nothing(structure, joint, mission):
 
 
 def test_cycle_that_follows_another_repeats_it(structure, joint, solved, mission):
-    """The second cycle is closed: a third one is the same."""
+    """Check that the second cycle is closed: a third one is the same."""
     cycle = solved(0.4, mission)
     frictional = FrictionalJoint(joint.resolvent(), 0.4)
     third = structure.solve_cycle(
@@ -259,7 +259,7 @@ def test_too_few_iterations_are_reported(structure, joint, mission, monkeypatch)
 
 
 def test_free_shape_of_the_joint_does_not_matter(joint):
-    """A joint with twice the stiffness and loads moves the same under twice the forces."""
+    """Check that doubling stiffness and loads doubles the forces and keeps the motion."""
     doubled = replace(
         joint,
         stiffness=2.0 * np.asarray(joint.stiffness),
@@ -275,7 +275,7 @@ def test_free_shape_of_the_joint_does_not_matter(joint):
 
 @pytest.mark.parametrize("distance", [1e-4, 1e-3, 1e-2, 1.0])
 def test_floating_body_that_starts_apart_arrives(distance):
-    """Held by nothing along z but the contact, and pushed towards it: the path does not matter."""
+    """Check a body held along z by the contact only: its start does not matter."""
     joint = small_joint(np.random.default_rng(4))
     up = np.tile([0.0, 0.0, 1.0], NODES)
     pushed = joint.stiffness @ up
@@ -291,7 +291,7 @@ def test_floating_body_that_starts_apart_arrives(distance):
 
 
 def test_sticking_nodes_have_no_slip_and_none_gains_energy(structure, joint, mission):
-    """To the last bit, component by component: what rounding leaves has a sign."""
+    """Check signs to the last bit, component by component."""
     amplitudes = mission.amplitudes()
     for state in FrictionalJoint(joint.resolvent(), 0.4).march(amplitudes, structure.gap()):
         assert np.all(state.force[:2] * state.slip <= 0.0)
@@ -302,7 +302,7 @@ def test_sticking_nodes_have_no_slip_and_none_gains_energy(structure, joint, mis
 
 @pytest.mark.slow
 def test_worn_faces_meet_under_a_light_load(structure, joint, mission):
-    """A first load of 1/5000 of the largest, on faces worn by more than it presses together."""
+    """Check a first load of 1/5000 of the largest on deeply worn faces."""
     amplitudes, gap = mission.amplitudes(), structure.gap()
     frictional = FrictionalJoint(joint.resolvent(), 0.4)
     light = np.concatenate([2e-4 * amplitudes[7:8], amplitudes])
@@ -312,7 +312,7 @@ def test_worn_faces_meet_under_a_light_load(structure, joint, mission):
     first = next(frictional.march(light, worn, end, [s.state for s in before]))
     assert first.converged
     assert first.iterations < 100
-    # The same from pressed hard, in steps too small for any of them to be a leap.
+    # The reference starts from a high pressure and takes small steps.
     (state,) = frictional.march(light[8:9], worn, end)
     for load in np.geomspace(0.6, 2e-4, 16)[:, None] * light[8:9]:
         (state,) = frictional.march(load[None], worn, end, [state.state])

@@ -1,7 +1,7 @@
-"""Structural friction against whole bodies in one matrix, solved by Newton's method.
+"""Structural friction compared with whole bodies in one matrix, solved by Newton's method.
 
-The condensed joint and its splitting on one side; on the other :mod:`tests.fe_models.monolithic`,
-which shares neither. What the two impose is compared, so all tolerances are the solver's.
+The condensed joint and its splitting are compared with :mod:`tests.fe_models.monolithic`, which
+shares neither. Both solve the same equations, so all tolerances are those of the solvers.
 """
 
 from dataclasses import replace
@@ -42,27 +42,27 @@ CROWN = 2e-5
 # This tilt and twist shake the block down in few cycles, with part of it off the plate; others
 # take hundreds. Each cycle is 0.18 times as far from closed as the one before.
 CLOSING, SHAKEN = {"tilt": -10.0, "twist": 0.0}, 10
-# Both solvers run to rounding; what is compared is asked to agree to this.
+# Tolerance of the comparisons; both solvers run to rounding.
 AGREEMENT = 1e-6
-# What processors and libraries make of the same data, and some more.
+# Relative perturbation, somewhat more than that of different processors and libraries.
 ROUNDING = 1e-13
 
 
 @pytest.fixture(autouse=True)
 def to_rounding(monkeypatch):
-    """The splitting's tolerance is not what is in question here."""
+    """Set the splitting's tolerance to rounding, since it is not tested here."""
     monkeypatch.setattr(friction, "TOLERANCE", 1e-11)
     monkeypatch.setattr(friction, "MAX_ITERATIONS", 5000)
 
 
-# The small dovetail of the cases, on a mesh coarser still: 5 x 6 nodes per flank.
+# The small dovetail of the cases on an even coarser mesh: 5 x 6 nodes per flank.
 SMALL = {"edge_radius": 100.0, "edge_width": 2.0, "end_radius": 600.0, "end_width": 6.0}
 SMALL_PATH = {"increments": 12, "peak_at": 5}
 FLANK_NODES, SIZE = (5, 6), 12.0
 
 
 def block(steps, material, order):
-    """A box on the ``steps`` of its axes; the face at z = 0 over the block is the contact."""
+    """Return a box on the ``steps`` of its axes; the face at z = 0 is the contact."""
     inside = lambda x: (x[0] > 0) & (x[0] < LENGTH) & (x[1] > 0) & (x[1] < WIDTH)  # noqa: E731
     mesh = MeshTet.init_tensor(*steps).with_boundaries(
         {
@@ -75,7 +75,7 @@ def block(steps, material, order):
 
 
 class BlockOnPlate:
-    """A block on a held plate: free but for the contact and its mean displacement along y.
+    """Block on a held plate, free except for the contact and its mean displacement along y.
 
     Load cases: a pressure of 1 MPa on the block's top, a shear of 1 MPa along x, a normal traction
     of 1 MPa/mm across it, which tilts the block, and one along y, which twists it.
@@ -138,17 +138,17 @@ class BlockOnPlate:
         return Monolith(*parts, self.frames, FRICTION)
 
     def tops(self, displacement):
-        """Mean displacement of the top along x, from the block's ``(3 n,)``."""
+        """Return the mean displacement of the top along x, from the block's ``(3 n,)``."""
         mean = self.top_weights @ displacement.reshape(-1, 3)[self.top, 0]
         return mean / self.top_weights.sum()
 
 
 def swing(values, tilt=-20.0, twist=3.0):
-    """Amplitudes under 30 MPa as shear, tilt and twist swing together."""
+    """Return amplitudes under 30 MPa as shear, tilt and twist swing together."""
     return np.array([[30.0, 7.0 * a, tilt * a, twist * a] for a in values])
 
 
-# Pressed, pulled, and back and forth. At the ends of the swing the block lifts off in part.
+# The block is pressed, pulled, and moved back and forth; it partly lifts off at the ends.
 PRESS = np.array([[15.0, 0.0, 0.0, 0.0], [30.0, 0.0, 0.0, 0.0]])
 UP, DOWN = np.linspace(0.25, 1.0, 4), np.linspace(0.95, -1.0, 5)
 PATH = np.concatenate([PRESS, swing(UP), swing(DOWN), swing(-DOWN)])
@@ -157,7 +157,7 @@ TURN = len(PRESS) + len(UP) - 1
 
 @cache
 def both(order):
-    """The joint, its condensed bodies, and the states of both methods along the path."""
+    """Return the joint, its condensed bodies, and the states of both methods along the path."""
     joint = BlockOnPlate(order)
     supported, condensed = joint.condensed()
     split = list(FrictionalJoint(condensed.resolvent(), FRICTION).march(PATH, joint.gap))
@@ -172,19 +172,19 @@ def solved_pair(request, to_rounding):
 
 
 def statuses(force):
-    """Numbers of nodes that are open, sliding and stuck under forces ``(3, n)``."""
+    """Return the numbers of nodes that are open, sliding and stuck under forces ``(3, n)``."""
     closed = force[2] > 0.0
     slides = closed & (np.hypot(*force[:2]) >= FRICTION * force[2] * (1.0 - 1e-9))
     return int(np.sum(~closed)), int(np.sum(slides)), int(np.sum(closed & ~slides))
 
 
 def perturbed(values, rng):
-    """Every number changed in its last digits, as the rounding of another machine might."""
+    """Return the values with their last digits changed, as by rounding on another machine."""
     return values * (1.0 + ROUNDING * rng.uniform(-1.0, 1.0, values.shape))
 
 
 def test_whole_bodies_are_solved_whatever_the_rounding():
-    """An oracle that converges by luck is none: the same forces from perturbed data, thrice."""
+    """Check that the reference method gives the same forces from three perturbed inputs."""
     joint = BlockOnPlate(1)
     forces = []
     for seed in range(3):
@@ -199,7 +199,7 @@ def test_whole_bodies_are_solved_whatever_the_rounding():
 
 
 def test_path_sees_every_status(pair):
-    """Otherwise the comparisons below would prove less than they say."""
+    """Check that the path has nodes of every status, so that the comparisons are meaningful."""
     _, _, _, _, whole = pair
     opened, slipping, stuck = np.array([statuses(state.force) for state in whole]).T
     assert opened.max() >= 4
@@ -218,7 +218,7 @@ def test_forces_and_slips_are_those_of_the_whole_bodies(pair):
 
 
 def test_resultants_and_energies_are_those_of_the_whole_bodies(pair):
-    """P, Qx, Qy, Mx, My, Mz and the energy of each direction at every increment."""
+    """Compare P, Qx, Qy, Mx, My, Mz and the energies at every increment."""
     joint, _, _, split, whole = pair
     reduced, expected = (
         np.array([resultants(s.force, joint.x, joint.y) for s in states])
@@ -236,7 +236,7 @@ def test_resultants_and_energies_are_those_of_the_whole_bodies(pair):
 
 
 def test_load_and_contact_balance(pair):
-    """Resultants by hand from the tractions on the top; the support there holds Qy alone."""
+    """Compare with the resultants of the tractions on the top; its support holds only Qy."""
     joint, _, _, split, _ = pair
     area, height = LENGTH * WIDTH, 2.0
     second = WIDTH * LENGTH**3 / 12.0
@@ -256,7 +256,7 @@ def test_load_and_contact_balance(pair):
 
 
 def whole_displacements(supported, states, amplitudes):
-    """All displacements of the upper body in each of the states."""
+    """Return all displacements of the upper body in each of the states."""
     displacements = []
     for state, amplitude in zip(states, amplitudes, strict=True):
         force = state.force.T.ravel()
@@ -268,9 +268,9 @@ def whole_displacements(supported, states, amplitudes):
 
 
 def test_slope_of_the_stuck_branch_is_that_of_a_tied_joint(pair):
-    """After the reversal: dQ/du of the loaded top, and every contact force, as if bonded.
+    """Check that after the reversal dQ/du of the top and all contact forces are those of a bond.
 
-    Bonded in the whole bodies, at the nodes that touch; the others stay open.
+    The whole bodies are bonded at the nodes that touch; the others stay open.
     """
     joint, supported, monolith, split, _ = pair
     window = slice(TURN, TURN + 2)
@@ -289,7 +289,7 @@ def test_slope_of_the_stuck_branch_is_that_of_a_tied_joint(pair):
 
 @pytest.mark.parametrize("order", [1, 2])
 def test_slope_of_a_fully_closed_stuck_branch_is_that_of_a_bonded_block(order):
-    """Without tilt no node lifts off, and after the reversal all twenty are as if bonded."""
+    """Check the branch after the reversal without tilt, where all twenty nodes touch."""
     joint = BlockOnPlate(order)
     supported, condensed = joint.condensed()
     path = np.concatenate([PRESS, swing([*UP, 0.98], tilt=0.0)])
@@ -305,10 +305,11 @@ def test_slope_of_a_fully_closed_stuck_branch_is_that_of_a_bonded_block(order):
 
 
 def cycle_energies(steps):
-    """Of a cycle that repeats itself, in ``steps`` increments each way: work and energy lost.
+    """Return work and dissipated energy of a repeated cycle, in ``steps`` increments each way.
 
-    Work of the loads by the trapezoidal rule, energy by the same rule (which is exact for the
-    elastic part) and as the increments report it; and how far the cycle is from closed.
+    The work of the loads is by the trapezoidal rule. The energy is by the same rule (which is exact
+    for the elastic part) and as the increments report it. The last result is how far the cycle is
+    from closed.
     """
     joint = BlockOnPlate(1)
     supported, condensed = joint.condensed()
@@ -331,9 +332,9 @@ def cycle_energies(steps):
 
 @pytest.mark.slow
 def test_work_of_a_closed_cycle_is_the_energy_lost():
-    """The loads' work is the friction's to rounding, and what is reported tends to it.
+    """Check that the work equals the dissipation, and that the reported energy converges to it.
 
-    An increment reports the shear at its end times its slip, so it is right to first order.
+    An increment reports the shear at its end times its slip, which is accurate to first order.
     """
     errors = []
     for steps in (5, 10, 20):
@@ -348,7 +349,7 @@ def test_work_of_a_closed_cycle_is_the_energy_lost():
 
 @pytest.fixture(scope="module")
 def small_dovetail(dovetail, titanium, mission):
-    """Structure, joint, the same as whole bodies, and a load path with the moment."""
+    """Return structure, joint, the same as whole bodies, and a load path with the moment."""
     shape = replace(dovetail, **SMALL)
     load_path = replace(mission, **SMALL_PATH)
     mesh = shape.mesh(FLANK_NODES, SIZE)
@@ -358,12 +359,12 @@ def small_dovetail(dovetail, titanium, mission):
 
 
 def whole_dovetail(mesh, material, mission):
-    """Supports and loads written down again: a held disk, a blade kept in the slot by its mean."""
+    """Return independent supports and loads: a held disk, and a blade held on average."""
     disk, blade = (ElasticBody(body, material, 1) for body in mesh.bodies)
     size_1, size_2 = 3 * len(disk.nodes), 3 * len(blade.nodes)
     inner = disk.boundary_nodes("inner")
     sides, normals = disk.boundary_normals("sides")
-    # Nodes that are held need not slide as well: the equations would depend on each other.
+    # Held nodes are not made to slide, too, since the equations would be dependent.
     loose = ~np.isin(sides, inner)
     supports = sp.vstack([held(size_1, inner), sliding(size_1, sides[loose], normals[loose])])
     spin = disk.centrifugal_load()
@@ -394,9 +395,9 @@ def whole_dovetail(mesh, material, mission):
 
 @pytest.mark.slow
 def test_dovetail_is_that_of_the_whole_bodies(small_dovetail):
-    """Forces, slips and the resultants of both flanks through a mission with its moment."""
+    """Compare forces, slips and the resultants of both flanks in a mission with a moment."""
     structure, joint, monolith, amplitudes = small_dovetail
-    # At rest nothing holds the blade, and where it lies is anyone's choice.
+    # At rest nothing holds the blade, and its position is arbitrary.
     amplitudes = amplitudes[:-1]
     split = list(FrictionalJoint(joint.resolvent(), FRICTION).march(amplitudes, structure.gap()))
     whole = list(monolith.march(amplitudes, structure.gap()))
@@ -418,10 +419,10 @@ def test_dovetail_is_that_of_the_whole_bodies(small_dovetail):
 
 
 def test_stuck_branch_of_the_dovetail_is_that_of_a_tied_one(small_dovetail):
-    """Slopes dP/dF, dQ/dF and all nodal forces past the peak, against flanks bonded.
+    """Compare slopes dP/dF, dQ/dF and all nodal forces past the peak with bonded flanks.
 
-    Two increments past the peak every node that touches sticks. Right past the peak the rims still
-    creep: an eighth of the nodes, that move the slopes by less than 0.1 %.
+    Two increments past the peak every touching node sticks. Immediately past the peak the rims
+    still creep: an eighth of the nodes, which change the slopes by less than 0.1 %.
     """
     structure, joint, monolith, amplitudes = small_dovetail
     frictional = FrictionalJoint(joint.resolvent(), FRICTION)

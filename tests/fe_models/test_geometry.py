@@ -1,4 +1,4 @@
-"""The dovetail's bodies: faces that match, boundaries where they belong, gaps in closed form."""
+"""Geometry of the dovetail: matching faces, boundaries in place, and gaps in closed form."""
 
 from dataclasses import replace
 
@@ -34,7 +34,7 @@ def test_faces_match_node_to_node(joint_and_mesh):
 
 
 def test_faces_are_split_along_the_same_diagonals(joint_and_mesh):
-    """Or a uniform pressure would not be the same nodal forces on both bodies."""
+    """Check the diagonals: only then a uniform pressure gives equal nodal forces on both bodies."""
     _, mesh = joint_and_mesh
     for face in mesh.interfaces:
         number = {int(node): k for k, node in enumerate(face.nodes_1)}
@@ -45,7 +45,7 @@ def test_faces_are_split_along_the_same_diagonals(joint_and_mesh):
 
 
 def test_flanks_have_their_area(joint_and_mesh):
-    """The face is a parallelogram of flank width and slot length."""
+    """Check that the face is a parallelogram of flank width and slot length."""
     dovetail, mesh = joint_and_mesh
     for side, face in zip((1, -1), mesh.interfaces, strict=True):
         up = np.array([-side * np.sin(dovetail.flank_angle), 0.0, np.cos(dovetail.flank_angle)])
@@ -57,16 +57,16 @@ def test_flanks_have_their_area(joint_and_mesh):
 
 
 def test_frames(joint_and_mesh):
-    """Right-handed; x up the flank, as the blade slides out; z out of the disk; y opposite."""
+    """Check that frames are right-handed, with x up the flank, z out of the disk, y opposite."""
     dovetail, mesh = joint_and_mesh
     for side, face in zip((1, -1), mesh.interfaces, strict=True):
         x, y, z = face.frame.axes
         np.testing.assert_allclose(face.frame.axes @ face.frame.axes.T, np.eye(3), atol=1e-14)
         np.testing.assert_allclose(np.cross(x, y), z, atol=1e-14)
         assert abs(y @ dovetail.slot_direction) == pytest.approx(1.0)
-        # Of all directions in the face x has the largest share of the pull.
+        # Among all directions in the face, x has the largest component along the pull.
         assert x @ dovetail.load_axis == pytest.approx(np.hypot(z[0], z[1]))
-        # Out of the disk and into the blade: down, and towards the middle of the slot.
+        # The normal points out of the disk and into the blade: down, towards the slot's middle.
         assert z[2] < 0.0
         assert side * z[0] < 0.0
     ys = [face.frame.axes[1] for face in mesh.interfaces]
@@ -74,7 +74,7 @@ def test_frames(joint_and_mesh):
 
 
 def test_normals_point_out_of_the_disk(joint_and_mesh):
-    """The disk's material lies behind the face, the blade's in front of it."""
+    """Check that the disk's material lies behind the face, the blade's in front of it."""
     _, mesh = joint_and_mesh
     for face in mesh.interfaces:
         for body, sense in ((mesh.bodies[0], -1.0), (mesh.bodies[1], 1.0)):
@@ -136,7 +136,7 @@ def test_sides_lie_on_the_sector_planes(dovetail, coarse_mesh):
 
 
 def test_mesh_is_its_own_mirror_image(joint_and_mesh):
-    """Nodes and elements, about the middle of every section."""
+    """Check nodes and elements for symmetry about the middle of every section."""
     dovetail, mesh = joint_and_mesh
     for body in mesh.bodies:
         points = body.mesh.p.T
@@ -159,7 +159,7 @@ def test_no_element_is_flat(joint_and_mesh):
 
 
 def test_gap_is_flat_with_circular_edges_and_ends(joint_and_mesh):
-    """Distances to the edges of the parallelogram: R - sqrt(R² - t²) a length t into the arc."""
+    """Check R - sqrt(R² - t²) at distances t into the arcs along the edges of the face."""
     dovetail, _ = joint_and_mesh
 
     def arc(t, radius):
@@ -195,7 +195,7 @@ def test_nodes_carry_that_gap(joint_and_mesh):
 
 
 def test_gap_opens_beyond_the_face(dovetail):
-    """There fillets and corners begin: the faces part fast and without end."""
+    """Check that the gap opens fast beyond the face, where fillets and corners begin."""
     half = 0.5 * dovetail.flank_width
     x = half + np.array([0.0, 0.1, 1.0, 10.0])
     gap = dovetail.flank_gap(x, np.zeros(4), 1)
@@ -212,7 +212,7 @@ def test_gap_opens_beyond_the_face(dovetail):
     ],
 )
 def test_impossible_sections_are_refused(dovetail, changes, words):
-    """In one sentence that says what to change."""
+    """Check that the message is one sentence that says what to change."""
     with pytest.raises(MeshError, match=words) as caught:
         replace(dovetail, **changes).mesh((8, 10), 8.0)
     assert "\n" not in str(caught.value)

@@ -1,18 +1,18 @@
-"""A gmsh model leaves the process as it was."""
+"""Sessions of gmsh leave the process unchanged."""
 
 import os
 import signal
 
 import pytest
 
-from fe_models.meshes.gmsh_session import GIVEN_BACK, gmsh_model
+from fe_models.meshes.gmsh_session import RESET_BY_GMSH, gmsh_model
 
-NUMBERS = [getattr(signal, name) for name in GIVEN_BACK if hasattr(signal, name)]
+NUMBERS = [getattr(signal, name) for name in RESET_BY_GMSH if hasattr(signal, name)]
 
 
 @pytest.fixture(params=[signal.SIG_IGN, lambda number, frame: heard.append(number)])
 def handler(request):
-    """What a program does at signals: nothing, as after `nohup`, or what it wants."""
+    """Return a signal handler: ignoring, as after `nohup`, or a program's own."""
     before = {number: signal.signal(number, request.param) for number in NUMBERS}
     yield request.param
     for number, was in before.items():

@@ -1,4 +1,4 @@
-"""Hertz's contacts of bodies of finite elements, with the rates of their meshes."""
+"""Hertz's contacts of finite element bodies, with the convergence rates of their meshes."""
 
 import numpy as np
 import pytest
@@ -24,21 +24,21 @@ from tests.fe_models.test_verification import (
 
 
 class HertzPair:
-    """Two equal blocks under the tractions that Hertz's contact leaves on their far faces.
+    """Two equal blocks under the tractions that Hertz's contact causes on their far faces.
 
-    So the blocks are cut out of half-spaces, and their size is no approximation. Lines in the
-    plane, spheres in space: a parabolic gap, contact half-width 1, without friction. The nodes
-    gather at the contact.
+    The blocks are thus cut out of half-spaces, and their size is no approximation. There are lines
+    in the plane and spheres in space: a parabolic gap, contact half-width 1, without friction. The
+    nodes are denser at the contact.
     """
 
     # Half the width of a block and its depth, in contact half-widths; nodes within REACH may touch.
     SIZE, REACH = 3.0, 1.5
     RADIUS = 100.0
-    # Places go with sinh: cells at the contact are cosh(2) = 3.8 times smaller than far from it.
+    # Positions follow sinh: cells at the contact are cosh(2) = 3.8 times smaller than far away.
     GATHERED = 2.0
 
     def __init__(self, dimension, order, cells):
-        """``cells`` across a block, half as many into it."""
+        """Build blocks with ``cells`` across and half as many in depth."""
         self.cell = 2.0 * self.SIZE / cells * self.GATHERED / np.sinh(self.GATHERED)
         self.dimension, self.order = dimension, order
         modulus = MATERIAL.young / (2.0 * (1.0 - MATERIAL.poisson**2))
@@ -54,7 +54,7 @@ class HertzPair:
         self.points = self.lower.nodes[self.nodes]
 
     def _block(self, cells, side):
-        """The lower block, or its mirror image: so the two faces conform, diagonals and all."""
+        """Return the lower block, or its mirror image, so that the two faces match."""
         spread = np.sinh(np.linspace(-1.0, 1.0, cells + 1) * self.GATHERED)
         across = self.SIZE * spread / spread[-1]
         across[cells // 2] = 0.0
@@ -69,13 +69,13 @@ class HertzPair:
         return ElasticBody(Body("block", mirrored), MATERIAL, self.order)
 
     def _far_load(self, elastic, side):
-        """Tractions on the cut faces; z0 is the far one of both blocks."""
+        """Return the tractions on the cut faces; z0 is the far one of both blocks."""
         names = [name for name in elastic.body.mesh.boundaries if name != "contact"]
         normals = {name: OUTWARD[name] for name in names} | {"z0": side * AXES[2]}
         return traction_forces(elastic, lambda x: self.stress(x, side), normals)
 
     def stress(self, x, side):
-        """In the block on that ``side`` of the contact, depth counted from it."""
+        """Return the stress in the block on that ``side`` of the contact, with depth from it."""
         depth = side * x[2]
         if self.dimension == 2:
             voigt = cylinder_stress(self.exact, 0.0, x[0], depth, MATERIAL.poisson)
@@ -84,12 +84,15 @@ class HertzPair:
             for force, at in zip(*self._ring_forces(), strict=True):
                 arms = x[0] - at[0], x[1] - at[1], depth
                 voigt += force * point_force_stress(*arms, MATERIAL.poisson)[:, 2]
-        # Body 1 lies below: there the depth runs the other way.
+        # Body 1 is below, where the depth has the opposite direction.
         turned = np.array([1.0, 1.0, 1.0, 1.0, side, side]).reshape(6, *[1] * (x.ndim - 1))
         return (turned * voigt)[[[0, 3, 5], [3, 1, 4], [5, 4, 2]]]
 
     def _ring_forces(self):
-        """Hertz's pressure as forces on rings, by Gauss's rule in 1 - r²: exact far from it."""
+        """Return Hertz's pressure as forces on rings, by Gauss's rule in 1 - r².
+
+        It is accurate far from the contact.
+        """
         nodes, weights = np.polynomial.legendre.leggauss(6)
         # With s = sqrt(1 - r²): p r dr = p0 s² ds.
         s, share = 0.5 * (nodes + 1.0), 0.5 * weights
@@ -100,7 +103,7 @@ class HertzPair:
         return np.repeat(forces, len(angles)), places.reshape(-1, 2)
 
     def shortening(self):
-        """Approach of the far ends of the axis [mm]: ∫ ε_zz of both blocks along it."""
+        """Return the approach of the far ends of the axis [mm]: ∫ ε_zz of both blocks along it."""
         nu, young = MATERIAL.poisson, MATERIAL.young
 
         def strain(z):
@@ -114,7 +117,7 @@ class HertzPair:
         return -2.0 * quad(strain, 0.0, self.SIZE, epsabs=1e-12)[0]
 
     def solve(self):
-        """Relative errors of approach, half-width, peak pressure, and of the pressure in L2."""
+        """Return relative errors of approach, half-width, peak pressure, and pressure in L2."""
         supported = []
         dimension = self.lower.dimension
         frames = np.tile(np.eye(dimension), (len(self.nodes), 1, 1))
@@ -136,7 +139,7 @@ class HertzPair:
 
     def _errors(self, supported, state, square):
         force = state.force[2]
-        # The cut faces carry Hertz's load, but for the error of integration along them.
+        # The cut faces carry Hertz's load up to the integration error along them.
         assert force.sum() == pytest.approx(self.exact.load, rel=1e-4)
         components = state.displacement[list(self.lower.body.axes)].T.ravel()
         forces = state.force[list(self.lower.body.axes)].T.ravel()
@@ -151,7 +154,7 @@ class HertzPair:
         exact = self.exact.pressure(x) if self.dimension == 2 else self.exact.pressure(x, y)
         pressure = force / areas
         trace = LinearTrace.of(self.lower, {"contact": self.nodes})
-        if trace is not None:  # forces are of a linear traction: they tell means about the nodes
+        if trace is not None:  # Forces of a linear traction give means about the nodes.
             exact = trace.products @ exact / areas
         middle = int(np.argmin(square))
         deviations = np.array(
@@ -165,7 +168,7 @@ class HertzPair:
         return np.abs(deviations)
 
     def _far_end(self, elastic, u):
-        """u_z of the node on the axis, on the far face."""
+        """Return u_z of the node on the axis, on the far face."""
         node = np.linalg.norm(np.abs(elastic.nodes) - [0.0, 0.0, self.SIZE], axis=1).argmin()
         return u.reshape(-1, self.dimension)[node, -1]
 
@@ -182,11 +185,11 @@ HERTZ_RATES = [2.0, 2.0, 2.0, 1.0]
 
 
 def check_hertz(dimension, cells):
-    """Bounds with their rates on every mesh, and what the second order is worth.
+    """Check bounds with their rates on every mesh, and the gain by second order.
 
-    Faces that touch stay linear between vertices, where the gap is a parabola: h² / 8R at most,
-    h² for the approach whatever the order of the elements. The pressure ends with an infinite slope
-    within a cell: h in L2.
+    Faces in contact stay linear between vertices, where the gap is a parabola: an error of at most
+    h² / 8R, and h² for the approach whatever the order of the elements. The pressure ends with an
+    infinite slope within a cell, which gives h in L2.
     """
     approach = {}
     for order in ORDERS:

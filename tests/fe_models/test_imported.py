@@ -1,4 +1,4 @@
-"""Meshes of the user's: round trips through the formats, what is checked, and what is refused."""
+"""Meshes of users: round trips through the formats, checks, and refusals."""
 
 import meshio
 import numpy as np
@@ -18,7 +18,7 @@ LOWER, UPPER = ((0.0, 0.0, 0.0), (2.0, 1.0, 1.0)), ((0.5, 0.0, 1.0), (1.5, 1.0, 
 TAGS = {"lower": (1, 3), "upper": (2, 3), "lower_top": (3, 2), "upper_bottom": (4, 2)}
 VOLUME = {"lower": 2.0, "upper": 0.5}
 AREA = {"lower_top": 2.0, "upper_bottom": 1.0}
-# meshio's name of scikit-fem's elements and their facets.
+# Names in meshio of scikit-fem's elements and their facets.
 KINDS = {
     MeshTet: ("tetra", "triangle"), MeshHex: ("hexahedron", "quad"), MeshTri: ("triangle", "line"),
     MeshQuad: ("quad", "line"),
@@ -35,14 +35,14 @@ def box(kind, low, high, count=3):
 
 
 def two_boxes(kind=MeshTet, tags=True):
-    """Both boxes in one file; in the plane their sections y = 0."""
+    """Return both boxes in one file; in the plane their sections y = 0."""
     dim = kind.elem.refdom.dim()
     points, cells, facets, offset = [], [], [], 0
     for (low, high), level in ((LOWER, 1.0), (UPPER, 1.0)):
         pick = (0, 1, 2) if dim == 3 else (0, 2)
         mesh = box(kind, [low[k] for k in pick], [high[k] for k in pick])
         face = mesh.facets[:, mesh.facets_satisfying(lambda x, z=level: np.isclose(x[-1], z))]
-        if kind is MeshHex:  # scikit-fem counts the corners of a cube in another order
+        if kind is MeshHex:  # scikit-fem numbers the corners of a cube in another order.
             cell = mesh.t[[0, 1, 4, 2, 3, 5, 7, 6]]
         else:
             cell = mesh.t
@@ -63,7 +63,7 @@ def two_boxes(kind=MeshTet, tags=True):
 
 
 def check_two_boxes(imported, names):
-    """``names`` of the two bodies and their boundaries: volumes, areas, normals are exact."""
+    """Check ``names`` of bodies and boundaries, and exact volumes, areas and normals."""
     lower, upper, top, bottom = names
     assert list(imported.bodies) == [lower, upper]
     assert volume(imported.bodies[lower]) == pytest.approx(2.0, rel=1e-12)
@@ -100,7 +100,7 @@ def test_gmsh_numbers_of_nodes_are_kept(tmp_path):
 
 
 def test_old_gmsh_file_with_gaps_in_its_numbers(tmp_path):
-    """An unnamed group goes by its number."""
+    """Check that an unnamed group is named by its number."""
     path = tmp_path / "tetrahedron.msh"
     path.write_text(
         "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n"
@@ -116,7 +116,7 @@ def test_old_gmsh_file_with_gaps_in_its_numbers(tmp_path):
 
 
 def _write_with_gmsh(path, mesh, version, binary, first=1, names=True, order=1, save_all=False):
-    """Write with gmsh itself, every block an entity."""
+    """Write with gmsh itself, with every block as an entity."""
     kinds = {"tetra": (3, 4), "triangle": (2, 2), "hexahedron": (3, 5), "quad": (2, 3)}
     with gmsh_model("boxes") as gmsh:
         for tag, block in enumerate(mesh.cells, start=1):
@@ -129,7 +129,7 @@ def _write_with_gmsh(path, mesh, version, binary, first=1, names=True, order=1, 
         if names:
             for name, (tag, dim) in mesh.field_data.items():
                 gmsh.model.addPhysicalGroup(int(dim), [int(tag)], int(tag), name)
-        if order > 1:  # which renumbers the nodes
+        if order > 1:  # This renumbers the nodes.
             gmsh.model.mesh.setOrder(order)
         gmsh.option.setNumber("Mesh.MshFileVersion", version)
         gmsh.option.setNumber("Mesh.Binary", binary)
@@ -213,10 +213,10 @@ def test_formats_without_names_go_by_numbers(tmp_path, suffix):
 
 
 def test_med_groups_go_by_their_names(tmp_path):
-    """A family of MED is numbered below zero on cells."""
+    """Check names of MED families, which have negative numbers on cells."""
     mesh = two_boxes()
     tags = [-values for values in mesh.cell_data["gmsh:physical"]]
-    # meshio's writer wants one block per kind of element.
+    # meshio's writer requires one block per kind of element.
     mesh = meshio.Mesh(
         mesh.points,
         {kind: mesh.get_cells_type(kind) for kind in ("tetra", "triangle")},
@@ -259,7 +259,7 @@ def test_several_unknown_tags_are_refused(tmp_path):
 @pytest.mark.parametrize("kind", [MeshTri, MeshQuad])
 @pytest.mark.parametrize("plane", ["xy", "xz"])
 def test_plane_mesh(tmp_path, kind, plane):
-    """Whichever coordinate is constant, ours are X and Z."""
+    """Check that the axes become X and Z whichever coordinate is constant."""
     mesh = two_boxes(kind)
     points = np.full((len(mesh.points), 3), 7.0)
     points[:, (0, 1) if plane == "xy" else (0, 2)] = mesh.points
@@ -294,7 +294,7 @@ def test_hexahedra_fill_their_box_conformingly(tmp_path, suffix):
 
 
 def test_random_numbering_splits_conformingly():
-    """Diagonals agree whatever the numbers of the nodes; the volume stays that of the box."""
+    """Check that diagonals agree and the volume is that of the box for any node numbers."""
     rng = np.random.default_rng(1)
     mesh = box(MeshHex, (0.0, 0.0, 0.0), (1.0, 2.0, 3.0), 4)
     order = rng.permutation(mesh.p.shape[1])
@@ -343,7 +343,7 @@ def test_description_lists_faces_with_area_and_normal(tmp_path):
 
 
 def changed(change):
-    """Two boxes of tetrahedra after ``change``."""
+    """Return two boxes of tetrahedra after ``change``."""
     mesh = two_boxes()
     change(mesh)
     return mesh
@@ -399,15 +399,15 @@ def lose_coordinate(mesh):
     ("change", "message"),
     [
         (bond, "bodies 1 and 2 share 2 nodes: they are bonded, not in contact"),
-        (repeat_element, "1 elements of body 1 come more than once"),
+        (repeat_element, "1 elements of body 1 occur more than once"),
         (repeat_node, "1 elements of body 1 repeat a node, the first near"),
         (flatten, "48 elements of body 1 are flat"),
         (fold, "body 1 folds over itself"),
         (put_facet_inside, "1 of the 8 facets of boundary 3 are inside body 1"),
-        (put_facet_off, "boundary 3 has facets that are no faces of the mesh"),
+        (put_facet_off, "boundary 3 has facets that are not faces of the mesh"),
         (put_facet_between, "1 of the 8 facets of boundary 3 are on no body"),
         (tear, "body 1 is in 2 pieces that share no nodes"),
-        (lose_coordinate, "coordinates are no numbers"),
+        (lose_coordinate, "coordinates are not finite numbers"),
     ],
 )
 def test_broken_mesh_is_refused(tmp_path, change, message):

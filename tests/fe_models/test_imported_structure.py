@@ -47,7 +47,7 @@ def solved(joined, amplitudes, preload=None, mu=MU):
 
 @pytest.fixture
 def precise(monkeypatch):
-    """Solved to the last digits, and always three cycles: those of any two models compare."""
+    """Solve to the last digits and always with three cycles, so that any two models compare."""
     monkeypatch.setattr(friction, "TOLERANCE", 1e-12)
     monkeypatch.setattr(structure, "CLOSED", -1.0)
     monkeypatch.setattr(structure, "MOST_CYCLES", 3)
@@ -62,9 +62,9 @@ PATH = np.array([[1.0, 0.0], [1.0, 1.0], [1.0, -1.0]])
 @pytest.mark.parametrize("match", [True, False])
 @pytest.mark.parametrize("order", [1, 2])
 def test_half_model_equals_the_full_one(order, match, precise):
-    """A plane of symmetry through the contact, along the frame's x: loads are halved."""
+    """Check a plane of symmetry through the contact, along the frame's x, with half the loads."""
     base, plane = Support("base", "xyz"), Support("plane", "normal")
-    shares = PATH * [1.0, 0.5]  # half the force on half the lid
+    shares = PATH * [1.0, 0.5]  # Half the force acts on half the lid.
     half = built(block_and_pad(False, match), [base, plane], PRESSED, order)
     full = built(block_and_pad(True, match), [base], PRESSED, order)
     one, two = solved(half, shares, mu=0.35), solved(full, PATH, mu=0.35)
@@ -101,7 +101,7 @@ def test_half_model_equals_the_full_one(order, match, precise):
 
 
 def plane_block_and_pad(full):
-    """The section of such a joint, half (X > 0) or all of it."""
+    """Return the section of such a joint, half (X > 0) or all of it."""
     lower = MeshTri.init_tensor(along((0, 1, 4), (1, 2, 2)), along((-2, 0, 3)))
     upper = MeshTri.init_tensor(along((0, 1, 5)), along((0, 1, 3)))
     if full:
@@ -112,7 +112,7 @@ def plane_block_and_pad(full):
 
 
 def test_half_section_equals_the_full_one(precise):
-    """The plane of symmetry is across the frame's x: friction acts towards it on both sides."""
+    """Check a plane of symmetry across the frame's x, towards which friction acts."""
     base, plane = Support("base", "xz"), Support("plane", "x")
     loads, path = [Pressure("lid", 50.0)], np.array([[0.5], [1.0], [0.2]])
     half = built(plane_block_and_pad(False), [base, plane], loads)
@@ -127,7 +127,7 @@ def test_half_section_equals_the_full_one(precise):
 
 
 def test_slice_in_plane_strain(precise):
-    """Held along y everywhere it never leaves the plane, and is the section but for its mesh."""
+    """Check that a slice held along y stays in the plane and equals the section."""
     x = along((-2, -1, 2), (-1, 1, 12), (1, 2, 2))
     lower = MeshTet.init_tensor(x, np.array([0.0, 0.1]), along((-2, 0, 5)))
     upper = MeshTet.init_tensor(along((-1, 1, 12)), np.array([0.0, 0.1]), along((0, 1, 4)))
@@ -157,12 +157,12 @@ def test_slice_in_plane_strain(precise):
         lid_motion(s, stress_state(s, h.force[1], h.displacement[1], path[1])[1].displacement)
         for s, h in ((joined, history), (flat, plane))
     ]
-    # Slice and section differ in the diagonals of their meshes, which are as fine.
+    # Slice and section differ only in the diagonals of their meshes.
     np.testing.assert_allclose(moved[0], moved[1], atol=0.03 * np.abs(moved[1]).max())
 
 
 def lid_motion(joined, displacement):
-    """Mean displacement of body 2 at its top, along x and z."""
+    """Return the mean displacement of body 2 at its top, along x and z."""
     top = joined.mesh.bodies[1].points[:, 2] == 1.0
     return displacement[top][:, [0, 2]].mean(axis=0)
 
@@ -212,16 +212,18 @@ def test_displacement_imposed_on_a_contact_face_is_refused():
 
 @pytest.mark.parametrize("hold", ["x", "xyz", "mean_x"])
 def test_displacement_against_a_support_is_refused(hold):
-    """It must not win over what is held; where supports hold across it, all is well."""
+    """Check that it must not override supports; supports across it are allowed."""
     moved = [Displacement("lid", np.array([1e-3, 0.0, 0.0]))]
     base = Support("base", "xyz")
-    with pytest.raises(MeshError, match="imposed on lid along what a support holds"):
+    with pytest.raises(
+        MeshError, match="imposed on lid along a direction in which a support holds"
+    ):
         built(block_and_pad(False, True), [base, Support("lid", hold)], moved)
     built(block_and_pad(False, True), [base, Support("lid", "yz"), Support("plane", "y")], moved)
 
 
 def test_displacements_add_up_on_one_boundary_only():
-    """Nodes of two boundaries would move twice as far as either."""
+    """Check the refusal where nodes of two boundaries would move twice as far."""
     mesh = block_and_pad(False, True)
     upper = mesh.bodies["upper"].mesh
     half = upper.facets_satisfying(lambda p: np.isclose(p[2], 1.0) & (p[0] < 0.0))
@@ -237,14 +239,14 @@ def test_displacements_add_up_on_one_boundary_only():
 
 
 def test_force_on_a_boundary_of_both_bodies_is_refused():
-    """It would be applied twice."""
+    """Check the refusal of a force that would be applied twice."""
     push = BoundaryForce("plane", np.array([0.0, 0.0, -10.0]))
     with pytest.raises(MeshError, match="plane is a boundary of lower and upper"):
         built(block_and_pad(False, True), [Support("base", "xyz")], [push])
 
 
 def test_body_1_alone_may_be_held_at_the_face(precise):
-    """Its nodes at rest where they meet the support; body 2 still slides over them."""
+    """Check that body 2 still slides over nodes that a support of body 1 holds."""
     mesh = block_and_pad(False, True)
     lower = mesh.bodies["lower"].mesh
     mesh.bodies["lower"] = Body("lower", lower.with_boundaries({"wall": lower.boundaries["plane"]}))
@@ -259,7 +261,7 @@ def test_body_1_alone_may_be_held_at_the_face(precise):
 
 
 def domed():
-    """A box whose top bulges over its flat rim, 2 x 1 x 1 below it; and a block under it."""
+    """Return a box with a domed top over a flat rim, 2 x 1 x 1 below it, and a block under it."""
     upper = MeshTet.init_tensor(along((0, 2, 6)), along((0, 1, 4)), along((0, 1, 3)))
     x, y, z = upper.p
     points = upper.p.copy()
@@ -284,7 +286,7 @@ def resultants(load, about=(0.0, 0.0, 0.0)):
 
 
 def test_pressure_on_a_dome_is_that_on_its_rim():
-    """Pressure on any surface over a flat rim: -p A, whatever the surface."""
+    """Check that pressure on any surface over a flat rim has the resultant -p A."""
     force, _, _, _ = resultants(Pressure("dome", 3.0))
     np.testing.assert_allclose(force, [0.0, 0.0, -6.0], atol=1e-12)
 
@@ -298,7 +300,7 @@ def test_force_is_spread_about_the_centroid():
 
 
 def test_force_at_a_point_and_moment_are_handed_on():
-    """On one side of a dome: the resultants of both about the point, exactly."""
+    """Check the exact resultants of both about the point, on one side of a dome."""
     at, force, moment = np.array([7.0, -3.0, 4.0]), np.array([5.0, -7.0, 11.0]), [20.0, 30.0, -40.0]
     given = BoundaryForce("side", force, at, np.array(moment))
     total, about, _, _ = resultants(given, at)
@@ -310,7 +312,7 @@ def test_force_at_a_point_and_moment_are_handed_on():
 
 
 def test_rotation_about_a_shifted_axis():
-    """ρ V Ω² times the arm of the centre of mass, and no moment about the axis itself."""
+    """Check ρ V Ω² times the arm of the centre of mass, without moment about the axis."""
     axis, through, speed = np.array([1.0, 2.0, 2.0]) / 3.0, np.array([5.0, -3.0, 7.0]), 600.0
     load = Rotation(3.0 * axis, through, speed)
     force, moment, volume, centre = resultants(load, through)
@@ -351,7 +353,7 @@ def test_moments_in_the_plane_are_about_y():
 
 @pytest.mark.parametrize("order", [1, 2])
 def test_bar_in_two_pieces_is_strained(order, precise):
-    """P = E A d / L: the pieces widen alike, so that nothing rubs; node sets hold the base."""
+    """Check P = E A d / L for pieces that widen equally, held by node sets."""
     lower = MeshTet.init_tensor(along((0, 2, 2)), along((0, 1, 2)), along((0, 3, 3)))
     upper = MeshTet.init_tensor(along((0, 2, 3)), along((0, 1, 2)), along((3, 4, 2)))
     edge = (lower.p[1] == 0.0) & (lower.p[2] == 0.0)
@@ -385,7 +387,7 @@ def test_bar_in_two_pieces_is_strained(order, precise):
 
 
 def rounded_pad(cells, unmatched):
-    """A plane pad with a cylindrical foot on a block, of fewer nodes than it if ``unmatched``."""
+    """Return a plane pad with a cylindrical foot on a block with more nodes if ``unmatched``."""
     x = along((-2, -1, 2), (-1, 1, cells), (1, 2, 2))
     lower = MeshTri.init_tensor(x, along((-2, 0, cells)))
     count = cells if not unmatched else 3 * cells // 4
@@ -398,7 +400,7 @@ def rounded_pad(cells, unmatched):
 
 
 def rubbed(cells, unmatched):
-    """Partial slip over most of the foot; it settles slowly, by about 0.8 in each cycle."""
+    """Return partial slip over most of the foot, which settles by about 0.8 per cycle."""
     loads = [Pressure("lid", 20.0), Displacement("lid", np.array([2e-3, 0.0, 0.0]))]
     preload = np.array([[0.5, 0.0], [1.0, 0.0], [1.0, 0.5], [1.0, 1.0]])
     shift = np.array([0.5, 0.0, -0.5, -1.0, -0.5, 0.0, 0.5, 1.0])
@@ -409,7 +411,7 @@ def rubbed(cells, unmatched):
 
 @pytest.mark.slow
 def test_meshes_that_do_not_match_agree_with_those_that_do():
-    """Q and energy of a partial slip, to discretisation; P is equilibrium."""
+    """Compare Q and energy of partial slip up to discretisation; P follows from equilibrium."""
     differences = []
     for cells in (16, 32):
         one, two = (rubbed(cells, unmatched).histories[0].loads for unmatched in (False, True))
@@ -431,7 +433,7 @@ def test_cycles_are_marched_until_they_close():
 
 
 def test_cycle_that_follows_goes_as_far():
-    """From the closed cycle with the same gap nothing changes."""
+    """Check that nothing changes from the closed cycle with the same gap."""
     loads = [Pressure("lid", 20.0), Displacement("lid", np.array([1e-3, 0.0, 0.0]))]
     joined = built(rounded_pad(16, True), [Support("base", "xz")], loads)
     joint = FrictionalJoint(joined.condense().resolvent(), MU)
@@ -452,7 +454,7 @@ def test_cycle_that_follows_goes_as_far():
 
 @pytest.mark.parametrize("match", [True, False])
 def test_parts_of_a_face_are_one_face(match):
-    """Seams included: the interface is that of the whole."""
+    """Check that an interface of several boundaries, seams included, is that of the whole."""
     whole = block_and_pad(full=True, match=match)
     lower, upper = (whole.bodies[name].mesh for name in ("lower", "upper"))
     bottom = upper.boundaries["bottom"]

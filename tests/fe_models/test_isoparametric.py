@@ -21,7 +21,7 @@ from sa_solver.types import Material
 
 STEEL = Material(210e3, 0.3, 7.8e-9)
 GRID = np.linspace(0.0, 1.0, 3)
-# Far from the origin, as bodies of an assembly are.
+# The body is far from the origin, as bodies of an assembly are.
 MESHES = {
     2: MeshTri.init_tensor(GRID, GRID).translated((40.0, 70.0)),
     3: MeshTet.init_tensor(GRID, GRID, GRID).translated((40.0, 70.0, -20.0)),
@@ -38,7 +38,7 @@ def middles(mesh):
 
 @pytest.fixture(params=[2, 3])
 def perturbed(request):
-    """A block all of whose midsides are off the middle of their edges, by up to 6 % of them."""
+    """Return a block with all midside nodes up to 6 % of their edges off their middle."""
     mesh = MESHES[request.param]
     mesh = mesh.with_boundaries(
         {"skin": lambda x: x[0] > 0.0, "low": lambda x: x[0] < 40.1, "high": lambda x: x[0] > 40.9}
@@ -66,7 +66,7 @@ def test_rigid_motions_take_no_force(perturbed):
 
 
 def test_constant_strain_is_exact(perturbed):
-    """Stress the same everywhere; forces of the nodes those of its traction on the skin."""
+    """Check uniform stress, and nodal forces that are those of its traction on the surface."""
     d = perturbed.dimension
     gradient = np.random.default_rng(1).standard_normal((d, d)) * 1e-3
     displacement = (in_body(perturbed) @ gradient.T).ravel()
@@ -111,7 +111,7 @@ def test_pressure_all_round_balances(perturbed):
 
 
 def test_weight_and_centrifugal_force_are_those_of_the_mass(perturbed):
-    """ρ Ω² times the mass matrix on places: what the body's rotation gives, and softening."""
+    """Compare rotation and softening with ρ Ω² times the mass matrix on positions."""
     d = perturbed.dimension
     load = perturbed.centrifugal_load().reshape(-1, d)
     places = in_body(perturbed).copy()
@@ -127,7 +127,7 @@ def test_weight_and_centrifugal_force_are_those_of_the_mass(perturbed):
 
 
 def test_free_expansion_takes_no_force(perturbed):
-    """In plane strain it is (1 + ν) θ, since it is held across the plane."""
+    """Check the free expansion, (1 + ν) θ in plane strain, where it is held across."""
     strain = 1e-3
     free = (1.3 if perturbed.dimension == 2 else 1.0) * strain
     load = perturbed.thermal_load(np.full(perturbed.body.mesh.nvertices, strain))
@@ -137,7 +137,7 @@ def test_free_expansion_takes_no_force(perturbed):
 
 
 def circle(rings, curved, inner=10.0, outer=20.0):
-    """A quarter of a thick-walled cylinder, its curved edges straight or on their circles."""
+    """Return a quarter of a thick-walled cylinder, with straight or circular edges."""
     r, angle = np.linspace(inner, outer, rings + 1), np.linspace(0.0, 0.5 * np.pi, rings + 1)
     mesh = MeshTri.init_tensor(r, angle)
     places = mesh.p.copy()
@@ -159,7 +159,10 @@ def circle(rings, curved, inner=10.0, outer=20.0):
 
 
 def lame(r, inner=10.0, outer=20.0, pressure=100.0):
-    """Radial displacement, radial and hoop stress of plane strain (Timoshenko & Goodier, §28)."""
+    """Return radial displacement and radial and hoop stress of plane strain.
+
+    Source: Timoshenko & Goodier, §28.
+    """
     a = pressure * inner**2 / (outer**2 - inner**2)
     radial, hoop = a * (1.0 - (outer / r) ** 2), a * (1.0 + (outer / r) ** 2)
     strain = ((1.0 - 0.09) * hoop - 0.3 * 1.3 * radial) / STEEL.young
@@ -167,7 +170,7 @@ def lame(r, inner=10.0, outer=20.0, pressure=100.0):
 
 
 def expand(elastic, pressure=100.0):
-    """Displacement of a quarter under a pressure inside."""
+    """Return the displacement of a quarter under internal pressure."""
     held = np.concatenate(
         [
             2 * elastic.boundary_nodes("x") + 1,
@@ -198,15 +201,15 @@ def lame_errors(rings, curved):
 
 
 def rates(errors):
-    """Powers of the element size that errors of meshes twice as fine each go down with."""
+    """Return the powers of the element size with which errors fall between meshes."""
     return np.log2(np.array(errors)[:-1] / np.array(errors)[1:])
 
 
 def test_thick_walled_cylinder():
-    """Curved edges give displacement its third order, and recovered stress too; straight take it.
+    """Check the third order of displacement and stress, which straight edges lose.
 
-    Largest errors over the nodes, of 32 elements through the wall 4e-6 and 5e-4 instead of 4e-4
-    and 1.5e-3.
+    The largest errors over the nodes, with 32 elements through the wall, are 4e-6 and 5e-4 instead
+    of 4e-4 and 1.5e-3.
     """
     sizes = (8, 16, 32)
     straight, curved = (np.array([lame_errors(n, c) for n in sizes]) for c in (False, True))
@@ -217,7 +220,7 @@ def test_thick_walled_cylinder():
 
 
 def ball(refinements, curved):
-    """A ball of radius 1 mm; its facets flat, or their midsides on the sphere."""
+    """Return a ball of radius 1 mm, with flat facets or midside nodes on the sphere."""
     mesh = MeshTet.init_ball(refinements).with_boundaries({"skin": lambda x: x[0] < 9.0})
     places = middles(mesh)
     outside = np.unique(mesh.f2e[:, mesh.boundary_facets()])
@@ -226,7 +229,7 @@ def ball(refinements, curved):
 
 
 def test_ball():
-    """Volume and area with h⁴ instead of h²; normals are radii, and pressure lifts nothing."""
+    """Check volume and area with h⁴ instead of h², radial normals, and balanced pressure."""
     errors = []
     for curved in (False, True):
         bodies = [ball(n, curved) for n in (1, 2, 3)]
@@ -246,7 +249,7 @@ def test_ball():
 
 
 def test_stress_round_a_hole_without_tractions():
-    """Normals of a coarse hole are its radii: none of its vertices is taken for a corner."""
+    """Check that normals of a coarse hole are radial: no vertex counts as a corner."""
     elastic = circle(4, curved=True)
     recovery = StressRecovery(elastic, elastic.body.mesh.boundaries["bore"])
     mean, smooth, inwards, _ = recovery._surface(elastic.body.mesh.boundaries["bore"])
@@ -258,7 +261,7 @@ def test_stress_round_a_hole_without_tractions():
 
 
 def test_normals_go_on_in_the_next_sector():
-    """At a cut of a wheel they are radial for both sectors; one alone leaves a thousandth."""
+    """Check radial normals at a cut of a wheel; one sector alone has an error of 1e-3."""
     elastic = circle(4, curved=True)
     cyclic = Cyclic(["x"], ["z"], np.array([0.0, 1.0, 0.0]), np.zeros(3), 4)
     cuts = Cuts.of(elastic.body, cyclic)
@@ -282,7 +285,7 @@ def test_cuts_whose_midsides_are_no_images_are_refused():
 
 
 def test_far_places_of_faces_are_found():
-    """Where rounding of coordinates is large against an element, scikit-fem's search never ends."""
+    """Check points with large coordinates, for which scikit-fem's search never ends."""
     elastic = ball(1, curved=True)
     far = replace(elastic.body.mesh, doflocs=1e-3 * elastic.body.mesh.p + 1e3)
     body = Body("far", far, midsides=1e-3 * elastic.body.midsides + 1e3)

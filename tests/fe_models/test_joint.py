@@ -1,4 +1,4 @@
-"""Two condensed bodies joined must be the two bodies glued, or moved apart, directly."""
+"""Joints of two condensed bodies compared with direct solutions of glued or separated bodies."""
 
 import numpy as np
 import pytest
@@ -18,9 +18,9 @@ STEEL, TITANIUM = Material(200e3, 0.3, 7.8e-9), Material(115e3, 0.29, 4.43e-9)
 
 
 def nodal_trace(elastic, face, nodes):
-    """Nodal values ``(3 n, 3 all)`` of the linear field next to a displacement on a face.
+    """Return nodal values ``(3 n, 3 all)`` of the linear field closest to a displacement.
 
-    By Gauss's rule on the face, in least squares.
+    They are found by Gauss's rule on the face, in least squares.
     """
     mesh, corners = elastic.body.mesh, elastic.body.facets(face)
     trace = np.zeros((len(nodes), len(elastic.nodes)))
@@ -48,7 +48,7 @@ def nodal_trace(elastic, face, nodes):
 
 
 class Stacked:
-    """A held box, and a floating one on it that is pulled at its top; both spin."""
+    """Held box with a floating one on it that is pulled at its top; both spin."""
 
     def __init__(self, box, order):
         self.lower = box((2, 3, 2), (0.0, 0.0, 0.0), (2.0, 3.0, 1.5), STEEL, order)
@@ -93,9 +93,9 @@ class Stacked:
         return join([body.condense() for body in self.bodies])
 
     def direct(self, relative, amplitudes):
-        """Both bodies with u_2 = u_1 + w on the face as constraints of one dense system.
+        """Solve both bodies with u_2 = u_1 + w on the face as constraints of one dense system.
 
-        Returns forces on body 2 in the frame and the displacements of both bodies.
+        Returns the forces on body 2 in the frame and the displacements of both bodies.
         """
         matrices, loads = [], []
         for elastic, constraints, load in zip(
@@ -139,7 +139,7 @@ def stacked(request, box):
 
 @pytest.mark.parametrize("apart", [0.0, 1e-3])
 def test_joint_is_the_direct_solution(stacked, apart):
-    """Glued (w = 0) or at a given relative displacement, and all that lies inside."""
+    """Compare glued bodies (w = 0) and a given relative displacement, inside, too."""
     joint = stacked.joined()
     amplitudes = np.array([2.0, 30.0])
     relative = apart * np.random.default_rng(1).standard_normal((len(stacked.nodes_1), 3))
@@ -155,13 +155,13 @@ def test_joint_is_the_direct_solution(stacked, apart):
 
 
 def condensed(rng, size, rank):
-    """A stiffness of that rank and two load cases that a floating body can be in balance with."""
+    """Return a stiffness of that rank and two load cases that it can balance."""
     root = rng.standard_normal((size, rank))
     return root @ root.T, root @ rng.standard_normal((rank, 2))
 
 
 def test_projected_joint_is_the_direct_solution():
-    """Body 1 with fewer nodes than body 2: equilibrium of both with u_2 = N u_1 + w."""
+    """Check equilibrium of both bodies with u_2 = N u_1 + w, body 1 with fewer nodes."""
     rng = np.random.default_rng(0)
     first, second = condensed(rng, 18, 18), condensed(rng, 24, 18)
     projection = sp.random(24, 18, 0.3, "csr", random_state=rng)
@@ -215,7 +215,7 @@ def test_resolvent(stacked):
 
 
 def test_linear_displacements_are_their_own_trace(box):
-    """Of elements of second order, in turned frames."""
+    """Check elements of second order in rotated frames."""
     stacked = Stacked(box, 2)
     body, elastic = stacked.bodies[1], stacked.upper
     gradient, shift = np.random.default_rng(0).standard_normal((2, 3, 3))
@@ -226,7 +226,7 @@ def test_linear_displacements_are_their_own_trace(box):
 
 @pytest.mark.parametrize("order", ORDERS)
 def test_uniform_pressure_crosses_the_interface(box, order):
-    """Contact patch test: bodies of one material glued carry p times the nodal areas."""
+    """Check that glued bodies of one material carry p times the nodal areas."""
     stacked = Stacked(box, order)
     stacked.lower = box((2, 3, 2), (0.0, 0.0, 0.0), (2.0, 3.0, 1.5), TITANIUM, order)
     pressure, normal = 50.0, np.array([0.0, 0.0, 1.0])
@@ -237,7 +237,7 @@ def test_uniform_pressure_crosses_the_interface(box, order):
     ):
         constraints = Constraints(len(elastic.nodes))
         if elastic is stacked.lower:
-            # On a smooth table, with just enough more to keep it in place.
+            # It is on a smooth table, with just enough further supports to keep it in place.
             constraints.slide(*elastic.boundary_normals("z0"))
             origin, corner = (
                 np.linalg.norm(elastic.nodes - [0.0, y, 0.0], axis=1).argmin() for y in (0.0, 3.0)
@@ -264,7 +264,7 @@ def test_uniform_pressure_crosses_the_interface(box, order):
 def test_tied_interface_node_is_refused(box):
     stacked = Stacked(box, 1)
     stacked.constraints[0].average(stacked.nodes_1[:1], stacked.nodes_1[None, 1:3])
-    with pytest.raises(ValueError, match="ties nodes of a contact face"):
+    with pytest.raises(ValueError, match="couples nodes of a contact face"):
         SupportedBody(
             stacked.lower,
             stacked.constraints[0],
@@ -275,7 +275,7 @@ def test_tied_interface_node_is_refused(box):
 
 
 def test_dovetail_has_five_rigid_modes(structure, joint):
-    """Every motion of the blade but along the slot; H does not feel them."""
+    """Check that H has no stiffness to all motions of the blade except along the slot."""
     assert joint.rigid_modes == 5
     along = np.array([0.0, 1.0, 0.0])
     blade = structure.mesh.bodies[1]
@@ -292,7 +292,7 @@ def test_dovetail_has_five_rigid_modes(structure, joint):
 
 
 def test_order_2_dovetail_is_softer(dovetail, titanium, mission):
-    """Its space of displacements is larger, so its energy under the same loads is."""
+    """Check that its larger displacement space gives more energy under the same loads."""
     mesh = dovetail.mesh((4, 4), 15.0, notch=16)
     energies = []
     for order in ORDERS:

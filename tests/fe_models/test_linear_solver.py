@@ -1,4 +1,4 @@
-"""Sparse solves and Schur complements, with PARDISO, without it, when it errs, and iterated."""
+"""Sparse solves and Schur complements: with PARDISO, without it, when it errs, and iterative."""
 
 import subprocess
 import sys
@@ -23,7 +23,7 @@ from fe_models.solvers.multigrid import MultigridSolver, softness
 from fe_models.solvers.pardiso import Pardiso
 
 SIZE = 120
-# What may be taken for factors, where the system is to be iterated.
+# Memory allowed for factors, too little for any, so that the system is solved iteratively.
 NO_MEMORY = 0.0
 
 
@@ -34,14 +34,14 @@ def rng():
 
 @pytest.fixture
 def matrix(rng):
-    """Sparse, symmetric, positive definite."""
+    """Return a sparse, symmetric, positive definite matrix."""
     random = sp.random(SIZE, SIZE, 0.05, random_state=rng, format="csr")
     return (random @ random.T + sp.diags(0.5 + rng.random(SIZE))).tocsr()
 
 
 @pytest.fixture
 def split(rng):
-    """Unknowns kept, in no order, and the others."""
+    """Return kept unknowns, in random order, and the others."""
     kept = rng.permutation(SIZE)[:30]
     return kept, np.setdiff1d(np.arange(SIZE), kept)
 
@@ -61,7 +61,7 @@ def need_pardiso():
 
 
 def held_box(box, titanium, counts, size):
-    """Stiffness and rigid motions of a box clamped at z0, and a load."""
+    """Return stiffness and rigid motions of a box clamped at z0, and a load."""
     elastic = box(counts, (0, 0, 0), size, titanium, 1)
     constraints = Constraints(len(elastic.nodes))
     constraints.hold(elastic.boundary_nodes("z0"))
@@ -78,7 +78,7 @@ def dense_schur(matrix, kept, inner):
 
 
 def condensed(matrix, kept, inner):
-    """The condensed matrix, its loads looked at."""
+    """Return the condensed matrix after a check of its loads."""
     loads = np.random.default_rng(3).standard_normal((matrix.shape[0], 2)) * [1.0, 1e6]
     result, condensed_loads = condense(matrix, loads, kept)
     solved = np.linalg.solve(matrix.toarray()[np.ix_(inner, inner)], loads[inner])
@@ -105,7 +105,7 @@ def test_schur_complement_follows_the_order_of_the_kept_unknowns(matrix, split, 
 
 
 def test_schur_complement_of_a_singular_matrix(rng, split, solver):
-    """A floating body: K is singular, K_ii is not; constants are the null space of both."""
+    """Check a floating body: K is singular, K_ii is not, and constants are the null space."""
     pairs = np.stack([np.arange(SIZE - 1), np.arange(1, SIZE)])
     pairs = np.hstack([pairs, rng.integers(0, SIZE, (2, 200))])
     difference = sp.csr_matrix(
@@ -120,7 +120,7 @@ def test_schur_complement_of_a_singular_matrix(rng, split, solver):
 
 @pytest.mark.parametrize("inner", [1, 2, 9])
 def test_hardly_anything_to_condense_away(matrix, split, inner):
-    """PARDISO's analysis has crashed on one unknown, after larger matrices."""
+    """Check a single inner unknown, with which PARDISO's analysis has crashed."""
     condensed(matrix, *split)
     few = matrix[-(inner + 2) :, -(inner + 2) :].tocsr()
     parts = np.arange(2), np.arange(2, inner + 2)
@@ -163,7 +163,7 @@ def test_pardiso_that_fails_while_solving_is_replaced(matrix, rng, monkeypatch):
 
 
 def test_a_wrong_column_is_caught_beside_a_large_one(matrix, rng, monkeypatch):
-    """The residual of each right-hand side is judged by that column alone."""
+    """Check that the residual of each right-hand side is judged by its own column."""
     need_pardiso()
     rhs = rng.standard_normal((SIZE, 2)) * [1.0, 1e12]
     exact = np.linalg.solve(matrix.toarray(), rhs)
@@ -194,7 +194,7 @@ def test_schur_complement_that_pardiso_refuses(matrix, split, monkeypatch):
 
 
 def test_body_that_is_not_held(box, titanium, solver):
-    """Six rigid motions: no answer, but a sentence."""
+    """Check that six rigid motions give an error instead of a solution."""
     stiffness = box((2, 2, 2), (0, 0, 0), (1, 1, 1), titanium, 1).stiffness
     with pytest.raises(SolverError, match="a body is not held"):
         factorise(stiffness)
@@ -224,7 +224,7 @@ def test_too_little_memory_is_said_before_factorising(box, titanium, solver, mon
 
 
 def test_fallback_that_does_not_fit_is_refused_as_well(matrix, rng, monkeypatch):
-    """PARDISO errs, and SuperLU would need more than is allowed."""
+    """Check the error if PARDISO fails and SuperLU needs more memory than allowed."""
     need_pardiso()
     solve = factorise(matrix, memory=1e8)
     monkeypatch.setattr(Pardiso, "__call__", lambda _, b: 0.0 * b)
@@ -305,7 +305,7 @@ print((resident_bytes() - before) / announced)
 
 @pytest.mark.slow
 def test_memory_that_pardiso_announces():
-    """Against what a process grows by; a new one, for MKL keeps what others gave back."""
+    """Compare with the growth of a new process, since MKL keeps memory that was released."""
     need_pardiso()
     if not Path("/proc/self/statm").exists():
         pytest.skip("the system does not tell")
@@ -317,14 +317,14 @@ def test_memory_that_pardiso_announces():
 
 @pytest.mark.parametrize("counts", [(8, 8, 8), (4, 4, 40), (2, 16, 16)])
 def test_memory_estimated_for_superlu(box, titanium, counts):
-    """Cube, bar and plate, whose factors differ tenfold: within half to three times."""
+    """Check a cube, a bar and a plate with very different factors: within half to three times."""
     matrix, _, _ = held_box(box, titanium, counts, counts)
     actual = superlu.BYTES_PER_ENTRY * superlu.factors(matrix).nnz
     assert 0.5 < superlu.factor_bytes(matrix) / actual < 3.0
 
 
 def test_envelope_of_a_band_is_exact():
-    """A tridiagonal matrix fills nothing: two entries per row and factor."""
+    """Check a tridiagonal matrix without fill: two entries per row and factor."""
     matrix = sp.diags([-1.0, 2.0, -1.0], [-1, 0, 1], shape=(SIZE, SIZE), format="csr")
     order = np.random.default_rng(0).permutation(SIZE)
     entries = superlu.factor_bytes(matrix[order][:, order].tocsr()) / superlu.BYTES_PER_ENTRY
@@ -333,7 +333,7 @@ def test_envelope_of_a_band_is_exact():
 
 @pytest.mark.slow
 def test_iterations_hardly_grow_with_rigid_motions(box, titanium):
-    """A slender box, three meshes: constant within three, four to eight times as many without."""
+    """Check three meshes of a slender box: constant within three, else four to eight times more."""
     with_motions, without = [], []
     for cells in (4, 6, 9):
         matrix, modes, load = held_box(box, titanium, (cells, cells, 3 * cells), (1, 1, 3))
@@ -410,7 +410,7 @@ def test_rigid_motions_take_no_energy_and_follow_the_constraints(box, titanium):
     scale = np.abs(elastic.stiffness).max()
     assert np.abs(elastic.stiffness @ modes).max() < 1e-12 * scale
     assert np.linalg.matrix_rank(modes) == 6
-    # No energy to the solver, which takes less for a body that is not held.
+    # The energy of the motions is small enough for the solver to detect a free body.
     assert abs(softness(elastic.stiffness, modes)) * linear_solver.GROWTH_LIMIT < 1.0
     # On a slide with a slanted normal the motions along it remain, exactly.
     constraints = Constraints(len(elastic.nodes))

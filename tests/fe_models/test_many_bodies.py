@@ -1,4 +1,4 @@
-"""Structures of more than two bodies against one body, springs in series, and statics."""
+"""Structures of more than two bodies, compared with one body, springs in series, and statics."""
 
 from itertools import pairwise
 
@@ -27,12 +27,12 @@ X, Z = np.array([1.0, 0.0, 0.0]), np.array([0.0, 0.0, 1.0])
 
 @pytest.fixture(autouse=True)
 def precise(monkeypatch):
-    """Solved to the last digits: what differs is not the friction solver's."""
+    """Solve to the last digits, so that differences are not due to the friction solver."""
     monkeypatch.setattr(friction, "TOLERANCE", 1e-12)
 
 
 def box(x, y, z):
-    """Of tetrahedra between such coordinates, with its six faces named x0 ... z1."""
+    """Return a box of tetrahedra between coordinates, with faces named x0 ... z1."""
     return MeshTet.init_tensor(x, y, z), {
         f"{name}{end}": (axis, places[k])
         for axis, (name, places) in enumerate(zip("xyz", (x, y, z), strict=True))
@@ -41,7 +41,7 @@ def box(x, y, z):
 
 
 def imported(**boxes):
-    """Bodies of such boxes, each face called after its body."""
+    """Return bodies of such boxes, with each face named after its body."""
     bodies = {
         name: Body(name, with_faces(mesh, {f"{name}_{f}": where for f, where in faces.items()}))
         for name, (mesh, faces) in boxes.items()
@@ -51,7 +51,7 @@ def imported(**boxes):
 
 
 def pair(name, one, two, x=X):
-    """A contact between faces such as ``base_z1`` and ``pad_z0``."""
+    """Return a contact between faces such as ``base_z1`` and ``pad_z0``."""
     bodies = one.split("_")[0], two.split("_")[0]
     return ContactPair(name, bodies, [one], [two], x)
 
@@ -64,7 +64,7 @@ def built(mesh, pairs, supports, loads, order=1, materials=None):
 
 
 def marched(structure, amplitudes, mu=GLUED):
-    """States along a path of amplitudes, from rest."""
+    """Return the states along a path of amplitudes, from rest."""
     joint = FrictionalJoint(structure.condense().resolvent(), mu)
     states = list(joint.march(np.atleast_2d(amplitudes), structure.gap()))
     assert all(state.converged for state in states)
@@ -72,7 +72,7 @@ def marched(structure, amplitudes, mu=GLUED):
 
 
 def one_body(mesh, held, loads, order):
-    """Displacements of a body of its own under loads, clamped where ``held``."""
+    """Return displacements of a single body under loads, clamped where ``held``."""
     elastic = ElasticBody(mesh, STEEL, order)
     constraints = Constraints(len(elastic.nodes))
     constraints.hold(elastic.boundary_nodes(held))
@@ -87,9 +87,9 @@ PUSHED = np.array([120.0, 30.0, 0.0])
 
 
 def stack(order, flipped=()):
-    """Three blocks on each other that stick, and the same as a single body.
+    """Return three stacked blocks that stick, and the same as a single body.
 
-    Contacts ``flipped`` have their upper block as body 1.
+    Contacts that are ``flipped`` have their upper block as body 1.
     """
     x, y = along((0, 2, 4)), along((0, 1, 2))
     mesh = imported(**{name: box(x, y, along(z)) for name, z in STACK.items()})
@@ -105,7 +105,7 @@ def stack(order, flipped=()):
 
 @pytest.mark.parametrize("flipped", [(), ("high",), ("low", "high")])
 def test_blocks_that_stick_are_one_body(flipped):
-    """Whichever is body 1: base held, ring and pad held by contact alone."""
+    """Check a held base with ring and pad held by contact, whichever is body 1."""
     structure, (elastic, exact) = stack(1, flipped)
     (state,) = marched(structure, np.ones(2))
     assert (state.force[2] > 0.0).all()
@@ -122,7 +122,7 @@ def test_blocks_that_stick_are_one_body(flipped):
 
 
 def test_second_order_blocks_that_stick_are_nearly_one_body():
-    """Their faces meet as linear fields do: the mesh's own error apart."""
+    """Check agreement up to the mesh error, since faces meet as linear fields."""
     structure, (_, exact) = stack(2)
     (state,) = marched(structure, np.ones(2))
     moved = deformation(structure, state.force, state.displacement, np.ones(2))
@@ -132,7 +132,7 @@ def test_second_order_blocks_that_stick_are_nearly_one_body():
 
 
 def blocks_side_by_side():
-    """Two blocks on the halves of a base, pressed together above their lowest layer."""
+    """Return two blocks on the halves of a base, pressed together above their lowest layer."""
     y, low, high = along((0, 1, 2)), along((-1, 0, 2)), along((0, 1, 3))
     mesh = imported(
         base=box(along((0, 0.9, 3), (0.9, 1.1, 1), (1.1, 2, 3)), y, low),
@@ -154,7 +154,7 @@ def blocks_side_by_side():
 
 
 def test_three_bodies_that_all_touch_each_other():
-    """Blocks side by side on a base: the left one is body 2 on the base and body 1 of the right."""
+    """Check blocks side by side on a base: the left one is body 2 below and body 1 beside."""
     mesh = blocks_side_by_side()
     pairs = [
         pair("l", "base_left", "left_z0"),
@@ -174,7 +174,7 @@ def test_three_bodies_that_all_touch_each_other():
     assert resultants[:2, 0].sum() == pytest.approx(600.0, rel=1e-9)
     assert resultants[2, 0] == pytest.approx(250.0 + resultants[0, 1], rel=1e-6)
     assert structure.equilibrium_errors([state], np.ones((1, 4))).max() < 1e-9
-    # Displacements of all bodies meet as the contact says.
+    # Displacements of all bodies agree with the contact's relative displacements.
     motion = structure_motion(
         structure, state.force[None], state.displacement[None], np.ones((1, 4)), [0]
     )
@@ -192,7 +192,7 @@ def test_three_bodies_that_all_touch_each_other():
 
 
 def test_columns_are_springs_in_series():
-    """Bars of different stiffness, without Poisson's effect: F = Δ / Σ (L / E A)."""
+    """Check bars of different stiffness without Poisson's effect: F = Δ / Σ (L / E A)."""
     x, y = along((0, 1, 2)), along((0, 1, 2))
     moduli, heights = (200e3, 50e3, 100e3, 70e3), (1.0, 0.5, 2.0, 1.0)
     ends = np.insert(np.cumsum(heights), 0, 0.0)
@@ -225,9 +225,9 @@ def test_columns_are_springs_in_series():
 @pytest.mark.parametrize("order", [1, 2])
 @pytest.mark.parametrize("over", [False, True])
 def test_meshes_of_their_own_carry_the_load_through(order, over):
-    """A ring between plates with other nodes: forces and moments cross it, as statics say.
+    """Check that forces and moments cross a ring between plates with other nodes.
 
-    The plates go on beyond it, be they body 1 or body 2.
+    The plates extend beyond the ring, be they body 1 or body 2.
     """
     y, x = along((0, 1, 3)), along((0, 2, 5))
     mesh = imported(
@@ -250,7 +250,7 @@ def test_meshes_of_their_own_carry_the_load_through(order, over):
 
 
 def test_in_the_plane():
-    """Three strips on each other that stick are one strip."""
+    """Check that three stacked strips that stick are one strip."""
     x = along((0, 2, 6))
     heights = {"base": (-1.0, 0.0, 2), "ring": (0.0, 0.5, 2), "pad": (0.5, 1.5, 3)}
 
@@ -276,7 +276,7 @@ def test_in_the_plane():
 
 
 def test_bodies_that_nothing_holds_are_named():
-    """A pad on a ring that only the base's contact holds is held; one beside it is not."""
+    """Check that a pad is held through a ring and the base, and one beside it is not."""
     x, y = along((0, 2, 2)), along((0, 1, 2))
     mesh = imported(
         base=box(x, y, along((-1, 0, 2))),

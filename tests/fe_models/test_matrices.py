@@ -1,4 +1,4 @@
-"""Matrices of other programs: every format by hand, what is refused, units."""
+"""Matrices of other programs: handwritten files of every format, refusals, units."""
 
 import random
 import sys
@@ -94,7 +94,7 @@ DMIG*   PAX                            1               0
 
 
 def the_matrices(own):
-    """The example, as it is in every file."""
+    """Check that a file contains the example."""
     np.testing.assert_allclose(own.stiffness.toarray(), STIFFNESS, rtol=1e-15)
     np.testing.assert_allclose(own.mass.toarray(), MASS, rtol=1e-15, atol=1e-90)
     assert [unknown.name for unknown in own.unknowns] == list(NAMES)
@@ -123,7 +123,7 @@ def mat(path):
 
 
 def mat_73(path):
-    """As Matlab writes -v7.3: columns first, sparse matrices as groups, behind 512 bytes."""
+    """Write as Matlab's -v7.3: columns first, sparse matrices as groups, after 512 bytes."""
     with h5py.File(path, "w", userblock_size=512) as file:
         for name, values in (("K", STIFFNESS), ("F", LOAD)):
             file[name] = values.T
@@ -151,7 +151,7 @@ def op4(path):
     ("write", "name"),
     [
         *((npz, "a.npz"), (mat, "a.mat"), (mat_73, "a.mat"), (hdf5, "a.h5")),
-        # pyYeti takes 3 s to load.
+        # The import of pyYeti takes 3 s.
         *(slow(op4, name) for name in ("a.op4", "binary.op4")),
     ],
 )
@@ -173,7 +173,7 @@ def test_matrix_market_and_sparse_npz(tmp_path, layout):
 
 
 def write_texts(folder, **texts):
-    """Files of one text each, by part, as sources."""
+    """Write files of one text each; return them by part, as sources."""
     for part, text in texts.items():
         (folder / f"{part}.mtx").write_text(text, encoding="utf-8")
     return {part: (folder / f"{part}.mtx", "") for part in texts}
@@ -222,7 +222,7 @@ def test_a_nastran_punch_file(tmp_path):
 
 @pytest.mark.slow
 def test_pyyeti_reads_the_same_punch_file(tmp_path):
-    """An independent reader."""
+    """Compare with an independent reader."""
     bulk = pytest.importorskip("pyyeti.nastran.bulk")
     (tmp_path / "se.pch").write_text(PUNCH, encoding="utf-8")
     read = bulk.rddmig(str(tmp_path / "se.pch"))
@@ -383,9 +383,10 @@ def test_missing_and_unknown_names_are_told(tmp_path):
 
 
 def beam(length, bending, mass):
-    """Stiffness and mass of a clamped beam of two elements, deflections and rotations.
+    """Return stiffness and mass of a clamped beam of two elements, deflections and rotations.
 
-    Przemieniecki, Theory of Matrix Structural Analysis, 5.6 and 11.5; ``mass`` per length.
+    Source: Przemieniecki, Theory of Matrix Structural Analysis, 5.6 and 11.5; ``mass`` is per
+    length.
     """
     a = length
     k = np.array([[12, 6 * a, -12, 6 * a], [6 * a, 4 * a**2, -6 * a, 2 * a**2]])
@@ -401,7 +402,7 @@ def beam(length, bending, mass):
 
 
 def test_a_beam_in_metres_is_the_same_beam(tmp_path):
-    """Deflections, rotations and a modal coordinate; K in N/m, N and N m, with a load of each."""
+    """Check deflections, rotations and a modal coordinate, with K in N/m, N and N m."""
     # Steel, 10 x 10 mm, elements of 100 mm: E I [N m²], and kg/m.
     K, M = beam(0.1, 210e9 * 1e-8 / 12.0, 0.785)
     in_mm = beam(100.0, 210e3 * 1e4 / 12.0, 7.85e-7)

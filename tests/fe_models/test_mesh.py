@@ -28,7 +28,7 @@ def test_named_boundary_is_the_triangle_given():
 def test_triangle_that_is_no_face_is_refused():
     points = np.vstack([TETRAHEDRON, [1.0, 1.0, 1.0]])
     tets = np.array([[0, 1, 2, 3], [1, 2, 3, 4]])
-    with pytest.raises(MeshError, match="no faces of the mesh"):
+    with pytest.raises(MeshError, match="not faces of the mesh"):
         named_mesh(points, tets, {"wrong": np.array([[0, 1, 4]])})
 
 
@@ -53,7 +53,7 @@ def test_shifted_face_is_refused(dovetail, coarse_mesh):
 
 
 def test_nodal_areas_integrate_linear_fields(coarse_mesh):
-    """About the centre the first moments vanish; a second one is that of lumped trapezia."""
+    """Check first moments about the centre, which vanish, and a second one by trapezia."""
     face = coarse_mesh.interfaces[0]
     x, y = face.coordinates.T
     assert face.nodal_areas.min() > 0.0
@@ -81,7 +81,7 @@ def test_written_file_is_read_back(coarse_mesh, tmp_path):
 
 @pytest.mark.parametrize("size", [0, 5_000])
 def test_a_file_that_cannot_be_written_to_its_end_is_an_error(coarse_mesh, size, tmp_path):
-    """gmsh does not look whether what it writes arrives."""
+    """Check the error that gmsh does not raise if the disk is full."""
     resource = pytest.importorskip("resource")
     before = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (size, before[1]))
@@ -94,7 +94,7 @@ def test_a_file_that_cannot_be_written_to_its_end_is_an_error(coarse_mesh, size,
 
 @pytest.mark.parametrize("mesh", [MeshTet().refined(2), MeshTri().refined(3)])
 def test_facets_are_numbered_as_scikit_fem_numbers_them(mesh: MeshTet | MeshTri) -> None:
-    # In no order: a refined mesh has its vertices in one.
+    # The order is random, because a refined mesh has its vertices in a regular order.
     order = np.random.default_rng(0).permutation(mesh.nvertices)
     points, cells = mesh.p.T[np.argsort(order)], order[mesh.t].T
     ours = named_mesh(points, cells, {})

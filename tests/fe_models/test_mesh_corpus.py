@@ -1,4 +1,4 @@
-"""The same tetrahedron as many programs write it: read, or refused with its reason and remedy."""
+"""The same tetrahedron as many programs write it: read, or refused with reason and remedy."""
 
 import h5py
 import numpy as np
@@ -21,14 +21,14 @@ EDGES = "*ELEMENT, TYPE=B31, ELSET=edge\n7, 1, 2\n"
 GRID = "".join(f"GRID,{n},,{x}.,{y}.,{z}.\n" for n, (x, y, z) in enumerate(CORNERS, 1))
 SHELL = "CTRIA3,8,7,1,2,3\nPSHELL,7,1,.1\n"
 DECK = f"SOL 101\nCEND\nBEGIN BULK\n{GRID}CTETRA,1,4,1,2,3,4\nPSOLID,4,1\n{SHELL}ENDDATA\n"
-# The same volume of two tetrahedra, each of its own property.
+# The same volume as two tetrahedra with different properties.
 HALVES = DECK.replace("CTETRA,1,4,1,2,3,4", "GRID,5,,3.,0.,0.\nCTETRA,1,4,1,5,3,4") + ""
 HALVES = HALVES.replace("PSOLID,4", "CTETRA,2,5,5,2,3,4\nPSOLID,5,1\nPSOLID,4")
 HALVES = HALVES.replace("CTRIA3,8,7,1,2,3", "CTRIA3,8,7,1,5,3\nCTRIA3,9,7,5,2,3")
 
 
 def salome(blank="\n", units="    1.\n"):
-    """As Salome writes it, in mm here: a group of nothing before that of the nodes of a face."""
+    """Return a file of Salome in mm, with an empty group before that of a face's nodes."""
     nodes = "".join(
         f"{n:10d}{1:10d}{1:10d}{11:10d}\n{x:25.16E}{y:25.16E}{z:25.16E}\n"
         for n, (x, y, z) in enumerate(CORNERS, 1)
@@ -101,7 +101,7 @@ def test_properties_of_one_body_are_told(tmp_path):
 
 
 def test_beams_on_edges_name_these_and_are_told(tmp_path):
-    """Off the edges they would be a structure; trusses are told of where they have a section."""
+    """Check beams on and off edges, and trusses, which are reported if they have a section."""
     path = tmp_path / "a.inp"
     path.write_text(FLAT + TETRA + EDGES, encoding="utf-8")
     imported = read_bodies(path)
@@ -156,7 +156,7 @@ def test_what_a_program_writes_is_refused_with_what_to_do(tmp_path, program, nam
 
 # --- Exodus ---------------------------------------------------------------------------------------
 
-# A hexahedron of 2 x 3 x 4 mm, a wedge and a pyramid on it, and a tetrahedron by itself.
+# A hexahedron of 2 x 3 x 4 mm with a wedge and a pyramid on it, and a separate tetrahedron.
 POINTS = np.array(
     [(x, y, z) for z in (0, 4) for x, y in ((0, 0), (2, 0), (2, 3), (0, 3))]
     + [(0, 0, 6), (2, 0, 6), (-4, 1.5, 2)]
@@ -169,7 +169,7 @@ BLOCKS = {
     "PYRAMID5": [[1, 5, 8, 4, 11]],
     "TETRA": [[12, 13, 14, 15]],
 }
-# Centroids of sides of the elements, all but those between two: these are none of a body.
+# Centroids of the sides of the elements, except those between two elements.
 CENTROIDS = {
     1: {1: (1, 0, 2), 2: (2, 1.5, 2), 3: (1, 3, 2), 5: (1, 1.5, 0)},
     2: {2: (1, 1.5, 5), 3: (1, 0, 5), 4: (0, 1, 14 / 3), 5: (2, 1, 14 / 3)},
@@ -180,7 +180,7 @@ CENTROIDS = {
 
 
 def variables():
-    """Of the file, by name, and the types of the blocks."""
+    """Return the variables of the file by name, and the types of the blocks."""
     found = {
         "coordx": POINTS[:, 0], "coordy": POINTS[:, 1], "coordz": POINTS[:, 2],
         "node_num_map": 100 + np.arange(1, 16), "eb_prop1": np.array([10, 20, 30, 40]),
@@ -221,7 +221,7 @@ def write_exodus(path, found, classic):
 
 @pytest.mark.parametrize("classic", [True, False], ids=["netCDF-3", "netCDF-4"])
 def test_exodus(tmp_path, classic):
-    """Blocks that share nodes are one body; sides are those of the manual, by their places."""
+    """Check that blocks with shared nodes are one body, and the manual's sides by position."""
     path = tmp_path / "a.e"
     write_exodus(path, variables(), classic)
     imported = read_bodies(path)
@@ -242,7 +242,7 @@ def test_exodus(tmp_path, classic):
 
 
 def test_shells_of_exodus_name_faces(tmp_path):
-    """As blocks on the tetrahedron, and by a side set of such a shell, which has two sides."""
+    """Check shells as blocks on the tetrahedron, and in a side set with two sides."""
     path, found = tmp_path / "a.e", variables()
     found["connect5"], found["eb_names"] = np.array([[12, 14, 13]]), found["eb_names"][:0]
     found |= {"elem_ss1": np.array([5, 4]), "side_ss1": np.array([2, 2])}

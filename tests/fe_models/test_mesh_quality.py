@@ -1,4 +1,4 @@
-"""Sizes and shapes of elements, against gmsh and regular ones."""
+"""Sizes and shapes of elements, compared with gmsh and regular ones."""
 
 import numpy as np
 import pytest
@@ -13,7 +13,7 @@ CELLS = {2: 2, 3: 4}
 
 @pytest.mark.parametrize("dim", CELLS)
 def test_shapes_are_the_gamma_of_gmsh(dim):
-    """A cone of elements of many shapes, and the triangles of its base."""
+    """Check a cone of elements of many shapes, and the triangles of its base."""
     with gmsh_model("cone") as gmsh:
         gmsh.model.occ.addCone(0, 0, 0, 0, 0, 2, 1, 0.3)
         gmsh.model.occ.synchronize()

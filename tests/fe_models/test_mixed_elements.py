@@ -17,13 +17,13 @@ STRAIN = np.array([[1.0, 0.4, -0.2], [0.4, -0.5, 0.3], [-0.2, 0.3, 0.7]]) * 1e-3
 
 
 def moved(points, free):
-    """Points of which those free are off their places: no element is a box."""
+    """Return points of which the free ones are moved, so that no element is a box."""
     shift = 0.15 * np.sin(np.arange(points.size) * 1.7).reshape(points.shape)
     return points + np.where(free[:, None], shift, 0.0)
 
 
 def check_patch(body, expected_volume):
-    """Displacements linear in place leave no force inside, and store what their strain does."""
+    """Check that linear displacements cause no inner force and store the strain energy."""
     elastic = ElasticBody(body, STEEL)
     axes = list(body.axes)
     displacement = (elastic.nodes @ STRAIN)[:, axes].ravel()
@@ -40,7 +40,7 @@ def check_patch(body, expected_volume):
 
 
 def check_midsides(imported, up_to=np.inf):
-    """Every edge of the surface up to a height has its midside, in its middle: faces are plane."""
+    """Check that every surface edge below a height has a midside node in its middle."""
     (name, body), *_ = imported.bodies.items()
     facets = body.mesh.facets[:, body.mesh.boundary_facets()].T
     edges = edges_of(facets).reshape(-1, 2)
@@ -51,8 +51,8 @@ def check_midsides(imported, up_to=np.inf):
 
 def column(order):
     points, cells = cae_files.mixed_column()
-    points = moved(points, np.arange(len(points)) % 9 == 4)  # the middle of each layer
-    points[[4, 31]] = (1.0, 1.0, 0.0), (1.0, 1.0, 3.0)  # of those the ends stay plane
+    points = moved(points, np.arange(len(points)) % 9 == 4)  # middle of each layer
+    points[[4, 31]] = (1.0, 1.0, 0.0), (1.0, 1.0, 3.0)  # The ends stay plane.
     return (points, cells) if order == 1 else cae_files.second_order(points, cells)
 
 
@@ -86,7 +86,7 @@ def test_four_shapes_in_one_body(tmp_path, name, order):
 
 @pytest.mark.parametrize("order", [1, 2])
 def test_hexahedra_and_wedges_of_a_universal_file(tmp_path, order):
-    """Which has no pyramids; the wedges' cells are 8 mm³ of the column."""
+    """Check a format without pyramids; the wedges' cells are 8 mm³ of the column."""
     points, cells = cae_files.mixed_column()
     used = {shape: cells[shape] for shape in ("hexahedron", "wedge")}
     points = moved(points[:27], np.arange(27) == 13)

@@ -1,4 +1,4 @@
-"""The projection between faces with meshes of their own."""
+"""The projection between faces whose meshes do not match."""
 
 import numpy as np
 import pytest
@@ -13,7 +13,7 @@ DIMENSIONS = [LINE, SURFACE]
 
 
 def flat_face(dimension, count, seed, low=(0.0, 0.0), high=(2.0, 3.0)):
-    """Random points on a rectangle or segment, its corners among them, and their facets."""
+    """Return random points on a rectangle or segment, with its corners, and their facets."""
     rng = np.random.default_rng(seed)
     low, high = (np.array(end)[: dimension - 1] for end in (low, high))
     if dimension == LINE:
@@ -28,7 +28,7 @@ def flat_face(dimension, count, seed, low=(0.0, 0.0), high=(2.0, 3.0)):
         facets = Delaunay(place).simplices.astype(np.int64)
     points = np.zeros((len(place), 3))
     points[:, : dimension - 1] = low + place * (high - low)
-    # Facets turn either way.
+    # Facets have either orientation.
     facets[::2] = facets[::2, ::-1]
     return points, facets
 
@@ -38,7 +38,7 @@ def measure(dimension, low=(0.0, 0.0), high=(2.0, 3.0)):
 
 
 def linear(points):
-    """1 and the coordinates along the face, ``(n, 3)``."""
+    """Return 1 and the coordinates along the face, ``(n, 3)``."""
     return np.column_stack([np.ones(len(points)), points[:, :2]])
 
 
@@ -50,14 +50,14 @@ def test_linear_fields_and_integrals_pass(dimension, seed):
     assert mortar.kept.all()
     np.testing.assert_allclose(mortar.covered, 1.0, atol=1e-12)
     np.testing.assert_allclose(mortar.projection @ linear(master[0]), linear(slave[0]), atol=1e-12)
-    # What a unit pressure gives the master's nodes is what its own face gives them.
+    # The master's nodes receive the same forces of a unit pressure as from their own face.
     matching = mortar_projection(*master, *master)
     np.testing.assert_allclose(mortar.projection.T @ mortar.areas, matching.areas, atol=1e-12)
     assert mortar.areas.sum() == pytest.approx(measure(dimension), rel=1e-12)
 
 
 def test_one_segment_on_two_in_closed_form():
-    """ψ = 2 - 3x and 3x - 1 on the unit segment, whose master has a node in its middle."""
+    """Check ψ = 2 - 3x and 3x - 1 on the unit segment, with a master node in its middle."""
     slave = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]])
     master = np.array([[0.0, 0.0, 0.0], [0.5, 0.0, 0.0], [1.0, 0.0, 0.0]])
     mortar = mortar_projection(slave, np.array([[0, 1]]), master, np.array([[0, 1], [1, 2]]))
@@ -90,7 +90,7 @@ def test_turning_both_faces_changes_nothing(angle):
 @pytest.mark.parametrize("dimension", DIMENSIONS)
 @pytest.mark.parametrize("seed", range(3))
 def test_master_that_covers_a_part(dimension, seed):
-    """Integrals over the part are exact, and its nodes still see linear fields as they are."""
+    """Check exact integrals over the part, and linear fields at its nodes."""
     low, high = (0.7, 0.9), (1.9, 3.5)
     slave = flat_face(dimension, 60, seed)
     master = flat_face(dimension, 30, 100 + seed, low, high)
@@ -116,7 +116,7 @@ def test_master_that_covers_a_part(dimension, seed):
 @pytest.mark.parametrize("dimension", DIMENSIONS)
 @pytest.mark.parametrize("shift", [1e-2, 1e-4, 1e-6, 1e-9, 1e-13, 1e-16])
 def test_slivers_of_any_width(dimension, shift):
-    """Faces of one mesh, a little apart: N stays near the identity and exact on linear fields."""
+    """Check nearly equal faces: N stays near the identity and exact on linear fields."""
     points, facets = flat_face(dimension, 40, 0)
     moved = points + shift * np.array([1.0, 0.3, 0.0]) * (np.arange(3) < dimension - 1)
     mortar = mortar_projection(points, facets, moved, facets)
@@ -135,7 +135,7 @@ def test_slivers_of_any_width(dimension, shift):
 @pytest.mark.parametrize("dimension", DIMENSIONS)
 @pytest.mark.parametrize("width", [0.05, 1e-2, 1e-4, 1e-6, 1e-8, 1e-12])
 def test_master_that_ends_just_inside_a_facet(dimension, width):
-    """Strips of any width on a row of facets: no row of N explodes, and all stay exact."""
+    """Check strips of any width on a row of facets: rows of N stay bounded and exact."""
     slave = tensor_face(dimension, 8)
     points, facets = tensor_face(dimension, 5)
     points[:, :2] *= 0.5 + width
@@ -175,7 +175,7 @@ def tensor_face(dimension, count):
 
 @pytest.mark.parametrize("dimension", DIMENSIONS)
 def test_gap_is_the_distance_along_the_normal(dimension):
-    """Parallel tilted faces are apart by their offset; a parabola by its mean over ψ."""
+    """Check the offset of parallel tilted faces, and a parabola by its mean over ψ."""
     (slave, facets), (master, others) = flat_face(dimension, 80, 0), flat_face(dimension, 60, 1)
     slope = np.array([0.2, -0.1, 0.0])
     slave[:, 2], master[:, 2] = 0.05 + slave @ slope, master @ slope

@@ -1,4 +1,4 @@
-"""Contact across faces with meshes of their own."""
+"""Contact across faces whose meshes do not match."""
 
 from dataclasses import replace
 from functools import cache
@@ -31,7 +31,7 @@ from tests.fe_models.pressed_blocks import (
 
 
 def uniform(dimension, zz, zx, zy=0.0, xx=0.0):
-    """A uniform stress, in plane strain with its yy, and its six components."""
+    """Return a uniform stress, in plane strain with its yy, and its six components."""
     yy = 0.3 * (xx + zz) if dimension == LINE else 0.0
     zy = zy if dimension == SURFACE else 0.0
     tensor = np.array([[xx, 0.0, zx], [0.0, yy, zy], [zx, zy, zz]])
@@ -41,7 +41,7 @@ def uniform(dimension, zz, zx, zy=0.0, xx=0.0):
 @pytest.mark.parametrize("dimension", DIMENSIONS)
 @pytest.mark.parametrize("order", ORDERS)
 def test_any_uniform_stress_passes_glued_faces(dimension, order):
-    """The patch test (Taylor & Papadopoulos 1991), for all components at once."""
+    """Run the patch test (Taylor & Papadopoulos 1991) for all components at once."""
     field, expected = uniform(dimension, -50.0, 10.0, -7.0, 20.0)
     pressed = Pressed(dimension, order, (STEEL, STEEL), field)
     assert len(pressed.interface.nodes_1) != len(pressed.interface.nodes_2)
@@ -55,7 +55,7 @@ def test_any_uniform_stress_passes_glued_faces(dimension, order):
 @pytest.mark.parametrize("dimension", DIMENSIONS)
 @pytest.mark.parametrize("order", ORDERS)
 def test_uniform_pressure_passes_without_friction(dimension, order):
-    """Unlike bodies, free at their sides: each bulges as it likes and both carry the pressure."""
+    """Check dissimilar bodies with free sides, which bulge and both carry the pressure."""
     pressure = 50.0
     field, expected = uniform(dimension, -pressure, 0.0)
     pressed = Pressed(dimension, order, (STEEL, TITANIUM), field)
@@ -108,7 +108,7 @@ def test_forces_and_moments_on_both_faces_are_opposite(dimension):
 
 @pytest.mark.parametrize("dimension", DIMENSIONS)
 def test_rigid_motions_give_no_force(dimension):
-    """Of both bodies together no relative displacement, of body 2 alone no force."""
+    """Check no relative displacement for both bodies together, no force for body 2 alone."""
     pressed = pressed_once(dimension)
     axes = list(AXES[dimension])
     joint = pressed.joint
@@ -128,7 +128,7 @@ def test_rigid_motions_give_no_force(dimension):
 
 
 def bending(dimension):
-    """σ_zz = -50 + 20 (x - 1): pure bending of the whole column, with its yy in plane strain."""
+    """Return σ_zz = -50 + 20 (x - 1), pure bending of the column, with its yy in plane strain."""
 
     def stress(x):
         zz = -50.0 + 20.0 * (x[0] - 1.0)
@@ -140,7 +140,7 @@ def bending(dimension):
 
 
 def bending_errors(dimension, cells):
-    """Relative errors of the stress in both bodies and of the pressure across the interface."""
+    """Return relative errors of the stress in both bodies and of the interface pressure."""
     pressed = Pressed(dimension, 1, (STEEL, STEEL), bending(dimension), cells, 0.0)
     force = pressed.glued()
     squares, total = 0.0, 0.0
@@ -163,7 +163,7 @@ def bending_errors(dimension, cells):
 
 @pytest.mark.parametrize(("dimension", "levels"), [(LINE, (4, 8, 16)), (SURFACE, (2, 4))])
 def test_bending_converges(dimension, levels):
-    """At the rate of linear elements, the coarser body 1's; no worse than where meshes match."""
+    """Check the rate of the coarser body's linear elements, no worse than matching meshes."""
     unmatched, matched = [], []
     for level in levels:
         two, three = (2 * level, level, level), (3 * level, level + 1, level)
@@ -181,7 +181,7 @@ def test_bending_converges(dimension, levels):
 
 
 def graded(pitch, flat, end, growth=1.25):
-    """Steps from 0 to ``end``, of one pitch up to ``flat`` and growing beyond."""
+    """Return steps from 0 to ``end``, of one pitch up to ``flat`` and growing beyond."""
     steps = list(pitch * np.arange(round(flat / pitch) + 1))
     while steps[-1] < end:
         pitch *= growth
@@ -191,7 +191,7 @@ def graded(pitch, flat, end, growth=1.25):
 
 
 def half_planes(pitches, radius, size=10.0):
-    """Two rectangles in the plane, body 2 with a parabolic underside, fine at their contact."""
+    """Return two plane rectangles, body 2 with a parabolic underside, fine at the contact."""
     elastics = []
     for number, pitch in enumerate(pitches):
         x, z = graded(pitch, 1.5, size), graded(pitch, 0.5, size)
@@ -210,7 +210,7 @@ def half_planes(pitches, radius, size=10.0):
 
 
 def rub(elastics, held, face, load, friction):
-    """Press body 2, in the plane and free but for the contact: the state, and the load's work."""
+    """Press and rub body 2, free except for the contact; return the state and the work."""
     supports = held, Constraints(len(elastics[1].nodes), LINE)
     loads = np.zeros((elastics[0].size, 1)), load[:, None]
     bodies = [
@@ -231,7 +231,7 @@ def rub(elastics, held, face, load, friction):
 
 
 def hertz_error(pitches, radius=100.0):
-    """Errors of the pressure under a parabola: in the mean over that of Hertz, and at its peak."""
+    """Return errors of the pressure under a parabola, on average and at Hertz's peak."""
     load = np.pi * STEEL.young / (8.0 * (1.0 - STEEL.poisson**2) * radius)
     elastics = half_planes(pitches, radius)
     frame = Frame(np.zeros(3), np.eye(3))
@@ -252,7 +252,7 @@ def hertz_error(pitches, radius=100.0):
 
 @pytest.mark.parametrize("ratio", [0.7, 1.3])
 def test_curved_faces_press_as_hertz_says(ratio):
-    """Line contact of half-width 1 mm (Johnson 1985, §4.2c); gap and pressure by the mortar."""
+    """Check a line contact of half-width 1 mm (Johnson 1985, §4.2c) by the mortar."""
     errors = [hertz_error((ratio * pitch, pitch)) for pitch in (0.25, 0.0625)]
     mean, peak = np.transpose(errors)
     assert mean[1] < 0.012
@@ -261,7 +261,7 @@ def test_curved_faces_press_as_hertz_says(ratio):
 
 
 def overhang_work(below, above):
-    """Work of a load on a block that overhangs the one below; its nodes, and those in contact."""
+    """Return the work of a load on an overhanging block, its nodes, and those in contact."""
     lower, upper = (
         block((n, n // 2), low, high, STEEL, 1, 0.0, 0)
         for n, low, high in (
@@ -287,7 +287,7 @@ def overhang_work(below, above):
 
 @pytest.mark.parametrize("counts", [(40, 35), (40, 26), (28, 34)])
 def test_edge_inside_a_facet_presses_as_one_between_facets(counts):
-    """A block over an edge: where the meshes have nodes at the edge, and where they have none."""
+    """Check a block over an edge, with and without mesh nodes at the edge."""
     matching = overhang_work(40, 36)
     assert overhang_work(*counts) == pytest.approx(matching, rel=5e-3)
 

@@ -1,4 +1,4 @@
-"""Frames of faces with meshes of their own: they follow the bodies, tell bends, refuse."""
+"""Frames of faces whose meshes do not match: they follow the bodies, detect bends, refuse."""
 
 from dataclasses import replace
 
@@ -12,7 +12,7 @@ from tests.fe_models.pressed_blocks import DIMENSIONS, STEEL, SURFACE, block
 
 
 def turned(dimension, seed):
-    """A rotation of space, in the plane about Y."""
+    """Return a rotation of space, or in the plane about Y."""
     if dimension == SURFACE:
         axes, _ = np.linalg.qr(np.random.default_rng(seed).standard_normal((3, 3)))
         return axes * np.sign(np.linalg.det(axes))
@@ -23,7 +23,7 @@ def turned(dimension, seed):
 
 
 def moved(body, rotation, shift, bend=0.0):
-    """The body bent upwards by an angle on either side of x = 1, then turned and shifted."""
+    """Return the body bent upwards on either side of x = 1, then rotated and shifted."""
     points = body.points.copy()
     points[:, 2] += np.tan(bend) * np.abs(points[:, 0] - 1.0)
     points = points @ rotation.T + shift
@@ -31,7 +31,7 @@ def moved(body, rotation, shift, bend=0.0):
 
 
 def stacked(dimension, rotation=None, shift=0.0, bend=0.0):
-    """A wide lower block and an upper one that overhangs it at x = 2, both irregular."""
+    """Return a wide lower block and an upper one that overhangs it at x = 2, both irregular."""
     cells = [(4, 3, 2), (3, 4, 2)]
     ends = [((0.0, 0.0, 0.0), (2.0, 3.0, 1.0)), ((0.8, 0.0, 1.0), (2.6, 3.0, 2.0))]
     return [
@@ -48,7 +48,7 @@ def stacked(dimension, rotation=None, shift=0.0, bend=0.0):
 @pytest.mark.parametrize("dimension", DIMENSIONS)
 @pytest.mark.parametrize("seed", range(3))
 def test_frame_follows_the_bodies(dimension, seed):
-    """Its origin is the middle of what the faces share; x is turned into the plane."""
+    """Check the origin in the middle of the shared part, and x turned into the plane."""
     rotation, shift = turned(dimension, seed), np.array([5.0, 0.0, -3.0])
     lower, upper = stacked(dimension, rotation, shift)
     given = rotation @ np.array([2.0, 0.0, 0.7])

@@ -1,4 +1,4 @@
-"""Forces on node sets that are no faces: statics, however many nodes share them."""
+"""Forces on node sets that are not faces: statics for any number of nodes."""
 
 import numpy as np
 import pytest
@@ -29,7 +29,7 @@ def test_a_force_alone_is_shared_alike():
 
 
 def test_nodes_on_a_line_carry_no_moment_about_it():
-    """Across it they do."""
+    """Check that they carry moments across it."""
     places = np.array([[0.0, 0, 0], [1, 0, 0], [5, 0, 0]])
     none = np.zeros(3)
     forces = shared(BoundaryForce("edge", none, moment=np.array([0.0, 3.0, 0.0])), places)

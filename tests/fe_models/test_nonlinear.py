@@ -27,10 +27,10 @@ MU, PEAK = 0.4, 7
 
 
 class Peak:
-    """A structure at peak load, all that its checks need, and what they found."""
+    """Structure at peak load, all that its checks need, and their results."""
 
     def __init__(self, structure, joint, dovetail, mission, share=1.0):
-        """``share`` is that of the peak load."""
+        """Solve at a ``share`` of the peak load."""
         self.structure, self.like = structure, joint.resolvent()
         self.amplitudes = share * mission.amplitudes()[PEAK]
         slower = replace(mission, rotation_speed=np.sqrt(share) * mission.rotation_speed)
@@ -53,7 +53,7 @@ class Peak:
         return stress_stiffened(self.structure, self.deformed, self.amplitudes, self.softening)
 
     def left(self, model, check):
-        """How far a linear model's resultants and slips are from the nonlinear ones."""
+        """Return the errors of a linear model's resultants and slips against the nonlinear ones."""
         (state,) = self.march(model.condense(self.like).resolvent())
         resultants = model.interface_resultants(state)
         change = resultant_change(resultants, check.nonlinear, face_sizes(self.structure))
@@ -62,7 +62,7 @@ class Peak:
 
 @pytest.fixture(scope="module", autouse=True)
 def _exact_friction():
-    """What Newton's method leaves is to be seen, not what the friction solver leaves."""
+    """Solve friction exactly, so that only the error of Newton's method remains."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(friction, "TOLERANCE", 1e-10)
         yield
@@ -70,7 +70,7 @@ def _exact_friction():
 
 @pytest.fixture(scope="module")
 def coarse(dovetail, titanium, mission):
-    """Half the elements that other tests take: a check condenses it three times."""
+    """Return structure and joint with half the elements of other tests, to condense quickly."""
     mesh = dovetail.mesh((6, 6), 15.0)
     structure = dovetail_structure(dovetail, mesh, titanium, titanium, mission, 1)
     return structure, structure.condense()
@@ -83,14 +83,14 @@ def peak(coarse, dovetail, mission):
 
 @pytest.fixture(scope="module")
 def check(peak):
-    """An iteration further than a run needs."""
+    """Check with one more iteration than a run needs."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(nonlinear, "TOLERANCE", 1e-8)
         return peak.check()
 
 
 def test_newton_converges(peak, check):
-    """Two iterations to the tolerance; from there the frames, one behind, set the pace."""
+    """Check two iterations to the tolerance; then the delayed frames set the rate."""
     first = peak.check()
     assert first.converged
     assert first.iterations == 2
@@ -103,14 +103,14 @@ def test_newton_converges(peak, check):
 
 @pytest.fixture(scope="module")
 def tangent(peak, check):
-    """The structure tangent to the nonlinear state, and its state at peak."""
+    """Return the structure tangent to the nonlinear state, and its state at peak."""
     model = relinearised(peak.structure, check.displacements, peak.amplitudes, peak.softening)
     (state,) = peak.march(model.condense(peak.like).resolvent())
     return model, state
 
 
 def nodal_balance(peak, number, displacement):
-    """Internal less external forces ``(n, 3)`` of a body, the contact's not among them."""
+    """Return internal less external forces ``(n, 3)`` of a body, without those of contact."""
     body = peak.structure.bodies[number - 1]
     force = TotalLagrangian(body.elastic).internal_force(displacement)
     force -= body.loads @ peak.amplitudes + peak.softening[number - 1] @ displacement
@@ -118,9 +118,10 @@ def nodal_balance(peak, number, displacement):
 
 
 def test_every_node_is_balanced(peak, check, tangent):
-    """Nonlinear inner forces, contact forces in the turned frames, spin and loads, on both bodies.
+    """Check nonlinear inner forces, contact forces in the turned frames, spin and loads.
 
-    But for supports: held and guided nodes of the disk, and along the slot the bottom of the root.
+    Supported nodes are excepted: held and guided ones of the disk, and along the slot the bottom of
+    the root.
     """
     model, state = tangent
     faces = model.mesh.interfaces
@@ -128,7 +129,7 @@ def test_every_node_is_balanced(peak, check, tangent):
     balances = [nodal_balance(peak, k, u) for k, u in zip((1, 2), check.displacements, strict=True)]
     scale = np.abs(state.force).max()
     for face, force in zip(faces, shares, strict=True):
-        # Body 2 takes the forces, body 1 their opposites.
+        # Body 2 receives the forces, body 1 their opposites.
         balances[1][face.nodes_2] -= face.frame.to_global(force.T)
         balances[0][face.nodes_1] += face.frame.to_global(force.T)
     disk, blade = model.bodies[0].elastic, model.bodies[1].elastic
@@ -140,7 +141,7 @@ def test_every_node_is_balanced(peak, check, tangent):
 
 
 def test_contact_is_met_on_the_displaced_faces(peak, check, tangent):
-    """Displacements of both bodies, in the turned frames, are those of the contact law."""
+    """Compare displacements of both bodies, in the turned frames, with the contact law."""
     model, state = tangent
     disk, blade = (u.reshape(-1, 3) for u in check.displacements)
     relative = np.concatenate(
@@ -155,7 +156,7 @@ def test_contact_is_met_on_the_displaced_faces(peak, check, tangent):
 
 
 def test_load_in_gross_slip(coarse, dovetail, symmetric):
-    """P by the closed form for flanks turned by φ under a pull grown by δF.
+    """Check P by the closed form for flanks turned by φ under a pull grown by δF.
 
     F = 2 P (sin θ + µ cos θ): δP/P = δF/F + φ (cos θ - µ sin θ) / (sin θ + µ cos θ), θ falling by φ
     where the lugs open. A few nodes stick and bear a little more.
@@ -173,14 +174,14 @@ def test_load_in_gross_slip(coarse, dovetail, symmetric):
 
 
 def test_small_strains_small_changes(check):
-    """Half a per cent of strain and of rotation move nothing by more than a per cent."""
+    """Check that strains and rotations of 0.5 % change nothing by more than 1 %."""
     assert 1e-3 < check.largest_strain < 1e-2
     assert 1e-3 < check.largest_rotation < 1e-2
     assert 1e-3 < np.abs(check.change).max() < 1e-2
 
 
 def test_changes_vanish_with_the_load(check, coarse, dovetail, mission):
-    """Relative to the linear model they are of first order in the load."""
+    """Check that changes relative to the linear model are of first order in the load."""
     small = Peak(*coarse, dovetail, mission, share=0.01).check()
     assert small.converged
     assert np.abs(small.change).max() < 0.05 * np.abs(check.change).max()
@@ -192,17 +193,17 @@ def test_flanks_stay_alike(coarse, dovetail, symmetric):
 
 
 def test_relinearised_at_the_nonlinear_state_is_there(peak, check, tangent):
-    """The tangent structure goes through the state that it is tangent to."""
+    """Check that the tangent structure passes through the state that it is tangent to."""
     resultants, slips = peak.left(tangent[0], check)
     assert resultants < 1e-6
     assert slips < 1e-6
 
 
 def test_how_far_linear_models_get(peak, check):
-    """Of what nonlinearity changes, one re-linearisation leaves a twentieth at most.
+    """Check that one re-linearisation leaves at most a twentieth of the nonlinear change.
 
-    Stress stiffness and spin softening alone leave most of P's change: it comes from the turned
-    flanks.
+    Stress stiffness and spin softening alone leave most of the change of P, which comes from the
+    turned flanks.
     """
     once = relinearised(peak.structure, peak.deformed, peak.amplitudes, peak.softening)
     resultants, slips = peak.left(once, check)
@@ -216,9 +217,9 @@ def test_how_far_linear_models_get(peak, check):
 
 @pytest.mark.parametrize(("kind", "balance"), [("relinearised", 1e-6), ("stressed", 1e-5)])
 def test_mission_of_a_prestressed_structure(kind, balance, peak, tangent, mission):
-    """All the way to no load, and in balance with what its stiffness takes from rigid motions.
+    """Check the balance down to no load, with the stiffness forces of rigid motions as loads.
 
-    The stressed structure takes them at displacements of the linear one, a per cent off its own.
+    The stressed structure takes these at displacements of the linear one, which differ by 1 %.
     """
     model = tangent[0] if kind == "relinearised" else peak.stressed()
     joint = FrictionalJoint(model.condense_path(peak.like), MU)
@@ -233,7 +234,7 @@ def test_mission_of_a_prestressed_structure(kind, balance, peak, tangent, missio
 
 
 def test_supported_body_keeps_its_stiffness(peak, tangent, monkeypatch):
-    """A body 2 that its supports hold has no rigid motion to set free."""
+    """Check that a supported body 2 has no rigid motion to be released."""
     monkeypatch.setattr(SupportedBody, "free_motions", lambda *_: np.zeros((0, 6)))
     path, exact = (
         tangent[0].condense_path(peak.like),
@@ -244,7 +245,7 @@ def test_supported_body_keeps_its_stiffness(peak, tangent, monkeypatch):
 
 
 def test_path_goes_through_the_peak(peak, check, tangent):
-    """Rigid motions as loads or as stiffness: the same at the load that both are exact for."""
+    """Check that rigid motions as loads or as stiffness agree at the load of both."""
     model, state = tangent
     (reached,) = peak.march(model.condense_path(peak.like))
     scale = np.abs(state.force).max()
@@ -253,9 +254,10 @@ def test_path_goes_through_the_peak(peak, check, tangent):
 
 @pytest.mark.slow
 def test_half_the_load(peak, check, tangent, coarse, dovetail, mission):
-    """Half the peak load changes P by half as much of it; the stiffness of the peak by as much.
+    """Check the relative change of P at half the peak load, half as large as at peak.
 
-    Up to the few nodes that stick at one load and not at the other.
+    With the stiffness of the peak it is as large as there. A few nodes that stick at only one of
+    the loads are tolerated.
     """
     half = Peak(*coarse, dovetail, mission, share=0.5)
     exact = half.check()
@@ -267,7 +269,7 @@ def test_half_the_load(peak, check, tangent, coarse, dovetail, mission):
 
 
 def test_order_and_units_of_load_cases_do_not_matter(peak):
-    """What goes in proportion to the load follows the forces, not the numbers in front of them."""
+    """Check that the share depends on the forces, not on the amplitudes' units."""
     amplitudes, units = peak.amplitudes + np.array([0.0, 3e4]), np.array([1e-6, 1e3])
     other = tuple(map(copy, peak.structure.bodies))
     for body in other:
@@ -281,12 +283,12 @@ def test_order_and_units_of_load_cases_do_not_matter(peak):
 
 
 def test_without_load_there_is_nothing_to_linearise_at(peak):
-    with pytest.raises(ValueError, match="amplitudes are all zero"):
+    with pytest.raises(ValueError, match="all amplitudes are zero"):
         relinearised(peak.structure, peak.deformed, 0.0 * peak.amplitudes, peak.softening)
 
 
 def test_plane_dovetail(dovetail, titanium, mission, check):
-    """The section in plane strain: what it says of P is what the slot's length says."""
+    """Compare P of the section in plane strain with that of the slot's length."""
     mesh = dovetail.mesh((12, 2), 6.0, 2)
     structure = dovetail_structure(dovetail, mesh, titanium, titanium, mission, 2)
     section = Peak(structure, structure.condense(), dovetail, mission).check()
@@ -296,7 +298,7 @@ def test_plane_dovetail(dovetail, titanium, mission, check):
 
 @pytest.mark.parametrize("dimension", [2, 3])
 def test_mean_rotation(dimension):
-    """Points of a plane, or on a line in the plane, turned and hardly disturbed."""
+    """Check points of a plane, or on a line, rotated and slightly disturbed."""
     rng = np.random.default_rng(0)
     points = rng.standard_normal((30, dimension))
     points[:, -1] = 0.0

@@ -1,4 +1,4 @@
-"""Structures in the plane: against slices of space, closed forms of two flanks, exact transfer."""
+"""Plane structures: compared with slices of space, closed forms of two flanks, and transfer."""
 
 from dataclasses import replace
 from functools import cache
@@ -19,7 +19,7 @@ from sa_solver.types import Grid, Material
 ORDERS = [1, 2]
 DEPTH = 0.7
 PEAK = 7
-# Across each flank, and the size of elements far from it: the laws hold on any mesh.
+# Nodes across each flank, and element size far from it; the laws hold on any mesh.
 NODES, SIZE = 12, 8.0
 
 
@@ -27,7 +27,7 @@ NODES, SIZE = 12, 8.0
 
 
 def section():
-    """Triangles of 1 x 2 with inner vertices moved about, away from the origin."""
+    """Return triangles of 1 x 2 with inner vertices moved, away from the origin."""
     mesh = MeshTri.init_tensor(np.linspace(3.0, 4.0, 4), np.linspace(5.0, 7.0, 5))
     points = mesh.p.copy()
     inner = np.setdiff1d(np.arange(mesh.nvertices), mesh.boundary_nodes())
@@ -37,7 +37,7 @@ def section():
 
 
 def slice_of(mesh):
-    """One layer of tetrahedra over the triangles, from Y = 0 to ``DEPTH``."""
+    """Return one layer of tetrahedra over the triangles, from Y = 0 to ``DEPTH``."""
     low = np.insert(mesh.p, 1, 0.0, axis=0)
     points = np.hstack([low, low + np.array([[0.0], [DEPTH], [0.0]])])
     # Split by rising vertex numbers, so that neighbours share their diagonals.
@@ -50,10 +50,10 @@ def slice_of(mesh):
 
 @pytest.fixture(params=ORDERS)
 def pair(request, titanium):
-    """A plane body, the slice of it, and the slice's displacements from those of the plane.
+    """Return a plane body, its slice, and the map from plane displacements to the slice's.
 
-    The same all along Y and none along Y: every node of the slice moves as that of the plane with
-    its X and Z.
+    Displacements are constant along Y and zero in its direction: every node of the slice moves as
+    that of the plane with its X and Z.
     """
     plane = ElasticBody(Body("plane", section()), titanium, request.param)
     solid = ElasticBody(Body("slice", slice_of(section())), titanium, request.param)
@@ -89,7 +89,7 @@ def test_loads_are_those_of_the_slice_per_length(pair):
 
 
 def test_stress_is_that_of_the_slice(pair, titanium):
-    """And the one out of the plane is ν (σxx + σzz), as nothing may lengthen along Y."""
+    """Check that the stress out of the plane is ν (σxx + σzz), as lengths along Y are fixed."""
     plane, solid, motion = pair
     u = np.random.default_rng(1).standard_normal(plane.size)
     stress = plane.stress(u)
@@ -106,7 +106,7 @@ def test_stress_is_that_of_the_slice(pair, titanium):
 
 
 def test_a_spinning_plane_pulls_with_its_mass(pair, titanium):
-    """Per ω² and length: ρ A (X, Z) of the middle, and no moment about the axis but theirs."""
+    """Check ρ A (X, Z) of the centre per ω² and length, without moment about the axis."""
     plane, _, _ = pair
     mesh = plane.body.mesh
     areas = np.abs(element_volumes(mesh))
@@ -114,7 +114,7 @@ def test_a_spinning_plane_pulls_with_its_mass(pair, titanium):
     expected = titanium.density * mesh.p[:, mesh.t].mean(axis=1) @ areas
     load = plane.centrifugal_load().reshape(-1, 2)
     np.testing.assert_allclose(load.sum(axis=0), expected, rtol=1e-12)
-    # A radial force turns nothing about the axis.
+    # A radial force has no moment about the axis.
     x, _, z = plane.nodes.T
     turning = np.sum(x * load[:, 1] - z * load[:, 0])
     assert abs(turning) < 1e-12 * np.linalg.norm(expected) * 7.0
@@ -137,7 +137,7 @@ def test_midsides_lie_between_the_ends_of_their_edges(pair):
 
 @pytest.fixture(scope="module")
 def plane_cycle(dovetail, titanium):
-    """Structure and closed cycle of a plane dovetail with some fields changed."""
+    """Return structure and closed cycle of a plane dovetail with some fields changed."""
 
     @cache
     def solve(mission, friction=0.4, order=1, **changes):
@@ -153,16 +153,16 @@ def plane_cycle(dovetail, titanium):
 
 
 def pull(structure, amplitudes):
-    """Pull on the blade at every increment [N/mm]."""
+    """Return the pull on the blade at every increment [N/mm]."""
     return np.array([structure.bodies[1].load_resultants(a, np.zeros(3))[0, 2] for a in amplitudes])
 
 
 @pytest.mark.slow
 def test_pull_is_that_of_the_whole_blade_per_length(dovetail, structure_of, plane_cycle, mission):
-    """F = Ω² (ρ A Z + m R / L): a section carries its share of the airfoil and of the moment."""
+    """Check F = Ω² (ρ A Z + m R / L), with a section's share of the airfoil and the moment."""
     structure, _ = plane_cycle(mission)
     per_length = structure.bodies[1].load_resultants(mission.amplitudes()[PEAK], np.zeros(3))
-    # Sections of the same size along the flank, whatever the mesh: fillets differ a little.
+    # Sections have the same size along the flank on any mesh; fillets differ slightly.
     whole = structure_of()[0].bodies[1].load_resultants(mission.amplitudes()[PEAK], np.zeros(3))
     assert dovetail.slot_length * per_length[0, 2] == pytest.approx(whole[0, 2], rel=1e-4)
     np.testing.assert_allclose(
@@ -173,7 +173,7 @@ def test_pull_is_that_of_the_whole_blade_per_length(dovetail, structure_of, plan
 @pytest.mark.parametrize("order", ORDERS)
 def test_blade_is_in_balance(plane_cycle, mission, order):
     structure, cycle = plane_cycle(mission, order=order)
-    # Two forces and a moment: the only motions that the plane leaves a free blade.
+    # A free blade in the plane has three motions: two forces and a moment must balance.
     assert structure.bodies[1].free_motions(np.zeros(3), 250.0).shape == (3, 6)
     assert cycle.equilibrium.max() < 1e-6
 
@@ -181,7 +181,7 @@ def test_blade_is_in_balance(plane_cycle, mission, order):
 @pytest.mark.parametrize("mu", [0.0, 0.2, 0.6])
 @pytest.mark.parametrize("angle", [40.0, 50.0, 60.0])
 def test_flanks_carry_the_pull(plane_cycle, symmetric, angle, mu):
-    """F = 2 (P sin θ - Qx cos θ) at every increment, on both flanks alike, and nothing along y."""
+    """Check F = 2 (P sin θ - Qx cos θ) at every increment, with nothing along y."""
     theta = np.deg2rad(angle)
     structure, cycle = plane_cycle(symmetric, mu, flank_angle=theta)
     force = pull(structure, symmetric.amplitudes())
@@ -198,12 +198,13 @@ def test_flanks_carry_the_pull(plane_cycle, symmetric, angle, mu):
 @pytest.mark.parametrize("mu", [0.2, 0.4, 0.6])
 @pytest.mark.parametrize("angle", [40.0, 50.0, 60.0])
 def test_gross_slip_in_closed_form(plane_cycle, symmetric, angle, mu):
-    """P = F / 2 (sin θ + µ cos θ) as the load rises, with - once the flanks slide back.
+    """Check P = F / 2 (sin θ ± µ cos θ), with minus once the flanks slide back.
 
-    To the solver's tolerance wherever every node slides: no friction along y blurs it.
+    It holds to the solver's tolerance wherever every node slides, since there is no friction along
+    y.
     """
     theta = np.deg2rad(angle)
-    compliant = {"disk_height": 200.0, "blades": 16}  # opens the slot enough for flanks to slide
+    compliant = {"disk_height": 200.0, "blades": 16}  # The slot opens: flanks slide.
     light = replace(symmetric, airfoil_mass=0.4e-3)
     structure, cycle = plane_cycle(light, mu, flank_angle=theta, **compliant)
     force = pull(structure, light.amplitudes())
@@ -221,9 +222,10 @@ def test_gross_slip_in_closed_form(plane_cycle, symmetric, angle, mu):
 
 @pytest.mark.parametrize("play", [1e-4, 3e-3, 1e-1])
 def test_blade_crosses_the_play_of_worn_flanks(plane_cycle, symmetric, play):
-    """Worn all over, flanks are apart until the load takes the blade across: then all is as before.
+    """Check worn flanks, which are apart until the load moves the blade across the gap.
 
-    On its way nothing holds the blade, and the solver's residual stays the same.
+    Then all is as before. On the way nothing holds the blade, and the solver's residual stays the
+    same.
     """
     structure, unworn = plane_cycle(symmetric)
     joint = FrictionalJoint(structure.condense().resolvent(), 0.4)
@@ -243,7 +245,7 @@ def test_skewed_slot_is_refused(dovetail):
 
 
 def rows_in_middle(history):
-    """P and Qx per length at peak load and slip over the cycle, at the nodes next to y = 0."""
+    """Return P and Qx per length at peak load and the slip of a cycle, at nodes near y = 0."""
     y = history.interface.coordinates[:, 1]
     levels = np.unique(np.round(y, 6))
     middle = np.abs(y - levels[len(levels) // 2]) < 1e-6
@@ -256,10 +258,11 @@ def rows_in_middle(history):
 
 @pytest.mark.slow
 def test_space_tends_to_the_plane_without_poisson_and_roundings(dovetail, mission):
-    """Nothing then tells one section from another: the middle of a slot is the plane's solution.
+    """Check that the middle of a slot, whose sections are all the same, is the plane solution.
 
-    But for its mesh: tetrahedra at the two ends hold their share of a prism's forces at some nodes
-    and not at others. What that leaves in the middle falls with the spacing of the rows, or faster.
+    The mesh causes a difference: tetrahedra at the two ends hold their share of a prism's forces at
+    some nodes and not at others. Its effect in the middle falls with the spacing of the rows, or
+    faster.
     """
     cork = Material(115e3, 0.0, 4.43e-9)
     straight = replace(dovetail, end_radius=1e6, end_width=0.1)
@@ -294,7 +297,7 @@ def test_space_tends_to_the_plane_without_poisson_and_roundings(dovetail, missio
 
 @pytest.fixture(scope="module", params=[0, 1], ids=["intrados", "extrados"])
 def strips(request, dovetail):
-    """A line face, strips that cover it and end beyond it, and their transfer."""
+    """Return a line face, strips that cover it and extend beyond it, and their transfer."""
     face = dovetail.mesh((NODES, 2), SIZE, 2).interfaces[request.param]
     assert face.line
     grid = Grid.strips(dovetail.flank_size()[0] * 1.1, 37)
@@ -302,7 +305,7 @@ def strips(request, dovetail):
 
 
 def test_linear_fields_keep_their_integral_over_every_strip(strips):
-    """∫ (1 + x) over what a strip shares with the face, in closed form."""
+    """Check ∫ (1 + x) over the part that a strip shares with the face, in closed form."""
     face, grid, transfer = strips
     x = face.coordinates[:, 0]
     low = np.clip(grid.x.ravel() - 0.5 * grid.pitch[0], x.min(), x.max())
@@ -316,7 +319,7 @@ def test_linear_fields_keep_their_integral_over_every_strip(strips):
 
 
 def test_what_wears_off_strips_wears_off_the_face(strips):
-    """Volumes per length and constants, and one transfer is the other's adjoint."""
+    """Check volumes per length and constants, and that the transfers are adjoint."""
     face, grid, transfer = strips
     rng = np.random.default_rng(0)
     inside = np.abs(grid.x.ravel()) < 0.45 * np.ptp(face.coordinates[:, 0])
@@ -330,7 +333,7 @@ def test_what_wears_off_strips_wears_off_the_face(strips):
 
 
 def test_nodal_forces_arrive_on_the_strips(strips, plane_cycle, mission):
-    """P and My of the structure's pressure, kept to rounding and to the strips' width squared."""
+    """Check P to rounding and My to the square of the strips' width."""
     face, grid, transfer = strips
     _, cycle = plane_cycle(mission)
     history = next(h for h in cycle.histories if h.interface.name == face.name)

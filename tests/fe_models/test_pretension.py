@@ -1,4 +1,4 @@
-"""Bolts that are tightened: against springs, the joint diagram, and balances."""
+"""Tightened bolts: compared with springs, the joint diagram, and balances."""
 
 import numpy as np
 import pytest
@@ -18,7 +18,7 @@ from tests.mirrored_blocks import along
 
 STEEL = Material(200e3, 0.0, 7.8e-9)
 UP = np.array([0.0, 0.0, 1.0])
-# Of the stack: height of the clamped block and of the frame's beams, areas of block and pull rods.
+# Height of the clamped block and of the frame's beams, and areas of the block and the rods.
 HEIGHT, BEAM = 4.0, 2.0
 BOLT = Pretension("frame", np.array([3.0, 0.5, 0.5 * HEIGHT + 0.1]), UP)
 
@@ -29,9 +29,10 @@ def precise(monkeypatch):
 
 
 def clamp(bars=(0.5, 0.5)):
-    """A frame round a block: two rods of ``bars`` mm between stiff beams, a block between these.
+    """Return a frame around a block: two rods of ``bars`` mm between stiff beams.
 
-    A plane model of a bolt: rods and beams are one body, whose upper beam presses on the block.
+    It is a plane model of a bolt: rods and beams are one body, whose upper beam presses on the
+    block.
     """
     x = along((0, bars[0], 1), (bars[0], 2.0, 2), (2.0, 4.0, 4), (4.0, 6.0 - bars[1], 2),
               (6.0 - bars[1], 6.0, 1))  # fmt: skip
@@ -103,7 +104,7 @@ def test_tension_is_what_the_faces_carry_and_the_rods_are_strained_by(order):
 
 @pytest.mark.parametrize("place", [0.2, 0.5, 0.8])
 def test_wherever_the_shank_is_cut(place):
-    """The tension and all displacements but a shift of what lies between."""
+    """Check that the tension and all displacements, except the shift, do not depend on the cut."""
     mesh = clamp()
     pairs = [pair("under", "frame_under", "block_z0"), pair("over", "block_z1", "frame_over")]
     through = np.array([3.0, 0.5, place * HEIGHT + 0.01])
@@ -121,7 +122,7 @@ def test_wherever_the_shank_is_cut(place):
 
 
 def test_joint_diagram():
-    """Rods and beams as a spring of k_b, the block of k_c = E A / L: F = δ k_b k_c / (k_b + k_c).
+    """Check F = δ k_b k_c / (k_b + k_c) for the frame as a spring k_b and k_c = E A / L.
 
     k_b is measured on the frame alone, pushed apart by the block's forces; a gap opened by wear h
     costs ΔF = h k_b k_c / (k_b + k_c).
@@ -133,7 +134,7 @@ def test_joint_diagram():
     for name, of, at in (("block", structure, section), ("soft", soft, same)):
         forces[name] = tensions(of, at, marched(of, [0.01]), [0.01])[0]
     compliance = 0.01 / forces["block"]
-    # With a block of 20 MPa nearly all of the shortening is the block's.
+    # With a block of 20 MPa, the block takes nearly all of the shortening.
     assert forces["soft"] == pytest.approx(0.01 / (1 / 10.0 + compliance - 1 / stiff), rel=0.02)
     for worn in (1e-3, 2e-3):
         gap = structure.gap() + np.repeat([worn, 0.0], [len(i) for i in structure.mesh.interfaces])
@@ -154,9 +155,9 @@ def test_bolts_are_shortened_until_they_have_their_force():
 
 
 def test_a_load_on_the_clamped_parts_divides_as_stiffness_says():
-    """A pressure between the beams: the rods take a steady share, the block loses the rest.
+    """Check a pressure between the beams, of which the rods take a constant share.
 
-    While it is clamped; then the rods have all of it.
+    This holds while the block is clamped; then the rods carry all of it.
     """
     opening = [Pressure("frame_over", 1.0)]
     structure, section = clamped(opening)
@@ -164,7 +165,7 @@ def test_a_load_on_the_clamped_parts_divides_as_stiffness_says():
     states = marched(structure, path)
     told = tensions(structure, section, states, path)
     pressed = np.array([structure.interface_resultants(s)[1, 0] for s in states])
-    # 2 mm² are pressed upon: what pulls the rods is what the block still has and the pressure.
+    # The pressure acts on 2 mm²; the rods carry the block's remaining force and the pressure.
     np.testing.assert_allclose(told, pressed + 2.0 * path[:, 1], rtol=1e-9)
     shares = np.diff(told[:3]) / 20.0
     assert shares[0] == pytest.approx(shares[1], rel=2e-3)

@@ -1,7 +1,7 @@
 """Stress at the vertices: exact to the order of the elements, and close to closed forms in notches.
 
-The hole is one in a plate under tension (Kirsch) or under the same tension from all sides, on half
-of a ring whose outside carries the tractions of the infinite plate.
+The notch is a hole in a plate under tension (Kirsch) or equal tension from all sides, modelled as
+half of a ring whose outside carries the tractions of the infinite plate.
 """
 
 from itertools import product
@@ -19,13 +19,13 @@ from fe_models.meshes.structure_mesh import Body
 from sa_solver.types import Material
 
 TITANIUM = Material(115e3, 0.29, 4.43e-9)
-# Outside of the ring, by the radius of the hole, and its layers in space.
+# Outer radius of the ring over that of the hole, and number of layers in space.
 OUTSIDE, LAYERS = 6.0, 4
 NOTHING = np.empty(0, dtype=np.int64)
 
 
 def perturbed(dimension):
-    """A box whose inner vertices are moved about."""
+    """Return a box whose inner vertices are moved."""
     steps = [np.linspace(0.0, size, 5) for size in (1.0, 2.0, 3.0)[:dimension]]
     mesh = (MeshTet if dimension == 3 else MeshTri).init_tensor(*steps)
     points = mesh.p.copy()
@@ -37,7 +37,7 @@ def perturbed(dimension):
 @pytest.mark.parametrize("order", [1, 2])
 @pytest.mark.parametrize("dimension", [2, 3])
 def test_a_stress_of_the_elements_order_is_exact(dimension, order):
-    """From displacements of one order more, at every vertex, far from the origin, by any fit."""
+    """Check displacements of one order more, at every vertex, far from the origin, by any fit."""
     elastic = ElasticBody(Body("box", perturbed(dimension)), TITANIUM, order)
     random, axes = np.random.default_rng(1), list(elastic.body.axes)
     exponents = [e for e in product(range(order + 2), repeat=dimension) if sum(e) <= order + 1]
@@ -71,9 +71,9 @@ def test_a_stress_of_the_elements_order_is_exact(dimension, order):
 
 
 def hole_stress(x, z, uniaxial):
-    """Stress ``(xx, zz, xz)`` round a hole of radius 1 under tension 1 along x, or from all sides.
+    """Return stress ``(xx, zz, xz)`` around a hole of radius 1 under tension 1.
 
-    Of Kirsch 1898, and of Lamé.
+    The tension is along x (Kirsch 1898) or from all sides (Lamé).
     """
     square = x**2 + z**2
     c2, s2, second, fourth = (x**2 - z**2) / square, 2 * x * z / square, 1 / square, 1 / square**2
@@ -87,9 +87,9 @@ def hole_stress(x, z, uniaxial):
 
 
 def pulled_plate(dimension, order, round_hole, uniaxial):
-    """Half a ring of elements as long as wide, ``round_hole`` of them round the whole hole.
+    """Return half a ring of square elements, ``round_hole`` of them around the whole hole.
 
-    Its stress field, and the largest von Mises stress that there is. In space it is a slice
+    The other results are its stress field and the largest von Mises stress. In space it is a slice
     between planes of symmetry.
     """
     angles = np.linspace(0.0, np.pi, round_hole // 2 + 1)
@@ -125,7 +125,7 @@ def pulled_plate(dimension, order, round_hole, uniaxial):
 
 
 def outside_load(elastic, uniaxial):
-    """Nodal forces of what the infinite plate does to the outside of the ring."""
+    """Return nodal forces of the infinite plate on the outside of the ring."""
     basis = FacetBasis(
         elastic.body.mesh,
         ELEMENTS[elastic.dimension, elastic.order](),
@@ -140,13 +140,13 @@ def outside_load(elastic, uniaxial):
     return load.ravel()
 
 
-# What is left of the peak, by dimension, order and elements round the hole.
+# Error of the peak, by dimension, order and number of elements around the hole.
 LEFT = [
     (2, 1, 24, 0.16), (2, 1, 48, 0.06), (2, 2, 16, 0.08), (2, 2, 24, 0.02), (2, 2, 48, 0.002),
     (3, 1, 24, 0.16), (3, 1, 36, 0.09), (3, 2, 16, 0.10),
 ]  # fmt: skip
-# An error below is told as less than the second number: what order 1 leaves of displacements all
-# over the plate may cancel what it leaves at the hole.
+# If the error is small, its estimate must be below the second number: with order 1 the error of
+# the displacements in the whole plate may cancel that at the hole.
 SMALL, TOLD_OF_SMALL = 0.01, 0.06
 
 
@@ -166,7 +166,7 @@ def test_peak_at_a_hole_and_its_error(dimension, order, round_hole, left, uniaxi
 
 @pytest.mark.parametrize("dimension", [2, 3])
 def test_tractions_are_taken_off_where_nothing_acts(dimension):
-    """Of a constant stress: on planes, on edges that stick out; not where the body goes inwards."""
+    """Check a constant stress on planes and convex edges; re-entrant edges are unchanged."""
     steps = [np.linspace(0.0, 3.0, 4)] * dimension
     whole = (MeshTet if dimension == 3 else MeshTri).init_tensor(*steps)
     middle = whole.p[:, whole.t].mean(axis=1)
@@ -199,7 +199,7 @@ def test_tractions_are_taken_off_where_nothing_acts(dimension):
 
 @pytest.mark.parametrize("order", [1, 2])
 def test_stress_without_bound_is_not_told_as_certain(order):
-    """Beside a sharp inward corner, and at the end of a clamped face where there is none."""
+    """Check the error at a re-entrant corner, and at the end of a clamped face."""
     steps = np.linspace(0.0, 3.0, 13)
     whole = MeshTri.init_tensor(steps, steps)
     middle = whole.p[:, whole.t].mean(axis=1)

@@ -1,4 +1,4 @@
-"""Contact of the reduced pair beside Hertz, Mindlin and the coupled march."""
+"""Contact of the reduced pair, compared with Hertz, Mindlin and the coupled march."""
 
 from dataclasses import replace
 
@@ -22,7 +22,7 @@ from tests.reduced_pads import ALPHA, FRICTION, SOLVER, STROKE, coarse_pads, pad
 
 @pytest.fixture(scope="module")
 def specimens():
-    """A coarse pair: the pad with its curved gap, the stiffness of both bodies there."""
+    """Return a coarse pair: the pad with its curved gap, and the stiffness of both bodies there."""
     return coarse_pads()
 
 
@@ -47,7 +47,7 @@ def conditions(force=17.0):
 
 
 def worn_evenly(pair, gap):
-    """A shape that has worn until nearly all nodes lose the same, α times energy."""
+    """Return a shape that has worn until nearly all nodes lose the same, α times energy."""
     for _ in range(60):
         cycle = pair.fretting_cycle(gap, conditions())
         per_force = 2.0 * ALPHA * FRICTION * cycle.cycle_slip / pair.areas
@@ -92,7 +92,7 @@ SPHERE = ShearedSphere(40.0, 50.0, SOFT, SOFT, 0.5)
 
 @pytest.fixture(scope="module")
 def half_space():
-    """Nodes 1/10 of the contact radius apart, each loading a square about it."""
+    """Return a half-space with nodes 1/10 of the contact radius apart, each loading a square."""
     count, step = 27, 0.1 * SPHERE.contact.contact_radius
     line = step * (np.arange(count) - count // 2)
     x, y = (part.ravel() for part in np.meshgrid(line, line, indexing="ij"))
@@ -144,7 +144,7 @@ class TestSphere:
 
 class TestPair:
     def test_compliance_is_the_sum_of_both_bodies(self, pair, specimens):
-        """Two held pads glued: forces of a relative displacement from one dense system."""
+        """Compare with one dense system of two held, glued pads under a relative displacement."""
         _, (first, second) = specimens
         rng = np.random.default_rng(0)
         relative = rng.standard_normal(len(first))
@@ -164,7 +164,7 @@ class TestPair:
         assert stiffness[0] == pytest.approx(stiffness[1], rel=SOLVER)
 
     def test_uncoupled_stiffness_of_the_source(self, pair):
-        """A_zz⁻¹ is K_zz - K_zt K_tt⁻¹ K_tz of the pair (eq. 23, with both tangents)."""
+        """Check that A_zz⁻¹ is K_zz - K_zt K_tt⁻¹ K_tz (eq. 23, with both tangents)."""
         count = len(pair.face)
         K = np.linalg.inv(pair.compliance.reshape(3 * count, 3 * count))
         normal = np.arange(2, 3 * count, 3)
@@ -187,7 +187,7 @@ class TestPair:
         pressed = pair.normal(curved, 87.0)
         curve = pair.virgin_curve(pressed, np.linspace(0.0, 0.5 * STROKE, 200), FRICTION)
         assert curve.converged
-        # Less would drown in the limit, of which the force is what is left.
+        # Smaller forces would be lost in rounding, as differences from the limit.
         small = pair.tangential(pressed, 1e-6, FRICTION)
         assert small.force == pytest.approx(1e-6 * curve.stick_stiffness, rel=SOLVER)
         assert curve.friction == pytest.approx(FRICTION, rel=SOLVER)
@@ -208,7 +208,7 @@ class TestPair:
             last = curve.states[-1]
             energy = 4.0 * np.abs(last.shear) @ last.slip
             errors.append(abs(masing_loop(curve).energy / energy - 1.0))
-        # The curve is read linearly between its points: second order.
+        # The curve is interpolated linearly between its points: second order.
         assert errors[1] < 0.4 * errors[0] < 1e-3
 
     def test_loop_is_closed_and_odd(self, pair, flat):
@@ -254,7 +254,7 @@ class TestCoupled:
         np.testing.assert_allclose(far, near, atol=1e-5 * near.max())
 
     def test_stuck_stiffness(self, pair, flat):
-        """Coupled and stuck: 1ᵀH'1 along x, stiffer than with the other directions free."""
+        """Check 1ᵀH'1 along x, which is stiffer than with the other directions free."""
         small = replace(conditions(), stroke=2e-6)
         cycle = pair.coupled_cycle(flat, small, 1)
         slope = np.ptp(cycle.loop.force) / np.ptp(cycle.loop.displacement)
@@ -266,7 +266,7 @@ class TestCoupled:
     @pytest.mark.parametrize("shape", ["flat", "curved", "worn"])
     @pytest.mark.parametrize("force", [17.0, 250.0])
     def test_uncoupled_method(self, pair, flat, curved, shape, force):
-        """What the source's assumptions cost: 1 % of force, 4 % of the peak force at a node."""
+        """Check the cost of the source's assumptions: 1 % of force, 4 % of a node's peak force."""
         gap = {"flat": flat, "curved": curved, "worn": worn_evenly(pair, flat)}[shape]
         cycle = pair.coupled_cycle(gap, conditions(force), self.STEPS)
         assert cycle.converged
@@ -289,11 +289,11 @@ class TestCoupled:
 class TestStability:
     @pytest.mark.parametrize(("share", "grows"), [(0.95, False), (1.05, True)])
     def test_errors_of_shape_grow_beyond_the_limit(self, pair, flat, share, grows):
-        """A small error of shape on the steady state, along the stiffest direction."""
+        """Check a small error of shape on the steady state, along the stiffest direction."""
         gap = worn_evenly(pair, flat)
 
         def loss(shape):
-            """Of both bodies per cycle, and the longest stable block."""
+            """Return the loss of both bodies per cycle, and the longest stable block."""
             cycle = pair.fretting_cycle(shape, conditions())
             per_force = 2.0 * ALPHA * FRICTION * cycle.cycle_slip / pair.areas
             limit = pair.stable_cycles(cycle.normal, per_force)
@@ -308,7 +308,7 @@ class TestStability:
             change = step * (loss(gap + error)[0] - steady)
             error = error + change - (error + change).mean()
             sizes.append(np.linalg.norm(error) / 1e-9)
-        # Even depths are lost by design; the largest other factor is |1 - 2 share|.
+        # Uniform depths vanish by design; the largest other factor is |1 - 2 share|.
         assert (sizes[-1] > 1.0) == grows
         if grows:
             assert sizes[-1] == pytest.approx(2.0 * share - 1.0, rel=0.02)
@@ -318,7 +318,7 @@ class TestStability:
         assert pair.stable_cycles(cycle.normal, cycle.cycle_slip) == np.inf
 
     def test_a_single_node_has_no_limit(self, pair, flat):
-        """Its gap changes nothing, whatever digits its compliance ends in."""
+        """Check that its gap changes nothing, whatever the rounding of its compliance."""
         for node in range(len(flat)):
             gap = np.where(np.arange(len(flat)) == node, 0.0, 1.0)
             alone = pair.normal(gap, 1.0)
@@ -351,7 +351,7 @@ class TestRig:
         return pairs
 
     def test_stiffness_of_flat_pads(self, rigs):
-        """About twice the measured 50 N/µm; less if the ring's points are held and not a line."""
+        """Check about twice the measured 50 N/µm; less if the ring's points are held."""
         for tied, low, high in ((True, 95e3, 100e3), (False, 84e3, 88e3)):
             pressed = rigs[tied].normal(np.zeros(121), 17.0)
             assert low < rigs[tied].stick_stiffness(pressed) < high

@@ -1,4 +1,4 @@
-"""Reduced models must be the full ones: static exactly, vibrating as far as their modes reach."""
+"""Reduced models equal the full ones: exactly in statics, and up to their modes in vibration."""
 
 import h5py
 import numpy as np
@@ -18,7 +18,7 @@ STEEL = Material(200e3, 0.3, 7.8e-9)
 
 @pytest.fixture(scope="module")
 def matrices(box):
-    """A free box with three different sides, and the displacements of one of its faces."""
+    """Return the matrices of a free box with different sides, and one face's displacements."""
     elastic = box((3, 2, 5), (0.0, 0.0, 0.0), (3.0, 2.0, 7.0), STEEL, 1)
     nodes = elastic.body.vertices("z1")
     kept = (3 * nodes[:, None] + np.arange(3)).ravel()
@@ -30,7 +30,7 @@ def others(size, kept):
 
 
 def chain(element_stiffness, element_mass, elements):
-    """Equal elements in a row that share half of their displacements with the next."""
+    """Assemble equal elements in a row that share half of their displacements with the next."""
     shared = len(element_stiffness) // 2
     matrices = []
     for element in (element_stiffness, element_mass):
@@ -43,7 +43,7 @@ def chain(element_stiffness, element_mass, elements):
 
 
 def bar(elements, length=33.0):
-    """A bar of linear elements with consistent mass, unit section."""
+    """Return a bar of linear elements with consistent mass and unit section."""
     h = length / elements
     k = STEEL.young / h * np.array([[1.0, -1.0], [-1.0, 1.0]])
     m = STEEL.density * h / 6.0 * np.array([[2.0, 1.0], [1.0, 2.0]])
@@ -51,7 +51,7 @@ def bar(elements, length=33.0):
 
 
 def beam(elements, length=33.0, radius=4.0):
-    """A round Euler beam of cubic elements, deflection and rotation at each node."""
+    """Return a round Euler beam of cubic elements, with deflection and rotation at each node."""
     h = length / elements
     section = np.pi * radius**2
     bending = STEEL.young * 0.25 * np.pi * radius**4
@@ -104,7 +104,7 @@ class TestFreeFrequencies:
             assert frequencies[:6].max() < 1e-5 * frequencies[6]
 
     def test_more_than_there_are(self):
-        with pytest.raises(ValueError, match="take 1 to fewer"):
+        with pytest.raises(ValueError, match="at least 1 and fewer"):
             free_frequencies(*bar(4), 5)
 
 
@@ -161,7 +161,7 @@ class TestReduction:
         for modes in (0, 3, 10, 40):
             model = reduce_body(stiffness, mass, kept, modes)
             errors.append(free_frequencies(model.stiffness, model.mass, 12)[6:] / full - 1.0)
-        # Rayleigh-Ritz: never below the full model, and nested spaces only come nearer.
+        # By Rayleigh-Ritz frequencies are never below the full model's, and approach them.
         assert np.all(np.array(errors) > -1e-9)
         assert np.all(np.diff(errors, axis=0) < 1e-9)
         assert errors[-1].max() < 2e-3
@@ -212,7 +212,7 @@ class TestReduction:
 
     def test_more_modes_than_there_are(self, matrices):
         stiffness, mass, kept = matrices
-        with pytest.raises(ValueError, match="take 0 to fewer"):
+        with pytest.raises(ValueError, match="at least 0 and fewer"):
             reduce_body(stiffness, mass, kept, stiffness.shape[0])
 
     def test_a_body_that_can_still_move(self, matrices):

@@ -1,4 +1,4 @@
-"""How much of the answer is the mesh's: resultants converge, edge peaks do not."""
+"""Influence of the mesh: resultants converge, edge peaks do not."""
 
 import numpy as np
 import pytest
@@ -11,7 +11,7 @@ FRICTION, PEAK = 0.4, 7
 
 
 def solve(dovetail, titanium, mission, flank_nodes, size):
-    """Per flank (P, Qx, Mx, My) at the peak and the largest slip of a node per cycle; stresses."""
+    """Return (P, Qx, Mx, My) per flank at the peak, the largest slip of a node, and stresses."""
     mesh = dovetail.mesh(flank_nodes, size)
     structure = dovetail_structure(dovetail, mesh, titanium, titanium, mission, 1)
     frictional = FrictionalJoint(structure.condense().resolvent(), FRICTION)
@@ -34,14 +34,14 @@ def solve(dovetail, titanium, mission, flank_nodes, size):
 
 @pytest.mark.slow
 def test_refined_mesh_moves_the_load_by_less_than_half_a_percent(dovetail, titanium, mission):
-    """From 8 x 14 nodes per flank over 13 x 23 to the default of 20 x 34."""
+    """Compare 8 x 14 nodes per flank with 13 x 23 and the default of 20 x 34."""
     ladder = [((8, 14), 8.0), ((13, 23), 6.5), ((20, 34), 5.0)]
     results = [solve(dovetail, titanium, mission, *mesh) for mesh in ladder]
     (_, coarse_slip, _), (middle, middle_slip, _), (fine, fine_slip, stress) = results
     for mesh, (loads, slip, peak) in zip(ladder, results, strict=True):
         print(mesh, "P, Qx, Mx, My", loads.round(1).tolist(), "slip [mm]", slip, "MPa", peak)  # noqa: T201
     np.testing.assert_allclose(middle[:, :2], fine[:, :2], rtol=5e-3)
-    # Moments are small differences of large ones: measured against P times the flank's width.
+    # Moments are small differences of large ones, so they are compared with P times the width.
     arm = fine[:, :1] * dovetail.flank_width
     assert np.all(np.abs(middle[:, 2:] - fine[:, 2:]) < 5e-3 * arm)
     np.testing.assert_allclose(middle_slip, fine_slip, rtol=5e-2)
@@ -51,7 +51,7 @@ def test_refined_mesh_moves_the_load_by_less_than_half_a_percent(dovetail, titan
 
 @pytest.mark.slow
 def test_stress_of_the_notches_is_near_that_of_a_fine_mesh(dovetail, titanium, symmetric):
-    """In the plane; the error told is the true one within a factor of three, if that counts."""
+    """Check in the plane that a significant estimated error is within a factor of three."""
     amplitudes = symmetric.amplitudes()
 
     def notches(flank_nodes, order, notch):

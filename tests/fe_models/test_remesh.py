@@ -1,4 +1,4 @@
-"""Worn meshes: the flank goes where the depth says, its volume is the depth's, nothing folds."""
+"""Worn meshes: the flank moves by the depth, the volume is the depth's, nothing folds."""
 
 from dataclasses import replace
 
@@ -13,7 +13,7 @@ from sa_solver.types import Frame
 
 
 def bowls(face, depth):
-    """A depth that is zero on the rim of the face."""
+    """Return a depth that is zero on the rim of the face."""
     x, y = np.abs(face.coordinates.T) / np.abs(face.coordinates).max(axis=0)[:, None]
     return depth * (1.0 - x**2) * (1.0 - y**2)
 
@@ -62,7 +62,7 @@ def test_other_boundaries_stay(coarse_mesh, worn):
 
 
 def test_worn_volume_is_that_of_the_depth(coarse_mesh, worn):
-    """By the nodal areas, and independently as the volume that the elements have lost."""
+    """Compare by the nodal areas, and with the volume that the elements have lost."""
     depths, after = worn
     for number, (old, new) in enumerate(zip(bodies(coarse_mesh), bodies(after), strict=True)):
         volumes = [worn_volume(old, new, face, number + 1) for face in coarse_mesh.interfaces]
@@ -84,7 +84,7 @@ def test_no_element_turns_over(coarse_mesh, worn):
 
 
 def test_inner_nodes_move_less_than_the_surface(coarse_mesh, worn):
-    """A harmonic field has its extremes on the boundary."""
+    """Check that the harmonic field has its extremes on the boundary."""
     _, after = worn
     for old, new in zip(bodies(coarse_mesh), bodies(after), strict=True):
         moved = new.mesh.p - old.mesh.p
@@ -110,7 +110,7 @@ def test_interfaces_keep_their_gaps(coarse_mesh, worn):
 
 @pytest.mark.parametrize(("number", "name"), [(0, "disk"), (1, "blade")])
 def test_depth_that_crushes_elements_is_refused(coarse_mesh, number, name):
-    """A spike twice as deep as the elements are large."""
+    """Check a spike twice as deep as the elements are large."""
     depths = []
     for face in coarse_mesh.interfaces:
         pair = [np.zeros(len(face)), np.zeros(len(face))]
@@ -124,7 +124,7 @@ def test_depth_that_crushes_elements_is_refused(coarse_mesh, number, name):
 
 
 def opening(mesh, face):
-    """How far the faces of an interface are apart, seen along its normal ``(n,)`` [mm]."""
+    """Return the distance of the faces of an interface, along its normal ``(n,)`` [mm]."""
     low, high = (
         face.frame.coordinates(body.points[face.nodes(number)])[:, 2]
         for number, body in enumerate(bodies(mesh), start=1)
@@ -133,7 +133,7 @@ def opening(mesh, face):
 
 
 def test_flanks_are_as_far_apart_as_gap_and_wear(coarse_mesh, worn):
-    """Rounded edges and ends on the blade; the disk and the wear are as without them."""
+    """Check rounded edges and ends on the blade; disk and wear are as without them."""
     depths, after = worn
     form = form_of(coarse_mesh)
     unworn, shown = (formed_mesh(mesh, form) for mesh in (coarse_mesh, after))
@@ -155,7 +155,7 @@ def test_flanks_are_as_far_apart_as_gap_and_wear(coarse_mesh, worn):
 
 
 def test_edges_finer_than_their_form_blend_into_the_sides(dovetail):
-    """Edges that are rounded by more than elements are large: these are not crushed."""
+    """Check edges rounded by more than the element size, which are not crushed."""
     section = replace(dovetail, edge_radius=10.0).mesh((160, 2), 8.0, dimension=2)
     shown = formed_mesh(section, form_of(section))
     ratio = element_volumes(shown.bodies[1].mesh) / element_volumes(section.bodies[1].mesh)
@@ -164,7 +164,7 @@ def test_edges_finer_than_their_form_blend_into_the_sides(dovetail):
 
 
 def test_faces_meshed_apart_move_by_what_is_not_meshed():
-    """A crowned pad of nodes of its own, overhanging, with the gap of a groove beside it."""
+    """Check an overhanging crowned pad with its own nodes, next to the gap of a groove."""
     z = np.array([0.0, 1.0])
     low = MeshTri.init_tensor(np.linspace(0.0, 5.0, 11), z)
     high = MeshTri.init_tensor(np.linspace(-1.0, 5.0, 14), 1.0 + z)
@@ -181,7 +181,7 @@ def test_faces_meshed_apart_move_by_what_is_not_meshed():
     mesh = StructureMesh(pair, (groove,))
     shown = formed_mesh(mesh, form_of(mesh))
     np.testing.assert_allclose(opening(shown, groove), groove.gap, atol=1e-12)
-    # Beyond the base's end the pad goes on as it is above that.
+    # Beyond the base's end the pad has the form that it has above the end.
     (end,) = np.flatnonzero((high.p[0] == -1.0) & (high.p[1] == 1.0))
     nearest = np.argmin(groove.coordinates[:, 0])
     form = groove.gap[nearest] - face.gap[nearest]
@@ -189,7 +189,7 @@ def test_faces_meshed_apart_move_by_what_is_not_meshed():
 
 
 def test_form_that_crushes_elements_is_refused(coarse_mesh):
-    """A groove deeper than the elements are large, from one node to the next."""
+    """Check a groove deeper than the elements are large, from one node to the next."""
     faces = []
     for face in coarse_mesh.interfaces:
         spike = np.where(np.arange(len(face)) == np.hypot(*face.coordinates.T).argmin(), 3.0, 0.0)

@@ -31,7 +31,7 @@ IN_PLANE = [0, 2, 4]
 
 
 def bar(order, dimension=3, material=STEEL):
-    """Of 4 mm along x, its left end's nodes and its right end, a boundary."""
+    """Return a bar of 4 mm along x, the nodes of its left end, and its right end, a boundary."""
     x, y, z = along((0, 4, 6)), along((0, 1, 2)), along((0, 1.5, 2))
     mesh = MeshTet.init_tensor(x, y, z) if dimension == 3 else MeshTri.init_tensor(x, z)
     mesh = with_faces(mesh, {"left": (0, 0.0), "end": (0, 4.0)})
@@ -52,7 +52,7 @@ def solved(elastic, constraints, forces, imposed=0.0):
 
 
 def reaction(elastic, displacement, forces=0.0, boundary="end", at=AT):
-    """Force and moment ``(6,)`` about a point that hold a boundary."""
+    """Return force and moment ``(6,)`` about a point that hold a boundary."""
     nodes = elastic.boundary_nodes(boundary)
     left = np.zeros((len(elastic.nodes), 3))
     residual = elastic.stiffness @ displacement - forces
@@ -85,7 +85,7 @@ def pushed_by(elastic, load):
 
 
 def mean_motion(elastic, displacement):
-    """Of the point, by least squares over the end: the work of unit forces there."""
+    """Return the mean motion of the end by least squares: the work of unit forces there."""
     return np.array([unit_force(k, False).forces(elastic) @ displacement for k in range(6)])
 
 
@@ -110,7 +110,7 @@ def test_rigid_face_moves_with_its_point(dimension, order):
 
 @pytest.mark.parametrize(("dimension", "order"), MODELS)
 def test_averaged_face_has_its_points_motion_on_average(dimension, order):
-    """And deforms; the forces that hold it are tractions linear over it."""
+    """Check that it deforms, held by tractions that are linear over it."""
     elastic = bar(order, dimension)
     motion = np.zeros(6)
     motion[IN_PLANE] = 1e-3, -2e-3, 5e-4
@@ -129,7 +129,7 @@ def test_averaged_face_has_its_points_motion_on_average(dimension, order):
 @pytest.mark.parametrize("rigid", [True, slow(False)])
 @pytest.mark.parametrize(("dimension", "order"), MODELS)
 def test_forces_and_motions_of_a_point_are_reciprocal(dimension, order, rigid):
-    """The stiffness of given motions is the inverse of the compliance under forces."""
+    """Check that stiffness of given motions is the inverse of the compliance under forces."""
     elastic = bar(order, dimension)
     known = list(range(6)) if dimension == 3 else IN_PLANE
     stiffness = np.stack(
@@ -140,7 +140,7 @@ def test_forces_and_motions_of_a_point_are_reciprocal(dimension, order, rigid):
     )
     np.testing.assert_allclose(stiffness @ compliance, np.eye(len(known)), atol=1e-8)
     np.testing.assert_allclose(stiffness, stiffness.T, atol=1e-9 * np.abs(stiffness).max())
-    # Free components: no force; given ones as the compliance has them.
+    # Free components have no force; given ones follow from the compliance.
     free = np.ones(6, bool)
     free[[0, 4]] = False
     motion = np.array([1e-3, 0, 0, 0, 2e-4, 0])
@@ -154,7 +154,7 @@ def test_forces_and_motions_of_a_point_are_reciprocal(dimension, order, rigid):
 
 @pytest.mark.parametrize("rigid", [True, False])
 def test_slender_bar_is_a_beam(rigid):
-    """Without lateral contraction sections stay plane: M = E I θ / L, N = E A u / L, exactly."""
+    """Check M = E I θ / L and N = E A u / L, exact without lateral contraction."""
     elastic = bar(2, material=Material(200e3, 0.0))
     at = np.array([4.0, 0.5, 0.75])
     load = remote([2e-3, 0, 0, 0, 1e-4, 0], rigid, [0, 1, 1, 1, 0, 1], at=at)
@@ -166,7 +166,7 @@ def test_slender_bar_is_a_beam(rigid):
 
 @pytest.mark.parametrize("rigid", [True, False])
 def test_force_at_a_point_is_balanced(rigid):
-    """The support has the same force, and its moment about any point."""
+    """Check that the support has the same force, and its moment about any point."""
     elastic = bar(1)
     load = BoundaryForce("end", np.array([3.0, -5.0, 7.0]), AT, np.array([2.0, 0.0, -4.0]), rigid)
     displacement, forces = pushed_by(elastic, load)
@@ -181,7 +181,7 @@ def test_force_at_a_point_is_balanced(rigid):
 
 
 def test_two_loads_of_one_point_add_up():
-    """One turns it, the other shifts it: together as one load does both."""
+    """Check that a rotation and a shift in two loads equal both in one load."""
     elastic = bar(1)
     for rigid in (True, False):
         constraints, imposed = held_at_left(elastic), np.zeros(elastic.size)
@@ -196,7 +196,7 @@ def test_two_loads_of_one_point_add_up():
 
 @pytest.mark.parametrize("order", [1, 2])
 def test_mean_of_a_face_is_of_its_own_nodes(order):
-    """What integrals over facets leave behind them is rounding, and ties nothing."""
+    """Check that rounding errors at nodes behind the face tie nothing."""
     elastic = bar(order)
     constraints = Constraints(len(elastic.nodes))
     impose(constraints, elastic, remote(np.ones(6), False))
@@ -205,7 +205,7 @@ def test_mean_of_a_face_is_of_its_own_nodes(order):
 
 
 def test_means_of_a_rigid_face_are_its_motion():
-    """A force keeps it rigid, a motion is given on average: as a rigid face that is given it."""
+    """Check that a motion on average of a face that a force keeps rigid is that of the face."""
     elastic = bar(2)
     motion = np.array([1e-3, 0, -2e-3, 3e-4, 1e-4, 0])
     constraints = held_at_left(elastic)
@@ -217,7 +217,7 @@ def test_means_of_a_rigid_face_are_its_motion():
 
 
 def test_rigid_edge_of_nodes_on_a_line():
-    """In the plane a boundary of one facet, in space one whose turn about itself nobody sees."""
+    """Check a plane boundary of one facet, and in space one whose own axis is no rotation."""
     constraints = Constraints(3)
     nodes = np.arange(3)
     points = np.array([[0.0, 0, 0], [1.0, 0, 0], [2.0, 0, 0]])
@@ -231,7 +231,7 @@ def test_rigid_edge_of_nodes_on_a_line():
 
 @pytest.mark.parametrize("first", [0, 1, 2, 3])
 def test_a_mean_that_a_rigid_edge_takes_part_in(first):
-    """Whichever displacement the mean is held by: the edge is rigid, and the mean is zero."""
+    """Check that the edge is rigid and the mean is zero, whichever displacement is eliminated."""
     points = np.array([[0.0, 0, 0], [1.0, 0, 0], [2.0, 0, 0], [1.0, 0, 1.0]])
     weights = np.ones(4)
     weights[first] = 3.0
@@ -269,10 +269,10 @@ def cycle_of(structure, path=PATH):
 @pytest.mark.parametrize("order", [1, 2])
 @pytest.mark.parametrize("rigid", [True, False])
 def test_half_model_equals_the_full_one(order, rigid):
-    """A head that is pressed, then tilted and pushed: the plane of symmetry meets the tied face.
+    """Check a head that is pressed, then tilted and pushed, with symmetry across the tied face.
 
-    The mean motion of half a face is that of the whole at the middle of the half, where what is odd
-    is left free; a rigid face knows that by itself.
+    The mean motion of half a face is that of the whole at the middle of the half, where odd
+    components are left free; a rigid face needs no such care.
     """
     motions = [0, 0, -4e-3, 0, 0, 0], [8e-3, 0, 0, 0, -2e-4, 0]
     odd = np.array([0, 1, 0, 1, 0, 1], bool)
@@ -293,7 +293,7 @@ def test_half_model_equals_the_full_one(order, rigid):
 
 @pytest.mark.parametrize("rigid", [True, False])
 def test_contact_carries_what_the_point_does(rigid):
-    """A force and a moment at a point above the pad: the contact's resultants are theirs."""
+    """Check that the contact's resultants are the force and moment at a point above the pad."""
     at = np.array([0.3, -0.2, 5.0])
     force, moment = np.array([20.0, -5.0, -200.0]), np.array([30.0, 20.0, 10.0])
     structure = joined(
@@ -316,9 +316,13 @@ def lid(motion, at=AT):
 @pytest.mark.parametrize(
     ("supports", "loads", "wrong"),
     [
-        ([Support("lid", "x")], [lid([1e-3] * 6)], "along what a support holds"),
+        ([Support("lid", "x")], [lid([1e-3] * 6)], "in which a support holds its nodes"),
         ([], [remote([1e-3] * 6, True, boundary="side")], "on nodes of a contact face"),
-        ([], [BoundaryForce("side", np.ones(3), rigid=True)], "tied load ties nodes of a contact"),
+        (
+            [],
+            [BoundaryForce("side", np.ones(3), rigid=True)],
+            "tied load couples nodes of a contact",
+        ),
         (
             [],
             [lid([1e-3, 0, 0, 0, 0, 0]), lid([0, 0, 0, 0, 1e-3, 0], 2.0 * AT)],
@@ -350,7 +354,7 @@ def test_a_rotation_out_of_the_plane_is_refused():
     )
     for motion, wrong in (
         ([0, 0, 0, 1e-3, 0, 0], "a rotation about x or z"),
-        ([0, 1e-3, 0, 0, 0, 0], "a load along y"),
+        ([0, 1e-3, 0, 0, 0, 0], "a load acts along y"),
     ):
         with pytest.raises(MeshError, match=wrong):
             check_load(blocks, list(blocks.bodies.values()), remote(motion, True, boundary="lid"))
@@ -358,7 +362,7 @@ def test_a_rotation_out_of_the_plane_is_refused():
 
 @pytest.mark.parametrize("rigid", [True, slow(False)])
 def test_faces_of_curved_elements_follow_too(rigid):
-    """A rigid motion of a body that nothing else holds strains nothing, whatever its edges."""
+    """Check that a rigid motion of a free body causes no strain, whatever its edges."""
     grid = np.linspace(0.0, 1.0, 3)
     mesh = with_faces(MeshTet.init_tensor(grid, grid, grid), {"end": (0, 1.0)})
     middles = mesh.p[:, mesh.edges].mean(axis=1).T

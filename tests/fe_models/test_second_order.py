@@ -1,4 +1,4 @@
-"""Midside nodes of a file become those of the elements, go along with bodies, or are refused."""
+"""Midside nodes of a file become those of the elements, move with bodies, or are refused."""
 
 from dataclasses import replace
 
@@ -32,7 +32,7 @@ AXES = Frame(np.zeros(3), np.eye(3))
 
 
 def curved_cubes(amount=0.05):
-    """Two cubes on each other, all edges of the upper one's faces apart from the contact bent."""
+    """Return two cubes on each other, with bent edges on the upper one except at the contact."""
     mesh = MeshTet().refined(1).with_boundaries({"contact": lambda x: x[2] == 0.0})
     lower = Body("lower", mesh.mirrored((0.0, 0.0, 1.0)))
     middle = mesh.p[:, mesh.edges].mean(axis=1).T
@@ -50,7 +50,7 @@ def imported(mesh, folder):
 
 @pytest.fixture(scope="module")
 def found(tmp_path_factory):
-    """The cubes from a file; a process of its own reads it, which takes two seconds."""
+    """Return the cubes read from a file once, since a separate process takes two seconds."""
     return imported(curved_cubes(), tmp_path_factory.mktemp("cubes"))
 
 
@@ -60,7 +60,7 @@ def same_bodies(found: ImportedMesh):
 
 @pytest.mark.parametrize("dimension", [2, 3])
 def test_written_and_read_again(tmp_path, request, dimension):
-    """Element by element every node is where it was, whatever order gmsh lists them in."""
+    """Check that every node of every element is where it was, whatever gmsh's order."""
     if dimension == 3:
         mesh, found = curved_cubes(), request.getfixturevalue("found")
     else:
@@ -105,7 +105,7 @@ def test_edges_without_a_node_are_straight(found):
 
 
 def test_folded_elements_have_straight_edges(found):
-    """The one that folds them, if it is inside; counted, and all others as they were."""
+    """Check that the folding edge is straightened, inner ones first, and others are unchanged."""
     straight = found.bodies["upper"].mesh
     surface = np.unique(straight.f2e[:, straight.boundary_facets()])
     inside = np.setdiff1d(np.arange(straight.nedges), surface)[0]
@@ -144,7 +144,7 @@ def test_faces_whose_midsides_are_apart_are_told():
 
 
 def test_worn_bodies_keep_their_bulges():
-    """Midsides go with the mean of their ends, on the worn face and inside."""
+    """Check that midside nodes move with the mean of their ends, on the face and inside."""
     mesh = curved_cubes()
     face = mesh.interfaces[0]
     depth = 0.05 * (1.0 + face.coordinates[:, 0])
@@ -154,14 +154,14 @@ def test_worn_bodies_keep_their_bulges():
     moved = (after.mesh.p - before.mesh.p)[:, ends].mean(axis=1).T
     np.testing.assert_allclose(after.midsides - before.midsides, moved, atol=1e-14)
     volumes = [ElasticBody(b, STEEL, 2).basis().dx.sum() for b in (before, after)]
-    # The face sweeps a mean of 0.075 mm over 1 mm²; bent edges go along inside and at the sides.
+    # The face moves by 0.075 mm on average over 1 mm²; bent edges move with it.
     assert volumes[0] - volumes[1] == pytest.approx(0.075, rel=0.02)
     with pytest.raises(MeshError, match="crushes elements"):
         worn_mesh(mesh, [(np.zeros(len(face)), np.full(len(face), 0.47))])
 
 
 def test_node_sets_have_their_midside_nodes(tmp_path):
-    """Those that the file lists; of a file without any, those of facets with all corners in it."""
+    """Check listed midside nodes or, without any, those of facets with all corners in the set."""
     file = tmp_path / "wedge.inp"
     corners = "*NODE\n1, 0, 0, 0\n2, 2, 0, 0\n3, 0, 2, 0\n4, 0, 0, 2\n"
     middle = "5, 1, 0, 0\n6, 1, 1, 0\n7, 0, 1, 0\n8, 0, 0, 1\n9, 1, 0, 1\n10, 0, 1, 1\n"
@@ -209,7 +209,7 @@ HEXAHEDRON = """*NODE
 
 
 def test_a_brick_is_split_into_curved_tetrahedra(tmp_path):
-    """Diagonals are where its own twenty nodes put them: the volume is that of the brick."""
+    """Check that diagonals follow its twenty nodes: the volume is that of the brick."""
     file = tmp_path / "brick.inp"
     cells = "1, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15,\n16, 17, 18, 19, 20\n"
     file.write_text(HEXAHEDRON + cells)
@@ -222,7 +222,7 @@ def test_a_brick_is_split_into_curved_tetrahedra(tmp_path):
 
 @pytest.mark.parametrize("matching", [True, False])
 def test_curved_faces_bear_what_is_applied(matching):
-    """Forces and moments of tractions where the bent face is, not at its corners: 0.3 % there."""
+    """Check tractions on the bent face instead of its corners, a difference of 0.3 %."""
     bodies = blocks(2, curved=True, matching=matching)
     structure = structure_of(bodies, matching)
     joint = FrictionalJoint(structure.condense().resolvent(), friction=0.9)

@@ -1,4 +1,4 @@
-"""Structures of one sector: their contacts are those of all sectors, and what is refused."""
+"""Structures of one sector: their contacts are those of all sectors; refusals."""
 
 from dataclasses import replace
 
@@ -36,7 +36,7 @@ SECTORS = 4
 COUNTS = (4, 7, 1)
 CYCLIC = about(sectors=SECTORS)
 BORE = Support("bore", "xyz")
-# Pressed, pushed round to and fro so that some of the face slides, and spun.
+# The shoes are pressed, pushed back and forth around so that part of the face slides, and spun.
 PATH = np.array([[1.0, 0.0, 0.0], [1.0, 1.0, 0.5], [1.0, -1.0, 1.0]])
 PUSH = np.array([215.0, 0.0, -115.0])
 # Forces are per length in the plane.
@@ -45,7 +45,7 @@ SPIN = Rotation(Y, np.zeros(3), 500.0)
 
 
 def structure_of(disk, shoes, forces, cyclic, order, supports=(BORE,)):
-    """A disk with shoes on its pads, each with its own force on the top."""
+    """Return a disk with shoes on its pads, each with its own force on the top."""
     named = {body.name: body for body in (disk, *shoes)}
     imported = ImportedMesh(
         named,
@@ -66,7 +66,7 @@ def structure_of(disk, shoes, forces, cyclic, order, supports=(BORE,)):
 
 
 def sector_of(order=1, cyclic=(CYCLIC,), part=None, dimension=2, **changes):
-    """One sector with its shoe."""
+    """Return one sector with its shoe."""
     body = turned(shoe(SECTORS, COUNTS, dimension), CYCLIC, 0)
     force = BoundaryForce("top_0", PUSH * DEPTH[dimension])
     part = part or sector(SECTORS, COUNTS, dimension)
@@ -74,7 +74,7 @@ def sector_of(order=1, cyclic=(CYCLIC,), part=None, dimension=2, **changes):
 
 
 def cycle_of(joined, path):
-    """A closed cycle, and its friction's amplitudes."""
+    """Return a closed cycle, and its load amplitudes."""
     joint = FrictionalJoint(joined.condense().resolvent(), MU)
     return joined.solve_cycle(joint, path, joined.gap(), MU)
 
@@ -87,7 +87,7 @@ IN_SPACE = [Support("bore", "normal"), Support("front", "mean_y")]
     [(2, 1, [BORE]), (2, 2, [BORE]), (3, 1, [BORE]), slow(3, 1, IN_SPACE), slow(3, 2, [BORE])],
 )
 def test_contacts_of_a_sector_are_those_of_the_wheel(dimension, order, supports, monkeypatch):
-    """Forces, slips, displacements and stresses of four shoes on a ring."""
+    """Compare forces, slips, displacements and stresses of four shoes on a ring."""
     monkeypatch.setattr(friction, "TOLERANCE", 1e-13)
     monkeypatch.setattr(structure, "CLOSED", -1.0)
     monkeypatch.setattr(structure, "MOST_CYCLES", 3)
@@ -134,7 +134,7 @@ def test_contacts_of_a_sector_are_those_of_the_wheel(dimension, order, supports,
 
 
 def test_forces_do_not_depend_on_how_cuts_are_named():
-    """High for low: the same structure."""
+    """Check that exchanging high and low gives the same structure."""
     forward, backward = (
         cycle_of(sector_of(cyclic=[cyclic]), PATH).histories[0].force
         for cyclic in (CYCLIC, replace(CYCLIC, low=("high",), high=("low",), axis=-Y))
@@ -143,7 +143,7 @@ def test_forces_do_not_depend_on_how_cuts_are_named():
 
 
 def test_cuts_that_do_not_match_change_little():
-    """Forces of the contact by a mortar on the cuts, beside those node by node."""
+    """Compare contact forces with a mortar on the cuts and with matching nodes."""
     exact = cycle_of(sector_of(), PATH).histories[0].force
     tied = cycle_of(sector_of(part=sector(SECTORS, COUNTS, moved=0.3)), PATH).histories[0].force
     change = np.abs(tied - exact).max() / np.abs(exact).max()
@@ -152,7 +152,7 @@ def test_cuts_that_do_not_match_change_little():
 
 @pytest.mark.parametrize("moved", [0.0, 0.3])
 def test_deformed_cuts_are_images(moved):
-    """A bore that slides, its cuts tied: the turn about the axis is held by nothing else."""
+    """Check a sliding bore with tied cuts, where only the cuts hold the rotation."""
     part = sector(SECTORS, COUNTS, moved=moved)
     joined = sector_of(part=part, supports=[Support("bore", "xyz")])
     cycle = cycle_of(joined, PATH)
@@ -174,13 +174,13 @@ REFUSED = [
     ({"cyclic": [about(sectors=SECTORS, high=("edge",))]}, "no boundary edge on body wheel"),
     (
         {"cyclic": [about(sectors=SECTORS, high=("top",))]},
-        "no boundary top on body wheel, for both cuts of it; allowed",
+        "no boundary top on body wheel, which needs both cuts; allowed",
     ),
     ({"cyclic": [about(sectors=5)]}, "is not low turned about the axis by 360°/5"),
     ({"cyclic": [about((0.0, 0.0, 1.0), sectors=SECTORS)]}, "an axis in the plane"),
     (
         {"cyclic": [CYCLIC, about(sectors=8, low=("bore",), high=("rim",))]},
-        "another axis or number of sectors than the first",
+        "the axis or the number of sectors differs",
     ),
     (
         {"cyclic": [CYCLIC, about(sectors=SECTORS, low=("high",), high=("low",))]},
@@ -212,7 +212,7 @@ def test_loads_that_are_not_alike_in_all_sectors(load, said):
 
 
 def test_contact_face_that_meets_a_cut():
-    """It would go on in the next sector."""
+    """Check the refusal, since it would continue in the next sector."""
     part = sector(SECTORS, COUNTS)
     boundaries = part.mesh.boundaries | {"pad": part.mesh.boundaries["rim"]}
     part = replace(part, mesh=part.mesh.with_boundaries(boundaries))
@@ -222,7 +222,7 @@ def test_contact_face_that_meets_a_cut():
 
 @pytest.mark.parametrize("moved", [0.0, 0.3])
 def test_temperatures_are_alike_on_both_cuts(moved):
-    """One that depends on the radius is; one that rises along X is not."""
+    """Check that a function of the radius is accepted, and one that rises along X is not."""
     part, body = sector(SECTORS, COUNTS, moved=moved), turned(shoe(SECTORS, COUNTS), CYCLIC, 0)
     numbers = np.arange(part.mesh.nvertices)
     for changes, alike in ((np.linalg.norm(part.points, axis=1), True), (part.points[:, 0], False)):
@@ -230,12 +230,14 @@ def test_temperatures_are_alike_on_both_cuts(moved):
         if alike:
             structure_of(part, [body], [load], [CYCLIC], 1)
         else:
-            with pytest.raises(MeshError, match="temperatures of body wheel are not alike"):
+            with pytest.raises(
+                MeshError, match="temperatures of body wheel differ between both cuts"
+            ):
                 structure_of(part, [body], [load], [CYCLIC], 1)
 
 
 def test_heated_sector_is_the_heated_wheel():
-    """Stress of a disk that is hotter at its rim, on the cuts too."""
+    """Compare the stress of a disk with a hotter rim, on the cuts, too."""
     steel = replace(STEEL, expansion=1e-5)
     part, whole = sector(5), wheel(sector(5), about(sectors=5))
     stresses = []
@@ -258,7 +260,7 @@ def test_heated_sector_is_the_heated_wheel():
 
 
 def test_bolts_shift_cuts_alike():
-    """Along the axis, or not at all."""
+    """Check that bolts shift cuts along the axis, or not at all."""
     part = sector(SECTORS, COUNTS, 3)
     pair, nothing = Cuts.of(part, CYCLIC), np.zeros((len(part.points), 3, 1))
     within, along, across = nothing.copy(), nothing.copy(), nothing.copy()
@@ -266,5 +268,5 @@ def test_bolts_shift_cuts_alike():
     along[:, 1] = across[:, 0] = 1.0
     for jumps in (nothing, within, along):
         check_jumps(part, jumps.reshape(-1, 1), [pair])
-    with pytest.raises(MeshError, match="not alike in all sectors"):
+    with pytest.raises(MeshError, match="not the same in all sectors"):
         check_jumps(part, across.reshape(-1, 1), [pair])

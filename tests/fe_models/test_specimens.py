@@ -1,4 +1,4 @@
-"""The specimen pair: geometry, matched pads and rings, and frequencies of the printed specimen."""
+"""The specimen pair: geometry, matched pads and rings, and frequencies from the source."""
 
 import numpy as np
 import pytest
@@ -29,7 +29,7 @@ def volume(mesh):
 
 
 def exact_volume(specimen):
-    """Cylinder less both chamfers, the latter by quadrature over their width."""
+    """Return the cylinder less both chamfers, by quadrature over their width."""
     radius, half = 0.5 * specimen.diameter, 0.5 * specimen.strip_width
     nodes, weights = np.polynomial.legendre.leggauss(200)
     y = half + 0.5 * (radius - half) * (nodes + 1.0)
@@ -141,7 +141,7 @@ class TestGeometry:
 
 class TestModels:
     def test_body_2_is_body_1_turned(self, pair):
-        """The same body in other axes: equal stiffness after the swap of X, Y and of the nodes."""
+        """Check equal stiffness after exchanging X and Y, and the nodes."""
         first, second = reduced_specimens(COARSE, pair, (STEEL, STEEL), order=1, modes=0)
         turn = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])
         (face,) = pair.interfaces
@@ -174,7 +174,7 @@ class TestModels:
         assert max(exact[:6].max(), reduced[:6].max()) < 1e-5 * exact[6]
 
     def test_tied_ring_moves_linearly(self, pair):
-        """A displacement that is linear in each element is left as it is, the pad's trace too."""
+        """Check that a displacement linear in each element is unchanged, and the pad's trace."""
         (face,) = pair.interfaces
         full = specimen_matrices(COARSE, pair.bodies[0], face.nodes_1, STEEL)
         elastic = ElasticBody(pair.bodies[0], STEEL, 2)
@@ -186,7 +186,10 @@ class TestModels:
 
     @pytest.mark.slow
     def test_printed_frequencies(self):
-        """Full within 2 % of the thesis's, the chamfer assumed 1 mm deep; reduced within 0.6 %."""
+        """Check the thesis's frequencies: full model within 2 %, reduced one within 0.6 % of it.
+
+        The chamfer is assumed to be 1 mm deep.
+        """
         specimen = Specimen()
         mesh = specimen.mesh()
         nodes = mesh.interfaces[0].nodes_1

@@ -1,4 +1,4 @@
-"""Centrifugal force by displacement: rotating bars and carried masses in closed form."""
+"""Centrifugal force due to displacement: rotating bars and carried masses in closed form."""
 
 import numpy as np
 import pytest
@@ -15,7 +15,7 @@ SPEED = 40.0
 
 
 def test_of_the_places_it_is_the_centrifugal_load(box, titanium):
-    """Ω² M X, on nodes of both orders."""
+    """Check Ω² M X, for elements of both orders."""
     for order in (1, 2):
         elastic = box((2, 2, 2), (0.5, 0.0, 3.0), (1.0, 1.5, 5.0), titanium, order)
         force = spin_softening(elastic, SPEED) @ elastic.nodes.ravel()
@@ -24,9 +24,10 @@ def test_of_the_places_it_is_the_centrifugal_load(box, titanium):
 
 
 def test_rotating_bar(box):
-    """E u'' + ρ Ω² (r + u) = 0, held at r = 2 and free at 10: r + u = 2 cos k(r-2) + C sin k(r-2).
+    """Check E u'' + ρ Ω² (r + u) = 0, held at r = 2 and free at 10.
 
-    With k² = ρ Ω² / E; without the softening the same bar stretches a quarter less.
+    The solution is r + u = 2 cos k(r-2) + C sin k(r-2) with k² = ρ Ω² / E; without softening the
+    same bar stretches a quarter less.
     """
     material = Material(1e5, 0.0, 1e5 * (0.1 / SPEED) ** 2)
     elastic = box((1, 1, 8), (0.0, 0.0, 2.0), (1.0, 1.0, 10.0), material, 2)
@@ -41,7 +42,7 @@ def test_rotating_bar(box):
     k, r = 0.1, elastic.nodes[:, 2]
     slope = (1.0 + 2.0 * k * np.sin(8.0 * k)) / (k * np.cos(8.0 * k))
     exact = 2.0 * np.cos(k * (r - 2.0)) + slope * np.sin(k * (r - 2.0)) - r
-    # Eight quadratic elements leave 7e-5.
+    # The error of eight quadratic elements is 7e-5.
     np.testing.assert_allclose(u, exact, atol=1e-4 * exact.max())
 
 
@@ -59,7 +60,7 @@ def elastic(request, box, titanium):
 
 
 def test_carried_mass_moves_with_the_body(elastic):
-    """In a small rigid motion of the body the mass moves by the same motion."""
+    """Check that in a small rigid motion of the body the mass has the same motion."""
     carried = CarriedMass("z1", 1.0, np.array([0.3, 0.7, 9.0]))
     motion = carried_motion(elastic, carried)
     axes = list(elastic.body.axes)
@@ -73,7 +74,7 @@ def test_carried_mass_moves_with_the_body(elastic):
 
 
 def test_carried_mass_pulls_where_it_is(elastic):
-    """Its force has the moment of m Ω² d at its centre, d across the axis."""
+    """Check that its force has the moment of m Ω² d at its centre, d across the axis."""
     mass, centre = 1e-3, np.array([0.3, 0.7, 9.0])
     bare = spin_softening(elastic, SPEED)
     loaded = spin_softening(elastic, SPEED, [CarriedMass("z1", mass, centre)])

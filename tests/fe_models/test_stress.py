@@ -22,7 +22,7 @@ def state(cycle, increment):
 
 @pytest.fixture(scope="module")
 def peak(structure, solved, symmetric):
-    """Amplitudes, contact forces and stress fields at the peak of the symmetric mission."""
+    """Return amplitudes, contact forces and stress fields at the peak of the symmetric mission."""
     amplitudes = symmetric.amplitudes()[PEAK]
     force, relative = state(solved(0.4, symmetric), PEAK)
     return amplitudes, force, relative, stress_state(structure, force, relative, amplitudes)
@@ -36,7 +36,7 @@ def test_unloaded_joint_has_no_stress(structure):
 
 
 def test_contact_forces_are_recovered(structure, peak):
-    """K u - loads, from the displacements alone, is the contact force on the flanks of either body.
+    """Check that K u - loads is the contact force on the flanks of either body.
 
     It vanishes at every other node that is not supported.
     """
@@ -62,7 +62,7 @@ def test_contact_forces_are_recovered(structure, peak):
 
 
 def test_relative_displacements_are_those_given(structure, peak):
-    """Body 2 follows body 1 at the distance that the friction solver found."""
+    """Check that body 2 follows body 1 at the distance that the friction solver found."""
     _, _, relative, (disk, blade) = peak
     start = 0
     for face in structure.mesh.interfaces:
@@ -74,7 +74,7 @@ def test_relative_displacements_are_those_given(structure, peak):
 
 
 def test_supports_hold(structure, peak):
-    """The bore stays, the sides of the sector slide in their planes, the root stays on average."""
+    """Check the held bore, the sliding sides of the sector, and the mean of the root."""
     _, _, _, (disk, blade) = peak
     body = structure.bodies[0].elastic
     np.testing.assert_allclose(disk.displacement[body.boundary_nodes("inner")], 0.0, atol=1e-15)
@@ -99,7 +99,7 @@ def test_symmetric_load_gives_symmetric_stress(structure, peak):
 
 
 def test_shank_carries_the_pull(structure, peak):
-    """Virial of a body in equilibrium: ∫ σ = Σ r ⊗ f over the forces on it, for all components."""
+    """Check the virial of a body in equilibrium: ∫ σ = Σ r ⊗ f over the forces on it."""
     _, _, _, (_, blade) = peak
     elastic = structure.bodies[1].elastic
     stress = elastic.stress(blade.displacement.ravel())
@@ -112,7 +112,7 @@ def test_shank_carries_the_pull(structure, peak):
 
 
 def test_neck_stress_is_pull_over_area(structure, dovetail, peak):
-    """Mean of σ_zz over a slice of the shank far from fillet and top."""
+    """Check the mean of σ_zz over a slice of the shank far from fillet and top."""
     amplitudes, _, _, (_, blade) = peak
     elastic = structure.bodies[1].elastic
     mesh = elastic.body.mesh
@@ -131,7 +131,7 @@ def test_neck_stress_is_pull_over_area(structure, dovetail, peak):
 
 
 def test_faces_move_over_a_cycle_as_the_bodies_do(structure, solved, symmetric, peak):
-    """In every increment as far apart as given, and at peak load as all nodes of either body."""
+    """Check relative motions in every increment, and all nodes of both bodies at peak load."""
     fields = solved(0.4, symmetric).fields()
     force, relative = fields["force"], fields["displacement"]
     amplitudes, done = symmetric.amplitudes(), []
@@ -164,7 +164,7 @@ def test_faces_move_over_a_cycle_as_the_bodies_do(structure, solved, symmetric, 
 
 @pytest.mark.parametrize("kind", ["MeshTet", "MeshTri"])
 def test_stress_at_points_is_linear_and_turned(kind):
-    """Tension along global X that grows along it, in a frame turned by 45° about Y."""
+    """Check tension along global X that grows along it, in a frame turned by 45° about Y."""
     import skfem
 
     mesh = getattr(skfem, kind)().refined(2)
@@ -187,7 +187,7 @@ def test_stress_at_points_is_linear_and_turned(kind):
 
 
 def test_depth_of_elements_is_their_height_over_the_face(structure):
-    """Three times its volume by the area of its face, of a tetrahedron."""
+    """Check a tetrahedron: three times its volume over the area of its face."""
     body, name = structure.mesh.bodies[0], structure.mesh.interfaces[0].name
     areas = np.linalg.norm(body.outward(name), axis=1)
     cells = body.mesh.f2t[0, body.mesh.boundaries[name]]

@@ -1,4 +1,4 @@
-"""A joint split by a mirror must be the joint, and what has no mirror must not be split."""
+"""Joints split by a mirror equal the joint; joints without a mirror are not split."""
 
 from copy import copy
 from dataclasses import replace
@@ -20,7 +20,7 @@ from fe_models.solvers.symmetry import (
 
 @pytest.fixture(scope="module", params=[1, 2], ids=["first order", "second order"])
 def both(request, structure, dovetail, titanium, mission):
-    """The joint by halves, and of the whole bodies."""
+    """Return the joint by halves, and that of the whole bodies."""
     if request.param == 2:
         mesh = dovetail.mesh((10, 34), 10.0, dimension=2)
         structure = dovetail_structure(dovetail, mesh, titanium, titanium, mission, 2)
@@ -39,7 +39,7 @@ def test_split_joint_is_the_whole_one(both):
 
 
 def test_a_condensation_tells_its_steps(structure):
-    """By halves or whole: as many, evenly."""
+    """Check that the steps are as many, by halves or whole."""
     one_sided = copy(structure.bodies[0])
     one_sided.mirror = lambda axis: None
     for joined in (structure, replace(structure, bodies=(one_sided, structure.bodies[1]))):
@@ -66,7 +66,7 @@ def test_symmetric_products_are_products(order):
 
 
 def test_a_body_that_is_stiffer_on_one_side_is_not_split(structure):
-    """Nodes, supports and frames have a mirror, the stiffness has not."""
+    """Check a stiffness without the mirror of nodes, supports and frames."""
     body = structure.bodies[0]
     mirror = body.mirror(0)
     stiffness, _ = body._reduced()
@@ -76,7 +76,7 @@ def test_a_body_that_is_stiffer_on_one_side_is_not_split(structure):
 
 
 def test_halves_hold_every_quadratic_form():
-    """xᵀK y is the sum over both halves, also of unknowns that are their own image."""
+    """Check that xᵀK y is the sum over both halves, with unknowns that are their own image."""
     rng = np.random.default_rng(1)
     mirror = Mirror(np.array([1, 0, 2, 3, 5, 4]), np.array([1.0, 1.0, 1.0, -1.0, -1.0, -1.0]))
     root = rng.standard_normal((6, 6))

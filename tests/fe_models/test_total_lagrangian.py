@@ -19,7 +19,7 @@ ALONG, ACROSS = np.eye(3)[0], np.eye(3)[2]
 
 
 def beam(length, cells, order=2, poisson=0.0, young=1e5):
-    """A strip 1 mm high in the plane, from X = 0 to ``length``."""
+    """Return a strip 1 mm high in the plane, from X = 0 to ``length``."""
     mesh = MeshTri.init_tensor(np.linspace(0.0, length, cells + 1), np.linspace(-0.5, 0.5, 2))
     ends = {"root": lambda x: x[0] == 0.0, "tip": lambda x: np.isclose(x[0], length)}
     return ElasticBody(
@@ -34,7 +34,7 @@ def clamped(elastic):
 
 
 def tip(elastic, displacement):
-    """Mean displacement of the tip, ``(d,)``."""
+    """Return the mean displacement of the tip, ``(d,)``."""
     nodes, weights = elastic.boundary_weights("tip")
     return weights @ displacement.reshape(-1, elastic.dimension)[nodes] / weights.sum()
 
@@ -44,7 +44,7 @@ def solved(matrix, load, t):
 
 
 def equilibrium(finite, load, t, start):
-    """Newton's method for dead loads."""
+    """Solve for dead loads by Newton's method."""
     u = start.copy()
     for _ in range(30):
         step = solved(finite.tangent(u), load - finite.internal_force(u), t)
@@ -67,7 +67,7 @@ def disturbed(elastic, size=0.05):
 
 
 def in_axes(elastic, points):
-    """Displacements ``(size,)`` that bring the nodes to ``points`` ``(n, d)``."""
+    """Return displacements ``(size,)`` that bring the nodes to ``points`` ``(n, d)``."""
     return (points - elastic.nodes[:, elastic.body.axes]).ravel()
 
 
@@ -77,7 +77,7 @@ def turn(dimension):
 
 
 def test_undisplaced_tangent_is_the_linear_stiffness(elastic):
-    """An assembly of its own: by node pairs here, by scalar forms there."""
+    """Compare assembly by node pairs with assembly by scalar forms."""
     scale = np.abs(elastic.stiffness).max()
     finite = TotalLagrangian(elastic)
     assert np.abs(finite.tangent(np.zeros(elastic.size)) - elastic.stiffness).max() < 1e-13 * scale
@@ -93,7 +93,7 @@ def test_rotation_takes_no_force(elastic):
 
 
 def test_forces_turn_with_the_body(elastic):
-    """F(R x) = R F(x), and neither has a force or a moment left over on the displaced body."""
+    """Check F(R x) = R F(x), each in balance on the displaced body."""
     d, rotation = elastic.dimension, turn(elastic.dimension)
     u = disturbed(elastic)
     finite = TotalLagrangian(elastic)
@@ -108,7 +108,7 @@ def test_forces_turn_with_the_body(elastic):
 
 
 def test_tangent_is_the_derivative(elastic):
-    """The force is a cubic of the displacement: two central differences give it exactly."""
+    """Check by two central differences, exact since the force is cubic in the displacement."""
     u = disturbed(elastic)
     finite = TotalLagrangian(elastic)
     tangent = finite.tangent(u)
@@ -126,7 +126,7 @@ def test_tangent_is_the_derivative(elastic):
 
 @pytest.mark.parametrize("stretch", [0.7, 1.5])
 def test_uniaxial_stretch(box, stretch):
-    """Second Piola-Kirchhoff stress E (λ² - 1)/2 along the bar: a force λ times that, by area."""
+    """Check the second Piola-Kirchhoff stress E (λ² - 1)/2, and the force λ times that."""
     material = Material(1e5, 0.3)
     elastic = box((2, 2, 2), (0.0, 0.0, 0.0), (1.0, 2.0, 3.0), material, 1)
     strain = 0.5 * (stretch**2 - 1.0)
@@ -142,9 +142,10 @@ def test_uniaxial_stretch(box, stretch):
 
 
 def elastica(load):
-    """Tip of a cantilever under a dead force across it, ``(along, across)`` by its length.
+    """Return the tip of a cantilever under a dead force across it, ``(along, across)``.
 
-    ``load`` is F L²/EI; elliptic integrals after Bisshopp & Drucker 1945, doi:10.1090/qam/13360.
+    It is relative to the length. ``load`` is F L²/EI; elliptic integrals are as in Bisshopp &
+    Drucker 1945, doi:10.1090/qam/13360.
     """
     root = np.sqrt(load)
 
@@ -159,13 +160,13 @@ def elastica(load):
 
 
 def test_elastica_in_print():
-    """F L²/EI = 1 and 10 in the table of Mattiasson 1981, doi:10.1002/nme.1620170113."""
+    """Check F L²/EI = 1 and 10 in the table of Mattiasson 1981, doi:10.1002/nme.1620170113."""
     np.testing.assert_allclose(elastica(1.0), [-0.05643, 0.30172], atol=6e-6)
     np.testing.assert_allclose(elastica(10.0), [-0.55500, 0.81061], atol=6e-6)
 
 
 def bent(load, length):
-    """Tip of a cantilever of finite elements by its length, ``(along, across)``."""
+    """Return the tip of a finite element cantilever over its length, ``(along, across)``."""
     elastic = beam(length, int(0.8 * length))
     force = load * elastic.material.young / 12.0 / length**2
     full = elastic.traction_load("tip", lambda x: np.full_like(x[0], force), ACROSS)
@@ -177,14 +178,14 @@ def bent(load, length):
 
 @pytest.mark.parametrize("load", [1.0, 4.0])
 def test_cantilever_is_the_elastica(load):
-    """Shear and stretch, which the elastica leaves out, fall as (height/length)²."""
+    """Check that shear and stretch, not in the elastica, fall as (height/length)²."""
     short, long = bent(load, 25.0), bent(load, 50.0)
     np.testing.assert_allclose(long, elastica(load), atol=5e-4)
     np.testing.assert_allclose((4.0 * long - short) / 3.0, elastica(load), atol=3e-5)
 
 
 def test_small_loads_are_linear(box, titanium):
-    """What the linear model leaves out grows as the square of the load."""
+    """Check that the error of the linear model grows as the square of the load."""
     elastic = box((2, 2, 3), (0.0, 0.0, 0.0), (1.0, 1.0, 3.0), titanium, 1)
     held = Constraints(len(elastic.nodes))
     held.hold(elastic.boundary_nodes("z0"))
@@ -200,7 +201,7 @@ def test_small_loads_are_linear(box, titanium):
 
 
 def test_buckling_load_of_a_column():
-    """det(K + K_σ) = 0 at Euler's π² EI / 4 L², less what shear takes (Engesser)."""
+    """Check det(K + K_σ) = 0 at Euler's π² EI / 4 L², less the effect of shear (Engesser)."""
     length = 20.0
     elastic = beam(length, 20)
     t = clamped(elastic)
@@ -216,10 +217,10 @@ def test_buckling_load_of_a_column():
 
 
 def test_pulled_cantilever():
-    """Tip of a beam under tension T: w = F/T (L - tanh(kL)/k), k² = T/EI.
+    """Check the tip of a beam under tension T: w = F/T (L - tanh(kL)/k), k² = T/EI.
 
-    The linear stiffness knows nothing of T; the stressed one agrees with the nonlinear body up to
-    the stretch of the beam, here half a thousandth.
+    The linear stiffness does not depend on T; the stressed one agrees with the nonlinear body up to
+    the stretch of the beam, here 5e-4.
     """
     length, across = 40.0, 1e-3
     elastic = beam(length, 40)

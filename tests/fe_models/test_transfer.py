@@ -1,4 +1,4 @@
-"""Between face and grid: constants, integrals, adjointness, linear fields."""
+"""Transfer between face and grid: constants, integrals, adjointness, linear fields."""
 
 from dataclasses import replace
 
@@ -16,13 +16,13 @@ def on_grid(face, size, shape=(40, 96)):
 
 @pytest.fixture(scope="module", params=[0, 1], ids=["intrados", "extrados"])
 def covered(request, dovetail, coarse_mesh):
-    """A face that covers its grid."""
+    """Return a face that covers its grid."""
     return on_grid(coarse_mesh.interfaces[request.param], dovetail.flank_size())
 
 
 @pytest.fixture(scope="module")
 def skewed(dovetail):
-    """A parallelogram in a rectangular grid."""
+    """Return a parallelogram in a rectangular grid."""
     turned = replace(dovetail, skew=np.deg2rad(15.0))
     return on_grid(turned.mesh((8, 10), 8.0).interfaces[0], turned.flank_size())
 
@@ -53,7 +53,7 @@ def test_shared_areas_are_those_of_nodes_and_cells(case):
 
 
 def test_integrals_are_kept(covered):
-    """Force of a pressure, and volume of a depth."""
+    """Check the force of a pressure, and the volume of a depth."""
     face, grid, transfer = covered
     rng = np.random.default_rng(0)
     pressure, depth = rng.random(len(face)), rng.random(grid.shape)
@@ -64,7 +64,7 @@ def test_integrals_are_kept(covered):
 
 
 def test_transfers_are_adjoint(case):
-    """∫ (nodes → cells) of one field times the other is that of the way back."""
+    """Check that ∫ (nodes → cells) of one field times the other is that of the way back."""
     face, grid, transfer = case
     rng = np.random.default_rng(1)
     nodal, cells = rng.random(len(face)), rng.random(grid.shape)
@@ -76,7 +76,7 @@ def test_transfers_are_adjoint(case):
 
 
 def test_linear_field_on_cells(covered):
-    """A linear field on the nodes is linear between them, and so are its means over cells."""
+    """Check that a linear field is linear between nodes, and so are its means over cells."""
     face, grid, transfer = covered
     x, y = face.coordinates.T
     np.testing.assert_allclose(
@@ -88,7 +88,7 @@ def test_linear_field_on_cells(covered):
 
 
 def test_linear_field_on_nodes(covered):
-    """Inside, the mean over a node's symmetric surroundings is the value there.
+    """Check that the mean over a node's symmetric surroundings is the value there.
 
     At the rim they lie on one side: the mean is that of a point 3/8 of an element further in.
     """
@@ -105,7 +105,7 @@ def test_linear_field_on_nodes(covered):
 
 
 def test_resultants_survive(covered, solved, mission):
-    """Forces to rounding, moments to what lumping at the nodes leaves of their arm."""
+    """Check forces to rounding, and moments up to the error of lumping at the nodes."""
     face, grid, transfer = covered
     history = next(h for h in solved(0.4, mission).histories if h.interface.name == face.name)
     tractions = history.force[7] / face.nodal_areas
@@ -114,7 +114,7 @@ def test_resultants_survive(covered, solved, mission):
     loads = history.loads
     expected = [getattr(loads, name)[7] for name in ("P", "Qx", "Qy", "Mx", "My", "Mz")]
     np.testing.assert_allclose(on_cells[:3], expected[:3], atol=1e-10 * loads.P[7])
-    # Nodal forces act at the nodes, the linear field between them: 1 % of an element as arm.
+    # Nodal forces act at the nodes, the linear field between them: an arm of 1 % of an element.
     element = 60.0 / 9.0
     np.testing.assert_allclose(on_cells[3:], expected[3:], atol=1e-2 * loads.P[7] * element)
 

@@ -2,8 +2,8 @@
 
 With tractions of the exact solution on the boundary, L2 errors of linear elements fall as h² in
 displacement and h in stress, those of quadratic ones as h³ and h². Straight sides of elements on a
-curved boundary leave h² in displacement; their stress errors are of order h in a layer as thin as
-an element, so h^1.5 in energy.
+curved boundary cause an error of h² in displacement; their stress errors are of order h in a layer
+as thin as an element, so h^1.5 in energy.
 """
 
 from dataclasses import dataclass
@@ -35,14 +35,17 @@ AXES = np.eye(3)
 OUTWARD = {
     f"{name}{end}": (2 * end - 1) * AXES["xyz".index(name)] for name in "xyz" for end in (0, 1)
 }
-# Exact for the errors of quadratic elements against solutions as smooth as these.
+# Quadrature degree that is exact for errors of quadratic elements with such smooth solutions.
 INTEGRATION_ORDER = 6
-# What two meshes of a ladder may miss of a rate.
+# Tolerance of a rate between two meshes.
 SLACK = 0.15
 
 
 def tensor_mesh(steps, dimension):
-    """A box of cells: ``steps`` along X, Y (one cell, in space alone) and Z, faces by name."""
+    """Return a box of cells with named faces.
+
+    ``steps`` are along X, Y (one cell, in space only) and Z.
+    """
     axis_steps = steps if dimension == 3 else [steps[0], steps[2]]
     names = "xyz" if dimension == 3 else "xz"
     faces = {
@@ -55,12 +58,12 @@ def tensor_mesh(steps, dimension):
 
 
 def moved(mesh, points):
-    """The mesh with its vertices elsewhere and its boundaries' names."""
+    """Return the mesh with moved vertices and the same boundary names."""
     return type(mesh)(points, mesh.t).with_boundaries(mesh.boundaries)
 
 
 def irregular(dimension):
-    """A unit box whose inner vertices are moved about."""
+    """Return a unit box whose inner vertices are moved."""
     mesh = tensor_mesh([np.linspace(0.0, 1.0, 4)] * 3, dimension)
     points = mesh.p.copy()
     inner = np.setdiff1d(np.arange(mesh.nvertices), mesh.boundary_nodes())
@@ -74,7 +77,10 @@ def solved(elastic, constraints, load):
 
 
 def traction_forces(elastic, stress, normals):
-    """Forces of the tractions σ·n; ``stress`` gives ``(3, 3, ...)`` at points, by name a normal."""
+    """Return the forces of tractions σ·n on ``normals``, given by boundary name.
+
+    ``stress`` gives ``(3, 3, ...)`` at points.
+    """
     load = np.zeros(elastic.size)
     for name, normal in normals.items():
         for row in elastic.body.axes:
@@ -85,7 +91,7 @@ def traction_forces(elastic, stress, normals):
 
 
 def rigid_motions(points, dimension):
-    """Displacements ``(motions, 3, ...)`` at points ``(3, ...)``: in the plane, those along it."""
+    """Return rigid displacements ``(motions, 3, ...)`` at points; in the plane only in it."""
     shifts = np.broadcast_to(AXES.reshape(3, 3, *[1] * (points.ndim - 1)), (3, *points.shape))
     turns = np.stack([np.cross(axis, points, axis=0, axisb=0, axisc=0) for axis in AXES])
     kept = ([0, 1, 2], [0, 1, 2]) if dimension == 3 else ([0, 2], [1])
@@ -93,9 +99,9 @@ def rigid_motions(points, dimension):
 
 
 def held_still(elastic, face, floats=False):
-    """Three corners of a face held across it, two along it, one along it: no load is taken.
+    """Hold three corners of a face across it, two along it, one along it: no load is taken.
 
-    ``floats``: those along it alone. In the plane it is two corners across and one along.
+    ``floats`` holds them along it only. In the plane it is two corners across and one along.
     """
     axes = list(elastic.body.axes)
     normal = "xyz".index(face[0])
@@ -121,7 +127,7 @@ def strain_of(stress, material):
 
 @dataclass(frozen=True)
 class Errors:
-    """Of displacements, in L2; in energy; and of the element means of stress, in L2: relative."""
+    """Relative errors of displacements in L2, in energy, and of element mean stresses in L2."""
 
     displacement: float
     energy: float
@@ -129,9 +135,9 @@ class Errors:
 
 
 def errors(elastic, u, displacement, stress, free=False):
-    """Errors of displacements ``(size,)`` against exact ones and their stress, at points in space.
+    """Return errors of displacements ``(size,)`` against exact ones and their stress.
 
-    ``free``: but for rigid motions.
+    Exact values are given at points in space. If ``free``, rigid motions are ignored.
     """
     dimension, axes = elastic.dimension, list(elastic.body.axes)
     basis = Basis(
@@ -168,7 +174,7 @@ def energy(strain, dx, elastic):
 
 
 def without_rigid_motion(field, points, dx, dimension):
-    """A field less the rigid motion next to it in L2."""
+    """Return a field less the rigid motion closest to it in L2."""
     motions = rigid_motions(points, dimension)
     gram = np.einsum("iaeq,jaeq,eq->ij", motions, motions, dx)
     share = np.linalg.solve(gram, np.einsum("iaeq,aeq,eq->i", motions, field, dx))
@@ -176,7 +182,7 @@ def without_rigid_motion(field, points, dx, dimension):
 
 
 def rates(coarse, fine):
-    """Rates of the three errors between meshes of which one is twice as fine."""
+    """Return the rates of the three errors between meshes with a ratio of two."""
     return np.log2([getattr(coarse, n) / getattr(fine, n) for n in Errors.__annotations__])
 
 
@@ -204,13 +210,13 @@ def test_rigid_motions_are_all_that_takes_no_force(dimension, order):
 )
 @pytest.mark.parametrize("order", ORDERS)
 def test_constant_stress_by_tractions(dimension, order, component):
-    """Each unit stress on the faces of an irregular mesh goes through it unchanged."""
+    """Check that each unit stress on the faces of an irregular mesh is reproduced."""
     row, column = ("xyz".index(letter) for letter in component)
     elastic = ElasticBody(Body("box", irregular(dimension)), MATERIAL, order)
     unit = np.zeros((3, 3))
     unit[row, column] = unit[column, row] = 1.0
     if dimension == 2:
-        # Plane strain: what keeps the sides in place.
+        # In plane strain these forces keep the sides in place.
         unit[1, 1] = MATERIAL.poisson * np.trace(unit)
 
     def constant(x):
@@ -230,7 +236,7 @@ def test_constant_stress_by_tractions(dimension, order, component):
 @pytest.mark.parametrize("dimension", DIMENSIONS)
 @pytest.mark.parametrize("order", ORDERS)
 def test_constant_stress_crosses_a_stuck_contact(monkeypatch, dimension, order):
-    """Pressed and sheared below Coulomb's limit: a block that nothing but contact holds."""
+    """Check a block held by contact only, pressed and sheared below Coulomb's limit."""
     monkeypatch.setattr(friction, "TOLERANCE", 1e-13)
     tensor = np.array([[0.3, 0.0, 0.2], [0.0, 0.0, 0.1], [0.2, 0.1, -1.0]])
     if dimension == 2:
@@ -270,10 +276,10 @@ def test_constant_stress_crosses_a_stuck_contact(monkeypatch, dimension, order):
 
 
 class Cantilever:
-    """Plane strain, along X to ``LENGTH``, ``2 HALF`` high; sheared at its free end X = 0.
+    """Cantilever in plane strain, along X to ``LENGTH``, ``2 HALF`` high, sheared at X = 0.
 
-    Timoshenko & Goodier 1970, *Theory of Elasticity*, art. 21, with E/(1 - ν²) and ν/(1 - ν) for
-    E and ν; the tractions on both ends are those of the exact solution.
+    Timoshenko & Goodier 1970, *Theory of Elasticity*, art. 21, with E/(1 - ν²) and ν/(1 - ν) for E
+    and ν; the tractions on both ends are those of the exact solution.
     """
 
     LENGTH, HALF, FORCE = 4.0, 0.5, 1.0
@@ -290,7 +296,7 @@ class Cantilever:
 
     @classmethod
     def displacement(cls, x):
-        """Without its rigid motion."""
+        """Return the displacement without its rigid motion."""
         nu = MATERIAL.poisson / (1.0 - MATERIAL.poisson)
         bending = MATERIAL.young / (1.0 - MATERIAL.poisson**2) * 2.0 * cls.HALF**3 / 3.0
         shearing = MATERIAL.shear_modulus * 2.0 * cls.HALF**3 / 3.0
@@ -312,7 +318,7 @@ class Cantilever:
 
     @classmethod
     def errors(cls, dimension, order, cells):
-        """With ``cells`` over the height."""
+        """Return the errors with ``cells`` over the height."""
         steps = [
             np.linspace(0.0, cls.LENGTH, 4 * cells + 1),
             np.array([0.0, cls.THICKNESS]),
@@ -334,7 +340,7 @@ class Cantilever:
 
 
 def plane_strain(elastic):
-    """In space: sides y0 and y1 that slide."""
+    """Hold sides y0 and y1 across Y in space, where they slide."""
     constraints = Constraints(len(elastic.nodes), elastic.dimension)
     if elastic.dimension == 3:
         for side in ("y0", "y1"):
@@ -346,7 +352,7 @@ def plane_strain(elastic):
 
 
 class Cylinder:
-    """A quarter of a thick cylinder under ``PRESSURE`` inside, in plane strain (Lamé)."""
+    """Quarter of a thick cylinder under internal ``PRESSURE``, in plane strain (Lamé)."""
 
     INNER, OUTER, PRESSURE, THICKNESS = 1.0, 2.0, 1.0, 0.25
     # Size of the stresses, p ri² / (ro² - ri²).
@@ -374,7 +380,7 @@ class Cylinder:
 
     @classmethod
     def errors(cls, dimension, order, cells):
-        """With ``cells`` through the wall and half as many again round the quarter."""
+        """Return the errors with ``cells`` through the wall and half as many again around."""
         angles = np.linspace(0.0, 0.5 * np.pi, 3 * cells // 2 + 1)
         steps = [
             np.linspace(cls.INNER, cls.OUTER, cells + 1),
@@ -420,7 +426,7 @@ def test_convergence(case, expected, dimension, order):
 @pytest.mark.parametrize(("case", "expected"), CASES)
 @pytest.mark.parametrize("order", ORDERS)
 def test_convergence_goes_on(case, expected, order):
-    """In the plane, eight times as fine; and no faster than it should where the rate is sharp."""
+    """Check meshes eight times as fine in the plane, and that sharp rates are not exceeded."""
     coarse, fine = (case.errors(2, order, 8 * cells) for cells in CELLS[order])
     measured = rates(coarse, fine)
     assert np.all(measured > np.array(expected[order]) - 0.05)

@@ -390,7 +390,7 @@ def test_a_nastran_deck_becomes_a_case(tmp_path):
         (("FORCE,3,14,,2.", "FORCE,3,14,,3."), "forces of force_3 that differ: their sum"),
         (("GRID,14,,1.,0.,2.", "GRID,14,,1.,0.,2.,6"), "another coordinate system"),
         (("BCTSET,4,2,1", "BCTSET,4,2,9"), "no contact surface 9: allowed: BSURFS, BSURF"),
-        (("MAT1,8,,26316.", "MAT1,8,,x"), "'x' is no number"),
+        (("MAT1,8,,26316.", "MAT1,8,,x"), "'x' is not a number"),
         (("FORCE,3,13", "FORCE,6,13"), "load sets 3, 6: all are taken, together"),
     ],
 )

@@ -372,7 +372,7 @@ def test_files_that_are_none_end_in_one_line(two):
     assert "/K: a link to another file" in told(two, "structure.matrices.file=out.h5")
     (two / "k.mtx").write_text("1,1, 1,1, 3.0\n1,1, 2,x, 4.0\n", encoding="utf-8")
     line = told(two, "structure.matrices.stiffness=k.mtx")
-    assert f"{two / 'k.mtx'}:2: 'x' is no number" in line
+    assert f"{two / 'k.mtx'}:2: 'x' is not a number" in line
 
 
 def test_a_file_that_changes_is_read_again(two):

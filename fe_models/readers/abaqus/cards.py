@@ -1,4 +1,4 @@
-"""Keywords of an Abaqus input file with their parameters and data lines, and where they stand."""
+"""Keywords of an Abaqus input file with their parameters, data lines and places in the file."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from fe_models.readers.text_files import open_text
 
 
 class SourceLine(NamedTuple):
-    """A line of a file, for messages; 0 of files without lines."""
+    """Line of a file, for messages; the number is 0 for files without lines."""
 
     path: Path
     line: int
@@ -23,12 +23,12 @@ class SourceLine(NamedTuple):
 
     @property
     def short(self) -> str:
-        """With the name of the file alone."""
+        """Place with the name of the file instead of its path."""
         return f"{self.path.name}:{self.line}"
 
 
 class DataLine(NamedTuple):
-    """A data line: its fields without blanks, and where it stands."""
+    """Data line: its place in the file and its fields without blanks."""
 
     place: SourceLine
     fields: list[str]
@@ -36,7 +36,7 @@ class DataLine(NamedTuple):
 
 @dataclass
 class Card:
-    """A keyword, upper case and without blanks, and what belongs to it."""
+    """Keyword, in upper case and without blanks, with its parameters and data lines."""
 
     place: SourceLine
     keyword: str
@@ -44,14 +44,14 @@ class Card:
     rows: list[DataLine] = field(default_factory=list)
 
     def name(self, parameter: str) -> str:
-        """The value of a parameter that has to be there."""
+        """Return the value of a required parameter. Raises :class:`MeshError` if it is missing."""
         if not self.parameters.get(parameter):
             raise MeshError(f"{self.place}: *{self.keyword} needs {parameter.lower()}=name")
         return self.parameters[parameter]
 
 
 def cards(path: Path) -> Iterator[Card]:
-    """Keywords of a file in their order; ``*Include`` is followed, comments are skipped.
+    """Yield the keywords of a file in their order; ``*Include`` is followed, comments are skipped.
 
     Raises :class:`MeshError` if data come before any keyword or an included file is missing.
     """
@@ -60,14 +60,14 @@ def cards(path: Path) -> Iterator[Card]:
     for place, text in _lines(path, ()):
         if unfinished or text.startswith("*"):
             unfinished += text
-            if text.endswith(","):  # goes on in the next line
+            if text.endswith(","):  # It continues in the next line.
                 continue
             if card is not None:
                 yield card
             card = _card(place, unfinished)
             unfinished = ""
         elif card is None:
-            raise MeshError(f"{place}: is no Abaqus input; allowed: keywords that begin with *")
+            raise MeshError(f"{place}: is not Abaqus input; allowed: keywords that begin with *")
         else:
             card.rows.append(
                 DataLine(place, [part.strip() for part in text.rstrip(",").split(",")])
@@ -78,23 +78,23 @@ def cards(path: Path) -> Iterator[Card]:
 
 
 def integer(place: SourceLine, text: str) -> int:
-    """A number of a node or an element."""
+    """Return the number of a node or an element. Raises :class:`MeshError`."""
     try:
         return int(text)
     except ValueError:
-        raise MeshError(f"{place}: {text!r} is no whole number") from None
+        raise MeshError(f"{place}: {text!r} is not a whole number") from None
 
 
 def real(place: SourceLine, text: str) -> float:
-    """A coordinate or an angle; an empty field is 0, as in Abaqus."""
+    """Return a coordinate or an angle; an empty field is 0, as in Abaqus."""
     try:
         return float(text.upper().replace("D", "E")) if text else 0.0
     except ValueError:
-        raise MeshError(f"{place}: {text!r} is no number") from None
+        raise MeshError(f"{place}: {text!r} is not a number") from None
 
 
 def _lines(path: Path, including: tuple[Path, ...]) -> Iterator[tuple[SourceLine, str]]:
-    """Lines that are neither blank nor comments, those of included files in their place."""
+    """Yield lines that are neither blank nor comments, with included files inserted."""
     # Comments may be in any encoding.
     with open_text(path) as file:
         for number, line in enumerate(file, start=1):
@@ -115,7 +115,7 @@ def _lines(path: Path, including: tuple[Path, ...]) -> Iterator[tuple[SourceLine
 
 
 def _card(place: SourceLine, text: str) -> Card:
-    """A keyword line; values in quotes may hold commas and blanks."""
+    """Return the card of a keyword line; values in quotes may contain commas and blanks."""
     keyword, *parts = re.findall(r'(?:"[^"]*"|[^,"])+', text)
     parameters = {}
     for part in parts:

@@ -1,6 +1,6 @@
-"""Elements of Abaqus input files: those that are read, and why others are refused, by family.
+"""Elements of Abaqus input files that are read, and advice on the families that are refused.
 
-Names of types as in the Abaqus Elements Guide, which CalculiX follows.
+Names of types are as in the Abaqus Elements Guide, which CalculiX follows.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ PLANES = {3: "triangle", 6: "triangle", 4: "quad", 8: "quad"}
 # Letters after the number (reduced integration, hybrid, modified, ...) do not change the mesh.
 SOLID_TYPE, PLANE_TYPE = re.compile(r"C3D(\d+)[HIMPRST]*"), re.compile(r"CP[ES](\d+)[HIMPRT]*")
 PLANE_STRESS = re.compile(r"CPS\d+.*")
-# What gmsh, meshio and FreeCAD write for edges and facets: neither is a body.
+# Types that gmsh, meshio and FreeCAD write for edges and facets, which are not bodies.
 FACET_TYPES = {
     "B21": (2, "line"), "B22": (3, "line"), "B31": (2, "line"), "B32": (3, "line"),
     "T2D2": (2, "line"), "T2D3": (3, "line"), "T3D2": (2, "line"), "T3D3": (3, "line"),
@@ -31,7 +31,7 @@ ALLOWED_TYPES = (
 )
 
 SOLIDS_FOR_IT = "mesh its volume with solid elements (C3D8, C3D10, ...)"
-# Types that begin like this are of a family, for which there is something else to do.
+# Families of types that are refused: pattern of the type, description and remedy.
 FAMILIES = (
     (r"SC[68]", "a continuum shell", "write it as C3D8, several across its thickness"),
     (r"(SAX|MAX|RAX|CAX|CGAX|DCAX|ASI2DAX)\w*",
@@ -60,19 +60,22 @@ FAMILIES = (
 
 
 def element_type(card: Card) -> tuple[int, str]:
-    """Number of nodes and shape of the elements of a keyword; raises :class:`MeshError`."""
+    """Return the number of nodes and the shape of the elements of a keyword.
+
+    Raises :class:`MeshError` for a type that is not read.
+    """
     kind = card.name("TYPE").upper()
     for pattern, shapes in ((SOLID_TYPE, SOLIDS), (PLANE_TYPE, PLANES)):
         if (match := pattern.fullmatch(kind)) and int(match[1]) in shapes:
             return int(match[1]), shapes[int(match[1])]
     if kind not in FACET_TYPES:
-        told = f" is {advice(kind)}" if advice(kind) else f"; allowed: {ALLOWED_TYPES}"
-        raise MeshError(f"{card.place}: element type {kind}{told}")
+        why = f" is {advice(kind)}" if advice(kind) else f"; allowed: {ALLOWED_TYPES}"
+        raise MeshError(f"{card.place}: element type {kind}{why}")
     return FACET_TYPES[kind]
 
 
 def advice(kind: str) -> str:
-    """What family a type that is not read is of, and what to do; empty if it is of none known."""
+    """Return the family of a type that is not read and what to do; empty if it is unknown."""
     for pattern, family, remedy in FAMILIES:
         if re.fullmatch(rf"{pattern}[A-Z]*", kind):
             return f"{family}: {remedy}"

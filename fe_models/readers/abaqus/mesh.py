@@ -1,7 +1,8 @@
 """Meshes in Abaqus input files: flat ones, and ones of parts, instances and an assembly.
 
-Keywords as in the Abaqus Keywords Reference Guide. What belongs to no mesh (materials, steps) is
-skipped; what changes the mesh or ties bodies together and is not carried over is refused.
+Keywords are as in the Abaqus Keywords Reference Guide. Keywords that do not belong to the mesh
+(materials, steps) are skipped; those that change the mesh or tie bodies together are refused,
+because they are not imported.
 """
 
 from __future__ import annotations
@@ -24,11 +25,11 @@ def read_abaqus(path: Path) -> GroupedMesh:
 
     Each instance is a body of that name with its part's node numbers. Element surfaces are
     boundaries; node sets and node surfaces are node sets. Those of a part keep their name, or are
-    ``Instance.name`` if another instance or the assembly has it too.
+    named ``Instance.name`` if another instance or the assembly has the name, too.
 
-    In a flat file each connected piece is a body by the name of the element set of just its
-    elements, or else ``body_1``, ...; element sets of facets (triangles beside tetrahedra, as gmsh
-    writes them) are boundaries too, those of edges beside solids node sets.
+    In a flat file each connected piece is a body with the name of the element set that is exactly
+    its elements, or else ``body_1``, .... Element sets of facets (triangles on tetrahedra, as gmsh
+    writes them) are boundaries too, and those of edges of solids are node sets.
 
     Raises :class:`MeshError` with file and line.
     """
@@ -52,7 +53,7 @@ def read_abaqus(path: Path) -> GroupedMesh:
 
 
 def _plane_stress(scopes: list[Scope]) -> list[str]:
-    """A line if bodies are of plane stress, which are computed in plane strain."""
+    """Return a line if bodies are of plane stress, which are computed in plane strain."""
     for scope in scopes:
         for element in scope.elements.values():
             if PLANE_STRESS.fullmatch(element.kind) and dimension_of(scope) == 2:
@@ -64,12 +65,12 @@ def _plane_stress(scopes: list[Scope]) -> list[str]:
 
 
 def _stiff_edges(model: Model) -> list[str]:
-    """A line for each type of beams on edges of solids, and of trusses that have a section.
+    """Return a line for each type of beams on edges of solids, and of trusses with a section.
 
-    Those without one are what gmsh writes for edges.
+    Trusses without a section are what gmsh writes for edges.
     """
     sets = model.flat.element_sets
-    sections = [card.parameters.get("ELSET", "") for _, card in model.said
+    sections = [card.parameters.get("ELSET", "") for _, card in model.case_cards
                 if card.keyword == "SOLIDSECTION"]  # fmt: skip
     stiff = {n for name in sections if name in sets for n in sets[name].get("", ())}
     first = {
@@ -83,17 +84,17 @@ def _stiff_edges(model: Model) -> list[str]:
 
 
 def _check_assembly(path: Path, model: Model) -> None:
-    """All elements are those of instances."""
+    """Raise unless all elements are those of instances."""
     if model.assembly.elements:
         place = next(iter(model.assembly.elements.values())).place
         raise MeshError(f"{place}: an element of the assembly; allowed: elements of parts")
     if not model.flat.is_empty():
         raise MeshError(
             f"{path}: has nodes, sets or surfaces outside of its parts and its assembly; allowed: "
-            "inside of either"
+            "inside either of them"
         )
     if not model.instances:
-        raise MeshError(f"{path}: has parts but no *Instance of any")
+        raise MeshError(f"{path}: has parts but no *Instance of any part; add one")
     for name, scope in model.instances.items():
         if not scope.elements:
             raise MeshError(f"{scope.place}: instance {name} has no elements")

@@ -32,9 +32,9 @@ REFUSED = (
     | {"DISPLAYBODY": "it is shown and no body that is computed; leave its instance out"}
 )  # fmt: skip
 
-# Keywords that other ones stand below.
+# Keywords that are the context of others.
 CONTEXT = frozenset(["MATERIAL", "SOLIDSECTION", "SURFACEINTERACTION", "STEP"])
-# Keywords that say what a case says: they are not taken over.
+# Keywords that describe what a case has to describe: they are not imported with the mesh.
 LEFT = frozenset(
     ["BOUNDARY", "CLOAD", "DLOAD", "DSLOAD", "TEMPERATURE", "CONTACTPAIR", "CONTACT", "CLEARANCE",
      "CONTACTINTERFERENCE", "CONTACTINCLUSIONS", "CONTACTPROPERTYASSIGNMENT", "FRICTION",
@@ -45,7 +45,7 @@ LEFT = frozenset(
 
 
 class Model:
-    """What has been read so far: a flat file, or parts, their instances and the assembly."""
+    """Content of an input file read so far: a flat file, or parts, instances and the assembly."""
 
     def __init__(self, path: Path) -> None:
         self.flat = Scope("", SourceLine(path, 1))
@@ -53,8 +53,8 @@ class Model:
         self.parts: Names[Scope] = Names()
         self.instances: Names[Scope] = Names()
         self.left: list[str] = []
-        # What a case says, with the scope it stands in, and the part of each instance.
-        self.said: list[tuple[Scope, Card]] = []
+        # Keywords that a case has to describe, with their scope, and the part of each instance.
+        self.case_cards: list[tuple[Scope, Card]] = []
         self.part_of: dict[str, str] = {}
         self._scope = self.flat
         self._handlers: dict[str, Callable[[Card], None]] = {
@@ -72,15 +72,15 @@ class Model:
         }
 
     def read(self, card: Card) -> None:
-        """Take in a keyword; raises :class:`MeshError` if it is not supported."""
+        """Read a keyword; raises :class:`MeshError` if it is not supported."""
         if card.keyword in REFUSED:
             raise MeshError(
                 f"{card.place}: *{card.keyword} is not supported: {REFUSED[card.keyword]}"
             )
         if card.keyword in LEFT:
-            self.left.append(told(card))
+            self.left.append(summary_line(card))
         if card.keyword in LEFT | CONTEXT:
-            self.said.append((self._scope, card))
+            self.case_cards.append((self._scope, card))
         if card.keyword in self._handlers:
             self._handlers[card.keyword](card)
 
@@ -106,7 +106,7 @@ class Model:
         if name in self.instances:
             raise MeshError(f"{card.place}: instance {name} is defined twice")
         self.part_of[name] = self.parts[part].name
-        # What follows up to *End Instance belongs to it: CAE writes independent instances so.
+        # Keywords up to *End Instance belong to it: CAE writes independent instances this way.
         self._scope = self.instances.add(
             name, self.parts[part].instance(name, card.place, _placing(card.rows))
         )
@@ -132,10 +132,10 @@ class Model:
         scope = self._scope
         count, shape = element_type(card)
         corners, kind = CORNERS[shape], card.name("TYPE").upper()
-        told = advice(kind)
+        remedy = advice(kind)
         numbers: list[int | range] = []
         for place, (number, *nodes) in _element_rows(card, count):
-            if (shape, count) == ("line", 3):  # the middle one stands between the ends
+            if (shape, count) == ("line", 3):  # The middle node is listed between the ends.
                 nodes = [nodes[0], nodes[2], nodes[1]]
             if number in scope.elements:
                 raise MeshError(f"{place}: element {number} is defined twice")
@@ -146,7 +146,7 @@ class Model:
                 place=place,
                 kind=kind,
                 stands_alone=kind not in FACET_TYPES,
-                advice=told,
+                advice=remedy,
             )
             numbers.append(number)
         if name := card.parameters.get("ELSET"):
@@ -162,8 +162,8 @@ class Model:
             for instance, chosen in elements.items():
                 known = (self.instances[instance] if instance else self._scope).elements
                 numbers = existing(chosen, known, f"{card.place}: element set {source}")
-                every = (known[n].nodes + known[n].midsides for n in numbers)
-                extend(members, {instance: [node for nodes in every for node in nodes]})
+                node_lists = (known[n].nodes + known[n].midsides for n in numbers)
+                extend(members, {instance: [node for nodes in node_lists for node in nodes]})
         extend(self._scope.node_sets.add(name, {}), members)
 
     def _element_set(self, card: Card) -> None:
@@ -184,7 +184,7 @@ class Model:
         self._scope.surfaces.add(name, card)
 
     def _members(self, card: Card, kind: str) -> Members:
-        """What the data lines of a set name."""
+        """Return the members that the data lines of a set name."""
         members: Members = {}
         scope, owner = self._scope, ""
         if instance := card.parameters.get("INSTANCE", ""):
@@ -205,8 +205,8 @@ class Model:
         return members
 
 
-def told(card: Card) -> str:
-    """A keyword in a line: where it stands, its parameters and its first data."""
+def summary_line(card: Card) -> str:
+    """Return a keyword in one line: its place, its parameters and its first data."""
     given = card.parameters.items()
     parameters = [f"{key.lower()}={value}" if value else key.lower() for key, value in given]
     data = [", ".join(row.fields) for row in card.rows[:1]] + ["..."] * (len(card.rows) > 1)
@@ -215,7 +215,7 @@ def told(card: Card) -> str:
 
 
 def _range(place: SourceLine, fields: list[str]) -> range:
-    """First and last number, and step."""
+    """Return the range from the first and last number and the step."""
     numbers = [integer(place, text) for text in fields if text]
     if len(numbers) not in (2, 3) or numbers[2:] == [0]:
         raise MeshError(f"{place}: allowed: first number, last number, step")
@@ -232,7 +232,7 @@ def _refuse(card: Card, parameter: str) -> None:
 
 
 def _element_rows(card: Card, count: int) -> Iterator[tuple[SourceLine, list[int]]]:
-    """Number and nodes of each element, which may go over several lines."""
+    """Yield the number and nodes of each element, which may extend over several lines."""
     values: list[int] = []
     for place, fields in card.rows:
         values += [integer(place, text) for text in fields]
@@ -248,17 +248,17 @@ def _element_rows(card: Card, count: int) -> Iterator[tuple[SourceLine, list[int
 
 
 def _placing(rows: list[DataLine]) -> Callable[[Array], Array]:
-    """Where an instance has its points: translated, then turned about an axis by an angle [°].
+    """Return the function that moves points to their positions in an instance.
 
-    Two points on the axis are given.
+    Points are translated, then rotated about an axis, given by two points, by an angle [°].
     """
     if not rows:
         return lambda points: points
     values = [[real(row.place, text) for text in row.fields] for row in rows]
     if [len(line) for line in values] not in ([2], [3], [2, 7], [3, 7]):
         raise MeshError(
-            f"{rows[0].place}: allowed: a line of 3 numbers that move the instance and one of 7 "
-            "that turn it"
+            f"{rows[0].place}: allowed: a line of 3 numbers that translate the instance and one of "
+            "7 that rotate it"
         )
     translation = np.array([*values[0], 0.0][:3])
     if len(values) == 1:
@@ -266,6 +266,8 @@ def _placing(rows: list[DataLine]) -> Callable[[Array], Array]:
     start, end, angle = np.array(values[1][:3]), np.array(values[1][3:6]), values[1][6]
     length = np.linalg.norm(end - start)
     if length == 0.0:
-        raise MeshError(f"{rows[1].place}: the axis of rotation has no length")
+        raise MeshError(
+            f"{rows[1].place}: the axis of rotation has no length; give two different points"
+        )
     turn = Rotation.from_rotvec(angle * (end - start) / length, degrees=True)
     return lambda points: turn.apply(points + translation - start) + start

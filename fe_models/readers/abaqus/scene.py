@@ -1,7 +1,7 @@
 """Materials, contacts, supports and loads of an Abaqus input file, step by step.
 
-Keywords as in the Abaqus Keywords Reference Guide. What is not understood is ignored with its line
-and why; nothing of it changes the mesh.
+Keywords are as in the Abaqus Keywords Reference Guide. Lines that are not understood are ignored,
+with the line and the reason; none of them changes the mesh.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import numpy as np
 
 from fe_models.meshes.structure_mesh import MeshError
 from fe_models.readers.abaqus.cards import Card, DataLine, real
-from fe_models.readers.abaqus.model import Model, told
+from fe_models.readers.abaqus.model import Model, summary_line
 from fe_models.readers.flattened import Flattened
 from fe_models.readers.grouped import GroupedMesh
 from fe_models.readers.scene import (
@@ -30,33 +30,34 @@ from fe_models.readers.scope import Scope, existing
 
 AXES = "xyz"
 UNITS: dict[str, Vector] = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
-# Displacements that a named boundary condition holds, of those that solids have.
+# Displacements of solids that a named boundary condition holds.
 NAMED = {
     "ENCASTRE": "xyz", "PINNED": "xyz", "XSYMM": "x", "YSYMM": "y", "ZSYMM": "z", "XASYMM": "yz",
     "YASYMM": "xz", "ZASYMM": "xy",
 }  # fmt: skip
-# Kinds of loads that a step may end with op=new, by keyword.
+# Kinds of loads that op=new ends, by keyword.
 KINDS = {
     "CLOAD": ("force",), "DSLOAD": ("pressure", "traction"), "DLOAD": ("acceleration", "rotation"),
     "BOUNDARY": ("displacement",),
 }  # fmt: skip
-# Parameters of supports and loads whose data lines mean something else.
+# Parameters that change the meaning of the data lines of supports and loads, with the reason for
+# which they are ignored.
 OTHERWISE = {
     "ORIENTATION": "along the axes of an orientation", "FIXED": "held where it has come to",
     "SUBMODEL": "as another model moves", "USER": "by a subroutine",
 }  # fmt: skip
 
-# What reading a line raises: nothing of it keeps a mesh from being read.
+# Errors in reading a line, none of which prevents the mesh from being read.
 WRONG = (NotTakenError, MeshError, IndexError, KeyError, ValueError)
 
 
 def scene_of(model: Model, flattened: Flattened, mesh: GroupedMesh) -> Scene:
-    """What a file says besides its mesh, in the names of its bodies and groups."""
+    """Return the scene of a file in the names of its bodies and groups."""
     return _Reader(model, flattened, mesh).scene()
 
 
 class _Reader:
-    """Goes through the keywords in their order."""
+    """Reader that goes through the keywords in their order."""
 
     def __init__(self, model: Model, flattened: Flattened, mesh: GroupedMesh) -> None:
         self.model, self.flattened, self.mesh = model, flattened, mesh
@@ -89,7 +90,7 @@ class _Reader:
         }
 
     def scene(self) -> Scene:
-        for scope, card in self.model.said:
+        for scope, card in self.model.case_cards:
             handler = self._handlers.get(card.keyword)
             try:
                 if card.keyword == "SOLIDSECTION":
@@ -114,7 +115,10 @@ class _Reader:
         )
 
     def _rows(self, take: Callable[[Card, DataLine, str], None]) -> Callable[[Card], None]:
-        """Take each data line by itself, those that cannot be taken with why not."""
+        """Return a handler that reads each data line separately.
+
+        Lines that cannot be used are ignored with the reason.
+        """
 
         def handler(card: Card) -> None:
             if card.parameters.get("OP", "").upper() == "NEW" and self.step:
@@ -144,7 +148,7 @@ class _Reader:
         self.sections.append((scope, card))
         thickness = card.rows[0].fields[0] if card.rows else ""
         if thickness and real(card.rows[0].place, thickness) != 1.0:
-            # On plane bodies; those in space have none.
+            # Only plane bodies have a thickness.
             raise NotTakenError(f"thickness of {thickness}: forces in the plane are per length")
 
     def _name_material(self, card: Card) -> None:
@@ -159,7 +163,7 @@ class _Reader:
         (self.properties[self._material][name],) = self._first(card, 1)
 
     def _first(self, card: Card, count: int) -> list[float]:
-        """Numbers of the first data line; more lines are for other temperatures."""
+        """Return the numbers of the first data line; more lines are for other temperatures."""
         if not card.parameters.get("TYPE", "ISO").upper().startswith("ISO"):
             raise NotTakenError("bodies are isotropic")
         if not card.rows or not self._material:
@@ -189,7 +193,7 @@ class _Reader:
             self.pairs.append((faces, interaction, row.place.short))
 
     def _materials(self) -> dict[str, dict[str, float]]:
-        """Constants of the bodies all of whose elements are of one material."""
+        """Return the constants of the bodies whose elements are all of one material."""
         found: dict[str, set[str]] = {}
         for scope, card in self.sections:
             material = card.parameters.get("MATERIAL", "").upper()
@@ -205,7 +209,7 @@ class _Reader:
         return materials
 
     def _bodies_of(self, scope: Scope, elements: str) -> Iterator[str]:
-        """Names of the bodies that have elements of a set, of a part or of a flat file."""
+        """Yield the names of the bodies with elements of a set of a part or of a flat file."""
         if scope is not self.model.flat:
             for name, instance in self.model.instances.items():
                 mine = scope.name in (name, self.model.part_of.get(name))
@@ -226,7 +230,7 @@ class _Reader:
     # --- supports and loads ---------------------------------------------------------------------
 
     def _group(self, text: str) -> str:
-        """The name that a set or a surface goes by in a case."""
+        """Return the name that a set or a surface has in a case."""
         text = text.strip('"')
         if re.fullmatch(r"(.*\.)?\d+", text):
             raise NotTakenError(f"on node {text}: name a set of it")
@@ -246,7 +250,7 @@ class _Reader:
         axes, value = _moved(row)
         held = ""
         for axis in axes:
-            # What has been moved before goes back.
+            # A displacement imposed in an earlier step returns to zero.
             if value or _key("displacement", group, UNITS[axis]) in self.loads:
                 self._load("displacement", group, value, line, UNITS[axis])
             else:
@@ -282,7 +286,7 @@ class _Reader:
         kind = row.fields[1].upper() if len(row.fields) > 1 else ""
         numbers = [real(row.place, text) for text in row.fields[2:]]
         if kind == "GRAV" and len(numbers) == 4:
-            # Bodies are pulled against the acceleration of their frame.
+            # Inertia forces on bodies are opposite to the acceleration of their frame.
             self._load("acceleration", "", -numbers[0], line, _direction(numbers[1:4]))
         elif kind == "CENTRIF" and len(numbers) == 7:
             x, y, z = numbers[1:4]
@@ -302,8 +306,9 @@ class _Reader:
         along: Vector | None = None,
         through: Vector = (0.0, 0.0, 0.0),
     ) -> None:
-        """Keep a load, a pressure or one along a direction; the same one in a later step goes on
-        from there, and ends where it is none.
+        """Store a load: a pressure, or a load along a direction.
+
+        The same load in a later step continues from there, and ends where it is zero.
         """
         if not self.step:
             raise NotTakenError("before the first step")
@@ -321,7 +326,7 @@ class _Reader:
         factors[self.step] = factor
 
     def _end_loads(self, card: Card) -> None:
-        """End those of the steps before: once in a step, each of whose cards may say op=new."""
+        """End the loads of earlier steps, once per step although several cards may have op=new."""
         if (self.step, card.keyword) in self.ended:
             return
         self.ended.add((self.step, card.keyword))
@@ -332,7 +337,10 @@ class _Reader:
             self.ignored.append(_ignored(card, "what is held stays held, through all steps"))
 
     def _load_paths(self) -> Iterator[SaidLoad]:
-        """Loads with their factors at the end of every step; they stay until they change."""
+        """Yield the loads with their factors at the end of every step.
+
+        A load stays until it changes.
+        """
         for key, load in self.loads.items():
             path, factor = [], 0.0
             for step in range(1, self.step + 1):
@@ -342,9 +350,9 @@ class _Reader:
 
 
 def _moved(row: DataLine) -> tuple[str, float]:
-    """The axes that a line of *Boundary names, and how far it moves nodes along them.
+    """Return the axes that a line of *Boundary names, and the displacement along them.
 
-    No axes where it names rotations, of which solids have none.
+    There are no axes if it names rotations, which solids do not have.
     """
     first = row.fields[1].upper()
     if first in NAMED:
@@ -356,7 +364,7 @@ def _moved(row: DataLine) -> tuple[str, float]:
 
 
 def _key(kind: str, group: str, along: Vector | None) -> tuple[str, str, str]:
-    """What tells a load from others: also the axes that it is along."""
+    """Return the key that distinguishes a load from others, which includes the axes it is along."""
     return kind, group, "" if along is None else str([c != 0.0 for c in along])
 
 
@@ -374,7 +382,7 @@ def _times(vector: Vector, size: float) -> Vector:
 
 
 def _ratio(value: float | Vector, first: float | Vector) -> float | None:
-    """How many times the first one a load is; None if it is along another direction."""
+    """Return the ratio of a load to the first one, or None if it is along another direction."""
     if isinstance(value, float) or isinstance(first, float):
         assert isinstance(value, float)
         assert isinstance(first, float)
@@ -387,4 +395,4 @@ def _ratio(value: float | Vector, first: float | Vector) -> float | None:
 
 def _ignored(card: Card, why: object) -> str:
     known = isinstance(why, NotTakenError | MeshError | str)
-    return f"{told(card)}: {why if known else 'not understood'}"
+    return f"{summary_line(card)}: {why if known else 'not understood'}"

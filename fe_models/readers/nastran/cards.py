@@ -1,7 +1,8 @@
-"""Entries of Nastran bulk data with their fields, and where they stand.
+"""Entries of Nastran bulk data with their fields and their lines in the file.
 
-Small fields of 8 columns, large ones of 16 and free ones between commas, with continuations, as in
-the Nastran Quick Reference Guide (Bulk Data Entries, Format of Bulk Data Entries).
+Fields may be small ones of 8 columns, large ones of 16 or free ones between commas, with
+continuations, as in the Nastran Quick Reference Guide (Bulk Data Entries, Format of Bulk Data
+Entries).
 """
 
 from __future__ import annotations
@@ -22,55 +23,55 @@ BARE_EXPONENT = re.compile(r"(?<=[\d.])([+-]\d+)$")
 
 
 def fortran_real(text: str) -> float:
-    """A number as Fortran writes it: 1.5D-3, 1.5-3, 0.5-101. Raises ``ValueError``."""
+    """Return a number written in Fortran's forms: 1.5D-3, 1.5-3, 0.5-101. Raises ``ValueError``."""
     plain = text.strip().upper().replace("D", "E")
     return float(plain if "E" in plain else BARE_EXPONENT.sub(r"E\1", plain))
 
 
 @dataclass
 class Entry:
-    """A bulk data entry: its name, its fields without the continuation marks, and its line."""
+    """Bulk data entry: its line, its name, and its fields without continuation marks."""
 
     place: SourceLine
     name: str
     fields: list[str] = field(default_factory=list)
 
     def text(self, index: int) -> str:
-        """A field, counted from zero behind the name; empty if it is not given."""
+        """Return a field, counted from zero after the name; empty if it is not given."""
         return self.fields[index] if index < len(self.fields) else ""
 
     def whole(self, index: int) -> int:
-        """A field that is a whole number. Raises :class:`MeshError`."""
+        """Return a field that is a whole number. Raises :class:`MeshError`."""
         try:
             return int(self.text(index))
         except ValueError:
-            raise self.wrong(f"{self.text(index)!r} is no whole number") from None
+            raise self.wrong(f"{self.text(index)!r} is not a whole number") from None
 
     def real(self, index: int) -> float:
-        """A field that is a number; an empty one is 0. Raises :class:`MeshError`."""
+        """Return a field that is a number, 0 if it is empty. Raises :class:`MeshError`."""
         text = self.text(index)
         try:
             return fortran_real(text) if text else 0.0
         except ValueError:
-            raise self.wrong(f"{self.text(index)!r} is no number") from None
+            raise self.wrong(f"{self.text(index)!r} is not a number") from None
 
     def wrong(self, what: str) -> MeshError:
-        """What is wrong with it, at its line."""
+        """Return the error that names the entry and its line."""
         return MeshError(f"{self.place}: {self.name}: {what}")
 
 
 @dataclass
 class BulkData:
-    """The entries of a file in their order, and the comments, which hold names."""
+    """Entries of a file in their order, and the comments, which may contain names."""
 
     entries: list[Entry] = field(default_factory=list)
     comments: list[str] = field(default_factory=list)
 
 
 def bulk_data(path: Path) -> BulkData:
-    """Entries between ``BEGIN BULK`` and ``ENDDATA``, or all; ``INCLUDE`` is followed.
+    """Return the entries between ``BEGIN BULK`` and ``ENDDATA``, or all; ``INCLUDE`` is followed.
 
-    Raises :class:`MeshError` at what is no entry and at included files that are missing.
+    Raises :class:`MeshError` for a line that is not an entry, and for missing included files.
     """
     found = BulkData()
     lines = list(_lines(path, ()))
@@ -87,7 +88,7 @@ def bulk_data(path: Path) -> BulkData:
 
 
 def _lines(path: Path, including: tuple[Path, ...]) -> Iterator[tuple[SourceLine, str]]:
-    """Lines that are not blank, with spaces for tabs; those of included files in their place."""
+    """Yield lines that are not blank, with tabs expanded and included files inserted."""
     with open_text(path) as file:
         for number, line in enumerate(file, start=1):
             text, place = line.expandtabs(SMALL).rstrip(), SourceLine(path, number)
@@ -118,20 +119,20 @@ def _take(entries: list[Entry], place: SourceLine, line: str) -> None:
     head, fields, width = _divided(text)
     if not head or head[0] in "+*":
         if not entries:
-            raise MeshError(f"{place}: is no Nastran bulk data; allowed: entries such as GRID")
+            raise MeshError(f"{place}: is not Nastran bulk data; allowed: entries such as GRID")
         entries[-1].fields += _filled(entries[-1].fields, width) + fields
         return
     name = head.rstrip("*").upper()
     if not re.fullmatch(r"[A-Z]\w*", name):
         raise MeshError(
-            f"{place}: {head!r} is no entry of Nastran bulk data; allowed: entries written out, "
-            "such as GRID"
+            f"{place}: {head!r} is not an entry of Nastran bulk data; allowed: entries written "
+            "out, such as GRID"
         )
     entries.append(Entry(place, name, fields))
 
 
 def _divided(text: str) -> tuple[str, list[str], int]:
-    """First field, the data fields of a line, and how many of them a full line has."""
+    """Return the first field of a line, its data fields, and the number of them in a full line."""
     if "," in text:
         head, *fields = [part.strip() for part in text.split(",")]
         count = 4 if head.endswith("*") or head.startswith("*") else 8
@@ -143,12 +144,12 @@ def _divided(text: str) -> tuple[str, list[str], int]:
 
 
 def _filled(fields: list[str], width: int) -> list[str]:
-    """Empty fields up to the end of the line before: lines of 4 or 8 fields follow each other."""
+    """Return the empty fields that complete a line of 4 or 8 fields."""
     return [""] * (-len(fields) % width)
 
 
-def told(entry: Entry) -> str:
-    """An entry in a line: where it stands, and its fields."""
+def summary_line(entry: Entry) -> str:
+    """Return an entry in one line: its place in the file and its fields."""
     shown = ", ".join(text for text in entry.fields[:8])
     return (
         f"{entry.place.short}: {entry.name}: {shown.rstrip(', ')}{' ...' * (len(entry.fields) > 8)}"

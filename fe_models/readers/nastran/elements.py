@@ -1,6 +1,6 @@
-"""Elements of Nastran bulk data: those that are read, and which entries are refused, and why.
+"""Elements of Nastran bulk data that are read, and entries that are refused with the reason.
 
-Names as in the Nastran Quick Reference Guide.
+Names are as in the Nastran Quick Reference Guide.
 """
 
 from __future__ import annotations
@@ -9,8 +9,8 @@ import re
 
 from fe_models.readers.nastran.cards import Entry
 
-# Shape of the elements that are read, and their numbers of nodes, corners first; of first order
-# and second.
+# Shape of the elements that are read, and their numbers of nodes of first and of second order;
+# corners come first.
 SOLIDS = {
     "CTETRA": ("tetra", (4, 10)), "CPYRAM": ("pyramid", (5, 13)), "CPYRA": ("pyramid", (5, 13)),
     "CPENTA": ("wedge", (6, 15)), "CHEXA": ("hexahedron", (8, 20)),
@@ -30,10 +30,10 @@ SHELL = (
 )
 TIED = "the tie or constraint is not carried over; make one body of what is bonded"
 BEAM = "a beam: mesh its volume with solid elements, or leave it out and put its force on the body"
-# Edges of solids that lie under them are named by these.
+# Beams, which name the edges of solids that they lie on.
 BEAMS = ("CBAR", "CBEAM", "CROD", "CTUBE")
 POINTS = "leave it out and put its force on the body as a load"
-# Entries that are refused, by their first letters, and what to do.
+# Entries that are refused, by their first letters, with the reason and the remedy.
 REFUSED = (
     (r"RBE\d|RBAR\d?|RROD|RTRPLT\d?|RSPLINE|RSSCON|RJOINT|MPC|MPCY|BGSET|CWELD|CFAST|CSEAM", TIED),
     (r"CBEAM3|CBEND|CONROD", BEAM),
@@ -51,7 +51,7 @@ REFUSED = (
 
 
 def refuse(entry: Entry) -> None:
-    """Raise :class:`MeshError` for an entry that must not be passed over."""
+    """Raise :class:`MeshError` for an entry that must not be ignored."""
     for pattern, reason in REFUSED:
         if re.fullmatch(pattern, entry.name):
             raise entry.wrong(reason)

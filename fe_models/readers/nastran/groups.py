@@ -1,4 +1,4 @@
-"""Boundaries and node sets that loads, supports and contacts of Nastran bulk data stand on."""
+"""Boundaries and node sets named by loads, supports and contacts of Nastran bulk data."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ from fe_models.readers.scope import Element, Scope, extend
 
 
 class Groups:
-    """Adds what entries name to a scope whose elements are known.
+    """Adds the groups that entries name to a scope whose elements are known.
 
-    Facets that are no elements of the file have numbers below zero.
+    Facets that are not elements of the file have negative numbers.
     """
 
     def __init__(self, scope: Scope) -> None:
@@ -29,7 +29,7 @@ class Groups:
         }
 
     def read(self, entry: Entry) -> None:
-        """Take in an entry, if it is one of these."""
+        """Read an entry if it names a group."""
         if entry.name in self._handlers:
             self._handlers[entry.name](entry)
 
@@ -56,7 +56,7 @@ class Groups:
                 self._facet(entry, self._face(entry, entry.whole(first), corners))
 
     def _pressed(self, entry: Entry) -> None:
-        """The face of a solid by its corners, or shells themselves."""
+        """Add the face of a solid, given by its corners, or shells themselves."""
         numbers: list[int | range] = [entry.whole(1)]
         corners = []
         if entry.text(6).upper() == "THRU":
@@ -67,18 +67,18 @@ class Groups:
             self._facet(entry, _loaded(entry, element, corners))
 
     def _nodes(self, name: str, members: list[int | range]) -> None:
-        if not name.endswith("_"):  # rotations alone, of which solids have none
+        if not name.endswith("_"):  # Ignore rotations alone, which solids do not have.
             extend(self.scope.node_sets.add(name, {}), {"": members})
 
     def _elements(self, numbers: list[int | range]) -> Iterator[Element]:
-        """Those of the numbers that are read."""
+        """Yield the elements among the numbers that are read."""
         for number in numbers:
             for one in [number] if isinstance(number, int) else number:
                 if one in self.scope.elements:
                     yield self.scope.elements[one]
 
     def _face(self, entry: Entry, number: int, corners: list[int]) -> tuple[int, ...]:
-        """The face of an element that has the corners."""
+        """Return the face of an element that has the corners."""
         if number not in self.scope.elements:
             raise entry.wrong(f"element {number} is not defined")
         found = [f for f in _faces(self.scope.elements[number]) if set(corners) <= set(f)]
@@ -96,20 +96,20 @@ class Groups:
 
 
 def held_name(number: str, components: str) -> str:
-    """Name of the nodes that a set of constraints holds along some components."""
+    """Return the name of the nodes that a set of constraints holds along some components."""
     return f"spc_{number}_{axes_of(components)}"
 
 
 def axes_of(components: str) -> str:
-    """Axes of the translations 1 to 3 among components."""
+    """Return the axes of the translations 1 to 3 among components."""
     return "".join(axis for axis, number in zip("xyz", "123", strict=True) if number in components)
 
 
 def _loaded(entry: Entry, element: Element, corners: list[int]) -> tuple[int, ...]:
-    """Corners of the face of an element on which a pressure acts.
+    """Return the corners of the face of an element on which a pressure acts.
 
-    Of a tetrahedron the second one given is off the face; a quadrilateral is given by two opposite
-    ones, the triangle of a wedge by one.
+    For a tetrahedron the second given corner is off the face. A quadrilateral is given by two
+    opposite corners, the triangle of a wedge by one.
     """
     if DIMENSION[element.shape] == 2:
         return element.nodes
@@ -131,7 +131,7 @@ def _faces(element: Element) -> list[tuple[int, ...]]:
 
 
 def _listed(entry: Entry, first: int) -> list[int | range]:
-    """Numbers from a field on, or a range ``a THRU b``."""
+    """Return the numbers from a field on, or a range ``a THRU b``."""
     if entry.text(first + 1).upper() == "THRU":
         return [range(entry.whole(first), entry.whole(first + 2) + 1)]
     return [entry.whole(k) for k in range(first, len(entry.fields)) if entry.text(k)]

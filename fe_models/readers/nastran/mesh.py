@@ -1,7 +1,7 @@
 """Meshes in Nastran bulk data (``.bdf``, ``.nas``, ``.dat``): grid points, solids, faces and sets.
 
-Entries as in the Nastran Quick Reference Guide. What ties bodies together is refused by line; what
-says more than a mesh is named and not taken over.
+Entries are as in the Nastran Quick Reference Guide. Entries that tie bodies together are refused
+with their line; entries that describe more than a mesh are listed and not imported.
 """
 
 from __future__ import annotations
@@ -17,19 +17,19 @@ from fe_models.meshes.structure_mesh import MeshError
 from fe_models.readers.abaqus.cards import SourceLine
 from fe_models.readers.flattened import FlatFile
 from fe_models.readers.grouped import CORNERS, GroupedMesh
-from fe_models.readers.nastran.cards import BulkData, Entry, bulk_data, told
+from fe_models.readers.nastran.cards import BulkData, Entry, bulk_data, summary_line
 from fe_models.readers.nastran.elements import BEAM, BEAMS, PLANES, SHELL, SHELLS, SOLIDS, refuse
 from fe_models.readers.nastran.groups import Groups
 from fe_models.readers.nastran.scene import scene_of
 from fe_models.readers.scope import Element, Scope, extend
 from sa_solver.types import Array
 
-# Entries that say what a case says: they are not taken over.
+# Entries that describe what a case has to describe: they are not imported with the mesh.
 LEFT = re.compile(
     r"SPC1?|SPCD|FORCE\d?|MOMENT\d?|PLOAD\d?|GRAV|ACCEL1?|RFORCE|TEMPD?|TEMPP\d|MAT\d+|MATS1|"
     r"LOAD|LSEQ|BCTABLE1?|BCTSET|BCTPARM|BCONP|BFRIC|BCBODY|BCTADD|BSURFS?|DEFORM"
 )
-# Names that pre-processors write into comments: of a property by its number.
+# Names of properties, by number, in the comments that pre-processors write.
 NAMED = (
     re.compile(r'\$HMNAME\s+PROP\s+(\d+)\s*"([^"]+)"'),
     re.compile(r"\$\s*FEMAP.*\bProperty\s+(\d+)\s*:\s*(.+?)\s*$", re.IGNORECASE),
@@ -40,11 +40,11 @@ NAMED = (
 def read_nastran(path: Path) -> GroupedMesh:
     """Read the mesh of a Nastran bulk data file.
 
-    Each connected piece of solids is a body by the name or number of the property of just its
-    elements, of several with a plus between them, or else ``body_1``, ...; shells that lie on
-    solids are boundaries by their property, and have no stiffness. ``PLOAD4``, ``BSURFS`` and
-    ``BSURF`` name boundaries ``pload4_1``, ``bsurfs_1``, ...; ``SPC1``, ``SPC`` and ``FORCE`` node
-    sets ``spc_1_xyz``, ``force_1``, ....
+    Each connected piece of solids is a body. It has the name or number of the property that is
+    exactly its elements, or of several properties joined by plus signs, or else ``body_1``, ....
+    Shells that lie on solids are boundaries named by their property, and have no stiffness.
+    ``PLOAD4``, ``BSURFS`` and ``BSURF`` name boundaries ``pload4_1``, ``bsurfs_1``, ...; ``SPC1``,
+    ``SPC`` and ``FORCE`` name node sets ``spc_1_xyz``, ``force_1``, ....
 
     Raises :class:`MeshError` with file and line.
     """
@@ -53,21 +53,21 @@ def read_nastran(path: Path) -> GroupedMesh:
         raise MeshError(f"{path}: has no elements that are read: {', '.join(SOLIDS)}")
     flat = FlatFile(read.scope, joins=True)
     mesh = flat.mesh()
-    scene, caveats = scene_of(read.entries, mesh, read.left), (*read.caveats, *flat.told)
+    scene, caveats = scene_of(read.entries, mesh, read.left), (*read.caveats, *flat.notes)
     return replace(
         mesh,
-        left=(*map(told, read.left), *caveats),
+        left=(*map(summary_line, read.left), *caveats),
         scene=replace(scene, ignored=(*scene.ignored, *caveats)),
     )
 
 
 class _Read:
-    """The scope of a file's mesh, and the lines that say more."""
+    """Scope of a file's mesh, and the entries that describe more than a mesh."""
 
     def __init__(self, path: Path, data: BulkData) -> None:
         self.scope = Scope("", SourceLine(path, 1))
         self.entries, self.left = data.entries, [e for e in data.entries if LEFT.fullmatch(e.name)]
-        # What bodies do not have of elements that name faces, or of plane ones.
+        # Notes on properties that bodies do not have: stiffness of shells, and plane stress.
         self.caveats: list[str] = []
         self._names = _property_names(data.comments)
         self._shells: dict[str, Element] = {}
@@ -75,7 +75,7 @@ class _Read:
         solids = [entry for entry in data.entries if entry.name in SOLIDS]
         self._solid_properties = {entry.text(1) for entry in solids}
         self._shell_properties = {e.text(1) for e in data.entries if e.name in SHELLS | PLANES}
-        # The first of each name.
+        # Check the first entry of each name.
         for entry in {entry.name: entry for entry in reversed(data.entries)}.values():
             refuse(entry)
         for entry in data.entries:
@@ -90,7 +90,7 @@ class _Read:
         groups = Groups(self.scope)
         for entry in data.entries:
             groups.read(entry)
-        self._tell_shells(plane=not solids)
+        self._note_shells(plane=not solids)
 
     def _grid(self, entry: Entry) -> None:
         number = entry.whole(0)
@@ -102,21 +102,21 @@ class _Read:
         self.scope.nodes[number] = (x, y, z)
 
     def _placed(self, entry: Entry, system: int, place: Array) -> Array:
-        """Coordinates in the basic system of a point given in a system."""
+        """Return the coordinates in the basic system of a point given in a system."""
         if system == 0:
             return place
         if system not in self._systems:
             raise entry.wrong(f"no coordinate system {system}; allowed: CORD2R, CORD2C, CORD2S")
         card = self._systems[system]
         if card.text(1) not in ("", "0"):
-            raise card.wrong("on another system; write it on the basic one")
+            raise card.wrong("is defined in another system; define it in the basic system")
         origin, on_z, on_xz = (
             np.array([card.real(2 + 3 * point + k) for k in range(3)]) for point in range(3)
         )
         z = on_z - origin
         y = np.cross(z, on_xz - origin)
         if not np.linalg.norm(y) > 0.0:
-            raise card.wrong("its three points are on a line")
+            raise card.wrong("its three points are on a line; give points that span a plane")
         axes = np.array([np.cross(y, z), y, z])
         axes /= np.linalg.norm(axes, axis=1)[:, None]
         return np.asarray(origin + _cartesian(card.name[-1], place) @ axes)
@@ -134,7 +134,7 @@ class _Read:
 
     def _plane(self, entry: Entry) -> None:
         shape, count = (SHELLS | PLANES)[entry.name]
-        # Angles and offsets follow the nodes.
+        # Angles and offsets follow the nodes and are not read.
         nodes = [
             entry.whole(2 + k) for k in range(count) if k < CORNERS[shape] or entry.text(2 + k)
         ]
@@ -150,7 +150,10 @@ class _Read:
         self._shells.setdefault(name, element)
 
     def _set(self, entry: Entry) -> str:
-        """Name of an element's property, with what it is of where others have it before it."""
+        """Return the name of an element's property.
+
+        It gets a suffix if elements of another dimension have the property, too.
+        """
         number = entry.text(1) or entry.text(0)
         name = self._names.get(number, number)
         if entry.name in SOLIDS:
@@ -183,8 +186,8 @@ class _Read:
         extend(self.scope.element_sets.add(name, {}), {"": [number]})
         return element
 
-    def _tell_shells(self, plane: bool) -> None:
-        """Which faces are named by shells, and that a plane mesh is one of plane strain."""
+    def _note_shells(self, plane: bool) -> None:
+        """Note which faces are named by shells, and that plane bodies are in plane strain."""
         for name, element in self._shells.items():
             place = element.place.short
             if not plane:
@@ -199,7 +202,11 @@ class _Read:
 
 
 def _cartesian(kind: str, place: Array) -> Array:
-    """Of coordinates in a rectangular, cylindrical or spherical system; angles in degrees."""
+    """Return the Cartesian coordinates of a point in a system of a kind.
+
+    The kind is R for rectangular, C for cylindrical and S for spherical coordinates, with angles in
+    degrees.
+    """
     if kind == "R":
         return place
     if kind == "C":
@@ -211,7 +218,7 @@ def _cartesian(kind: str, place: Array) -> Array:
 
 
 def _property_names(comments: list[str]) -> dict[str, str]:
-    """Names of properties by their numbers, those that only one has."""
+    """Return the names of properties by their numbers, if only one property has the name."""
     found = {
         match[1]: match[2].strip()
         for comment in comments

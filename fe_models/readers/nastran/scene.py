@@ -1,6 +1,7 @@
 """Materials, contacts, supports and loads of Nastran bulk data, all of them in one step.
 
-Entries as in the Nastran Quick Reference Guide. Which of them a subcase takes is not read.
+Entries are as in the Nastran Quick Reference Guide. The selection of entries by subcases is not
+read.
 """
 
 from __future__ import annotations
@@ -12,17 +13,21 @@ import numpy as np
 
 from fe_models.meshes.structure_mesh import MeshError
 from fe_models.readers.grouped import GroupedMesh
-from fe_models.readers.nastran.cards import Entry, told
+from fe_models.readers.nastran.cards import Entry, summary_line
 from fe_models.readers.nastran.elements import SOLIDS
 from fe_models.readers.nastran.groups import axes_of, held_name
 from fe_models.readers.scene import NotTakenError, SaidContact, SaidLoad, SaidSupport, Scene
 
-# Directions of supports and forces whose nodes have systems of their own are not those of the file.
+# Reason to ignore supports and forces along the axes of another coordinate system.
 LOCAL = "along the axes of another coordinate system"
 
 
 def scene_of(entries: Sequence[Entry], mesh: GroupedMesh, left: Sequence[Entry]) -> Scene:
-    """What the entries say besides their mesh; those ``left`` are taken or told why not."""
+    """Return the scene of the entries.
+
+    ``left`` are the entries that describe more than the mesh. Each is either used or ignored with a
+    reason.
+    """
     return _Reader(entries, mesh).scene(left)
 
 
@@ -32,7 +37,7 @@ class _Reader:
         self.of: dict[str, list[Entry]] = {}
         for entry in entries:
             self.of.setdefault(entry.name, []).append(entry)
-        # Grid points whose displacements are along another system.
+        # Grid points whose displacements are along the axes of another system.
         self.local = {e.whole(0) for e in self.of.get("GRID", []) if e.text(5) not in ("", "0")}
         self.contacts: list[SaidContact] = []
         self.supports: list[SaidSupport] = []
@@ -61,7 +66,7 @@ class _Reader:
                     raise NotTakenError("not part of a case")
                 handler(entry)
             except (NotTakenError, MeshError) as error:
-                self.ignored.append(f"{told(entry)}: {error}")
+                self.ignored.append(f"{summary_line(entry)}: {error}")
         self.loads += [*self._total_forces(), *self._even_pressures()]
         sets = {load.group.rpartition("_")[2] for load in self.loads if load.group}
         if len(sets) > 1:
@@ -78,13 +83,13 @@ class _Reader:
     # --- materials and contacts -----------------------------------------------------------------
 
     def _materials(self) -> dict[str, dict[str, float]]:
-        """Constants of the bodies all of whose solids are of one material."""
+        """Return the constants of the bodies whose solids are all of one material."""
         constants = {}
         for entry in self.of.get("MAT1", []):
             try:
                 constants[entry.text(0)] = _constants(entry)
             except MeshError as error:
-                self.ignored.append(f"{told(entry)}: {error}")
+                self.ignored.append(f"{summary_line(entry)}: {error}")
         found: dict[str, set[str]] = {}
         for section in self.of.get("PSOLID", []):
             for body in self._bodies_of(section.text(0)):
@@ -99,7 +104,7 @@ class _Reader:
         return materials
 
     def _bodies_of(self, section: str) -> Iterator[str]:
-        """Names of the bodies that have solids of a property."""
+        """Yield the names of the bodies that have solids of a property."""
         numbers = [
             entry.whole(2)
             for name in SOLIDS
@@ -141,7 +146,7 @@ class _Reader:
         axes = axes_of(components)
         group = held_name(entry.text(0), components)
         if not axes or group not in self.mesh.node_sets:
-            return  # rotations, of which solids have none
+            return  # These are rotations, which solids do not have.
         if self.local.intersection(self.mesh.numbers[self.mesh.node_sets[group]].tolist()):
             raise NotTakenError(LOCAL)
         if all(support.group != group for support in self.supports):
@@ -154,7 +159,7 @@ class _Reader:
         self.forces.setdefault(f"force_{entry.text(0)}", []).append((entry, vector))
 
     def _total_forces(self) -> Iterator[SaidLoad]:
-        """The forces of a set together."""
+        """Yield the sum of the forces of each set."""
         for group, forces in self.forces.items():
             vectors = np.array([vector for _, vector in forces])
             x, y, z = vectors.sum(axis=0).tolist()
@@ -173,18 +178,18 @@ class _Reader:
         self.pressures.setdefault(f"pload4_{entry.text(0)}", []).append((entry, size))
 
     def _even_pressures(self) -> Iterator[SaidLoad]:
-        """The pressure of a set, if it is the same everywhere."""
+        """Yield the pressure of each set if it is the same everywhere."""
         for group, pressures in self.pressures.items():
             entry, size = pressures[0]
             if any(value != size for _, value in pressures):
-                self.ignored.append(f"{told(entry)}: the pressures of its set differ")
+                self.ignored.append(f"{summary_line(entry)}: the pressures of its set differ")
                 continue
             yield SaidLoad("pressure", group, size, (1.0,), entry.place.short)
 
     def _gravity(self, entry: Entry) -> None:
         if entry.text(1) not in ("", "0"):
             raise NotTakenError(LOCAL)
-        # Bodies are pulled against the acceleration of their frame.
+        # Inertia forces on bodies are opposite to the acceleration of their frame.
         x, y, z = (-entry.real(2) * entry.real(k) for k in (3, 4, 5))
         self.loads.append(SaidLoad("acceleration", "", (x, y, z), (1.0,), entry.place.short))
 
@@ -193,7 +198,7 @@ class _Reader:
             raise NotTakenError(LOCAL)
         point = self.mesh.points[self.mesh.numbers == (entry.whole(1) if entry.text(1) else 0)]
         through = point[0].tolist() if len(point) else [0.0, 0.0, 0.0]
-        # Revolutions in a unit of time.
+        # The speed is given in revolutions per unit of time.
         axis = [2.0 * math.pi * entry.real(3) * entry.real(k) for k in (4, 5, 6)]
         x, y, z = axis
         a, b, c = through
@@ -201,7 +206,7 @@ class _Reader:
 
 
 def _constants(entry: Entry) -> dict[str, float]:
-    """Of MAT1, of whose moduli and Poisson's ratio two are given."""
+    """Return the constants of MAT1, which gives two of both moduli and Poisson's ratio."""
     young, shear, poisson = (entry.real(k) if entry.text(k) else None for k in (1, 2, 3))
     if poisson is None and young and shear:
         poisson = young / (2.0 * shear) - 1.0
