@@ -80,12 +80,12 @@ def test_forces_add_up():
     ("make", "message"),
     [
         (lambda: HarmonicForce(SHAPE, 1.0, 0.0), "frequency 0 Hz"),
-        (lambda: HarmonicForce(SHAPE, 1.0, 1.0, ramp=-1.0), "ramp -1 s"),
-        (lambda: HammerBlow(SHAPE, 1.0, 0.0), "a blow of 0 s"),
+        (lambda: HarmonicForce(SHAPE, 1.0, 1.0, ramp=-1.0), "ramp of -1 s"),
+        (lambda: HammerBlow(SHAPE, 1.0, 0.0), "last 0 s"),
         (lambda: RecordedForce(SHAPE, np.array([]), np.array([])), "0 times and 0 forces"),
         (lambda: RecordedForce(SHAPE, np.zeros(2), np.zeros(3)), "2 times and 3 forces"),
         (lambda: RecordedForce(SHAPE, np.array([1.0, 1.0]), np.zeros(2)), "do not ascend"),
-        (lambda: RecordedForce(SHAPE, np.array([1.0]), np.array([np.nan])), "not a number"),
+        (lambda: RecordedForce(SHAPE, np.array([1.0]), np.array([np.nan])), "not a finite number"),
     ],
 )
 def test_signals_that_cannot_be_are_refused(make, message):
