@@ -39,8 +39,8 @@ from typing import TYPE_CHECKING
 from sa_solver.lazy import lazy_names
 
 if TYPE_CHECKING:
-    from fe_models.dynamics.curves.continuation import ContinuationControl
     from fe_models.dynamics.curves.crossings import motions_at
+    from fe_models.dynamics.curves.curve_steps import ContinuationControl
     from fe_models.dynamics.curves.forced_response import Accuracy, along_force, along_frequency
     from fe_models.dynamics.curves.nonlinear_mode import LinearMode, along_nonlinear_mode
     from fe_models.dynamics.curves.phase_resonance import along_phase_resonance
@@ -53,8 +53,9 @@ if TYPE_CHECKING:
         RecordedForce,
     )
     from fe_models.dynamics.model import DynamicModel
-    from fe_models.dynamics.periodic.harmonic_balance import HarmonicBalance, PeriodicLoad
+    from fe_models.dynamics.periodic.harmonic_balance import HarmonicBalance
     from fe_models.dynamics.periodic.harmonics import Resolution
+    from fe_models.dynamics.periodic.load import PeriodicLoad
     from fe_models.dynamics.rig import (
         Link,
         lumped_rig,
@@ -101,7 +102,7 @@ __all__ = [
 __getattr__, __dir__ = lazy_names(
     __name__,
     {
-        "curves.continuation": ("ContinuationControl",),
+        "curves.curve_steps": ("ContinuationControl",),
         "curves.crossings": ("motions_at",),
         "damping": ("damped",),
         "excitation": (
@@ -118,11 +119,9 @@ __getattr__, __dir__ = lazy_names(
             "along_frequency",
         ),
         "transient.free_decay": ("ring_down",),
-        "periodic.harmonic_balance": (
-            "HarmonicBalance",
-            "PeriodicLoad",
-        ),
+        "periodic.harmonic_balance": ("HarmonicBalance",),
         "periodic.harmonics": ("Resolution",),
+        "periodic.load": ("PeriodicLoad",),
         "transient.impact_hammer": ("frequency_response",),
         "model": ("DynamicModel",),
         "transient.newmark": (

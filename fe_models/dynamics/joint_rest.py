@@ -138,11 +138,8 @@ class Rest:
         ``slopes`` ``(j, m, d, m, d)`` are the derivatives of the joints' forces.
         """
         # Compare the first function of time that is not the mean.
-        stuck, first, tangential = (
-            self.stuck.tangents,
-            slopes[:, 1, :, 1],
-            slice(TANGENTIAL_DIRECTIONS),
-        )
+        stuck, first = self.stuck.tangents, slopes[:, 1, :, 1]
+        tangential = slice(TANGENTIAL_DIRECTIONS)
         present = np.vdot(stuck[:, tangential, tangential], first[:, tangential, tangential])
         at_rest = np.vdot(stuck[:, tangential, tangential], stuck[:, tangential, tangential])
         return self.sliding if present < STICKING_SHARE * at_rest else self.stuck
