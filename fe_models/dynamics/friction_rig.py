@@ -57,7 +57,7 @@ def friction_rig(
         If a specimen has no mass matrix or no names, or if the pads have different numbers of
         nodes.
     """
-    parts = [_held(lower, "lower"), _held(upper, "upper", HOLDER)]
+    parts = [_with_holder(lower, "lower"), _with_holder(upper, "upper", HOLDER)]
     names = [name for part in parts for name in part[2]]
     pads = [[name for name in part[2] if f" {PAD} " in name] for part in parts]
     if len(pads[0]) != len(pads[1]) or not pads[0]:
@@ -105,8 +105,8 @@ def ground_inertia(
         assert body.mass is not None
         inertia = tie.T @ (body.mass @ translation_of(body, axis))
         lumped = {"m2 x": masses[1], "m2 z": masses[1]}
-        held = [lumped.get(name, 0.0) * name.endswith(f" {axis}") for name in names]
-        inertias.append(inertia + np.array(held))
+        holder_masses = [lumped.get(name, 0.0) * name.endswith(f" {axis}") for name in names]
+        inertias.append(inertia + np.array(holder_masses))
     return np.concatenate([*inertias, [masses[0] * (axis == "x")]])
 
 
@@ -115,7 +115,7 @@ def _by_node(names: list[str]) -> list[list[str]]:
     return [names[start : start + 3] for start in range(0, len(names), 3)]
 
 
-def _held(
+def _with_holder(
     body: ReducedModel, label: str, holder: dict[str, str] | None = None
 ) -> tuple[Array, Array, list[str]]:
     """Return mass and stiffness ``(c, c)`` of a specimen whose ring moves with its holder.

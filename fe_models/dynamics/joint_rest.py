@@ -69,7 +69,7 @@ class Rest:
     def loaded(self) -> Array:
         """Displacements ``(j d,)`` of the joints under the load without joint forces.
 
-        If only the joints hold the structure, the springs of ``Receptance.held`` act.
+        If only the joints hold the structure, the springs of ``Receptance.holding_stiffness`` act.
         """
         motion = self._receptance.at(np.zeros(1)).respond(self._load[None])
         return np.asarray((motion @ self._receptance.at_joints.T)[0].real)
@@ -82,7 +82,7 @@ class Rest:
         Therefore a spring is added to each joint and made softer from iteration to iteration, so
         that the structure moves until the joints close.
         """
-        compliance, held = self._receptance.static_flexibility, self._receptance.held
+        compliance, held = self._receptance.static_flexibility, self._receptance.holding_stiffness
         if not (self._load.any() and compliance.any()):
             # Joints between sectors are not displaced by a motion that is the same in all sectors.
             return np.zeros(self._shape)

@@ -13,7 +13,7 @@ from typing import Generic, Protocol, TypeVar
 
 import numpy as np
 
-# Callers import the control and the first point together with the continuation.
+# Re-exported for callers that import them together with the continuation.
 from fe_models.dynamics.curves.curve_steps import ContinuationControl as ContinuationControl
 from fe_models.dynamics.curves.curve_steps import CurvePoint, Scaling, correct, next_point
 from fe_models.dynamics.curves.curve_steps import first_point as first_point
@@ -85,8 +85,7 @@ def follow(
     """Follow a curve from a point until λ leaves its span.
 
     The last point is at the end of the span. The start is not repeated among the points. If the
-    curve does not reach an end, its message says
-    why.
+    curve does not reach an end, its message says why.
 
     Parameters
     ----------
@@ -108,7 +107,8 @@ def follow(
     end
         End of the span that the curve must reach; either one if None.
     steps
-        Observer of the steps, each of which finds and describes one point.
+        Runner of the steps, each of which finds and describes one point; see
+        :class:`sa_solver.steps.Steps`.
     """
     control = control or ContinuationControl()
     scaling, point = Scaling(max(map(abs, span)), origin, rounding), start
@@ -192,7 +192,7 @@ def _find_and_describe(
     control: ContinuationControl,
     recorder: Recorder[L, D] | None,
 ) -> tuple[CurvePoint, D | None] | str:
-    """Return the next point with its description, or a message why there is none."""
+    """Return the next point with its description, or the reason why there is none."""
     following = _next_within_span(equations, point, span, scaling, control)
     if isinstance(following, str):
         return following

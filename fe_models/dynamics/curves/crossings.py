@@ -54,7 +54,7 @@ def motions_at(
     control
         Control of the continuation, with the tolerance of the motions.
     steps
-        Observer of the steps, each of which finds one motion.
+        Runner of the steps, each of which finds one motion; see :class:`sa_solver.steps.Steps`.
 
     Examples
     --------

@@ -30,8 +30,8 @@ from sa_solver.types import Array
 # Unknowns are measured relative to their norm, but at least to this share of the largest norm on
 # the curve: otherwise, where all of them pass through zero, no step would be small enough.
 LEAST_SHARE = 1e-2
-# λ is measured relative to itself, but at least to this share of the farther end, for curves from λ
-# = 0.
+# λ is measured relative to itself, but at least to this share of the farther end, for curves that
+# start at zero.
 LEAST_PARAMETER = 0.1
 # Step below which a turn of the tangent is a corner, where a joint changes its state. Such a step
 # is accepted however much the tangent turns.
@@ -177,7 +177,7 @@ class Scaling:
         return np.asarray(step)
 
     def column(self, slope: Array) -> Array:
-        """Return ∂r/∂λ ``(n,)`` in the relative terms in which ∂r/∂u stays as it is."""
+        """Return ∂r/∂λ ``(n,)``, scaled so that ∂r/∂u need not be scaled."""
         return np.asarray(slope * (self.parameter / self.unknowns))
 
     def direction(self, point: CurvePoint) -> Array:
@@ -219,7 +219,7 @@ def first_point(
 def next_point(
     equations: Equations[L], point: CurvePoint, scaling: Scaling, control: ContinuationControl
 ) -> tuple[CurvePoint, L] | str:
-    """Return the next point of a curve and the equations there, or a message why there is none.
+    """Return the next point of a curve and the equations there, or the reason why there is none.
 
     Parameters
     ----------

@@ -136,7 +136,7 @@ def along_frequency(
     accuracy
         Accuracy of the motions; if None, the resolution is that of the problem.
     steps
-        Observer of the steps, each of which finds one motion.
+        Runner of the steps, each of which finds one motion; see :class:`sa_solver.steps.Steps`.
 
     Examples
     --------
@@ -354,7 +354,7 @@ def _first(
     control: ContinuationControl,
     steps: Steps,
 ) -> CurvePoint | str:
-    """Return the first point of a branch, which is recorded, or a message why there is none."""
+    """Return the first point of a branch, which is recorded, or the reason why there is none."""
     frequency, force = along.frequency_and_force(parameter)
 
     def found(unknowns: Array) -> tuple[CurvePoint, HarmonicSolution] | str:

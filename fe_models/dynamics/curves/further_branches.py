@@ -96,7 +96,7 @@ def further_branches(
     accuracy
         Accuracy of the motions; if None, the resolution is that of the problem.
     steps
-        Observer of the steps, each of which finds one motion.
+        Runner of the steps, each of which finds one motion; see :class:`sa_solver.steps.Steps`.
     """
     if not 0.0 < span[0] <= frequency <= span[1]:
         raise HarmonicBalanceError(
@@ -161,7 +161,7 @@ def _shape(
 ) -> ComplexArray:
     """Return displacements of joints ``(j d,)`` in a motion with this amplitude of the output.
 
-    The motion is the response to the first harmonic of the load.
+    The motion is the response to the lowest harmonic of the load, at the frequency ``angular``.
     """
     if not problem.load.waves:
         raise HarmonicBalanceError(

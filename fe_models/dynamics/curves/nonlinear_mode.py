@@ -57,7 +57,7 @@ class ModeBalance:
     damping_ratio
         Damping ratio D.
     amplitude
-        Amplitude that is asked for.
+        Prescribed amplitude [t^0.5 mm].
     """
 
     equations: NonlinearMode
@@ -95,8 +95,8 @@ class ModeBalance:
     @cached_property
     def relative(self) -> float:
         """Relative residual of harmonic balance, amplitude and phase together."""
-        left = float(np.hypot(self.balance.relative, np.linalg.norm(self._conditions)))
-        return left if np.isfinite(left) else np.inf
+        residual = float(np.hypot(self.balance.relative, np.linalg.norm(self._conditions)))
+        return residual if np.isfinite(residual) else np.inf
 
     @cached_property
     def jacobian(self) -> Array:
@@ -109,10 +109,10 @@ class ModeBalance:
         transfer, steady = self.equations.problem.transfer, self.balance.steady
         to_first = self._conditions_by_unknowns
         forces = self._forces_by_frequency, self._forces_by_damping
-        for column, needed in enumerate(forces, start=count):
-            moved = steady.vibrate(needed)
-            matrix[:count, column] = transfer.at_joints(moved) / scale
-            matrix[count:, column] = -(self._condition_rows @ moved[self.equations.first]).real
+        for column, force in enumerate(forces, start=count):
+            response = steady.vibrate(force)
+            matrix[:count, column] = transfer.at_joints(response) / scale
+            matrix[count:, column] = -(self._condition_rows @ response[self.equations.first]).real
         # Rows are the equations times the scale; the columns of the joint unknowns are not scaled.
         matrix[count:, :count] = scale * to_first
         return matrix
@@ -302,7 +302,7 @@ class LinearMode:
     frequency
         Natural frequency [Hz].
     damping_ratio
-        Damping ratio due to the damping matrix.
+        Damping ratio due to the damping of the structure.
     shape
         Mode shape ``(n,)`` of unit modal mass.
 
@@ -369,7 +369,7 @@ def along_nonlinear_mode(
     control
         Control of the steps.
     steps
-        Observer of the steps, each of which finds one motion.
+        Runner of the steps, each of which finds one motion; see :class:`sa_solver.steps.Steps`.
 
     Raises
     ------
@@ -433,7 +433,7 @@ def _linear_start(
 def _first(
     record: _ModeRecorder, unknowns: Array, amplitude: float, control: ContinuationControl
 ) -> tuple[CurvePoint, ModeMotion] | str:
-    """Return the motion of the smallest amplitude, or a message why there is none."""
+    """Return the motion of the smallest amplitude, or the reason why there is none."""
     found = solve(record.equations, unknowns, amplitude, NewtonControl(control.tolerance))
     if not found.converged:
         return (

@@ -7,10 +7,10 @@ phase with the force). Then one equation is added for one more unknown, the freq
     cot(phase of x) = Re x / Im x = 0.
 
 The cotangent is used because it is linear in the frequency near the resonance of a mode, however
-small its damping, whereas Re x itself turns back within the half-power bandwidth. By default x is
-wᴴ x, with the complex amplitudes w of the force, which weights the displacements of the force's own
-points: the power of the force is then dissipated in phase (Peter and Leine, Mech. Syst. Signal
-Process. 96, 2017, 139, doi:10.1016/j.ymssp.2017.04.011).
+small its damping, whereas Re x itself turns back within the half-power bandwidth. By default the
+output is the displacement wᴴ x of the force's own points, with the complex amplitudes w of the
+force. At phase resonance all power of the force's first harmonic is then active power (Peter and
+Leine, Mech. Syst. Signal Process. 96, 2017, 139, doi:10.1016/j.ymssp.2017.04.011).
 
 The unknowns are those of harmonic balance and ln(f / f0). The latter is multiplied by the norm of
 the joints' vibration at the start, so that both have comparable sizes. The structure's matrices are
@@ -68,7 +68,7 @@ class PhaseBalance:
 
     @property
     def cotangent(self) -> float:
-        """Cotangent of the phase; infinite if no power is dissipated, where no phase is defined."""
+        """Cotangent of the phase; infinite if the force does no work."""
         return self.output.real / self.output.imag if self.output.imag else np.inf
 
     @cached_property
@@ -83,8 +83,8 @@ class PhaseBalance:
     @cached_property
     def relative(self) -> float:
         """Relative residual of the harmonic balance and the cotangent together."""
-        left = float(np.hypot(self.balance.relative, self.cotangent))
-        return left if np.isfinite(left) else np.inf
+        residual = float(np.hypot(self.balance.relative, self.cotangent))
+        return residual if np.isfinite(residual) else np.inf
 
     @cached_property
     def jacobian(self) -> Array | LinearMap:
@@ -189,7 +189,7 @@ def along_phase_resonance(
     accuracy
         Accuracy of the motions; if None, the resolution is that of the problem.
     steps
-        Observer of the steps, each of which finds one motion.
+        Runner of the steps, each of which finds one motion; see :class:`sa_solver.steps.Steps`.
 
     Raises
     ------
@@ -376,7 +376,7 @@ class _StartResonance:
 def _start_resonance(
     record: _BackboneRecorder, start: HarmonicSolution, control: ContinuationControl, steps: Steps
 ) -> _StartResonance | str:
-    """Return the phase resonance under the force of the start, or a message why there is none."""
+    """Return the phase resonance under the force of the start, or the reason why there is none."""
 
     def found(unknowns: Array) -> tuple[CurvePoint, CurvePoint, HarmonicSolution] | str:
         resonance = solve(record.equations, unknowns, start.force, NewtonControl(control.tolerance))
@@ -406,7 +406,7 @@ def _start_resonance(
 
 @dataclass(frozen=True)
 class _HalfBackbone:
-    """Motions on one side of the start, and a message why there are not more, or empty."""
+    """Motions on one side of the start; ``message`` says why there are not more, or is empty."""
 
     solutions: tuple[HarmonicSolution, ...]
     message: str

@@ -496,7 +496,7 @@ class HarmonicBalance:
         """
         if not self.transfer.mean:
             return norm(coefficients) + norm(response)
-        first = int(self.transfer.held > 0.0)
+        first = int(self.transfer.holding_stiffness > 0.0)
         size = norm(coefficients[:, first:]) + norm(self.transfer.shaped(response)[:, first:])
         by_joints = self.transfer.receptance.static_flexibility @ cycle.force[:, 0].ravel()
         return size + norm(by_joints) + norm(self.rest.loaded)

@@ -61,9 +61,9 @@ class HarmonicTransfer:
         return self.resolution.harmonics[0] == 0
 
     @cached_property
-    def held(self) -> float:
+    def holding_stiffness(self) -> float:
         """Stiffness κ [N/mm] of the holding springs; 0 where none are needed."""
-        return self.receptance.held if self.mean else 0.0
+        return self.receptance.holding_stiffness if self.mean else 0.0
 
     def steady(self, angular: Array) -> SteadyMotion:
         """Return the structure at the angular frequencies ``(k,)`` [rad/s] of the harmonics."""
@@ -87,7 +87,7 @@ class HarmonicTransfer:
         ``force`` ``(j, m, d)`` are the coefficients of the joints' forces. The holding springs act
         at harmonic 0 on the displacements ``unknowns``.
         """
-        if self.held:
+        if self.holding_stiffness:
             force = force.copy()
             force[:, 0] -= self._holding(unknowns).reshape(-1, self.directions)
         return self.modal(force)
@@ -125,7 +125,7 @@ class HarmonicTransfer:
 
     def _holding(self, unknowns: Array) -> Array:
         """Return the forces ``(j d,)`` of the springs that hold the joints at harmonic 0."""
-        return self.held * self.shaped(unknowns)[:, 0].ravel()
+        return self.holding_stiffness * self.shaped(unknowns)[:, 0].ravel()
 
 
 @dataclass(frozen=True)
@@ -170,7 +170,7 @@ class HarmonicJacobian:
         shaped = vector.reshape(self.slopes.shape[:3])
         force = shaped @ self._springs.tangents
         if self.transfer.mean:
-            held = self._springs.stiffened.held - self.transfer.held
+            held = self._springs.stiffened.holding_stiffness - self.transfer.holding_stiffness
             force[:, 0] += held * shaped[:, 0]
         response = self._at_all_joints.respond(by_function(force))
         return vector - by_joint(response, self.transfer.directions).ravel()
@@ -196,7 +196,7 @@ class HarmonicJacobian:
     def _differing(self) -> tuple[np.ndarray, Array, ResidualReceptance]:
         """Joints ``(a,)`` whose J differs from D, their J - D ``(a, m d, m d)``, and their R'."""
         directions, springs = self.slopes.shape[2], self._springs
-        holding = springs.stiffened.held if self.transfer.mean else 0.0
+        holding = springs.stiffened.holding_stiffness if self.transfer.mean else 0.0
         differing, excess = _excess(self.slopes, springs.tangents, holding)
         places = (differing[:, None] * directions + np.arange(directions)).ravel()
         return differing, excess, self._residual_receptance(places)
@@ -215,7 +215,9 @@ class HarmonicJacobian:
         slopes = self.slopes.reshape(*self.slopes.shape[:3], -1)
         jacobian = np.zeros((transfer.size, transfer.size))
         places = transfer.resolution.places
-        _assemble(self.steady.between_joints(), slopes, transfer.held, *places, jacobian)
+        _assemble(
+            self.steady.between_joints(), slopes, transfer.holding_stiffness, *places, jacobian
+        )
         return jacobian
 
 

@@ -5,8 +5,9 @@ modal; no mode is left out. Complex amplitudes x stand for Re x exp(iωt). The `
 [rad/s] ascend from 0 or above. Structural damping D does not act at ω = 0.
 
 At ω = 0, a structure that only its joints hold is singular. It is then solved with auxiliary
-springs of one stiffness κ, ``held``, in every direction of the joints, and the caller subtracts κ
-times the joints' displacements from their forces. The equations are the same, but regular.
+springs of one stiffness κ, ``holding_stiffness``, in every direction of the joints, and the caller
+subtracts κ times the joints' displacements from their forces. The equations are the same, but
+regular.
 """
 
 from __future__ import annotations
@@ -89,7 +90,10 @@ class SteadyMotion:
         return np.asarray(lagging - (2.0 * self.angular)[:, None] * motion)
 
     def between_joints(self) -> ComplexArray:
-        """Return receptances between joints ``(k, j d, j d)`` [mm/N]; held at ω = 0."""
+        """Return receptances between joints ``(k, j d, j d)`` [mm/N].
+
+        At ω = 0 the holding springs act.
+        """
         at_joints, moving = self.structure.at_joints, self._moving
         size = len(at_joints)
         between = np.empty((len(self.angular), size, size), dtype=complex)
@@ -166,10 +170,11 @@ class Receptance:
             smaller = len(rows) <= len(squares)
             if smaller and _is_diagonal(damping - rows.T @ rows, largest):
                 self._dashpots = rows
-        self.held = self._holding_stiffness() if rigid.any() else 0.0
+        self.holding_stiffness = self._stiffness_to_hold() if rigid.any() else 0.0
         try:
             self.static_factors = sl.cho_factor(
-                np.diag(self.squares) + self.held * self.at_joints.conj().T @ self.at_joints
+                np.diag(self.squares)
+                + self.holding_stiffness * self.at_joints.conj().T @ self.at_joints
             )
         except np.linalg.LinAlgError:
             raise ReceptanceError(
@@ -233,8 +238,8 @@ class Receptance:
         return np.asarray(motion.real @ at_points + 1j * (motion.imag @ at_points))
 
     def respond_at_rest(self, force: Array) -> Array:
-        """Return modal displacements ``(n,)`` due to constant modal forces ``(n,)``, held."""
-        if not self.held:
+        """Return modal displacements ``(n,)`` under constant modal forces, with holding springs."""
+        if not self.holding_stiffness:
             return np.asarray(force / self.squares)
         # This is part of every product with a Jacobian: the caller notices values that are not
         # finite.
@@ -250,7 +255,7 @@ class Receptance:
             self._residuals = {count: (high / self.squares[count:]) @ high.T}
         return self._residuals[count]
 
-    def _holding_stiffness(self) -> float:
+    def _stiffness_to_hold(self) -> float:
         """Return κ [N/mm], a share of the structure's elastic stiffness at its joints."""
         elastic = self.squares > 0.0
         at_joints = self.at_joints[:, elastic]

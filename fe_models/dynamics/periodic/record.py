@@ -34,13 +34,13 @@ class PeriodicRecord:
 
     Raises
     ------
-    ~fe_models.dynamics.excitation.ExcitationError
+    ExcitationError
         If times do not ascend from 0 to 1, if the forces do not close, or if numbers are not
         finite.
 
     Examples
     --------
-    A triangle of height 1 has 8/π² of the first harmonic, and a ninth of that of the third:
+    The first harmonic of a triangle of height 1 is 8/π², and the third is a ninth of it:
 
     >>> import numpy as np
     >>> from fe_models.dynamics.periodic.record import PeriodicRecord

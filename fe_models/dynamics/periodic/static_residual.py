@@ -22,7 +22,9 @@ MODES_STEP = 16
 
 
 class ResidualReceptance:
-    """Map from forces on some directions of the joints to displacements of all; held at ω = 0.
+    """Map from forces on some directions of the joints to displacements of all.
+
+    At ω = 0 the structure is held by the holding springs.
 
     Parameters
     ----------

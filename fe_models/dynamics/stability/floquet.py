@@ -266,7 +266,9 @@ class Floquet:
             joints = ActiveJoints.of(first, structure)
             at = structure, motion.frequency
             period = period_map(*at, times, first, joints)
-            coarse, moved = (period_map(*at, half, of, joints).multipliers for of in others)
+            coarse, moved = (
+                period_map(*at, half, deviations, joints).multipliers for deviations in others
+            )
             fine = period.multipliers
             errors = _size_differences(fine, coarse) + _size_differences(moved, coarse)
             stability = _verdict(fine, errors, joints.neutral + period.shifts.shape[1])

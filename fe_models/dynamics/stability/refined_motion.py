@@ -173,10 +173,10 @@ class MotionInTime:
     def _newton_step(self, path: Path, times: PeriodTimes) -> tuple[RefinedMotion | None, float]:
         """Return the motion after one step of Newton's method, and its relative change."""
         shares = times.starts / times.parts
-        moved = path(shares)
-        deviations = self._deviations(moved, times)
+        displacement = path(shares)
+        deviations = self._deviations(displacement, times)
         joints = ActiveJoints.of(deviations, self._structure, every=True)
-        driven = DrivenMotion(self._harmonics, self._load, moved)
+        driven = DrivenMotion(self._harmonics, self._load, displacement)
         at = self._structure, self._frequency, times, deviations, joints
         linear = period_map(*at, driven)
         try:
@@ -186,7 +186,7 @@ class MotionInTime:
         size = norm(np.abs(change).max(axis=0)) / self._vibration
         if not size < 1.0:
             return None, size
-        after = moved + change
+        after = displacement + change
         ends = np.append(shares, 1.0), np.vstack([after, after[:1]])
         spline = CubicSpline(*ends, bc_type="periodic")
         neutral = joints.neutral + linear.shifts.shape[1]
@@ -196,30 +196,30 @@ class MotionInTime:
     def _times(self, path: Path, samples: int, deepest: int) -> PeriodTimes:
         """Return the steps of a period, short where joints change their state."""
 
-        def moved(times: PeriodTimes) -> Array:
+        def displacement(times: PeriodTimes) -> Array:
             return path(times.starts / times.parts)
 
         def regimes(times: PeriodTimes) -> np.ndarray:
-            return self._deviations(moved(times), times).regimes
+            return self._deviations(displacement(times), times).regimes
 
-        return PeriodTimes.adapted(regimes, samples, deepest, moved)
+        return PeriodTimes.adapted(regimes, samples, deepest, displacement)
 
-    def _deviations(self, moved: Array, times: PeriodTimes) -> Deviations:
+    def _deviations(self, displacement: Array, times: PeriodTimes) -> Deviations:
         steps = np.diff(np.append(times.starts, times.parts)) / times.parts
-        mean = steps @ (0.5 * (moved + np.roll(moved, -1, axis=0)))
-        lead = np.vstack([mean, moved[0]]) if self._mean else moved[:1]
+        mean = steps @ (0.5 * (displacement + np.roll(displacement, -1, axis=0)))
+        lead = np.vstack([mean, displacement[0]]) if self._mean else displacement[:1]
         count = len(self._unit_coefficients[0])
-        parts = [slice(first, first + count) for first in range(0, moved.shape[1], count)]
+        parts = [slice(first, first + count) for first in range(0, displacement.shape[1], count)]
 
-        def of(part: slice, memory: int) -> Deviations:
+        def linearised(part: slice, memory: int) -> Deviations:
             return self._joints.linearise(
-                self._unit_coefficients, moved[:, part], lead[:, part], memory
+                self._unit_coefficients, displacement[:, part], lead[:, part], memory
             )
 
         if len(parts) == 1:
-            return of(parts[0], 0)
-        memory = max(of(part, 0).kept.shape[2] for part in parts)
-        return JoinedDeviations.of(of(part, memory) for part in parts)
+            return linearised(parts[0], 0)
+        memory = max(linearised(part, 0).kept.shape[2] for part in parts)
+        return JoinedDeviations.of(linearised(part, memory) for part in parts)
 
 
 def _motions_of_sectors(ring: Ring, motion: HarmonicSolution) -> list[HarmonicSolution]:

@@ -139,7 +139,7 @@ def integrate(
     start
         Initial state; at rest if None.
     steps
-        Observer of blocks of many time steps, which may store and resume them.
+        Runner of blocks of many time steps; see :class:`sa_solver.steps.Steps`.
     reached
         Function that is called after each block with the share of the work that is done.
 

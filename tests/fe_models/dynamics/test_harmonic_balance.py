@@ -192,7 +192,7 @@ def test_stuck_joints_are_preconditioned_by_their_stiffness(free):
         model = replace(model, stiffness=np.diag([500.0, 700.0, 900.0]))
     load = pressed(model, 8.0, 1.0)
     problem = balance(model, PeriodicMarch(FrictionContact(300.0, 400.0, 0.5)), (0, 1, 2), 64, load)
-    assert (problem.transfer.held > 0.0) == free
+    assert (problem.transfer.holding_stiffness > 0.0) == free
     motion = problem.solve(30.0, 0.1)
     assert np.all(motion.cycle.states == STICK)
     at = problem.evaluate(motion.coefficients.ravel(), 30.0, 0.1, "frequency")
