@@ -101,7 +101,11 @@ def curve_by_phase(problem: HarmonicBalance, near: HarmonicSolution) -> Followed
 
 @dataclass(frozen=True)
 class LocatedPoint(Generic[L]):
-    """Point of a curve, the equations there, and the direction of the curve along the parameter."""
+    """Point of a curve that has been located between two others.
+
+    ``equations`` are those at the ``point``, and ``parameter_direction`` is the component of the
+    curve's direction along the parameter; it is 0 at a fold.
+    """
 
     point: CurvePoint
     equations: L
@@ -110,7 +114,7 @@ class LocatedPoint(Generic[L]):
 
 @dataclass(frozen=True)
 class Chord(Generic[L]):
-    """Chord between two points ``(n + 1,)`` of a curve; a share of 0 is its begin, 1 its end."""
+    """Chord between two points ``(n + 1,)`` of a curve; a share of 0 is its start, 1 its end."""
 
     curve: FollowedCurve[L]
     begin: Array

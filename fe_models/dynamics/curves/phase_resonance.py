@@ -247,8 +247,8 @@ def along_phase_resonance(
 def nearest_to_phase(branch: ResponseBranch, weights: ComplexArray) -> HarmonicSolution | None:
     """Return the motion of a branch nearest to where it passes through phase resonance, or None.
 
-    If it passes several times, the one with the largest displacement wᴴ x with ``weights`` w
-    ``(n,)`` is taken. The branch also passes between two resonances.
+    If the branch passes several times, the passage with the largest displacement wᴴ x counts, with
+    ``weights`` w ``(n,)``. Between two resonances there is one too, with a small displacement.
     """
     outputs = [
         complex(np.vdot(weights, solution.motion[solution.resolution.harmonics.index(1)]))

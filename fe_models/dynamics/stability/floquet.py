@@ -81,7 +81,7 @@ class Stability:
     Parameters
     ----------
     verdict
-        Whether deviations decay.
+        Stable, unstable or unknown: whether deviations decay.
     multipliers
         Largest multipliers ``(k,)`` in descending order of magnitude, without the neutral ones.
     unstable

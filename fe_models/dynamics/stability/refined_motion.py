@@ -1,11 +1,11 @@
 """Refinement of a periodic motion in time, with steps that resolve all changes of the joints.
 
-Where a stop is stiff, or a slider sticks only for a moment, harmonics resolve the instants badly at
-which joints change their state, and multipliers depend on just these. The joint displacements from
-harmonic balance are therefore the initial guess of Newton's method for all times of a period at
-once. The structure takes exact steps under its load and under joint forces that are linear in each
-step. Steps are short where joints change their state. The derivative of the very same steps is the
-map of deviations over a period.
+Where a stop is stiff, or a slider sticks only for a moment, harmonics resolve poorly the instants
+at which joints change their state, and multipliers depend on just these instants. The joint
+displacements from harmonic balance are therefore the initial guess of Newton's method for all times
+of a period at once. The structure takes exact steps under its load and under joint forces that are
+linear in each step. Steps are short where joints change their state. The derivative of the very
+same steps is the map of deviations over a period.
 """
 
 from __future__ import annotations
