@@ -31,11 +31,7 @@ from fe_models.dynamics.joint_rest import Rest
 from fe_models.dynamics.model import DynamicModel
 from fe_models.dynamics.periodic.harmonic_jacobian import HarmonicJacobian
 from fe_models.dynamics.periodic.harmonic_solution import HarmonicSolution
-from fe_models.dynamics.periodic.harmonics import (
-    ComplexArray,
-    HarmonicBalanceError,
-    Resolution,
-)
+from fe_models.dynamics.periodic.harmonics import ComplexArray, HarmonicBalanceError, Resolution
 from fe_models.dynamics.periodic.joints import Cycle, CycleRecord, PeriodicJoints
 from fe_models.dynamics.periodic.load import PeriodicLoad as PeriodicLoad
 from fe_models.dynamics.periodic.neglected import NeglectedHarmonics, examined
@@ -63,12 +59,10 @@ class Balance:
 
     Parameters
     ----------
-    problem
-        The problem.
+    problem, force
+        The problem, and the force factor of its load.
     varies
         Name of the continuation parameter, ``frequency`` or ``force``.
-    force
-        Force factor of the load.
     steady
         The structure at this frequency.
     on_modes, vibration
@@ -129,18 +123,12 @@ class HarmonicBalance:
 
     Parameters
     ----------
-    model
-        The structure.
-    joints
-        The joint law.
-    load
-        The periodic load.
+    model, joints, load
+        The structure, its joint law and the periodic load.
     resolution
         Harmonics of the motion and samples of a period.
-    receptance
-        Receptance of the structure; computed if None.
-    rest
-        Static equilibrium of the joints; computed if None.
+    receptance, rest
+        Receptance of the structure and static equilibrium of the joints; computed if None.
 
     Raises
     ------
@@ -175,17 +163,7 @@ class HarmonicBalance:
         receptance: Receptance | WaveReceptance | None = None,
         rest: Rest | None = None,
     ) -> None:
-        lacking = sorted(load.harmonics - set(resolution.harmonics))
-        static = load.static is not None and np.any(load.static)
-        if lacking or (static and resolution.harmonics[0] != 0):
-            raise HarmonicBalanceError(
-                f"the load has harmonics {lacking or [0]}, which the resolution lacks: add them"
-            )
-        forces = [*load.waves.values(), *load.inertial.values()]
-        if load.static is not None:
-            forces.append(load.static)
-        if not all(np.isfinite(force).all() for force in forces):
-            raise HarmonicBalanceError("a force of the load is not finite: give finite forces")
+        load.check(resolution)
         self.model, self.joints, self.load, self.resolution = model, joints, load, resolution
         self.receptance = receptance or Receptance(model)
         self.transfer = transfer_of(resolution, self.receptance, joints.directions)
@@ -196,7 +174,7 @@ class HarmonicBalance:
         # and the constant ones.
         self.wave, self.inertial = (self._on_modes(part) for part in (load.waves, load.inertial))
         self._constant = np.zeros_like(self.wave)
-        if load.static is not None and static:
+        if load.static is not None and np.any(load.static):
             self._constant[0] = load.static @ self.receptance.of(0).at_points
         self.rest = rest or Rest(model, self.receptance.of(0), joints, self._constant[0].real)
         self._richer: HarmonicBalance | None = None
@@ -259,8 +237,7 @@ class HarmonicBalance:
     ) -> HarmonicSolution:
         """Return the periodic motion at a frequency [Hz] and a force.
 
-        Newton's method starts from another motion ``start``, or from the static equilibrium if
-        None.
+        Newton's method starts from a motion ``start``, or from the static equilibrium.
         """
         solution = self.find(frequency, force, self.guess(start))
         motion = self.describe(
@@ -295,8 +272,7 @@ class HarmonicBalance:
         unknowns
             Initial guess ``(n,)`` for Newton's method.
         control
-            Steps of the branch along which the force is raised. Its ``watch`` is not called, since
-            it observes another curve.
+            Steps along which the force is raised, whose ``watch`` is not called.
 
         Raises
         ------

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from fe_models.dynamics.periodic.harmonics import ComplexArray
+from fe_models.dynamics.periodic.harmonics import ComplexArray, HarmonicBalanceError, Resolution
 from sa_solver.types import Array
 
 
@@ -71,3 +71,17 @@ class PeriodicLoad:
         growing = growing + angular**2 * self.inertial.get(harmonic, nothing)
         constant = nothing if harmonic or self.static is None else self.static
         return np.asarray(force * growing + constant, dtype=complex)
+
+    def check(self, resolution: Resolution) -> None:
+        """Raise :class:`HarmonicBalanceError` if the load is not finite or not in a resolution."""
+        lacking = sorted(self.harmonics - set(resolution.harmonics))
+        static = self.static is not None and np.any(self.static)
+        if lacking or (static and resolution.harmonics[0] != 0):
+            raise HarmonicBalanceError(
+                f"the load has harmonics {lacking or [0]}, which the resolution lacks: add them"
+            )
+        forces = [*self.waves.values(), *self.inertial.values()]
+        if self.static is not None:
+            forces.append(self.static)
+        if not all(np.isfinite(force).all() for force in forces):
+            raise HarmonicBalanceError("a force of the load is not finite: give finite forces")
