@@ -4,6 +4,7 @@ import ast
 import dataclasses
 import doctest
 import importlib
+import inspect
 import re
 import subprocess
 import sys
@@ -115,10 +116,20 @@ def test_texts_of_public_classes_speak_of_every_field(name):
     """The pages show a signature and this text: shapes and units are nowhere else."""
     for public, value in _public_objects(name).items():
         fields = dataclasses.fields(value) if dataclasses.is_dataclass(value) else ()
-        text = " ".join(base.__doc__ or "" for base in value.__mro__) if fields else ""
-        quoted = " ".join(text.split("``")[1::2])
-        silent = {field.name for field in fields} - set(re.findall(r"\w+", quoted))
+        texts = [base.__doc__ or "" for base in value.__mro__] if fields else []
+        silent = {field.name for field in fields}.difference(*map(_documented, texts))
         assert not silent, f"{name}.{public} says nothing of {', '.join(sorted(silent))}"
+
+
+def _documented(text):
+    """Return the names in double backquotes, and those that numpydoc sections list."""
+    section = re.search(
+        r"^(?:Attributes|Parameters)\n-+\n((?:.*\n)*?)(?=\S.*\n-+\n|\Z)",
+        inspect.cleandoc(text) + "\n",
+        re.MULTILINE,
+    )
+    listed = re.findall(r"^\S.*$", section[1], re.MULTILINE) if section else []
+    return set(re.findall(r"\w+", " ".join([*listed, *text.split("``")[1::2]])))
 
 
 @pytest.mark.parametrize("package", ["sa_solver", "wear", "fe_models", "workflow"])
