@@ -24,7 +24,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from skfem import MeshTet
 
-from fe_models.dynamics.curves.control import ContinuationControl
+from fe_models.dynamics.curves.curve_steps import ContinuationControl
 from fe_models.dynamics.curves.forced_response import along_frequency
 from fe_models.dynamics.periodic.harmonic_balance import HarmonicBalance
 from fe_models.dynamics.periodic.harmonics import Resolution

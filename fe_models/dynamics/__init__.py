@@ -1,27 +1,27 @@
 """Structures that vibrate with joints: models, excitations, motion in time and periodic motion.
 
-M x'' + C x' + K x = f(t) - Bᵀ F(B x), with joint laws F that are handed over, such as those of
-``wear.joints``. What most uses begin with:
+The equation of motion is M x'' + C x' + K x = f(t) - Bᵀ F(B x). The caller supplies the joint laws
+F, for example those of ``wear.joints``. The main entry points are:
 
-- ``DynamicModel``: mass, damping, stiffness and where the joints are
-- ``lumped_rig``, ``reduced_rig``, ``Link``: it, from masses, springs and a reduced body
-- ``damped``: it, with Rayleigh's damping, a loss factor or dashpots
-- ``unit_force``, ``natural_frequencies``: a force on one of its points; its modes
+- ``DynamicModel``: mass, damping and stiffness matrices, and the positions of the joints
+- ``lumped_rig``, ``reduced_rig``, ``Link``: a model built from masses, springs and a reduced body
+- ``damped``: a model with Rayleigh damping, a loss factor or dashpots added
+- ``unit_force``, ``natural_frequencies``: a force on one point of a model; its modes
 - ``ConstantForce``, ``HarmonicForce``, ``HammerBlow``, ``RecordedForce``, ``CombinedForces``
-- ``integrate``, ``TimeStepControl``: the motion in time, by Newmark's average acceleration
-- ``HarmonicBalance``, ``PeriodicLoad``, ``Resolution``: periodic motions, by their harmonics
-- ``along_frequency``, ``along_force``: branches of them, folds included
-- ``motions_at``: all motions of a branch at a frequency
-- ``along_phase_resonance``: the backbone of a resonance
+- ``integrate``, ``TimeStepControl``: time integration by Newmark's average acceleration
+- ``HarmonicBalance``, ``PeriodicLoad``, ``Resolution``: periodic motions by harmonic balance
+- ``along_frequency``, ``along_force``: branches of periodic motions, folds included
+- ``motions_at``: all motions of a branch at one frequency
+- ``along_phase_resonance``: the backbone curve of a resonance
 - ``along_nonlinear_mode``, ``LinearMode``: frequency and damping of a mode against its amplitude
-- ``HarmonicBalance.of_sector``, with :mod:`fe_models.dynamics.rings.sector`: one sector of a ring
-  in a wave that travels round
-- ``Floquet``: whether motions are stable
-- ``ContinuationControl``, ``Accuracy``: the steps along a branch, how fine its motions are
-- ``frequency_response``, ``ring_down``: what a hammer's blow shows
+- ``HarmonicBalance.of_sector``, with :mod:`fe_models.dynamics.rings.sector`: one sector of a
+  cyclically symmetric ring under a travelling wave
+- ``Floquet``: stability of periodic motions
+- ``ContinuationControl``, ``Accuracy``: step sizes along a branch, and resolution of its motions
+- ``frequency_response``, ``ring_down``: evaluation of impact-hammer tests
 
-A mass of 1 kg on a spring of 1 N/µm, struck by a hammer: it vibrates at its natural frequency, and
-the energy of the blow goes into the damper.
+In the example a hammer strikes a mass of 1 kg on a spring of 1 N/µm. The mass vibrates at its
+natural frequency, and the damper dissipates the energy of the blow.
 
 >>> from fe_models.dynamics import HammerBlow, Link, TimeStepControl
 >>> from fe_models.dynamics import integrate, lumped_rig, natural_frequencies, unit_force
@@ -39,8 +39,8 @@ from typing import TYPE_CHECKING
 from sa_solver.lazy import lazy_names
 
 if TYPE_CHECKING:
-    from fe_models.dynamics.curves.control import ContinuationControl
     from fe_models.dynamics.curves.crossings import motions_at
+    from fe_models.dynamics.curves.curve_steps import ContinuationControl
     from fe_models.dynamics.curves.forced_response import Accuracy, along_force, along_frequency
     from fe_models.dynamics.curves.nonlinear_mode import LinearMode, along_nonlinear_mode
     from fe_models.dynamics.curves.phase_resonance import along_phase_resonance
@@ -102,7 +102,7 @@ __all__ = [
 __getattr__, __dir__ = lazy_names(
     __name__,
     {
-        "curves.control": ("ContinuationControl",),
+        "curves.curve_steps": ("ContinuationControl",),
         "curves.crossings": ("motions_at",),
         "damping": ("damped",),
         "excitation": (
@@ -121,6 +121,7 @@ __getattr__, __dir__ = lazy_names(
         "transient.free_decay": ("ring_down",),
         "periodic.harmonic_balance": ("HarmonicBalance",),
         "periodic.harmonics": ("Resolution",),
+        "periodic.load": ("PeriodicLoad",),
         "transient.impact_hammer": ("frequency_response",),
         "model": ("DynamicModel",),
         "transient.newmark": (
@@ -131,7 +132,6 @@ __getattr__, __dir__ = lazy_names(
             "LinearMode",
             "along_nonlinear_mode",
         ),
-        "periodic.load": ("PeriodicLoad",),
         "curves.phase_resonance": ("along_phase_resonance",),
         "rig": (
             "Link",

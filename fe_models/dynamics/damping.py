@@ -1,10 +1,11 @@
-"""Damping of a structure without its joints, beside that of its modes.
+"""Damping added to a structure without its joints: Rayleigh damping, dashpots, structural damping.
 
-Rayleigh's C = α M + β K, dashpots between two points or to the ground, and structural damping:
-its force is in phase with the velocity but does not grow with the frequency. At every harmonic
-k > 0 the stiffness is K + iD, with D = η K for one loss factor η. It is known in steady vibration
-only: in time it is not causal (Crandall 1970, J. Sound Vib. 11, 3,
-doi:10.1016/S0022-460X(70)80105-5).
+- Rayleigh damping is C = α M + β K.
+- Dashpots act between two points, or between a point and the ground.
+- The force of structural damping is in phase with the velocity but does not grow with the
+  frequency. At every harmonic k > 0 the stiffness is K + iD, with D = η K for one loss factor η. It
+  is defined in steady vibration only: in time it is not causal (Crandall 1970, J. Sound Vib. 11, 3,
+  doi:10.1016/S0022-460X(70)80105-5).
 """
 
 from __future__ import annotations
@@ -27,15 +28,31 @@ def damped(
     loss_factor: float = 0.0,
     dashpots: Mapping[Link, float] | None = None,
 ) -> DynamicModel:
-    """A model with more damping: C + α M + β K + Σ c g gᵀ, and D + η K.
+    """Return a copy of a model with damping added: C + α M + β K + Σ c g gᵀ, and D + η K.
 
-    ``mass_factor`` α [1/s], ``stiffness_factor`` β [s], ``loss_factor`` η, ``dashpots`` c [N s/mm]
-    by what stretches them. M and K are those of the structure without joints. Raises
-    :class:`RigError` for a factor or a dashpot below zero, and for names of no point.
+    M and K are those of the structure without joints.
+
+    Parameters
+    ----------
+    model
+        The structure.
+    mass_factor
+        Rayleigh factor α [1/s].
+    stiffness_factor
+        Rayleigh factor β [s].
+    loss_factor
+        Loss factor η of structural damping.
+    dashpots
+        Coefficients c [N s/mm], by the link whose stretch each dashpot resists.
+
+    Raises
+    ------
+    RigError
+        If a factor or a dashpot is below zero, or if a link names a point that does not exist.
 
     Examples
     --------
-    At resonance a loss factor η leaves F / (η k) of an amplitude:
+    At resonance a loss factor η limits the amplitude to F / (η k):
 
     >>> import numpy as np
     >>> from fe_models.dynamics import *
@@ -52,7 +69,7 @@ def damped(
     for value in (mass_factor, stiffness_factor, loss_factor, *dashpots.values()):
         checks.number("a damping", value, error=RigError)
     if min(mass_factor, stiffness_factor, loss_factor, *dashpots.values(), 0.0) < 0.0:
-        raise RigError("damping below zero, which feeds vibrations: give 0 or more")
+        raise RigError("damping below zero would feed energy into vibrations: give 0 or more")
     damping = model.damping + mass_factor * model.mass + stiffness_factor * model.stiffness
     rows = [] if model.dashpots is None else [*model.dashpots]
     for link, coefficient in dashpots.items():
@@ -60,21 +77,28 @@ def damped(
         damping = damping + np.outer(rows[-1], rows[-1])
     structural = model.structural
     if loss_factor > 0.0:
-        of_stiffness = loss_factor * model.stiffness
-        structural = of_stiffness if structural is None else structural + of_stiffness
+        by_stiffness = loss_factor * model.stiffness
+        structural = by_stiffness if structural is None else structural + by_stiffness
     together = np.array(rows) if rows else None
     return replace(model, damping=damping, structural=structural, dashpots=together)
 
 
 def rayleigh_factors(frequencies: Array, ratios: Array) -> tuple[float, float]:
-    """α [1/s] and β [s] by which modes of two ``frequencies`` [Hz] have two damping ``ratios``.
+    """Return Rayleigh factors α [1/s] and β [s] that give two modes their damping ratios.
 
-    2 ζ = α / ω + β ω. One of them is below zero where the ratios differ by more than their
-    frequencies do. Raises :class:`RigError` for frequencies that are equal or not above zero.
+    The factors solve 2 ζ = α / ω + β ω for both modes. One of them is below zero if the ratio of
+    the damping ratios exceeds that of the frequencies.
+
+    Parameters
+    ----------
+    frequencies
+        The two natural frequencies [Hz].
+    ratios
+        The two damping ratios ζ.
 
     Examples
     --------
-    Ratios as the frequencies are damping by stiffness alone:
+    Damping ratios in proportion to the frequencies need stiffness damping alone:
 
     >>> import numpy as np
     >>> from fe_models.dynamics.damping import rayleigh_factors

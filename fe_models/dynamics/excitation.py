@@ -1,6 +1,6 @@
-"""Forces on a structure: constant, harmonic, a hammer's blow, a recorded signal, and their sums.
+"""Excitation forces: constant, harmonic, a hammer blow, a recorded signal, and their sums.
 
-An excitation is called with times ``(t,)`` [s] and answers with forces ``(t, n)`` [N].
+An excitation is called with times ``(t,)`` [s] and returns forces ``(t, n)`` [N].
 """
 
 from __future__ import annotations
@@ -16,12 +16,12 @@ from sa_solver.types import Array
 
 
 class ExcitationError(InputError):
-    """A signal that no force can have."""
+    """Error in the parameters of an excitation force."""
 
 
 @dataclass(frozen=True)
 class ExcitationForce(ABC):
-    """One signal in time along ``shape`` ``(n,)``, the forces per unit of it."""
+    """Scalar signal in time, applied along ``shape`` ``(n,)``, the force per unit of the signal."""
 
     shape: Array
 
@@ -35,16 +35,16 @@ class ExcitationForce(ABC):
 
     @abstractmethod
     def value(self, times: Array) -> Array:
-        """The signal [N], of the shape of ``times``."""
+        """Return the signal [N] in the shape of ``times``."""
 
 
 @dataclass(frozen=True)
 class ConstantForce(ExcitationForce):
-    """A signal that is always 1: ``shape`` is the force [N].
+    """Constant force; ``shape`` ``(n,)`` is the force itself [N].
 
     Examples
     --------
-    A load of 5 N on the first of two points:
+    A load of 5 N acts on the first of two points:
 
     >>> import numpy as np
     >>> from fe_models.dynamics import ConstantForce
@@ -59,14 +59,30 @@ class ConstantForce(ExcitationForce):
 
 @dataclass(frozen=True)
 class HarmonicForce(ExcitationForce):
-    """``amplitude`` sin(2π ``frequency`` t + ``phase``) [N, Hz], along ``shape`` ``(n,)``.
+    """Sinusoidal force ``amplitude`` sin(2π ``frequency`` t + ``phase``) along ``shape`` ``(n,)``.
 
-    With a ``ramp`` [s] it grows from zero at t = 0 as (1 - cos(π t / ramp)) / 2. Raises
-    :class:`ExcitationError` for a frequency that is not above zero or a negative ramp.
+    Parameters
+    ----------
+    shape
+        Force ``(n,)`` per unit of the signal.
+    amplitude
+        Amplitude [N].
+    frequency
+        Frequency [Hz], above 0.
+    phase
+        Phase [rad] at t = 0.
+    ramp
+        Time [s] over which the amplitude grows from zero at t = 0, as (1 - cos(π t / ramp)) / 2; 0
+        for no ramp.
+
+    Raises
+    ------
+    ExcitationError
+        If the frequency is not above zero or the ramp is negative.
 
     Examples
     --------
-    A quarter of a period after it has grown in full it is at its amplitude:
+    A quarter of a period after the end of the ramp the force is at its amplitude:
 
     >>> import numpy as np
     >>> from fe_models.dynamics import HarmonicForce
@@ -86,8 +102,8 @@ class HarmonicForce(ExcitationForce):
         checks.numbers(self, *names, error=ExcitationError)
         if not (self.frequency > 0.0 and self.ramp >= 0.0):
             raise ExcitationError(
-                f"frequency {self.frequency:g} Hz, ramp {self.ramp:g} s: give a frequency above 0 "
-                "and a ramp of 0 or more"
+                f"a harmonic force cannot have the frequency {self.frequency:g} Hz and a ramp of "
+                f"{self.ramp:g} s: give a frequency above 0 and a ramp of 0 or more"
             )
 
     def value(self, times: Array) -> Array:
@@ -99,10 +115,24 @@ class HarmonicForce(ExcitationForce):
 
 @dataclass(frozen=True)
 class HammerBlow(ExcitationForce):
-    """Half a sine of height ``peak`` [N] from ``start`` on for ``duration`` [s].
+    """Hammer blow: half a sine of height ``peak`` that lasts for ``duration``.
 
-    It acts along ``shape`` ``(n,)``, as :func:`fe_models.dynamics.unit_force` gives it.
-    Raises :class:`ExcitationError` for a duration that is not above zero.
+    Parameters
+    ----------
+    shape
+        Force ``(n,)`` per unit of the signal, for example from
+        :func:`fe_models.dynamics.unit_force`.
+    peak
+        Largest force [N].
+    duration
+        Duration [s], above 0.
+    start
+        Time [s] at which the blow begins.
+
+    Raises
+    ------
+    ExcitationError
+        If the duration is not above zero.
 
     Examples
     --------
@@ -124,7 +154,9 @@ class HammerBlow(ExcitationForce):
         super().__post_init__()
         checks.numbers(self, "peak", "duration", "start", error=ExcitationError)
         if not self.duration > 0.0:
-            raise ExcitationError(f"a blow of {self.duration:g} s: give a duration above 0")
+            raise ExcitationError(
+                f"a hammer blow cannot last {self.duration:g} s: give a duration above 0"
+            )
 
     def value(self, times: Array) -> Array:
         share = (times - self.start) / self.duration
@@ -134,15 +166,26 @@ class HammerBlow(ExcitationForce):
 
 @dataclass(frozen=True)
 class RecordedForce(ExcitationForce):
-    """Samples ``force`` ``(s,)`` [N] at ``times`` ``(s,)`` [s]: linear between, constant beyond.
+    """Force from samples: linear between the samples, constant before the first and after the last.
 
-    It acts along ``shape`` ``(n,)``.
-    Raises :class:`ExcitationError` for no or unequal samples, for values that are not finite, or
-    for times that do not ascend.
+    Parameters
+    ----------
+    shape
+        Force ``(n,)`` per unit of the signal.
+    times
+        Sample times ``(s,)`` [s], ascending.
+    force
+        Samples ``(s,)`` [N].
+
+    Raises
+    ------
+    ExcitationError
+        If there are no samples, if times and forces differ in number, if a value is not finite, or
+        if the times do not ascend.
 
     Examples
     --------
-    A triangle of three samples:
+    Three samples make a triangle:
 
     >>> import numpy as np
     >>> from fe_models.dynamics import RecordedForce
@@ -169,13 +212,15 @@ class RecordedForce(ExcitationForce):
         checks.settle(self, **columns)
         if not 0 < len(self.times) == len(self.force):
             raise ExcitationError(
-                f"{len(self.times)} times and {len(self.force)} forces: give one or more, as many "
-                "of both"
+                f"a recorded force has {len(self.times)} times and {len(self.force)} forces: give "
+                "one force for each time, and at least one of both"
             )
         if not (np.isfinite(self.times).all() and np.isfinite(self.force).all()):
-            raise ExcitationError("a recorded time or force is not a number: give finite ones")
+            raise ExcitationError(
+                "a recorded time or force is not a finite number: remove or correct it"
+            )
         if np.any(np.diff(self.times) <= 0.0):
-            raise ExcitationError("recorded times do not ascend: give each once, earliest first")
+            raise ExcitationError("recorded times do not ascend: sort them and remove duplicates")
 
     def value(self, times: Array) -> Array:
         return np.asarray(np.interp(times, self.times, self.force))
@@ -183,11 +228,11 @@ class RecordedForce(ExcitationForce):
 
 @dataclass(frozen=True)
 class CombinedForces:
-    """The sum of one or more ``forces``.
+    """Sum of one or more ``forces``.
 
     Examples
     --------
-    A load that stays and one that swings:
+    A constant and a harmonic load act together:
 
     >>> import numpy as np
     >>> from fe_models.dynamics import CombinedForces, ConstantForce, HarmonicForce

@@ -1,4 +1,4 @@
-"""A vibrating structure with joints: M x'' + C x' + K x = f(t) - Bᵀ F(B x)."""
+"""Model of a vibrating structure with joints: M x'' + C x' + K x = f(t) - Bᵀ F(B x)."""
 
 from __future__ import annotations
 
@@ -11,19 +11,28 @@ from sa_solver.types import Array
 
 @dataclass(frozen=True)
 class DynamicModel:
-    """``mass``, ``damping`` and ``stiffness`` ``(n, n)`` without joints, in t, N s/mm and N/mm.
+    """Matrices of a structure without its joints, and the connection to the joints.
 
-    ``connection`` ``(j d, n)`` is B: it takes displacements of the structure to those of its ``j``
-    joints of ``d`` directions, one joint after the other. ``names`` ``(n,)`` are those of the
-    degrees of freedom. ``structural`` ``(n, n)`` D [N/mm], None for none, is damping in phase with
-    the velocity that does not grow with it: in steady vibration the stiffness is K + iD. There is
-    none in time. ``dashpots`` ``(r, n)`` G tells what part of ``damping`` a few dashpots are, GᵀG:
-    steady vibration is found the sooner. Raises InputError for other shapes, and for numbers that
-    are masked or not finite.
+    Parameters
+    ----------
+    mass, damping, stiffness
+        Matrices M [t], C [N s/mm] and K [N/mm], ``(n, n)``.
+    connection
+        Matrix B ``(j d, n)``. It maps displacements of the structure to those of its ``j`` joints
+        of ``d`` directions, one joint after the other.
+    names
+        Names ``(n,)`` of the degrees of freedom.
+    structural
+        Structural damping matrix D ``(n, n)`` [N/mm], or None. Its force is in phase with the
+        velocity but does not grow with the frequency: in steady vibration the stiffness is K + iD.
+        Time integration does not support it.
+    dashpots
+        Rows G ``(r, n)`` of a few dashpots whose damping GᵀG is already part of ``damping``, or
+        None. They only make steady vibration faster to compute.
 
     Examples
     --------
-    A mass of 1 kg on a spring of 1 N/µm, with a joint between it and the ground: ω = √(k/m)
+    A mass of 1 kg stands on a spring of 1 N/µm, with a joint to the ground: ω = √(k/m).
 
     >>> import numpy as np
     >>> from fe_models.dynamics import DynamicModel, natural_frequencies
@@ -52,7 +61,7 @@ class DynamicModel:
 
 
 class IncrementResponse(Protocol):
-    """What joints answer to an increment of displacement; see :class:`Joints`."""
+    """Response of joints to an increment of displacement; see :class:`Joints`."""
 
     @property
     def force(self) -> Array: ...
@@ -65,10 +74,11 @@ class IncrementResponse(Protocol):
 
 
 class Joints(Protocol):
-    """A law of joints: :class:`wear.joints.law.JointLaw` is one.
+    """Protocol of a joint law for time integration, e.g. :class:`wear.joints.law.JointLaw`.
 
-    ``respond`` answers to increments ``(j, d)`` [mm] with resisting forces ``(j, d)`` [N], tangents
-    ``(j, d, d)``, a new state and the energies dissipated ``(j,)`` [N mm].
+    ``respond`` takes increments of displacement ``(j, d)`` [mm]. It returns the resisting forces
+    ``(j, d)`` [N], the tangents ``(j, d, d)`` [N/mm], the new state and the dissipated energies
+    ``(j,)`` [N mm].
     """
 
     @property

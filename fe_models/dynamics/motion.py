@@ -1,4 +1,4 @@
-"""How a structure with joints has moved, whichever integrator found it, and its energies."""
+"""Motion of a structure with joints in time, and its energies, from any integrator."""
 
 from __future__ import annotations
 
@@ -13,11 +13,20 @@ from sa_solver.types import Array
 
 @dataclass(frozen=True)
 class Start:
-    """State at the first time: at rest in every respect unless given.
+    """Initial state of a time integration; at rest unless given.
 
-    ``displacement`` and ``velocity`` ``(n,)`` [mm, mm/s]. Without a ``joint_state`` ``(j, k)`` the
-    joints have been loaded from rest straight to the displacement. ``companion`` is where the same
-    motion is by steps of twice the length, if not there.
+    Parameters
+    ----------
+    displacement, velocity
+        Initial displacement [mm] and velocity [mm/s], ``(n,)``.
+    joint_state
+        State ``(j, k)`` of the joints. If None, the joints are loaded from rest straight to the
+        initial displacement.
+    time
+        Initial time [s].
+    companion
+        Initial state of the companion run, which integrates the same motion with steps of twice the
+        length. If None, it starts from this state.
     """
 
     displacement: Array | None = None
@@ -27,7 +36,10 @@ class Start:
     companion: Start | None = None
 
     def motion(self, size: int) -> Array:
-        """Displacements, then velocities ``(2 n,)``. Raises InputError for others than ``(n,)``."""
+        """Return displacements, then velocities, as one vector ``(2 n,)``.
+
+        Raise InputError unless they are ``(n,)``.
+        """
         given = {"displacements": self.displacement, "velocities": self.velocity}
         return np.concatenate(
             [
@@ -41,12 +53,13 @@ class Start:
 
 @dataclass(frozen=True)
 class Energies:
-    """Energies [N mm] at each time.
+    """Energies [N mm] of a structure with joints at each time.
 
-    ``kinetic`` and ``elastic`` ``(t,)`` of the structure; from the start until then: ``excitation``
-    ``(t,)``, the work of the excitation, ``damping`` ``(t,)``, what the structure's damping has
-    dissipated, ``joint_work`` ``(t,)``, the work done on the joints, and ``joints`` ``(t, j)``,
-    what each of them has dissipated of it. The rest of the work they store.
+    ``kinetic`` and ``elastic`` ``(t,)`` are those of the structure. The others are summed from the
+    start: ``excitation`` ``(t,)`` is the work of the excitation, ``damping`` ``(t,)`` the energy
+    that the damping of the structure has dissipated, ``joint_work`` ``(t,)`` the work done on the
+    joints, and ``joints`` ``(t, j)`` the part of it that each joint has dissipated. The joints
+    store the rest of that work.
     """
 
     kinetic: Array
@@ -58,13 +71,13 @@ class Energies:
 
     @property
     def missing(self) -> Array:
-        """What is missing ``(t,)`` [N mm] of what the excitation and the start have brought in."""
+        """Error ``(t,)`` [N mm] of the energy balance: energy supplied less energy found."""
         held = self.kinetic + self.elastic
         return self.excitation - (held - held[0]) - self.damping - self.joint_work
 
     @property
     def balance_error(self) -> float:
-        """The largest of what is missing, relative to the largest energy there is."""
+        """Largest error of the energy balance, relative to the largest energy that occurs."""
         terms = (self.kinetic, self.elastic, self.excitation, self.damping, self.joint_work)
         largest = max(float(np.abs(term).max(initial=0.0)) for term in terms)
         return float(np.abs(self.missing).max(initial=0.0)) / largest if largest > 0.0 else 0.0
@@ -72,15 +85,31 @@ class Energies:
 
 @dataclass(frozen=True)
 class Motion:
-    """A motion at ``times`` ``(t,)`` [s], up to where it was found.
+    """Motion of a structure with joints at ``times`` ``(t,)`` [s].
 
-    ``displacement``, ``velocity`` and ``acceleration`` ``(t, n)`` [mm, s]; of the joints
-    ``joint_displacement`` [mm] and the resisting ``joint_force`` [N] ``(t, j, d)``, and
-    ``joint_state`` ``(j, k)`` and ``companion`` at the end. ``error`` estimates the largest error
-    of displacement that the steps leave, those before the start included, relative to the largest
-    displacement, both as norms weighted by mass; ``residual`` is the largest residual of the
-    joints' equilibrium, relative to their largest force; ``steps`` counts all steps, and
-    ``message`` is empty unless the integration has stopped early: then it says why and what to try.
+    Parameters
+    ----------
+    times
+        Times ``(t,)`` [s] at which the motion is recorded.
+    displacement, velocity, acceleration
+        Motion ``(t, n)`` of the structure [mm, mm/s, mm/s²].
+    joint_displacement, joint_force
+        Displacements [mm] and resisting forces [N] of the joints, ``(t, j, d)``.
+    joint_state
+        State ``(j, k)`` of the joints at the last time.
+    companion
+        State of the companion run at the last time, or None; see :class:`Start`.
+    energies
+        Energies at all times.
+    error
+        Estimate of the largest displacement error due to the time steps, those before the start
+        included, relative to the largest displacement. Both are norms weighted by mass.
+    residual
+        Largest residual of the joints' equilibrium, relative to their largest force.
+    steps
+        Number of all time steps.
+    message
+        Empty, or the reason why the integration stopped early and what to change.
     """
 
     times: Array
@@ -103,7 +132,7 @@ class Motion:
 
     @property
     def end(self) -> Start:
-        """The last state, to go on from."""
+        """Last state, from which the integration can be continued."""
         return Start(
             self.displacement[-1],
             self.velocity[-1],
@@ -114,15 +143,23 @@ class Motion:
 
 
 def quadratic(matrix: Array, values: Array) -> Array:
-    """½ vᵀ A v ``(t,)`` of vectors ``(t, n)``: the energy held in a mass or a stiffness."""
+    """Return ½ vᵀ A v ``(t,)`` for vectors ``(t, n)``: the energy held in a mass or a stiffness."""
     return np.asarray(0.5 * np.einsum("ti,ti->t", values @ matrix, values))
 
 
 def accelerations(model: DynamicModel, motion: Array, force: Array, joint_force: Array) -> Array:
-    """M⁻¹ (f - Bᵀ F - C v - K x) ``(t, n)``.
+    """Return the accelerations M⁻¹ (f - Bᵀ F - C v - K x) ``(t, n)`` [mm/s²].
 
-    ``motion`` ``(t, 2 n)`` are displacements, then velocities; ``force`` ``(t, n)``,
-    ``joint_force`` ``(t, j d)``.
+    Parameters
+    ----------
+    model
+        The structure.
+    motion
+        Displacements, then velocities, ``(t, 2 n)``.
+    force
+        Forces ``(t, n)`` [N] on the structure.
+    joint_force
+        Resisting forces ``(t, j d)`` [N] of the joints.
     """
     displacement, velocity = np.split(motion, 2, axis=1)
     unbalanced = (

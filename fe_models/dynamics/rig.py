@@ -1,7 +1,7 @@
-"""Rigs: lumped masses, springs and reduced bodies that vibrate, and where their joints are.
+"""Rigs: lumped masses, springs and reduced bodies that vibrate, with joints between named points.
 
-Points are known by their names. Damping is that of the modes with the joints free, so that a rig
-without friction rings down as measured: C = M Φ diag(2 ζ ω) Φᵀ M with Φᵀ M Φ = I.
+Modal damping is defined for the rig with its joints free, so that a rig without friction rings down
+with the damping ratios that were measured: C = M Φ diag(2 ζ ω) Φᵀ M with Φᵀ M Φ = I.
 """
 
 from __future__ import annotations
@@ -20,21 +20,21 @@ from sa_solver.errors import InputError
 from sa_solver.types import Array
 
 NOTHING: Mapping[str, float] = {}
-# Names that fit into a message.
+# Number of names that a message lists at most.
 MOST_LISTED = 12
 
 
 class RigError(InputError):
-    """A rig that cannot be built from what was given."""
+    """Error in the description of a rig, so that it cannot be built."""
 
 
 @dataclass(frozen=True)
 class Link:
-    """What stretches by the displacement of ``second`` relative to ``first``; None is ground.
+    """Link that stretches by the displacement of ``second`` relative to ``first``; None is ground.
 
     Examples
     --------
-    Two masses of 1 kg that a link of 1 N/µm joins and nothing holds: ω = 0 and √(2 k/m)
+    A spring of 1 N/µm joins two free masses of 1 kg: ω = 0 and √(2 k/m).
 
     >>> import numpy as np
     >>> from fe_models.dynamics import Link, lumped_rig, natural_frequencies
@@ -54,15 +54,28 @@ def lumped_rig(
     joints: Sequence[Sequence[Link]],
     damping_ratio: float | Array = 0.0,
 ) -> DynamicModel:
-    """Masses [t] and springs [N/mm] that move along one line, with joints.
+    """Return a rig of masses and springs that move along one line, with joints.
 
-    Every joint is one link per direction. ``damping_ratio`` is one, or that of each mode ``(n,)``,
-    from the lowest on; of fewer the last is that of all beyond. Raises :class:`RigError` for a name
-    that is not a mass, or a mass that is not above zero.
+    Parameters
+    ----------
+    masses
+        Mass [t] of each point, by its name.
+    springs
+        Stiffness [N/mm] of each spring, by the link that it joins.
+    joints
+        One link per direction for every joint.
+    damping_ratio
+        Modal damping ratio: one for all modes, or one per mode from the lowest on. If there are
+        fewer ratios than modes, the last one holds for all higher modes.
+
+    Raises
+    ------
+    RigError
+        If a link names a point without a mass, or a mass is not above zero.
 
     Examples
     --------
-    Two masses of 1 kg in a row on springs of 1 N/µm: ω² = (3 ∓ √5)/2 k/m
+    Two masses of 1 kg stand in a row on springs of 1 N/µm: ω² = (3 ∓ √5)/2 k/m.
 
     >>> import numpy as np
     >>> from fe_models.dynamics import Link, lumped_rig, natural_frequencies
@@ -85,19 +98,36 @@ def reduced_rig(
     springs: Mapping[Link, float] | None = None,
     damping_ratio: float | Array = 0.0,
 ) -> DynamicModel:
-    """A reduced body, with lumped masses [t] and springs [N/mm] added to it, and joints.
+    """Return a rig made of a reduced body, with lumped masses, springs and joints added.
 
-    ``names`` ``(c,)`` are those of its kept displacements; its modes follow as ``mode 1`` ... A
-    mass of another name is a further point. Every joint is one link per direction, its
-    displacement the second's minus the first's. ``damping_ratio`` is one, or that of each mode
-    ``(n,)`` of the rig, as of :func:`lumped_rig`; a damping matrix of the body comes to it. Raises
-    :class:`RigError` for a model without mass, for names that are not as many as the kept
-    displacements, and as :func:`lumped_rig`.
+    Parameters
+    ----------
+    reduced
+        The reduced body, with its mass matrix. Its damping matrix, if any, is added to the modal
+        damping.
+    names
+        Names ``(c,)`` of the kept displacements of the body. Its modes are named ``mode 1``,
+        ``mode 2``, ...
+    joints
+        One link per direction for every joint. The displacement of a joint is that of the second
+        point less that of the first.
+    masses
+        Lumped masses [t] by name. A name that the body does not have adds a point.
+    springs
+        Stiffness [N/mm] of each spring, by the link that it joins.
+    damping_ratio
+        Modal damping ratio of the rig, as in :func:`lumped_rig`.
+
+    Raises
+    ------
+    RigError
+        If the body has no mass matrix, if names and kept displacements differ in number, or as in
+        :func:`lumped_rig`.
 
     Examples
     --------
-    Eleven masses and ten springs in a row, reduced to the ends and eight modes: it is free, and
-    vibrates at 2 √(k/m) sin(π/22).
+    Eleven masses and ten springs in a row are reduced to the two ends and eight modes. The row is
+    free, and its first elastic mode has ω = 2 √(k/m) sin(π/22).
 
     >>> import numpy as np
     >>> import scipy.sparse as sp
@@ -115,10 +145,13 @@ def reduced_rig(
     if not isinstance(reduced, ReducedModel):
         raise RigError(f"a {type(reduced).__name__} in place of a reduced body: give one")
     if reduced.mass is None:
-        raise RigError("the reduced model has no mass: reduce the body with its mass matrix")
+        raise RigError(
+            "the reduced model has no mass: reduce the body together with its mass matrix"
+        )
     if len(names) != len(reduced.kept):
         raise RigError(
-            f"{len(names)} names for {len(reduced.kept)} kept displacements: give one for each"
+            f"there are {len(names)} names for {len(reduced.kept)} kept displacements: give one "
+            "name for each"
         )
     modes = tuple(f"mode {mode + 1}" for mode in range(len(reduced.frequencies)))
     named = (*names, *modes)
@@ -140,12 +173,19 @@ def connected_rig(
     joints: Sequence[Sequence[Link]],
     damping_ratio: float | Array = 0.0,
 ) -> DynamicModel:
-    """Masses and springs added to the matrices ``(c, c)`` of displacements ``names``, and joints.
+    """Return a rig made of given matrices, with masses, springs and joints added.
 
-    As :func:`reduced_rig`, whatever the matrices come from.
+    Parameters
+    ----------
+    mass, stiffness
+        Matrices ``(c, c)`` [t, N/mm] of the displacements ``names``.
+    names
+        Names ``(c,)`` of these displacements.
+    masses, springs, joints, damping_ratio
+        As in :func:`reduced_rig`.
     """
-    every = names + tuple(name for name in masses if name not in names)
-    rig = undamped_rig(mass, stiffness, every, masses, springs, joints)
+    all_names = names + tuple(name for name in masses if name not in names)
+    rig = undamped_rig(mass, stiffness, all_names, masses, springs, joints)
     return replace(rig, damping=modal_damping(rig.mass, rig.stiffness, damping_ratio))
 
 
@@ -157,15 +197,25 @@ def undamped_rig(
     springs: Mapping[Link, float],
     joints: Sequence[Sequence[Link]],
 ) -> DynamicModel:
-    """The same without damping, of all ``names``: matrices are of the first of them."""
+    """Return a rig without damping; see :func:`connected_rig`.
+
+    Parameters
+    ----------
+    mass, stiffness
+        Matrices ``(c, c)`` [t, N/mm] of the first ``c`` of the displacements ``names``.
+    names
+        Names ``(n,)`` of all displacements, those that ``masses`` add included.
+    masses, springs, joints
+        As in :func:`reduced_rig`.
+    """
     if len(set(names)) < len(names):
-        raise RigError("two points have the same name: give each its own")
+        raise RigError("two points have the same name: give every point a name of its own")
     added = len(names) - len(mass)
     mass, stiffness = (np.pad(matrix, (0, added)) for matrix in (mass, stiffness))
     for name, value in masses.items():
         checks.number(f"mass of {name}", value, error=RigError)
-        place = _place(names, name)
-        mass[place, place] += value
+        row = _index(names, name)
+        mass[row, row] += value
     for link, value in springs.items():
         checks.number(f"spring of {link}", value, error=RigError)
         stretch = stretch_of(names, link)
@@ -180,21 +230,38 @@ def undamped_rig(
 
 
 def modal_damping(mass: Array, stiffness: Array, ratio: float | Array) -> Array:
-    """C = M Φ diag(2 ζ ω) Φᵀ M ``(n, n)`` with ``ratio`` ζ of all modes, or of each ``(n,)``.
+    """Return the damping matrix C = M Φ diag(2 ζ ω) Φᵀ M ``(n, n)`` for given damping ratios.
 
-    Of fewer ratios, from the lowest mode on, the last is that of all modes beyond. Rigid motions
-    (ω = 0) are modes too, and are not damped. Raises :class:`RigError` if the mass is not positive
-    definite, or a ratio is below zero, or there are more of them than modes.
+    Rigid motions (ω = 0) count as modes and are not damped.
+
+    Parameters
+    ----------
+    mass, stiffness
+        Matrices ``(n, n)`` [t, N/mm].
+    ratio
+        Damping ratio ζ of all modes, or one per mode from the lowest on. If there are fewer ratios
+        than modes, the last one holds for all higher modes.
+
+    Raises
+    ------
+    RigError
+        If the mass matrix is not positive definite, if a ratio is below zero, or if there are more
+        ratios than modes.
     """
     given = np.atleast_1d(checks.array("damping ratios", ratio, None, error=RigError))
     if given.ndim > 1 or np.any(given < 0.0):
         raise RigError(f"damping ratio {given.min(initial=0.0):g}: give one or (n,), 0 or more")
     if not 0 < len(given) <= len(mass):
-        raise RigError(f"{len(given)} damping ratios for {len(mass)} modes: give one for each")
+        raise RigError(
+            f"there are {len(given)} damping ratios for {len(mass)} modes: give at least one, at "
+            "most one for each mode"
+        )
     try:
         squares, shapes = sl.eigh(stiffness, mass)
     except np.linalg.LinAlgError:
-        raise RigError("the mass matrix is not positive definite: give every point mass") from None
+        raise RigError(
+            "the mass matrix is not positive definite: give every point mass above 0"
+        ) from None
     angular = np.sqrt(np.maximum(squares, 0.0))
     moved = mass @ shapes
     ratios = np.pad(given, (0, len(mass) - len(given)), mode="edge")
@@ -202,14 +269,21 @@ def modal_damping(mass: Array, stiffness: Array, ratio: float | Array) -> Array:
 
 
 def natural_frequencies(model: DynamicModel, joint_stiffness: float | Array = 0.0) -> Array:
-    """Natural frequencies ``(n,)`` [Hz], undamped, with springs in place of the joints.
+    """Return the undamped natural frequencies ``(n,)`` [Hz], with springs in place of the joints.
 
-    ``joint_stiffness`` [N/mm] is one for all, one for each row of the connection ``(j d,)``, or
-    the joints' tangents ``(j, d, d)``. Zero leaves the joints free. Rigid motions have 0.
+    Rigid motions have the frequency 0.
+
+    Parameters
+    ----------
+    model
+        The structure.
+    joint_stiffness
+        Stiffness [N/mm] of these springs: one value for all, one per row of the connection
+        ``(j d,)``, or tangents ``(j, d, d)``. Zero leaves the joints free.
 
     Examples
     --------
-    A joint that sticks is one more spring, √((k + kt)/m):
+    A joint that sticks acts as one more spring, ω = √((k + kt)/m):
 
     >>> import numpy as np
     >>> from fe_models.dynamics import Link, lumped_rig, natural_frequencies
@@ -219,17 +293,19 @@ def natural_frequencies(model: DynamicModel, joint_stiffness: float | Array = 0.
     2.000000
     """
     stretch = model.connection
-    held = checks.array("joint stiffnesses", joint_stiffness, None, error=RigError)
-    size = len(held) * held.shape[1] if held.ndim == 3 else held.size if held.ndim else len(stretch)
-    if held.ndim == 2 or size != len(stretch):
+    stiffnesses = checks.array("joint stiffnesses", joint_stiffness, None, error=RigError)
+    size = stiffnesses.size if stiffnesses.ndim else len(stretch)
+    if stiffnesses.ndim == 3:
+        size = len(stiffnesses) * stiffnesses.shape[1]
+    if stiffnesses.ndim == 2 or size != len(stretch):
         raise RigError(
-            f"joint stiffnesses of shape {held.shape} for {len(stretch)} rows of the connection: "
-            "give one, one for each row, or the tangents of the joints"
+            f"joint stiffnesses of shape {stiffnesses.shape} for {len(stretch)} rows of the "
+            "connection: give one, one for each row, or the tangents of the joints"
         )
-    if held.ndim == 3:
-        springs = sl.block_diag(*held)
+    if stiffnesses.ndim == 3:
+        springs = sl.block_diag(*stiffnesses)
     else:
-        springs = np.diag(np.broadcast_to(held, len(stretch)))
+        springs = np.diag(np.broadcast_to(stiffnesses, len(stretch)))
     squares = sl.eigh(
         model.stiffness + stretch.conj().T @ springs @ stretch, model.mass, eigvals_only=True
     )
@@ -239,11 +315,16 @@ def natural_frequencies(model: DynamicModel, joint_stiffness: float | Array = 0.
 
 
 def unit_force(model: DynamicModel, name: str) -> Array:
-    """A force of 1 N on the point ``name``, as ``(n,)``. Raises :class:`RigError` if unknown.
+    """Return a force of 1 N on the point ``name``, as a vector ``(n,)``.
+
+    Raises
+    ------
+    RigError
+        If the model has no such point.
 
     Examples
     --------
-    1 N on the second of two masses:
+    A force of 1 N acts on the second of two masses:
 
     >>> from fe_models.dynamics import Link, lumped_rig, unit_force
     >>> rig = lumped_rig({"a": 1e-3, "b": 1e-3}, {Link("a"): 1e3, Link("b", "a"): 1e3}, [])
@@ -251,28 +332,30 @@ def unit_force(model: DynamicModel, name: str) -> Array:
     [0. 1.]
     """
     force = np.zeros(len(model.names))
-    force[_place(model.names, name)] = 1.0
+    force[_index(model.names, name)] = 1.0
     return force
 
 
 def _connection(names: tuple[str, ...], joints: Sequence[Sequence[Link]]) -> Array:
-    """B ``(j d, n)``. All joints have the same directions."""
+    """Return the connection matrix B ``(j d, n)``; all joints must have the same directions."""
     if len({len(joint) for joint in joints}) > 1:
-        raise RigError("joints of different numbers of directions: give all the same")
+        raise RigError(
+            "joints have different numbers of directions: give every joint as many links"
+        )
     rows = [stretch_of(names, link) for joint in joints for link in joint]
     return np.array(rows).reshape(len(rows), len(names))
 
 
 def stretch_of(names: tuple[str, ...], link: Link) -> Array:
-    """The row that takes the displacements of all points to the stretch of a link."""
+    """Return the row ``(n,)`` that maps displacements of all points to the stretch of a link."""
     row = np.zeros(len(names))
     for name, sign in ((link.second, 1.0), (link.first, -1.0)):
         if name is not None:
-            row[_place(names, name)] += sign
+            row[_index(names, name)] += sign
     return row
 
 
-def _place(names: tuple[str, ...], name: str) -> int:
+def _index(names: tuple[str, ...], name: str) -> int:
     if name not in names:
         more = ", ..." if len(names) > MOST_LISTED else ""
         listed = ", ".join(names[:MOST_LISTED]) + more

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from fe_models.dynamics.curves.control import ContinuationControl
+from fe_models.dynamics.curves.curve_steps import ContinuationControl
 from fe_models.dynamics.curves.forced_response import ResponseBranch, along_frequency
 from fe_models.dynamics.periodic.harmonic_balance import HarmonicBalance
 from fe_models.dynamics.periodic.harmonics import Resolution

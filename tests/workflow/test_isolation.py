@@ -12,7 +12,7 @@ import h5py
 import numpy as np
 import pytest
 
-from fe_models.dynamics.curves.control import ContinuationControl
+from fe_models.dynamics.curves.curve_steps import ContinuationControl
 from fe_models.dynamics.periodic.harmonic_balance import HarmonicBalance
 from fe_models.dynamics.periodic.harmonics import Resolution
 from fe_models.dynamics.periodic.load import PeriodicLoad

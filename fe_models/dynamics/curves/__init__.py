@@ -1,1 +1,1 @@
-"""Curves of periodic motions: forced responses, nonlinear modes, bifurcations."""
+"""Curves of periodic motions: forced responses, backbones, nonlinear modes, bifurcations."""

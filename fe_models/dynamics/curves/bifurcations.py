@@ -1,14 +1,16 @@
-"""Bifurcations on a curve of periodic motions: where their stability changes, and where it folds.
+"""Bifurcations on a curve of periodic motions: changes of stability, and folds.
 
-Between two points the curve is followed along the chord, across which Newton's method leads back to
-it. Where multipliers leave the unit circle the one that does so is brought to it there, and says
-what happens: at 1 the curve folds, or another one branches off, as where a motion loses its
-symmetry; at -1 the period doubles; a pair elsewhere is a Neimark-Sacker bifurcation (Seydel 2010,
-*Practical Bifurcation and Stability Analysis*, 3rd ed., section 7.4).
+Between two points, the curve is parametrised by the chord between them: Newton's method leads to
+the curve in the plane across the chord. Where the number of multipliers outside the unit circle
+changes, the point is located at which one of them crosses the circle. The multiplier there says
+what happens: at 1 the curve folds or another one branches off, as where a motion loses its
+symmetry; at -1 the period doubles; a complex pair indicates a Neimark-Sacker bifurcation (Seydel
+2010, *Practical Bifurcation and Stability Analysis*, 3rd ed., section 7.4).
 
-Folds are found by the curve itself, where it turns: the multiplier of a motion of few harmonics is
-1 nearby. Everything else is looked for only between motions whose multipliers are known. Joints
-that begin to touch or to slip may take multipliers past the circle in a jump.
+Folds are located where the curve itself turns back, since for a motion of few harmonics the
+multiplier is 1 only nearby. All other bifurcations are located only between motions whose
+multipliers are known. Joints that close or begin to slip may make multipliers jump across the
+circle.
 """
 
 from __future__ import annotations
@@ -21,31 +23,40 @@ from typing import Generic, Literal
 import numpy as np
 from scipy.optimize import brentq
 
-from fe_models.dynamics.curves.control import ContinuationControl
-from fe_models.dynamics.curves.followed_curve import Chord, FollowedCurve, Place
+from fe_models.dynamics.curves.curve_steps import ContinuationControl
+from fe_models.dynamics.curves.followed_curve import Chord, FollowedCurve, LocatedPoint
 from fe_models.dynamics.curves.newton import L
 from fe_models.dynamics.periodic.harmonic_solution import HarmonicSolution
 from fe_models.dynamics.stability.floquet import Floquet, Stability
 from sa_solver.errors import ConvergenceError
 
 Kind = Literal["fold", "branching", "period_doubling", "neimark_sacker", "jump"]
-# Share of the way between two points to which a bifurcation is located.
-LOCATED = 1e-5
-# Distance of a multiplier from the circle at a bifurcation beyond which it has jumped past it.
-NEAR = 2e-2
-# Angle [rad] from 1 or -1 up to which one on the circle is taken as real: two that meet there part
-# along it as the root of how far they are past it.
-REAL = 2e-2
+# Tolerance of the location of a bifurcation, as a share of the chord between two points.
+LOCATION_TOLERANCE = 1e-5
+# Distance of a multiplier from the unit circle at a bifurcation beyond which it has jumped across.
+JUMP_DISTANCE = 2e-2
+# Angle [rad] from 1 or -1 up to which a multiplier on the circle counts as real. Two multipliers
+# that meet there move apart along the circle with the square root of the distance beyond the
+# bifurcation.
+REAL_ANGLE = 2e-2
 
 
 @dataclass(frozen=True)
 class Bifurcation:
-    """A ``motion`` of a ``kind``, between two points of a curve of which one comes ``after`` so
-    many others.
+    """Bifurcation of a curve of motions.
 
-    ``multiplier`` is the one that passes the circle there; of a fold, the nearest to 1.
-    ``unstable`` is how many are beyond the circle at the points before and after, None where that
-    is not known.
+    Parameters
+    ----------
+    kind
+        Kind of the bifurcation.
+    motion
+        The motion at the bifurcation.
+    multiplier
+        The multiplier that crosses the unit circle there; for a fold, the one nearest to 1.
+    after
+        Index of the last point of the curve before the bifurcation.
+    unstable
+        Number of multipliers outside the circle at the points before and after, None where unknown.
     """
 
     kind: Kind
@@ -58,141 +69,161 @@ class Bifurcation:
 def find_bifurcations(
     curve: FollowedCurve[L], motions: Sequence[HarmonicSolution], stability: Sequence[Stability]
 ) -> tuple[Bifurcation, ...]:
-    """Those between ``motions`` of a curve, in their order, of which the ``stability`` is known.
+    """Return the bifurcations between the motions of a curve, in their order.
 
-    Where Newton's method does not find the curve between two points none is told there.
+    None is reported between two motions where Newton's method does not find the curve.
+
+    Parameters
+    ----------
+    curve
+        The curve.
+    motions
+        Motions of the curve, in their order.
+    stability
+        Stability of each motion.
     """
     floquet = Floquet(curve.problem)
-    places = [curve.coordinates_of(motion) for motion in motions]
+    points = [curve.coordinates_of(motion) for motion in motions]
     control = ContinuationControl()
-    ways = [_Way(Chord(curve, *ends, control), floquet) for ends in pairwise(places)]
-    folds = {place: fold for place in _turns(curve, motions, ways) if (fold := ways[place].fold())}
+    segments = [_Segment(Chord(curve, *ends, control), floquet) for ends in pairwise(points)]
+    folds = {
+        index: fold
+        for index in _fold_segments(curve, motions, segments)
+        if (fold := segments[index].fold())
+    }
     counts: dict[int, tuple[int | None, int | None]] = {}
     found = []
-    for place in _changes(stability):
-        changed = stability[place].beyond, stability[place + 1].beyond
-        for motion, multiplier in ways[place].passages(*changed):
+    for index in _stability_changes(stability):
+        changed = stability[index].beyond, stability[index + 1].beyond
+        for motion, multiplier in segments[index].circle_crossings(*changed):
             kind = _kind_of(multiplier)
-            near = [at for at in (place, place - 1, place + 1) if at in folds]
-            if near and kind in ("branching", "jump"):
-                counts[near[0]] = changed
+            nearest_fold = [at for at in (index, index - 1, index + 1) if at in folds]
+            if nearest_fold and kind in ("branching", "jump"):
+                counts[nearest_fold[0]] = changed
             else:
-                found.append(Bifurcation(kind, motion, multiplier, place, changed))
-    for place, (motion, multiplier) in folds.items():
-        beside = stability[place], stability[place + 1]
-        before, after = (at.beyond if at.resolved else None for at in beside)
-        unstable = counts.get(place, (before, after))
-        found.append(Bifurcation("fold", motion, multiplier, place, unstable))
+                found.append(Bifurcation(kind, motion, multiplier, index, changed))
+    for index, (motion, multiplier) in folds.items():
+        neighbours = stability[index], stability[index + 1]
+        before, after = (at.beyond if at.resolved else None for at in neighbours)
+        unstable = counts.get(index, (before, after))
+        found.append(Bifurcation("fold", motion, multiplier, index, unstable))
     return tuple(sorted(found, key=lambda bifurcation: bifurcation.after))
 
 
-def _changes(stability: Sequence[Stability]) -> Iterator[int]:
-    """Points between which and the next the number of multipliers beyond the circle changes.
+def _stability_changes(stability: Sequence[Stability]) -> Iterator[int]:
+    """Yield the index of each motion after which the number of unstable multipliers changes.
 
-    Where several of no verdict lie between two that have one, only if it does between these, and
-    if the multipliers of all of them are known.
+    Motions without a verdict between two with a verdict are skipped, unless the number differs
+    between these two and the multipliers of all motions between them are known.
     """
-    known = [place for place, at in enumerate(stability) if at.verdict != "unknown"]
+    known = [index for index, at in enumerate(stability) if at.verdict != "unknown"]
     for first, last in pairwise(known):
         resolved = all(at.resolved for at in stability[first:last])
         if resolved and stability[first].beyond != stability[last].beyond:
-            for place in range(first, last):
-                if stability[place].beyond != stability[place + 1].beyond:
-                    yield place
+            for index in range(first, last):
+                if stability[index].beyond != stability[index + 1].beyond:
+                    yield index
 
 
-def _turns(
-    curve: FollowedCurve[L], motions: Sequence[HarmonicSolution], ways: Sequence[_Way[L]]
+def _fold_segments(
+    curve: FollowedCurve[L], motions: Sequence[HarmonicSolution], segments: Sequence[_Segment[L]]
 ) -> Iterator[int]:
-    """Points between which and the next the curve turns back in its parameter."""
+    """Yield the index of each motion after which the curve turns back in its parameter."""
     steps = np.diff([curve.parameter_of(motion) for motion in motions])
-    for place in range(1, len(steps)):
-        if steps[place - 1] * steps[place] < 0.0:
-            # On which side of the farthest point it turns is told by its direction there.
-            ahead = ways[place].at(0.0)
-            turned = ahead is not None and ahead.turning * steps[place] > 0.0
-            yield place - 1 if turned else place
+    for index in range(1, len(steps)):
+        if steps[index - 1] * steps[index] < 0.0:
+            # The direction of the curve at the farthest point tells on which side of it the fold
+            # lies.
+            located = segments[index].at(0.0)
+            turned = located is not None and located.parameter_direction * steps[index] > 0.0
+            yield index - 1 if turned else index
 
 
 def _kind_of(multiplier: complex) -> Kind:
-    """What happens where a multiplier passes the circle."""
-    if abs(abs(multiplier) - 1.0) > NEAR:
+    """Return the kind of bifurcation at which a multiplier crosses the unit circle."""
+    if abs(abs(multiplier) - 1.0) > JUMP_DISTANCE:
         return "jump"
     angle = abs(np.angle(multiplier))
-    if angle <= REAL:
+    if angle <= REAL_ANGLE:
         return "branching"
-    return "period_doubling" if np.pi - angle <= REAL else "neimark_sacker"
+    return "period_doubling" if np.pi - angle <= REAL_ANGLE else "neimark_sacker"
 
 
-class _Lost(ConvergenceError):
-    """Newton's method does not find the curve."""
+class _CurveLost(ConvergenceError):
+    """Error raised where Newton's method does not find the curve."""
 
 
-class _Way(Generic[L]):
-    """The way from one motion of a curve to another, by shares of the chord between them."""
+class _Segment(Generic[L]):
+    """Segment of a curve between two of its motions, parametrised by shares of the chord."""
 
     def __init__(self, chord: Chord[L], floquet: Floquet) -> None:
         self._chord, self._floquet = chord, floquet
-        self._places: dict[float, Place[L] | None] = {}
-        self._known: dict[float, Stability] = {}
+        self._points: dict[float, LocatedPoint[L] | None] = {}
+        self._stabilities: dict[float, Stability] = {}
 
-    def at(self, share: float) -> Place[L] | None:
-        """The point of the curve across the chord at a share of it; None where there is none."""
-        if share not in self._places:
-            self._places[share] = self._chord.at(share)
-        return self._places[share]
+    def at(self, share: float) -> LocatedPoint[L] | None:
+        """Return the point of the curve across the chord at a share of it, or None."""
+        if share not in self._points:
+            self._points[share] = self._chord.at(share)
+        return self._points[share]
 
     def fold(self) -> tuple[HarmonicSolution, complex] | None:
-        """Where the curve turns, and the multiplier nearest to 1."""
-        share = self._root(lambda share: self._require(share).turning)
+        """Return the motion at which the curve turns back, and the multiplier nearest to 1."""
+        share = self._root(lambda share: self._require(share).parameter_direction)
         if share is None:
             return None
-        # Of the curve as its harmonics have it: its fold is one of them.
+        # These are multipliers of the motion as given by its harmonics, since the fold is one of
+        # that curve.
         multipliers = self._floquet.multipliers(self._motion(share))
         nearest = min(multipliers, key=lambda value: float(abs(value - 1.0)), default=0.0)
         return self._motion(share), complex(nearest)
 
-    def passages(self, before: int, after: int) -> Iterator[tuple[HarmonicSolution, complex]]:
-        """Where multipliers, of which so many are beyond the circle, pass it, one or a pair."""
-        number, last = min(before, after), max(before, after)
-        while number < last:
+    def circle_crossings(
+        self, before: int, after: int
+    ) -> Iterator[tuple[HarmonicSolution, complex]]:
+        """Yield the motions at which a multiplier or a pair crosses the unit circle.
 
-            def distance(share: float, number: int = number) -> float:
+        ``before`` and ``after`` are the numbers of multipliers outside the circle at the ends.
+        """
+        index, last = min(before, after), max(before, after)
+        while index < last:
+
+            def distance(share: float, index: int = index) -> float:
                 multipliers = self._stability(share).multipliers
-                return float(abs(multipliers[number])) - 1.0 if number < len(multipliers) else -1.0
+                return float(abs(multipliers[index])) - 1.0 if index < len(multipliers) else -1.0
 
             share = self._root(distance)
             if share is None:
                 return
-            multiplier = complex(self._stability(share).multipliers[number])
+            multiplier = complex(self._stability(share).multipliers[index])
             yield self._motion(share), multiplier
-            number += 2 if _kind_of(multiplier) == "neimark_sacker" else 1
+            index += 2 if _kind_of(multiplier) == "neimark_sacker" else 1
 
     def _root(self, function: Callable[[float], float]) -> float | None:
-        """The share at which a function of it passes zero, None where it does not."""
+        """Return the share at which a function of it crosses zero, or None if it does not."""
         try:
             if function(0.0) * function(1.0) > 0.0:
                 return None
-            share = float(brentq(function, 0.0, 1.0, xtol=LOCATED))
-            function(share)  # known there too
+            share = float(brentq(function, 0.0, 1.0, xtol=LOCATION_TOLERANCE))
+            function(share)  # so that its value there is cached
             return share
-        except _Lost:
+        except _CurveLost:
             return None
 
     def _motion(self, share: float) -> HarmonicSolution:
-        place = self._require(share)
-        unknowns, parameter = place.point.unknowns, place.point.parameter
-        return self._chord.curve.motion_of(unknowns, parameter, place.equations)
+        point = self._require(share)
+        unknowns, parameter = point.point.unknowns, point.point.parameter
+        return self._chord.curve.motion_of(unknowns, parameter, point.equations)
 
     def _stability(self, share: float) -> Stability:
-        if share not in self._known:
-            self._known[share] = self._floquet.stability(self._motion(share))
-        if not self._known[share].resolved:
-            raise _Lost
-        return self._known[share]
+        if share not in self._stabilities:
+            self._stabilities[share] = self._floquet.stability(self._motion(share))
+        if not self._stabilities[share].resolved:
+            raise _CurveLost
+        return self._stabilities[share]
 
-    def _require(self, share: float) -> Place[L]:
-        place = self.at(share)
-        if place is None:
-            raise _Lost
-        return place
+    def _require(self, share: float) -> LocatedPoint[L]:
+        point = self.at(share)
+        if point is None:
+            raise _CurveLost
+        return point

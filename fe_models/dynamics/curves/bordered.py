@@ -1,9 +1,9 @@
 """Linear systems of continuation: a Jacobian, alone or bordered by a column and a row.
 
-A matrix is factorised. A Jacobian that is only known by what it does to a vector is solved with
-GMRES, which needs few iterations where it is 1 and something compact, as in harmonic balance, and
-fewer still where the inverse of one like it preconditions it; where it does not converge, the
-Jacobian is assembled after all.
+A matrix is factorised. A Jacobian that is known only by its products with vectors is solved with
+GMRES. GMRES needs few iterations if the Jacobian is 1 plus a compact operator, as in harmonic
+balance, and fewer still with the inverse of a similar matrix as preconditioner. If GMRES does not
+converge, the Jacobian is assembled and factorised.
 """
 
 from __future__ import annotations
@@ -20,71 +20,102 @@ from scipy.linalg.lapack import dgetrf, dgetrs
 from fe_models.dynamics.curves.sizes import norm
 from sa_solver.types import Array
 
-# Residual that GMRES leaves of its right-hand side, unless it is given another.
+# Default relative residual of GMRES.
 GMRES_TOLERANCE = 1e-6
-# Krylov vectors of GMRES. If it needs more, the matrix is solved directly.
+# Largest number of Krylov vectors of GMRES. If it needs more, the matrix is solved directly.
 MAX_VECTORS = 150
-# Preconditioned solutions of what earlier ones leave, at most, and the share of it that each may
-# leave: more of them would not help.
-MAX_REFINED, LOOSEST_REFINED = 4, 0.1
-# Share of what is wanted that they are asked for: what is left is measured differently.
-BELOW = 0.3
+# Largest number of preconditioned solutions for the remaining residual, and largest relative
+# residual of each: more or looser ones would not help.
+MAX_REFINEMENTS, LOOSEST_REFINEMENT = 4, 0.1
+# Tolerance of a preconditioned solution over the wanted one, since it measures the residual
+# differently.
+REFINEMENT_MARGIN = 0.3
 
 
 class LinearMap(Protocol):
-    """A square matrix known by its products with vectors ``(n,)``."""
+    """Protocol of a square matrix known by its products with vectors ``(n,)``."""
 
     def __matmul__(self, vector: Array, /) -> Array: ...
     def assembled(self) -> Array:
-        """The matrix ``(n, n)``."""
+        """Return the matrix ``(n, n)``."""
         ...
 
 
 @runtime_checkable
 class Preconditioned(Protocol):
-    """A matrix that is like another one, whose inverse is known by its products."""
+    """Protocol of a matrix with a preconditioner: products with the inverse of a similar matrix."""
 
     def precondition(self, vector: Array) -> Array:
-        """The inverse of the other one times a vector ``(n,)``."""
+        """Return the inverse of the similar matrix times a vector ``(n,)``."""
         ...
 
     def preconditioned(self, vector: Array) -> Array:
-        """That inverse times the matrix times a vector; cheaper than both, nearly the same."""
+        """Return that inverse times this matrix times a vector.
+
+        One call is cheaper than two separate products, and the result is nearly the same.
+        """
         ...
 
 
 def solve_alone(
     jacobian: Array | LinearMap, rhs: Array, tolerance: float = GMRES_TOLERANCE
 ) -> Array:
-    """x of J x = b, ``(n,)`` or ``(n, r)``; by products it leaves the share ``tolerance`` of b.
+    """Solve J x = b for x, ``(n,)`` or ``(n, r)``.
 
-    A singular J has its smallest least squares. Raises ``numpy.linalg.LinAlgError`` where numbers
-    are not finite.
+    A singular matrix J gives the least-squares solution of smallest norm.
+
+    Parameters
+    ----------
+    jacobian
+        J, a matrix ``(n, n)`` or a linear map.
+    rhs
+        b, ``(n,)`` or ``(n, r)``.
+    tolerance
+        Relative residual if J is a linear map.
+
+    Raises
+    ------
+    numpy.linalg.LinAlgError
+        If numbers are not finite.
     """
     if isinstance(jacobian, np.ndarray):
         return _Factors(jacobian).solve(rhs)
     if rhs.ndim == 2:
         return np.stack([solve_alone(jacobian, side, tolerance) for side in rhs.T], axis=1)
-    alike = jacobian if isinstance(jacobian, Preconditioned) else None
-    solution = _iteratively(jacobian, alike, rhs, tolerance)
+    preconditioner = jacobian if isinstance(jacobian, Preconditioned) else None
+    solution = _solve_iteratively(jacobian, preconditioner, rhs, tolerance)
     return _Factors(jacobian.assembled()).solve(rhs) if solution is None else solution
 
 
 def solve_bordered(
     jacobian: Array | LinearMap, column: Array, row: Array, rhs: Array
 ) -> tuple[Array, int]:
-    """x ``(n + 1, r)`` of [J column; row] x = b; the sign of the determinant, 0 if 0 or not known.
+    """Solve [J column; row] x = b for x ``(n + 1, r)``; also return the sign of the determinant.
 
-    As :func:`solve_alone`.
+    The sign is 0 if the determinant is 0 or not known. Otherwise as :func:`solve_alone`.
+
+    Parameters
+    ----------
+    jacobian
+        J, a matrix ``(n, n)`` or a linear map.
+    column, row
+        Border, ``(n,)`` and ``(n + 1,)``.
+    rhs
+        b ``(n + 1, r)``.
     """
     system = Bordered(jacobian, column, row)
     return np.array([system.solve(side) for side in rhs.T]).T, system.sign
 
 
 class Bordered:
-    """[J column; row] of ``inner`` J ``(n, n)``, known by products, and solved more than once.
+    """Bordered matrix [J column; row] for several solutions.
 
-    ``column`` ``(n,)``, ``row`` ``(n + 1,)``.
+    Parameters
+    ----------
+    inner
+        J, a matrix ``(n, n)`` or a linear map.
+    column, row
+        Border, ``(n,)`` and ``(n + 1,)``.
     """
 
     def __init__(self, inner: Array | LinearMap, column: Array, row: Array) -> None:
@@ -96,7 +127,7 @@ class Bordered:
         return np.append(upper, self._row @ vector)
 
     def assembled(self) -> Array:
-        """The matrix ``(n + 1, n + 1)``."""
+        """Return the matrix ``(n + 1, n + 1)``."""
         size = len(self._row)
         matrix = np.empty((size, size), order="F")
         inner = self.inner
@@ -105,31 +136,31 @@ class Bordered:
         return matrix
 
     def precondition(self, vector: Array) -> Array:
-        """The inverse with that of a matrix like J, if one is known, or 1 for J, times a vector.
+        """Return the inverse of the bordered preconditioner of J times a vector.
 
-        The border is eliminated with it, and a pivot that is not 0.
+        The preconditioner is 1 if J has none. The border is eliminated with a pivot that is not 0.
         """
-        return self._border_undone(self._inner_preconditioned(vector[:-1]), float(vector[-1]))
+        return self._eliminate_border(self._inner_preconditioned(vector[:-1]), float(vector[-1]))
 
     def preconditioned(self, vector: Array) -> Array:
-        """That inverse times the matrix times a vector."""
+        """Return that inverse times the bordered matrix times a vector."""
         inner = self.inner
         assert isinstance(inner, Preconditioned)
         upper = inner.preconditioned(vector[:-1]) + vector[-1] * self._preconditioned_column
-        return self._border_undone(upper, float(self._row @ vector))
+        return self._eliminate_border(upper, float(self._row @ vector))
 
-    def _border_undone(self, upper: Array, last: float) -> Array:
+    def _eliminate_border(self, upper: Array, last: float) -> Array:
         last = (last - float(self._row[:-1] @ upper)) / self._pivot
         return np.append(upper - last * self._preconditioned_column, last)
 
     def solve(self, rhs: Array, tolerance: float = GMRES_TOLERANCE) -> Array:
-        """x ``(n + 1,)`` of [J column; row] x = b; by products it leaves so large a share of b.
+        """Solve [J column; row] x = b for x ``(n + 1,)``, as :func:`solve_alone` does.
 
-        As :func:`solve_alone`.
+        ``tolerance`` is the relative residual if J is a linear map.
         """
         if not self._direct:
-            alike = isinstance(self.inner, Preconditioned)
-            solution = _iteratively(self, self if alike else None, rhs, tolerance)
+            preconditioned = isinstance(self.inner, Preconditioned)
+            solution = _solve_iteratively(self, self if preconditioned else None, rhs, tolerance)
             if solution is not None:
                 return solution
             self._direct = True
@@ -137,7 +168,7 @@ class Bordered:
 
     @property
     def sign(self) -> int:
-        """Of the determinant; 0 if not known."""
+        """Sign of the determinant; 0 if it is not known."""
         return self._factors.sign if self._direct else 0
 
     @cached_property
@@ -158,9 +189,10 @@ class Bordered:
 
 
 class _Factors:
-    """A matrix factorised.
+    """Factors of a matrix.
 
-    One that is singular, as where a body may stand anywhere, has its smallest least squares.
+    For a singular matrix, as where a body is not held, solutions are least-squares solutions of
+    smallest norm.
     """
 
     def __init__(self, matrix: Array) -> None:
@@ -174,70 +206,72 @@ class _Factors:
 
     @property
     def sign(self) -> int:
-        """Of the determinant; 0 if it is singular."""
+        """Sign of the determinant; 0 if the matrix is singular."""
         if self._singular:
             return 0
-        exchanged = np.count_nonzero(self._pivots != np.arange(len(self._pivots)))
+        row_exchanges = np.count_nonzero(self._pivots != np.arange(len(self._pivots)))
         negative = np.count_nonzero(np.diagonal(self._factors) < 0.0)
-        return -1 if (exchanged + negative) % 2 else 1
+        return -1 if (row_exchanges + negative) % 2 else 1
 
 
-def _iteratively(
-    matrix: LinearMap, alike: Preconditioned | None, rhs: Array, tolerance: float
+def _solve_iteratively(
+    matrix: LinearMap, preconditioner: Preconditioned | None, rhs: Array, tolerance: float
 ) -> Array | None:
-    """Solution by GMRES, preconditioned from the left if it can be; None if it does not converge.
+    """Return the solution by GMRES, left-preconditioned if possible; None if it does not converge.
 
-    What a preconditioned solution leaves is seen with the matrix itself, and solved for again.
-    Where preconditioning loses too many digits, as of joints that stick for ones that slide near a
-    resonance of either, products alone are tried.
+    The true residual of a preconditioned solution is computed, and solved for again. Where
+    preconditioning loses too many digits, as near a resonance of the preconditioner or the matrix,
+    GMRES without preconditioning is tried.
     """
-    if alike is not None:
-        solution, left = np.zeros_like(rhs), rhs
-        enough = tolerance * norm(rhs)
-        for _ in range(MAX_REFINED):
-            share = min(BELOW * enough / (norm(left) or 1.0), LOOSEST_REFINED)
-            part = _gmres(alike.preconditioned, alike.precondition(left), share)
-            if part is None:
+    if preconditioner is not None:
+        solution, residual = np.zeros_like(rhs), rhs
+        allowed = tolerance * norm(rhs)
+        for _ in range(MAX_REFINEMENTS):
+            share = min(REFINEMENT_MARGIN * allowed / (norm(residual) or 1.0), LOOSEST_REFINEMENT)
+            correction = _gmres(
+                preconditioner.preconditioned, preconditioner.precondition(residual), share
+            )
+            if correction is None:
                 break
-            solution = solution + part
-            left = rhs - matrix @ solution
-            if norm(left) <= enough:
+            solution = solution + correction
+            residual = rhs - matrix @ solution
+            if norm(residual) <= allowed:
                 return solution
     return _gmres(lambda vector: matrix @ vector, rhs, tolerance)
 
 
-def _gmres(times: Callable[[Array], Array], rhs: Array, tolerance: float) -> Array | None:
-    """Solution by GMRES, None if it does not converge.
+def _gmres(multiply: Callable[[Array], Array], rhs: Array, tolerance: float) -> Array | None:
+    """Return the solution by GMRES, or None if it does not converge.
 
-    Saad and Schultz 1986, doi:10.1137/0907058; vectors are made orthogonal all at once, and twice,
-    which takes a third of scipy's time, one at a time.
+    Saad and Schultz 1986, doi:10.1137/0907058. Each vector is orthogonalised against all others at
+    once, and twice, which takes a third of the time of scipy's one-by-one orthogonalisation.
     """
-    vectors, length = min(MAX_VECTORS, len(rhs)), norm(rhs)
-    if length == 0.0:
+    max_vectors, rhs_norm = min(MAX_VECTORS, len(rhs)), norm(rhs)
+    if rhs_norm == 0.0:
         return np.zeros_like(rhs)
-    basis, triangle = np.empty((vectors + 1, len(rhs))), np.zeros((vectors, vectors))
-    left, turns = np.zeros(vectors + 1), np.empty((vectors, 2))
-    basis[0], left[0] = rhs / length, length
-    for count in range(vectors):
-        before, vector = basis[: count + 1], times(basis[count])
-        column = before @ vector
-        vector = vector - column @ before
-        again = before @ vector
-        vector -= again @ before
-        column += again
-        for i, (cosine, sine) in enumerate(turns[:count].tolist()):
+    basis, triangle = np.empty((max_vectors + 1, len(rhs))), np.zeros((max_vectors, max_vectors))
+    residual, rotations = np.zeros(max_vectors + 1), np.empty((max_vectors, 2))
+    basis[0], residual[0] = rhs / rhs_norm, rhs_norm
+    for count in range(max_vectors):
+        previous, vector = basis[: count + 1], multiply(basis[count])
+        column = previous @ vector
+        vector = vector - column @ previous
+        correction = previous @ vector
+        vector -= correction @ previous
+        column += correction
+        for i, (cosine, sine) in enumerate(rotations[:count].tolist()):
             upper, lower = column[i], column[i + 1]
             column[i], column[i + 1] = cosine * upper + sine * lower, cosine * lower - sine * upper
-        beyond = norm(vector)
-        pivot = hypot(column[count], beyond)
+        new_length = norm(vector)
+        pivot = hypot(column[count], new_length)
         if not 0.0 < pivot < inf:
             return None
-        cosine, sine = column[count] / pivot, beyond / pivot
-        column[count], turns[count] = pivot, (cosine, sine)
+        cosine, sine = column[count] / pivot, new_length / pivot
+        column[count], rotations[count] = pivot, (cosine, sine)
         triangle[: count + 1, count] = column
-        left[count], left[count + 1] = cosine * left[count], -sine * left[count]
-        if abs(left[count + 1]) <= tolerance * length:
+        residual[count], residual[count + 1] = cosine * residual[count], -sine * residual[count]
+        if abs(residual[count + 1]) <= tolerance * rhs_norm:
             used = slice(count + 1)
-            return np.asarray(solve_triangular(triangle[used, used], left[used]) @ basis[used])
-        basis[count + 1] = vector / beyond
+            return np.asarray(solve_triangular(triangle[used, used], residual[used]) @ basis[used])
+        basis[count + 1] = vector / new_length
     return None

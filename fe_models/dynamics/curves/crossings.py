@@ -1,10 +1,11 @@
-"""The motions of a branch at one frequency: every crossing of its curve, solved for there.
+"""Motions of a branch at one frequency: all crossings of its curve with that frequency.
 
-Between two points of the curve that lie on either side of the frequency there is a crossing.
-Newton's method at the frequency finds it from between them, and is believed where what it finds
-lies along the chord; otherwise the curve is cut by planes across the chord, and the share of the
-chord at which it crosses is bracketed. Where the curve turns back beside the frequency it may do so
-beyond it, between two points: its farthest point is looked for, on either side of which it crosses.
+If two consecutive points of the curve lie on either side of the frequency, there is a crossing
+between them. Newton's method at the frequency starts between them, and its result is accepted if it
+lies along the chord. Otherwise the curve is intersected with planes across the chord, and the share
+of the chord at which it crosses is bracketed. Where the curve turns back close to the frequency, it
+may cross it twice between two points: then its turning point is located, with a crossing on either
+side.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ from itertools import pairwise
 import numpy as np
 from scipy.optimize import brentq, minimize_scalar
 
-from fe_models.dynamics.curves.control import ContinuationControl
+from fe_models.dynamics.curves.curve_steps import ContinuationControl
 from fe_models.dynamics.curves.followed_curve import Chord, curve_by_frequency
 from fe_models.dynamics.curves.forced_response import ResponseBranch
 from fe_models.dynamics.curves.newton import NewtonControl, NewtonSolution, solve
@@ -29,10 +30,10 @@ from sa_solver import checks
 from sa_solver.steps import COMPUTED, Steps
 from sa_solver.types import Array
 
-# Of a chord: where a curve crosses a frequency, and where it is farthest.
+# Tolerances of a crossing and of a turning point, as shares of the chord.
 SHARE_TOLERANCE, FARTHEST_TOLERANCE = 1e-9, 1e-6
-# Motions that differ by less, as a share of the vibration, are one.
-SAME = 1e-6
+# Difference below which two motions are the same one, relative to the vibration.
+SAME_MOTION = 1e-6
 
 
 def motions_at(
@@ -41,15 +42,25 @@ def motions_at(
     control: ContinuationControl | None = None,
     steps: Steps = COMPUTED,
 ) -> tuple[HarmonicSolution, ...]:
-    """The motions in which a branch crosses a ``frequency`` [Hz], in the order of its curve.
+    """Return the motions in which a branch crosses a frequency, in the order of its curve.
 
-    They are solved for at the resolution with which the branch ended, to the tolerance of
-    ``control``; one that is not found has a ``message``. There are none where the curve does not
-    get to the frequency. Each of the ``steps`` finds one.
+    The result is empty if the curve does not reach the frequency. A motion that is not found has a
+    ``message``.
+
+    Parameters
+    ----------
+    branch
+        The branch. Its last resolution is used.
+    frequency
+        Frequency [Hz].
+    control
+        Control of the continuation, with the tolerance of the motions.
+    steps
+        Runner of the steps, each of which finds one motion; see :class:`sa_solver.steps.Steps`.
 
     Examples
     --------
-    At 200 Hz exactly, the motion on a branch is that which is found there alone:
+    At exactly 200 Hz, the motion on a branch equals the one that is solved for at 200 Hz directly:
 
     >>> import numpy as np
     >>> from fe_models.dynamics import *
@@ -66,17 +77,17 @@ def motions_at(
     """
     checks.number("frequency", frequency, above=0.0, error=HarmonicBalanceError)
     control = control or ContinuationControl()
-    curve = _Curve(branch, control)
+    curve = _BranchCurve(branch, control)
     found: list[HarmonicSolution] = []
-    for begin, end in curve.crossed(frequency):
+    for begin, end in curve.segments_across(frequency):
         motion = steps("motion at a frequency", partial(curve.crossing, begin, end, frequency))
-        if not any(curve.same(motion, other) for other in found):
+        if not any(curve.is_same(motion, other) for other in found):
             found.append(motion)
     return tuple(found)
 
 
-class _Curve:
-    """The points ``(n + 1,)`` of a branch, unknowns and frequency, at its last resolution."""
+class _BranchCurve:
+    """Points ``(n + 1,)`` of a branch, unknowns and frequency, at its last resolution."""
 
     def __init__(self, branch: ResponseBranch, control: ContinuationControl) -> None:
         force = branch.solutions[0].force if branch.solutions else 0.0
@@ -84,15 +95,15 @@ class _Curve:
         self._curve = curve_by_frequency(self._problem, force)
         self._points = [self._curve.coordinates_of(motion) for motion in branch.solutions]
 
-    def crossed(self, frequency: float) -> Iterator[tuple[Array, Array]]:
-        """Points between which the curve crosses a frequency, in its order."""
-        for place, (begin, end) in enumerate(pairwise(self._points)):
+    def segments_across(self, frequency: float) -> Iterator[tuple[Array, Array]]:
+        """Yield pairs of points between which the curve crosses a frequency, in its order."""
+        for index, (begin, end) in enumerate(pairwise(self._points)):
             if begin[-1] == frequency:
                 yield begin, begin
             if (begin[-1] - frequency) * (end[-1] - frequency) < 0.0:
                 yield begin, end
-            elif self._may_turn_beyond(place, frequency):
-                farthest = _farthest(self._chord(begin, end), frequency)
+            elif self._may_turn_back_beyond(index, frequency):
+                farthest = _turning_point(self._chord(begin, end), frequency)
                 if farthest is not None:
                     yield begin, farthest
                     yield farthest, end
@@ -100,47 +111,47 @@ class _Curve:
             yield self._points[-1], self._points[-1]
 
     def crossing(self, begin: Array, end: Array, frequency: float) -> HarmonicSolution:
-        """The motion at a frequency between two points."""
-        solution = self._between(begin, end, frequency)
+        """Return the motion at a frequency between two points."""
+        solution = self._solve_between(begin, end, frequency)
         motion = self._problem.describe(
             solution.unknowns, solution.at, frequency, self._force, solution.iterations
         )
         return replace(motion, message=solution.message)
 
-    def same(self, motion: HarmonicSolution, other: HarmonicSolution) -> bool:
-        """Whether two motions are one."""
+    def is_same(self, motion: HarmonicSolution, other: HarmonicSolution) -> bool:
+        """Return whether two motions are the same one."""
         problem = self._problem
-        apart = norm(problem.guess(motion) - problem.guess(other))
-        return apart <= SAME * problem.vibration(motion.coefficients)
+        distance = norm(problem.guess(motion) - problem.guess(other))
+        return distance <= SAME_MOTION * problem.vibration(motion.coefficients)
 
-    def _between(self, begin: Array, end: Array, frequency: float) -> NewtonSolution[Balance]:
-        way = float(end[-1] - begin[-1])
-        share = (frequency - float(begin[-1])) / way if way else 0.0
+    def _solve_between(self, begin: Array, end: Array, frequency: float) -> NewtonSolution[Balance]:
+        difference = float(end[-1] - begin[-1])
+        share = (frequency - float(begin[-1])) / difference if difference else 0.0
         direct = self._solve(begin + share * (end - begin), frequency)
-        if not way:
+        if not difference:
             return direct
         chord = self._chord(begin, end)
-        if direct.converged and chord.along(np.append(direct.unknowns, frequency)):
+        if direct.converged and chord.contains(np.append(direct.unknowns, frequency)):
             return direct
-        across = _crossing(chord, frequency)
-        return direct if across is None else self._solve(across, frequency)
+        crossing = _crossing_point(chord, frequency)
+        return direct if crossing is None else self._solve(crossing, frequency)
 
     def _solve(self, coordinates: Array, frequency: float) -> NewtonSolution[Balance]:
         newton = NewtonControl(self._control.tolerance)
         return solve(self._curve.equations, coordinates[:-1], frequency, newton)
 
-    def _may_turn_beyond(self, place: int, frequency: float) -> bool:
-        """Whether the curve turns back at an end of a chord, and may have got to a frequency.
+    def _may_turn_back_beyond(self, index: int, frequency: float) -> bool:
+        """Return whether the curve turns back at an end of a segment, perhaps beyond a frequency.
 
-        Between points it may get farther than they are by no more than they are apart.
+        Between two points it may exceed them by no more than the distance between them.
         """
         at = [float(point[-1]) for point in self._points]
-        for turn in (place, place + 1):
+        for turn in (index, index + 1):
             if not 0 < turn < len(at) - 1:
                 continue
             before, after = at[turn] - at[turn - 1], at[turn] - at[turn + 1]
-            beyond = (frequency - at[turn]) * np.sign(before)
-            if before * after > 0.0 and 0.0 <= beyond <= max(abs(before), abs(after)):
+            excess = (frequency - at[turn]) * np.sign(before)
+            if before * after > 0.0 and 0.0 <= excess <= max(abs(before), abs(after)):
                 return True
         return False
 
@@ -148,22 +159,22 @@ class _Curve:
         return Chord(self._curve, begin, end, self._control)
 
 
-def _crossing(chord: Chord[Balance], frequency: float) -> Array | None:
-    """Where a curve crosses a frequency that lies between those of a chord's ends, if found."""
+def _crossing_point(chord: Chord[Balance], frequency: float) -> Array | None:
+    """Return the point where a curve crosses a frequency between the ends of a chord, if found."""
 
-    def beyond(share: float) -> float:
+    def excess(share: float) -> float:
         return _frequency(chord, share) - frequency
 
-    ends = beyond(0.0), beyond(1.0)
+    ends = excess(0.0), excess(1.0)
     if not ends[0] * ends[1] < 0.0:
         return None
-    share = brentq(beyond, 0.0, 1.0, xtol=SHARE_TOLERANCE, disp=False)
+    share = brentq(excess, 0.0, 1.0, xtol=SHARE_TOLERANCE, disp=False)
     found = chord.at(float(share))
     return None if found is None else found.point.coordinates
 
 
-def _farthest(chord: Chord[Balance], frequency: float) -> Array | None:
-    """The point in which a curve turns back beyond a frequency, if it gets there."""
+def _turning_point(chord: Chord[Balance], frequency: float) -> Array | None:
+    """Return the point where a curve turns back beyond a frequency, or None if it does not."""
     sense = float(np.sign(frequency - chord.begin[-1]))
 
     def nearness(share: float) -> float:
@@ -178,6 +189,6 @@ def _farthest(chord: Chord[Balance], frequency: float) -> Array | None:
 
 
 def _frequency(chord: Chord[Balance], share: float) -> float:
-    """That of the curve across a chord; NaN where it is not found."""
+    """Return the frequency of the curve across a chord; NaN if the curve is not found."""
     found = chord.at(share)
     return np.nan if found is None else found.point.parameter

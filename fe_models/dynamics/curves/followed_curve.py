@@ -1,6 +1,7 @@
-"""Curves of periodic motions once they are followed: what of one lies between two of its points.
+"""Curves of periodic motions that have been followed, and points between two of their points.
 
-It is found along the chord between them, across which Newton's method leads back to the curve.
+Such a point is found from the chord between the two: Newton's method leads to the curve in the
+plane across the chord.
 """
 
 from __future__ import annotations
@@ -12,8 +13,7 @@ from typing import Generic
 
 import numpy as np
 
-from fe_models.dynamics.curves.continuation import CurvePoint, Scaling, correct
-from fe_models.dynamics.curves.control import ContinuationControl
+from fe_models.dynamics.curves.curve_steps import ContinuationControl, CurvePoint, Scaling, correct
 from fe_models.dynamics.curves.newton import Equations, L
 from fe_models.dynamics.curves.phase_resonance import PhaseBalance, PhaseResonance
 from fe_models.dynamics.curves.sizes import norm
@@ -21,17 +21,27 @@ from fe_models.dynamics.periodic.harmonic_balance import Balance, HarmonicBalanc
 from fe_models.dynamics.periodic.harmonic_solution import HarmonicSolution
 from sa_solver.types import Array
 
-# Of a chord's length: how far from it a motion between its ends may be. A curve whose tangent turns
-# by 30 degrees in a step is off by a tenth.
-BESIDE = 0.5
+# Largest distance of a motion from the chord between its neighbours, over the length of the chord.
+# A curve whose tangent turns by 30 degrees in a step is a tenth away.
+MAX_DISTANCE = 0.5
 
 
 @dataclass(frozen=True)
 class FollowedCurve(Generic[L]):
-    """The ``equations`` of a curve of motions of a ``problem``, and how motions are points of it.
+    """Equations of a curve of motions, and the relation between motions and points of the curve.
 
-    ``unknowns_of`` and ``parameter_of`` a motion; ``motion_of`` unknowns, a parameter and the
-    equations there; steps are shares of what unknowns differ from the ``origin`` ``(n,)``.
+    Parameters
+    ----------
+    problem
+        The problem of harmonic balance.
+    equations
+        Equations of the curve.
+    origin
+        Unknowns ``(n,)`` from which steps are measured relatively.
+    unknowns_of, parameter_of
+        Functions that return unknowns and parameter of a motion.
+    motion_of
+        Function that returns the motion for unknowns, a parameter and the equations there.
     """
 
     problem: HarmonicBalance
@@ -42,12 +52,12 @@ class FollowedCurve(Generic[L]):
     motion_of: Callable[[Array, float, L], HarmonicSolution]
 
     def coordinates_of(self, motion: HarmonicSolution) -> Array:
-        """Unknowns and parameter ``(n + 1,)``."""
+        """Return unknowns and parameter of a motion ``(n + 1,)``."""
         return np.append(self.unknowns_of(motion), self.parameter_of(motion))
 
 
 def curve_by_frequency(problem: HarmonicBalance, force: float) -> FollowedCurve[Balance]:
-    """Motions under a force, along the frequency."""
+    """Return the curve of motions under a force, with the frequency as parameter."""
     return FollowedCurve(
         problem,
         problem.by_frequency(force),
@@ -59,7 +69,7 @@ def curve_by_frequency(problem: HarmonicBalance, force: float) -> FollowedCurve[
 
 
 def curve_by_force(problem: HarmonicBalance, frequency: float) -> FollowedCurve[Balance]:
-    """Motions at a frequency [Hz], along the force."""
+    """Return the curve of motions at a frequency [Hz], with the force as parameter."""
     return FollowedCurve(
         problem,
         problem.by_force(frequency),
@@ -71,11 +81,14 @@ def curve_by_force(problem: HarmonicBalance, frequency: float) -> FollowedCurve[
 
 
 def curve_by_phase(problem: HarmonicBalance, near: HarmonicSolution) -> FollowedCurve[PhaseBalance]:
-    """Phase resonances, along the force; frequencies are counted from that of one of them."""
+    """Return the curve of phase resonances, with the force as parameter.
+
+    The motion ``near`` the curve sets the reference of the unknown frequency.
+    """
     equations = PhaseResonance.near(problem, near)
 
     def unknowns_of(motion: HarmonicSolution) -> Array:
-        return np.append(problem.guess(motion), equations.place_of(motion.frequency))
+        return np.append(problem.guess(motion), equations.unknown_of(motion.frequency))
 
     def motion_of(unknowns: Array, force: float, at: PhaseBalance) -> HarmonicSolution:
         return problem.describe(unknowns[:-1], at.balance, at.frequency, force)
@@ -87,46 +100,50 @@ def curve_by_phase(problem: HarmonicBalance, near: HarmonicSolution) -> Followed
 
 
 @dataclass(frozen=True)
-class Place(Generic[L]):
-    """A ``point`` of a curve, the ``equations`` there, and its direction along the parameter."""
+class LocatedPoint(Generic[L]):
+    """Point of a curve that has been located between two others.
+
+    ``equations`` are those at the ``point``, and ``parameter_direction`` is the component of the
+    curve's direction along the parameter; it is 0 at a fold.
+    """
 
     point: CurvePoint
     equations: L
-    turning: float
+    parameter_direction: float
 
 
 @dataclass(frozen=True)
 class Chord(Generic[L]):
-    """The way from one point ``(n + 1,)`` of a ``curve`` to another, by shares of it."""
+    """Chord between two points ``(n + 1,)`` of a curve; a share of 0 is its start, 1 its end."""
 
     curve: FollowedCurve[L]
     begin: Array
     end: Array
     control: ContinuationControl
 
-    def at(self, share: float) -> Place[L] | None:
-        """The point of the curve across the chord at a share of it; None where it is not found."""
-        # A step as long as the chord, from where it leads to this share of it.
-        start = self._point(self.begin + (share - 1.0) * self._way)
+    def at(self, share: float) -> LocatedPoint[L] | None:
+        """Return the point of the curve across the chord at a share of it, or None."""
+        # A step of the length of the chord that leads to this share of it.
+        start = self._point(self.begin + (share - 1.0) * self._difference)
         corrected = correct(self.curve.equations, start, self._step, self._scaling, self.control)
         if corrected is None:
             return None
         point, equations, tangent = corrected
-        return Place(point, equations, float(tangent[-1]))
+        return LocatedPoint(point, equations, float(tangent[-1]))
 
-    def along(self, coordinates: Array) -> bool:
-        """Whether a point ``(n + 1,)`` lies beside the chord, between its ends."""
-        way, length = self._scaling.scaled(coordinates - self.begin), norm(self._step)
-        share = float(way @ self._step) / length**2
-        return 0.0 <= share <= 1.0 and norm(way - share * self._step) <= BESIDE * length
+    def contains(self, coordinates: Array) -> bool:
+        """Return whether a point ``(n + 1,)`` is close to the chord, between its ends."""
+        offset, length = self._scaling.scaled(coordinates - self.begin), norm(self._step)
+        share = float(offset @ self._step) / length**2
+        return 0.0 <= share <= 1.0 and norm(offset - share * self._step) <= MAX_DISTANCE * length
 
     @cached_property
-    def _way(self) -> Array:
+    def _difference(self) -> Array:
         return self.end - self.begin
 
     @cached_property
     def _step(self) -> Array:
-        return self._scaling.scaled(self._way)
+        return self._scaling.scaled(self._difference)
 
     @cached_property
     def _scaling(self) -> Scaling:
@@ -136,4 +153,6 @@ class Chord(Generic[L]):
         return scaling
 
     def _point(self, coordinates: Array) -> CurvePoint:
-        return CurvePoint(coordinates[:-1], float(coordinates[-1]), self._way, 1.0, 0, 0, 0.0)
+        return CurvePoint(
+            coordinates[:-1], float(coordinates[-1]), self._difference, 1.0, 0, 0, 0.0
+        )

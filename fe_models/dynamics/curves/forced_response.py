@@ -8,14 +8,8 @@ from typing import Literal
 
 import numpy as np
 
-from fe_models.dynamics.curves.continuation import (
-    CurvePoint,
-    Refinement,
-    SolutionCurve,
-    first_point,
-    follow,
-)
-from fe_models.dynamics.curves.control import ContinuationControl
+from fe_models.dynamics.curves.continuation import Refinement, SolutionCurve, follow
+from fe_models.dynamics.curves.curve_steps import ContinuationControl, CurvePoint, first_point
 from fe_models.dynamics.curves.newton import Equations, solve
 from fe_models.dynamics.periodic.harmonic_balance import (
     SAMPLES_PER_PERIOD,
@@ -29,20 +23,27 @@ from sa_solver import checks
 from sa_solver.steps import COMPUTED, Steps
 from sa_solver.types import Array
 
-# Of the tolerance, what harmonics that stay left out may have of the error, and samples.
-HARMONICS_LEAVE, SAMPLES_LEAVE = 0.3, 0.5
+# Shares of the tolerance that neglected harmonics and samples may contribute to the error.
+HARMONICS_SHARE, SAMPLES_SHARE = 0.3, 0.5
 
 
 @dataclass(frozen=True)
 class Accuracy:
-    """How accurate motions are to be: ``tolerance`` of their ``error``, vibration and energy.
+    """Accuracy of periodic motions, to which their resolution adapts.
 
-    Harmonics and samples grow as needed up to the ``highest`` harmonic and ``most_samples``; what
-    then is left is in the solutions.
+    Parameters
+    ----------
+    tolerance
+        Tolerance of the errors of vibration and energy.
+    highest
+        Highest harmonic that may be added.
+    most_samples
+        Largest number of samples of a period. If harmonics and samples do not suffice, the
+        remaining error is in the solutions.
 
     Examples
     --------
-    A slider's force has a third harmonic: it is added where motions are to be accurate to 0.1 %.
+    The force of a slider has a third harmonic. It is added for an accuracy of 0.1 %.
 
     >>> import numpy as np
     >>> from fe_models.dynamics import *
@@ -69,7 +70,7 @@ class Accuracy:
 
 @dataclass(frozen=True)
 class Motions:
-    """Motions ``(s,)`` in the order of a curve."""
+    """Periodic motions ``(s,)`` in the order of a curve."""
 
     solutions: tuple[HarmonicSolution, ...]
 
@@ -82,16 +83,22 @@ class Motions:
         return np.array([solution.force for solution in self.solutions])
 
     def first_amplitudes(self, place: int) -> Array:
-        """Size of harmonic 1 of a degree of freedom ``(s,)`` [mm]."""
+        """Return the magnitude ``(s,)`` [mm] of harmonic 1 of a degree of freedom."""
         return np.array([abs(solution.amplitude(place)) for solution in self.solutions])
 
 
 @dataclass(frozen=True)
 class ResponseBranch(Motions):
-    """Motions in the order in which they were found, the first one included.
+    """Branch of forced responses in the order in which they were found, the first one included.
 
-    ``message`` is empty if the branch reached the far end of its span. ``points`` are those of the
-    curve, and ``problem`` is what it ended with, to go on from its last point.
+    Parameters
+    ----------
+    solutions
+        The motions.
+    curve
+        The points of the curve.
+    problem
+        The problem at its last resolution, with which the branch can be continued.
     """
 
     curve: SolutionCurve
@@ -99,6 +106,7 @@ class ResponseBranch(Motions):
 
     @property
     def message(self) -> str:
+        """Empty if the branch reached the far end of its span, else the reason why not."""
         return self.curve.message
 
 
@@ -113,16 +121,33 @@ def along_frequency(
     accuracy: Accuracy | None = None,
     steps: Steps = COMPUTED,
 ) -> ResponseBranch:
-    """Motions under a force for the frequencies of ``span`` [Hz], folds included.
+    """Follow the periodic motions under a force over a span of frequencies, past folds.
 
-    From its lower end upward or from its upper end downward: a branch that does not get to the
-    other end says why. From a ``start`` if there is one: a solution as a first guess; or a branch,
-    to go on from its last point to either end. Without ``accuracy`` the
-    resolution is that of the problem. Each of the ``steps`` finds a motion.
+    A branch that does not reach the other end says why in its ``message``.
+
+    Parameters
+    ----------
+    problem
+        The problem of harmonic balance.
+    force
+        Force factor of the load.
+    span
+        Lowest and highest frequency [Hz].
+    start
+        A motion as initial guess, or a branch, which is continued from its last point to either
+        end.
+    upward
+        Whether the branch starts at the lower end of the span, or at the upper one.
+    control
+        Control of the steps.
+    accuracy
+        Accuracy of the motions; if None, the resolution is that of the problem.
+    steps
+        Runner of the steps, each of which finds one motion; see :class:`sa_solver.steps.Steps`.
 
     Examples
     --------
-    Without friction the resonance is that of the mass and spring alone, F / (2 ζ k):
+    Without friction the amplitude at resonance is that of mass and spring alone, F / (2 ζ k):
 
     >>> import numpy as np
     >>> from fe_models.dynamics import *
@@ -150,11 +175,22 @@ def along_force(
     accuracy: Accuracy | None = None,
     steps: Steps = COMPUTED,
 ) -> ResponseBranch:
-    """Motions at a frequency [Hz] for the forces of ``span``; see :func:`along_frequency`.
+    """Follow the periodic motions at a frequency over a span of forces, past folds.
+
+    Parameters
+    ----------
+    problem
+        The problem of harmonic balance.
+    frequency
+        Frequency [Hz].
+    span
+        Lowest and highest force factor.
+    start, upward, control, accuracy, steps
+        As in :func:`along_frequency`.
 
     Examples
     --------
-    Far above its resonance a mass moves by F / (m ω²) at its frequency, whatever the joint does:
+    Far above resonance the amplitude of a mass is F / (m ω²), whatever the joint does:
 
     >>> import numpy as np
     >>> from fe_models.dynamics import *
@@ -174,7 +210,7 @@ def along_force(
 
 @dataclass(frozen=True)
 class Along:
-    """What varies along a branch, and the value of the other."""
+    """Quantity that varies along a branch, and the fixed value of the ``other`` one."""
 
     varies: Literal["frequency", "force"]
     other: float
@@ -189,14 +225,14 @@ class Along:
 
 
 class BranchRecorder:
-    """Describes every new point of a branch, and asks for finer equations where needed."""
+    """Recorder of the motions of a branch, which requests refined equations where needed."""
 
     def __init__(self, problem: HarmonicBalance, along: Along, accuracy: Accuracy | None) -> None:
         self.problem, self._along, self._accuracy = problem, along, accuracy
         self.solutions: list[HarmonicSolution] = []
 
     def describe(self, point: CurvePoint, at: Balance) -> HarmonicSolution:
-        """The motion at a point, with its error if it is to be accurate."""
+        """Return the motion at a point, with its error if an accuracy is given."""
         frequency, force = self._along.frequency_and_force(point.parameter)
         solution = self.problem.describe(point.unknowns, at, frequency, force, point.iterations)
         if self._accuracy is None:
@@ -204,12 +240,12 @@ class BranchRecorder:
         return replace(solution, error=resolution_error(self.problem, solution))
 
     def take(self, description: HarmonicSolution) -> Refinement[Balance] | None:
-        """Keep a motion, or ask for finer equations where it is not accurate."""
+        """Store a motion, or request refined equations if it is not accurate."""
         finer = finer_for(self.problem, description, self._accuracy)
         if finer is not None:
             return self._refine(finer)
         if description.resolution is not self.problem.resolution:
-            # One that was found in an earlier run: a resolution for all.
+            # A stored motion has a resolution object of its own: let all motions share one.
             description = replace(description, resolution=self.problem.resolution)
         self.solutions.append(description)
         return None
@@ -227,10 +263,11 @@ class BranchRecorder:
 def finer_for(
     problem: HarmonicBalance, motion: HarmonicSolution, accuracy: Accuracy | None
 ) -> Resolution | None:
-    """The resolution that a motion of known error asks for, None if that of the problem will do."""
+    """Return the resolution that a motion needs, or None if that of the problem suffices."""
     if accuracy is None or motion.error is None:
         return None
-    # An error that was estimated in an earlier run let the richer problem grow; this one must too.
+    # When the error was estimated in an earlier run, the richer problem grew; it must grow here
+    # too.
     richer_problem(problem, motion)
     return finer_resolution(problem.resolution, motion.error, accuracy)
 
@@ -238,19 +275,30 @@ def finer_for(
 def finer_resolution(
     present: Resolution, error: ResolutionError, accuracy: Accuracy
 ) -> Resolution | None:
-    """The resolution that an error asks for, None if the present will do or is the finest allowed.
+    """Return the resolution that an error demands, or None if the present one is kept.
 
-    The harmonics that cause most of the error are added.
+    The harmonics that cause most of the error are added. The present resolution is kept if it
+    suffices or is the finest allowed.
+
+    Parameters
+    ----------
+    present
+        Present resolution.
+    error
+        Error of a motion.
+    accuracy
+        Accuracy demanded.
     """
     tolerance, harmonics, samples = accuracy.tolerance, present.harmonics, present.samples
     if error.largest > tolerance:
         parts = error.harmonics[: accuracy.highest + 1]
         order = np.argsort(parts)
-        # What is left out if the harmonics up to this one, in the order of their parts, are.
-        left = np.sqrt(np.cumsum(parts[order] ** 2))
-        added = order[left > HARMONICS_LEAVE * tolerance]
+        # Error that remains if the harmonics up to this one, in ascending order of contribution,
+        # are neglected.
+        remaining = np.sqrt(np.cumsum(parts[order] ** 2))
+        added = order[remaining > HARMONICS_SHARE * tolerance]
         harmonics = tuple(sorted({*harmonics, *added.tolist()}))
-        if error.sampling > SAMPLES_LEAVE * tolerance:
+        if error.sampling > SAMPLES_SHARE * tolerance:
             samples *= 2
     while samples < SAMPLES_PER_PERIOD * harmonics[-1]:
         samples *= 2
@@ -268,19 +316,20 @@ def _branch(
     accuracy: Accuracy | None,
     steps: Steps,
 ) -> ResponseBranch:
+    """Return the branch along frequency or force; see :func:`along_frequency`."""
     checks.number("force or frequency", along.other, error=HarmonicBalanceError)
     checks.array("ends of the span", span, (2,), error=HarmonicBalanceError, finite=False)
-    above = 0.0 if along.varies == "frequency" else -np.inf
-    if not above < span[0] < span[1] < np.inf:
+    lower_bound = 0.0 if along.varies == "frequency" else -np.inf
+    if not lower_bound < span[0] < span[1] < np.inf:
         raise HarmonicBalanceError(
-            f"a span from {span[0]:g} to {span[1]:g}: give its lower end first, and finite ends, "
-            "above 0 if they are frequencies"
+            f"the span from {span[0]:g} to {span[1]:g} is not possible: give its lower end first, "
+            "and finite ends, above 0 if they are frequencies"
         )
     control = control or ContinuationControl()
     end: float | None = span[1] if upward else span[0]
     if isinstance(start, ResponseBranch):
         record, point = BranchRecorder(start.problem, along, accuracy), start.curve.points[-1]
-        # Which way it leads is in its last point.
+        # The last point knows in which direction the branch continues.
         end = None
     else:
         record = BranchRecorder(problem, along, accuracy)
@@ -288,7 +337,8 @@ def _branch(
         if isinstance(first, str):
             return ResponseBranch((), SolutionCurve((), first), problem)
         point = first
-    # Steps are shares of the vibration: the displacement under the constant load may be far larger.
+    # Steps are relative to the vibration, since the displacement under the constant load may be far
+    # larger.
     rest = record.problem.guess(None)
     curve = follow(
         along.equations(record.problem),
@@ -313,7 +363,7 @@ def _first(
     control: ContinuationControl,
     steps: Steps,
 ) -> CurvePoint | str:
-    """The first point of a branch, recorded; or why there is none."""
+    """Return the first point of a branch, which is recorded, or the reason why there is none."""
     frequency, force = along.frequency_and_force(parameter)
 
     def found(unknowns: Array) -> tuple[CurvePoint, HarmonicSolution] | str:

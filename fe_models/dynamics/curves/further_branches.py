@@ -1,10 +1,10 @@
-"""Further branches of motions under a force, which no branch from an end of the span leads to.
+"""Further branches of motions under a force, which no branch from an end of the span reaches.
 
-Such a branch is often closed, an isola: the motions on it are only met from nearby. It is looked
-for from motions of a given size at a given frequency, vibrating in harmonic 1 as the structure
-would with its joints free, or stuck, at several phases: Newton's method leads from each of them to
-some motion, and from those that are not on a known branch the curve is followed both ways. Nothing
-says that there are no others.
+Such a branch is often closed, an isola: its motions are only found from nearby. The search starts
+from motions of a given size at a given frequency that vibrate in harmonic 1 as the structure would
+with its joints free, or stuck, at several phases. Newton's method leads from each of them to some
+motion. If that motion is not on a known branch, its curve is followed in both directions. There is
+no guarantee that all branches are found.
 """
 
 from __future__ import annotations
@@ -15,8 +15,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from fe_models.dynamics.curves.continuation import CurvePoint, Refinement, first_point, follow
-from fe_models.dynamics.curves.control import ContinuationControl
+from fe_models.dynamics.curves.continuation import Refinement, follow
+from fe_models.dynamics.curves.curve_steps import ContinuationControl, CurvePoint, first_point
 from fe_models.dynamics.curves.followed_curve import Chord, curve_by_frequency
 from fe_models.dynamics.curves.forced_response import Accuracy, Along, BranchRecorder, Motions
 from fe_models.dynamics.curves.newton import NewtonControl, solve
@@ -28,24 +28,33 @@ from sa_solver.errors import FretscaleError
 from sa_solver.steps import COMPUTED, Steps
 from sa_solver.types import Array
 
-# Phases at which a motion of given size is tried.
+# Number of phases at which a motion of given size is tried.
 PHASES = 12
-# Share of the vibration by which two motions at one frequency differ that are the same: both are
-# solved, in resolutions that may not be the same.
-SAME = 1e-3
-# A curve has come round where it passes its first point within this share of a step, ...
-NEARBY = 0.1
-# ... not before so many points.
-AWAY = 3
+# Relative difference up to which two motions at one frequency are the same one: both are solved
+# for, perhaps in different resolutions.
+SAME_MOTION = 1e-3
+# A curve is closed if it passes its first point within this share of a step, ...
+CLOSURE_SHARE = 0.1
+# ... but not before this number of points.
+MIN_POINTS = 3
 
 
 @dataclass(frozen=True)
 class FurtherBranch(Motions):
-    """Motions under a force in the order of their curve, in whose middle the first found was.
+    """Motions under a force in the order of their curve, with the first one found in its middle.
 
-    ``closed``, where the last follows the first again. ``message`` is empty where it is, or both
-    its ends are those of the span. ``joins`` tells that an end is that of a known branch.
-    ``problem`` is what it ended with.
+    Parameters
+    ----------
+    solutions
+        The motions.
+    closed
+        Whether the curve is closed, so that the first motion follows the last.
+    joins
+        Whether an end is that of a known branch.
+    message
+        Empty if the curve is closed or reaches both ends of the span, else the reason why not.
+    problem
+        The problem at its last resolution.
     """
 
     closed: bool
@@ -66,14 +75,33 @@ def further_branches(
     accuracy: Accuracy | None = None,
     steps: Steps = COMPUTED,
 ) -> tuple[FurtherBranch, ...]:
-    """Branches through the motions that Newton's method finds from ``starts`` at a frequency [Hz].
+    """Return the branches through the motions that Newton's method finds from initial guesses.
 
-    ``starts`` are unknowns ``(n,)``, such as :func:`vibrating_starts` or another motion's;
-    ``known`` the motions of branches under the same force, in the order of each.
+    Parameters
+    ----------
+    problem
+        The problem of harmonic balance.
+    force
+        Force factor of the load.
+    span
+        Lowest and highest frequency [Hz].
+    starts
+        Initial guesses of the unknowns ``(n,)``, for example from :func:`vibrating_starts`.
+    frequency
+        Frequency [Hz] of the initial guesses, within the span.
+    known
+        Motions of known branches under the same force, in the order of each.
+    control
+        Control of the steps.
+    accuracy
+        Accuracy of the motions; if None, the resolution is that of the problem.
+    steps
+        Runner of the steps, each of which finds one motion; see :class:`sa_solver.steps.Steps`.
     """
     if not 0.0 < span[0] <= frequency <= span[1]:
         raise HarmonicBalanceError(
-            f"a start at {frequency:g} Hz: give one within the span, {span[0]:g} to {span[1]:g} Hz"
+            f"the start at {frequency:g} Hz is outside the span: give one within {span[0]:g} to "
+            f"{span[1]:g} Hz"
         )
     control = control or ContinuationControl()
     curves, found = [*known], []
@@ -84,12 +112,12 @@ def further_branches(
         if not solution.converged:
             continue
         motion = problem.describe(solution.unknowns, solution.at, frequency, force)
-        if any(_passes(problem, motions, motion) for motions in curves):
+        if any(_contains(problem, motions, motion) for motions in curves):
             continue
-        branch = _both_ways(problem, motion, span, control, accuracy, steps)
+        branch = _follow_both_ways(problem, motion, span, control, accuracy, steps)
         ends = branch.solutions[0], branch.solutions[-1]
         joins = not branch.closed and any(
-            _passes(branch.problem, motions, end) for motions in known for end in ends
+            _contains(branch.problem, motions, end) for motions in known for end in ends
         )
         found.append(replace(branch, joins=joins))
         curves.append(branch.solutions)
@@ -99,8 +127,19 @@ def further_branches(
 def vibrating_starts(
     problem: HarmonicBalance, frequency: float, amplitude: float, output: Array
 ) -> Iterator[Array]:
-    """Unknowns ``(n,)`` of motions in which the ``output`` ``(n,)`` of the structure vibrates by an
-    ``amplitude`` [mm], with joints free and stuck, at all phases."""
+    """Yield unknowns ``(n,)`` of motions of a given size, with joints free and stuck.
+
+    Parameters
+    ----------
+    problem
+        The problem of harmonic balance.
+    frequency
+        Frequency [Hz].
+    amplitude
+        Amplitude [mm] of the output.
+    output
+        Combination ``(n,)`` of the structure's displacements that has this amplitude.
+    """
     first = problem.resolution.harmonics.index(1)
     angular = np.array([2.0 * np.pi * frequency])
     rest = problem.guess(None).reshape(problem.transfer.joints, problem.resolution.size, -1)
@@ -120,24 +159,28 @@ def _shape(
     amplitude: float,
     output: Array,
 ) -> ComplexArray:
-    """Displacements of joints ``(j d,)`` in a motion of that size of the output, as the first
-    harmonic of the load would cause."""
+    """Return displacements of joints ``(j d,)`` in a motion with this amplitude of the output.
+
+    The motion is the response to the lowest harmonic of the load, at the frequency ``angular``.
+    """
     if not problem.load.waves:
-        raise HarmonicBalanceError("the load has no harmonics: give other starts")
+        raise HarmonicBalanceError(
+            "the load has no harmonics that could give starts: give other starts"
+        )
     force = problem.load.waves[min(problem.load.waves)]
     motion = structure.at(angular).respond((force @ structure.at_points.conj())[None])[0]
-    seen = abs(complex(output @ structure.at_points @ motion))
-    if seen == 0.0:
-        raise HarmonicBalanceError("what is looked at does not move: look at what does")
-    return np.asarray(amplitude / seen * (structure.at_joints @ motion))
+    output_amplitude = abs(complex(output @ structure.at_points @ motion))
+    if output_amplitude == 0.0:
+        raise HarmonicBalanceError("the output does not move under the load: give one that does")
+    return np.asarray(amplitude / output_amplitude * (structure.at_joints @ motion))
 
 
-class _Returned(FretscaleError):
-    """The curve has come round to its first point."""
+class _CurveClosed(FretscaleError):
+    """Error raised when the curve has returned to its first point."""
 
 
-class _UntilClosed(BranchRecorder):
-    """Keeps the points of a branch until it has come round to its first."""
+class _ClosedCurveRecorder(BranchRecorder):
+    """Recorder of a branch that stops when the curve has returned to its first point."""
 
     def __init__(
         self,
@@ -151,13 +194,13 @@ class _UntilClosed(BranchRecorder):
 
     def take(self, description: HarmonicSolution) -> Refinement[Balance] | None:
         finer = super().take(description)
-        away = finer is None and len(self.solutions) > AWAY
-        if away and _passes(self.problem, self.solutions[-2:], self._first):
-            raise _Returned
+        may_close = finer is None and len(self.solutions) > MIN_POINTS
+        if may_close and _contains(self.problem, self.solutions[-2:], self._first):
+            raise _CurveClosed
         return finer
 
 
-def _both_ways(
+def _follow_both_ways(
     problem: HarmonicBalance,
     motion: HarmonicSolution,
     span: tuple[float, float],
@@ -165,10 +208,11 @@ def _both_ways(
     accuracy: Accuracy | None,
     steps: Steps,
 ) -> FurtherBranch:
+    """Follow the curve through a motion in both directions."""
     along = Along("frequency", motion.force)
     halves, messages = [], []
     for upward in (True, False):
-        record = _UntilClosed(problem, along, accuracy, motion)
+        record = _ClosedCurveRecorder(problem, along, accuracy, motion)
         solution = solve(
             problem.by_frequency(motion.force), problem.guess(motion), motion.frequency
         )
@@ -184,7 +228,7 @@ def _both_ways(
                 problem.rounding,
                 steps=steps,
             )
-        except _Returned:
+        except _CurveClosed:
             motions = (motion, *record.solutions)
             return FurtherBranch(motions, True, False, "", record.problem)
         halves.append(record.solutions)
@@ -195,29 +239,36 @@ def _both_ways(
     return FurtherBranch(motions, False, False, message, problem)
 
 
-def _passes(
+def _contains(
     problem: HarmonicBalance, motions: Sequence[HarmonicSolution], motion: HarmonicSolution
 ) -> bool:
-    """Whether a curve of motions passes a motion: the point of it that is nearest is the motion."""
+    """Return whether a motion is on a curve of motions."""
     curve, control = curve_by_frequency(problem, motion.force), ContinuationControl()
     at = curve.coordinates_of(motion)
-    places = [curve.coordinates_of(each) for each in motions]
-    # Shares of the motion's unknowns and of its frequency count alike.
+    points = [curve.coordinates_of(each) for each in motions]
+    # Relative differences of the unknowns and of the frequency have equal weight.
     scale = np.full(len(at), 1.0 / (problem.vibration(motion.coefficients) or 1.0))
     scale[-1] = 1.0 / motion.frequency
-    for start, end in pairwise(places):
-        chord, beyond = scale * (end - start), scale * (at - start)
-        share = float(beyond @ chord) / (float(chord @ chord) or 1.0)
-        away = np.linalg.norm(beyond - share * chord)
-        if 0.0 <= share <= 1.0 and away <= NEARBY * np.linalg.norm(chord):
-            place = Chord(curve, start, end, control).at(share)
-            if place is None or _apart(problem, place.point.coordinates, at, motion) <= SAME:
+    for start, end in pairwise(points):
+        chord, difference = scale * (end - start), scale * (at - start)
+        share = float(difference @ chord) / (float(chord @ chord) or 1.0)
+        offset = np.linalg.norm(difference - share * chord)
+        if 0.0 <= share <= 1.0 and offset <= CLOSURE_SHARE * np.linalg.norm(chord):
+            located = Chord(curve, start, end, control).at(share)
+            if (
+                located is None
+                or _distance(problem, located.point.coordinates, at, motion) <= SAME_MOTION
+            ):
                 return True
-    return any(_apart(problem, end, at, motion) <= SAME for end in (places[0], places[-1]))
+    return any(
+        _distance(problem, end, at, motion) <= SAME_MOTION for end in (points[0], points[-1])
+    )
 
 
-def _apart(problem: HarmonicBalance, one: Array, other: Array, motion: HarmonicSolution) -> float:
-    """How far two points are from each other, in shares of a motion."""
+def _distance(
+    problem: HarmonicBalance, first: Array, second: Array, motion: HarmonicSolution
+) -> float:
+    """Return the distance between two points, relative to a motion."""
     size = problem.vibration(motion.coefficients) or 1.0
-    unknowns = float(np.linalg.norm(one[:-1] - other[:-1])) / size
-    return max(unknowns, abs(one[-1] / other[-1] - 1.0))
+    unknowns = float(np.linalg.norm(first[:-1] - second[:-1])) / size
+    return max(unknowns, abs(first[-1] / second[-1] - 1.0))

@@ -1,4 +1,4 @@
-"""Newton's method for r(u, λ) = 0: one solution at a given λ, or across a curve's tangent."""
+"""Newton's method for r(u, λ) = 0: a solution at a given λ, or across the tangent of a curve."""
 
 from __future__ import annotations
 
@@ -13,17 +13,18 @@ from fe_models.dynamics.curves.bordered import GMRES_TOLERANCE, LinearMap, solve
 from fe_models.dynamics.curves.sizes import norm
 from sa_solver.types import Array
 
-# Share of the residual that an iterative solver may leave. Newton's method squares a small relative
-# residual: more digits than that has are lost again. But near a resonance what leaves little of a
-# residual may be far from the solution: with 1e-3, curves take half as many evaluations again.
+# Loosest relative residual of an iterative linear solver. Newton's method squares a small relative
+# residual, so that more accurate corrections are useless. But near a resonance a small residual may
+# be far from the solution: with 1e-3, curves need half as many evaluations again.
 LOOSEST_TOLERANCE = 1e-4
 
 
 class Linearisation(Protocol):
-    """r ``(n,)``, ∂r/∂u, ∂r/∂λ ``(n,)``, and the norm of the terms r is the sum of.
+    """Protocol of linearised equations: r ``(n,)``, ∂r/∂u, ∂r/∂λ ``(n,)``, and their size.
 
-    ∂r/∂u is a matrix ``(n, n)``, or what multiplies like one. ``relative`` is the residual's norm
-    over ``size``: 0 if it vanishes, infinite if it is not a number.
+    ``jacobian`` ∂r/∂u is a matrix ``(n, n)`` or a linear map. ``size`` is the norm of the terms
+    whose sum is r. ``relative`` is the norm of r over ``size``: 0 if r vanishes, infinite if it is
+    not finite.
     """
 
     @property
@@ -43,17 +44,26 @@ L_co = TypeVar("L_co", bound=Linearisation, covariant=True)
 
 
 class Equations(Protocol[L_co]):
-    """r(u, λ) and its derivatives, for u ``(n,)``."""
+    """Protocol of equations r(u, λ) and their derivatives, for unknowns u ``(n,)``."""
 
     def __call__(self, unknowns: Array, parameter: float) -> L_co: ...
 
 
 @dataclass(frozen=True)
 class NewtonControl:
-    """When Newton's method has converged, and when it is given up.
+    """Criteria by which Newton's method has converged or is stopped.
 
-    ``max_shortened``: how often a correction that does not lower the residual is halved.
-    ``patience``: so many iterations in a row without a new least residual end it; None: any number.
+    Parameters
+    ----------
+    tolerance
+        Relative residual of a solution.
+    max_iterations
+        Largest number of iterations.
+    max_shortened
+        How often a correction that does not reduce the residual is halved.
+    patience
+        Number of iterations in a row without a new smallest residual after which the method stops;
+        None for any number.
     """
 
     tolerance: float = 1e-10
@@ -64,7 +74,7 @@ class NewtonControl:
 
 @dataclass(frozen=True)
 class NewtonSolution(Generic[L]):
-    """Unknowns for a parameter, the equations there, and a message if they are not solved."""
+    """Result of Newton's method: unknowns and equations; ``message`` says why it failed, if so."""
 
     unknowns: Array
     at: L
@@ -82,9 +92,21 @@ def solve(
     parameter: float,
     control: NewtonControl | None = None,
 ) -> NewtonSolution[L]:
-    """Newton's method at a given λ."""
+    """Solve r(u, λ) = 0 at a given λ by Newton's method.
+
+    Parameters
+    ----------
+    equations
+        The equations.
+    unknowns
+        Initial guess ``(n,)``.
+    parameter
+        λ.
+    control
+        Criteria of convergence.
+    """
     control = control or NewtonControl()
-    last = iterate(
+    result = iterate(
         lambda trial: equations(trial, parameter),
         lambda at: solve_alone(at.jacobian, -at.residual, linear_tolerance(at)),
         unknowns,
@@ -92,15 +114,15 @@ def solve(
     )
     message = (
         ""
-        if last.at.relative <= control.tolerance
-        else f"Newton's method leaves a residual of {last.at.relative:.2g} at {parameter:g} after "
-        f"{last.iterations} iterations: start from a solution nearby"
+        if result.at.relative <= control.tolerance
+        else f"Newton's method leaves a residual of {result.at.relative:.2g} at {parameter:g} "
+        f"after {result.iterations} iterations: start from a solution nearby"
     )
-    return NewtonSolution(last.unknowns, last.at, last.iterations, message)
+    return NewtonSolution(result.unknowns, result.at, result.iterations, message)
 
 
 def linear_tolerance(at: Linearisation) -> float:
-    """Share of the residual that an iterative linear solver may leave of it."""
+    """Return the relative residual that an iterative linear solver may leave."""
     return min(max(at.relative, GMRES_TOLERANCE), LOOSEST_TOLERANCE)
 
 
@@ -110,32 +132,43 @@ def iterate(
     unknowns: Array,
     control: NewtonControl,
 ) -> NewtonSolution[L]:
-    """Newton's method from given unknowns; what it has when it ends, converged or not.
+    """Iterate Newton's method, and return its last state whether converged or not.
 
-    A correction that does not lower the residual is shortened. Where shortening does not help, a
-    corner of the equations is in the way, and the whole correction leads to its other side.
+    A correction that does not reduce the residual is shortened. If shortening does not help, the
+    equations have a kink there, and the full correction is taken to its other side.
+
+    Parameters
+    ----------
+    equations_at
+        Function that returns the equations at unknowns.
+    correction_of
+        Function that returns the correction for the equations there.
+    unknowns
+        Initial guess.
+    control
+        Criteria of convergence.
     """
     at = equations_at(unknowns)
-    least, waited = at.relative, 0
+    smallest, without_progress = at.relative, 0
     for iteration in range(control.max_iterations):
         if at.relative <= control.tolerance or not isfinite(at.relative):
             return NewtonSolution(unknowns, at, iteration, "")
-        if waited == control.patience:
+        if without_progress == control.patience:
             return NewtonSolution(unknowns, at, iteration, "")
         try:
             correction = correction_of(at)
         except np.linalg.LinAlgError:
             return NewtonSolution(unknowns, at, iteration, "")
-        left, whole = norm(at.residual), unknowns + correction
-        trial = whole_at = equations_at(whole)
-        shortened = 0
-        while norm(trial.residual) >= left and shortened < control.max_shortened:
-            shortened += 1
-            trial = equations_at(unknowns + 0.5**shortened * correction)
-        if norm(trial.residual) < left:
-            unknowns, at = unknowns + 0.5**shortened * correction, trial
+        residual_norm, full_step = norm(at.residual), unknowns + correction
+        trial = at_full_step = equations_at(full_step)
+        halvings = 0
+        while norm(trial.residual) >= residual_norm and halvings < control.max_shortened:
+            halvings += 1
+            trial = equations_at(unknowns + 0.5**halvings * correction)
+        if norm(trial.residual) < residual_norm:
+            unknowns, at = unknowns + 0.5**halvings * correction, trial
         else:
-            unknowns, at = whole, whole_at
-        waited = 0 if at.relative < least else waited + 1
-        least = min(least, at.relative)
+            unknowns, at = full_step, at_full_step
+        without_progress = 0 if at.relative < smallest else without_progress + 1
+        smallest = min(smallest, at.relative)
     return NewtonSolution(unknowns, at, control.max_iterations, "")

@@ -1,20 +1,20 @@
-"""Modes of a structure with joints: frequency and damping against amplitude.
+"""Nonlinear modes of a structure with joints: frequency and damping against amplitude.
 
-A free vibration of a structure whose joints dissipate dies away. A periodic motion takes its place
-when as much energy is fed in as is lost, by a damping -2Dω M proportional to the mass (extended
+A free vibration of a structure with dissipative joints decays. It is replaced by a periodic motion
+that is fed as much energy as it loses, by a damping term -2Dω M proportional to the mass (extended
 periodic motion concept: Krack 2015, Comput. Struct. 154, 59, doi:10.1016/j.compstruc.2015.03.008):
 
     M x'' + (C - 2Dω M) x' + K x + Bᵀ F(B x) = s.
 
-Of each amplitude a, the norm of the first harmonic by the mass, there is one such motion with its
-frequency ω and its damping ratio D: of a linear mode its own. Because the feed acts on all
-harmonics and all places alike, D is the energy lost in a period over 2ω ∫ x'ᵀ M x' dt, whatever the
-mode's form. A response at phase resonance is near it where its force feeds one mode that no other
-meets, lightly damped.
+The amplitude a is the norm of the first harmonic, weighted by mass. For each amplitude there is one
+such motion with a frequency ω and a damping ratio D; a linear mode has its own ω and D. Because the
+feed acts on all harmonics and all points in proportion to their mass, D is the energy lost in a
+period over 2ω ∫ x'ᵀ M x' dt, whatever the shape of the mode. A response at phase resonance is close
+to the mode if its force excites a single, lightly damped mode that no other mode is close to.
 
-The unknowns are those of harmonic balance, ln ω and D. Two equations more say the amplitude, and
-that the first harmonic is in phase with the linear mode, q̂ᴴ x = real in the coordinates of the
-modes without joints.
+The unknowns are those of harmonic balance, ln ω and D. Two further equations set the amplitude, and
+require that the first harmonic is in phase with the linear mode: q̂ᴴ x is real, in the coordinates
+of the modes without joints.
 """
 
 from __future__ import annotations
@@ -25,8 +25,8 @@ from functools import cached_property, partial
 import numpy as np
 
 from fe_models.dynamics.curves.bordered import solve_alone
-from fe_models.dynamics.curves.continuation import CurvePoint, first_point, follow
-from fe_models.dynamics.curves.control import ContinuationControl
+from fe_models.dynamics.curves.continuation import follow
+from fe_models.dynamics.curves.curve_steps import ContinuationControl, CurvePoint, first_point
 from fe_models.dynamics.curves.newton import NewtonControl, solve
 from fe_models.dynamics.periodic.harmonic_balance import Balance, HarmonicBalance
 from fe_models.dynamics.periodic.harmonic_solution import HarmonicSolution
@@ -36,19 +36,29 @@ from sa_solver import checks
 from sa_solver.steps import COMPUTED, Steps
 from sa_solver.types import Array
 
-# Share of its frequency by which a linear mode is left to begin with: with joints of no stiffness
-# it is that of the structure alone, whose flexibility is not finite there.
-BESIDE = 1e-4
-# Frequencies are looked for up to this factor from the linear mode's, and damping ratios up to it.
-FARTHEST, MOST_DAMPED = 1e3, 10.0
+# Relative offset of the initial frequency from that of the linear mode. With joints of no
+# stiffness, that frequency is one of the structure alone, whose flexibility is not finite there.
+INITIAL_OFFSET = 1e-4
+# Largest ratio of a frequency to that of the linear mode, and largest damping ratio.
+MAX_FREQUENCY_RATIO, MAX_DAMPING_RATIO = 1e3, 10.0
 
 
 @dataclass(frozen=True)
 class ModeBalance:
-    """The equations of a mode at one motion, and their derivatives when asked for.
+    """Equations of a nonlinear mode at one motion, and their derivatives on demand.
 
-    ``balance`` is that of the motion without a force, fed as the ``damping_ratio`` D says, at a
-    ``frequency`` [Hz]; ``amplitude`` is the one that is asked for.
+    Parameters
+    ----------
+    equations
+        The equations.
+    balance
+        Harmonic balance of the motion without a force, with the feed of D.
+    frequency
+        Frequency [Hz].
+    damping_ratio
+        Damping ratio D.
+    amplitude
+        Prescribed amplitude [t^0.5 mm].
     """
 
     equations: NonlinearMode
@@ -59,7 +69,7 @@ class ModeBalance:
 
     @cached_property
     def first(self) -> ComplexArray:
-        """Harmonic 1 of the modes without joints ``(n,)``."""
+        """Harmonic 1 ``(n,)`` of the modes without joints."""
         return self.balance.motion[self.equations.first]
 
     @cached_property
@@ -67,8 +77,8 @@ class ModeBalance:
         return float(np.linalg.norm(self.first))
 
     @cached_property
-    def _left(self) -> Array:
-        """What is left of the amplitude, as a share of it, and the sine of the phase."""
+    def _conditions(self) -> Array:
+        """Residuals of amplitude and phase: the logarithm of its ratio, the sine of its angle."""
         if not 0.0 < self._size < np.inf:
             return np.array([np.inf, np.inf])
         phase = np.vdot(self.equations.reference, self.first).imag / self._size
@@ -76,61 +86,70 @@ class ModeBalance:
 
     @cached_property
     def residual(self) -> Array:
-        return np.append(self.balance.residual, self.equations.scale * self._left)
+        return np.append(self.balance.residual, self.equations.scale * self._conditions)
 
     @property
     def size(self) -> float:
-        """That of the balance."""
+        """Norm of the terms of the harmonic balance."""
         return self.balance.size
 
     @cached_property
     def relative(self) -> float:
-        """What is left of the balance, relative to its terms, of amplitude and phase, together."""
-        left = float(np.hypot(self.balance.relative, np.linalg.norm(self._left)))
-        return left if np.isfinite(left) else np.inf
+        """Relative residual of harmonic balance, amplitude and phase together."""
+        residual = float(np.hypot(self.balance.relative, np.linalg.norm(self._conditions)))
+        return residual if np.isfinite(residual) else np.inf
 
     @cached_property
     def jacobian(self) -> Array:
-        """∂r/∂u ``(n + 2, n + 2)``."""
+        """Jacobian ∂r/∂u ``(n + 2, n + 2)``."""
         inner = self.balance.jacobian
         inner = inner if isinstance(inner, np.ndarray) else inner.assembled()
         count, scale = len(inner), self.equations.scale
         matrix = np.empty((count + 2, count + 2), order="F")
         matrix[:count, :count] = inner
         transfer, steady = self.equations.problem.transfer, self.balance.steady
-        to_first = self._by_motion
-        forces = self._by_frequency, self._by_damping
-        for column, needed in enumerate(forces, start=count):
-            moved = steady.vibrate(needed)
-            matrix[:count, column] = transfer.at_joints(moved) / scale
-            matrix[count:, column] = -(self._rows @ moved[self.equations.first]).real
-        # Rows are scale times the equations, and of the columns before unknowns are as they are.
+        to_first = self._conditions_by_unknowns
+        forces = self._forces_by_frequency, self._forces_by_damping
+        for column, force in enumerate(forces, start=count):
+            response = steady.vibrate(force)
+            matrix[:count, column] = transfer.at_joints(response) / scale
+            matrix[count:, column] = -(self._condition_rows @ response[self.equations.first]).real
+        # Rows are the equations times the scale; the columns of the joint unknowns are not scaled.
         matrix[count:, :count] = scale * to_first
         return matrix
 
     @cached_property
     def slope(self) -> Array:
-        """∂r/∂a ``(n + 2,)`` by the amplitude."""
+        """Derivative ∂r/∂a ``(n + 2,)`` with respect to the amplitude."""
         slope = np.zeros(len(self.residual))
         slope[-2] = -self.equations.scale / self.amplitude
         return slope
 
     @cached_property
-    def _rows(self) -> ComplexArray:
-        """What both equations make of a change of harmonic 1 ``(2, n)``: the real part of these."""
+    def _condition_rows(self) -> ComplexArray:
+        """Rows ``(2, n)`` whose products with a change of harmonic 1 change both conditions.
+
+        The change is the real part of the product.
+        """
         along = self.first.conj() / self._size**2
         # Re(-i z) is the imaginary part of z.
         across = -1j * self.equations.reference.conj() / self._size
-        return np.stack([along, across - self._left[1] * along])
+        return np.stack([along, across - self._conditions[1] * along])
 
     @property
-    def _by_motion(self) -> Array:
-        """Both equations by the unknowns of the joints ``(2, n)``, through their forces."""
+    def _conditions_by_unknowns(self) -> Array:
+        """Derivatives ``(2, n)`` of both conditions by the unknowns, through the joints' forces."""
         problem, first = self.equations.problem, self.equations.first
-        # What joins displacements and forces of modes is symmetric.
-        alone = problem.alone.less_damped(self._rate).at(np.array([self._angular]))
-        per_force = np.concatenate([alone.vibrate(row[None]) for row in self._rows])
-        by_joint = (per_force @ problem.alone.at_joints.T).reshape(2, -1, problem.joints.directions)
+        # The matrix between displacements and forces of modes is symmetric.
+        fed_structure = problem.uniform_receptance.less_damped(self._feed_rate).at(
+            np.array([self._angular])
+        )
+        per_force = np.concatenate(
+            [fed_structure.vibrate(row[None]) for row in self._condition_rows]
+        )
+        by_joint = (per_force @ problem.uniform_receptance.at_joints.T).reshape(
+            2, -1, problem.joints.directions
+        )
         cosine, sine = (places[first] for places in problem.resolution.places)
         slopes = self.balance.cycle.jacobian
         by_motion = slopes[:, cosine] - 1j * slopes[:, sine]
@@ -141,35 +160,47 @@ class ModeBalance:
         return 2.0 * np.pi * self.frequency
 
     @property
-    def _rate(self) -> float:
-        """2Dω [1/s]."""
+    def _feed_rate(self) -> float:
+        """Feed 2Dω [1/s]."""
         return 2.0 * self.damping_ratio * self._angular
 
     @property
-    def _by_frequency(self) -> ComplexArray:
-        """Forces on the modes ``(k, n)`` that a motion needs more per ln ω."""
+    def _forces_by_frequency(self) -> ComplexArray:
+        """Change ``(k, n)`` of the modal forces that maintain a motion, per ln ω."""
         by_angular = self.balance.steady.stiffness_slope(self.balance.vibration)
-        by_angular *= self._angulars[:, None]
-        # The feed grows with ω itself.
-        return np.asarray(by_angular + self.damping_ratio * self._by_damping)
+        by_angular *= self._angular_by_harmonic[:, None]
+        # The feed is proportional to ω itself.
+        return np.asarray(by_angular + self.damping_ratio * self._forces_by_damping)
 
     @property
-    def _by_damping(self) -> ComplexArray:
-        """Forces on the modes ``(k, n)`` that a motion needs more per D."""
-        return np.asarray(-2j * self._angular * self._angulars[:, None] * self.balance.vibration)
+    def _forces_by_damping(self) -> ComplexArray:
+        """Change ``(k, n)`` of the modal forces that maintain a motion, per D."""
+        return np.asarray(
+            -2j * self._angular * self._angular_by_harmonic[:, None] * self.balance.vibration
+        )
 
     @property
-    def _angulars(self) -> Array:
-        """kω [rad/s] of all harmonics ``(k,)``."""
-        return self._angular * self.equations.problem.orders
+    def _angular_by_harmonic(self) -> Array:
+        """Angular frequency kω [rad/s] of each harmonic ``(k,)``."""
+        return self._angular * self.equations.problem.harmonic_numbers
 
 
 @dataclass(frozen=True)
 class NonlinearMode:
-    """Equations for the unknowns of a balance, ``scale`` · ln(f / ``frequency``) and ``scale`` · D.
+    """Equations of a mode; the unknowns are those of a balance, ln(f / ``frequency``) and D.
 
-    The amplitude is their parameter. ``reference`` ``(n,)`` is q̂ of the module, ``scale`` [mm] the
-    size of the joints' vibration at the start.
+    The last two are multiplied by ``scale``. The amplitude is the parameter of the equations.
+
+    Parameters
+    ----------
+    problem
+        The problem of harmonic balance.
+    reference
+        q̂ ``(n,)`` of the module.
+    frequency
+        Reference frequency [Hz].
+    scale
+        Norm of the joints' vibration at the start [mm].
     """
 
     problem: HarmonicBalance
@@ -183,31 +214,50 @@ class NonlinearMode:
         return self.problem.resolution.harmonics.index(1)
 
     def frequency_of(self, unknowns: Array) -> float:
-        """[Hz]"""
-        share = np.clip(unknowns[-2] / self.scale, -np.log(FARTHEST), np.log(FARTHEST))
+        """Return the frequency [Hz] that the unknowns stand for."""
+        share = np.clip(
+            unknowns[-2] / self.scale, -np.log(MAX_FREQUENCY_RATIO), np.log(MAX_FREQUENCY_RATIO)
+        )
         return float(self.frequency * np.exp(share))
 
     def damping_ratio_of(self, unknowns: Array) -> float:
-        """D"""
-        return float(np.clip(unknowns[-1] / self.scale, -MOST_DAMPED, MOST_DAMPED))
+        """Return the damping ratio D that the unknowns stand for."""
+        return float(np.clip(unknowns[-1] / self.scale, -MAX_DAMPING_RATIO, MAX_DAMPING_RATIO))
 
     def __call__(self, unknowns: Array, parameter: float) -> ModeBalance:
         problem = self.problem
         frequency, ratio = self.frequency_of(unknowns), self.damping_ratio_of(unknowns)
-        fed = problem.alone.less_damped(4.0 * np.pi * ratio * frequency)
+        fed = problem.uniform_receptance.less_damped(4.0 * np.pi * ratio * frequency)
         balance = problem.evaluate(
-            unknowns[:-2], frequency, 0.0, "frequency", fed.at(frequency * problem.turning)
+            unknowns[:-2],
+            frequency,
+            0.0,
+            "frequency",
+            fed.at(frequency * problem.angular_per_hertz),
         )
         return ModeBalance(self, balance, frequency, ratio, parameter)
 
 
 @dataclass(frozen=True)
 class ModeMotion:
-    """A periodic motion of a mode: ``solution``, without a force, and its ``damping_ratio`` D.
+    """Periodic motion of a nonlinear mode.
 
-    ``amplitude`` [t^0.5 mm] is the norm of harmonic 1 by the mass. A richer resolution would change
-    the joints' vibration by ``vibration_error`` and the frequency by ``frequency_error``, as shares
-    of themselves, and D by ``damping_error``, to first order.
+    The errors are the changes that a richer resolution would make, to first order.
+
+    Parameters
+    ----------
+    solution
+        The motion, without a force.
+    amplitude
+        Norm of harmonic 1, weighted by mass [t^0.5 mm].
+    damping_ratio
+        Damping ratio D.
+    vibration_error
+        Relative error of the joints' vibration.
+    frequency_error
+        Relative error of the frequency.
+    damping_error
+        Error of D.
     """
 
     solution: HarmonicSolution
@@ -220,9 +270,9 @@ class ModeMotion:
 
 @dataclass(frozen=True)
 class ModeBranch:
-    """Motions of a mode from the least amplitude on, and the ``linear`` one.
+    """Motions of a nonlinear mode from the smallest amplitude on, and its linear mode.
 
-    ``message`` is empty if the largest amplitude was reached.
+    ``message`` is empty if the largest amplitude was reached, else the reason why not.
     """
 
     motions: tuple[ModeMotion, ...]
@@ -231,12 +281,12 @@ class ModeBranch:
 
     @property
     def amplitudes(self) -> Array:
-        """[t^0.5 mm]"""
+        """Amplitudes [t^0.5 mm]."""
         return np.array([motion.amplitude for motion in self.motions])
 
     @property
     def frequencies(self) -> Array:
-        """[Hz]"""
+        """Frequencies [Hz]."""
         return np.array([motion.solution.frequency for motion in self.motions])
 
     @property
@@ -246,13 +296,20 @@ class ModeBranch:
 
 @dataclass(frozen=True)
 class LinearMode:
-    """A mode of the structure with its joints as stiff as they are at rest.
+    """Mode of the structure with its joints as stiff as they are at rest.
 
-    ``frequency`` [Hz], ``shape`` ``(n,)`` of unit modal mass, ``damping_ratio`` what C takes of it.
+    Parameters
+    ----------
+    frequency
+        Natural frequency [Hz].
+    damping_ratio
+        Damping ratio due to the damping of the structure.
+    shape
+        Mode shape ``(n,)`` of unit modal mass.
 
     Examples
     --------
-    A mass of 1 kg on a spring and a joint of 1 N/µm each: √(2 k/m)
+    A mass of 1 kg stands on a spring and a joint of 1 N/µm each: ω = √(2 k/m).
 
     >>> from fe_models.dynamics import *
     >>> from wear.joints import Jenkins, PeriodicMarch
@@ -269,22 +326,26 @@ class LinearMode:
 
     @classmethod
     def of(cls, problem: HarmonicBalance, number: int) -> LinearMode:
-        """The mode of a ``number``, counted from 1, rigid motions left out.
+        """Return the mode of a ``number``, counted from 1 without rigid motions.
 
-        Raises :class:`HarmonicBalanceError` for one that there is not.
+        Raises
+        ------
+        HarmonicBalanceError
+            If there is no such mode.
         """
-        # A sector in a wave is refused.
-        _ = problem.alone
+        # Raises an error for a sector in a wave.
+        _ = problem.uniform_receptance
         stuck = problem.rest.stuck.stiffened
         elastic = np.flatnonzero(stuck.squares)
         if not 1 <= checks.whole("mode", number, HarmonicBalanceError) <= len(elastic):
             raise HarmonicBalanceError(
-                f"mode {number}: the structure with stuck joints has 1 to {len(elastic)}"
+                f"mode {number} does not exist: the structure with stuck joints has 1 to "
+                f"{len(elastic)}"
             )
-        place = elastic[number - 1]
-        angular = float(np.sqrt(stuck.squares[place]))
-        ratio = float(stuck.damping[place] + stuck.loss[place] / angular) / (2.0 * angular)
-        return cls(angular / (2.0 * np.pi), ratio, stuck.at_points[:, place])
+        index = elastic[number - 1]
+        angular = float(np.sqrt(stuck.squares[index]))
+        ratio = float(stuck.damping[index] + stuck.loss[index] / angular) / (2.0 * angular)
+        return cls(angular / (2.0 * np.pi), ratio, stuck.at_points[:, index])
 
 
 def along_nonlinear_mode(
@@ -294,15 +355,31 @@ def along_nonlinear_mode(
     control: ContinuationControl | None = None,
     steps: Steps = COMPUTED,
 ) -> ModeBranch:
-    """A mode from a least to a largest amplitude [t^0.5 mm].
+    """Follow a nonlinear mode from a smallest to a largest amplitude.
 
-    It begins with the ``linear`` one, which must be near that of the least amplitude. The load of
-    the problem counts as far as it is constant. Each of the ``steps`` finds a motion. Raises
-    :class:`HarmonicBalanceError` for amplitudes that do not ascend from above zero.
+    Only the constant part of the problem's load counts.
+
+    Parameters
+    ----------
+    problem
+        The problem of harmonic balance.
+    linear
+        The linear mode, which must be close to the mode of the smallest amplitude.
+    amplitudes
+        Smallest and largest amplitude [t^0.5 mm].
+    control
+        Control of the steps.
+    steps
+        Runner of the steps, each of which finds one motion; see :class:`sa_solver.steps.Steps`.
+
+    Raises
+    ------
+    HarmonicBalanceError
+        If the amplitudes do not ascend from above zero.
 
     Examples
     --------
-    A mass on a slider: D is the energy of its loop over 2π m ω² X², X = a / √m.
+    For a mass on a slider, D is the energy of its loop over 2π m ω² X², with X = a / √m.
 
     >>> import numpy as np
     >>> from fe_models.dynamics import *
@@ -322,11 +399,12 @@ def along_nonlinear_mode(
     least, largest = ends.tolist()
     if not 0.0 < least < largest < np.inf:
         raise HarmonicBalanceError(
-            f"amplitudes from {least:g} to {largest:g}: give two above 0 that ascend"
+            f"amplitudes from {least:g} to {largest:g} are not possible: give two above 0 that "
+            "ascend"
         )
     control = control or ContinuationControl()
-    unknowns, equations = _beginning(problem, linear, least)
-    record = _Recorder(equations)
+    unknowns, equations = _linear_start(problem, linear, least)
+    record = _ModeRecorder(equations)
     first = steps("first motion of a mode", partial(_first, record, unknowns, least, control))
     if isinstance(first, str):
         return ModeBranch((), first, linear)
@@ -339,44 +417,45 @@ def along_nonlinear_mode(
     return ModeBranch(tuple(record.motions), curve.message, linear)
 
 
-def _beginning(
+def _linear_start(
     problem: HarmonicBalance, linear: LinearMode, amplitude: float
 ) -> tuple[Array, NonlinearMode]:
-    """Unknowns of the linear mode with an amplitude, and the equations that count from it."""
+    """Return the unknowns of the linear mode with an amplitude, and the equations around it."""
     unknowns = problem.transfer.shaped(problem.guess(None).copy())
     cosine, _ = problem.resolution.places
-    place = cosine[problem.resolution.harmonics.index(1)]
+    index = cosine[problem.resolution.harmonics.index(1)]
     moved = amplitude * problem.model.connection @ linear.shape
-    unknowns[:, place] = moved.reshape(len(unknowns), -1)
-    reference = problem.alone.at_points.T @ problem.model.mass @ linear.shape
+    unknowns[:, index] = moved.reshape(len(unknowns), -1)
+    reference = problem.uniform_receptance.at_points.T @ problem.model.mass @ linear.shape
     scale = float(np.linalg.norm(moved)) or 1.0
     equations = NonlinearMode(problem, reference + 0j, linear.frequency, scale)
-    return np.append(unknowns, [scale * BESIDE, scale * linear.damping_ratio]), equations
+    return np.append(unknowns, [scale * INITIAL_OFFSET, scale * linear.damping_ratio]), equations
 
 
 def _first(
-    record: _Recorder, unknowns: Array, amplitude: float, control: ContinuationControl
+    record: _ModeRecorder, unknowns: Array, amplitude: float, control: ContinuationControl
 ) -> tuple[CurvePoint, ModeMotion] | str:
-    """The motion of the least amplitude; or why there is none."""
+    """Return the motion of the smallest amplitude, or the reason why there is none."""
     found = solve(record.equations, unknowns, amplitude, NewtonControl(control.tolerance))
     if not found.converged:
         return (
-            f"at the least amplitude Newton's method leaves {found.at.relative:.2g} after "
-            f"{found.iterations} iterations from the linear mode; begin with a smaller one"
+            f"at the smallest amplitude Newton's method, started from the linear mode, leaves a "
+            f"residual of {found.at.relative:.2g} after {found.iterations} iterations: begin with "
+            "a smaller amplitude"
         )
     point = first_point(found, amplitude, True, control.first)
     return point, record.describe(point, found.at)
 
 
-class _Recorder:
-    """Keeps every new motion of a mode, with its error."""
+class _ModeRecorder:
+    """Recorder of the motions of a mode, with their errors."""
 
     def __init__(self, equations: NonlinearMode) -> None:
         self.equations = equations
         self.motions: list[ModeMotion] = []
 
     def describe(self, point: CurvePoint, at: ModeBalance) -> ModeMotion:
-        """The motion at a point."""
+        """Return the motion at a point."""
         problem = self.equations.problem
         motion = problem.describe(
             point.unknowns[:-2], at.balance, at.frequency, 0.0, point.iterations
@@ -386,11 +465,11 @@ class _Recorder:
         return ModeMotion(motion, point.parameter, at.damping_ratio, *errors)
 
     def take(self, description: ModeMotion) -> None:
-        """Keep a motion."""
+        """Store a motion."""
         self.motions.append(description)
 
     def _errors(self, motion: HarmonicSolution, point: CurvePoint) -> tuple[float, float, float]:
-        """Of vibration, frequency and D: one step of Newton's method with a richer resolution."""
+        """Return errors of vibration, frequency and D, by a Newton step at richer resolution."""
         problem, scale = self.equations.problem, self.equations.scale
         vibration = problem.vibration(motion.coefficients)
         if vibration == 0.0:
@@ -399,5 +478,5 @@ class _Recorder:
         joints = richer.problem.resolution.adopt(motion.coefficients, problem.resolution)
         at = richer(np.append(joints, point.unknowns[-2:]), point.parameter)
         change = solve_alone(at.jacobian, -at.residual)
-        moved = float(np.linalg.norm(richer.problem.vibrating(change[:-2])))
+        moved = float(np.linalg.norm(richer.problem.without_mean(change[:-2])))
         return moved / vibration, abs(float(change[-2])) / scale, abs(float(change[-1])) / scale

@@ -1,18 +1,19 @@
-"""Phase resonance of a structure with joints: the backbone of its forced responses.
+"""Phase resonance of a structure with joints: the backbone curve of its forced responses.
 
 At phase resonance the first harmonic of a displacement lags that of the force by a quarter of a
-period. With x that displacement as a complex amplitude relative to the force (its real part in
-phase with it), this is one more equation for one more unknown, the frequency:
+period. Let x be that displacement as a complex amplitude relative to the force (its real part in
+phase with the force). Then one equation is added for one more unknown, the frequency:
 
     cot(phase of x) = Re x / Im x = 0.
 
-The cotangent is taken because it is linear in the frequency near the resonance of a mode, however
-little damped, where Re x itself turns back within the half-power width. By default x is that of the
-force's own points, wᴴ x with the complex amplitudes w of the force: all of its power is then spent
-(Peter and Leine, Mech. Syst. Signal Process. 96, 2017, 139, doi:10.1016/j.ymssp.2017.04.011).
+The cotangent is used because it is linear in the frequency near the resonance of a mode, however
+small its damping, whereas Re x itself turns back within the half-power bandwidth. By default the
+output is the displacement wᴴ x of the force's own points, with the complex amplitudes w of the
+force. At phase resonance all power of the force's first harmonic is then active power (Peter and
+Leine, Mech. Syst. Signal Process. 96, 2017, 139, doi:10.1016/j.ymssp.2017.04.011).
 
-The unknowns are those of harmonic balance and ln(f / f0), in units of the size of the joints'
-vibration at the start, so that the two may be measured together. The structure's matrices are
+The unknowns are those of harmonic balance and ln(f / f0). The latter is multiplied by the norm of
+the joints' vibration at the start, so that both have comparable sizes. The structure's matrices are
 symmetric.
 """
 
@@ -25,8 +26,8 @@ from itertools import pairwise
 import numpy as np
 
 from fe_models.dynamics.curves.bordered import Bordered, LinearMap
-from fe_models.dynamics.curves.continuation import CurvePoint, Refinement, first_point, follow
-from fe_models.dynamics.curves.control import ContinuationControl
+from fe_models.dynamics.curves.continuation import Refinement, follow
+from fe_models.dynamics.curves.curve_steps import ContinuationControl, CurvePoint, first_point
 from fe_models.dynamics.curves.forced_response import Accuracy, Motions, ResponseBranch, finer_for
 from fe_models.dynamics.curves.newton import NewtonControl, solve
 from fe_models.dynamics.periodic.harmonic_balance import Balance, HarmonicBalance
@@ -38,19 +39,27 @@ from sa_solver import checks
 from sa_solver.steps import COMPUTED, Steps
 from sa_solver.types import Array
 
-# Frequencies are looked for up to this factor from the start's: Newton's method that goes farther
-# is lost, and must not overflow.
-FARTHEST = 1e3
-# Of the phases of a force's points: below it they push together, in one sense or the other.
+# Largest ratio of a frequency to that of the start. If Newton's method goes farther it is lost, and
+# must not overflow.
+MAX_FREQUENCY_RATIO = 1e3
+# Tolerance for the points of a force to act in phase or in antiphase.
 SAME_PHASE = 1e-9
 
 
 @dataclass(frozen=True)
 class PhaseBalance:
-    """The equations of phase resonance at one motion, and their derivatives when asked for.
+    """Equations of phase resonance at one motion, and their derivatives on demand.
 
-    ``balance`` is the motion's own, with the frequency as parameter, and ``output`` the complex x
-    of the module, that ``frequency`` [Hz] and the motion have.
+    Parameters
+    ----------
+    equations
+        The equations.
+    balance
+        The harmonic balance of the motion, with the frequency as parameter.
+    frequency
+        Frequency [Hz] of the motion.
+    output
+        Complex output displacement x of the motion; see the module.
     """
 
     equations: PhaseResonance
@@ -60,7 +69,7 @@ class PhaseBalance:
 
     @property
     def cotangent(self) -> float:
-        """Of the phase; infinite where no power is spent: no frequency has the phase then."""
+        """Cotangent of the phase; infinite if the force does no work."""
         return self.output.real / self.output.imag if self.output.imag else np.inf
 
     @cached_property
@@ -69,62 +78,61 @@ class PhaseBalance:
 
     @property
     def size(self) -> float:
-        """That of the balance."""
+        """Norm of the terms of the harmonic balance."""
         return self.balance.size
 
     @cached_property
     def relative(self) -> float:
-        """What is left of the balance, relative to its terms, and of the phase, together."""
-        left = float(np.hypot(self.balance.relative, self.cotangent))
-        return left if np.isfinite(left) else np.inf
+        """Relative residual of the harmonic balance and the cotangent together."""
+        residual = float(np.hypot(self.balance.relative, self.cotangent))
+        return residual if np.isfinite(residual) else np.inf
 
     @cached_property
     def jacobian(self) -> Array | LinearMap:
-        """∂r/∂u ``(n + 1, n + 1)``, a matrix where that of the balance is one."""
+        """Jacobian ∂r/∂u ``(n + 1, n + 1)``, a matrix if that of the harmonic balance is one."""
         scale, inner = self.equations.scale, self.balance.jacobian
-        # Hz per unknown.
-        stretch = self.frequency / scale
+        hertz_per_unknown = self.frequency / scale
         by_frequency = complex(
-            self._steady.stiffness_slope(self._first_harmonic)[0] @ self._per_force
+            self._steady.stiffness_slope(self._first_harmonic)[0] @ self._output_by_forces
         )
-        corner = -2.0 * np.pi * stretch * self._of_phase(by_frequency)
-        row = np.append(self._of_phase(self._by_motion), corner)
-        bordered = Bordered(inner, self.balance.slope * stretch, row)
+        corner = -2.0 * np.pi * hertz_per_unknown * self._change_of_phase(by_frequency)
+        row = np.append(self._change_of_phase(self._output_by_unknowns), corner)
+        bordered = Bordered(inner, self.balance.slope * hertz_per_unknown, row)
         return bordered.assembled() if isinstance(inner, np.ndarray) else bordered
 
     @cached_property
     def slope(self) -> Array:
-        """∂r/∂a ``(n + 1,)`` by the force."""
-        by_force = replace(self.balance, over="force").slope
+        """Derivative ∂r/∂a ``(n + 1,)`` with respect to the force."""
+        by_force = replace(self.balance, varies="force").slope
         wave = self.equations.problem.wave[self.equations.first]
-        return np.append(by_force, self._of_phase(complex(wave @ self._per_force)))
+        return np.append(by_force, self._change_of_phase(complex(wave @ self._output_by_forces)))
 
-    def _of_phase(self, change: ComplexArray | complex) -> Array:
-        """By how much a change of x changes the last of the equations."""
+    def _change_of_phase(self, change: ComplexArray | complex) -> Array:
+        """Return the change of the last equation for a change of x."""
         cotangent = np.real(change) - self.cotangent * np.imag(change)
         return np.asarray(self.equations.scale * cotangent / self.output.imag)
 
     @property
     def _first_harmonic(self) -> ComplexArray:
-        """The modes at harmonic 1 ``(1, n)``."""
+        """Modal displacements at harmonic 1 ``(1, n)``."""
         return self.balance.motion[self.equations.first][None]
 
     @cached_property
     def _steady(self) -> SteadyMotion:
-        """The structure at harmonic 1."""
+        """Structure at harmonic 1."""
         first = self.equations.problem.receptance.of(1)
         return first.at(np.array([2.0 * np.pi * self.frequency]))
 
     @cached_property
-    def _per_force(self) -> ComplexArray:
-        """x by forces on the modes ``(n,)``."""
-        return np.asarray(self._steady.per_force(self.equations.of_modes[None])[0])
+    def _output_by_forces(self) -> ComplexArray:
+        """Derivative ``(n,)`` of x with respect to modal forces."""
+        return np.asarray(self._steady.per_force(self.equations.output_by_modes[None])[0])
 
     @property
-    def _by_motion(self) -> ComplexArray:
-        """x by the unknowns ``(n,)``, through the forces of the joints."""
+    def _output_by_unknowns(self) -> ComplexArray:
+        """Derivative ``(n,)`` of x with respect to the unknowns, through the joints' forces."""
         problem, first = self.equations.problem, self.equations.first
-        by_joint = problem.receptance.of(1).at_joints.conj() @ self._per_force
+        by_joint = problem.receptance.of(1).at_joints.conj() @ self._output_by_forces
         cosine, sine = (places[first] for places in problem.resolution.places)
         slopes = self.balance.cycle.jacobian
         by_motion = slopes[:, cosine] - 1j * slopes[:, sine]
@@ -134,10 +142,16 @@ class PhaseBalance:
 
 @dataclass(frozen=True)
 class Backbone(Motions):
-    """Motions at phase resonance, from the least force on; the curve may turn back in force.
+    """Phase resonances from the lowest force on; the curve may turn back in force.
 
-    ``message`` is empty if the curve reaches both ends of the forces. ``problem`` is at the
-    resolution of the last motion found upward.
+    Parameters
+    ----------
+    solutions
+        The motions.
+    message
+        Empty if the curve reaches both ends of the forces, else the reason why not.
+    problem
+        The problem at the resolution of the last motion found at increasing force.
     """
 
     message: str
@@ -154,21 +168,39 @@ def along_phase_resonance(
     accuracy: Accuracy | None = None,
     steps: Steps = COMPUTED,
 ) -> Backbone:
-    """Phase resonances for ``forces`` from a least to a largest, folds included.
+    """Follow the phase resonances of a structure over a range of forces, past folds.
 
-    They begin where a response ``start`` passes through the phase with the largest displacement, or
-    near one motion, best its peak. Newton's method finds the phase resonance under its force, from
-    which the curve is followed both ways. ``output`` ``(n,)`` is the displacement whose phase
-    counts, as a combination of those of the structure; the force's own if it is not given. Without
-    ``accuracy`` the resolution is that of the problem. Each of the ``steps`` finds a motion.
+    If ``start`` is a response, the curve starts where the response passes through phase resonance
+    with the largest displacement. Newton's method finds the phase resonance under that force, from
+    which the curve is followed in both directions.
 
-    Raises :class:`HarmonicBalanceError` for a load without a first harmonic, an ``output`` that
-    is nothing or lags a force of several phases, and forces that are not above zero or do not
-    include the start's.
+    Parameters
+    ----------
+    problem
+        The problem of harmonic balance.
+    start
+        A response that passes through phase resonance, or a motion near it, such as a peak.
+    forces
+        Lowest and highest force factor, including that of the start.
+    output
+        Combination ``(n,)`` of the structure's displacements whose phase counts; that of the
+        force's own points if None.
+    control
+        Control of the steps.
+    accuracy
+        Accuracy of the motions; if None, the resolution is that of the problem.
+    steps
+        Runner of the steps, each of which finds one motion; see :class:`sa_solver.steps.Steps`.
+
+    Raises
+    ------
+    HarmonicBalanceError
+        If the load has no first harmonic, if the output is zero or refers to a force of several
+        phases, or if the forces are not above zero or do not include that of the start.
 
     Examples
     --------
-    At phase resonance the force does the work of damping and joint, F = c ω X + E / π X:
+    At phase resonance damping and joint dissipate the work of the force, F = c ω X + E / π X:
 
     >>> import numpy as np
     >>> from fe_models.dynamics import *
@@ -188,22 +220,24 @@ def along_phase_resonance(
     nearest = nearest_to_phase(start, weights) if isinstance(start, ResponseBranch) else start
     if nearest is None:
         return Backbone(
-            (), "the response does not pass through the phase: give one with its peak", problem
+            (),
+            "the response does not pass through phase resonance: give one with its peak",
+            problem,
         )
     if not 0.0 < low <= nearest.force <= high:
         raise HarmonicBalanceError(
-            f"forces from {low:g} to {high:g} with a start at {nearest.force:g}: give two above 0 "
-            "that include the start's"
+            f"forces from {low:g} to {high:g} do not suit a start at {nearest.force:g}: give two "
+            "above 0 that include the start's"
         )
     if nearest.message:
-        return Backbone((), f"the start is no solution: {nearest.message}", problem)
+        return Backbone((), f"the start is not a solution: {nearest.message}", problem)
     control = control or ContinuationControl()
     equations = PhaseResonance.near(problem, nearest, output)
-    first = _first(_Recorder(equations, accuracy), nearest, control, steps)
+    first = _start_resonance(_BackboneRecorder(equations, accuracy), nearest, control, steps)
     if isinstance(first, str):
         return Backbone((), first, problem)
-    below = _half(first, False, forces, accuracy, control, steps)
-    above = _half(first, True, forces, accuracy, control, steps)
+    below = _half_backbone(first, False, forces, accuracy, control, steps)
+    above = _half_backbone(first, True, forces, accuracy, control, steps)
     return Backbone(
         (*reversed(below.solutions), first.solution, *above.solutions),
         "; ".join(filter(None, (below.message, above.message))),
@@ -212,33 +246,43 @@ def along_phase_resonance(
 
 
 def nearest_to_phase(branch: ResponseBranch, weights: ComplexArray) -> HarmonicSolution | None:
-    """The motion of a branch before or after which it passes through the phase, None if it never.
+    """Return the motion of a branch nearest to where it passes through phase resonance, or None.
 
-    The larger displacement wᴴ x with the ``weights`` w ``(n,)`` decides if it passes more often:
-    between two resonances it also does.
+    If the branch passes several times, the passage with the largest displacement wᴴ x counts, with
+    ``weights`` w ``(n,)``. Between two resonances there is one too, with a small displacement.
     """
     outputs = [
         complex(np.vdot(weights, solution.motion[solution.resolution.harmonics.index(1)]))
         for solution in branch.solutions
     ]
     passing = [
-        (abs(before) + abs(after), place)
-        for place, (before, after) in enumerate(pairwise(outputs))
+        (abs(before) + abs(after), index)
+        for index, (before, after) in enumerate(pairwise(outputs))
         if before.real * after.real <= 0.0 < before.imag * after.imag
     ]
     if not passing:
         return None
-    _, place = max(passing)
-    cotangents = [abs(x.real / x.imag) for x in outputs[place : place + 2]]
-    return branch.solutions[place + int(np.argmin(cotangents))]
+    _, index = max(passing)
+    cotangents = [abs(x.real / x.imag) for x in outputs[index : index + 2]]
+    return branch.solutions[index + int(np.argmin(cotangents))]
 
 
 @dataclass(frozen=True)
 class PhaseResonance:
-    """Equations for the unknowns of a balance and ``scale`` · ln(f / ``frequency``).
+    """Equations for the unknowns of a harmonic balance and ``scale`` · ln(f / ``frequency``).
 
-    The force is their parameter. ``weights`` ``(n,)`` w make wᴴ x of the structure's amplitudes x;
-    ``scale`` [mm] is the size of the joints' vibration at the start.
+    The force is their parameter.
+
+    Parameters
+    ----------
+    problem
+        The problem of harmonic balance.
+    weights
+        Weights w ``(n,)`` of the output wᴴ x of the structure's amplitudes x.
+    frequency
+        Reference frequency [Hz].
+    scale
+        Norm of the joints' vibration at the start [mm].
     """
 
     problem: HarmonicBalance
@@ -250,9 +294,9 @@ class PhaseResonance:
     def near(
         cls, problem: HarmonicBalance, start: HarmonicSolution, output: Array | None = None
     ) -> PhaseResonance:
-        """The equations near a motion; see :func:`along_phase_resonance`."""
+        """Return the equations near a motion; see :func:`along_phase_resonance`."""
         vibration = problem.guess(start) - problem.guess(None)
-        # Where no joint moves there is nothing to be measured with the frequency.
+        # If no joint moves, there is no scale for the frequency.
         scale = float(np.linalg.norm(vibration)) or 1.0
         return cls(problem, _weights(problem, output), start.frequency, scale)
 
@@ -262,35 +306,37 @@ class PhaseResonance:
         return self.problem.resolution.harmonics.index(1)
 
     @cached_property
-    def of_modes(self) -> ComplexArray:
-        """x by the amplitudes of the modes at harmonic 1 ``(n,)``."""
+    def output_by_modes(self) -> ComplexArray:
+        """Derivative ``(n,)`` of x with respect to the modal amplitudes at harmonic 1."""
         return np.asarray(self.weights.conj() @ self.problem.receptance.of(1).at_points)
 
     def frequency_of(self, unknowns: Array) -> float:
-        """[Hz]"""
-        share = np.clip(unknowns[-1] / self.scale, -np.log(FARTHEST), np.log(FARTHEST))
+        """Return the frequency [Hz] that the unknowns stand for."""
+        share = np.clip(
+            unknowns[-1] / self.scale, -np.log(MAX_FREQUENCY_RATIO), np.log(MAX_FREQUENCY_RATIO)
+        )
         return float(self.frequency * np.exp(share))
 
-    def place_of(self, frequency: float) -> float:
-        """The unknown that stands for a frequency [Hz]."""
+    def unknown_of(self, frequency: float) -> float:
+        """Return the unknown that stands for a frequency [Hz]."""
         return float(self.scale * np.log(frequency / self.frequency))
 
     def __call__(self, unknowns: Array, parameter: float) -> PhaseBalance:
         frequency = self.frequency_of(unknowns)
         balance = self.problem.evaluate(unknowns[:-1], frequency, parameter, "frequency")
-        output = complex(self.of_modes @ balance.motion[self.first])
+        output = complex(self.output_by_modes @ balance.motion[self.first])
         return PhaseBalance(self, balance, frequency, output)
 
 
-class _Recorder:
-    """Describes every new point of the curve, and asks for finer equations where needed."""
+class _BackboneRecorder:
+    """Recorder of the motions of a backbone, which requests refined equations where needed."""
 
     def __init__(self, equations: PhaseResonance, accuracy: Accuracy | None) -> None:
         self.equations, self._accuracy = equations, accuracy
         self.solutions: list[HarmonicSolution] = []
 
     def describe(self, point: CurvePoint, at: PhaseBalance) -> HarmonicSolution:
-        """The motion at a point, with its error if it is to be accurate."""
+        """Return the motion at a point, with its error if an accuracy is given."""
         problem = self.equations.problem
         solution = problem.describe(point.unknowns[:-1], at.balance, at.frequency, point.parameter)
         if self._accuracy is not None:
@@ -298,7 +344,7 @@ class _Recorder:
         return replace(solution, iterations=point.iterations, residual=at.relative)
 
     def take(self, description: HarmonicSolution) -> Refinement[PhaseBalance] | None:
-        """Keep a motion, or ask for finer equations where it is not accurate."""
+        """Store a motion, or request refined equations if it is not accurate."""
         problem = self.equations.problem
         finer = finer_for(problem, description, self._accuracy)
         if finer is not None:
@@ -319,8 +365,8 @@ class _Recorder:
 
 
 @dataclass(frozen=True)
-class _First:
-    """The phase resonance from which the curve is followed ``down`` and ``up`` in force."""
+class _StartResonance:
+    """Phase resonance from which the curve is followed ``down`` and ``up`` in force."""
 
     equations: PhaseResonance
     down: CurvePoint
@@ -328,17 +374,17 @@ class _First:
     solution: HarmonicSolution
 
 
-def _first(
-    record: _Recorder, start: HarmonicSolution, control: ContinuationControl, steps: Steps
-) -> _First | str:
-    """The phase resonance under the start's force; or why there is none."""
+def _start_resonance(
+    record: _BackboneRecorder, start: HarmonicSolution, control: ContinuationControl, steps: Steps
+) -> _StartResonance | str:
+    """Return the phase resonance under the force of the start, or the reason why there is none."""
 
     def found(unknowns: Array) -> tuple[CurvePoint, CurvePoint, HarmonicSolution] | str:
         resonance = solve(record.equations, unknowns, start.force, NewtonControl(control.tolerance))
         if not resonance.converged:
             return (
                 f"no phase resonance is found under {start.force:g} N from {start.frequency:.6g} "
-                f"Hz: Newton's method leaves {resonance.at.relative:.2g} after "
+                f"Hz: Newton's method leaves a residual of {resonance.at.relative:.2g} after "
                 f"{resonance.iterations} iterations; start from a motion nearer to the peak of the "
                 "response"
             )
@@ -355,64 +401,68 @@ def _first(
         down, up, motion = first
         finer = record.take(motion)
         if finer is None:
-            return _First(record.equations, down, up, record.solutions[-1])
+            return _StartResonance(record.equations, down, up, record.solutions[-1])
         unknowns = finer.lift(up.unknowns)
 
 
 @dataclass(frozen=True)
-class _Half:
-    """Motions on one side of the first, in their order, and why there are not more."""
+class _HalfBackbone:
+    """Motions on one side of the start; ``message`` says why there are not more, or is empty."""
 
     solutions: tuple[HarmonicSolution, ...]
     message: str
     problem: HarmonicBalance
 
 
-def _half(
-    first: _First,
+def _half_backbone(
+    first: _StartResonance,
     upward: bool,
     forces: tuple[float, float],
     accuracy: Accuracy | None,
     control: ContinuationControl,
     steps: Steps,
-) -> _Half:
+) -> _HalfBackbone:
+    """Follow the curve from the start to one end of the forces."""
     force, problem = first.solution.force, first.equations.problem
     if force == forces[upward]:
-        return _Half((), "", problem)
-    record = _Recorder(first.equations, accuracy)
+        return _HalfBackbone((), "", problem)
+    record = _BackboneRecorder(first.equations, accuracy)
     point = first.up if upward else first.down
-    # Steps are shares of the vibration, as those of forced responses.
+    # Steps are relative to the vibration, as for forced responses.
     rest = np.append(problem.guess(None), 0.0)
     end = forces[upward]
     curve = follow(first.equations, point, forces, control, record, rest, end=end, steps=steps)
     message = curve.message
     if message:
-        message = f"{'upward' if upward else 'downward'} in force, {message}"
-    return _Half(tuple(record.solutions), message, record.equations.problem)
+        message = f"at {'increasing' if upward else 'decreasing'} force, {message}"
+    return _HalfBackbone(tuple(record.solutions), message, record.equations.problem)
 
 
 def _weights(problem: HarmonicBalance, output: Array | None) -> ComplexArray:
-    """Weights ``(n,)`` whose product wᴴ x is the output displacement, relative to the force."""
+    """Return the weights ``(n,)`` whose product wᴴ x is the output displacement."""
     if problem.load.inertial:
         raise HarmonicBalanceError(
-            "a load that changes with the frequency: give a force or an acceleration that does not"
+            "a load that changes with the frequency has no phase resonance under a force: give a "
+            "force or an acceleration that does not"
         )
     wave = problem.load.waves.get(1)
     if wave is None or not np.any(wave):
-        raise HarmonicBalanceError("the load has no harmonic 1: no phase is relative to it")
+        raise HarmonicBalanceError(
+            "the load has no harmonic 1 to which a phase could be relative: give one"
+        )
     if output is None:
         return np.asarray(wave, dtype=complex)
     output = checks.complex_array("outputs", output, None, error=HarmonicBalanceError)
     if output.shape != wave.shape or not np.any(output):
         raise HarmonicBalanceError(
             f"the output displacement has shape {output.shape}: give a combination, not zero, "
-            f"of the {len(wave)} of the structure"
+            f"of the {len(wave)} displacements of the structure"
         )
     largest = wave[np.argmax(np.abs(wave))]
     turn = largest / abs(largest)
     if np.abs((wave * np.conj(turn)).imag).max() > SAME_PHASE * abs(largest):
         raise HarmonicBalanceError(
-            "the force has several phases, so that no displacement lags it by a quarter: leave out "
-            "the output"
+            "the force has several phases, so that no displacement lags all of it by a quarter of "
+            "a period: leave out the output"
         )
     return np.asarray(turn * output)

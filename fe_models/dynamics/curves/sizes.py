@@ -1,4 +1,4 @@
-"""Sizes of small arrays: of unknowns, residuals, and what balances in them."""
+"""Norms of small arrays of unknowns and residuals."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from sa_solver.types import Array
 
 
 def norm(values: Array) -> float:
-    """Euclidean norm of all values together; of few of them in a quarter of numpy's time."""
+    """Return the Euclidean norm of all values; for few values in a quarter of numpy's time."""
     return sqrt(np.vdot(values, values))
 
 
 def relative_norm(residual: Array, size: float) -> float:
-    """A residual's norm over ``size``: 0 if it vanishes, infinite if it is not a number."""
-    left = norm(residual)
-    if not isfinite(left):
+    """Return the norm of a residual over ``size``; infinite if it is not finite."""
+    residual_norm = norm(residual)
+    if not isfinite(residual_norm):
         return np.inf
-    return left / size if left > 0.0 else 0.0
+    return residual_norm / size if residual_norm > 0.0 else 0.0

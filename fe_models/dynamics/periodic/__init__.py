@@ -1,1 +1,1 @@
-"""Periodic motions by harmonic balance."""
+"""Periodic motions of structures with joints, by harmonic balance."""

@@ -1,16 +1,17 @@
-"""Periodic motion of a structure with joints under periodic forces, by its harmonics.
+"""Periodic motion of a structure with joints under periodic forces, by harmonic balance.
 
     M x'' + C x' + K x = f(t) - Bᵀ F(B x),   f(t) = s + a Re Σ (w_k + (kω)² v_k) exp(ikωt)
 
-The unknowns are the real Fourier coefficients of the joints' displacements u = B x: the structure
-answers exactly, harmonic by harmonic, by its receptances R_k between joints (alternating frequency
-and time: Cameron and Griffin, J. Appl. Mech. 56, 1989, 149; condensed to the joints: Petrov and
-Ewins, doi:10.1115/1.1539868). With the Fourier coefficients F_k of the joints' forces
+The unknowns are the real Fourier coefficients of the joints' displacements u = B x. The structure
+responds exactly, harmonic by harmonic, through its receptances R_k between joints (alternating
+frequency-time method: Cameron and Griffin, J. Appl. Mech. 56, 1989, 149; condensation to the
+joints: Petrov and Ewins, doi:10.1115/1.1539868). With the Fourier coefficients F_k of the joints'
+forces, the equations are
 
-    r_k = u_k - (what the forces without joints make of u)_k + R_k F_k = 0.
+    r_k = u_k - (displacement u_k due to the load without joint forces) + R_k F_k = 0.
 
-This form has no stiff terms: its Jacobian 1 + R J is near 1 where joints are soft, and of the size
-of kt R where they are stiff.
+This form has no stiff terms: its Jacobian 1 + R J is close to 1 where joints are soft, and of the
+size of kt R where they are stiff.
 """
 
 from __future__ import annotations
@@ -22,52 +23,61 @@ from functools import cached_property
 import numpy as np
 
 from fe_models.dynamics.curves.bordered import LinearMap
-from fe_models.dynamics.curves.continuation import first_point, follow
-from fe_models.dynamics.curves.control import ContinuationControl
+from fe_models.dynamics.curves.continuation import follow
+from fe_models.dynamics.curves.curve_steps import ContinuationControl, first_point
 from fe_models.dynamics.curves.newton import NewtonControl, NewtonSolution, solve
 from fe_models.dynamics.curves.sizes import norm, relative_norm
 from fe_models.dynamics.joint_rest import Rest
 from fe_models.dynamics.model import DynamicModel
-from fe_models.dynamics.periodic.harmonic_jacobian import HarmonicJacobian, HarmonicTransfer
+from fe_models.dynamics.periodic.harmonic_jacobian import HarmonicJacobian
 from fe_models.dynamics.periodic.harmonic_solution import HarmonicSolution
-from fe_models.dynamics.periodic.harmonics import (
-    ComplexArray,
-    HarmonicBalanceError,
-    Resolution,
-)
+from fe_models.dynamics.periodic.harmonics import ComplexArray, HarmonicBalanceError, Resolution
 from fe_models.dynamics.periodic.joints import Cycle, CycleRecord, PeriodicJoints
-from fe_models.dynamics.periodic.load import PeriodicLoad
+from fe_models.dynamics.periodic.load import PeriodicLoad as PeriodicLoad
+from fe_models.dynamics.periodic.neglected import NeglectedHarmonics, examined
 from fe_models.dynamics.periodic.receptance import Receptance, SteadyMotion
 from fe_models.dynamics.rings.sector import CyclicSector
-from fe_models.dynamics.rings.travelling_wave import WaveReceptance
+from fe_models.dynamics.rings.travelling_wave import WaveReceptance, transfer_of
 from sa_solver import checks
 from sa_solver.types import Array
 
-# Unknowns up to which a matrix is assembled and factorised; beyond, products with it are cheaper,
-# but for a sector in a wave, for which these are not written.
+# Largest number of unknowns for which the Jacobian is assembled and factorised. Beyond it, products
+# with the Jacobian are cheaper. A sector in a travelling wave is always assembled, because these
+# products are not implemented for it.
 DENSE = 400
-# Harmonics left out are looked for up to this multiple of the highest, and at least to this one.
-LOOK_BEYOND, LOOK_AT_LEAST = 2, 63
-# Samples per period of the highest harmonic, at least: a corner of a joint's force is then seen.
+# Smallest number of samples per period of the highest harmonic, so that samples show corners of a
+# joint force.
 SAMPLES_PER_PERIOD = 8
-# Between numbers of one size, what rounding hides of their difference.
+# Relative rounding error of the difference of two numbers of one size.
 EPSILON = float(np.finfo(float).eps)
-# A vibration below this share of what balances in the mean is rounding: there is none.
+# Share of the static displacements below which a vibration is rounding error, and counts as zero.
 NO_VIBRATION = 1e-12
 
 
 @dataclass(frozen=True)
 class Balance:
-    """The equations at one motion: what is left of them ``(n,)``, and derivatives when asked for.
+    """Equations of harmonic balance at one motion: residual, and derivatives on demand.
 
-    ``over`` is what varies, frequency or ``force``; ``steady`` the structure at this frequency,
-    ``on_modes`` ``(k, n)`` the forces on its modes, ``vibration`` ``(k, n)`` their motion without
-    the mean, ``cycle`` what the joints do, ``size`` the norm of the terms that balance, and
-    ``relative`` what is left over it.
+    Parameters
+    ----------
+    problem, force
+        The problem, and the force factor of its load.
+    varies
+        Name of the continuation parameter, ``frequency`` or ``force``.
+    steady
+        The structure at this frequency.
+    on_modes, vibration
+        Modal forces, and modal displacements without the mean, ``(k, n)``.
+    cycle
+        Response of the joints over one period.
+    residual
+        Residual r ``(n,)`` [mm].
+    size, relative
+        Norm of the terms that balance [mm], and norm of the residual over it.
     """
 
     problem: HarmonicBalance
-    over: str
+    varies: str
     force: float
     steady: SteadyMotion
     on_modes: ComplexArray
@@ -79,38 +89,57 @@ class Balance:
 
     @cached_property
     def motion(self) -> ComplexArray:
-        """That of the modes ``(k, n)``."""
+        """Complex amplitudes ``(k, n)`` of the modal displacements."""
         return self.steady.respond(self.on_modes)
 
     @cached_property
     def jacobian(self) -> Array | LinearMap:
-        """∂r/∂u ``(n, n)``, a matrix up to :data:`DENSE` unknowns."""
+        """Jacobian ∂r/∂u ``(n, n)``: a matrix up to :data:`DENSE` unknowns, else products."""
         problem = self.problem
         products = HarmonicJacobian(
             problem.transfer, problem.rest, self.steady, self.cycle.jacobian
         )
-        return products.assembled() if problem.size <= DENSE or problem.travels else products
+        return (
+            products.assembled()
+            if problem.size <= DENSE or problem.is_travelling_wave
+            else products
+        )
 
     @cached_property
     def slope(self) -> Array:
-        """∂r/∂λ ``(n,)``."""
+        """Derivative ∂r/∂λ ``(n,)`` with respect to the continuation parameter."""
         problem, steady = self.problem, self.steady
-        if self.over == "force":
+        if self.varies == "force":
             wave = problem.wave_at(steady.angular)
             return -problem.transfer.at_joints(steady.respond(wave))
         forces = steady.stiffness_slope(self.vibration)
         if problem.load.inertial:
             forces -= self.force * (2.0 * steady.angular)[:, None] * problem.inertial
-        forces *= problem.turning[:, None]
+        forces *= problem.angular_per_hertz[:, None]
         return problem.transfer.at_joints(steady.vibrate(forces))
 
 
 class HarmonicBalance:
-    """The balance of one structure, its joints and a load, at one resolution.
+    """Harmonic balance of a structure, its joints and a load, at one resolution.
+
+    Parameters
+    ----------
+    model, joints, load
+        The structure, its joint law and the periodic load.
+    resolution
+        Harmonics of the motion and samples of a period.
+    receptance, rest
+        Receptance of the structure and static equilibrium of the joints; computed if None.
+
+    Raises
+    ------
+    HarmonicBalanceError
+        If the load has harmonics that the resolution lacks, or numbers that are not finite.
 
     Examples
     --------
-    In a period the force does the work that damping and joint take, π c ω X² and its loop:
+    Per period, the work of the force is the energy that the damping, π c ω X², and the joint
+    dissipate:
 
     >>> import numpy as np
     >>> from fe_models.dynamics import *
@@ -135,26 +164,20 @@ class HarmonicBalance:
         receptance: Receptance | WaveReceptance | None = None,
         rest: Rest | None = None,
     ) -> None:
-        missing = sorted(load.harmonics - set(resolution.harmonics))
-        static = load.static is not None and np.any(load.static)
-        if missing or (static and resolution.harmonics[0] != 0):
-            raise HarmonicBalanceError(
-                f"the load has harmonics {missing or [0]} that the motion has not: add them"
-            )
-        load.require(len(model.mass))
+        load.check(resolution, len(model.mass))
         self.model, self.joints, self.load, self.resolution = model, joints, load, resolution
         self.receptance = receptance or Receptance(model)
-        self.transfer = _transfer(resolution, self.receptance, joints.directions)
-        self.orders = np.array(resolution.harmonics, dtype=float)
-        # 2π k: angular frequencies per Hz.
-        self.turning = 2.0 * np.pi * self.orders
-        # Forces on the modes (k, n): those that grow with the force, and the others.
+        self.transfer = transfer_of(resolution, self.receptance, joints.directions)
+        self.harmonic_numbers = np.array(resolution.harmonics, dtype=float)
+        # Angular frequencies [rad/s] per Hz: 2π k.
+        self.angular_per_hertz = 2.0 * np.pi * self.harmonic_numbers
+        # Modal forces (k, n): those proportional to the force, to force times squared frequency,
+        # and the constant ones.
         self.wave, self.inertial = (self._on_modes(part) for part in (load.waves, load.inertial))
         self._constant = np.zeros_like(self.wave)
-        if load.static is not None and static:
+        if load.static is not None and np.any(load.static):
             self._constant[0] = load.static @ self.receptance.of(0).at_points
         self.rest = rest or Rest(model, self.receptance.of(0), joints, self._constant[0].real)
-        self._neglected = _neglected(resolution)
         self._richer: HarmonicBalance | None = None
 
     @classmethod
@@ -165,48 +188,58 @@ class HarmonicBalance:
         load: PeriodicLoad,
         resolution: Resolution,
     ) -> HarmonicBalance:
-        """That of a sector in a wave that travels round its ring, under a load that does.
+        """Return the problem of one sector in a wave that travels round its ring.
 
-        ``load`` is that of sector 0 on its own unknowns, ``joints`` are of one sector.
+        The joints are those of one sector. The load is that of sector 0 on the sector's own
+        unknowns, and travels round the ring with the wave.
         """
         return cls(sector.at(0), joints, load, resolution, WaveReceptance(sector))
 
     def _on_modes(self, waves: Mapping[int, ComplexArray]) -> ComplexArray:
-        """Amplitudes on the modes ``(k, n)`` of those on the structure, by harmonic."""
-        on_modes = np.zeros((len(self.orders), len(self.model.mass)), dtype=complex)
+        """Return modal amplitudes ``(k, n)`` for amplitudes on the structure, given by harmonic."""
+        on_modes = np.zeros((len(self.harmonic_numbers), len(self.model.mass)), dtype=complex)
         for harmonic, wave in waves.items():
             row = self.resolution.harmonics.index(harmonic)
             on_modes[row] = self.transfer.load_on_modes(wave, row)
         return on_modes
 
     def wave_at(self, angular: Array) -> ComplexArray:
-        """The force on the modes ``(k, n)`` at angular frequencies ``(k,)`` of its harmonics."""
+        """Return the modal load ``(k, n)`` per unit force.
+
+        ``angular`` ``(k,)`` [rad/s] are the angular frequencies of the harmonics.
+        """
         if not self.load.inertial:
             return self.wave
         return np.asarray(self.wave + np.square(angular)[:, None] * self.inertial)
 
     def first_wave(self, angular: Array) -> ComplexArray:
-        """Harmonic 1 of the force on the modes ``(f, n)`` at angular frequencies ``(f,)``."""
+        """Return harmonic 1 of the modal load ``(f, n)`` per unit force.
+
+        ``angular`` ``(f,)`` [rad/s] are angular frequencies of this harmonic.
+        """
         first = self.resolution.harmonics.index(1)
         return np.asarray(self.wave[first] + np.square(angular)[:, None] * self.inertial[first])
 
     @property
     def size(self) -> int:
-        """Unknowns."""
+        """Number of unknowns."""
         return self.transfer.size
 
     def by_frequency(self, force: float) -> _ByFrequency:
-        """The equations at a given force, with the frequency [Hz] as parameter."""
+        """Return the equations at a given force, with the frequency [Hz] as parameter."""
         return _ByFrequency(self, force)
 
     def by_force(self, frequency: float) -> _ByForce:
-        """The equations at a given frequency [Hz], with the force as parameter."""
+        """Return the equations at a given frequency [Hz], with the force as parameter."""
         return _ByForce(self, frequency)
 
     def solve(
         self, frequency: float, force: float, start: HarmonicSolution | None = None
     ) -> HarmonicSolution:
-        """The motion at a frequency [Hz] and a force, found from another motion or from rest."""
+        """Return the periodic motion at a frequency [Hz] and a force.
+
+        Newton's method starts from a motion ``start``, or from the static equilibrium.
+        """
         solution = self.find(frequency, force, self.guess(start))
         motion = self.describe(
             solution.unknowns, solution.at, frequency, force, solution.iterations
@@ -214,7 +247,7 @@ class HarmonicBalance:
         return replace(motion, message=solution.message)
 
     def guess(self, start: HarmonicSolution | None) -> Array:
-        """Unknowns taken from another motion, or those of the structure at rest under its load."""
+        """Return unknowns adopted from another motion, or those of the static equilibrium."""
         if start is None:
             unknowns = self.transfer.shaped(np.zeros(self.size))
             if self.transfer.mean:
@@ -229,12 +262,23 @@ class HarmonicBalance:
         unknowns: Array,
         control: ContinuationControl | None = None,
     ) -> NewtonSolution[Balance]:
-        """Newton's method from given unknowns; if it fails, from rest, by raising the force.
+        """Solve for the unknowns by Newton's method, and by raising the force from 0 if that fails.
 
-        A branch is followed for the latter, with the steps of ``control``; its ``watch``, who looks
-        at another curve, is told nothing of it. The equations of the
-        solution are those with the frequency as parameter. Raises :class:`HarmonicBalanceError` for
-        a frequency that is not above zero, and for numbers that are not finite.
+        The solution holds the equations with the frequency as parameter.
+
+        Parameters
+        ----------
+        frequency, force
+            Frequency [Hz] and force factor of the load.
+        unknowns
+            Initial guess ``(n,)`` for Newton's method.
+        control
+            Steps along which the force is raised, whose ``watch`` is not called.
+
+        Raises
+        ------
+        HarmonicBalanceError
+            If the frequency is not above zero, or if a number is not finite.
         """
         checks.number("frequency", frequency, above=0.0, error=HarmonicBalanceError)
         checks.number("force", force, error=HarmonicBalanceError)
@@ -248,8 +292,9 @@ class HarmonicBalance:
         if not unforced.converged:
             return replace(
                 unforced,
-                message="there is no rest under the constant load, from which the force could be "
-                f"raised: {unforced.message}, or give a load that does not pull all joints apart",
+                message="no static equilibrium is found under the constant load, from which the "
+                f"force could be raised: {unforced.message}, or give a load that does not pull all "
+                "joints apart",
             )
         point = first_point(unforced, 0.0, force > 0.0, control.first)
         curve = follow(
@@ -262,13 +307,17 @@ class HarmonicBalance:
             end=force,
         )
         if curve.message:
-            return replace(direct, message=f"raising the force from 0, {curve.message}")
+            return replace(direct, message=f"while the force was raised from 0, {curve.message}")
         return solve(self.by_frequency(force), curve.points[-1].unknowns, frequency, newton)
 
     def describe(
         self, unknowns: Array, at: Balance, frequency: float, force: float, iterations: int = 0
     ) -> HarmonicSolution:
-        """The motion with these unknowns, found in so many iterations."""
+        """Return the motion for given unknowns, at a frequency [Hz] and a force.
+
+        ``at`` are the equations at the unknowns, to which ``iterations`` of Newton's method have
+        led.
+        """
         coefficients, record = self.transfer.shaped(unknowns), CycleRecord.of(at.cycle)
         return HarmonicSolution(
             frequency=frequency,
@@ -285,90 +334,76 @@ class HarmonicBalance:
         )
 
     def left_out(self, coefficients: Array, cycle: CycleRecord, frequency: float) -> Array:
-        """Share of the joints' vibration that each harmonic 0, 1, 2, ... left out would have.
+        """Return the estimated share of each neglected harmonic in the joints' vibration.
 
-        The larger of what the joints' forces there cause with joints free, and as stiff as at rest:
-        a harmonic may meet a mode of either.
+        The shares are ordered by harmonic 0, 1, 2, ...; those of the kept harmonics are 0. They
+        are estimates by :class:`NeglectedHarmonics`.
         """
-        neglected, vibration = self._neglected, self.vibration(coefficients)
-        shares = np.zeros(neglected.harmonics[-1] + 1)
+        vibration = self.vibration(coefficients)
         if vibration == 0.0:
-            return shares
-        force = (neglected.weights @ cycle.samples.reshape(neglected.samples, -1)).reshape(
-            neglected.size, -1, self.joints.directions
-        )
-        orders, sizes = self._orders_left_out, []
-        for transfer in self._left_out_by:
-            steady = transfer.steady(2.0 * np.pi * frequency * orders)
-            motion = steady.respond(transfer.modal(force.transpose(1, 0, 2)))
-            sizes.append(neglected.sizes(transfer.shaped(transfer.at_joints(motion))))
-        shares[orders] = np.maximum(*sizes)
-        shares[list(self.resolution.harmonics)] = 0.0
-        shares /= vibration
-        return shares
+            return np.zeros(examined(self.resolution).harmonics[-1] + 1)
+        return self._neglected.sizes(cycle.samples, frequency) / vibration
 
     @cached_property
-    def _orders_left_out(self) -> np.ndarray:
-        return np.array(self._neglected.harmonics)
-
-    @cached_property
-    def _left_out_by(self) -> tuple[HarmonicTransfer, ...]:
-        """What harmonics left out do with joints free, and as stiff as at rest."""
+    def _neglected(self) -> NeglectedHarmonics:
         structures = self.receptance, self.stuck
-        directions = self.joints.directions
-        return tuple(_transfer(self._neglected, of, directions) for of in structures)
+        return NeglectedHarmonics(self.resolution, structures, self.joints.directions)
 
     @property
-    def travels(self) -> bool:
+    def is_travelling_wave(self) -> bool:
         """Whether this is a sector in a wave that travels round its ring."""
         return isinstance(self.receptance, WaveReceptance)
 
     @property
-    def alone(self) -> Receptance:
-        """The structure, with the same modes in every harmonic.
+    def uniform_receptance(self) -> Receptance:
+        """Receptance of a structure that has the same modes in every harmonic.
 
-        Raises :class:`HarmonicBalanceError` for a sector in a wave, which has not.
+        Raises :class:`HarmonicBalanceError` for a sector in a wave, whose modes differ between
+        harmonics.
         """
         if isinstance(self.receptance, WaveReceptance):
             raise HarmonicBalanceError(
-                "a sector has other modes in every harmonic of a wave: only its responses and "
-                "phase resonance are found"
+                "the modes of a sector differ between the harmonics of a wave: only its responses "
+                "and phase resonances can be computed"
             )
         return self.receptance
 
     @property
     def stuck(self) -> Receptance | WaveReceptance:
-        """The structure with joints as stiff as at rest."""
+        """Receptance of the structure with its joints as stiff as at rest."""
         if isinstance(self.receptance, WaveReceptance):
             return self.receptance.stuck(self.rest.stuck.tangents)
         return self.rest.stuck.stiffened
 
     @cached_property
     def rounding(self) -> float:
-        """Norm of unknowns that only rounding leaves of what balances in the mean [mm]."""
+        """Norm [mm] of a vibration that is only rounding error of the mean displacements."""
         rest, loaded = self.rest.displacement, self.rest.loaded
         return NO_VIBRATION * float(np.linalg.norm(rest) + np.linalg.norm(loaded))
 
-    def vibrating(self, unknowns: Array) -> Array:
-        """Unknowns without those of the mean, in one row."""
+    def without_mean(self, unknowns: Array) -> Array:
+        """Return the unknowns without those of the mean, in one row."""
         first = int(self.resolution.harmonics[0] == 0)
         return self.transfer.shaped(unknowns)[:, first:].ravel()
 
     def vibration(self, coefficients: Array) -> float:
-        """Norm of coefficients ``(j, m, d)`` without the mean [mm], 0 where it is rounding."""
-        size = norm(self.vibrating(coefficients))
+        """Return the norm [mm] of coefficients ``(j, m, d)`` without the mean.
+
+        It is 0 where it is only rounding error.
+        """
+        size = norm(self.without_mean(coefficients))
         return size if size > self.rounding else 0.0
 
     def refined(self, resolution: Resolution) -> HarmonicBalance:
-        """The same problem at another resolution."""
+        """Return the same problem at another resolution."""
         return HarmonicBalance(
             self.model, self.joints, self.load, resolution, self.receptance, self.rest
         )
 
     def richer(self, harmonics: set[int]) -> HarmonicBalance:
-        """The same problem with these harmonics too, and at least twice the samples.
+        """Return the same problem with further harmonics, and at least twice the samples.
 
-        It is kept, and grows with what is asked for.
+        The result is cached and contains the harmonics of all earlier calls.
         """
         known = () if self._richer is None else self._richer.resolution.harmonics
         if self._richer is None or not harmonics <= set(known):
@@ -384,19 +419,20 @@ class HarmonicBalance:
         unknowns: Array,
         frequency: float,
         force: float,
-        over: str,
+        varies: str,
         steady: SteadyMotion | None = None,
     ) -> Balance:
-        """The equations; ``over`` is what varies in their derivatives, frequency or force.
+        """Evaluate the equations for given unknowns, at a frequency [Hz] and a force.
 
-        ``steady`` is the structure at this frequency, if it is damped otherwise than it is.
+        ``varies`` names the continuation parameter, ``frequency`` or ``force``. ``steady`` is the
+        structure at this frequency, if its damping differs from that of the model.
         """
         resolution = self.resolution
         coefficients = self.transfer.shaped(unknowns)
         cycle = self.joints.settle(
             coefficients, resolution.basis, resolution.weights, resolution.lead
         )
-        steady = steady or self.transfer.steady(frequency * self.turning)
+        steady = steady or self.transfer.steady(frequency * self.angular_per_hertz)
         on_modes = self._constant + force * self.wave_at(steady.angular)
         on_modes -= self.transfer.on_modes(cycle.force, unknowns)
         vibration = steady.vibrate(on_modes)
@@ -409,32 +445,32 @@ class HarmonicBalance:
         residual = unknowns - response
         relative = relative_norm(residual, size)
         if self.transfer.mean:
-            # Bodies that only joints hold and that have left each other have no balance: far apart,
-            # rounding hides what is left of it.
-            hidden = EPSILON * norm(coefficients[:, 0])
-            relative = max(relative, hidden / size if size > 0.0 else 0.0)
+            # Bodies that only joints hold have no equilibrium once they have separated. If they are
+            # far apart, rounding hides their residual.
+            rounding = EPSILON * norm(coefficients[:, 0])
+            relative = max(relative, rounding / size if size > 0.0 else 0.0)
         return Balance(
-            self, over, force, steady, on_modes, vibration, cycle, residual, size, relative
+            self, varies, force, steady, on_modes, vibration, cycle, residual, size, relative
         )
 
     @cached_property
     def _mean_by_load(self) -> Array:
-        """Mean displacement ``(2, j, d)`` of the joints by the load alone, constant and growing."""
+        """Mean displacements ``(2, j, d)`` due to the constant load, and per unit force."""
         at_rest = self.transfer.receptance
         loads = np.stack([self._constant[0].real, self.wave[0].real])
         means = np.stack([at_rest.respond_at_rest(load) for load in loads]) @ at_rest.at_joints.T
         return means.reshape(2, self.transfer.joints, -1)
 
     def _size(self, coefficients: Array, response: Array, cycle: Cycle) -> float:
-        """Norm of the terms that balance.
+        """Return the norm [mm] of the terms that balance, to which residuals are relative.
 
-        Load and joints may cancel at rest: what each does to the mean displacement counts. Where
-        only joints hold the structure, any mean displacement balances that of the springs that
-        hold it here, and does not count.
+        Load and joint forces may cancel at rest: the mean displacements that each of them causes
+        count separately. Where only joints hold the structure, its mean displacement does not
+        count, because the auxiliary holding springs balance any value of it.
         """
         if not self.transfer.mean:
             return norm(coefficients) + norm(response)
-        first = int(self.transfer.held > 0.0)
+        first = int(self.transfer.holding_stiffness > 0.0)
         size = norm(coefficients[:, first:]) + norm(self.transfer.shaped(response)[:, first:])
         by_joints = self.transfer.receptance.static_flexibility @ cycle.force[:, 0].ravel()
         return size + norm(by_joints) + norm(self.rest.loaded)
@@ -442,6 +478,8 @@ class HarmonicBalance:
 
 @dataclass(frozen=True)
 class _ByFrequency:
+    """Equations at a given force, with the frequency as parameter."""
+
     problem: HarmonicBalance
     force: float
 
@@ -451,25 +489,10 @@ class _ByFrequency:
 
 @dataclass(frozen=True)
 class _ByForce:
+    """Equations at a given frequency, with the force as parameter."""
+
     problem: HarmonicBalance
     frequency: float
 
     def __call__(self, unknowns: Array, parameter: float) -> Balance:
         return self.problem.evaluate(unknowns, self.frequency, parameter, "force")
-
-
-def _transfer(
-    resolution: Resolution, receptance: Receptance | WaveReceptance, directions: int
-) -> HarmonicTransfer:
-    """Between joints and modes: of a sector, those of every harmonic."""
-    if isinstance(receptance, WaveReceptance):
-        return receptance.transfer(resolution, directions)
-    return HarmonicTransfer(resolution, receptance, directions)
-
-
-def _neglected(resolution: Resolution) -> Resolution:
-    """Harmonics that are left out, as far as they are looked for, and the highest that is not."""
-    kept = resolution.harmonics
-    highest = min((resolution.samples - 1) // 2, max(LOOK_BEYOND * kept[-1], LOOK_AT_LEAST))
-    others = set(range(highest + 1)).difference(kept[:-1])
-    return Resolution(tuple(sorted(others)), resolution.samples)

@@ -1,9 +1,9 @@
-"""Between the joints of a structure and its modes, harmonic by harmonic, and the Jacobian of that.
+"""Transfer between joints and modes, harmonic by harmonic, and the Jacobian of the balance.
 
-With the receptances R_k between joints, and the derivative J of the joints' forces by their
-displacements, the balance of harmonics u - ... + R F(u) has the Jacobian 1 + R J. Where only joints
-hold the structure, R is that of a structure held by springs κ in every direction of the joints, and
-κ u is taken off the joints' forces at harmonic 0: see
+Let R_k be the receptances between joints, and J the derivative of the joints' forces with respect
+to their displacements. Then the harmonic balance u - ... + R F(u) has the Jacobian 1 + R J. Where
+only joints hold the structure, R is that of a structure held by springs κ in every direction of the
+joints, and κ u is subtracted from the joints' forces at harmonic 0: see
 :mod:`fe_models.dynamics.periodic.receptance`.
 """
 
@@ -22,13 +22,24 @@ from fe_models.dynamics.periodic.receptance import Receptance, SteadyMotion
 from fe_models.dynamics.periodic.static_residual import ResidualReceptance
 from sa_solver.types import Array
 
-# Share of the largest derivative below which one that differs from a spring's is rounding.
-SAME = 1e-9
+# Difference between a derivative and that of a spring, relative to the largest derivative, below
+# which it counts as rounding.
+SPRING_TOLERANCE = 1e-9
 
 
 @dataclass(frozen=True)
 class HarmonicTransfer:
-    """Between coefficients of joints of so many ``directions`` and amplitudes of the modes."""
+    """Transfer between joint coefficients and complex amplitudes of the modes.
+
+    Parameters
+    ----------
+    resolution
+        Harmonics of the motion and samples of a period.
+    receptance
+        The structure.
+    directions
+        Number of directions of each joint.
+    """
 
     resolution: Resolution
     receptance: Receptance
@@ -36,74 +47,76 @@ class HarmonicTransfer:
 
     @cached_property
     def joints(self) -> int:
-        """How many there are."""
+        """Number of joints."""
         return len(self.receptance.at_joints) // self.directions
 
     @cached_property
     def size(self) -> int:
-        """Coefficients of all joints."""
+        """Number of coefficients of all joints."""
         return self.joints * self.resolution.size * self.directions
 
     @property
     def mean(self) -> bool:
-        """Whether harmonic 0 is one of the motion."""
+        """Whether the motion has harmonic 0."""
         return self.resolution.harmonics[0] == 0
 
     @cached_property
-    def held(self) -> float:
-        """κ [N/mm], 0 where it is not needed."""
-        return self.receptance.held if self.mean else 0.0
+    def holding_stiffness(self) -> float:
+        """Stiffness κ [N/mm] of the holding springs; 0 where none are needed."""
+        return self.receptance.holding_stiffness if self.mean else 0.0
 
     def steady(self, angular: Array) -> SteadyMotion:
-        """The structure at the angular frequencies ``(k,)`` of the harmonics [rad/s]."""
+        """Return the structure at the angular frequencies ``(k,)`` [rad/s] of the harmonics."""
         return self.receptance.at(angular)
 
     def load_on_modes(self, load: ComplexArray, row: int) -> ComplexArray:
-        """Forces on the modes ``(n,)`` by those on the structure, of the harmonic of this row."""
+        """Return modal forces ``(n,)`` for a load on the structure in the harmonic of a row."""
         return np.asarray(load @ self.receptance.at_points)
 
     def displacement(self, motion: ComplexArray) -> ComplexArray:
-        """That of the structure ``(k, n)`` by a motion of its modes."""
+        """Return the structure's displacements ``(k, n)`` for displacements of its modes."""
         return self.receptance.displacement(motion)
 
     def shaped(self, unknowns: Array) -> Array:
-        """Coefficients ``(j, m, d)`` from all in a row."""
+        """Return coefficients in one row as ``(j, m, d)``."""
         return unknowns.reshape(self.joints, self.resolution.size, self.directions)
 
     def on_modes(self, force: Array, unknowns: Array) -> ComplexArray:
-        """Forces on the modes ``(k, n)``, of the opposite sign, by joints' ``force`` ``(j, m, d)``.
+        """Return the modal forces ``(k, n)`` of joints, with the opposite sign.
 
-        It is their ``unknowns`` by which they are held at harmonic 0.
+        ``force`` ``(j, m, d)`` are the coefficients of the joints' forces. The holding springs act
+        at harmonic 0 on the displacements ``unknowns``.
         """
-        if self.held:
+        if self.holding_stiffness:
             force = force.copy()
             force[:, 0] -= self._holding(unknowns).reshape(-1, self.directions)
         return self.modal(force)
 
     def modal(self, force: Array) -> ComplexArray:
-        """Forces on the modes ``(k, n)`` by coefficients ``(j, m, d)`` of forces on the joints."""
+        """Return modal forces ``(k, n)`` for coefficients ``(j, m, d)`` of forces on the joints."""
         if self._few:
             return _few_on_modes(force, self.receptance.at_joints, *self.resolution.places)
-        return self.resolution.combined(by_function(force) @ self.receptance.at_joints)
+        return self.resolution.complex_from_real(by_function(force) @ self.receptance.at_joints)
 
     def at_joints(self, motion: ComplexArray) -> Array:
-        """Coefficients ``(j m d,)`` of the joints' displacements, of a motion of the modes."""
+        """Return coefficients ``(j m d,)`` of the joints' displacements for a modal motion."""
         if self._few:
             few = np.empty((self.joints, self.resolution.size, self.directions))
             _few_at_joints(motion, self.receptance.at_joints, *self.resolution.places, few)
             return few.ravel()
-        rows = self.resolution.separated(motion) @ self.receptance.at_joints.T
+        rows = self.resolution.real_from_complex(motion) @ self.receptance.at_joints.T
         return by_joint(rows, self.directions).ravel()
 
     @cached_property
     def _few(self) -> bool:
-        """Whether a compiled loop over all harmonics, joints and modes is the shortest."""
+        """Whether a compiled loop over harmonics, joints and modes beats matrix products."""
         return len(self.resolution.harmonics) * self.receptance.at_joints.size <= FEW
 
     def mean_response(self, force: Array, unknowns: Array) -> Array:
-        """Coefficients ``(j m d,)`` of the mean displacement by the mean of forces on joints.
+        """Return coefficients ``(j m d,)`` of the mean displacement due to mean forces on joints.
 
-        The forces are ``force`` ``(j, m, d)`` less those by which the ``unknowns`` are held.
+        The forces are ``force`` ``(j, m, d)`` less those of the holding springs on the
+        displacements ``unknowns``.
         """
         response = np.zeros(self.size)
         mean = self.receptance.static_flexibility @ (force[:, 0].ravel() - self._holding(unknowns))
@@ -111,16 +124,24 @@ class HarmonicTransfer:
         return response
 
     def _holding(self, unknowns: Array) -> Array:
-        """Forces ``(j d,)`` of the springs that hold the joints at harmonic 0."""
-        return self.held * self.shaped(unknowns)[:, 0].ravel()
+        """Return the forces ``(j d,)`` of the springs that hold the joints at harmonic 0."""
+        return self.holding_stiffness * self.shaped(unknowns)[:, 0].ravel()
 
 
 @dataclass(frozen=True)
 class HarmonicJacobian:
-    """1 + R (J - κ): what it does to a vector, and its assembly.
+    """Jacobian 1 + R (J - κ): its products with vectors, its preconditioner, its assembly.
 
-    ``steady`` is the structure at the harmonics of a frequency, ``slopes`` ``(j, m, d, m, d)`` J,
-    and ``rest`` knows springs that are like the joints.
+    Parameters
+    ----------
+    transfer
+        Transfer between joints and modes.
+    rest
+        Static equilibrium of the joints, which knows springs that resemble the joints.
+    steady
+        The structure at the harmonics of a frequency.
+    slopes
+        Derivatives J ``(j, m, d, m, d)`` [N/mm] of the joints' forces.
     """
 
     transfer: HarmonicTransfer
@@ -140,24 +161,24 @@ class HarmonicJacobian:
         return response
 
     def precondition(self, vector: Array) -> Array:
-        """The inverse P of the matrix with springs D like the joints, for J, times a vector.
+        """Return P times a vector, with P the inverse of the Jacobian for springs D instead of J.
 
-        P = (1 + R (D - κ))⁻¹ = 1 - R' (D - κ), with receptances R' of the structure stiffened by D.
-        Where D does not hold it, springs κ' do: then D + κ' at harmonic 0. Of R' the high modes
-        answer as at rest.
+        P = (1 + R (D - κ))⁻¹ = 1 - R' (D - κ), with receptances R' of the structure stiffened by D,
+        springs that resemble the joints. If D does not hold the structure, springs κ' do: then D +
+        κ' replaces D at harmonic 0. In R' the high modes respond quasi-statically.
         """
         shaped = vector.reshape(self.slopes.shape[:3])
         force = shaped @ self._springs.tangents
         if self.transfer.mean:
-            held = self._springs.stiffened.held - self.transfer.held
+            held = self._springs.stiffened.holding_stiffness - self.transfer.holding_stiffness
             force[:, 0] += held * shaped[:, 0]
-        response = self._everywhere.respond(by_function(force))
+        response = self._at_all_joints.respond(by_function(force))
         return vector - by_joint(response, self.transfer.directions).ravel()
 
     def preconditioned(self, vector: Array) -> Array:
-        """P times the matrix times a vector: P (1 + R (J - κ)) = 1 + R' (J - D), in one step.
+        """Return P times the Jacobian times a vector: P (1 + R (J - κ)) = 1 + R' (J - D).
 
-        Only joints that do not do as these springs have a part in it.
+        Only joints that differ from the springs D contribute.
         """
         joints, excess, receptance = self._differing
         shaped = vector.reshape(self.slopes.shape[:3])
@@ -173,54 +194,68 @@ class HarmonicJacobian:
 
     @cached_property
     def _differing(self) -> tuple[np.ndarray, Array, ResidualReceptance]:
-        """Joints ``(a,)`` whose J is not D, their J - D ``(a, m d, m d)``, and R' of these."""
+        """Joints ``(a,)`` whose J differs from D, their J - D ``(a, m d, m d)``, and their R'."""
         directions, springs = self.slopes.shape[2], self._springs
-        held = springs.stiffened.held if self.transfer.mean else 0.0
-        differing, excess = _excess(self.slopes, springs.tangents, held)
+        holding = springs.stiffened.holding_stiffness if self.transfer.mean else 0.0
+        differing, excess = _excess(self.slopes, springs.tangents, holding)
         places = (differing[:, None] * directions + np.arange(directions)).ravel()
-        return differing, excess, self._residual(places)
+        return differing, excess, self._residual_receptance(places)
 
     @cached_property
-    def _everywhere(self) -> ResidualReceptance:
-        return self._residual(slice(None))
+    def _at_all_joints(self) -> ResidualReceptance:
+        return self._residual_receptance(slice(None))
 
-    def _residual(self, some: np.ndarray | slice) -> ResidualReceptance:
+    def _residual_receptance(self, some: np.ndarray | slice) -> ResidualReceptance:
         resolution = self.transfer.resolution
         return ResidualReceptance(self._springs.stiffened, resolution, self.steady.angular, some)
 
     def assembled(self) -> Array:
-        """The matrix ``(n, n)``."""
+        """Return the matrix ``(n, n)``."""
         transfer = self.transfer
         slopes = self.slopes.reshape(*self.slopes.shape[:3], -1)
         jacobian = np.zeros((transfer.size, transfer.size))
         places = transfer.resolution.places
-        _assemble(self.steady.between_joints(), slopes, transfer.held, *places, jacobian)
+        _assemble(
+            self.steady.between_joints(), slopes, transfer.holding_stiffness, *places, jacobian
+        )
         return jacobian
 
 
 @njit(cache=True, nogil=True)
-def _largest(slopes: Array, tangents: Array, held: float) -> tuple[float, float]:
-    """Largest derivative ``(m, d, m, d)`` of a joint, and largest difference from its springs'."""
-    largest = most = 0.0
+def _largest_derivative(slopes: Array, tangents: Array, held: float) -> tuple[float, float]:
+    """Return the largest derivative of a joint, and its largest difference from its springs."""
+    largest = largest_difference = 0.0
     for to, along, function, by in np.ndindex(slopes.shape):
         slope = float(slopes[to, along, function, by])
         spring = float(tangents[along, by]) if function == to else 0.0
         if function == 0 and to == 0 and by == along:
             spring += held
-        largest, most = max(largest, abs(slope)), max(most, abs(slope - spring))
-    return largest, most
+        largest, largest_difference = (
+            max(largest, abs(slope)),
+            max(largest_difference, abs(slope - spring)),
+        )
+    return largest, largest_difference
 
 
 @njit(cache=True, nogil=True)
 def _excess(slopes: Array, tangents: Array, held: float) -> tuple[np.ndarray, Array]:
-    """Joints ``(a,)`` whose derivatives ``(j, m, d, m, d)`` are not those of springs, and by how
-    much ``(a, m d, m d)``; at harmonic 0 with springs that hold them."""
+    """Return the joints ``(a,)`` that differ from their springs, and by how much ``(a, m d, m d)``.
+
+    Parameters
+    ----------
+    slopes
+        Derivatives ``(j, m, d, m, d)`` of the joints' forces.
+    tangents
+        Springs ``(j, d, d)``.
+    held
+        Stiffness of the holding springs at harmonic 0.
+    """
     joints, size, directions = slopes.shape[:3]
-    # Derivatives of many harmonics are gigabytes: no copies but of what differs.
+    # The derivatives of many harmonics take gigabytes: only copy those that differ.
     each = np.empty((joints, 2))
     for joint in range(joints):
-        each[joint, 0], each[joint, 1] = _largest(slopes[joint], tangents[joint], held)
-    differing = np.flatnonzero(each[:, 1] > SAME * each[:, 0].max())
+        each[joint, 0], each[joint, 1] = _largest_derivative(slopes[joint], tangents[joint], held)
+    differing = np.flatnonzero(each[:, 1] > SPRING_TOLERANCE * each[:, 0].max())
     excess = slopes[differing]
     for place in range(len(differing)):
         for along in range(directions):
@@ -234,7 +269,7 @@ def _excess(slopes: Array, tangents: Array, held: float) -> tuple[np.ndarray, Ar
 def _few_on_modes(
     force: Array, at_joints: Array, cosines: np.ndarray, sines: np.ndarray
 ) -> ComplexArray:
-    """Amplitudes of forces on modes ``(k, n)`` by coefficients of joints' forces ``(j, m, d)``."""
+    """Return modal forces ``(k, n)`` for coefficients ``(j, m, d)`` of the joints' forces."""
     joints, _, directions = force.shape
     on_modes = np.zeros((len(cosines), at_joints.shape[1]), np.complex128)
     for k in range(len(cosines)):
@@ -251,7 +286,7 @@ def _few_on_modes(
 def _few_at_joints(
     motion: ComplexArray, at_joints: Array, cosines: np.ndarray, sines: np.ndarray, few: Array
 ) -> None:
-    """Write the coefficients ``(j, m, d)`` of joints by the amplitudes of modes ``(k, n)``."""
+    """Write coefficients ``(j, m, d)`` of the joints for complex amplitudes ``(k, n)`` of modes."""
     joints, _, directions = few.shape
     for k in range(len(cosines)):
         for joint in range(joints):
@@ -273,10 +308,10 @@ def _assemble(
     sines: np.ndarray,
     jacobian: Array,
 ) -> None:
-    """1 + R (J - κ), added to ``jacobian`` of zeros.
+    """Add 1 + R (J - κ) to ``jacobian``, which is zero at first.
 
-    ``between`` ``(k, j d, j d)`` R; ``slopes`` ``(j, m, d, m d)`` J of the joints' forces, from
-    which ``held`` κ is taken off at harmonic 0.
+    ``between`` ``(k, j d, j d)`` is R, ``slopes`` ``(j, m, d, m d)`` is J of the joints' forces,
+    and ``held`` is κ, which is subtracted at harmonic 0.
     """
     joints, size, directions, columns = slopes.shape
     for k in range(len(cosines)):

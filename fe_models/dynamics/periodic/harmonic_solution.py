@@ -1,4 +1,4 @@
-"""A periodic motion of a structure with joints, by its harmonics."""
+"""Periodic motion of a structure with joints, as a result of harmonic balance."""
 
 from __future__ import annotations
 
@@ -13,11 +13,19 @@ from sa_solver.types import Array
 
 @dataclass(frozen=True)
 class ResolutionError:
-    """By how much a richer resolution would change a motion, to first order.
+    """Estimated change of a motion by a richer resolution, to first order.
 
-    ``vibration`` of the joints, as a share of itself, and ``energy`` that the joints take in a
-    cycle, as a share of all that is lost. ``harmonics`` ``(k + 1,)`` is the part of the larger of
-    them that each harmonic 0, 1, 2, ... left out has, and ``sampling`` that of the samples.
+    Parameters
+    ----------
+    vibration
+        Change of the joints' vibration, relative to that vibration.
+    energy
+        Change of the energy that the joints dissipate per cycle, relative to all energy that is
+        lost.
+    harmonics
+        Contribution ``(k + 1,)`` of each neglected harmonic 0, 1, 2, ... to the larger of the two.
+    sampling
+        Contribution of the sampling to the larger of the two.
     """
 
     vibration: float
@@ -27,22 +35,39 @@ class ResolutionError:
 
     @property
     def largest(self) -> float:
-        """The larger of the two."""
+        """Larger of the errors of vibration and energy."""
         return max(self.vibration, self.energy)
 
 
 @dataclass(frozen=True)
 class HarmonicSolution:
-    """A periodic motion.
+    """Periodic motion of a structure with joints.
 
-    ``frequency`` [Hz], ``force`` (the factor a of the load), ``coefficients`` ``(j, m, d)`` [mm] of
-    the joints' displacements, ``motion`` ``(k, n)`` the complex amplitudes of the structure's [mm],
-    ``cycle`` what the joints do, ``iterations`` and ``residual`` of Newton's method. ``message`` is
-    empty, or says why this is not a solution.
-
-    ``shares`` ``(k + 1,)`` of the joints' vibration are what their forces would cause in each
-    harmonic 0, 1, 2, ... left out, as if those of the ``resolution`` would not change for it;
-    ``error``, what a richer resolution would change, is None if not asked for.
+    Parameters
+    ----------
+    frequency
+        Frequency [Hz].
+    force
+        Force factor a of the load.
+    resolution
+        Harmonics of the motion and samples of a period.
+    coefficients
+        Coefficients ``(j, m, d)`` [mm] of the joints' displacements.
+    motion
+        Complex amplitudes ``(k, n)`` [mm] of the structure's displacements.
+    cycle
+        Response of the joints over one period.
+    iterations
+        Number of iterations of Newton's method.
+    residual
+        Relative residual of the equations.
+    shares
+        Estimated share ``(k + 1,)`` of each neglected harmonic 0, 1, 2, ... in the joints'
+        vibration, for joint forces that do not change in the other harmonics.
+    error
+        Estimated change by a richer resolution, or None if it was not computed.
+    message
+        Empty, or the reason why this is not a solution.
     """
 
     frequency: float
@@ -59,7 +84,7 @@ class HarmonicSolution:
 
     @property
     def left_out(self) -> float:
-        """Of all harmonics left out together."""
+        """Estimated share of all neglected harmonics together in the joints' vibration."""
         return float(np.linalg.norm(self.shares))
 
     @property
@@ -67,20 +92,20 @@ class HarmonicSolution:
         return not self.message
 
     def amplitude(self, place: int, harmonic: int = 1) -> complex:
-        """Complex amplitude of a degree of freedom [mm]."""
+        """Return the complex amplitude [mm] of one degree of freedom in one harmonic."""
         return complex(self.motion[self.resolution.harmonics.index(harmonic), place])
 
     def displacement(self, samples: int) -> Array:
-        """Displacement of the structure ``(t, n)`` [mm] at equal times of a period."""
+        """Return displacements ``(t, n)`` [mm] of the structure at equal times of a period."""
         return _in_time(self.motion, self.resolution, samples)
 
     def velocity(self, samples: int) -> Array:
-        """Velocity of the structure ``(t, n)`` [mm/s]."""
+        """Return velocities ``(t, n)`` [mm/s] of the structure at equal times of a period."""
         rates = 2j * np.pi * self.frequency * np.array(self.resolution.harmonics)
         return _in_time(rates[:, None] * self.motion, self.resolution, samples)
 
 
 def _in_time(amplitudes: ComplexArray, resolution: Resolution, samples: int) -> Array:
-    """Re Σ a_k exp(ikωt) ``(t, n)`` at equal times of a period."""
+    """Return Re Σ a_k exp(ikωt) ``(t, n)`` at equally spaced times of a period."""
     turns = np.outer(np.arange(samples), resolution.harmonics) % samples / samples
     return np.asarray((np.exp(2j * np.pi * turns) @ amplitudes).real)

@@ -1,4 +1,4 @@
-"""What joints do in a period of a given motion: the protocol of the laws that are handed over."""
+"""Protocols of joint laws over one period of a given motion."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from sa_solver.types import Array, Indices
 
 
 class Cycle(Protocol):
-    """What joints do in a period; see :class:`PeriodicJoints`."""
+    """Response of joints over one period; see :class:`PeriodicJoints`."""
 
     @property
     def force(self) -> Array: ...
@@ -28,16 +28,20 @@ class Cycle(Protocol):
 
 
 class Deviations(Protocol):
-    """March of small deviations through the joints over one period.
+    """Maps of small deviations through the joints over one period.
 
     :class:`wear.joints.periodic.linearised.LinearisedMarch` is one.
 
-    From each of ``t`` times of a period to the next, deviations of what ``j`` joints remember
-    ``(p,)`` and of their displacements ``(d,)`` go on as δs_end = A δs + E δu + D δu_end, and their
-    forces are S δs_end + T δu_end: ``kept`` A, ``by_start`` E, ``by_end`` D ``(t, j, ...)``,
-    ``pull`` S ``(j, d, p)`` and ``tangent`` T. ``regimes`` ``(t, j)`` tell what joints do, and
-    ``force`` ``(t, j, d)`` [N] is that of the motion itself at the times. Of the numbers each joint
-    has ``remembered`` ``(j,)``: further ones, of which others have more, stay as they are.
+    The period has ``t`` times, and there are ``j`` joints. From each time to the next, the
+    deviations δs ``(p,)`` of a joint's state and δu ``(d,)`` of its displacements become δs_end = A
+    δs + E δu + D δu_end. The deviation of its forces is S δs_end + T δu_end. The attributes are:
+
+    - ``kept`` A, ``by_start`` E and ``by_end`` D ``(t, j, ...)``, ``pull`` S ``(j, d, p)`` and
+      ``tangent`` T ``(t, j, d, d)``
+    - ``regimes`` ``(t, j)``: a number for the state of each joint, such as sticking or sliding
+    - ``force`` ``(t, j, d)`` [N]: the force in the motion itself
+    - ``remembered`` ``(j,)``: how many of the ``p`` numbers are the state of a joint; the others
+      are padding and stay as they are
     """
 
     @property
@@ -60,11 +64,12 @@ class Deviations(Protocol):
 
 @runtime_checkable
 class DeviatingJoints(Protocol):
-    """:class:`PeriodicJoints` that also know what becomes of small deviations from their period.
+    """Protocol of :class:`PeriodicJoints` that can also be linearised about a period.
 
-    Without them nothing can be said of the stability of a motion. The times of ``basis`` ascend
-    from the beginning of the period; the last increment leads back to it. Joints that remember more
-    in some motions than in others have room for at least ``memory`` numbers.
+    The stability of a motion can only be computed with such joints. The times of ``basis`` ascend
+    from the beginning of the period, and the last increment leads back to it. ``memory`` is the
+    least number of state variables for which the result has room, since joints may have more of
+    them in some motions than in others.
     """
 
     def linearise(
@@ -73,17 +78,19 @@ class DeviatingJoints(Protocol):
 
 
 class PeriodicJoints(Protocol):
-    """Joints that are marched through a period.
+    """Protocol of joint laws that are marched through a period until their forces repeat.
 
     :class:`wear.joints.periodic.march.PeriodicMarch` is one.
 
     The displacement of joint j at sample t is ``basis[t] @ coefficients[j]``, from ``basis``
-    ``(t, m)`` and ``coefficients`` ``(j, m, d)`` [mm]; ``lead`` ``(p, m)`` gives the points through
-    which they are marched from rest to the first sample, the last. Answers ``force`` ``(j, m, d)``
-    [N], the samples times ``weights`` ``(m, t)``, its derivative ``jacobian``
-    ``(j, m, d, m, d)``, the ``samples`` ``(t, j, d)`` and ``states`` ``(t, j)`` (0 stick, 1 slip,
-    2 separated), the energy ``dissipated`` ``(j,)`` [N mm] per period, and the relative ``change``
-    ``(j,)`` of the force from one period to the next.
+    ``(t, m)`` and ``coefficients`` ``(j, m, d)`` [mm]. ``lead`` ``(p, m)`` gives the points through
+    which the joints are marched from rest; the last one is the first sample. The result has
+
+    - ``force`` ``(j, m, d)`` [N]: the samples times ``weights`` ``(m, t)``
+    - ``jacobian`` ``(j, m, d, m, d)`` [N/mm]: its derivative with respect to the coefficients
+    - ``samples`` ``(t, j, d)`` [N] and ``states`` ``(t, j)``: 0 stick, 1 slip, 2 separated
+    - ``dissipated`` ``(j,)`` [N mm]: energy dissipated per period
+    - ``change`` ``(j,)``: relative change of the force from one period to the next
     """
 
     @property
@@ -95,7 +102,7 @@ class PeriodicJoints(Protocol):
 
 @dataclass(frozen=True)
 class CycleRecord:
-    """What is kept of a :class:`Cycle`: all but its derivative."""
+    """Part of a :class:`Cycle` that is stored: all but its derivative, which is large."""
 
     force: Array
     samples: Array
@@ -105,5 +112,5 @@ class CycleRecord:
 
     @classmethod
     def of(cls, cycle: Cycle) -> CycleRecord:
-        """Of a cycle whose derivative is no longer needed."""
+        """Return the record of a cycle."""
         return cls(cycle.force, cycle.samples, cycle.states, cycle.dissipated, cycle.change)

@@ -1,9 +1,4 @@
-"""Periodic forces on a structure, by their harmonics.
-
-    f(t) = s + a Re Σ (w_k + (kω)² v_k) exp(ikωt)
-
-with the force a, and a load s that does not grow with it.
-"""
+"""Periodic loads on a structure, by their harmonics."""
 
 from __future__ import annotations
 
@@ -12,25 +7,31 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from fe_models.dynamics.periodic.harmonics import ComplexArray, HarmonicBalanceError
+from fe_models.dynamics.periodic.harmonics import ComplexArray, HarmonicBalanceError, Resolution
 from sa_solver import checks
 from sa_solver.types import Array
 
 
 @dataclass(frozen=True)
 class PeriodicLoad:
-    """Forces on the structure [N].
+    """Periodic forces on a structure [N], by harmonic.
 
-    ``waves`` gives the complex amplitudes ``(n,)`` of its harmonics, for a force of 1: with w the
-    force is Re w exp(ikωt), so that -1j makes a sine. ``static`` ``(n,)`` does not grow with the
-    force. ``inertial`` gives amplitudes ``(n,)`` [N s²] by harmonic that are multiplied by the
-    square of its angular frequency: those of a ground that moves by a given way X along a rigid
-    translation r are M r X, of displacements relative to the ground.
+    Parameters
+    ----------
+    waves
+        Complex amplitudes w ``(n,)`` of the harmonics for a force of 1. The force is Re w
+        exp(ikωt), so that -1j makes a sine.
+    static
+        Constant force ``(n,)``, independent of the force factor.
+    inertial
+        Amplitudes ``(n,)`` [N s²] by harmonic that are multiplied by the square of the angular
+        frequency. For a ground that moves with the displacement X along a rigid translation r they
+        are M r X; displacements are then relative to the ground.
 
     Examples
     --------
-    A sine of twice the frequency, and a force that stays: it moves the mass by F / k, as a joint
-    without friction holds nothing.
+    A sine of twice the frequency acts together with a constant force F. The latter moves the mass
+    by F / k, since a joint without friction transmits nothing.
 
     >>> import numpy as np
     >>> from fe_models.dynamics import *
@@ -49,6 +50,29 @@ class PeriodicLoad:
     static: Array | None = None
     inertial: Mapping[int, ComplexArray] = field(default_factory=dict)
 
+    @property
+    def harmonics(self) -> set[int]:
+        """Harmonics of the load, without the static one."""
+        return {*self.waves, *self.inertial}
+
+    def amplitude(self, harmonic: int, angular: float, force: float) -> ComplexArray:
+        """Return the complex amplitude ``(n,)`` [N] of the load in one harmonic.
+
+        Parameters
+        ----------
+        harmonic
+            Number of the harmonic.
+        angular
+            Its angular frequency kω [rad/s].
+        force
+            Force factor of the load.
+        """
+        nothing = np.zeros(1)
+        growing = self.waves.get(harmonic, nothing)
+        growing = growing + angular**2 * self.inertial.get(harmonic, nothing)
+        constant = nothing if harmonic or self.static is None else self.static
+        return np.asarray(force * growing + constant, dtype=complex)
+
     def __post_init__(self) -> None:
         found: dict[str, dict[int, ComplexArray]] = {"waves": {}, "inertial": {}}
         for name, waves in found.items():
@@ -63,26 +87,18 @@ class PeriodicLoad:
             static = checks.array("static forces", self.static, (None,), error=HarmonicBalanceError)
             checks.settle(self, static=static)
 
-    def require(self, size: int) -> None:
-        """Raise :class:`HarmonicBalanceError` unless forces are those on ``size`` displacements."""
+    def check(self, resolution: Resolution, size: int) -> None:
+        """Raise :class:`HarmonicBalanceError` unless a problem of ``size`` displacements fits."""
+        lacking = sorted(self.harmonics - set(resolution.harmonics))
+        static = self.static is not None and np.any(self.static)
+        if lacking or (static and resolution.harmonics[0] != 0):
+            raise HarmonicBalanceError(
+                f"the load has harmonics {lacking or [0]}, which the resolution lacks: add them"
+            )
         forces = [*self.waves.values(), *self.inertial.values()]
-        lengths = {len(force) for force in forces} | {
-            size if self.static is None else len(self.static)
-        }
+        lengths = {len(force) for force in forces}
+        lengths.add(size if self.static is None else len(self.static))
         if lengths != {size}:
             raise HarmonicBalanceError(
                 f"forces on {sorted(lengths)} displacements of a structure of {size}: give as many"
             )
-
-    @property
-    def harmonics(self) -> set[int]:
-        """Those of the force."""
-        return {*self.waves, *self.inertial}
-
-    def amplitude(self, harmonic: int, angular: float, force: float) -> ComplexArray:
-        """Return the load ``(n,)`` of a harmonic at a frequency [rad/s], under a force."""
-        nothing = np.zeros(1)
-        growing = self.waves.get(harmonic, nothing)
-        growing = growing + angular**2 * self.inertial.get(harmonic, nothing)
-        constant = nothing if harmonic or self.static is None else self.static
-        return np.asarray(force * growing + constant, dtype=complex)

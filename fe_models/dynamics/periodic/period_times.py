@@ -1,4 +1,4 @@
-"""Times of a period: steps of equal length, some of which are divided in four, again and again."""
+"""Times of a period: uniform steps, some of which are divided in four repeatedly."""
 
 from __future__ import annotations
 
@@ -9,16 +9,27 @@ import numpy as np
 
 from fe_models.dynamics.transient.linear_steps import SPLIT
 
-# Times in a step at which it is looked what joints do, and levels to which it is divided for that.
-PROBE, PROBED = 8, 2
+# Probe steps per step that detect changes of the joints, and the number of levels to which all
+# steps with a change are divided. Deeper levels are only for changes that last less than a probe
+# step.
+PROBE_REFINEMENT, PROBED_LEVELS = 8, 2
 
 
 @dataclass(frozen=True)
 class PeriodTimes:
-    """Steps that begin at ``starts`` ``(t,)``, as ``parts`` of the period, of ``levels`` ``(t,)``.
+    """Steps of a period, of different lengths.
 
-    Of level 0 are ``samples`` steps; one of each next level is a quarter as long, until the
-    ``deepest``.
+    Parameters
+    ----------
+    starts
+        Starts ``(t,)`` of the steps, as multiples of the period over :attr:`parts`.
+    levels
+        Level ``(t,)`` of each step. A step of level 0 is the period over ``samples``; each further
+        level divides it in four.
+    samples
+        Number of steps of level 0 in the period.
+    deepest
+        Deepest level allowed.
     """
 
     starts: np.ndarray
@@ -27,56 +38,70 @@ class PeriodTimes:
     deepest: int
 
     @classmethod
-    def even(cls, samples: int, deepest: int) -> PeriodTimes:
-        """Steps of equal length, as many as there are samples."""
+    def uniform(cls, samples: int, deepest: int) -> PeriodTimes:
+        """Return ``samples`` steps of equal length."""
         starts = SPLIT**deepest * np.arange(samples)
         return cls(starts, np.zeros(samples, np.int64), samples, deepest)
 
     @classmethod
-    def following(
+    def adapted(
         cls,
         regimes: Callable[[PeriodTimes], np.ndarray],
         samples: int,
         deepest: int,
         path: Callable[[PeriodTimes], np.ndarray] | None = None,
     ) -> PeriodTimes:
-        """Steps that are divided to the ``deepest`` level where ``regimes`` ``(t, j)`` change.
+        """Return steps that are divided to the deepest level where joints change their state.
 
-        What joints do for less than a step is looked for at more times, and not passed over: also
-        at those at which a ``path`` ``(t, d)`` turns, as a stop may be met there for a moment only.
+        Joint states that last less than a step are not missed, because the states are also probed
+        at more times. Turning points of the path are among them, since a stop may be touched there
+        only for a moment.
+
+        Parameters
+        ----------
+        regimes
+            Function that returns the joint states ``(t, j)`` at given times.
+        samples
+            Number of steps of level 0.
+        deepest
+            Deepest level.
+        path
+            Function that returns the joint displacements ``(t, d)`` at given times; without it
+            turning points are not probed.
         """
-        times, probe = cls.even(samples, deepest), cls.even(PROBE * samples, deepest)
+        times = cls.uniform(samples, deepest)
+        probe = cls.uniform(PROBE_REFINEMENT * samples, deepest)
         if path is not None:
             starts = np.union1d(probe.starts, probe.turns(path(probe)))
             probe = replace(probe, starts=starts, levels=np.zeros(len(starts), np.int64))
         known = regimes(probe)
         differs = known != np.roll(known, -1, axis=0)
         changes = differs.any(axis=1)
-        moments = (differs & np.roll(differs, 1, axis=0)).any(axis=1)
+        brief = (differs & np.roll(differs, 1, axis=0)).any(axis=1)
         for level in range(deepest):
             marked = np.zeros(len(times.starts), bool)
-            sought = probe.starts[changes if level < PROBED else moments]
-            within = np.searchsorted(times.starts, sought // PROBE, side="right")
+            events = probe.starts[changes if level < PROBED_LEVELS else brief]
+            within = np.searchsorted(times.starts, events // PROBE_REFINEMENT, side="right")
             marked[within - 1] = True
-            times = times.divided(marked & (times.levels == level))
+            times = times.with_divided(marked & (times.levels == level))
         while True:
             known = regimes(times)
             changes = (known != np.roll(known, -1, axis=0)).any(axis=1)
-            # It changes in this step or, where the motion turns, in the next.
+            # The joint changes in this step or, where the motion turns, in the next one.
             marked = changes | np.roll(changes, 1)
             if not (marked & (times.levels < deepest)).any():
                 return times
-            times = times.divided(marked)
+            times = times.with_divided(marked)
 
     @property
     def parts(self) -> int:
-        """In which times are counted."""
+        """Number of units of time in the period."""
         return int(self.samples * SPLIT**self.deepest)
 
     def turns(self, values: np.ndarray) -> np.ndarray:
-        """Times, in parts, at which ``values`` ``(t, d)`` at steps of equal length turn.
+        """Return the times, in parts, of the extrema of ``values`` ``(t, d)`` at uniform steps.
 
-        They are those of parabolas through three values.
+        The extrema are those of parabolas through three values.
         """
         before, after = values - np.roll(values, 1, axis=0), np.roll(values, -1, axis=0) - values
         steps, numbers = np.nonzero((before * after <= 0.0) & (before != after))
@@ -85,11 +110,11 @@ class PeriodTimes:
         length = self.parts // self.samples
         return np.rint(self.starts[steps] + offset * length).astype(np.int64) % self.parts
 
-    def divided(self, marked: np.ndarray) -> PeriodTimes:
-        """With the ``marked`` ``(t,)`` steps in four, if they are not of the deepest level.
+    def with_divided(self, marked: np.ndarray) -> PeriodTimes:
+        """Return times in which the ``marked`` ``(t,)`` steps are divided in four.
 
-        The first two steps, the next two, ... are divided together, so that :meth:`halved` is of
-        the same times.
+        Steps at the deepest level stay as they are. The first two steps, the next two, and so on
+        are divided together, so that :meth:`halved` can merge them.
         """
         marked = np.repeat(marked.reshape(-1, 2).any(axis=1), 2)
         pieces = np.where(marked & (self.levels < self.deepest), SPLIT, 1)
@@ -99,5 +124,5 @@ class PeriodTimes:
         return PeriodTimes(starts, levels, self.samples, self.deepest)
 
     def halved(self) -> PeriodTimes:
-        """With every step twice as long: those of a level come in pairs."""
+        """Return times with every two steps merged into one; steps of a level come in pairs."""
         return PeriodTimes(self.starts[::2] // 2, self.levels[::2], self.samples // 2, self.deepest)

@@ -1,6 +1,7 @@
-"""A force that is recorded over one period, and its harmonics: exactly, of straight lines between.
+"""Force recorded over one period, and the exact harmonics of its piecewise linear signal.
 
-The slope of such a signal f(τ), τ in turns from 0 to 1, jumps by Δs_j at its rows, so that
+Let f(τ) be the signal over the time τ in periods, from 0 to 1. Its slope jumps by Δs_j at its
+samples, so that
 
     f(τ) = Re Σ w_k exp(2πikτ),   w_k = -2/(2πk)² Σ Δs_j exp(-2πikτ_j) for k > 0.
 """
@@ -16,21 +17,30 @@ from fe_models.dynamics.excitation import ExcitationError
 from fe_models.dynamics.periodic.harmonics import ComplexArray
 from sa_solver.types import Array
 
-# Of the range of a record: its last force may differ by so much from its first.
-CLOSES = 1e-6
+# Largest difference between the last and the first force of a record, over its range.
+CLOSURE = 1e-6
 
 
 @dataclass(frozen=True)
 class PeriodicRecord:
-    """Samples ``force`` ``(s,)`` [N] of one period at ``turns`` ``(s,)`` of it, straight between.
+    """Piecewise linear force over one period.
 
-    Turns ascend from 0 to 1, and the last force is the first one. Raises
-    :class:`~fe_models.dynamics.excitation.ExcitationError` for turns that do not, forces that do
-    not close, and numbers that are not finite.
+    Parameters
+    ----------
+    turns
+        Times ``(s,)`` of the samples in periods, ascending from 0 to 1.
+    force
+        Samples ``(s,)`` [N]. The last one equals the first one.
+
+    Raises
+    ------
+    ExcitationError
+        If times do not ascend from 0 to 1, if the forces do not close, or if numbers are not
+        finite.
 
     Examples
     --------
-    A triangle of height 1 has 8/π² of the first harmonic, and a ninth of that of the third:
+    The first harmonic of a triangle of height 1 is 8/π², and the third is a ninth of it:
 
     >>> import numpy as np
     >>> from fe_models.dynamics.periodic.record import PeriodicRecord
@@ -45,33 +55,38 @@ class PeriodicRecord:
     def __post_init__(self) -> None:
         turns, force = self.turns, self.force
         if not (len(turns) == len(force) >= 3 and np.isfinite(turns).all()):
-            raise ExcitationError("give three or more turns of a period, and as many forces")
+            raise ExcitationError("a period needs three or more finite times, and as many forces")
         if turns[0] != 0.0 or turns[-1] != 1.0 or np.any(np.diff(turns) <= 0.0):
-            raise ExcitationError("turns of a period do not ascend from 0 to 1")
+            raise ExcitationError(
+                "the times of a period, in periods, do not ascend from 0 to 1: sort and scale them"
+            )
         if not np.isfinite(force).all():
-            raise ExcitationError("a recorded force is not a number: give finite ones")
-        if abs(force[-1] - force[0]) > CLOSES * np.ptp(force):
-            raise ExcitationError("a period does not end with the force that it begins with")
+            raise ExcitationError("a recorded force is not a finite number: remove or correct it")
+        if abs(force[-1] - force[0]) > CLOSURE * np.ptp(force):
+            raise ExcitationError(
+                "the recorded period does not end with the force that it begins with: record one "
+                "full period"
+            )
 
     def amplitudes(self, highest: int) -> ComplexArray:
-        """w_k ``(k + 1,)`` [N] of harmonics 0 to ``highest``; the mean is that of harmonic 0."""
+        """Return w_k ``(k + 1,)`` [N] of harmonics 0 to ``highest``; w_0 is the mean."""
         orders = np.arange(1, highest + 1)
         turning = np.exp(-2j * np.pi * np.outer(orders, self.turns[:-1]))
-        above = -2.0 / np.square(2.0 * np.pi * orders) * (turning @ self._jumps)
+        above = -2.0 / np.square(2.0 * np.pi * orders) * (turning @ self._slope_jumps)
         return np.concatenate([[self._mean], above])
 
     def left_out(self, highest: int) -> float:
-        """Of the root mean square without the mean, the share that harmonics above have."""
+        """Return the share of harmonics above ``highest`` in the root mean square without mean."""
         steps, swing = np.diff(self.turns), self.force - self._mean
-        begin, end = swing[:-1], swing[1:]
-        square = float(steps @ (begin * begin + begin * end + end * end)) / 3.0
+        starts, ends = swing[:-1], swing[1:]
+        square = float(steps @ (starts * starts + starts * ends + ends * ends)) / 3.0
         if square == 0.0:
             return 0.0
         kept = 0.5 * float(np.square(np.abs(self.amplitudes(highest)[1:])).sum())
         return float(np.sqrt(max(1.0 - kept / square, 0.0)))
 
     def value(self, turns: Array) -> Array:
-        """The force [N] at any ``turns``, periods counted from the beginning."""
+        """Return the force [N] at any times ``turns`` in periods."""
         return np.asarray(np.interp(np.mod(turns, 1.0), self.turns, self.force))
 
     @cached_property
@@ -79,9 +94,10 @@ class PeriodicRecord:
         return float(np.diff(self.turns) @ (self.force[1:] + self.force[:-1])) / 2.0
 
     @cached_property
-    def _jumps(self) -> Array:
-        """By how much the slope changes at every row but the last ``(s - 1,)``."""
-        # Closed exactly: what is missing would be a jump of the force.
-        closed = np.append(self.force[:-1], self.force[0])
-        slopes = np.diff(closed) / np.diff(self.turns)
+    def _slope_jumps(self) -> Array:
+        """Change of the slope at every sample but the last ``(s - 1,)``."""
+        # The last force is set to the first one exactly: a remaining difference would act as a jump
+        # of the force.
+        closed_force = np.append(self.force[:-1], self.force[0])
+        slopes = np.diff(closed_force) / np.diff(self.turns)
         return np.asarray(slopes - np.roll(slopes, 1))

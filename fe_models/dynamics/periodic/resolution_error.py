@@ -1,11 +1,13 @@
-"""How far a periodic motion is from what more harmonics and samples would make of it.
+"""Estimate of how much more harmonics and samples would change a periodic motion.
 
 The equations of a richer resolution are evaluated at the motion, and one step of Newton's method
-leads to theirs. It answers for what harmonics left out do to those that are kept, near a resonance
-many times what they are themselves, and for corners between samples.
+leads towards their solution. The step accounts for the effect of neglected harmonics on those that
+are kept, which near a resonance is many times their own size, and for corners of the forces between
+samples.
 
-Near a fold of a response there may be no motion at the same frequency: there the motion nearest on
-the richer curve is looked for, whose frequency may differ, at a price.
+Near a fold of a response, there may be no motion at the same frequency. Therefore the step leads to
+the nearest motion on the richer curve: its frequency may differ, but a difference counts as an
+error.
 """
 
 from __future__ import annotations
@@ -19,19 +21,19 @@ from fe_models.dynamics.periodic.harmonic_solution import HarmonicSolution, Reso
 from fe_models.dynamics.periodic.harmonics import Resolution
 from sa_solver.types import Array
 
-# Where a response is steeper than this (share of the vibration by share of the frequency) what
-# counts is how far its curve is, not how far the motion at the same frequency.
-STEEPEST = 100.0
-# A harmonic is looked at where its forces alone cause this share of the vibration.
-LOOKED_AT = 1e-6
-# Share of its right-hand side that an iterative solver may leave: an estimate needs no more.
+# Where a response is steeper than this (relative change of the vibration over relative change of
+# the frequency), the distance between the curves counts, not that between motions of one frequency.
+STEEPEST_RESPONSE = 100.0
+# A harmonic is examined if its forces alone cause this share of the vibration.
+EXAMINED_SHARE = 1e-6
+# Relative residual of the iterative linear solver: an estimate needs no more.
 LINEAR_TOLERANCE = 1e-3
 
 
 def resolution_error(problem: HarmonicBalance, solution: HarmonicSolution) -> ResolutionError:
-    """Error of a motion of the ``problem`` by its harmonics and samples; 0 where nothing vibrates.
+    """Return the error of a motion due to its harmonics and samples; 0 if nothing vibrates.
 
-    Equations of more harmonics and twice the samples are evaluated twice, and solved once.
+    The equations with more harmonics and twice the samples are evaluated twice, and solved once.
     """
     vibration = problem.vibration(solution.coefficients)
     if vibration == 0.0:
@@ -39,27 +41,28 @@ def resolution_error(problem: HarmonicBalance, solution: HarmonicSolution) -> Re
     richer = richer_problem(problem, solution)
     coefficients = richer.resolution.adopt(solution.coefficients, problem.resolution)
     at = richer.evaluate(coefficients.ravel(), solution.frequency, solution.force, "frequency")
-    change, share, distance = _step(richer, at, solution.frequency, vibration)
+    change, share, distance = _step_to_nearest(richer, at, solution.frequency, vibration)
     energy = _energy_error(richer, solution, coefficients.ravel() + change, share)
-    by_harmonic, sampling = _causes(problem.resolution, richer, at)
+    by_harmonic, sampling = _contributions(problem.resolution, richer, at)
     scale = max(distance, energy) / (float(np.hypot(np.linalg.norm(by_harmonic), sampling)) or 1.0)
     return ResolutionError(distance, energy, scale * by_harmonic, scale * sampling)
 
 
 def richer_problem(problem: HarmonicBalance, solution: HarmonicSolution) -> HarmonicBalance:
-    """The problem with what a motion leaves out: it has grown with all that were looked at before.
+    """Return the problem with the harmonics that a motion neglects.
 
-    Whoever takes an error that was estimated earlier lets it grow by this motion too.
+    It also has the harmonics that earlier motions of the same problem neglected. A caller that uses
+    a stored error must call this function for its motion too, so that later results are the same.
     """
-    return problem.richer(set(np.flatnonzero(solution.shares > LOOKED_AT).tolist()))
+    return problem.richer(set(np.flatnonzero(solution.shares > EXAMINED_SHARE).tolist()))
 
 
 def _energy_error(
     richer: HarmonicBalance, solution: HarmonicSolution, unknowns: Array, share: float
 ) -> float:
-    """Error of the joints' energy over all that is lost, by the motion nearest to a solution.
+    """Return the error of the joints' energy over all energy lost, from the nearest motion.
 
-    That has these ``unknowns``, and a frequency that is larger by a ``share``.
+    That motion has the given ``unknowns``, and a frequency larger by the factor 1 + ``share``.
     """
     frequency = solution.frequency * (1.0 + share)
     nearest = richer.evaluate(unknowns, frequency, solution.force, "frequency")
@@ -70,24 +73,27 @@ def _energy_error(
     return difference / (dissipated + damped) if difference > 0.0 else 0.0
 
 
-def _step(
+def _step_to_nearest(
     richer: HarmonicBalance, at: Balance, frequency: float, vibration: float
 ) -> tuple[Array, float, float]:
-    """The step ``(n,)`` [mm] to the nearest motion, the share of the frequency, and its size.
+    """Return the step ``(n,)`` [mm] to the nearest motion, its relative frequency, and its size.
 
-    Along the curve the unknowns u change by the slope with the frequency. Of all u' + slope s the
-    one is taken with the least |u' + slope s|² + (STEEPEST s)², in shares.
+    Let Δu be the step of Newton's method at the given frequency, u' the slope of the curve, and s a
+    relative change of the frequency. Among all steps Δu + s u', the one with the least |Δu + s u'|²
+    + (STEEPEST_RESPONSE s)² is taken, in relative quantities.
     """
     sides = -np.stack([at.residual, frequency * at.slope], axis=1)
     change, slope = solve_alone(at.jacobian, sides, LINEAR_TOLERANCE).T
-    moved, along = (richer.vibrating(rows) / vibration for rows in (change, slope))
-    share = -float(moved @ along) / (float(along @ along) + STEEPEST**2)
-    size = float(np.hypot(np.linalg.norm(moved + share * along), STEEPEST * share))
+    by_residual, by_slope = (richer.without_mean(rows) / vibration for rows in (change, slope))
+    share = -float(by_residual @ by_slope) / (float(by_slope @ by_slope) + STEEPEST_RESPONSE**2)
+    size = float(
+        np.hypot(np.linalg.norm(by_residual + share * by_slope), STEEPEST_RESPONSE * share)
+    )
     return change + share * slope, share, size
 
 
-def _causes(coarse: Resolution, richer: HarmonicBalance, at: Balance) -> tuple[Array, float]:
-    """Norm of the residual of each harmonic left out, by its order, and of those that are not."""
+def _contributions(coarse: Resolution, richer: HarmonicBalance, at: Balance) -> tuple[Array, float]:
+    """Return the residual norm of each neglected harmonic, and that of all kept harmonics."""
     rows = richer.transfer.shaped(at.residual)
     sizes = np.zeros(richer.resolution.harmonics[-1] + 1)
     sizes[list(richer.resolution.harmonics)] = richer.resolution.sizes(rows)

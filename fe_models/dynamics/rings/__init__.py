@@ -1,1 +1,1 @@
-"""Rings of identical sectors, and waves that travel round them."""
+"""Vibration of cyclically symmetric rings of equal sectors."""

@@ -1,10 +1,10 @@
-"""A sector of a ring in a wave that travels round it: every harmonic has its nodal diameters.
+"""Sector of a ring in a travelling wave: every harmonic has its own number of nodal diameters.
 
-The sector is solved harmonic by harmonic as any structure, with the complex shapes of its modes at
-that harmonic's nodal diameters. Joints are marched through a period once: those of the other
-sectors do the same later. Of a joint to the next sector both ends are in its row of B_d = B T_d,
-and B_dᴴ brings its force to both. Only such waves are found: motions in which sectors differ, as
-standing waves, are not looked for.
+The sector is solved harmonic by harmonic like any structure, with the complex mode shapes for the
+nodal diameters of each harmonic. Its joints are marched through one period: those of the other
+sectors do the same, later. A joint to the next sector has both of its ends in its row of B_d = B
+T_d, and B_dᴴ applies its force to both. Only travelling waves are computed, not motions in which
+sectors differ, such as standing waves.
 """
 
 from __future__ import annotations
@@ -23,45 +23,62 @@ from sa_solver.types import Array
 
 
 class WaveReceptance:
-    """What harmonic forces do to a sector, each harmonic at its nodal diameters.
+    """Receptance of a sector, with the nodal diameters of each harmonic.
 
-    With springs ``tangents`` ``(j, d, d)`` [N/mm] in the place of joints damping stays as it was;
-    ``mixed`` is that of :class:`Receptance`.
+    Parameters
+    ----------
+    sector
+        The sector.
+    tangents
+        Springs ``(j, d, d)`` [N/mm] in place of the joints, or None. They do not change the damping
+        matrix.
+    mixed
+        Whether damping between different modes is kept; see :class:`Receptance`.
     """
 
     def __init__(
         self, sector: CyclicSector, tangents: Array | None = None, *, mixed: bool = True
     ) -> None:
         self.sector, self._tangents, self._mixed = sector, tangents, mixed
-        self._by_shift: dict[int, Receptance] = {}
+        self._receptance_of_shift: dict[int, Receptance] = {}
 
     def of(self, harmonic: int) -> Receptance:
-        """The sector at the nodal diameters of a harmonic."""
+        """Return the receptance of the sector at the nodal diameters of a harmonic."""
         shift = self.sector.ring.shift(harmonic)
-        if shift not in self._by_shift:
+        if shift not in self._receptance_of_shift:
             model = self.sector.at(shift)
             if self._tangents is not None:
                 model = stiffened(model, self._tangents)
-            self._by_shift[shift] = Receptance(model, mixed=self._mixed)
-        return self._by_shift[shift]
+            self._receptance_of_shift[shift] = Receptance(model, mixed=self._mixed)
+        return self._receptance_of_shift[shift]
 
     def stuck(self, tangents: Array) -> WaveReceptance:
-        """With springs in the place of joints; damping between modes left out."""
+        """Return the receptance with springs as joints, without damping between modes."""
         return WaveReceptance(self.sector, tangents, mixed=False)
 
     def transfer(self, resolution: Resolution, directions: int) -> WaveTransfer:
-        """Between joints and modes at all harmonics of a resolution."""
+        """Return the transfer between joints and modes at all harmonics of a resolution."""
         structures = tuple(self.of(harmonic) for harmonic in resolution.harmonics)
         return WaveTransfer(resolution, self.of(0), directions, structures)
 
 
 class WaveMotion(SteadyMotion):
-    """A sector at frequencies ``(k,)``, of one harmonic each, with the ``structures`` of these."""
+    """Sector at frequencies ``(k,)``, one per harmonic.
+
+    Parameters
+    ----------
+    rest
+        Receptance without nodal diameters, which is that of the sector at rest.
+    structures
+        Receptance of each harmonic.
+    angular
+        Angular frequencies ``(k,)`` [rad/s] of the harmonics.
+    """
 
     def __init__(self, rest: Receptance, structures: Sequence[Receptance], angular: Array) -> None:
         self.structure, self.angular, self._structures = rest, angular, structures
         self._moving = int(angular[0] == 0.0)
-        # One at a time: every harmonic has a structure of its own.
+        # One inverse per harmonic, since every harmonic has its own modes.
         self._inverses = [
             structures[row].inverse_at(angular[row : row + 1])
             for row in range(self._moving, len(structures))
@@ -70,12 +87,12 @@ class WaveMotion(SteadyMotion):
     def vibrate(self, force: ComplexArray) -> ComplexArray:
         response = np.zeros(force.shape, dtype=complex)
         for row, inverse in enumerate(self._inverses, start=self._moving):
-            response[row] = inverse.times(force[row : row + 1])[0]
+            response[row] = inverse.apply(force[row : row + 1])[0]
         return response
 
     def per_force(self, weights: ComplexArray) -> ComplexArray:
         rows = zip(self._inverses, weights, strict=True)
-        return np.array([inverse.turned(row[None])[0] for inverse, row in rows])
+        return np.array([inverse.apply_transposed(row[None])[0] for inverse, row in rows])
 
     def stiffness_slope(self, motion: ComplexArray) -> ComplexArray:
         slopes = -2.0 * self.angular[:, None] * motion
@@ -91,15 +108,16 @@ class WaveMotion(SteadyMotion):
         if moving:
             between[0] = self.structure.static_flexibility
         for row, inverse in enumerate(self._inverses, start=moving):
-            inverse.between(self._structures[row].at_joints, between[row : row + 1])
+            inverse.write_between_joints(self._structures[row].at_joints, between[row : row + 1])
         return between
 
 
 @dataclass(frozen=True)
 class WaveTransfer(HarmonicTransfer):
-    """Between joints and modes of a sector; ``structures`` ``(k,)`` are those of the harmonics.
+    """Transfer between joints and modes of a sector.
 
-    ``receptance`` is that of no nodal diameter, which is at rest.
+    ``structures`` ``(k,)`` are the receptances of the harmonics. ``receptance`` is that without
+    nodal diameters, for the sector at rest.
     """
 
     structures: tuple[Receptance, ...]
@@ -109,22 +127,41 @@ class WaveTransfer(HarmonicTransfer):
 
     def modal(self, force: Array) -> ComplexArray:
         forces = self.resolution.amplitudes(force)
-        return self._each(forces, self._joints_to_modes)
+        return self._map_each(forces, self._joints_to_modes)
 
     def at_joints(self, motion: ComplexArray) -> Array:
-        moved = self._each(motion, [each.at_joints.T for each in self.structures])
+        moved = self._map_each(motion, [each.at_joints.T for each in self.structures])
         return self.resolution.coefficients(moved, self.directions).ravel()
 
     def load_on_modes(self, load: ComplexArray, row: int) -> ComplexArray:
         return np.asarray(load @ self.structures[row].at_points.conj())
 
     def displacement(self, motion: ComplexArray) -> ComplexArray:
-        return self._each(motion, [each.at_points.T for each in self.structures])
+        return self._map_each(motion, [each.at_points.T for each in self.structures])
 
     @cached_property
     def _joints_to_modes(self) -> list[ComplexArray]:
         return [each.at_joints.conj() for each in self.structures]
 
-    def _each(self, amplitudes: ComplexArray, maps: Sequence[ComplexArray]) -> ComplexArray:
-        """Amplitudes ``(k, ...)`` of harmonics, each by its own map."""
+    def _map_each(self, amplitudes: ComplexArray, maps: Sequence[ComplexArray]) -> ComplexArray:
+        """Multiply amplitudes ``(k, ...)`` of each harmonic by its own matrix."""
         return np.array([row @ by for row, by in zip(amplitudes, maps, strict=True)])
+
+
+def transfer_of(
+    resolution: Resolution, receptance: Receptance | WaveReceptance, directions: int
+) -> HarmonicTransfer:
+    """Return the transfer between the joints and modes of a structure, or of a sector in a wave.
+
+    Parameters
+    ----------
+    resolution
+        Harmonics of the motion and samples of a period.
+    receptance
+        The structure or the sector.
+    directions
+        Number of directions of each joint.
+    """
+    if isinstance(receptance, WaveReceptance):
+        return receptance.transfer(resolution, directions)
+    return HarmonicTransfer(resolution, receptance, directions)

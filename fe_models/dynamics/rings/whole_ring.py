@@ -1,6 +1,7 @@
-"""All sectors of a ring in a wave that was found of one: what small deviations of each do.
+"""All sectors of a ring whose motion is a travelling wave, for the analysis of its stability.
 
-Deviations need not travel as the wave does: whether it holds is a matter of all sectors.
+Deviations from the wave need not travel as the wave does. Therefore stability is a property of the
+whole ring, not of one sector.
 """
 
 from __future__ import annotations
@@ -33,31 +34,31 @@ class JoinedDeviations:
 
     @classmethod
     def of(cls, parts: Iterable[Deviations]) -> JoinedDeviations:
-        """Joined; all have room for as much memory."""
-        every = tuple(parts)
+        """Return the deviations of all parts, which have room for equally many state variables."""
+        all_parts = tuple(parts)
 
-        def joined(name: str, axis: int) -> Array:
-            return np.concatenate([getattr(part, name) for part in every], axis=axis)
+        def concatenated(name: str, axis: int) -> Array:
+            return np.concatenate([getattr(part, name) for part in all_parts], axis=axis)
 
         return cls(
-            joined("kept", 1),
-            joined("by_start", 1),
-            joined("by_end", 1),
-            joined("pull", 0),
-            joined("tangent", 1),
-            joined("regimes", 1),
-            joined("force", 1),
-            np.concatenate([part.remembered for part in every]),
+            concatenated("kept", 1),
+            concatenated("by_start", 1),
+            concatenated("by_end", 1),
+            concatenated("pull", 0),
+            concatenated("tangent", 1),
+            concatenated("regimes", 1),
+            concatenated("force", 1),
+            np.concatenate([part.remembered for part in all_parts]),
         )
 
 
 def ring_structure(sector: CyclicSector, directions: int) -> ModalStructure:
-    """The modes of all sectors, without joints, which are of so many directions."""
+    """Return the modes of all sectors without joints, which have ``directions`` directions each."""
     return ModalStructure.without_joints(Receptance(sector.whole()), directions)
 
 
 def motion_of(ring: Ring, motion: HarmonicSolution, sector: int) -> HarmonicSolution:
-    """That of a sector, counted from 0, by that of sector 0: the same, later.
+    """Return the motion of a sector, counted from 0, given that of sector 0: the same, later.
 
     Examples
     --------
@@ -73,8 +74,9 @@ def motion_of(ring: Ring, motion: HarmonicSolution, sector: int) -> HarmonicSolu
     >>> load = PeriodicLoad({1: np.ones(1)})
     >>> problem = HarmonicBalance.of_sector(sector, joints, load, Resolution((1,), 64))
     >>> motion = problem.solve(100.0, force=1.0)
-    >>> print(np.round(motion_of(sector.ring, motion, 1).amplitude(0) / motion.amplitude(0), 6))
-    -0-1j
+    >>> later = motion_of(sector.ring, motion, 1)
+    >>> print(np.isclose(later.amplitude(0), -1j * motion.amplitude(0)))
+    True
     """
     harmonics = motion.resolution.harmonics
     later = np.array([ring.phase(sector * ring.shift(harmonic)) for harmonic in harmonics])

@@ -1,1 +1,1 @@
-"""Stability of periodic motions."""
+"""Stability of periodic motions, by Floquet multipliers."""

@@ -1,18 +1,18 @@
-"""What a period makes of small deviations from a periodic motion: the monodromy matrix.
+"""Monodromy matrix: the map of small deviations from a periodic motion over one period.
 
-The state is that of the structure and all that its joints remember. The structure is stepped
-exactly under forces that change linearly from one time to the next, the joints by their own maps;
-within a step the displacements u of the joints are those under which both agree,
+The state consists of the structure's state and of all state variables of its joints. The structure
+takes exact steps under forces that change linearly from one time to the next, and the joints follow
+their own linear maps. Within a step the displacements u of the joints satisfy both,
 
-    u = (what the structure does without the forces at the end) - G F,   F = (T + S D) u + ...
+    u = (displacement without the forces at the end of the step) - G F,   F = (T + S D) u + ...
 
-A last column is no deviation but what the given motion lacks: the structure's whole state under
-the load and the forces that joints have in the motion, less the displacements of the motion. With
-it a period says which motion is periodic, by Newton's method for the whole period at once.
+The last column is not a deviation but the closure error of the given motion: the state of the
+structure under the load and under the joint forces of the motion, less the displacements of the
+motion. With it, one period determines the periodic motion by Newton's method for all times at once.
 
-Springs near to what the joints are in a step are taken as parts of the structure in it, and off the
-joints' forces: where joints are these springs nothing is left of the error, which is of second
-order in the steps, and of first order in those in which a joint changes what it does.
+In each step, springs that resemble the joints are made part of the structure and subtracted from
+the joint forces. Where joints equal these springs no error remains. The remaining error is of
+second order in the steps, and of first order in those in which a joint changes its state.
 """
 
 from __future__ import annotations
@@ -24,18 +24,27 @@ from numba import njit
 
 from sa_solver.types import Array
 
-# Unknowns up to which loops are faster than calls of BLAS and LAPACK.
+# Number of unknowns up to which loops are faster than calls of BLAS and LAPACK.
 FEW = 8
-# Of 1: what is left of a deviation that is forgotten.
-FORGOTTEN = 1e-100
+# Magnitude below which a state variable is set to 0, relative to a unit deviation.
+NEGLIGIBLE = 1e-100
 
 
 class StructureSteps(NamedTuple):
-    """The structure's ``k`` numbers, in ``v`` kinds of steps under forces of ``m`` directions.
+    """Maps of the structure over steps of ``v`` kinds, under forces of ``m`` directions.
 
-    ``forward`` ``(v, k, k)``, ``by_start`` and ``by_end`` ``(v, k, m)``, with the ``springs``
-    ``(v, a, d, d)`` of joints in it; displacements of joints ``at_joints`` ``(m, k)`` by these
-    numbers, and ``residual`` ``(m, m)`` by forces, at once.
+    Parameters
+    ----------
+    forward
+        Matrices ``(v, k, k)`` that map the ``k`` state variables over a step.
+    by_start, by_end
+        Effect of forces at the start and the end of a step ``(v, k, m)``.
+    springs
+        Springs ``(v, a, d, d)`` at the joints that are part of the structure.
+    at_joints
+        Displacements of joints ``(m, k)`` per state variable.
+    residual
+        Quasi-static displacements of joints ``(m, m)`` per force.
     """
 
     forward: Array
@@ -47,9 +56,10 @@ class StructureSteps(NamedTuple):
 
 
 class JointSteps(NamedTuple):
-    """The maps of ``t`` increments of ``a`` joints; ``kinds`` ``(t,)`` are those of the steps.
+    """Maps of ``a`` joints over ``t`` steps.
 
-    The others as in :class:`fe_models.dynamics.periodic.joints.Deviations`.
+    ``kinds`` ``(t,)`` are the kinds of steps of the structure. The others are as in
+    :class:`fe_models.dynamics.periodic.joints.Deviations`.
     """
 
     kinds: np.ndarray
@@ -61,10 +71,12 @@ class JointSteps(NamedTuple):
 
 
 class GivenMotion(NamedTuple):
-    """What joints do in the motion at ``t + 1`` times: displacements ``moved`` and ``force``
-    ``(t + 1, a d)``; all 0 where nothing is asked of it."""
+    """Displacements and forces ``(t + 1, a d)`` of the joints in the given motion, or 0.
 
-    moved: Array
+    They are 0 if no closure error is needed.
+    """
+
+    displacement: Array
     force: Array
 
 
@@ -73,21 +85,34 @@ def monodromy(
     structure: StructureSteps,
     joints: JointSteps,
     motion: GivenMotion,
-    begin: Array,
-    course: Array,
+    start: Array,
+    history: Array,
 ) -> Array:
-    """Columns ``(k + a p, n + a p + 1)``: numbers of the structure first, then memory by joint.
+    """Return the state after one period for every column, ``(k + a p, n + a p + 1)``.
 
-    ``begin`` ``(k, n + a p + 1)`` is the structure at first: unit deviations in ``n`` columns, the
-    last as the load begins. Displacements of joints are written into the ``course``
-    ``(t + 1, a d, n + a p + 1)``, or none where that is empty.
+    The rows are the state variables of the structure, then those of each joint.
+
+    Parameters
+    ----------
+    structure
+        Maps of the structure.
+    joints
+        Maps of the joints.
+    motion
+        The given motion of the joints.
+    start
+        Initial states of the structure ``(k, n + a p + 1)``: unit deviations in ``n`` columns, and
+        in the last column the state with which the load begins.
+    history
+        Array ``(t + 1, a d, n + a p + 1)`` into which the displacements of the joints are written,
+        or an empty one.
     """
-    own, size = begin.shape
-    count, remembered, directions = joints.by_end.shape[1:]
+    own, size = start.shape
+    count, states, directions = joints.by_end.shape[1:]
     forces = count * directions
-    state, memory = begin.copy(), np.zeros((count * remembered, size))
-    for number in range(count * remembered):
-        memory[number, size - 1 - count * remembered + number] = 1.0
+    state, memory = start.copy(), np.zeros((count * states, size))
+    for number in range(count * states):
+        memory[number, size - 1 - count * states + number] = 1.0
     compliance = np.empty((len(structure.forward), forces, forces))
     for kind in range(len(compliance)):
         _copy(structure.residual, compliance[kind])
@@ -96,26 +121,27 @@ def monodromy(
     force, moved = np.empty((forces, size)), np.zeros((forces, size))
     slopes, matrix = np.empty((count, directions, directions)), np.empty((forces, forces))
     given = np.empty(forces)
-    # Displacements at the beginning: those of the structure, less what forces do at once.
+    # Initial displacements of the joints: those of the structure, less the quasi-static effect of
+    # forces.
     force[:] = 0.0
     _add_blocks(1.0, joints.pull, memory, force)
-    _add_last(1.0, motion.force[0], force)
+    _add_to_last_column(1.0, motion.force[0], force)
     _add_product(1.0, structure.at_joints, state, moved)
     _add_product(-1.0, structure.residual, force, moved)
-    _add_last(-1.0, motion.moved[0], moved)
-    _add_last(-1.0, motion.force[0], force)
+    _add_to_last_column(-1.0, motion.displacement[0], moved)
+    _add_to_last_column(-1.0, motion.force[0], force)
     for joint in range(count):
         _copy(joints.tangent[-1, joint], slopes[joint])
-    _solve(_coupled(structure.residual, slopes, matrix), moved)
+    _solve(_coupled_matrix(structure.residual, slopes, matrix), moved)
     _add_blocks(1.0, joints.tangent[-1], moved, force)
-    if len(course):
-        _copy(moved, course[0])
+    if len(history):
+        _copy(moved, history[0])
     for step in range(len(joints.kinds)):
         kind = joints.kinds[step]
         springs = structure.springs[kind]
         _add_blocks(-1.0, springs, moved, force)
-        _beside_springs(motion, step, springs, given)
-        _add_last(1.0, given, force)
+        _forces_less_springs(motion, step, springs, given)
+        _add_to_last_column(1.0, given, force)
         new_state[:] = 0.0
         _add_product(1.0, structure.forward[kind], state, new_state)
         _add_product(1.0, structure.by_start[kind], force, new_state)
@@ -124,26 +150,26 @@ def monodromy(
         _add_blocks(1.0, joints.by_start[step], moved, new_memory)
         force[:] = 0.0
         _add_blocks(1.0, joints.pull, new_memory, force)
-        _beside_springs(motion, step + 1, springs, given)
-        _add_last(1.0, given, force)
+        _forces_less_springs(motion, step + 1, springs, given)
+        _add_to_last_column(1.0, given, force)
         moved[:] = 0.0
         _add_product(1.0, structure.at_joints, new_state, moved)
         _add_product(-1.0, compliance[kind], force, moved)
-        _add_last(-1.0, motion.moved[step + 1], moved)
-        _slopes(joints, step, springs, slopes)
-        _solve(_coupled(compliance[kind], slopes, matrix), moved)
+        _add_to_last_column(-1.0, motion.displacement[step + 1], moved)
+        _joint_slopes(joints, step, springs, slopes)
+        _solve(_coupled_matrix(compliance[kind], slopes, matrix), moved)
         _add_blocks(1.0, slopes, moved, force)
         _add_product(1.0, structure.by_end[kind], force, new_state)
         _add_blocks(1.0, joints.by_end[step], moved, new_memory)
-        # Whole forces again: those of springs in the structure are the joints'.
-        _add_last(-1.0, given, force)
+        # Restore the total forces: those of springs in the structure are forces of the joints.
+        _add_to_last_column(-1.0, given, force)
         _add_blocks(1.0, springs, moved, force)
-        if len(course):
-            _copy(moved, course[step + 1])
-        _forget(new_memory)
+        if len(history):
+            _copy(moved, history[step + 1])
+        _flush_negligible(new_memory)
         state, new_state = new_state, state
         memory, new_memory = new_memory, memory
-    whole = np.empty((own + count * remembered, size))
+    whole = np.empty((own + count * states, size))
     _copy(state, whole)
     _copy(memory, whole[own:])
     return whole
@@ -151,35 +177,35 @@ def monodromy(
 
 @njit(cache=True, nogil=True)
 def _copy(rows: np.ndarray, to: Array) -> None:
-    """Write rows as others: by numbers, which takes far less time to compile than as a whole."""
+    """Copy rows element by element, which compiles far faster than an array assignment."""
     for row in range(rows.shape[0]):
         for c in range(rows.shape[1]):
             to[row, c] = rows[row, c]
 
 
 @njit(cache=True, nogil=True)
-def _add_last(factor: float, values: Array, rows: Array) -> None:
-    """Add to the last column."""
+def _add_to_last_column(factor: float, values: Array, rows: Array) -> None:
+    """Add factor times values to the last column."""
     last = rows.shape[1] - 1
     for row in range(len(values)):
         rows[row, last] += factor * values[row]
 
 
 @njit(cache=True, nogil=True)
-def _beside_springs(motion: GivenMotion, at: int, springs: Array, given: Array) -> None:
-    """Write forces ``(a d,)`` of the motion at a time, less those of springs ``(a, d, d)``."""
+def _forces_less_springs(motion: GivenMotion, at: int, springs: Array, given: Array) -> None:
+    """Write the forces ``(a d,)`` of the motion at a time, less those of springs ``(a, d, d)``."""
     count, directions, _ = springs.shape
     for joint in range(count):
         first = joint * directions
         for i in range(directions):
             given[first + i] = motion.force[at, first + i]
             for k in range(directions):
-                given[first + i] -= springs[joint, i, k] * motion.moved[at, first + k]
+                given[first + i] -= springs[joint, i, k] * motion.displacement[at, first + k]
 
 
 @njit(cache=True, nogil=True)
 def _add_product(factor: float, matrix: Array, rows: Array, to: Array) -> None:
-    """factor matrix @ rows, added."""
+    """Add factor matrix @ rows."""
     if len(matrix) > FEW:
         product = np.dot(matrix, rows)
         for i in range(matrix.shape[0]):
@@ -194,24 +220,25 @@ def _add_product(factor: float, matrix: Array, rows: Array, to: Array) -> None:
 
 
 @njit(cache=True, nogil=True)
-def _add_row(share: float, row: Array, to: Array) -> None:
-    if share != 0.0:
+def _add_row(factor: float, row: Array, to: Array) -> None:
+    """Add factor times a row."""
+    if factor != 0.0:
         for c in range(len(row)):
-            to[c] += share * row[c]
+            to[c] += factor * row[c]
 
 
 @njit(cache=True, nogil=True)
-def _forget(memory: Array) -> None:
-    """What has decayed below all rounding is nothing: numbers without all digits are slow."""
+def _flush_negligible(memory: Array) -> None:
+    """Set values below all rounding to 0, since arithmetic with denormal numbers is slow."""
     for row in memory:
         for c in range(len(row)):
-            if abs(row[c]) < FORGOTTEN:
+            if abs(row[c]) < NEGLIGIBLE:
                 row[c] = 0.0
 
 
 @njit(cache=True, nogil=True)
 def _add_blocks(factor: float, blocks: Array, rows: Array, to: Array) -> None:
-    """Add factor times the joints' ``blocks`` ``(a, p, q)``, on rows ``(a q, n)``: ``(a p, n)``."""
+    """Add to ``(a p, n)`` the joints' ``blocks`` ``(a, p, q)`` times ``rows`` ``(a q, n)``."""
     count, height, width = blocks.shape
     for joint in range(count):
         for i in range(height):
@@ -221,22 +248,22 @@ def _add_blocks(factor: float, blocks: Array, rows: Array, to: Array) -> None:
 
 
 @njit(cache=True, nogil=True)
-def _slopes(joints: JointSteps, step: int, springs: Array, slopes: Array) -> None:
-    """T + S D less springs that the structure has, ``(a, d, d)``."""
-    count, directions, remembered = joints.pull.shape
+def _joint_slopes(joints: JointSteps, step: int, springs: Array, slopes: Array) -> None:
+    """Write T + S D less the springs that are part of the structure, ``(a, d, d)``."""
+    count, directions, states = joints.pull.shape
     for joint in range(count):
         for i in range(directions):
             for k in range(directions):
                 slope = joints.tangent[step, joint, i, k] - springs[joint, i, k]
-                for number in range(remembered):
+                for number in range(states):
                     pull = joints.pull[joint, i, number]
                     slope += pull * joints.by_end[step, joint, number, k]
                 slopes[joint, i, k] = slope
 
 
 @njit(cache=True, nogil=True)
-def _coupled(compliance: Array, slopes: Array, matrix: Array) -> Array:
-    """1 + G times block-diagonal slopes, in ``matrix``."""
+def _coupled_matrix(compliance: Array, slopes: Array, matrix: Array) -> Array:
+    """Write 1 + G times block-diagonal slopes into ``matrix``, and return it."""
     count, directions, _ = slopes.shape
     matrix[:] = 0.0
     for row in range(len(matrix)):
@@ -245,14 +272,14 @@ def _coupled(compliance: Array, slopes: Array, matrix: Array) -> Array:
             first = joint * directions
             for k in range(directions):
                 for i in range(directions):
-                    share = compliance[row, first + i] * slopes[joint, i, k]
-                    matrix[row, first + k] += share
+                    factor = compliance[row, first + i] * slopes[joint, i, k]
+                    matrix[row, first + k] += factor
     return matrix
 
 
 @njit(cache=True, nogil=True)
 def _pivot(matrix: Array, column: int) -> int:
-    """Row of the largest entry of a column, from the diagonal down."""
+    """Return the row of the largest entry of a column, from the diagonal down."""
     largest = column
     for row in range(column + 1, len(matrix)):
         if abs(matrix[row, column]) > abs(matrix[largest, column]):
@@ -262,7 +289,7 @@ def _pivot(matrix: Array, column: int) -> int:
 
 @njit(cache=True, nogil=True)
 def _solve(matrix: Array, rhs: Array) -> None:
-    """Make of ``rhs`` matrix⁻¹ rhs; the matrix may be overwritten."""
+    """Overwrite ``rhs`` with matrix⁻¹ rhs; the matrix may be overwritten."""
     size = len(matrix)
     if size > FEW:
         _copy(np.linalg.solve(matrix, rhs), rhs)
@@ -270,19 +297,19 @@ def _solve(matrix: Array, rhs: Array) -> None:
     for column in range(size):
         pivot = _pivot(matrix, column)
         inverse = 1.0 / matrix[pivot, column]
-        _lift(matrix, pivot, column, inverse)
-        _lift(rhs, pivot, column, inverse)
+        _swap_and_scale(matrix, pivot, column, inverse)
+        _swap_and_scale(rhs, pivot, column, inverse)
         for row in range(size):
             if row != column:
-                share = -matrix[row, column]
-                _add_row(share, matrix[column], matrix[row])
-                _add_row(share, rhs[column], rhs[row])
+                factor = -matrix[row, column]
+                _add_row(factor, matrix[column], matrix[row])
+                _add_row(factor, rhs[column], rhs[row])
 
 
 @njit(cache=True, nogil=True)
-def _lift(rows: Array, pivot: int, to: int, factor: float) -> None:
-    """Exchange two rows, and multiply the one that has come up."""
+def _swap_and_scale(rows: Array, pivot: int, to: int, factor: float) -> None:
+    """Swap two rows, and multiply the one that moves up by a factor."""
     for c in range(rows.shape[1]):
-        lifted = factor * rows[pivot, c]
+        scaled = factor * rows[pivot, c]
         rows[pivot, c] = rows[to, c]
-        rows[to, c] = lifted
+        rows[to, c] = scaled

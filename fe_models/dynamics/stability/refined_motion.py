@@ -1,11 +1,11 @@
-"""Periodic motions in time: what a motion of few harmonics is near to, from event to event.
+"""Refinement of a periodic motion in time, with steps that resolve all changes of the joints.
 
-Where a stop is stiff, or a slider sticks for a moment only, harmonics show badly when joints change
-what they do, and multipliers depend on just that. From the displacements of joints that harmonic
-balance has found the motion is found again by Newton's method for all times of a period at once:
-the structure is stepped exactly, under its load and under forces of joints that are linear in steps
-which are short where joints change what they do. What a period makes of deviations from that motion
-is the derivative of the very same steps.
+Where a stop is stiff, or a slider sticks only for a moment, harmonics resolve poorly the instants
+at which joints change their state, and multipliers depend on just these instants. The joint
+displacements from harmonic balance are therefore the initial guess of Newton's method for all times
+of a period at once. The structure takes exact steps under its load and under joint forces that are
+linear in each step. Steps are short where joints change their state. The derivative of the very
+same steps is the map of deviations over a period.
 """
 
 from __future__ import annotations
@@ -27,48 +27,68 @@ from fe_models.dynamics.rings.sector import Ring
 from fe_models.dynamics.rings.whole_ring import JoinedDeviations, motion_of
 from fe_models.dynamics.stability.deviating_structure import (
     ActiveJoints,
-    Deviating,
-    Driven,
+    DrivenMotion,
     ModalStructure,
-    deviating,
+    PeriodMap,
+    period_map,
 )
 from fe_models.dynamics.transient.linear_steps import SPLIT
 from sa_solver.types import Array
 
-# A motion is found where two steps in succession change it by no more than this share of its
-# vibration, in at most so many steps: a single step says what becomes of deviations from the motion
-# before it, and where a stop is barely met that is another matter.
-FOUND, MOST_STEPS = 1e-6, 15
-# Share of its vibration by which the motion in time may differ from that in harmonics: one further
-# away may be another.
-NEAR = 0.1
+# The refinement has converged when two successive iterations change the motion by no more than this
+# share of its vibration, within this number of iterations. A single small change is not enough:
+# where a stop is barely touched, the map of deviations belongs to the motion before the change.
+CONVERGED, MAX_ITERATIONS = 1e-6, 15
+# Largest relative difference of the refined motion from that in harmonics: one farther away may be
+# another motion.
+MAX_DISTANCE = 0.1
 
-# Share of the steps with which the motion is found once more, in steps that begin elsewhere, and
-# levels left out there: steps in which joints change are then so many times as long, and more.
-COARSER, LEVELS_LESS = 0.625, 2
-EVENTS_LONGER = SPLIT**LEVELS_LESS
+# Share of the steps, and number of levels omitted, in a comparison with coarser steps that start at
+# other times. Steps in which joints change their state are then longer by this ratio, and more.
+COARSER_STEPS, FEWER_LEVELS = 0.625, 2
+EVENT_STEP_RATIO = SPLIT**FEWER_LEVELS
 
 Path = Callable[[Array], Array]
-"""Displacements of joints ``(t, j d)`` [mm] at shares ``(t,)`` of a period."""
+"""Function that returns joint displacements ``(t, j d)`` [mm] at shares ``(t,)`` of a period."""
 
 
 class RefinedMotion(NamedTuple):
-    """A motion in time: its ``path``, the ``times`` at which it was found, what a period makes of
-    deviations from it, how many of these are ``neutral``, and the same with joints that become
-    stiffer one shortest step ``late``.
+    """Motion refined in time.
+
+    Parameters
+    ----------
+    path
+        Displacements of the joints in the motion.
+    times
+        Steps of the period.
+    period_map
+        Map of deviations over the period.
+    neutral
+        Number of neutral deviations.
+    delayed
+        Function that returns the map with joints that become stiffer one shortest step later.
     """
 
     path: Path
     times: PeriodTimes
-    deviating: Deviating
+    period_map: PeriodMap
     neutral: int
-    late: Callable[[], Deviating]
+    delayed: Callable[[], PeriodMap]
 
 
 class MotionInTime:
-    """A ``motion`` of a problem with few joints and modes, at times of a period.
+    """Refinement of a motion in time, for a problem with few joints and modes.
 
-    Of a sector in a wave ``ring`` tells how all sectors of its ring follow it.
+    Parameters
+    ----------
+    problem
+        The problem of harmonic balance.
+    structure
+        Its modes, those of all sectors for a ring.
+    motion
+        The motion from harmonic balance.
+    ring
+        For a sector in a travelling wave, its ring, else None.
     """
 
     def __init__(
@@ -83,51 +103,62 @@ class MotionInTime:
         self._frequency, self._mean = motion.frequency, motion.resolution.harmonics[0] == 0
         self._harmonics = np.array(motion.resolution.harmonics)
         self._load = _load(problem, motion, ring, len(structure.at_points))
-        sectors = [motion] if ring is None else _every(ring, motion)
+        sectors = [motion] if ring is None else _motions_of_sectors(ring, motion)
         count, _, directions = motion.coefficients.shape
-        # Functions of time are the displacements themselves.
+        # The functions of time are the displacements themselves.
         each = np.eye(count * directions).reshape(-1, count, directions)
-        self._each = np.ascontiguousarray(each.transpose(1, 0, 2))
+        self._unit_coefficients = np.ascontiguousarray(each.transpose(1, 0, 2))
         rows = np.hstack([by_function(of.coefficients) for of in sectors])
-        self.in_harmonics: Path = lambda shares: motion.resolution.functions_during(shares) @ rows
-        self._vibration = float(np.linalg.norm(np.ptp(self._values(self.in_harmonics), axis=0)))
+        self.harmonic_path: Path = lambda shares: (
+            motion.resolution.functions_at_shares(shares) @ rows
+        )
+        self._vibration = float(np.linalg.norm(np.ptp(self._values(self.harmonic_path), axis=0)))
 
     @staticmethod
     def _values(path: Path) -> Array:
         return path(np.arange(128) / 128)
 
-    def found(self, samples: int, deepest: int, path: Path | None = None) -> RefinedMotion | None:
-        """The motion near to a path, that in harmonics at first, with so many steps and levels.
+    def refine(self, samples: int, deepest: int, path: Path | None = None) -> RefinedMotion | None:
+        """Return the refined motion near a path, or None if the iterations do not converge.
 
-        None where steps go on to change it.
+        Parameters
+        ----------
+        samples
+            Number of steps of level 0.
+        deepest
+            Deepest level of the steps.
+        path
+            Initial guess; the motion from harmonic balance if None.
         """
-        path, before = path or self.in_harmonics, np.inf
-        for _ in range(MOST_STEPS):
-            refined, change = self._stepped(path, self._times(path, samples, deepest))
+        path, before = path or self.harmonic_path, np.inf
+        for _ in range(MAX_ITERATIONS):
+            refined, change = self._newton_step(path, self._times(path, samples, deepest))
             if refined is None:
                 return None
             path = refined.path
-            if max(before, change) <= FOUND:
-                return refined if self._distance(path) <= NEAR else None
+            if max(before, change) <= CONVERGED:
+                return refined if self._distance(path) <= MAX_DISTANCE else None
             before = change
         return None
 
-    def others(self, refined: RefinedMotion) -> tuple[Deviating, Deviating] | None:
-        """Return the map of one period with joints that stiffen a step later, and in longer steps.
+    def comparison_maps(self, refined: RefinedMotion) -> tuple[PeriodMap, PeriodMap] | None:
+        """Return maps with joints that stiffen a step later, and with coarser steps.
 
-        The longer steps begin at other times; None where the motion is not found in these.
+        The coarser steps start at other times. The result is None if the motion is not found with
+        them.
         """
         times = refined.times
-        steps = 2 * int(0.5 * COARSER * times.samples), max(times.deepest - LEVELS_LESS, 0)
-        coarser = self.found(*steps, refined.path)
-        return None if coarser is None else (refined.late(), coarser.deviating)
+        steps = 2 * int(0.5 * COARSER_STEPS * times.samples), max(times.deepest - FEWER_LEVELS, 0)
+        coarser = self.refine(*steps, refined.path)
+        return None if coarser is None else (refined.delayed(), coarser.period_map)
 
     def volume_error(self, refined: RefinedMotion) -> float:
-        """Relative error of the product of all multipliers, by Liouville's formula exp(-T tr M⁻¹C).
+        """Return the relative error of the product of all multipliers.
 
-        It holds where joints remember nothing; 0 where they do.
+        Liouville's formula gives the product exp(-T tr M⁻¹C) if joints have no state variables;
+        otherwise the result is 0.
         """
-        matrix, damping = refined.deviating.matrix, self._structure.damping
+        matrix, damping = refined.period_map.matrix, self._structure.damping
         if len(matrix) != 2 * len(damping):
             return 0.0
         sign, size = np.linalg.slogdet(matrix)
@@ -135,19 +166,19 @@ class MotionInTime:
         return abs(float(error))
 
     def _distance(self, path: Path) -> float:
-        """Return how far a motion is from the one in harmonics, as a share of the vibration."""
-        away = self._values(path) - self._values(self.in_harmonics)
-        return float(np.linalg.norm(np.abs(away).max(axis=0))) / self._vibration
+        """Return the distance of a motion from that in harmonics, relative to the vibration."""
+        difference = self._values(path) - self._values(self.harmonic_path)
+        return float(np.linalg.norm(np.abs(difference).max(axis=0))) / self._vibration
 
-    def _stepped(self, path: Path, times: PeriodTimes) -> tuple[RefinedMotion | None, float]:
-        """The motion by one step of Newton's method, and by how much it has changed."""
+    def _newton_step(self, path: Path, times: PeriodTimes) -> tuple[RefinedMotion | None, float]:
+        """Return the motion after one step of Newton's method, and its relative change."""
         shares = times.starts / times.parts
-        moved = path(shares)
-        deviations = self._deviations(moved, times)
+        displacement = path(shares)
+        deviations = self._deviations(displacement, times)
         joints = ActiveJoints.of(deviations, self._structure, every=True)
-        driven = Driven(self._harmonics, self._load, moved)
+        driven = DrivenMotion(self._harmonics, self._load, displacement)
         at = self._structure, self._frequency, times, deviations, joints
-        linear = deviating(*at, driven)
+        linear = period_map(*at, driven)
         try:
             change = linear.corrections()
         except np.linalg.LinAlgError:
@@ -155,49 +186,51 @@ class MotionInTime:
         size = norm(np.abs(change).max(axis=0)) / self._vibration
         if not size < 1.0:
             return None, size
-        after = moved + change
+        after = displacement + change
         ends = np.append(shares, 1.0), np.vstack([after, after[:1]])
         spline = CubicSpline(*ends, bc_type="periodic")
         neutral = joints.neutral + linear.shifts.shape[1]
-        late = partial(deviating, *at, late=True)
-        return RefinedMotion(spline, times, linear, neutral, late), size
+        delayed = partial(period_map, *at, delayed=True)
+        return RefinedMotion(spline, times, linear, neutral, delayed), size
 
     def _times(self, path: Path, samples: int, deepest: int) -> PeriodTimes:
-        """Steps of a period, short where joints change what they do."""
+        """Return the steps of a period, short where joints change their state."""
 
-        def moved(times: PeriodTimes) -> Array:
+        def displacement(times: PeriodTimes) -> Array:
             return path(times.starts / times.parts)
 
         def regimes(times: PeriodTimes) -> np.ndarray:
-            return self._deviations(moved(times), times).regimes
+            return self._deviations(displacement(times), times).regimes
 
-        return PeriodTimes.following(regimes, samples, deepest, moved)
+        return PeriodTimes.adapted(regimes, samples, deepest, displacement)
 
-    def _deviations(self, moved: Array, times: PeriodTimes) -> Deviations:
+    def _deviations(self, displacement: Array, times: PeriodTimes) -> Deviations:
         steps = np.diff(np.append(times.starts, times.parts)) / times.parts
-        mean = steps @ (0.5 * (moved + np.roll(moved, -1, axis=0)))
-        lead = np.vstack([mean, moved[0]]) if self._mean else moved[:1]
-        count = len(self._each[0])
-        parts = [slice(first, first + count) for first in range(0, moved.shape[1], count)]
+        mean = steps @ (0.5 * (displacement + np.roll(displacement, -1, axis=0)))
+        lead = np.vstack([mean, displacement[0]]) if self._mean else displacement[:1]
+        count = len(self._unit_coefficients[0])
+        parts = [slice(first, first + count) for first in range(0, displacement.shape[1], count)]
 
-        def of(part: slice, memory: int) -> Deviations:
-            return self._joints.linearise(self._each, moved[:, part], lead[:, part], memory)
+        def linearised(part: slice, memory: int) -> Deviations:
+            return self._joints.linearise(
+                self._unit_coefficients, displacement[:, part], lead[:, part], memory
+            )
 
         if len(parts) == 1:
-            return of(parts[0], 0)
-        memory = max(of(part, 0).kept.shape[2] for part in parts)
-        return JoinedDeviations.of(of(part, memory) for part in parts)
+            return linearised(parts[0], 0)
+        memory = max(linearised(part, 0).kept.shape[2] for part in parts)
+        return JoinedDeviations.of(linearised(part, memory) for part in parts)
 
 
-def _every(ring: Ring, motion: HarmonicSolution) -> list[HarmonicSolution]:
-    """The motions of all sectors of a ring."""
+def _motions_of_sectors(ring: Ring, motion: HarmonicSolution) -> list[HarmonicSolution]:
+    """Return the motions of all sectors of a ring."""
     return [motion_of(ring, motion, sector) for sector in range(ring.sectors)]
 
 
 def _load(
     problem: HarmonicBalance, motion: HarmonicSolution, ring: Ring | None, points: int
 ) -> ComplexArray:
-    """The load ``(k, p)`` on a structure of so many ``points`` in the harmonics of a motion."""
+    """Return the load ``(k, p)`` on a structure of ``points`` points, in a motion's harmonics."""
     harmonics = motion.resolution.harmonics
     load = np.zeros((len(harmonics), points), dtype=complex)
     for row, harmonic in enumerate(harmonics):

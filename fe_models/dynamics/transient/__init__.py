@@ -1,1 +1,1 @@
-"""Motion in time, and what is measured from it."""
+"""Time integration of structures with joints, and evaluation of measured motions."""

@@ -1,14 +1,15 @@
-"""Frequency responses from blows of a hammer, measured or computed.
+"""Frequency response functions from hammer blows, measured or computed.
 
 Force and response of a blow are recorded from rest. H1 = Σ X F* / Σ F F* over the blows (spectra X
-of the response, F of the force, * conjugate) is unbiased by noise of the response; with one blow it
-is the ratio of the spectra. Coherence γ² = |Σ X F*|² / (Σ F F* Σ X X*) needs at least two.
+of the response and F of the force, * conjugate) is not biased by noise of the response. For one
+blow it is the ratio of the spectra. Coherence γ² = |Σ X F*|² / (Σ F F* Σ X X*) needs at least two
+blows.
 
-No window is applied unless one is asked for: a blow and its whole ring-down begin and end at rest,
-and a window would only distort them. ``blow_end`` sets the force to zero after it (the force
-window, against noise while nothing strikes). ``decay`` σ multiplies both records by exp(-σ t), for
-a response cut off before it is at rest; a linear structure then shows exactly its response at the
-complex frequency σ + iω: each mode has its damping rate ζω larger by σ.
+By default no window is applied: a blow with its whole ring-down begins and ends at rest, and a
+window would only distort the spectra. ``blow_end`` sets the force to zero after that time (force
+window, against noise after the blow). ``decay`` σ multiplies both records by exp(-σ t), for a
+response that is cut off before it is at rest. For a linear structure the result is then exactly the
+response at the complex frequency σ + iω: the damping rate ζω of each mode appears larger by σ.
 
 Source: Ewins 2000, *Modal Testing*, 2nd ed., chapter 3 (estimators, windows).
 """
@@ -26,25 +27,35 @@ from sa_solver.types import Array
 
 ResponseQuantity = Literal["receptance", "mobility", "accelerance"]
 DERIVATIVES: dict[ResponseQuantity, int] = {"receptance": 0, "mobility": 1, "accelerance": 2}
-"""Of the displacement in time, over force: mm/N, mm/(s N), mm/(s² N)."""
+"""Time derivatives of the displacement, over force: mm/N, mm/(s N), mm/(s² N)."""
 
 REST = 0.05
-"""Share at the end of a record that is looked at for what is left of the response."""
+"""Last part of a record in which the remaining response is evaluated, as a share of the record."""
 
 
 class SignalError(InputError):
-    """Records that say nothing about a structure."""
+    """Error for records from which no property of a structure can be computed."""
 
 
 @dataclass(frozen=True)
 class FrequencyResponse:
-    """Response over force by frequency.
+    """Frequency response function: response over force.
 
-    ``frequency`` ``(f,)`` [Hz] above 0; ``value`` ``(f,)`` complex, displacement, velocity or
-    acceleration (``quantity``) over force, in mm, s and N; ``coherence`` ``(f,)``, None for a
-    single blow; ``decay`` [1/s] of the exponential window; ``remaining``, the largest response in
-    the last part ``REST`` of a record over the largest at all, window included: what leaks (a
-    hundredth of it or so shows in the response).
+    Parameters
+    ----------
+    frequency
+        Frequencies ``(f,)`` [Hz], above 0.
+    value
+        Complex displacement, velocity or acceleration over force ``(f,)`` [mm, s, N].
+    quantity
+        Receptance, mobility or accelerance.
+    coherence
+        Coherence ``(f,)``, or None for a single blow.
+    decay
+        Decay rate [1/s] of the exponential window.
+    remaining
+        Largest windowed response in the last part ``REST`` of a record, over the largest at all. It
+        measures leakage: about a hundredth of it appears in the response function.
     """
 
     frequency: Array
@@ -55,10 +66,13 @@ class FrequencyResponse:
     remaining: float
 
     def converted(self, quantity: ResponseQuantity) -> FrequencyResponse:
-        """The same as another quantity: a factor iω (σ + iω with an exponential window) each."""
-        order = DERIVATIVES[quantity] - DERIVATIVES[self.quantity]
+        """Return the same response as another quantity.
+
+        Each derivative is a factor iω, or σ + iω with an exponential window.
+        """
+        derivatives = DERIVATIVES[quantity] - DERIVATIVES[self.quantity]
         rate = self.decay + 2j * np.pi * self.frequency
-        return replace(self, value=self.value * rate**order, quantity=quantity)
+        return replace(self, value=self.value * rate**derivatives, quantity=quantity)
 
 
 def frequency_response(
@@ -70,17 +84,35 @@ def frequency_response(
     blow_end: float | None = None,
     decay: float = 0.0,
 ) -> FrequencyResponse:
-    """H1 of records of blows.
+    """Return the estimate H1 of the frequency response from records of hammer blows.
 
-    ``force`` [N] and ``response`` (that ``quantity`` is over force, in mm and s) are ``(t,)`` or
-    ``(b, t)`` for ``b`` blows, sampled every ``step`` [s], from rest. ``blow_end`` [s] and
-    ``decay`` [1/s] are windows: see the module. The frequencies are those of the transform, up to
-    half the sampling rate, without 0; a blow excites those up to about 1 / its duration (a half
-    sine has nothing at 1.5 / duration), and beyond them the response is noise. Raises SignalError.
+    The frequencies are those of the discrete Fourier transform up to half the sampling rate,
+    without 0. A blow excites frequencies up to about 1 / duration (the spectrum of half a sine is 0
+    at 1.5 / duration); above, the response is noise.
+
+    Parameters
+    ----------
+    force
+        Forces [N], ``(t,)``, or ``(b, t)`` for ``b`` blows, recorded from rest.
+    response
+        Responses of the same shape, whose ``quantity`` is over force, in mm and s.
+    step
+        Sampling interval [s].
+    quantity
+        Receptance, mobility or accelerance.
+    blow_end
+        Time [s] after which the force is set to zero, or None; see the module.
+    decay
+        Decay rate [1/s] of the exponential window; see the module.
+
+    Raises
+    ------
+    SignalError
+        If shapes differ, if numbers are not finite, or if a record has no blow.
 
     Examples
     --------
-    The receptance of a rig from the record of a blow, at 100 Hz ``1 / |k - m ω² + i c ω|``:
+    The receptance of a rig at 100 Hz from the record of a blow is ``1 / |k - m ω² + i c ω|``:
 
     >>> import numpy as np
     >>> from fe_models.dynamics import *
@@ -101,18 +133,19 @@ def frequency_response(
         checks.number(name, value, error=SignalError)
     if not (step > 0.0 and 0.0 <= decay < np.inf):
         raise SignalError(
-            f"step {step:g} s, decay {decay:g} 1/s: give a step above 0, a decay >= 0"
+            f"the sampling interval is {step:g} s and the decay {decay:g} 1/s: give a step above 0 "
+            "and a decay of 0 or more"
         )
     time = step * np.arange(forces.shape[1])
     window = np.exp(-decay * time)
-    struck = window if blow_end is None else window * (time <= blow_end)
-    if not np.any(forces * struck, axis=1).all():
+    force_window = window if blow_end is None else window * (time <= blow_end)
+    if not np.any(forces * force_window, axis=1).all():
         raise SignalError("a record has no blow; allowed: forces that are not 0 before blow_end")
-    force_spectra = np.fft.rfft(forces * struck)[:, 1:]
+    force_spectra = np.fft.rfft(forces * force_window)[:, 1:]
     response_spectra = np.fft.rfft(responses * window)[:, 1:]
     power = np.sum(np.abs(force_spectra) ** 2, axis=0)
     if not (power > 0.0).all():
-        raise SignalError("the force has no part at some frequency; allowed: blows")
+        raise SignalError("the force has no part at some frequency; allowed: records of blows")
     cross = np.sum(response_spectra * force_spectra.conj(), axis=0)
     coherence = None
     if len(forces) > 1:
@@ -124,7 +157,7 @@ def frequency_response(
 
 
 def _records(force: Array, response: Array) -> tuple[Array, Array]:
-    """Both as ``(b, t)``, checked."""
+    """Return force and response as ``(b, t)``; raise :class:`SignalError` if they are not valid."""
     forces, responses = (
         np.atleast_2d(checks.array(name, values, None, error=SignalError, finite=False))
         for name, values in (("forces", force), ("responses", response))
@@ -140,7 +173,7 @@ def _records(force: Array, response: Array) -> tuple[Array, Array]:
 
 
 def _remaining(responses: Array) -> float:
-    """The largest response at the end of a record over the largest."""
-    late = int((1.0 - REST) * responses.shape[1])
+    """Return the largest response in the last part of a record over the largest at all."""
+    last_part = int((1.0 - REST) * responses.shape[1])
     largest = float(np.abs(responses).max())
-    return float(np.abs(responses[:, late:]).max()) / largest if largest > 0.0 else 0.0
+    return float(np.abs(responses[:, last_part:]).max()) / largest if largest > 0.0 else 0.0

@@ -1,9 +1,9 @@
 """Equilibrium of joints over one step of an implicit integrator: u = u_free - A F(u).
 
-``u_free`` is where the joints would go without their forces at the end of the step, and A what
-these forces take back. Newton's method with the joints' own tangents T, (1 + A T) Δu = -r; an
-inverse is kept as long as it lowers the residual fast, and a correction by the right one that does
-not lower it is shortened.
+``u_free`` is the displacement of the joints at the end of the step without their forces, and A is
+their dynamic flexibility over the step. Newton's method uses the tangents T of the joints, (1 + A
+T) Δu = -r. An inverse is reused as long as it reduces the residual quickly. A correction with the
+current inverse that does not reduce the residual is shortened.
 """
 
 from __future__ import annotations
@@ -15,27 +15,38 @@ import numpy as np
 from fe_models.dynamics.model import IncrementResponse, Joints
 from sa_solver.types import Array
 
-# Residual of the joints' equilibrium, relative to the largest force they have had so far. Newton
-# ends far below on its last iteration; sums over 1e5 steps still hold to 1e-6 at worst.
+# Residual of the equilibrium, relative to the largest force of the joints so far. The last
+# iteration of Newton ends far below it; sums over 1e5 steps are still accurate to 1e-6 in the worst
+# case.
 TOLERANCE = 1e-10
-# Where joints slip far in one step, their displacement is resolved to this share of it only: ten
-# times the rounding of a number.
+# Where joints slip far in one step, their displacement is resolved to this share only, ten times
+# the rounding error of a number.
 ROUNDING = 2e-15
-# An inverse is kept, from step to step too, while an iteration with it leaves at most this share of
-# the residual; up to SMALL unknowns a new one is cheaper than a further iteration.
-KEPT = 0.05
-SMALL = 12
-# Newton needs one to ten iterations; where it takes more, it walks between two kinks.
+# An inverse is reused, also in later steps, while an iteration with it leaves at most this share of
+# the residual. Up to SMALL_SIZE unknowns a new inverse is cheaper than a further iteration.
+REUSE_RATIO = 0.05
+SMALL_SIZE = 12
+# Newton needs one to ten iterations; if it takes more, it alternates between two kinks.
 MAX_ITERATIONS = 30
-# A correction that does not lower the residual at 1/64 of its size points in a useless direction.
-MAX_SHORTENED = 6
+# A correction that does not reduce the residual at 1/64 of its length has a useless direction.
+MAX_HALVINGS = 6
 
 
 class Trial(NamedTuple):
-    """Displacements of the joints over a step ``(j d,)`` [mm], and how far they are from the law.
+    """Trial displacements of the joints over a step, and their residual.
 
-    ``residual`` ``(j d,)`` [mm], its largest entry ``size``, and ``relative`` to what the largest
-    force of the joints would move them.
+    Parameters
+    ----------
+    increment
+        Displacements ``(j d,)`` [mm] over the step.
+    response
+        Response of the joint law.
+    residual
+        Residual ``(j d,)`` [mm].
+    size
+        Largest entry of the residual [mm].
+    relative
+        ``size`` over the displacement that the largest force of the joints would cause.
     """
 
     increment: Array
@@ -50,7 +61,7 @@ class Trial(NamedTuple):
 
 
 class JointEquilibrium:
-    """Newton's method for u = u_free - A F(u), with one A ``(j d, j d)`` [mm/N]."""
+    """Newton's method for u = u_free - A F(u) with a fixed flexibility A ``(j d, j d)`` [mm/N]."""
 
     def __init__(self, joints: Joints, flexibility: Array) -> None:
         self._joints, self._flexibility = joints, flexibility
@@ -62,38 +73,44 @@ class JointEquilibrium:
         self._inverse: Array = np.empty((0, 0))
 
     def solve(self, before: IncrementResponse, free: Array, largest: float) -> Trial:
-        """The best found from the state that ``before`` has ended in.
+        """Return the best trial found, from the joint state after an earlier response.
 
-        ``free`` is u_free ``(j d,)`` [mm], relative to that state, and ``largest`` the largest
-        force so far [N], which residuals are measured against.
+        Parameters
+        ----------
+        before
+            Response of the joints at the start of the step.
+        free
+            Displacements u_free ``(j d,)`` [mm], relative to that state.
+        largest
+            Largest force of the joints so far [N], to which residuals are relative.
         """
         state = before.state
         scale = self._weight * largest + ROUNDING / TOLERANCE * largest_entry(free)
         guess = free - self._flexibility @ before.force.ravel()
-        if self._size <= SMALL or not len(self._inverse):
+        if self._size <= SMALL_SIZE or not len(self._inverse):
             self._invert(before.tangent)
         at = self._trial(state, free, self._inverse @ guess, scale)
         for _ in range(MAX_ITERATIONS):
             if at.solved:
                 break
-            closer = self._closer(state, free, at, scale)
-            if closer is None:
+            improved = self._improved(state, free, at, scale)
+            if improved is None:
                 break
-            at = closer
+            at = improved
         return at
 
-    def _closer(self, state: Array, free: Array, at: Trial, scale: float) -> Trial | None:
-        """A trial with a lower residual, None if there is none along Newton's correction."""
-        if self._size > SMALL:
-            kept = self._inverse @ at.residual
-            trial = self._trial(state, free, at.increment - kept, scale)
-            if trial.size <= KEPT * at.size:
+    def _improved(self, state: Array, free: Array, at: Trial, scale: float) -> Trial | None:
+        """Return a trial with a lower residual, or None if Newton's correction leads to none."""
+        if self._size > SMALL_SIZE:
+            correction = self._inverse @ at.residual
+            trial = self._trial(state, free, at.increment - correction, scale)
+            if trial.size <= REUSE_RATIO * at.size:
                 return trial
         self._invert(at.response.tangent)
         correction = self._inverse @ at.residual
-        for shortened in range(MAX_SHORTENED + 1):
-            shorter = at.increment - 0.5**shortened * correction
-            trial = self._trial(state, free, shorter, scale)
+        for halvings in range(MAX_HALVINGS + 1):
+            increment = at.increment - 0.5**halvings * correction
+            trial = self._trial(state, free, increment, scale)
             if trial.size < at.size:
                 return trial
         return None
@@ -108,7 +125,7 @@ class JointEquilibrium:
         return Trial(increment, response, residual, size, relative)
 
     def _invert(self, tangent: Array) -> None:
-        """Find (1 + A T)⁻¹ of tangents ``(j, d, d)``."""
+        """Compute (1 + A T)⁻¹ for tangents ``(j, d, d)``."""
         if self._size == 1:
             self._inverse = np.asarray(1.0 / (1.0 + self._flexibility * tangent[0]))
             return
@@ -116,12 +133,12 @@ class JointEquilibrium:
         try:
             self._inverse = np.asarray(np.linalg.inv(np.eye(self._size) + coupled), float)
         except np.linalg.LinAlgError:
-            # Joints that soften by just as much as the structure holds them leave no direction.
+            # Joints that soften exactly as much as the structure resists leave no direction.
             self._inverse = np.eye(self._size)
 
 
 def largest_entry(values: Array) -> float:
-    """Largest magnitude of any entry, 0 of none; faster than numpy's for a few."""
+    """Return the largest magnitude of any entry, 0 if empty; faster than numpy for one entry."""
     if values.size == 1:
         return abs(float(values.ravel()[0]))
     return float(np.abs(values).max(initial=0.0))

@@ -1,23 +1,26 @@
-"""Newmark's average acceleration, implicit in the forces of the joints.
+"""Newmark's average acceleration method, implicit in the forces of the joints.
 
-Over a step h the mean of accelerations, velocities and forces at its ends acts throughout:
+Over a step h, the means of accelerations, velocities and forces at its two ends act throughout:
 
-    M Δv = h (f̄ - Bᵀ F̄ - C v̄ - K x̄),    Δx = h v̄,
+    M Δv = h (f̄ - Bᵀ F̄ - C v̄ - K x̄),    Δx = h v̄.
 
-which is of second order, stable for every step of a linear structure, and keeps its energy: the
-balance of energy closes to rounding with the work f̄·Δx of the excitation and F̄·BΔx on the joints.
-What the joints do to the structure within a step is constant and found once,
+The method is of second order, stable for every step of a linear structure, and conserves its
+energy: with the work f̄·Δx of the excitation and F̄·BΔx on the joints, the energy balance closes to
+rounding. The response of the structure to joint forces within a step is linear with constant
+matrices,
 
     u = u_free - A F(u),    A = h²/4 B (M + h/2 C + h²/4 K)⁻¹ Bᵀ,
 
-so that Newton's method has only the joints' displacements u as unknowns, however large the model.
-A step in which it fails, where a joint's force is not smooth, is taken again as two halves.
+so that the only unknowns of Newton's method are the joints' displacements u, however large the
+model. If Newton's method fails, because a joint force is not smooth, the step is repeated as two
+half steps.
 
-An error of displacement of h³/12 x''' arises in one step, which the change of acceleration shows
-as h²/12 Δa: it chooses the steps where a tolerance is given. What all steps together leave is told
-by a companion, the same motion by steps of twice the length, from the start on: global
-extrapolation (Shampine & Watts 1976, doi:10.1145/355666.355671). It takes half as much work again.
-Where both step over what happens, the largest error of one step is told.
+One step causes a displacement error of h³/12 x''', which is estimated from the change of
+acceleration as h²/12 Δa. Where a tolerance is given, this estimate controls the step size. The
+accumulated error of all steps is estimated by a companion run, the same motion with steps of twice
+the length from the start: global extrapolation (Shampine & Watts 1976, doi:10.1145/355666.355671).
+The companion run costs half as much again. If both runs step over an event, the reported error is
+the largest error of one step.
 
 Source: Newmark 1959, Journal of the Engineering Mechanics Division (ASCE) 85(3), 67.
 """
@@ -42,31 +45,45 @@ from sa_solver.errors import InputError
 from sa_solver.steps import COMPUTED, Steps
 from sa_solver.types import Array
 
-# A step is halved at most this often: to 1/4096, where any continuous law is nearly linear.
-MAX_HALVED = 12
-# A step is doubled when its error is this share of what is allowed: doubling multiplies it by 8.
+# Largest number of halvings of a step: to 1/4096, at which any continuous law is nearly linear.
+MAX_HALVINGS = 12
+# A step is doubled if its error is below this share of the allowed one: doubling multiplies it by
+# 8.
 DOUBLE_BELOW = 1.0 / 16.0
-# So much more may a step of twice the length add: its error goes with the third power.
+# Allowed error of a companion step over that of a step: errors grow with the third power of the
+# step.
 TWICE_AS_LONG = 8.0
-# Of the work of a motion whose steps are chosen, about what its first run in whole steps is.
-WHOLE_STEPS = 0.15
-# Steps held in full before their energies are summed and the rows not asked for dropped.
-BLOCK = 1024
+# Share of the rough first run in the work of an integration with step-size control.
+ROUGH_RUN_SHARE = 0.15
+# Number of steps held in memory before their energies are summed and unrecorded rows dropped.
+BLOCK_STEPS = 1024
 
 
 @dataclass(frozen=True)
 class TimeStepControl:
-    """Steps of ``step`` [s], or where ``tolerance`` is given, parts of it: halves, quarters, ...
+    """Control of the time steps.
 
-    ``tolerance`` is the error of displacement one step may add, relative to the largest
-    displacement, both as norms weighted by mass. A first run in whole steps finds how large that
-    is. The result has a row every ``every`` steps. Raises ``ValueError`` for a step or tolerance
-    that is not above zero, or an ``every`` below 1.
+    Parameters
+    ----------
+    step
+        Length of a step [s]. With a tolerance, steps are divided in halves, quarters, ... where
+        needed.
+    tolerance
+        Displacement error that one step may add, relative to the largest displacement; both are
+        norms weighted by mass. A rough first run without division finds the largest displacement.
+        None for steps of fixed length.
+    every
+        Number of steps between two rows of the result.
+
+    Raises
+    ------
+    InputError
+        If the step or the tolerance is not above zero, or ``every`` is below 1.
 
     Examples
     --------
-    Steps that follow from the error that one of them may add. A mass let go at 1 mm moves as its
-    cosine, within the error that the motion says it has:
+    The allowed error of one step controls the step size. A mass released at 1 mm moves as a cosine,
+    within the estimated error:
 
     >>> import numpy as np
     >>> from fe_models.dynamics import Link, TimeStepControl, integrate, lumped_rig
@@ -87,11 +104,13 @@ class TimeStepControl:
         checks.numbers(self, "step", "tolerance")
         if not self.step > 0.0 or checks.whole("every", self.every) < 1:
             raise InputError(
-                f"a step of {self.step:g} s, every {self.every}: give a step above 0, every 1 "
-                "or more"
+                f"a step of {self.step:g} s with a row every {self.every} steps is not possible: "
+                "give a step above 0 and a row every 1 or more steps"
             )
         if self.tolerance is not None and not self.tolerance > 0.0:
-            raise InputError(f"tolerance {self.tolerance:g}: give one above 0")
+            raise InputError(
+                f"tolerance {self.tolerance:g} is not above 0: give a tolerance above 0"
+            )
 
 
 def integrate(
@@ -104,19 +123,38 @@ def integrate(
     steps: Steps = COMPUTED,
     reached: Callable[[float], None] = lambda share: None,
 ) -> Motion:
-    """Motion of a structure with joints from ``start`` on, at rest unless given.
+    """Integrate the motion of a structure with joints in time.
 
-    ``excitation`` takes times ``(t,)`` to forces ``(t, n)``; None is none, and None of ``joints``
-    leaves all of them free. The last time is the first multiple of the step at or after
-    ``duration`` [s]. A motion that has not been found to the end says so in its ``message``. Each
-    of the ``steps`` marches many steps in time; ``reached`` is told after each what share of the
-    work is done.
-    Raises InputError if joints and connection do not have the same directions, or the model has
-    structural damping, which there is in steady vibration only.
+    An integration that stops early says so in the ``message`` of the result.
+
+    Parameters
+    ----------
+    model
+        The structure.
+    joints
+        The joint law; None leaves all joints free.
+    excitation
+        Function that returns forces ``(t, n)`` [N] at times ``(t,)`` [s]; None for no forces.
+    duration
+        Duration [s]. The last time is the first multiple of the step at or after it.
+    control
+        Control of the time steps.
+    start
+        Initial state; at rest if None.
+    steps
+        Runner of blocks of many time steps; see :class:`sa_solver.steps.Steps`.
+    reached
+        Function that is called after each block with the share of the work that is done.
+
+    Raises
+    ------
+    InputError
+        If joints and connection have different directions, or if the model has structural damping,
+        which is defined in steady vibration only.
 
     Examples
     --------
-    A load that is put on at once moves an undamped mass to twice F / k, and no energy is missing:
+    A suddenly applied load moves an undamped mass to twice F / k, and the energy balance closes:
 
     >>> import numpy as np
     >>> from fe_models.dynamics import *
@@ -129,41 +167,46 @@ def integrate(
     True
     """
     if model.structural is not None:
-        raise InputError("structural damping is not known in time: give damping of the modes")
-    laws = joints if joints is not None else _FreeJoints()
-    if len(model.connection) % laws.directions:
+        raise InputError("structural damping is not known in time: give modal damping instead")
+    law = joints if joints is not None else _FreeJoints()
+    if len(model.connection) % law.directions:
         raise InputError(
-            f"a connection of {len(model.connection)} rows for joints of {laws.directions} "
+            f"a connection of {len(model.connection)} rows for joints of {law.directions} "
             "directions: give a row for each direction of each joint"
         )
     checks.number("duration", duration, least=0.0)
     count = int(np.ceil(duration / control.step * (1.0 - 1e-12)))
-    forcing = excitation if excitation is not None else _NoForce(len(model.mass))
-    checks.array("forces of the excitation", forcing(np.zeros(1)), (1, len(model.mass)))
+    excite = excitation if excitation is not None else _NoForce(len(model.mass))
+    checks.array("forces of the excitation", excite(np.zeros(1)), (1, len(model.mass)))
     begin = start or Start()
-    allowed, before = np.inf, 0.0
+    allowed, first_share = np.inf, 0.0
     if control.tolerance is not None:
-        whole, before = _March(model, laws, forcing, control.step, begin, np.inf), WHOLE_STEPS
-        rough = _followed(whole, None, count, count, steps, lambda share: reached(before * share))
-        allowed = control.tolerance * rough.largest_displacement
-    march = _March(model, laws, forcing, control.step, begin, allowed)
-    twice = TWICE_AS_LONG * allowed
-    start_of_companion = replace(begin.companion or begin, time=begin.time)
-    companion = _March(model, laws, forcing, 2.0 * control.step, start_of_companion, twice)
-    record = _followed(
+        rough_march = _March(model, law, excite, control.step, begin, np.inf)
+        first_share = ROUGH_RUN_SHARE
+        rough_run = _march_blocks(
+            rough_march, None, count, count, steps, lambda share: reached(first_share * share)
+        )
+        allowed = control.tolerance * rough_run.largest_displacement
+    march = _March(model, law, excite, control.step, begin, allowed)
+    companion_allowed = TWICE_AS_LONG * allowed
+    companion_start = replace(begin.companion or begin, time=begin.time)
+    companion = _March(model, law, excite, 2.0 * control.step, companion_start, companion_allowed)
+    record = _march_blocks(
         march,
         companion,
         count,
         control.every,
         steps,
-        lambda share: reached(before + (1.0 - before) * share),
+        lambda share: reached(first_share + (1.0 - first_share) * share),
     )
-    together = march.taken == 2 * companion.taken and count % control.every == 0
-    return record.motion(march.message or companion.message, companion.end if together else None)
+    in_step = march.taken == 2 * companion.taken and count % control.every == 0
+    return record.motion(march.message or companion.message, companion.end if in_step else None)
 
 
 @dataclass(frozen=True)
 class _NoResponse:
+    """Response of joints that transmit nothing."""
+
     force: Array
     tangent: Array
     state: Array
@@ -185,6 +228,8 @@ class _FreeJoints:
 
 @dataclass(frozen=True)
 class _NoForce:
+    """Excitation without forces on ``size`` degrees of freedom."""
+
     size: int
 
     def __call__(self, times: Array) -> Array:
@@ -192,39 +237,52 @@ class _NoForce:
 
 
 class _Operators:
-    """What one step h does: its matrices, found once."""
+    """Matrices of one step h."""
 
     def __init__(self, model: DynamicModel, step: float) -> None:
         half = 0.5 * step
         effective = model.mass + half * model.damping + half**2 * model.stiffness
         self.step = step
-        # From a mean force to the change of velocity (n, n) ...
+        # Maps the mean force to the change of velocity (n, n), ...
         self.gain = step * np.linalg.inv(effective)
-        # ... from displacements and velocities to what is lost of it (n, 2 n) ...
+        # ... displacements and velocities to its reduction (n, 2 n), ...
         self.drag = self.gain @ np.hstack([model.stiffness, model.damping + half * model.stiffness])
-        # ... and from the joints' forces at one end to what is lost of it (n, j d).
+        # ... and the joints' forces at one end of the step to its reduction (n, j d).
         self.joint_gain = 0.5 * self.gain @ model.connection.T
-        # A: from the joints' forces at the end to what is lost of their displacements.
+        # A: maps the joints' forces at the end of the step to the reduction of their displacements.
         self.flexibility = half * model.connection @ self.joint_gain
 
 
 @dataclass(frozen=True)
-class _Reached:
-    """Where a march is: ``at`` a point, with so many whole steps ``taken``.
+class _MarchState:
+    """State of a march, from which it can be continued.
 
-    Steps are ``halved`` so often, and ``largest_force`` is that of a joint so far. ``message`` says
-    why it goes no further, if it does not.
+    ``at`` is the last point, and ``taken`` the number of whole steps so far. Steps are divided by 2
+    to the power ``halvings``. ``largest_force`` is the largest joint force so far. ``message`` says
+    why the march has stopped, or is empty.
     """
 
     at: StepState
     taken: int
-    halved: int
+    halvings: int
     largest_force: float
     message: str
 
 
 class _March:
-    """The structure marched step by step; ``allowed`` is the error one may add (mass norm)."""
+    """March of a structure with joints, step by step.
+
+    Parameters
+    ----------
+    model, joints, excitation
+        As in :func:`integrate`.
+    step
+        Length of a whole step [s].
+    start
+        Initial state.
+    allowed
+        Error that one step may add, as a norm weighted by mass.
+    """
 
     def __init__(
         self,
@@ -241,30 +299,30 @@ class _March:
         self._operators: dict[int, tuple[_Operators, JointEquilibrium]] = {}
         self._start_time, self.taken, self.message = start.time, 0, ""
         self.at = self._start(start)
-        self._halved, self._missed = 0, 0.0
+        self._halvings, self._joint_residual = 0, 0.0
         self._largest_force = largest_entry(self.at.response.force)
         self._inverse_mass = np.linalg.inv(model.mass)
 
     @property
     def end(self) -> Start:
-        """Where it is, to go on from."""
+        """Current state, from which an integration can be continued."""
         displacement, velocity = np.split(self.at.motion, 2)
         return Start(displacement, velocity, self.at.response.state, self.at.time)
 
     @property
-    def reached(self) -> _Reached:
-        """Where it is; a march that is put there goes on from it."""
-        return _Reached(self.at, self.taken, self._halved, self._largest_force, self.message)
+    def state(self) -> _MarchState:
+        """State of the march; setting it continues the march from there."""
+        return _MarchState(self.at, self.taken, self._halvings, self._largest_force, self.message)
 
-    @reached.setter
-    def reached(self, reached: _Reached) -> None:
-        self.at, self.taken, self.message = reached.at, reached.taken, reached.message
-        self._halved, self._largest_force = reached.halved, reached.largest_force
-        # Newton's method keeps an inverse of steps before, of which nothing may depend.
+    @state.setter
+    def state(self, state: _MarchState) -> None:
+        self.at, self.taken, self.message = state.at, state.taken, state.message
+        self._halvings, self._largest_force = state.halvings, state.largest_force
+        # Inverses reused from earlier steps are dropped: a resumed march must give the same result.
         self._operators.clear()
 
     def block(self, steps: int) -> list[list[StepState]]:
-        """The points of up to ``steps`` whole steps; fewer if ``message`` says so."""
+        """Return the points of up to ``steps`` whole steps; fewer if ``message`` says why."""
         times = self._time(np.arange(self.taken + 1.0, self.taken + steps + 1.0))
         whole_steps = []
         for time, force in zip(times.tolist(), self._excitation(times), strict=True):
@@ -276,35 +334,36 @@ class _March:
         return whole_steps
 
     def _whole_step(self, end: float, end_force: Array) -> list[StepState]:
-        """One step up to a time, in parts where that is needed."""
-        whole = 1 << MAX_HALVED
+        """Return the points of one whole step up to a time, divided where needed."""
+        whole = 1 << MAX_HALVINGS
         points: list[StepState] = []
         done = 0
         while done < whole:
-            part = whole >> self._halved
+            part = whole >> self._halvings
             time, force = end, end_force
             if done + part < whole:
                 times = self._time(np.array([self.taken + (done + part) / whole]))
                 time, force = float(times[0]), self._excitation(times)[0]
-            point, error = self._part(time, force)
+            point, error = self._sub_step(time, force)
             if point is None:
-                if self._halved == MAX_HALVED:
+                if self._halvings == MAX_HALVINGS:
                     self.message = self._failure(error)
                     return points
-                self._halved += 1
+                self._halvings += 1
                 continue
             points.append(point)
             self.at, done = point, done + part
-            if self._halved > 0 and error <= DOUBLE_BELOW and done % (2 * part) == 0:
-                self._halved -= 1
+            if self._halvings > 0 and error <= DOUBLE_BELOW and done % (2 * part) == 0:
+                self._halvings -= 1
         return points
 
-    def _part(self, time: float, force: Array) -> tuple[StepState | None, float]:
-        """A step up to a time, None if it must be smaller, and its error over what is allowed.
+    def _sub_step(self, time: float, force: Array) -> tuple[StepState | None, float]:
+        """Take a step up to a time; return its end and its error over the allowed one.
 
-        A step without equilibrium has an infinite error.
+        The end is None if the step must be smaller. A step without equilibrium has an infinite
+        error.
         """
-        operators, equilibrium = self._operators_of(self._halved)
+        operators, equilibrium = self._operators_of(self._halvings)
         at, step, size = self.at, operators.step, len(force)
         change = (
             operators.gain @ (0.5 * (at.force + force))
@@ -312,10 +371,10 @@ class _March:
             - operators.joint_gain @ at.response.force.ravel()
         )
         velocity = at.motion[size:]
-        free = step * (self.model.connection @ (velocity + 0.5 * change)) + at.missing
+        free = step * (self.model.connection @ (velocity + 0.5 * change)) + at.lag
         trial = equilibrium.solve(at.response, free, self._largest_force)
         if not trial.solved:
-            self._missed = trial.relative
+            self._joint_residual = trial.relative
             return None, np.inf
         joint_force = trial.response.force.ravel()
         change -= operators.joint_gain @ joint_force
@@ -332,7 +391,7 @@ class _March:
         return point, error
 
     def _error(self, point: StepState) -> float:
-        """The error a step adds, over what is allowed."""
+        """Return the error that a step adds over the allowed one."""
         if not np.isfinite(self._allowed):
             return 0.0
         jump = self._acceleration(point) - self._acceleration(self.at)
@@ -351,12 +410,12 @@ class _March:
             )
         )
 
-    def _operators_of(self, halved: int) -> tuple[_Operators, JointEquilibrium]:
-        if halved not in self._operators:
-            operators = _Operators(self.model, self._step / (1 << halved))
+    def _operators_of(self, halvings: int) -> tuple[_Operators, JointEquilibrium]:
+        if halvings not in self._operators:
+            operators = _Operators(self.model, self._step / (1 << halvings))
             equilibrium = JointEquilibrium(self._joints, operators.flexibility)
-            self._operators[halved] = operators, equilibrium
-        return self._operators[halved]
+            self._operators[halvings] = operators, equilibrium
+        return self._operators[halvings]
 
     def _start(self, start: Start) -> StepState:
         model, directions = self.model, self._joints.directions
@@ -375,7 +434,7 @@ class _March:
         return np.asarray(self._start_time + self._step * steps, dtype=np.float64)
 
     def _failure(self, error: float) -> str:
-        step = self._step / (1 << MAX_HALVED)
+        step = self._step / (1 << MAX_HALVINGS)
         where = f"at t = {self.at.time:.9g} s, with steps of {step:.3g} s"
         if np.isfinite(error):
             return (
@@ -383,13 +442,13 @@ class _March:
                 "or a larger tolerance"
             )
         return (
-            f"{where}, the joints are not in equilibrium: residual {self._missed:.3g} of their "
-            f"largest force, above {TOLERANCE:g}; give smaller steps, or a law of joints whose "
-            "force is continuous"
+            f"{where}, the joints are not in equilibrium: their residual is "
+            f"{self._joint_residual:.3g} of their largest force, above {TOLERANCE:g}; "
+            "give smaller steps, or a joint law whose force is continuous"
         )
 
 
-def _followed(
+def _march_blocks(
     march: _March,
     companion: _March | None,
     count: int,
@@ -397,22 +456,33 @@ def _followed(
     steps: Steps,
     reached: Callable[[float], None],
 ) -> MotionRecord:
-    """The record of a march until it has taken so many steps, or says why it has not.
+    """March until ``count`` whole steps are taken or the march stops; return the record.
 
-    Its ``companion``, by steps of twice the length, is to follow it.
+    Parameters
+    ----------
+    march
+        The march.
+    companion
+        March with steps of twice the length that follows, or None.
+    count
+        Number of whole steps.
+    every
+        Number of steps between two rows of the record.
+    steps, reached
+        As in :func:`integrate`.
     """
     record = MotionRecord(march.model, march.directions, every, march.at)
     marches = [march] if companion is None else [march, companion]
 
-    def block() -> tuple[RecordedSteps | None, list[_Reached]]:
-        points = march.block(min(BLOCK, count - march.taken))
-        beside = companion.block(march.taken // 2 - companion.taken) if companion else []
-        return record.recorded(points, beside), [each.reached for each in marches]
+    def block() -> tuple[RecordedSteps | None, list[_MarchState]]:
+        points = march.block(min(BLOCK_STEPS, count - march.taken))
+        companion_points = companion.block(march.taken // 2 - companion.taken) if companion else []
+        return record.recorded(points, companion_points), [each.state for each in marches]
 
     while march.taken < count and not any(each.message for each in marches):
-        recorded, reached_by = steps("steps in time", block)
-        for each, at in zip(marches, reached_by, strict=True):
-            each.reached = at
+        recorded, states = steps("steps in time", block)
+        for each, state in zip(marches, states, strict=True):
+            each.state = state
         if recorded is not None:
             record.add(recorded)
         reached(march.taken / count)

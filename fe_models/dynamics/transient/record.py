@@ -1,7 +1,7 @@
-"""What an integrator keeps of a march in small steps: rows, and the energies summed until each.
+"""Record of a time integration: the recorded rows, and the energies summed up to each.
 
-The energies are those of the trapezoidal rule, with which the balance of average acceleration
-closes: forces and velocities of a step are the means of its ends.
+Energies follow the trapezoidal rule, with which the energy balance of the average acceleration
+method closes: forces and velocities of a step are the means of those at its ends.
 """
 
 from __future__ import annotations
@@ -15,37 +15,71 @@ from fe_models.dynamics.model import DynamicModel, IncrementResponse
 from fe_models.dynamics.motion import Energies, Motion, Start, accelerations, quadratic
 from sa_solver.types import Array
 
-# Distance of a companion by steps of twice the length over the error: 2² - 1 of second order, and 1
-# where friction lasts that depends on a mode which the steps do not resolve. In between, both are
-# told within a factor of three.
-COMPANION = 2.0
+# Distance of the companion run, with steps of twice the length, over the error. The ratio is 2² - 1
+# = 3 for errors of second order, and 1 where permanent slip depends on a mode that the steps do not
+# resolve. With a value in between, both are estimated within a factor of three.
+COMPANION_RATIO = 2.0
 
 
 class StepState(NamedTuple):
-    """The end of a step: displacements and velocities ``(2 n,)``, and the joints.
+    """End of a time step.
 
-    ``missing`` ``(j d,)`` [mm] is how far the joints are behind the structure, what was left of
-    the ``residual``; ``step`` [s] ended here.
+    Parameters
+    ----------
+    time
+        Time [s].
+    motion
+        Displacements, then velocities, ``(2 n,)``.
+    force
+        Forces of the excitation ``(n,)`` [N].
+    response
+        Response of the joints.
+    lag
+        Displacement ``(j d,)`` [mm] by which the joints lag behind the structure, due to the
+        residual of their equilibrium.
+    step
+        Length of the step [s].
+    residual
+        Relative residual of the joints' equilibrium.
     """
 
     time: float
     motion: Array
     force: Array
     response: IncrementResponse
-    missing: Array
+    lag: Array
     step: float
     residual: float
 
 
 @dataclass(frozen=True)
 class RecordedSteps:
-    """What is kept of some whole steps: ``rows`` by column, None where no step of them has one.
+    """Contribution of some whole steps to a record.
 
-    ``last`` is the point that they end with, ``sums`` ``(3 + j,)`` the energies until there, and
-    ``kept`` the point of the last row so far. They are so many whole steps, of ``points`` in all;
-    ``missed`` is the largest distance from the companion, ``jump`` the largest error that one step
-    adds and ``moved`` the largest displacement, all as half of the square of their norm weighted by
-    mass, ``residual`` the largest one.
+    All quantities that are norms weighted by mass are stored as half their squares.
+
+    Parameters
+    ----------
+    rows
+        Columns of the recorded rows, or None if no row is recorded.
+    last
+        End of the last step.
+    sums
+        Energies ``(3 + j,)`` summed up to there.
+    kept
+        Point of the last recorded row so far.
+    whole_steps
+        Number of whole steps.
+    points
+        Number of steps, divided ones included.
+    companion_distance
+        Largest distance from the companion run, as half a squared norm.
+    step_error
+        Largest error that one step adds, as half a squared norm.
+    largest_displacement
+        Largest displacement, as half a squared norm.
+    residual
+        Largest residual of the joints' equilibrium.
     """
 
     rows: tuple[Array, Array, Array, Array, Array] | None
@@ -54,37 +88,51 @@ class RecordedSteps:
     kept: StepState
     whole_steps: int
     points: int
-    missed: float
-    jump: float
-    moved: float
+    companion_distance: float
+    step_error: float
+    largest_displacement: float
     residual: float
 
 
 class MotionRecord:
-    """Rows of the result, and the energies summed until each."""
+    """Recorded rows of a time integration, and the energies summed up to each.
+
+    Parameters
+    ----------
+    model
+        The structure.
+    directions
+        Number of directions of a joint.
+    every
+        Number of whole steps between two rows.
+    first
+        The start, which is the first row.
+    """
 
     def __init__(self, model: DynamicModel, directions: int, every: int, first: StepState) -> None:
         self._model, self._directions, self._every = model, directions, every
-        self._before, self._kept = first, first
+        self._last_point, self._kept = first, first
         sums = np.zeros((1, 3 + len(model.connection) // directions))
         self._sums, self._rows = sums[0], [(*_columns([first]), sums)]
-        self._missed = self._largest_jump = self._largest_motion = self._residual = 0.0
+        self._companion_distance = self._largest_step_error = 0.0
+        self._largest_motion = self._residual = 0.0
         self._taken = self._steps = 0
 
     def recorded(
         self, block: list[list[StepState]], companion: list[list[StepState]]
     ) -> RecordedSteps | None:
-        """What is to be added of whole steps, each of one or more points; None without any.
+        """Return the contribution of whole steps to the record; None if there are none.
 
-        Beside them, those of the ``companion``, each for two of them.
+        ``block`` has the points of each whole step, and ``companion`` those of the companion run,
+        one step of it for two of these.
         """
-        points = [point for whole in block for point in whole]
+        points = [point for step_points in block for point in step_points]
         if not points:
             return None
-        ends = np.cumsum([len(whole) for whole in block]) - 1
+        ends = np.cumsum([len(step_points) for step_points in block]) - 1
         kept = ends[(self._taken + 1 + np.arange(len(block))) % self._every == 0]
-        flows, jump = self._flows([self._before, *points])
-        sums, rows = self._sums + np.cumsum(flows, axis=0), None
+        increments, step_error = self._energy_increments([self._last_point, *points])
+        sums, rows = self._sums + np.cumsum(increments, axis=0), None
         if len(kept):
             rows = (*_columns([points[row] for row in kept]), sums[kept])
         return RecordedSteps(
@@ -94,65 +142,69 @@ class MotionRecord:
             kept=points[kept[-1]] if len(kept) else self._kept,
             whole_steps=len(block),
             points=len(points),
-            missed=self._distance(block[1::2], companion),
-            jump=jump,
-            moved=self._largest(np.array([point.motion for point in points])),
+            companion_distance=self._distance(block[1::2], companion),
+            step_error=step_error,
+            largest_displacement=self._largest(np.array([point.motion for point in points])),
             residual=max(point.residual for point in points),
         )
 
     def add(self, recorded: RecordedSteps) -> None:
-        """Add what has been recorded of the next whole steps."""
+        """Add the contribution of the next whole steps."""
         if recorded.rows is not None:
             self._rows.append(recorded.rows)
-        self._before, self._kept, self._sums = recorded.last, recorded.kept, recorded.sums
+        self._last_point, self._kept, self._sums = recorded.last, recorded.kept, recorded.sums
         self._taken += recorded.whole_steps
         self._steps += recorded.points
-        self._missed = max(self._missed, recorded.missed)
-        self._largest_jump = max(self._largest_jump, recorded.jump)
-        self._largest_motion = max(self._largest_motion, recorded.moved)
+        self._companion_distance = max(self._companion_distance, recorded.companion_distance)
+        self._largest_step_error = max(self._largest_step_error, recorded.step_error)
+        self._largest_motion = max(self._largest_motion, recorded.largest_displacement)
         self._residual = max(self._residual, recorded.residual)
 
     def _distance(self, block: list[list[StepState]], companion: list[list[StepState]]) -> float:
-        """Largest distance of whole steps that end at the same times, as half of its square."""
+        """Return the largest distance between two runs at equal times, as half a squared norm."""
         pairs = zip(block, companion, strict=False)
-        apart = [whole[-1].motion - other[-1].motion for whole, other in pairs]
-        return self._largest(np.array(apart)) if apart else 0.0
+        differences = [step_points[-1].motion - other[-1].motion for step_points, other in pairs]
+        return self._largest(np.array(differences)) if differences else 0.0
 
     def _largest(self, motion: Array) -> float:
-        """Largest displacement of motions ``(t, 2 n)``, as half of its square."""
+        """Return the largest displacement of motions ``(t, 2 n)``, as half a squared norm."""
         displacement = motion[:, : len(self._model.mass)]
         return float(quadratic(self._model.mass, displacement).max())
 
-    def _flows(self, points: list[StepState]) -> tuple[Array, float]:
-        """Energies of each step ``(s, 3 + j)``: brought in, damped, into joints, lost in each.
+    def _energy_increments(self, points: list[StepState]) -> tuple[Array, float]:
+        """Return the energies of each step ``(s, 3 + j)``, and the largest error of one step.
 
-        Beside them ``jump`` of :class:`RecordedSteps`.
+        The energies are the work of the excitation, the energy dissipated by damping, the work on
+        the joints, and the energy dissipated in each joint. The error is half a squared norm.
         """
         model = self._model
         _, motion, force, joint_force = _columns(points)
         steps = np.array([point.step for point in points[1:]])[:, None]
         velocity = np.split(0.5 * (motion[1:] + motion[:-1]), 2, axis=1)[1]
-        travel = steps * velocity
+        displacements = steps * velocity
         pairs = (
-            (0.5 * (force[1:] + force[:-1]), travel),
-            (velocity @ model.damping.T, travel),
-            (0.5 * (joint_force[1:] + joint_force[:-1]), travel @ model.connection.T),
+            (0.5 * (force[1:] + force[:-1]), displacements),
+            (velocity @ model.damping.T, displacements),
+            (0.5 * (joint_force[1:] + joint_force[:-1]), displacements @ model.connection.T),
         )
         works = np.stack([np.einsum("ti,ti->t", *pair) for pair in pairs], axis=1)
         dissipated = np.array([point.response.dissipated for point in points[1:]])
-        jumps = steps**2 / 12.0 * np.diff(accelerations(model, motion, force, joint_force), axis=0)
-        jump = float(quadratic(model.mass, jumps).max())
-        return np.hstack([works, dissipated]), jump
+        step_errors = (
+            steps**2 / 12.0 * np.diff(accelerations(model, motion, force, joint_force), axis=0)
+        )
+        step_error = float(quadratic(model.mass, step_errors).max())
+        return np.hstack([works, dissipated]), step_error
 
     @property
     def largest_displacement(self) -> float:
-        """As a norm weighted by mass [t^0.5 mm]."""
+        """Largest displacement, as a norm weighted by mass [t^0.5 mm]."""
         return float(np.sqrt(2.0 * self._largest_motion))
 
     def motion(self, message: str, companion: Start | None) -> Motion:
-        """All rows kept so far; ``message`` says why they end early, if they do.
+        """Return the motion from all recorded rows.
 
-        ``companion`` is where that is at the last of them.
+        ``message`` says why the integration stopped early, or is empty. ``companion`` is the state
+        of the companion run at the last row.
         """
         model, directions = self._model, self._directions
         times, motion, force, joint_force, sums = (
@@ -160,7 +212,8 @@ class MotionRecord:
         )
         displacement, velocity = np.split(motion, 2, axis=1)
         shape = (len(motion), len(model.connection) // directions, directions)
-        missed, moved = max(self._missed / COMPANION**2, self._largest_jump), self._largest_motion
+        error_square = max(self._companion_distance / COMPANION_RATIO**2, self._largest_step_error)
+        largest_square = self._largest_motion
         return Motion(
             times=times,
             displacement=displacement,
@@ -178,7 +231,7 @@ class MotionRecord:
                 joint_work=sums[:, 2],
                 joints=sums[:, 3:],
             ),
-            error=float(np.sqrt(missed / moved)) if moved > 0.0 else 0.0,
+            error=float(np.sqrt(error_square / largest_square)) if largest_square > 0.0 else 0.0,
             residual=self._residual,
             steps=self._steps,
             message=message,
@@ -186,7 +239,7 @@ class MotionRecord:
 
 
 def _columns(points: list[StepState]) -> tuple[Array, Array, Array, Array]:
-    """Times ``(t,)``, motion ``(t, 2 n)``, force ``(t, n)``, joint force ``(t, j d)`` of points."""
+    """Return times ``(t,)``, motion ``(t, 2 n)``, force ``(t, n)`` and joint force ``(t, j d)``."""
     times = np.array([point.time for point in points])
     motion = np.array([point.motion for point in points])
     force = np.array([point.force for point in points])

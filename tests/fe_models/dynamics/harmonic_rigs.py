@@ -1,4 +1,4 @@
-"""Rigs whose steady vibration is balanced by more than one test module."""
+"""Rigs whose steady vibration several test modules compute."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ ODD = tuple(range(1, 16, 2))
 
 
 def rig(ratio=0.001):
-    """The thesis's rig."""
+    """Return the rig of the thesis."""
     return two_mass_rig((21.152e-3, 1.189e-3), (1.3469e3, 273e3), ratio)
 
 
@@ -31,7 +31,7 @@ def balance(model, joints=JENKINS, harmonics=ODD, samples=256, load=None):
 
 
 def contact_rig():
-    """A mass free but for its contact along z, on springs along x and y."""
+    """Return a mass on springs along x and y, which only its contact holds along z."""
     return lumped_rig(
         {"x": 2e-3, "y": 2e-3, "z": 2e-3},
         {Link("x"): 500.0, Link("y"): 700.0},

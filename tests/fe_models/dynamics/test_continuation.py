@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from fe_models.dynamics.curves.bordered import Bordered, Preconditioned, solve_alone, solve_bordered
-from fe_models.dynamics.curves.continuation import Refinement, first_point, follow
-from fe_models.dynamics.curves.control import ContinuationControl
+from fe_models.dynamics.curves.continuation import Refinement, follow
+from fe_models.dynamics.curves.curve_steps import ContinuationControl, first_point
 from fe_models.dynamics.curves.newton import NewtonControl, solve
 from fe_models.dynamics.curves.sizes import relative_norm
 
@@ -18,7 +18,7 @@ EXACT = 1e-9
 
 @dataclass(frozen=True)
 class Linearised:
-    """Equations at one place, with all derivatives from the beginning."""
+    """Equations at one point, with all derivatives computed at once."""
 
     residual: np.ndarray
     jacobian: object
@@ -32,13 +32,13 @@ class Linearised:
 
 @dataclass(frozen=True)
 class Marked(Linearised):
-    """The same, with the place of its peak."""
+    """Linearised equations that also know the position of their peak."""
 
     peak: float
 
 
 def scalar(value, by_unknown, by_parameter):
-    """One equation in one unknown."""
+    """Return one equation in one unknown."""
 
     def equations(unknowns, parameter):
         u = float(unknowns[0])
@@ -53,22 +53,22 @@ def scalar(value, by_unknown, by_parameter):
 
 
 class Products:
-    """A matrix known by its products only."""
+    """Matrix known only by its products."""
 
     def __init__(self, matrix):
-        self._matrix, self.asked, self.products = matrix, False, 0
+        self._matrix, self.was_assembled, self.products = matrix, False, 0
 
     def __matmul__(self, vector):
         self.products += 1
         return self._matrix @ vector
 
     def assembled(self):
-        self.asked = True
+        self.was_assembled = True
         return self._matrix
 
 
 class LikeAnother(Products):
-    """The same, with the inverse of a matrix that differs in little."""
+    """Matrix known by its products, with the inverse of a similar matrix."""
 
     def __init__(self, matrix, other):
         super().__init__(matrix)
@@ -123,14 +123,14 @@ def test_both_folds_are_passed_both_ways(upward):
         assert pair.max() > fold - 0.3
 
 
-def test_every_point_is_told():
-    told = []
-    control = ContinuationControl(watch=told.append)
+def test_every_point_is_reported():
+    reported = []
+    control = ContinuationControl(watch=reported.append)
     curve = follow(S_CURVE, start(S_CURVE, -3.0, 1.0), (0.5, 9.5), control)
-    assert told == curve.parameters.tolist()
+    assert reported == curve.parameters.tolist()
 
 
-def test_a_curve_is_taken_up_again_from_any_point():
+def test_a_curve_can_be_resumed_from_any_point():
     whole = follow(S_CURVE, start(S_CURVE, -3.0, 1.0), (0.5, 9.5))
     middle = whole.points[len(whole.points) // 2]
     rest = follow(S_CURVE, middle, (0.5, 9.5))
@@ -156,7 +156,7 @@ def test_a_closed_curve_ends_by_the_number_of_points():
 
 @pytest.mark.parametrize("beyond", [0.2, 30.0, -1.5])
 def test_corners_are_passed(beyond):
-    """The slope changes at λ = 2, even its sign: there the curve turns back."""
+    """At λ = 2 the slope changes, even in sign: there the curve turns back."""
 
     def value(u, p):
         return p - (1.0 + u if u < 1.0 else 2.0 + beyond * (u - 1.0))
@@ -171,7 +171,7 @@ def test_corners_are_passed(beyond):
 
 
 def test_a_narrow_peak_is_not_jumped_over():
-    """A resonance of damping ratio 1e-4: two unknowns, phase and size turn within 1e-4 of λ."""
+    """Near a resonance of damping ratio 1e-4, amplitude and phase change within 1e-4 of λ."""
 
     def equations(unknowns, parameter):
         z = 1.0 - parameter**2
@@ -191,7 +191,7 @@ def test_a_narrow_peak_is_not_jumped_over():
 
 
 def test_a_curve_that_ends_says_where():
-    """Beyond λ = 1 there is nothing."""
+    """The equation has no solution beyond λ = 1."""
 
     def root(u, p):
         return u - 1.0 - (np.sqrt(1.0 - p) if p <= 1.0 else np.nan) - 0.5 * p
@@ -202,12 +202,12 @@ def test_a_curve_that_ends_says_where():
     ending = scalar(root, lambda u, p: 1.0, slope)
     curve = follow(ending, start(ending, 2.0, 0.5), (0.0, 2.0))
     assert "the curve ends at " in curve.message
-    assert "go on from another point" in curve.message
+    assert "continue from another point" in curve.message
     assert curve.parameters.max() == pytest.approx(1.0, abs=1e-2)
 
 
 def peak(place):
-    """A resonance: a peak of 100 at λ = ``place``, and no fold."""
+    """Return a resonance: a peak of 100 at λ = ``place``, without a fold."""
     return scalar(
         lambda u, p: u - 1.0 / ((p - place) ** 2 + 0.01),
         lambda u, p: 1.0,
@@ -218,7 +218,7 @@ def peak(place):
 @pytest.mark.parametrize("place", [5.1, 5.3, 5.6])
 @pytest.mark.parametrize("refined", [5.02, 5.1, 5.2])
 def test_finer_equations_with_their_peak_elsewhere_do_not_turn_the_curve_round(place, refined):
-    """Beyond the coarse peak the unknown falls, where finer equations still have it rise."""
+    """Beyond the coarse peak the unknown falls, while it still rises with the refined equations."""
 
     class Finer:
         def describe(self, point, at):
@@ -243,18 +243,18 @@ def test_finer_equations_with_their_peak_elsewhere_do_not_turn_the_curve_round(p
 
 @pytest.mark.parametrize("end", [0.5, 9.5])
 def test_a_curve_that_leaves_by_the_wrong_end_says_so(end):
-    """λ = 3 + u² comes down to its fold at 3, and goes up again."""
+    """The curve λ = 3 + u² falls to its fold at 3 and rises again."""
     parabola = scalar(lambda u, p: u * u + 3.0 - p, lambda u, p: 2.0 * u, lambda u, p: -1.0)
     first = start(parabola, 2.0, 7.0, upward=False)
     curve = follow(parabola, first, (0.5, 9.5), end=end)
     assert curve.points[-1].parameter == 9.5
-    told = "turns back at 3" in curve.message and "does not reach 0.5" in curve.message
-    assert told == (end == 0.5)
+    reported = "turns back at 3" in curve.message and "does not reach 0.5" in curve.message
+    assert reported == (end == 0.5)
     assert (curve.message == "") == (end == 9.5)
 
 
 def test_finer_equations_take_over_on_the_way():
-    """From λ = 3 on a second unknown is asked for, which is the square of the first."""
+    """From λ = 3 on the equations have a second unknown, the square of the first."""
     coarse = scalar(lambda u, p: u - p, lambda u, p: 1.0, lambda u, p: -1.0)
 
     def fine(unknowns, parameter):
@@ -290,7 +290,7 @@ def test_a_step_is_never_shorter_than_asked():
 
 @pytest.mark.parametrize("compact", [True, False])
 def test_bordered_systems_by_products_are_those_of_the_matrix(compact):
-    """1 and something compact is solved by products; noise of 200 unknowns has to be assembled."""
+    """GMRES solves 1 plus a compact matrix; a noise matrix of 200 unknowns has to be assembled."""
     rng = np.random.default_rng(1)
     noise = rng.standard_normal((200, 200))
     matrix = np.eye(200) + noise[:, :5] @ noise[:5] if compact else noise
@@ -298,7 +298,7 @@ def test_bordered_systems_by_products_are_those_of_the_matrix(compact):
     bordered = np.block([[matrix, column[:, None]], [np.append(row, 0.5)]])
     products = Products(matrix)
     solution, _ = solve_bordered(products, column, np.append(row, 0.5), wanted)
-    assert products.asked != compact
+    assert products.was_assembled != compact
     assert np.linalg.norm(bordered @ solution - wanted) <= 1e-5 * np.linalg.norm(wanted)
     exact, sign = solve_bordered(matrix, column, np.append(row, 0.5), wanted)
     np.testing.assert_allclose(exact, np.linalg.solve(bordered, wanted), atol=1e-9)
@@ -307,8 +307,8 @@ def test_bordered_systems_by_products_are_those_of_the_matrix(compact):
     assert np.linalg.norm(matrix @ alone - wanted[:-1, 0]) <= 1e-5 * np.linalg.norm(wanted[:, 0])
 
 
-def test_the_inverse_of_a_matrix_that_is_alike_saves_products():
-    """They differ in rank 2; a column and a row around them make it rank 4 at most."""
+def test_the_inverse_of_a_similar_matrix_saves_products():
+    """The matrices differ in rank 2; the border makes it rank 4 at most."""
     rng = np.random.default_rng(2)
     noise = rng.standard_normal((200, 200))
     other = noise + 40.0 * np.eye(200)
@@ -320,26 +320,26 @@ def test_the_inverse_of_a_matrix_that_is_alike_saves_products():
     for products in (alike, alone):
         solution = Bordered(products, column, row).solve(wanted, 1e-9)
         np.testing.assert_allclose(solution, exact[:, 0], atol=1e-7 * np.abs(exact).max())
-        assert not products.asked
+        assert not products.was_assembled
     assert alike.products <= 8 < 20 < alone.products
     solution = solve_alone(alike, wanted[:-1], 1e-9)
     np.testing.assert_allclose(solution, np.linalg.solve(matrix, wanted[:-1]), atol=1e-7)
     assert Bordered(matrix, column, row).sign == sign
 
 
-def test_an_inverse_that_is_of_no_use_is_done_without():
-    """One that forgets a direction never leads to a solution along it."""
+def test_a_useless_preconditioner_is_not_used():
+    """A preconditioner that loses a direction never leads to a solution along it."""
     rng = np.random.default_rng(4)
     noise, wanted = rng.standard_normal((200, 2)), rng.standard_normal(200)
     products = LikeAnother(np.eye(200) + noise @ noise.T, np.eye(200))
     products._inverse[3, 3] = 0.0
     solution = solve_alone(products, wanted, 1e-9)
-    assert not products.asked
+    assert not products.was_assembled
     np.testing.assert_allclose(products @ solution, wanted, atol=1e-7)
 
 
-def test_a_singular_matrix_has_its_smallest_solution():
-    """The second unknown is in no equation."""
+def test_a_singular_matrix_gives_the_smallest_solution():
+    """No equation contains the second unknown."""
     singular = np.array([[2.0, 0.0], [0.0, 0.0]])
     np.testing.assert_allclose(solve_alone(singular, np.array([4.0, 0.0])), [2.0, 0.0], atol=EXACT)
     system = Bordered(singular, np.array([1.0, 0.0]), np.array([0.0, 0.0, 1.0]))
@@ -347,27 +347,27 @@ def test_a_singular_matrix_has_its_smallest_solution():
     assert system.sign == 0
 
 
-def test_more_may_be_left_by_fewer_products():
+def test_a_looser_tolerance_needs_fewer_products():
     rng = np.random.default_rng(3)
     products = Products(np.eye(200) + 0.03 * rng.standard_normal((200, 200)))
-    wanted, asked = rng.standard_normal(200), []
+    wanted, counts = rng.standard_normal(200), []
     for left in (1e-2, 1e-6):
         products.products = 0
         solution = solve_alone(products, wanted, left)
         assert np.linalg.norm(products @ solution - wanted) <= 1.01 * left * np.linalg.norm(wanted)
-        asked.append(products.products)
-    assert 2 * asked[0] < asked[1]
+        counts.append(products.products)
+    assert 2 * counts[0] < counts[1]
 
 
-def test_newton_is_given_up_where_it_does_not_come_closer():
-    """It walks to and fro between two slopes."""
+def test_newton_stops_where_it_makes_no_progress():
+    """The iteration alternates between two slopes."""
     counted = [0]
 
     def value(u, p):
         counted[0] += 1
         return np.sign(u) * np.sqrt(abs(u)) + 0.0 * p
 
-    # The root's own slope leads from u to -u.
+    # The slope of the root leads from u to -u.
     to_and_fro = scalar(value, lambda u, p: 0.5 / np.sqrt(abs(u)), lambda u, p: 0.0)
     for patience, most in ((None, 30), (3, 5)):
         counted[0] = 0

@@ -1,4 +1,4 @@
-"""All motions of a branch at a frequency, against the roots of Duffing's cubic."""
+"""All motions of a branch at one frequency, against the roots of Duffing's cubic equation."""
 
 import numpy as np
 import pytest
@@ -17,7 +17,7 @@ DAMPING = 2.0 * RATIO * np.sqrt(MASS * STIFFNESS)
 
 
 def amplitudes(frequency):
-    """In one harmonic: A² ((k - m ω² + 3/4 k3 A²)² + (c ω)²) = F²."""
+    """Return the roots A of A² ((k - m ω² + 3/4 k3 A²)² + (c ω)²) = F², for one harmonic."""
     angular = 2.0 * np.pi * frequency
     linear, cubic = STIFFNESS - MASS * angular**2, 0.75 * CUBIC
     resisting = linear**2 + (DAMPING * angular) ** 2
@@ -27,7 +27,7 @@ def amplitudes(frequency):
 
 
 def fold(inside, outside):
-    """The frequency [Hz] between two at which two of three motions cease, by halving."""
+    """Return the frequency [Hz] at which two of three motions vanish, by bisection."""
     while abs(outside - inside) > 1e-9:
         middle = 0.5 * (inside + outside)
         if len(amplitudes(middle)) == 3:
@@ -67,7 +67,7 @@ def test_motions_are_in_the_order_of_the_curve(branch):
 
 
 def test_folds_between_points_are_not_missed(branch):
-    """Beyond the farthest point of the curve, on either side of where it turns back."""
+    """The frequency lies between the farthest point of the curve and its fold."""
     place = branch.curve.folds[0]
     farthest = branch.frequencies[place : place + 2].max()
     highest = fold(farthest, farthest + 1.0)
@@ -79,12 +79,12 @@ def test_folds_between_points_are_not_missed(branch):
     assert len(sizes(branch, highest + 1e-5)) == 1
 
 
-def test_where_newton_alone_goes_astray_the_chord_leads(branch, monkeypatch):
-    """Nothing that Newton's method finds at once is believed: planes across the chord cut it."""
-    monkeypatch.setattr(Chord, "along", lambda self, coordinates: False)
+def test_planes_across_the_chord_find_what_newton_misses(branch, monkeypatch):
+    """All direct results of Newton's method are rejected: planes across the chord are used."""
+    monkeypatch.setattr(Chord, "contains", lambda self, coordinates: False)
     np.testing.assert_allclose(np.sort(sizes(branch, 190.0)), amplitudes(190.0), rtol=1e-9)
 
 
-def test_none_where_the_curve_does_not_get_to(branch):
+def test_no_motion_where_the_curve_does_not_reach(branch):
     assert motions_at(branch, 401.0) == ()
     assert motions_at(branch, 99.0) == ()

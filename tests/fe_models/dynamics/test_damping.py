@@ -1,4 +1,4 @@
-"""Damping beside that of the modes, against linear algebra and balances of energy."""
+"""Damping other than modal damping, against linear algebra and energy balances."""
 
 from dataclasses import replace
 
@@ -44,7 +44,7 @@ def problem(model, joints=FREE, harmonics=(1,), samples=256):
     ],
 )
 def test_linear_responses_are_those_of_the_matrices(damping):
-    """Damping that mixes the modes included; at rest structural damping does nothing."""
+    """Damping that couples the modes is included; at rest structural damping has no effect."""
     model = two_masses(**damping)
     balance = problem(model, harmonics=(0, 1, 3))
     structural = np.zeros((2, 2)) if model.structural is None else model.structural
@@ -60,7 +60,10 @@ def test_linear_responses_are_those_of_the_matrices(damping):
 
 
 def test_work_balances_losses_with_friction_and_a_loss_factor():
-    """Of a motion with harmonics; structural damping takes as much of each cycle, however fast."""
+    """The motion has several harmonics.
+
+    Structural damping dissipates the same in each cycle, at any frequency.
+    """
     model = two_masses(loss_factor=0.05, dashpots={Link("b", "a"): 0.05})
     balance = problem(model, SLIDER, harmonics=(1, 3, 5, 7), samples=4096)
     motion = balance.solve(140.0, 20.0)
@@ -70,7 +73,7 @@ def test_work_balances_losses_with_friction_and_a_loss_factor():
     assert energy_lost(balance, motion) == pytest.approx(work, rel=1e-5)
 
 
-def test_derivatives_know_structural_damping():
+def test_derivatives_include_structural_damping():
     model = two_masses(loss_factor=0.1, dashpots={Link("b"): 0.1})
     balance = problem(model, SLIDER, harmonics=(0, 1, 3))
     motion = balance.solve(140.0, 20.0)
@@ -84,7 +87,7 @@ def test_derivatives_know_structural_damping():
 
 
 def test_equivalent_damping_is_half_the_loss_factor():
-    """At phase resonance of one mass without friction: amplitude F / (η k), ζ = η / 2."""
+    """At phase resonance of one mass without friction, the amplitude is F / (η k) and ζ = η / 2."""
     rig = lumped_rig({"m": 1e-3}, {Link("m"): 1e3}, [[Link("m")]])
     load = PeriodicLoad({1: -1j * unit_force(rig, "m")})
     balance = HarmonicBalance(damped(rig, loss_factor=0.04), FREE, load, Resolution((1,), 64))
@@ -97,7 +100,7 @@ def test_equivalent_damping_is_half_the_loss_factor():
     assert damping_ratio(balance, backbone.solutions[0]) == pytest.approx(0.02, rel=1e-9)
 
 
-def test_ratios_of_modes_and_rayleighs():
+def test_modal_ratios_and_rayleigh_factors():
     model = lumped_rig(MASSES, SPRINGS, [[Link("b")]], np.array([0.01, 0.04]))
     squares, shapes = sl.eigh(model.stiffness, model.mass)
     of_modes = np.diag(shapes.T @ model.damping @ shapes) / (2.0 * np.sqrt(squares))
@@ -114,7 +117,7 @@ def test_ratios_of_modes_and_rayleighs():
     np.testing.assert_allclose(ratios, [0.01, 0.02], rtol=1e-9)
 
 
-def test_what_cannot_be_is_refused():
+def test_invalid_damping_is_refused():
     model = two_masses()
     for wrong in ({"mass_factor": -1.0}, {"loss_factor": -0.1}, {"dashpots": {Link("a"): -1.0}}):
         with pytest.raises(RigError, match="damping below zero"):
@@ -127,8 +130,8 @@ def test_what_cannot_be_is_refused():
         integrate(two_masses(loss_factor=0.1), None, None, 0.1, TimeStepControl(1e-3))
 
 
-def test_dashpots_are_taken_apart_from_the_damping_of_modes():
-    """A row of 20 masses with three dashpots: as with the whole matrix, at resonance too."""
+def test_dashpots_are_separated_from_modal_damping():
+    """A row of 20 masses with three dashpots responds as with the full matrix, at resonance too."""
     names = [f"m{number}" for number in range(20)]
     springs = {Link(name, before): 1e3 for name, before in zip(names, [None, *names], strict=False)}
     dashpots = {Link("m3"): 0.5, Link("m9", "m4"): 2.0, Link("m19"): 1e3}
@@ -138,7 +141,8 @@ def test_dashpots_are_taken_apart_from_the_damping_of_modes():
         model = damped(row, loss_factor=0.01 * (ratio > 0.0), dashpots=dashpots)
         apart, whole = Receptance(model), Receptance(replace(model, dashpots=None))
         force = np.arange(60.0).reshape(3, 20) + 1j
-        # On a natural frequency a mode that nothing else damps cannot be divided by what is left.
+        # At the natural frequency of a mode with no other damping, the dashpots cannot be
+        # separated.
         at_resonance = MixedModes if ratio == 0.0 else ModesWithDashpots
         for frequency, way in ((17.0, ModesWithDashpots), (natural[2], at_resonance)):
             angular = 2.0 * np.pi * frequency * np.array([1.0, 3.0, 5.0])
@@ -152,7 +156,7 @@ def test_dashpots_are_taken_apart_from_the_damping_of_modes():
             np.testing.assert_allclose(stiffness @ response[0], force[0], rtol=1e-9)
             scale = np.abs(response).max()
             np.testing.assert_allclose(steady.vibrate(force), response, atol=1e-10 * scale)
-            # Constant forces know no damping: the mean has its own inverse.
+            # Constant forces are not affected by damping: the mean has an inverse of its own.
             still, with_mean = np.insert(force, 0, 1.0, axis=0), np.insert(angular, 0, 0.0)
             np.testing.assert_allclose(whole.at(with_mean).respond(still)[1:], response)
             alone = whole.at(np.zeros(1)).respond(still[:1])

@@ -1,4 +1,4 @@
-"""A sector of a wheel of finite elements, cut through solid, against the whole wheel."""
+"""Finite-element sector of a wheel, cut through solid material, against the whole wheel."""
 
 import numpy as np
 import scipy.linalg as sl
@@ -16,11 +16,14 @@ SECTORS, CELLS = 5, 3
 
 
 def wheel(cells):
-    """Part of a wheel of so many cells around: its body, and of its nodes angle and (r, z)."""
+    """Return the body of part of a wheel, and angle and (r, z) of its nodes.
+
+    ``cells`` is the number of cells around.
+    """
     angles = np.arange(cells + 1) * (2.0 * np.pi / (SECTORS * CELLS))
     flat = MeshTet.init_tensor(np.array([40.0, 60.0, 90.0]), angles, np.array([0.0, 8.0]))
     radius, angle, height = flat.p
-    # What is all round meets itself.
+    # A whole wheel closes on itself.
     meets = np.isclose(angle, 2.0 * np.pi)
     first = {(r, z): node for node, (r, a, z) in enumerate(flat.p.T) if a == 0.0}
     to = np.arange(len(angle))
@@ -32,7 +35,7 @@ def wheel(cells):
 
 
 def test_a_sector_of_finite_elements_has_the_frequencies_of_its_wheel():
-    """Reduced by Craig and Bampton, turned about z in axes that do not turn."""
+    """The sector is reduced by Craig and Bampton and rotated about z, with fixed axes."""
     body, angle, across = wheel(CELLS)
     faces = [
         sorted(np.flatnonzero(angle == end), key=lambda node: tuple(across[node]))
@@ -49,12 +52,13 @@ def test_a_sector_of_finite_elements_has_the_frequencies_of_its_wheel():
     squares = sl.eigvalsh(whole.stiffness.toarray(), whole.mass.toarray())
     lowest = slice(6, 40)
     every = np.sqrt(squares[lowest]) / (2.0 * np.pi)
-    # All modes with the faces held but one, and a third of them: what is left out makes it stiffer.
+    # All fixed-interface modes but one, and a third of them: neglected modes make the sector
+    # stiffer.
     for modes, error in ((body.size - len(kept) - 1, 1e-5), (12, 1e-2)):
         reduced = reduce_body(body.stiffness, body.mass, kept, modes=modes)
         sector = reduced_sector(reduced, (*left, *right), [], ring)
         by_shift = [natural_frequencies(sector.at(shift)) for shift in range(SECTORS)]
-        # Along and about the axis, and across it two that are waves of one nodal diameter.
+        # Rigid motions: along and about the axis, and across it two waves of one nodal diameter.
         assert [np.count_nonzero(found == 0.0) for found in by_shift] == [2, 2, 0, 0, 2]
         stiffer = np.sort(np.concatenate(by_shift))[lowest] / every - 1.0
         assert stiffer.min() > -1e-9

@@ -1,4 +1,4 @@
-"""Forces in time: their values, and that the smooth stretches they are made of are the same."""
+"""Forces in time: their values, and agreement with the smooth sections of which they consist."""
 
 import numpy as np
 import pytest
@@ -25,7 +25,7 @@ FORCES = {
 
 
 @pytest.mark.parametrize("force", FORCES.values(), ids=FORCES)
-def test_smooth_stretches_are_the_force(force):
+def test_smooth_sections_are_the_force(force):
     times = np.linspace(-5e-3, 30e-3, 71) + 1e-5
     stretches = [signal_at(force, time) for time in times]
     lines = [s.value + s.slope * (t - s.origin) for s, t in zip(stretches, times, strict=True)]
@@ -40,7 +40,7 @@ def test_smooth_stretches_are_the_force(force):
 
 
 @pytest.mark.parametrize("force", FORCES.values(), ids=FORCES)
-def test_a_stretch_goes_on_until_the_next_break(force):
+def test_a_section_continues_until_the_next_break(force):
     for early, late in [(-1.0, -1e-9), (1e-9, 0.99e-3), (1e-3, 2e-3), (2e-3, 6e-3), (9e-3, 1.3e-2)]:
         between = [time for time in breaks(force) if early < time < late]
         share = 1e-3 * (late - early)
@@ -57,7 +57,7 @@ def test_a_blow_is_half_a_sine():
     assert np.all(force[(times < 0.0) | (times > 4e-3)] == 0.0)
 
 
-def test_a_ramp_starts_without_force_or_slope_and_ends_in_the_harmonic():
+def test_a_ramp_starts_with_zero_force_and_slope_and_ends_in_the_harmonic():
     ramped, full = FORCES["ramped"], FORCES["harmonic"]
     h = 1e-9
     start = ramped(np.array([0.0, h]))[:, 1]
@@ -80,14 +80,14 @@ def test_forces_add_up():
     ("make", "message"),
     [
         (lambda: HarmonicForce(SHAPE, 1.0, 0.0), "frequency 0 Hz"),
-        (lambda: HarmonicForce(SHAPE, 1.0, 1.0, ramp=-1.0), "ramp -1 s"),
-        (lambda: HammerBlow(SHAPE, 1.0, 0.0), "a blow of 0 s"),
+        (lambda: HarmonicForce(SHAPE, 1.0, 1.0, ramp=-1.0), "ramp of -1 s"),
+        (lambda: HammerBlow(SHAPE, 1.0, 0.0), "last 0 s"),
         (lambda: RecordedForce(SHAPE, np.array([]), np.array([])), "0 times and 0 forces"),
         (lambda: RecordedForce(SHAPE, np.zeros(2), np.zeros(3)), "2 times and 3 forces"),
         (lambda: RecordedForce(SHAPE, np.array([1.0, 1.0]), np.zeros(2)), "do not ascend"),
-        (lambda: RecordedForce(SHAPE, np.array([1.0]), np.array([np.nan])), "not a number"),
+        (lambda: RecordedForce(SHAPE, np.array([1.0]), np.array([np.nan])), "not a finite number"),
     ],
 )
-def test_signals_that_cannot_be_are_refused(make, message):
+def test_invalid_signals_are_refused(make, message):
     with pytest.raises(ExcitationError, match=message):
         make()

@@ -1,4 +1,4 @@
-"""Stability of periodic motions against other methods: shooting, event-driven and Hill's."""
+"""Stability of periodic motions against shooting, event-driven integration and Hill's method."""
 
 from dataclasses import replace
 
@@ -8,7 +8,7 @@ from scipy.integrate import solve_ivp
 from scipy.special import mathieu_a, mathieu_b
 
 from fe_models.dynamics.curves.bifurcations import find_bifurcations
-from fe_models.dynamics.curves.control import ContinuationControl
+from fe_models.dynamics.curves.curve_steps import ContinuationControl
 from fe_models.dynamics.curves.followed_curve import curve_by_force, curve_by_frequency
 from fe_models.dynamics.curves.forced_response import along_force, along_frequency
 from fe_models.dynamics.curves.further_branches import further_branches, vibrating_starts
@@ -37,7 +37,7 @@ DAMPING = 0.1
 
 
 def oscillator(law, harmonics, ratio=0.5 * DAMPING, samples=256, load=None):
-    """A mass of 1 on a spring of 1 and a joint, driven by cosines."""
+    """Return a mass of 1 on a spring of 1 and a joint, driven by cosines."""
     model = lumped_rig({"m": 1.0}, {Link("m"): 1.0}, [[Link("m")]], damping_ratio=ratio)
     load = load or PeriodicLoad({1: unit_force(model, "m")})
     return HarmonicBalance(model, PeriodicMarch(law), load, Resolution(harmonics, samples))
@@ -49,8 +49,8 @@ def duffing(highest=11, samples=128):
     )
 
 
-def shot(force, slope, motion, amplitude, damping=DAMPING):
-    """Multipliers of a mass of 1 by shooting, for a spring's ``force`` and its ``slope``."""
+def shooting_multipliers(force, slope, motion, amplitude, damping=DAMPING):
+    """Return multipliers of a mass of 1 by shooting, for a spring's ``force`` and ``slope``."""
     omega = TURN * motion.frequency
 
     def rates(time, y):
@@ -74,7 +74,7 @@ def shot(force, slope, motion, amplitude, damping=DAMPING):
 
 
 def agree(found, wanted, tolerance):
-    """Whether multipliers are the same, pairs in either order."""
+    """Return whether multipliers agree, pairs in either order."""
     for value in wanted:
         assert np.abs(np.append(found, 0.0) - value).min() < tolerance, (found, wanted)
 
@@ -87,24 +87,26 @@ def folded():
 
 
 def test_a_joint_that_sticks_is_a_spring_whose_slider_is_neutral():
-    """The multipliers are those of the linear structure, exactly, without the slider's own."""
+    """The multipliers are exactly those of the linear structure, without that of the slider."""
     problem = oscillator(Jenkins(3.0, 0.5, 1e3), (1, 3))
-    told = Floquet(problem).stability(problem.solve(0.3, 1.0))
+    stability = Floquet(problem).stability(problem.solve(0.3, 1.0))
     exponent = complex(-0.5 * DAMPING, np.sqrt(4.0 - 0.25 * DAMPING**2))
-    assert (told.verdict, told.neutral) == ("stable", 1)
-    agree(told.multipliers, [np.exp(exponent / 0.3), np.exp(exponent.conjugate() / 0.3)], 1e-12)
+    assert (stability.verdict, stability.neutral) == ("stable", 1)
+    agree(
+        stability.multipliers, [np.exp(exponent / 0.3), np.exp(exponent.conjugate() / 0.3)], 1e-12
+    )
 
 
 def test_duffing_against_shooting_and_liouville(folded):
-    """At motions of every kind; the product of all multipliers is what damping leaves."""
+    """Liouville's formula gives the product of all multipliers for motions of every kind."""
     branch, known = folded
     for place in range(10, len(known), 20):
-        motion, told = branch.solutions[place], known[place]
-        wanted = shot(lambda x: x + x**3, lambda x: 1.0 + 3.0 * x**2, motion, 0.3)
-        agree(told.multipliers, wanted, 3e-4)
+        motion, stability = branch.solutions[place], known[place]
+        wanted = shooting_multipliers(lambda x: x + x**3, lambda x: 1.0 + 3.0 * x**2, motion, 0.3)
+        agree(stability.multipliers, wanted, 3e-4)
         lost = np.exp(-DAMPING / motion.frequency)
-        assert abs(np.prod(told.multipliers)) == pytest.approx(lost, rel=1e-4)
-        assert (told.verdict == "stable") == (abs(wanted[0]) < 1.0)
+        assert abs(np.prod(stability.multipliers)) == pytest.approx(lost, rel=1e-4)
+        assert (stability.verdict == "stable") == (abs(wanted[0]) < 1.0)
 
 
 @pytest.mark.parametrize(
@@ -113,8 +115,9 @@ def test_duffing_against_shooting_and_liouville(folded):
 def test_duffing_in_one_harmonic_against_mathieu(value, share):
     """Deviations from A cos ωt obey Mathieu's equation, whose characteristic values are known.
 
-    With τ = ωt and damping taken off, δ'' + (v + 2p cos 2τ) δ = 0, p = 3 A² / (4 ω²): on the border
-    v of stability both multipliers of a period are 1, and one is beyond 1 on one side of it.
+    With τ = ωt and without damping, δ'' + (v + 2p cos 2τ) δ = 0 with p = 3 A² / (4 ω²). At a
+    characteristic value v both multipliers of a period are 1, and on one side of it one of them is
+    above 1.
     """
     border = value(1 if share < 1.0 else 2, share)
     omega = np.sqrt((1.0 - 0.25 * DAMPING**2) / (border - 2.0 * share))
@@ -137,7 +140,7 @@ def test_folds_of_duffing_are_where_the_curve_turns_and_a_multiplier_is_1(folded
     assert [each.unstable for each in found] == [(0, 1), (1, 0)]
     for each in found:
         assert each.multiplier == pytest.approx(1.0, abs=1e-4)
-    # Along the force the folds of the same motions are the same motions.
+    # Along the force, the folds are at the same motions.
     upper = found[0].motion
     across = along_force(branch.problem, upper.frequency * 0.95, (0.01, 2.0), control=FINE)
     of = Floquet(branch.problem).stability
@@ -148,11 +151,12 @@ def test_folds_of_duffing_are_where_the_curve_turns_and_a_multiplier_is_1(folded
     assert all(each.multiplier == pytest.approx(1.0, abs=1e-4) for each in turned)
 
 
-def test_what_is_not_known_beside_a_fold_is_not_told_of_it(folded):
-    """Motions of no verdict neither hide a fold of the curve nor deny it."""
+def test_unknown_motions_near_a_fold_do_not_affect_it(folded):
+    """Motions without a verdict neither hide a fold of the curve nor contradict it."""
     branch, known = folded
     unknown = [
-        replace(told, verdict="unknown", error=np.inf, multipliers=np.empty(0)) for told in known
+        replace(stability, verdict="unknown", error=np.inf, multipliers=np.empty(0))
+        for stability in known
     ]
     found = find_bifurcations(curve_by_frequency(branch.problem, 0.3), branch.solutions, unknown)
     assert [each.kind for each in found] == ["fold", "fold"]
@@ -160,7 +164,7 @@ def test_what_is_not_known_beside_a_fold_is_not_told_of_it(folded):
 
 
 def test_time_integration_on_both_sides_of_a_fold(folded):
-    """Started 1 % off, it stays by stable motions and leaves unstable ones."""
+    """A motion that starts 1 % away stays near stable motions and leaves unstable ones."""
     branch, known = folded
     fold = branch.curve.folds[0]
     for place in (fold - 8, fold + 12):
@@ -181,7 +185,7 @@ def test_time_integration_on_both_sides_of_a_fold(folded):
 
 
 def test_hill_agrees_for_a_smooth_spring(folded):
-    """With deviations of all harmonics up to 15 the sorted exponents are those of the period."""
+    """With deviations in all harmonics up to 15, the sorted exponents agree."""
     branch, known = folded
     for place in range(10, len(known), 20):
         hill = hill_multipliers(branch.problem, branch.solutions[place], 15, 256)
@@ -189,7 +193,7 @@ def test_hill_agrees_for_a_smooth_spring(folded):
 
 
 def exact_period(model, joints, force, frequency, y):
-    """State (displacements, velocities, slider) after a period, from event to event."""
+    """Return the state (displacements, velocities, slider) after a period, from event to event."""
     size = len(model.mass)
     start = Start(displacement=y[:size], velocity=y[size:-1], joint_state=y[-1:, None])
     period = 1.0 / frequency
@@ -200,7 +204,7 @@ def exact_period(model, joints, force, frequency, y):
 @pytest.mark.slow
 @pytest.mark.parametrize(("frequency", "amplitude"), [(180.0, 40.0), (210.0, 100.0)])
 def test_jenkins_against_event_driven_integration(frequency, amplitude):
-    """All multipliers, the slider's among them; Hill's method has other ones."""
+    """All multipliers agree, that of the slider included; Hill's method gives other ones."""
     model = rig(0.01)
     problem = balance(model, harmonics=tuple(range(1, 60, 2)), samples=2048)
     motion = problem.solve(frequency, amplitude)
@@ -218,37 +222,39 @@ def test_jenkins_against_event_driven_integration(frequency, amplitude):
         ends = [exact_period(model, joints, force, frequency, state + s * away) for s in (1, -1)]
         matrix[:, column] = (ends[0] - ends[1]) / (2.0 * step)
     exact = np.linalg.eigvals(matrix)
-    told = Floquet(problem).stability(motion)
-    assert (told.verdict, told.neutral) == ("stable", 0)
-    agree(told.multipliers, exact, 2e-3)
+    stability = Floquet(problem).stability(motion)
+    assert (stability.verdict, stability.neutral) == ("stable", 0)
+    agree(stability.multipliers, exact, 2e-3)
     hill = hill_multipliers(problem, motion, 31, 512)
     assert max(np.abs(hill - value).min() for value in exact) > 0.02
 
 
-def test_without_damping_nothing_is_said():
-    """Multipliers on the circle itself: what rounding makes of them is no verdict."""
+def test_without_damping_there_is_no_verdict():
+    """The multipliers are on the unit circle, and rounding must not decide the verdict."""
     model = contact_rig()
     law = PeriodicMarch(FrictionContact(300.0, 400.0, 0.5, 10.0))
     resolution = Resolution((0, 1, 2, 3), 128)
     problem = HarmonicBalance(model, law, pressed(model, 10.0, 1.0, 1.0), resolution)
-    told = Floquet(problem).stability(problem.solve(40.0, 1.0))
-    assert told.verdict == "unknown"
-    assert told.largest == pytest.approx(1.0, abs=1e-9)
-    assert "as near to 1 as its error" in told.message
+    stability = Floquet(problem).stability(problem.solve(40.0, 1.0))
+    assert stability.verdict == "unknown"
+    assert stability.largest == pytest.approx(1.0, abs=1e-9)
+    assert "as close to 1 as its error" in stability.message
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("frequency", "state"), [(70.0, 2), (95.0, 1)])
 def test_a_contact_in_three_directions_against_fine_steps(frequency, state):
-    """Slip on the circle under a changing load, and loss of contact: a period of Newmark's method,
-    started nearby."""
+    """Newmark's method integrates one period from nearby states.
+
+    The contact slips along a circle under a changing load, and separates.
+    """
     model = body(normal=100.0, ratio=0.02)
     law = FrictionContact(300.0, 400.0, 0.5, 10.0)
     load = pressed(model, 10.0, 6.0, 3.0)
     problem = HarmonicBalance(model, PeriodicMarch(law), load, Resolution(tuple(range(20)), 512))
     motion = problem.solve(frequency, 1.0)
     assert (motion.cycle.states == state).any()
-    told = Floquet(problem).stability(motion)
+    stability = Floquet(problem).stability(motion)
     size, period = 3, 1.0 / frequency
     force = CombinedForces(
         (
@@ -278,34 +284,36 @@ def test_a_contact_in_three_directions_against_fine_steps(frequency, state):
         away = 1e-6 * np.abs(state[3:6] if 3 <= column < 6 else state[:3]).max() * np.eye(8)[column]
         matrix[:, column] = (after(state + away) - after(state - away)) / (2.0 * away[column])
     exact = np.linalg.eigvals(matrix)
-    assert told.verdict == "stable"
-    agree(told.multipliers, exact[np.abs(exact) > 0.05], 1e-2)
+    assert stability.verdict == "stable"
+    agree(stability.multipliers, exact[np.abs(exact) > 0.05], 1e-2)
 
 
 @pytest.mark.slow
 def test_a_mass_on_a_stop_through_grazing():
-    """Before it touches the multipliers are those of the free mass; beyond, those of shooting."""
+    """Before contact the multipliers are those of the free mass; beyond, those of shooting."""
     law = ElasticStop(stiffness=3.0, gap=1.0)
     problem = oscillator(law, tuple(range(41)), ratio=0.05, samples=2048)
     branch = along_frequency(problem, 0.4, (0.8 / TURN, 1.8 / TURN), control=FINE)
     of = Floquet(problem).stability
-    told = [of(motion) for motion in branch.solutions]
+    stability = [of(motion) for motion in branch.solutions]
     touches = np.array([(motion.cycle.states != 2).any() for motion in branch.solutions])
     assert 0 < touches.sum() < len(touches)
     first = int(np.argmax(touches))
     for place in (first - 1, first, first + 1, *np.flatnonzero(touches)[::15]):
         motion = branch.solutions[place]
-        wanted = shot(
+        wanted = shooting_multipliers(
             lambda x: x + 3.0 * max(x - 1.0, 0.0), lambda x: 1.0 + 3.0 * (x > 1.0), motion, 0.4
         )
-        # Where the stop is just met, its time of contact is steep in the motion.
-        agree(told[place].multipliers, wanted, 5e-3 + 2.0 * told[place].error)
+        # Where the stop is just touched, the contact time depends strongly on the motion.
+        agree(stability[place].multipliers, wanted, 5e-3 + 2.0 * stability[place].error)
 
 
 @pytest.mark.slow
 def test_a_period_doubles_where_time_integration_says_so():
-    """Under a static load the symmetry is gone: from a multiplier of -1 on each second period is
-    the same."""
+    """Beyond a multiplier of -1 only every second period is the same.
+
+    The static load removes the symmetry of the oscillator.
+    """
     model = duffing().model
     load = PeriodicLoad({1: unit_force(model, "m")}, static=1.5 * unit_force(model, "m"))
     problem = oscillator(PolynomialSpring(0.0, cubic=1.0), tuple(range(13)), load=load)
@@ -334,7 +342,7 @@ def test_a_period_doubles_where_time_integration_says_so():
 
 @pytest.mark.slow
 def test_motions_of_a_third_of_the_frequency_are_on_a_closed_branch():
-    """Duffing's subharmonic motions: no end of the span leads to them, and they close."""
+    """Duffing's subharmonic motions form a closed branch that no end of the span leads to."""
     model = lumped_rig({"m": 1.0}, {Link("m"): 1.0}, [[Link("m")]], damping_ratio=0.04)
     load = PeriodicLoad({3: unit_force(model, "m")})
     resolution = Resolution(tuple(range(1, 16, 2)), 128)
@@ -346,7 +354,7 @@ def test_motions_of_a_third_of_the_frequency_are_on_a_closed_branch():
     at = 1.4 / TURN
     starts = list(vibrating_starts(problem, at, 1.2, np.ones(1)))
     found = further_branches(problem, 5.0, span, starts, at, [branch.solutions], control=FINE)
-    # The same motion, one, two and three periods of the force later, is another.
+    # The same motion, shifted by one, two or three periods of the force, is a different one.
     assert [each.closed for each in found] == [True] * 3
     for each in found:
         assert each.first_amplitudes(0).min() > 0.1
@@ -359,10 +367,10 @@ def test_motions_of_a_third_of_the_frequency_are_on_a_closed_branch():
     assert again == ()
 
 
-def test_a_reduced_structure_tells_what_all_modes_do(monkeypatch):
-    """Of many modes few move: with those left out at rest the multipliers hardly change.
+def test_a_reduced_structure_has_the_multipliers_of_all_modes(monkeypatch):
+    """Few of many modes are dynamic: with the others quasi-static, multipliers hardly change.
 
-    As times of the period are not divided where the slider slips, many are taken.
+    Many times are taken, since steps are not divided where the slider slips.
     """
     monkeypatch.setattr(floquet, "LARGE_SAMPLES", 2048)
     names = [f"m{number}" for number in range(12)]
@@ -385,7 +393,7 @@ def test_a_reduced_structure_tells_what_all_modes_do(monkeypatch):
     assert np.any(motion.cycle.states == 1)
 
 
-def test_joints_that_tell_no_deviations_leave_it_unknown():
+def test_joints_without_linearisation_have_no_verdict():
     problem = duffing()
     motion = problem.solve(0.2, 0.3)
 
@@ -396,6 +404,6 @@ def test_joints_that_tell_no_deviations_leave_it_unknown():
             return problem.joints.settle(*arguments)
 
     silent = HarmonicBalance(problem.model, Silent(), problem.load, problem.resolution)
-    told = Floquet(silent).stability(replace(motion))
-    assert told.verdict == "unknown"
-    assert "do not tell" in told.message
+    stability = Floquet(silent).stability(replace(motion))
+    assert stability.verdict == "unknown"
+    assert "cannot be linearised" in stability.message

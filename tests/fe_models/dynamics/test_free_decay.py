@@ -1,9 +1,9 @@
-"""Ring-downs of known damping: linear ones, and one of a uniform Iwan joint."""
+"""Ring-downs of known damping: linear modes, and a uniform Iwan joint."""
 
 import numpy as np
 import pytest
 
-from fe_models.dynamics.transient.free_decay import FLOOR, ring_down
+from fe_models.dynamics.transient.free_decay import SMALLEST_AMPLITUDE, ring_down
 from fe_models.dynamics.transient.impact_hammer import SignalError
 from tests.marks import slow
 
@@ -20,18 +20,19 @@ def decay(ratio, seconds=2.0, phase=0.0, frequency=FREQUENCY):
 @pytest.mark.parametrize("ratio", [1e-3, 0.01, 0.03])
 @pytest.mark.parametrize("phase", [0.0, slow(1.0)])
 def test_linear_mode_gives_its_damping_and_frequency(ratio, phase, band):
-    """To what the filter may hold of the ends (1e-4 of the amplitude, less in its slope)."""
+    """The accuracy is that of the filter's transients: 1e-4 of the amplitude, less in its slope."""
     ringing = ring_down(decay(ratio, phase=phase), STEP, band)
     assert ringing.damping_ratio == pytest.approx(ratio, rel=5e-4)
     damped = FREQUENCY * np.sqrt(1.0 - ratio**2)
     assert ringing.frequency == pytest.approx(damped, rel=5e-6)
     amplitude = np.exp(-ratio * 2.0 * np.pi * FREQUENCY * ringing.time)
-    # An exponential has a wider spectrum than its frequency: what the filter's gain bends of it.
+    # The spectrum of a decay is wider than one frequency, so that the gain of the filter varies
+    # over it.
     assert ringing.amplitude == pytest.approx(amplitude, rel=1e-4 + 10.0 * ratio**2)
-    assert ringing.amplitude[-1] >= 0.99 * FLOOR * ringing.amplitude[0]
+    assert ringing.amplitude[-1] >= 0.99 * SMALLEST_AMPLITUDE * ringing.amplitude[0]
 
 
-def test_other_modes_are_left_out():
+def test_other_modes_are_filtered_out():
     ringing = ring_down(decay(0.005) + 0.3 * decay(0.005, frequency=650.0), STEP, (60.0, 140.0))
     assert ringing.damping_ratio == pytest.approx(0.005, rel=0.01)
     assert ringing.frequency == pytest.approx(FREQUENCY, rel=1e-3)
@@ -47,17 +48,17 @@ def test_noise_scatters_but_does_not_bias():
 
 # --- Iwan ---------------------------------------------------------------------------------------
 
-# Beside the joint a spring twice as stiff; loops of up to a tenth of full slip are
-# looked at: the averaged law is of first order in the amplitude.
+# A spring in parallel to the joint is twice as stiff. Loops of up to a tenth of full slip are
+# examined: the averaged law is of first order in the amplitude.
 MASS, SPRING, JOINT, SLIP = 1e-3, 400.0, 200.0, 0.05
 START = 0.12 * SLIP
 
 
 def iwan_ring_down(periods=900, steps=200):
-    """Displacement from rest at START, by Verlet's steps; reversals follow Masing's rule.
+    """Return displacement from rest at START, by Verlet's method, and the step.
 
-    Each amplitude is below the last, so that no loop closes and the last reversal is all that
-    counts. Returns displacement and step.
+    Reversals follow Masing's rule. Each amplitude is smaller than the last, so that no loop closes
+    and only the last reversal matters.
     """
     step = 2.0 * np.pi * np.sqrt(MASS / (SPRING + JOINT)) / steps
     moved, speed, displacement = START, 0.0, []
@@ -77,10 +78,11 @@ def iwan_ring_down(periods=900, steps=200):
 
 
 def iwan_law(amplitude):
-    """Frequency [Hz] and damping ratio of a slowly decaying vibration of ``amplitude``.
+    """Return frequency [Hz] and damping ratio of a slowly decaying vibration of ``amplitude``.
 
-    Averaged over a period (first harmonic): k(A) = K + kt (1 - A / 2φ) and a' = -E / (2π m ω A),
-    E = 2 kt A³ / (3 φ); so ζ = -a'/(a ω) = E / (4π · k A²/2), the energy lost over 4π that stored.
+    Averaged over a period (first harmonic): k(A) = K + kt (1 - A / 2φ) and a' = -E / (2π m ω A), E
+    = 2 kt A³ / (3 φ); so ζ = -a'/(a ω) = E / (4π · k A²/2), the energy lost over 4π times that
+    stored.
     """
     stiffness = SPRING + JOINT * (1.0 - amplitude / (2.0 * SLIP))
     energy = 2.0 * JOINT * amplitude**3 / (3.0 * SLIP)
@@ -95,7 +97,7 @@ def iwan():
 
 
 def test_iwan_ring_down_gives_its_law(iwan):
-    """Within 2 % up to a tenth of full slip, in proportion: the law is of first order."""
+    """Errors are within 2 % up to a tenth of full slip: the law is of first order."""
     *_, ringing = iwan
     frequency, ratio = iwan_law(ringing.amplitude)
     assert 0.05 * SLIP < ringing.amplitude[0] < 0.1 * SLIP
@@ -107,7 +109,7 @@ def test_iwan_ring_down_gives_its_law(iwan):
 
 
 def test_iwan_ring_down_agrees_with_its_decrement(iwan):
-    """Successive maxima, each the top of a parabola, decay by 2πζ; no filter, no law."""
+    """Successive maxima, each the top of a parabola, decay by 2πζ, without a filter or a law."""
     displacement, step, ringing = iwan
     inner = displacement[1:-1]
     tops = 1 + np.flatnonzero((inner > displacement[:-2]) & (inner >= displacement[2:]))
@@ -120,7 +122,7 @@ def test_iwan_ring_down_agrees_with_its_decrement(iwan):
     assert measured == pytest.approx(ratio[seen], rel=5e-3)
 
 
-# --- nonsense -----------------------------------------------------------------------------------
+# --- invalid records ----------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
@@ -137,7 +139,7 @@ def test_iwan_ring_down_agrees_with_its_decrement(iwan):
         (np.ones((2, 9000)), (50.0, 150.0), "finite"),
     ],
 )
-def test_what_cannot_be_measured_is_refused(signal, band, words):
+def test_invalid_records_are_refused(signal, band, words):
     with pytest.raises(SignalError, match=words):
         ring_down(signal, STEP, band)
     with pytest.raises(SignalError, match="at least 1"):

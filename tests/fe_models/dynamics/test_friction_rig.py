@@ -1,4 +1,4 @@
-"""Two reduced specimens in the rig: masses, signs, and the stiffness that the parts have alone."""
+"""Two reduced specimens in the rig: masses, signs, and the stiffnesses of the parts alone."""
 
 from dataclasses import replace
 
@@ -38,7 +38,7 @@ def rig(bodies):
 
 
 def together(model, axis):
-    """All displacements of a rig whose moving parts move as one along an axis."""
+    """Return all displacements of a rig whose moving parts move as one along an axis."""
     return np.array(
         [name.endswith(f" {axis}") and not name.startswith("lower") for name in model.names]
     ).astype(float)
@@ -62,12 +62,12 @@ def test_targets_are_vertices_of_the_side_close_to_where_they_are_wanted(bodies,
 
 
 def test_moved_as_one_it_has_the_mass_of_its_parts_and_only_the_leaf_spring(rig):
-    """A rigid motion does not strain the upper specimen: its mass is that of its volume."""
+    """A rigid motion does not strain the upper specimen, whose mass is that of its volume."""
     volume = np.pi * SPECIMEN.diameter**2 / 4.0 * SPECIMEN.length
     for axis, masses in (("x", sum(MASSES)), ("z", MASSES[1])):
         motion = together(rig, axis)
         mass = motion @ rig.mass @ motion - masses
-        # A polygon of a few edges, narrowed to its strip.
+        # The cross-section is a polygon of a few edges, narrowed to its strip.
         assert mass == pytest.approx(STEEL.density * volume, rel=0.15)
     along = together(rig, "x")
     assert along @ rig.stiffness @ along == pytest.approx(SPRINGS[0], rel=1e-6)
@@ -82,7 +82,7 @@ def test_joints_close_as_the_upper_specimen_comes_down_and_slide_as_it_goes_alon
 
 
 def test_open_it_is_the_rig_with_the_specimens_mass(rig, bodies):
-    """The first frequency of the two masses, the specimen (1 %) on the second."""
+    """The first frequency is that of the two masses, with the specimen (1 %) on the second."""
     motion = together(rig, "x")
     added = motion @ rig.mass @ motion - sum(MASSES)
     masses = MASSES[0], MASSES[1] + added
@@ -93,7 +93,7 @@ def test_open_it_is_the_rig_with_the_specimens_mass(rig, bodies):
 
 
 def test_tied_pads_are_as_stiff_as_the_reduced_pair(rig, bodies, mesh):
-    """Statically, with m1 held: k2 plus the pair's own stiffness with its pads tied."""
+    """Statically, with m1 held, the stiffness is k2 plus that of the pair with its pads tied."""
     joint = RIGID * rig.connection.T @ rig.connection
     force = unit_force(rig, "m2 x")
     held = rig.stiffness + joint + RIGID * np.diag(unit_force(rig, "m1 x"))
@@ -107,7 +107,7 @@ def test_tied_pads_are_as_stiff_as_the_reduced_pair(rig, bodies, mesh):
     assert stiffness - SPRINGS[1] == pytest.approx(tied, rel=1e-5)
 
 
-def test_what_is_no_pair_of_specimens_is_refused(bodies):
+def test_specimens_that_do_not_match_are_refused(bodies):
     lower, upper = bodies
     with pytest.raises(RigError, match="no mass or no names"):
         friction_rig(replace(lower, mass=None), upper, MASSES, SPRINGS)

@@ -1,4 +1,4 @@
-"""Structures on a ground that moves, against absolute coordinates and closed forms."""
+"""Structures on moving ground, against absolute coordinates and closed forms."""
 
 import numpy as np
 import pytest
@@ -20,7 +20,7 @@ WAY = 0.01
 
 
 def shaken(joints, harmonics=(1,)):
-    """Two masses of unlike weight on a ground that moves as a sine."""
+    """Return two different masses on a ground that moves as a sine."""
     springs = {Link("a"): 1e3, Link("b", "a"): 3e3}
     rig = lumped_rig({"a": 1e-3, "b": 2e-3}, springs, [[Link("b")]], 0.02)
     load = PeriodicLoad({}, inertial={1: -1j * WAY * rig.mass.sum(axis=1)})
@@ -40,7 +40,7 @@ def test_transmissibility_of_one_mass(ratio):
     assert passed == pytest.approx(np.sqrt((1.0 + turned) / ((1.0 - ratio**2) ** 2 + turned)))
 
 
-def test_derivatives_know_that_the_load_changes_with_the_frequency():
+def test_derivatives_include_the_change_of_the_load_with_frequency():
     balance = shaken(SLIDER, (1, 3))
     motion = balance.solve(140.0, 3.0)
     unknowns, step = motion.coefficients.ravel(), 1e-5
@@ -65,7 +65,7 @@ def test_phase_resonance_under_such_a_load_is_refused():
 
 
 def free_body(axes="xyz", points=("pad 1", "ring 1", "ring 2"), seed=0):
-    """Springs and a full mass matrix between points; a translation strains nothing."""
+    """Return springs and a full mass matrix between points; a translation strains nothing."""
     random = np.random.default_rng(seed)
     names = tuple(f"{point} {axis}" for point in points for axis in axes)
     size, each = len(names), len(axes)
@@ -86,8 +86,8 @@ def free_body(axes="xyz", points=("pad 1", "ring 1", "ring 2"), seed=0):
     )
 
 
-def test_what_holds_a_body_counts_with_its_mass():
-    """Points that move with the ground, in absolute coordinates, against -M r x_g''."""
+def test_the_mass_of_what_holds_a_body_counts():
+    """Points that move with the ground, in absolute coordinates, agree with -M r x_g''."""
     lower, upper = free_body(seed=1), free_body(seed=2)
     moved = translation_of(lower, "x")
     held = np.array([name.startswith("ring") for name in lower.names])
@@ -99,7 +99,7 @@ def test_what_holds_a_body_counts_with_its_mass():
     inertia = ground_inertia(lower, upper, (0.02, 0.001), "x")
     relative = np.linalg.solve(dynamic[np.ix_(~held, ~held)], angular**2 * inertia[:3])
     np.testing.assert_allclose(moved[~held] + relative, absolute, rtol=1e-9)
-    # The upper specimen stands on m2, and moves along x as a whole; m1 is the last.
+    # The upper specimen stands on m2 and moves along x as a whole; m1 is the last displacement.
     assert inertia[-1] == 0.02
     upper_moved = translation_of(upper, "x")
     whole = upper_moved @ upper.mass @ upper_moved

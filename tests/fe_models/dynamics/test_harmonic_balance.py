@@ -40,7 +40,7 @@ from wear.joints.periodic.march import STICK, PeriodicMarch
 
 
 def mixed_rig():
-    """One joint of three directions, damping that mixes modes, and nothing else along z."""
+    """Return a rig whose joint alone holds it along z, with damping that couples modes."""
     names = ("x", "y", "z")
     model = lumped_rig(
         dict(zip(names, (2e-3, 3e-3, 1e-3), strict=True)),
@@ -84,8 +84,8 @@ def test_receptances_are_the_inverse_of_the_dynamic_stiffness(damping):
         np.testing.assert_allclose(between[place], wanted, rtol=EXACT)
 
 
-def test_modes_far_above_the_forces_answer_as_at_rest():
-    """A chain of 40 masses, its few lowest modes slow: all others miss (ω/ω_n)² of their part."""
+def test_modes_far_above_the_forces_respond_quasistatically():
+    """A chain of 40 masses has a few slow modes; all others are in error by (ω/ω_n)²."""
     names = [f"m{place}" for place in range(40)]
     springs = {Link(name): 1e5 * 1.4**place for place, name in enumerate(names)}
     springs |= {Link(one, other): 1e6 for one, other in pairwise(names)}
@@ -100,7 +100,9 @@ def test_modes_far_above_the_forces_answer_as_at_rest():
     some = np.array([0, 2])
     answer = ResidualReceptance(receptance, resolution, angular, some).respond(force)
     between = receptance.at(angular).between_joints()[:, :, some]
-    wanted = resolution.separated((between @ resolution.combined(force)[:, :, None])[:, :, 0])
+    wanted = resolution.real_from_complex(
+        (between @ resolution.complex_from_real(force)[:, :, None])[:, :, 0]
+    )
     np.testing.assert_allclose(answer, wanted, atol=AT_REST**-2 * np.abs(wanted).max())
 
 
@@ -119,12 +121,12 @@ def test_a_structure_that_nothing_holds_is_refused():
 def test_coefficients_and_complex_amplitudes_are_the_same_function_of_time(harmonics):
     resolution = Resolution(harmonics, 32)
     rows = np.random.default_rng(9).standard_normal((resolution.size, 6))
-    amplitudes = resolution.combined(rows)
+    amplitudes = resolution.complex_from_real(rows)
     turns = 2.0 * np.pi * np.outer(np.arange(32), harmonics) / 32
     in_time = (np.exp(1j * turns) @ amplitudes).real
     np.testing.assert_allclose(resolution.basis @ rows, in_time, atol=1e-13)
     np.testing.assert_allclose(resolution.weights @ in_time, rows, atol=1e-13)
-    np.testing.assert_array_equal(resolution.separated(amplitudes), rows)
+    np.testing.assert_array_equal(resolution.real_from_complex(amplitudes), rows)
     by_joint = np.random.default_rng(10).standard_normal((3, resolution.size, 2))
     again = resolution.coefficients(resolution.amplitudes(by_joint), 2)
     np.testing.assert_array_equal(again, by_joint)
@@ -159,7 +161,7 @@ def test_derivatives_of_the_equations(case, varies):
 
 @pytest.mark.parametrize("case", ["rig", "mixed"])
 def test_products_with_the_jacobian_are_those_of_the_matrix(case, monkeypatch):
-    """Large problems never assemble it: the motion they find is the same."""
+    """Large problems never assemble the Jacobian, and find the same motion."""
     problem = balance(rig(0.02)) if case == "rig" else mixed_problem()
     motion = 0.01 * np.random.default_rng(5).standard_normal(problem.size)
     force = 60.0 if case == "rig" else 1.0
@@ -184,20 +186,20 @@ def test_products_with_the_jacobian_are_those_of_the_matrix(case, monkeypatch):
 
 @pytest.mark.parametrize("free", [False, True])
 def test_stuck_joints_are_preconditioned_by_their_stiffness(free):
-    """Where joints do as at rest, the inverse that is known is that of the Jacobian."""
+    """Where joints act as at rest, the preconditioner is the inverse of the Jacobian."""
     model = contact_rig()
     if not free:
         model = replace(model, stiffness=np.diag([500.0, 700.0, 900.0]))
     load = pressed(model, 8.0, 1.0)
     problem = balance(model, PeriodicMarch(FrictionContact(300.0, 400.0, 0.5)), (0, 1, 2), 64, load)
-    assert (problem.transfer.held > 0.0) == free
+    assert (problem.transfer.holding_stiffness > 0.0) == free
     motion = problem.solve(30.0, 0.1)
     assert np.all(motion.cycle.states == STICK)
     at = problem.evaluate(motion.coefficients.ravel(), 30.0, 0.1, "frequency")
     products = HarmonicJacobian(problem.transfer, problem.rest, at.steady, at.cycle.jacobian)
     vector = np.random.default_rng(8).standard_normal(problem.size)
     np.testing.assert_allclose(products.precondition(products @ vector), vector, atol=1e-9)
-    # In one step, also where joints do something else, and are nearer to sliding.
+    # The product is exact also where joints act otherwise, and are closer to sliding.
     for factor in (100.0, 1e5):
         moved = motion.coefficients.copy()
         moved[:, 1:] *= factor
@@ -229,21 +231,22 @@ def test_loops_over_few_modes_and_joints_are_the_products_of_many(monkeypatch, h
 
 
 def test_a_solution_keeps_no_derivatives():
-    """They would be megabytes for each point of a curve."""
+    """The derivatives would take megabytes for each point of a curve."""
     solution = balance(rig()).solve(90.0, 60.0)
     assert not hasattr(solution.cycle, "jacobian")
     assert solution.cycle.samples.shape == (256, 1, 1)
 
 
 @pytest.mark.parametrize(("load", "gap"), [(0.0, 0.001), (3.0, 0.0)])
-def test_harmonics_left_out_are_what_their_forces_would_cause(load, gap):
-    """Harmonic by harmonic, by the transform of the forces and the dynamic stiffness.
+def test_neglected_harmonics_are_the_response_to_their_forces(load, gap):
+    """Each neglected harmonic is computed from the Fourier transform of the forces.
 
-    With the joint free, or as stiff as it is at rest: open, or pressed and stuck.
+    The dynamic stiffness is that with the joint free, or as stiff as at rest: open, or pressed and
+    stuck.
     """
     free = np.diag([1300.0, 800.0, 700.0])
     mixed = mixed_rig()
-    # Modes that damping does not mix: what the stiffened structure leaves out.
+    # Damping does not couple the modes, as assumed for the stiffened structure.
     model = replace(mixed, stiffness=free, damping=1e-4 * free + 0.5 * mixed.mass)
     waves = {1: unit_force(model, "x") * (1.0 - 2j) + unit_force(model, "z") * 3.0}
     joints = PeriodicMarch(FrictionContact(300.0, 400.0, 0.5, normal_load=load, gap=gap))
@@ -287,7 +290,7 @@ def test_free_and_stuck_rig_are_linear(friction, held, peak):
         omega = 2.0 * np.pi * solution.frequency
         dynamic = stiffness + 1j * omega * model.damping - omega**2 * model.mass
         wanted = np.linalg.solve(dynamic, -10j * unit_force(model, "m1"))
-        # A residual of 1e-10 on both sides; a resonance makes 1/2ζ = 500 times as much of it.
+        # Both sides have a residual of 1e-10, which a resonance multiplies by 1/2ζ = 500.
         np.testing.assert_allclose(solution.motion[0], wanted, rtol=2e-7)
         assert np.abs(solution.motion[1:]).max() <= 1e-9 * np.abs(wanted).max()
         assert solution.left_out <= 1e-12
@@ -307,7 +310,7 @@ def test_without_force_nothing_moves():
 
 @pytest.mark.parametrize("reaches", [0.5, 1.5, 4.0, 50.0])
 def test_jenkins_oscillator_of_one_harmonic(reaches):
-    """From the amplitude the closed form gives the force; balance gives the amplitude back."""
+    """The closed form gives the force for an amplitude; harmonic balance returns the amplitude."""
     model = lumped_rig({"m": 2e-3}, {Link("m"): 800.0}, [[Link("m")]], 0.02)
     law = Jenkins(1500.0, 0.5, 10.0, 30.0)
     amplitude, frequency = reaches * 5.0 / 1500.0, 120.0
@@ -324,7 +327,7 @@ def test_jenkins_oscillator_of_one_harmonic(reaches):
 
 @pytest.mark.parametrize("upward", [True, False])
 def test_duffing_oscillator_of_one_harmonic_folds_both_ways(upward):
-    """((k + ¾ κ a² - m ω²)² + c² ω²) a² = F² at every point, folds included."""
+    """At every point ((k + ¾ κ a² - m ω²)² + c² ω²) a² = F², folds included."""
     model = lumped_rig({"m": 1e-3}, {Link("m"): 40.0}, [[Link("m")]], 0.02)
     problem = balance(model, CubicSprings(100.0), (1,), 16, sine(model, "m"))
     force = 1.5
@@ -365,7 +368,7 @@ def test_force_is_followed_through_folds_too():
 @pytest.mark.slow
 @pytest.mark.parametrize(("frequency", "force"), [(100.0, 75.0), (150.0, 40.0)])
 def test_rig_against_its_exact_steady_state(frequency, force):
-    """Event-driven integration, settled to 1e-12; error falls below 1e-4 with the harmonics."""
+    """The event-driven reference has settled to 1e-12; more harmonics reduce the error to 1e-4."""
     model, samples = rig(0.02), 256
     motion = integrate_exactly(
         model,
@@ -393,7 +396,7 @@ def test_rig_against_its_exact_steady_state(frequency, force):
 # --- Accuracy
 
 
-def test_too_few_samples_are_seen_by_twice_as_many():
+def test_twice_as_many_samples_reveal_too_few():
     coarse, fine = balance(rig(), samples=64), balance(rig(), samples=4096)
     rough, exact = coarse.solve(100.0, 75.0), fine.solve(100.0, 75.0)
 
@@ -420,7 +423,7 @@ def test_harmonics_and_samples_grow_to_a_tolerance():
 
 
 def reaches_the_end(force, tolerance):
-    """The branch of the rig, which has no folds, up to the far end of its span."""
+    """Check that the branch of the rig, which has no folds, reaches the far end of its span."""
     span = (20.0, 400.0)
     branch = along_frequency(balance(rig()), force, span, accuracy=Accuracy(tolerance))
     assert branch.message == ""
@@ -442,8 +445,8 @@ def test_branches_of_all_forces_reach_the_far_end(force, tolerance):
     reaches_the_end(float(force), tolerance)
 
 
-def test_the_error_of_motions_is_told_within_a_factor_of_three():
-    """Vibration and energy against many harmonics, at nineteen of twenty motions of a branch."""
+def test_the_error_of_motions_is_estimated_within_a_factor_of_three():
+    """Many harmonics give the true errors of vibration and energy, at 19 of 20 motions."""
     branch = along_frequency(balance(rig()), 30.0, (60.0, 300.0), accuracy=Accuracy(0.05))
     fine = balance(rig(), harmonics=tuple(range(1, 128, 2)), samples=4096)
     ratios = []

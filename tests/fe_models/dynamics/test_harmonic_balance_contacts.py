@@ -1,4 +1,4 @@
-"""Harmonic balance of contacts in three dimensions: balances, limits, joints apart."""
+"""Harmonic balance of contacts in three dimensions: balances, limits, independent joints."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from wear.joints.periodic.march import SEPARATED, SLIP, STICK, PeriodicMarch
 
 
 def test_preload_alone_closes_the_gap():
-    """z is held by the contact only: gap plus load over kn, whatever the frequency."""
+    """The contact alone holds z, which moves by the gap plus load over kn at every frequency."""
     model, law = contact_rig(), FrictionContact(300.0, 400.0, 0.5, gap=0.01)
     problem = balance(model, PeriodicMarch(law), (0, 1, 2, 3), 64, pressed(model, 8.0, 1.0))
     still = problem.solve(30.0, 0.0)
@@ -35,7 +35,7 @@ def test_preload_alone_closes_the_gap():
 
 
 def test_contact_that_opens_and_closes_balances_in_the_mean():
-    """All that carries the mean load is the contact: its mean force is the load."""
+    """The contact alone carries the mean load, so that its mean force is the load."""
     model, law = contact_rig(), FrictionContact(300.0, 400.0, 0.5)
     load = pressed(model, 8.0, 12.0, 2.0)
     problem = balance(model, PeriodicMarch(law), tuple(range(12)), 512, load)
@@ -63,8 +63,8 @@ def test_an_open_contact_leaves_the_structure_linear():
     assert np.all(solution.cycle.states == SEPARATED)
 
 
-def test_joints_apart_do_not_see_each_other():
-    """Two rigs in one model move as each alone, with its own load."""
+def test_joints_of_separate_rigs_do_not_interact():
+    """Two rigs in one model move as each alone does under its own load."""
     one = rig(0.02)
     pair = DynamicModel(
         *(np.kron(np.eye(2), part) for part in (one.mass, one.damping, one.stiffness)),

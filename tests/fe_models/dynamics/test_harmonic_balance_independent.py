@@ -1,7 +1,7 @@
-"""Harmonic balance against two integrators in time that know nothing of harmonics.
+"""Harmonic balance against two time integrators that do not use harmonics.
 
-A steady motion is a fixed point of what an integrator makes of a state in one period, however long
-a ring-down takes: at a damping ratio of 0.001 thousands of periods.
+A steady motion is a fixed point of the map of a state over one period. The fixed point is found
+directly, however long a ring-down takes: at a damping ratio of 0.001 it takes thousands of periods.
 """
 
 from __future__ import annotations
@@ -34,14 +34,14 @@ WANTED = 1e-4  # agreement of the motions, over the largest displacement
 
 
 def rig(ratio):
-    """The thesis's rig."""
+    """Return the rig of the thesis."""
     return two_mass_rig((21.152e-3, 1.189e-3), (1.3469e3, 273e3), ratio)
 
 
 def fixed_point(period, state):
-    """A state ``(n,)`` that a period leads back to itself, by Newton's method.
+    """Return the state ``(n,)`` that a period maps to itself, by Newton's method.
 
-    A derivative is kept while a step with it leaves a twentieth of the change at most.
+    A derivative is reused while a step with it leaves at most a twentieth of the change.
     """
     moving, slopes, before = np.flatnonzero(state), None, np.inf
     for _ in range(40):
@@ -57,7 +57,7 @@ def fixed_point(period, state):
 
 
 def slope(period, state, end, place):
-    """Derivative of a period by one number of a state that it leads to ``end``."""
+    """Return the derivative of the end of a period by one number of its initial state."""
     step = np.zeros(len(state))
     step[place] = 1e-6 * abs(state[place])
     return (period(state + step) - end) / step[place]
@@ -65,9 +65,9 @@ def slope(period, state, end, place):
 
 @dataclass(frozen=True)
 class ExactPeriod:
-    """One period of a rig with a Jenkins joint, from event to event.
+    """One period of a rig with a Jenkins joint, integrated from event to event.
 
-    A state is displacements, velocities over ω, and where the slider is.
+    A state consists of displacements, velocities over ω, and the position of the slider.
     """
 
     model: object
@@ -90,7 +90,7 @@ class ExactPeriod:
         )
 
     def steady(self):
-        """The steady motion at :data:`SAMPLES` times, and the energy lost in a period."""
+        """Return the steady motion at :data:`SAMPLES` times, and the energy lost in a period."""
         state = np.zeros(2 * len(self.model.mass) + 1)
         for _ in range(PERIODS):
             state = self(state)
@@ -100,9 +100,10 @@ class ExactPeriod:
 
 @dataclass(frozen=True)
 class NewmarkPeriod:
-    """One period in so many steps of average acceleration, with one joint.
+    """One period in a number of steps of average acceleration, with one joint.
 
-    A state is displacements, velocities over ω, and the stretch of the joint's tangential springs.
+    A state consists of displacements, velocities over ω, and the stretch of the joint's tangential
+    springs.
     """
 
     model: object
@@ -115,7 +116,8 @@ class NewmarkPeriod:
         size, speed = len(self.model.mass), 2.0 * np.pi * self.frequency
         apart = self.model.connection @ state[:size]
         stretch = state[2 * size :]
-        # A slider remembers where it is and its stretch; a contact its stretch and how near it is.
+        # The state of a slider is its position and stretch, that of a contact its stretch and
+        # approach.
         joint = [*stretch, apart[2]] if len(stretch) == 2 else [apart[0], *stretch]
         start = Start(state[:size], speed * state[size : 2 * size], np.array([joint]))
         return integrate(
@@ -137,9 +139,9 @@ class NewmarkPeriod:
 
 
 def newmark_steady(periods, state=None):
-    """States, steady motions and energies lost in a period, of ever finer :class:`NewmarkPeriod`.
+    """Return states, steady motions and energies lost per period of ever finer periods.
 
-    From rest, or from a ``state``.
+    The iteration starts from rest, or from a ``state``.
     """
     if state is None:
         size = 2 * len(periods[0].model.mass)
@@ -155,12 +157,12 @@ def newmark_steady(periods, state=None):
 
 
 def extrapolated(coarse, fine):
-    """Without the error of second order in the step."""
+    """Return the extrapolation that removes the error of second order in the step."""
     return (4.0 * fine - coarse) / 3.0
 
 
 def furthest(one, other):
-    """Largest difference of motions ``(t, n)``, over the largest displacement of each point."""
+    """Return the largest difference of motions ``(t, n)``, relative to each displacement."""
     return (np.abs(one - other).max(axis=0) / np.abs(other).max(axis=0)).max()
 
 
@@ -179,7 +181,7 @@ def odd_balance(model, highest, samples):
         slow(0.001, 150.0, 40.0, 63),
         (0.02, 150.0, 40.0, 63),
         (0.001, 240.0, 200.0, 31),
-        # The second mode, at 2478 Hz with the joint free, is in the way of harmonic 63.
+        # The second mode, at 2478 Hz with the joint free, is close to harmonic 63.
         slow(0.02, 39.0, 60.0, 91),
     ],
 )
@@ -200,10 +202,10 @@ def test_jenkins_rig_is_the_fixed_point_of_event_driven_integration(
 @pytest.mark.slow
 @pytest.mark.parametrize("ratio", [0.001, 0.02])
 def test_error_falls_with_the_third_power_of_the_harmonics(ratio):
-    """The slope of the joint's force jumps where it begins to slip, and its harmonics fall as k⁻².
+    """The slope of the joint's force jumps where slip begins: its harmonics fall as k⁻².
 
-    Those of the displacement then fall as k⁻⁴ beyond the second mode, here at harmonic 17, and what
-    is left out in all as k⁻³: 3.4 is what these harmonics show.
+    Those of the displacement then fall as k⁻⁴ above the second mode, here at harmonic 17, and the
+    sum of the neglected ones as k⁻³. These harmonics show an order of 3.4.
     """
     model = rig(ratio)
     wanted, _ = ExactPeriod(model, HarmonicForce(unit_force(model, "m1"), 40.0, 150.0)).steady()
@@ -214,7 +216,8 @@ def test_error_falls_with_the_third_power_of_the_harmonics(ratio):
         errors.append(furthest(solution.displacement(SAMPLES), wanted))
         estimates.append(solution.left_out)
     assert -4.0 < np.polyfit(np.log(highest), np.log(errors), 1)[0] < -2.9
-    # What a solution says of itself: the norm over time, not the largest, of the joint alone.
+    # The error estimate of a solution is the norm over time, not the largest value, for the joint
+    # alone.
     assert np.all(np.divide(errors, estimates) > 1.0)
     assert np.all(np.divide(errors, estimates) < 10.0)
 
@@ -222,7 +225,7 @@ def test_error_falls_with_the_third_power_of_the_harmonics(ratio):
 @pytest.mark.slow
 @pytest.mark.parametrize("ratio", [0.001, 0.02])
 def test_jenkins_rig_is_the_fixed_point_of_newmark(ratio):
-    """Second order in the step: what is left after extrapolation is below 1e-4."""
+    """Newmark is of second order; after extrapolation the error is below 1e-4."""
     model = rig(ratio)
     force = HarmonicForce(unit_force(model, "m1"), 40.0, 150.0)
     periods = [NewmarkPeriod(model, JENKINS, force, 150.0, steps) for steps in (1024, 2048)]
@@ -242,7 +245,7 @@ SHAKEN = {"m1": (75.0, 0.0), "y": (20.0, 1.9), "z": (110.0, 0.7)}
 
 
 class PressedRig:
-    """The rig, whose contact also moves across (y) and is pressed and lifted (z)."""
+    """Rig whose contact also moves across (y), and is pressed and lifted (z)."""
 
     frequency = 100.0
     law = FrictionContact(KT, 1.3 * KT, MU, LOAD)
@@ -254,7 +257,7 @@ class PressedRig:
             [[Link("m2"), Link("y"), Link("z")]],
             ratio,
         )
-        # More than balances the contact's own load: it is pressed by 0.1 µm more at rest.
+        # The load exceeds that of the contact: at rest it is pressed by 0.1 µm more.
         self.static = (LOAD + 8.0) * unit_force(self.model, "z")
 
     @property
@@ -292,7 +295,8 @@ def check_pressed_rig(pressed, steady, resolutions, allowed):
     assert {STICK, SLIP, SEPARATED} == set(np.unique(solution.cycle.states))
     assert errors[-1] <= allowed
     assert solution.cycle.dissipated[0] == pytest.approx(extrapolated(lost, lost_fine), rel=allowed)
-    # The mean: spring and contact carry the load, and not as at rest, since lift-off cuts a part.
+    # In the mean, spring and contact carry the load, but not as at rest, since lift-off cuts part
+    # of the force.
     mean, pressing = solution.amplitude(3, 0).real, solution.cycle.samples[:, 0, 2].mean()
     assert 20e3 * mean + pressing == pytest.approx(LOAD + 8.0, rel=1e-8)
     assert abs(pressing - LOAD) > 5.0
@@ -301,7 +305,7 @@ def check_pressed_rig(pressed, steady, resolutions, allowed):
 
 @pytest.mark.slow
 def test_contact_that_lifts_off_is_the_fixed_point_of_newmark():
-    """31 harmonics and 1024 steps: both leave less than 1e-3, 15 harmonics ten times as much."""
+    """Errors of 31 harmonics and 1024 steps are below 1e-3, those of 15 ten times as large."""
     pressed = PressedRig(0.02)
     steady = newmark_steady(pressed.newmark(512, 1024))
     errors = check_pressed_rig(pressed, steady, [(15, 512), (31, 1024)], 1e-3)
@@ -311,7 +315,7 @@ def test_contact_that_lifts_off_is_the_fixed_point_of_newmark():
 @pytest.mark.slow
 @pytest.mark.parametrize("ratio", [0.001, 0.02])
 def test_contact_that_lifts_off_is_the_fixed_point_of_newmark_to_1e_4(ratio):
-    """With little damping it is found from the one with more."""
+    """With little damping the search starts from the result with more damping."""
     state = newmark_steady(PressedRig(0.02).newmark(512))[0][0]
     pressed = PressedRig(ratio)
     steady = newmark_steady(pressed.newmark(512, 2048, 4096), state)

@@ -1,4 +1,4 @@
-"""Blows on structures whose response is known: H1, windows, quantities and resonances."""
+"""Hammer blows on structures of known response: H1, windows, quantities and resonances."""
 
 from dataclasses import replace
 
@@ -16,7 +16,7 @@ STEP, PEAK, DURATION = 2e-5, 100.0, 4e-4
 
 
 def rig(ratio):
-    """Mass, damping and stiffness with the damping ratio in both modes; natural frequencies."""
+    """Return mass, damping, stiffness and natural frequencies, with one damping ratio."""
     root = np.sqrt(np.diag(MASS))
     squares, modes = np.linalg.eigh(STIFFNESS / np.outer(root, root))
     shapes = root[:, None] * modes
@@ -25,7 +25,7 @@ def rig(ratio):
 
 
 def transfer(frequency, ratio, order=2, decay=0.0):
-    """x1 over a force on mass 1, times (σ + iω)^order."""
+    """Return x1 over a force on mass 1, times (σ + iω)^order."""
     viscous, _ = rig(ratio)
     s = decay + 2j * np.pi * frequency
     dynamic = STIFFNESS + s[:, None, None] * viscous + s[:, None, None] ** 2 * MASS
@@ -33,9 +33,9 @@ def transfer(frequency, ratio, order=2, decay=0.0):
 
 
 def blow(ratio, seconds, sampling=STEP):
-    """Half sine on mass 1 and the acceleration of mass 1, exact at the samples.
+    """Return half a sine on mass 1 and the acceleration of mass 1, exact at the samples.
 
-    The half sine is the motion of an oscillator that drives the structure, until it stops.
+    The half sine is the motion of an oscillator that drives the structure until it stops.
     """
     viscous, _ = rig(ratio)
     inverse, rate = np.linalg.inv(MASS), np.pi / DURATION
@@ -57,7 +57,7 @@ def blow(ratio, seconds, sampling=STEP):
 
 @pytest.fixture(scope="module")
 def damped():
-    """A blow whose ring-down ends in the record."""
+    """Return a blow whose ring-down ends within the record."""
     return blow(0.01, 1.5)
 
 
@@ -66,7 +66,7 @@ def near(response, lowest=20.0, highest=1500.0):
 
 
 def error(sampling):
-    """Largest error below 1500 Hz over the largest response."""
+    """Return the largest error below 1500 Hz over the largest response."""
     response = frequency_response(*blow(0.01, 1.0, sampling), sampling)
     band = near(response)
     assert response.coherence is None
@@ -76,9 +76,9 @@ def error(sampling):
 
 
 def test_single_blow_is_the_transfer_function():
-    """Sums for the integrals of the half sine, which has kinks: second order in the step.
+    """Sums replace integrals of the half sine, which has kinks: second order in the step.
 
-    Relative error (π step / duration)² / 12 of the force's spectrum.
+    The relative error of the force's spectrum is (π step / duration)² / 12.
     """
     coarse, fine = error(4e-5), error(2e-5)
     assert fine == pytest.approx((np.pi * 2e-5 / DURATION) ** 2 / 12.0, rel=0.1)
@@ -97,7 +97,7 @@ def test_conversions_are_factors_of_the_frequency(damped):
 
 
 def test_exponential_window_is_a_complex_frequency():
-    """A tenth of a second is far too short for a damping of 0.001."""
+    """A tenth of a second is far too short for a damping ratio of 0.001 without a window."""
     record, decay = blow(0.001, 0.15), 60.0
     response = frequency_response(*record, STEP, decay=decay)
     exact = transfer(response.frequency, 0.001, decay=decay)
@@ -108,12 +108,12 @@ def test_exponential_window_is_a_complex_frequency():
     _, natural = rig(0.001)
     (first,) = resonances(response, 50.0, 1000.0)
     assert first.natural_frequency == pytest.approx(natural[0], rel=1e-4)
-    # Of its damping rate 98 % are the window's, and are taken off again.
+    # The window makes up 98 % of the damping rate, and is subtracted again.
     assert first.damping_ratio == pytest.approx(0.001, abs=2e-4)
 
 
 def test_h1_of_several_noisy_blows(damped):
-    """Noise of the response averages out, and shows in the coherence."""
+    """Noise of the response averages out, and reduces the coherence."""
     generator = np.random.default_rng(4)
     force, response = damped
     scale = np.array([0.7, 1.0, 1.3, 0.9] * 10)[:, None]
@@ -148,7 +148,7 @@ def test_force_window_drops_what_comes_after_the_blow(damped):
 def test_resonances_are_those_of_the_modes(damped):
     response = frequency_response(*damped, STEP)
     _, natural = rig(0.01)
-    # Short of 3750 Hz, which a half sine of 0.4 ms does not excite.
+    # Frequencies stay below 3750 Hz, which a half sine of 0.4 ms does not excite.
     modes = resonances(response, 50.0, 3000.0, share=0.01)
     assert [mode.natural_frequency for mode in modes] == pytest.approx(natural, rel=1e-3)
     assert [mode.damping_ratio for mode in modes] == pytest.approx([0.01, 0.01], rel=0.02)
@@ -160,7 +160,7 @@ def test_resonances_are_those_of_the_modes(damped):
 
 
 def test_resonance_of_a_single_mode_is_exact():
-    """Three samples are enough, whatever the quantity, and whatever constant is beside it."""
+    """Three samples are enough, for any quantity and with any constant added."""
     frequency = np.arange(1.0, 200.0, 0.5)
     s = 2j * np.pi * frequency
     natural, ratio = 2.0 * np.pi * 41.3, 0.004
@@ -193,7 +193,7 @@ def test_resonance_of_a_single_mode_is_exact():
         ((np.ones(8), np.ones(8), 1.0), "no part at some frequency"),
     ],
 )
-def test_nonsense_is_refused(arguments, words):
+def test_invalid_records_are_refused(arguments, words):
     with pytest.raises(SignalError, match=words):
         frequency_response(*arguments)
     with pytest.raises(SignalError, match="decay"):

@@ -1,4 +1,4 @@
-"""Average acceleration with implicit friction: energy, order, closed forms, and honest failure."""
+"""Average acceleration with implicit friction: energy, order, closed forms, and failure."""
 
 from dataclasses import dataclass, replace
 
@@ -19,7 +19,7 @@ SOLVED = 1e-9
 
 @dataclass(frozen=True)
 class LinearSpring:
-    """A joint that only holds."""
+    """Joint that is a linear spring."""
 
     stiffness: float
     directions = 1
@@ -35,7 +35,7 @@ class LinearSpring:
 
 @pytest.fixture(scope="module")
 def rig():
-    """Two masses and two joints, to the ground and between them, that slip at different times."""
+    """Return two masses and two joints, to the ground and between them."""
     masses = {"a": 2e-3, "b": 1e-3}
     springs = {Link("a"): 400.0, Link("b", "a"): 900.0}
     return lumped_rig(masses, springs, [[Link("b")], [Link("b", "a")]], 0.01)
@@ -54,13 +54,13 @@ def drive(rig):
 
 @pytest.fixture(scope="module")
 def exact(rig, law, drive):
-    """The same joints integrated from event to event."""
+    """Return the motion with the same joints, integrated from event to event."""
     sliders = SliderJoints(law.stiffness, law.friction * law.normal_load, law.residual_stiffness)
     return integrate_exactly(rig, sliders, drive, 0.05, 1e-3)
 
 
 def error(motion, exact):
-    """Largest error of displacement, relative to the largest displacement."""
+    """Return the largest error of displacement, relative to the largest displacement."""
     difference = np.abs(motion.displacement - exact.displacement).max()
     return difference / np.abs(exact.displacement).max()
 
@@ -71,7 +71,7 @@ def order(steps, errors):
 
 @pytest.mark.parametrize("held", [False, True])
 def test_energy_is_kept_without_friction(held):
-    """1e-10 over 1e4 steps of both modes, coarse for the second, with and without a joint."""
+    """It is kept to 1e-10 over 1e4 steps, coarse for the second mode, with and without a joint."""
     rig = two_mass_rig((21.2e-3, 1.2e-3), (1.4e3, 273e3))
     joint = LinearSpring(27.3e3) if held else None
     start = Start(np.array([0.01, 0.02]), np.array([3.0, -2.0]))
@@ -85,8 +85,8 @@ def test_energy_is_kept_without_friction(held):
 
 
 @pytest.mark.parametrize("tolerance", [None, 1e-4])
-def test_what_is_done_is_told(tolerance):
-    """Also where a first run in whole steps finds how large the motion is."""
+def test_progress_is_reported(tolerance):
+    """Progress is also correct where a first run in whole steps finds how large the motion is."""
     rig, start, shares = two_mass_rig((21.2e-3, 1.2e-3), (1.4e3, 273e3)), Start(np.ones(2)), []
     control = TimeStepControl(1e-4, tolerance)
     integrate(rig, None, None, 0.3, control, start, reached=shares.append)
@@ -96,7 +96,7 @@ def test_what_is_done_is_told(tolerance):
 
 
 def test_implicit_friction_is_second_order(rig, law, drive, exact):
-    """Against the event-driven reference, whose joints slip both ways."""
+    """The event-driven reference has joints that slip in both directions."""
     assert np.all(exact.energies.joints[-1] > 0.0)
     parts = np.array([10, 20, 40, 80])
     errors = []
@@ -109,7 +109,7 @@ def test_implicit_friction_is_second_order(rig, law, drive, exact):
 
 
 def lagged(model, law, excitation, duration, step):
-    """The variant not offered: the joints' forces at the beginning of a step act throughout."""
+    """Integrate with joint forces of the start of a step throughout it, a variant not offered."""
     x, v = np.zeros((2, len(model.mass)))
     state = law.rest(len(model.connection))
     joint_force = np.zeros(len(model.connection))
@@ -141,7 +141,7 @@ def test_lagged_friction_is_first_order_only(rig, law, drive, exact):
 
 
 def test_a_tolerance_chooses_the_steps(rig, law, drive, exact):
-    """Errors of h³ in a step add up to h², so the whole falls with the tolerance to 2/3."""
+    """Errors of h³ per step add up to h²: the error falls as the tolerance to the power 2/3."""
     tolerances, errors = 10.0 ** -np.arange(4, 8), []
     for tolerance in tolerances:
         motion = integrate(rig, law, drive, 0.05, TimeStepControl(1e-3, tolerance))
@@ -155,19 +155,19 @@ def test_a_tolerance_chooses_the_steps(rig, law, drive, exact):
 
 @pytest.mark.slow
 def test_a_tolerance_spends_its_steps_where_they_are_needed():
-    """After a short blow the rig swings slowly: few steps do."""
+    """After a short blow the rig swings slowly, for which few steps suffice."""
     rig = two_mass_rig((20e-3, 1e-3), (1.4e3, 27.3e3), 0.05)
     blow = HammerBlow(unit_force(rig, "m1"), 100.0, 1e-3)
     motion = integrate(rig, None, blow, 0.2, TimeStepControl(1e-3, 1e-6))
     fixed = integrate(rig, None, blow, 0.2, TimeStepControl(1e-3 / 64, every=64))
     assert motion.converged
     assert motion.steps < 0.3 * fixed.steps
-    # The error is that of steps 64 times as many.
+    # Expected error: that of a fixed step 64 times as short.
     assert motion.error < 2.0 * fixed.error
 
 
 def test_a_harmonic_steady_state_is_the_closed_form():
-    """Solver: the rule turns ω into 2/h tan(ωh/2). Discretisation: so it is second order."""
+    """The rule replaces ω by 2/h tan(ωh/2), which is of second order."""
     rig = lumped_rig({"a": 2e-3, "b": 1e-3}, {Link("a"): 400.0, Link("b", "a"): 900.0},
                      [[Link("b")]], 0.1)  # fmt: skip
     joint, shape = LinearSpring(1200.0), unit_force(rig, "a")
@@ -194,11 +194,11 @@ def test_a_harmonic_steady_state_is_the_closed_form():
 
 
 def test_a_blow_converges_to_the_closed_form():
-    """Velocity after a short blow from its impulse, to the order of the step."""
+    """The velocity after a short blow follows from its impulse, to the order of the step."""
     rig = two_mass_rig((21.2e-3, 1.2e-3), (1.4e3, 273e3), 0.003)
     blow = HammerBlow(unit_force(rig, "m2"), 100.0, 0.73e-3)
     free = SliderJoints(np.array([1.0]), np.array([0.0]), np.array([0.0]))
-    # Proved against Duhamel's closed form in its own test.
+    # This closed form is verified against Duhamel's integral in a test of its own.
     exact = integrate_exactly(rig, free, blow, 0.02, 1e-3)
     parts = np.array([100, 200, 400])
     errors = [
@@ -217,7 +217,8 @@ def test_the_balance_of_energy_closes(rig, law, drive):
     stored = energies.joint_work - energies.joints.sum(axis=1)
     springs = law.stiffness * motion.joint_displacement[:, :, 0] ** 2
     assert stored.max() < springs.max()
-    # Half a kT/2 of each spring at most, and what the trapezoidal rule misses at its kinks.
+    # Bound: the springs store at most limit²/2kt each, and the trapezoidal rule has errors at
+    # kinks.
     limit = law.friction * law.normal_load
     residual = 0.5 * law.residual_stiffness * motion.joint_displacement[:, :, 0] ** 2
     most = (0.5 * limit**2 / law.stiffness + residual).sum(axis=1)
@@ -236,7 +237,7 @@ def test_accelerations_balance_the_forces(rig, law, drive):
     np.testing.assert_allclose(left, drive(motion.times), atol=6.0 * SOLVED)
 
 
-def test_a_motion_can_be_left_and_taken_up(rig, law, drive):
+def test_a_motion_can_be_stopped_and_resumed(rig, law, drive):
     whole = integrate(rig, law, drive, 0.04, TimeStepControl(1e-4))
     first = integrate(rig, law, drive, 0.02, TimeStepControl(1e-4))
     second = integrate(rig, law, drive, 0.02, TimeStepControl(1e-4), first.end)
@@ -246,7 +247,7 @@ def test_a_motion_can_be_left_and_taken_up(rig, law, drive):
 
 
 def test_rows_left_out_change_nothing(rig, law, drive):
-    """Over several blocks; the state at the end is that of the last row."""
+    """The run has several blocks, and the state at the end is that of the last row."""
     every, full = (integrate(rig, law, drive, 0.25, TimeStepControl(1e-4, every=n)) for n in (7, 1))
     np.testing.assert_array_equal(every.displacement, full.displacement[::7])
     np.testing.assert_array_equal(every.energies.joints, full.energies.joints[::7])
@@ -264,7 +265,7 @@ def test_nothing_moves_without_force(rig, law):
 
 
 def test_many_joints_are_as_good_as_their_sum():
-    """Sixty small joints on one point are one joint; a Newton of sixty unknowns."""
+    """Sixty small joints on one point equal one joint; Newton's method has sixty unknowns."""
     count = 60
     shared = lumped_rig({"m": 1e-3}, {Link("m"): 100.0}, [[Link("m")]] * count, 0.01)
     single = lumped_rig({"m": 1e-3}, {Link("m"): 100.0}, [[Link("m")]], 0.01)
@@ -279,7 +280,7 @@ def test_many_joints_are_as_good_as_their_sum():
 
 @dataclass(frozen=True)
 class SignOfSlip:
-    """Coulomb's law without a spring: its force jumps, which no integrator here can follow."""
+    """Coulomb's law without a spring, whose force jumps: no integrator here can follow it."""
 
     limit: float
     directions = 1
@@ -313,7 +314,7 @@ def test_a_force_that_jumps_is_refused_with_what_to_do():
     assert "whose force is continuous" in motion.message
 
 
-def test_what_cannot_be_integrated_is_refused(rig, law, drive):
+def test_invalid_integrations_are_refused(rig, law, drive):
     with pytest.raises(ValueError, match="a step of 0 s"):
         TimeStepControl(0.0)
     with pytest.raises(ValueError, match="tolerance -1"):

@@ -1,4 +1,4 @@
-"""Modes of structures with joints against closed forms, balances, time and phase resonance."""
+"""Nonlinear modes against closed forms, energy balances, time integration and phase resonance."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.special import ellipk
 
-from fe_models.dynamics.curves.control import ContinuationControl
+from fe_models.dynamics.curves.curve_steps import ContinuationControl
 from fe_models.dynamics.curves.forced_response import along_frequency
 from fe_models.dynamics.curves.nonlinear_mode import LinearMode, NonlinearMode, along_nonlinear_mode
 from fe_models.dynamics.curves.phase_resonance import along_phase_resonance
@@ -25,7 +25,7 @@ from wear.joints.elastic import PolynomialSpring
 from wear.joints.jenkins import Jenkins
 from wear.joints.periodic.march import PeriodicMarch
 
-# Points so near to each other that lines between them will do.
+# The points are so close that linear interpolation suffices.
 FINE = ContinuationControl(most=0.03)
 LAW = Jenkins(stiffness=1e3, friction=0.5, normal_load=10.0)
 
@@ -38,7 +38,7 @@ def oscillator(ratio=0.0, harmonics=(1,), samples=1024):
 
 
 def mode_of(problem, number, amplitudes, control=None):
-    """A mode, of amplitudes as shares of those at which its joints' largest motion is 1 mm."""
+    """Return a mode; amplitudes are relative to that at which a joint moves 1 mm at most."""
     linear = LinearMode.of(problem, number)
     one = 1.0 / np.abs(problem.model.connection @ linear.shape).max()
     mode = along_nonlinear_mode(problem, linear, tuple(one * np.array(amplitudes)), control)
@@ -47,7 +47,7 @@ def mode_of(problem, number, amplitudes, control=None):
 
 
 def test_one_mass_on_a_slider():
-    """With one harmonic ω² = (k + F₁/X) / m, and D is that of the dashpot and of the loop."""
+    """With one harmonic ω² = (k + F₁/X) / m, and D is that of dashpot and loop."""
     mode = mode_of(oscillator(ratio=0.02), 1, (1e-3, 5e-2))
     X = mode.amplitudes / np.sqrt(1e-3)
     cosine, _ = LAW.first_harmonic(X)
@@ -60,7 +60,7 @@ def test_one_mass_on_a_slider():
 
 
 def fed_back(problem, motion, ratio):
-    """Energy lost in a period over 2ω ∫ x'ᵀ M x' dt."""
+    """Return the energy lost in a period over 2ω ∫ x'ᵀ M x' dt."""
     orders = np.array(motion.resolution.harmonics)
     angular = 2.0 * np.pi * motion.frequency
     rates = orders[:, None] * motion.motion
@@ -70,7 +70,7 @@ def fed_back(problem, motion, ratio):
 
 @pytest.mark.parametrize("case", ["rig", "block"])
 def test_damping_is_the_energy_lost(case):
-    """Of several harmonics, in one direction and in three, under a constant load too."""
+    """Several harmonics, one and three directions, and a constant load are included."""
     if case == "rig":
         mode = mode_of(problem := balance(rig(), samples=512), 1, (0.3 * REACH, 4.0 * REACH))
     else:
@@ -82,9 +82,9 @@ def test_damping_is_the_energy_lost(case):
 
 
 def test_fed_structure_repeats_itself_in_time():
-    """Integrated from event to event, with C - 2Dω M in the place of C, for one period.
+    """One period is integrated from event to event, with C - 2Dω M in place of C.
 
-    What is fed makes other modes grow: those of a mode that loses much would not be small for long.
+    The feed makes other modes grow: for a mode with large losses they would not stay small.
     """
     problem = balance(rig(), samples=1024)
     motion = mode_of(problem, 1, (0.5 * REACH, 1.1 * REACH)).motions[-1]
@@ -93,7 +93,7 @@ def test_fed_structure_repeats_itself_in_time():
     rate = 4.0 * np.pi * motion.damping_ratio * solution.frequency
     fed = replace(model, damping=model.damping - rate * model.mass)
     path = solution.displacement(64)
-    # The slider is behind the joint by what its spring is stretched.
+    # The slider lags behind the joint by the stretch of its spring.
     slider = model.connection @ path[0] - solution.cycle.samples[0, :, 0] / KT
     start = Start(path[0], solution.velocity(64)[0], slider[:, None])
     period = 1.0 / solution.frequency
@@ -104,7 +104,7 @@ def test_fed_structure_repeats_itself_in_time():
     )
 
 
-def test_errors_tell_what_more_harmonics_change():
+def test_errors_are_the_changes_by_more_harmonics():
     coarse, fine = (
         mode_of(oscillator(0.01, tuple(range(1, top, 2)), 2048), 1, (4e-3, 1.5e-2))
         for top in (4, 30)
@@ -119,7 +119,7 @@ def test_errors_tell_what_more_harmonics_change():
 
 @pytest.mark.parametrize("number", [1, 2])
 def test_phase_resonance_of_a_light_mode_is_near(number):
-    """Two modes far apart: the force of phase resonance is 2 D ω² a over the mode's own share."""
+    """For two distant modes, the force at phase resonance is 2 D ω² a over the mode's share."""
     model = lumped_rig(
         {"a": 1e-3, "b": 1e-3},
         {Link("a"): 1e3, Link("b", "a"): 1e3},
@@ -141,7 +141,7 @@ def test_phase_resonance_of_a_light_mode_is_near(number):
     nearest = np.interp(forced[inside], free, mode.frequencies)
     np.testing.assert_allclose(backbone.frequencies[inside], nearest, rtol=2e-4)
     shape = np.array([m.solution.motion[0] for m in mode.motions])
-    # What the force does in a period is what is lost: π F |x_a| = 2π D ω² a².
+    # The work of the force equals the loss per period: π F |x_a| = 2π D ω² a².
     angular = 2.0 * np.pi * mode.frequencies
     wanted = 2.0 * mode.damping_ratios * (angular * mode.amplitudes) ** 2 / np.abs(shape[:, 0])
     np.testing.assert_allclose(
@@ -176,14 +176,17 @@ def test_amplitudes_must_ascend(ends):
         along_nonlinear_mode(problem, LinearMode.of(problem, 1), ends)
 
 
-def test_modes_that_are_not_there():
+def test_unknown_modes_are_refused():
     with pytest.raises(HarmonicBalanceError, match="has 1 to 1"):
         LinearMode.of(oscillator(), 2)
 
 
 def test_mode_of_duffing_is_the_free_vibration_of_elliptic_functions():
-    """x'' + x + x³ = 0 has the period 4 K(m) / √(1 + A²), m = A² / (2 + 2 A²), at amplitude A; the
-    joint has no stiffness at rest, and the mode begins where the structure alone has none."""
+    """At amplitude A, the period of x'' + x + x³ = 0 is 4 K(m) / √(1 + A²), m = A² / (2 + 2 A²).
+
+    The joint has no stiffness at rest, so that the mode starts where the structure alone has no
+    finite flexibility.
+    """
     model = lumped_rig({"m": 1.0}, {Link("m"): 1.0}, [[Link("m")]], 0.01)
     load = PeriodicLoad({1: unit_force(model, "m")})
     spring = PeriodicMarch(PolynomialSpring(0.0, cubic=1.0))

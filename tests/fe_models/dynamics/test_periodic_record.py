@@ -1,4 +1,4 @@
-"""Recorded periods and their harmonics, and rigs under several of them against integration."""
+"""Recorded periods and their harmonics, and rigs under several harmonics against integration."""
 
 import numpy as np
 import pytest
@@ -15,13 +15,13 @@ from wear.joints.periodic.march import PeriodicMarch
 
 
 def uneven():
-    """A record of uneven steps with a mean."""
+    """Return a record with uneven steps and a mean."""
     turns = np.array([0.0, 0.07, 0.2, 0.33, 0.61, 0.8, 1.0])
     return PeriodicRecord(turns, np.array([2.0, 5.0, -1.0, 0.5, 4.0, -6.0, 2.0]))
 
 
 def test_harmonics_add_up_to_the_record():
-    """Of straight lines they fall as 1/k²: the sum is off by about their tail."""
+    """Harmonics of straight lines fall as 1/k²: the sum is in error by about its tail."""
     record, turns = uneven(), np.linspace(0.0, 1.0, 501)
     orders, amplitudes = np.arange(2001), record.amplitudes(2000)
     again = (np.exp(2j * np.pi * np.outer(turns, orders)) @ amplitudes).real
@@ -34,7 +34,7 @@ def test_harmonics_add_up_to_the_record():
     np.testing.assert_allclose(record.amplitudes(5)[[0, 1, 5]], quadrature * [1, 2, 2], atol=1e-4)
 
 
-def test_what_is_left_out_is_what_is_missing():
+def test_the_neglected_share_is_that_of_the_missing_harmonics():
     record, turns = uneven(), (np.arange(20000) + 0.5) / 20000
     swing = record.value(turns) - np.mean(record.value(turns))
     for highest in (1, 3, 15):
@@ -53,16 +53,16 @@ def test_what_is_left_out_is_what_is_missing():
         ([0.0, 0.5, 0.9], [0.0, 1.0, 0.0], "ascend from 0 to 1"),
         ([0.0, 0.6, 0.5, 1.0], [0.0, 1.0, 1.0, 0.0], "ascend from 0 to 1"),
         ([0.0, 0.5, 1.0], [0.0, 1.0, 0.1], "does not end with the force"),
-        ([0.0, 0.5, 1.0], [0.0, np.nan, 0.0], "not a number"),
+        ([0.0, 0.5, 1.0], [0.0, np.nan, 0.0], "not a finite number"),
     ],
 )
-def test_what_is_no_period_is_refused(turns, force, message):
+def test_invalid_periods_are_refused(turns, force, message):
     with pytest.raises(ExcitationError, match=message):
         PeriodicRecord(np.array(turns), np.array(force))
 
 
 def test_linear_motion_is_the_sum_of_its_harmonics():
-    """One harmonic after the other, on a rig without friction."""
+    """Each harmonic is computed separately, on a rig without friction."""
     rig = lumped_rig({"m": 1e-3}, {Link("m"): 1e3}, [[Link("m")]], 0.02)
     free = PeriodicMarch(Jenkins(stiffness=1e3, friction=0.0, normal_load=10.0))
     waves = dict(enumerate(uneven().amplitudes(9)[:, None]))
@@ -75,7 +75,7 @@ def test_linear_motion_is_the_sum_of_its_harmonics():
 
 
 def test_a_slider_under_several_harmonics_moves_as_in_time():
-    """Forces of harmonics 1, 2 and 3 with phases on two masses, by Newmark to steady state."""
+    """Newmark's method reaches the steady state under harmonics 1, 2 and 3 with phases."""
     springs = {Link("a"): 1e3, Link("b", "a"): 3e3}
     rig = lumped_rig({"a": 1e-3, "b": 2e-3}, springs, [[Link("b")]], 0.05)
     law, frequency = Jenkins(stiffness=2e3, friction=0.5, normal_load=10.0), 70.0

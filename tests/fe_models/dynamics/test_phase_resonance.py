@@ -1,4 +1,4 @@
-"""Phase resonance and damping of vibration against closed forms and exact integration in time."""
+"""Phase resonance and damping against closed forms and exact time integration."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from fe_models.dynamics.curves.control import ContinuationControl
+from fe_models.dynamics.curves.curve_steps import ContinuationControl
 from fe_models.dynamics.curves.forced_response import Accuracy, along_frequency
 from fe_models.dynamics.curves.phase_resonance import PhaseResonance, along_phase_resonance
 from fe_models.dynamics.excitation import HarmonicForce
@@ -30,18 +30,18 @@ from wear.joints.friction_contact import FrictionContact
 from wear.joints.jenkins import Jenkins
 from wear.joints.periodic.march import SLIP, STICK, PeriodicMarch
 
-# What 1e-10 of the equations leaves of a motion with a joint that changes its state.
+# Error of a motion whose equations are solved to 1e-10, with a joint that changes its state.
 SOLVED = 1e-8
 KT, LIMIT = 45e3, 0.88 * 60.0
 ODD = tuple(range(1, 16, 2))
-# After which the rig damped by 2 % has settled to 1e-3.
+# Duration after which the rig, damped by 2 %, has settled to 1e-3.
 PERIODS = 20
-# Steps that show where a peak is.
+# Step sizes that resolve a peak.
 CLOSE = ContinuationControl(most=0.05)
 
 
 def rig(ratio=0.001):
-    """The thesis's rig."""
+    """Return the rig of the thesis."""
     return two_mass_rig((21.152e-3, 1.189e-3), (1.3469e3, 273e3), ratio)
 
 
@@ -60,21 +60,21 @@ def on_rig(harmonics=ODD, samples=256, ratio=0.001):
 
 
 def peak(problem, force, span, place=0):
-    """The motion of a response that moves a degree of freedom most."""
+    """Return the motion of a response with the largest amplitude of a degree of freedom."""
     branch = along_frequency(problem, force, span, control=CLOSE)
     return max(branch.solutions, key=lambda solution: abs(solution.amplitude(place)))
 
 
 def cotangent(problem, solution):
-    """Of the phase of the force's own points."""
+    """Return the cotangent of the phase at the force's own points."""
     seen = np.vdot(problem.load.waves[1], solution.motion[solution.resolution.harmonics.index(1)])
     return seen.real / seen.imag
 
 
 def pressed_block(joints=3):
-    """A block that only its contacts hold along z, which is pressed on them and shaken along x.
+    """Return a block that only its contacts hold along z, pressed on them and shaken along x.
 
-    Its contacts sit on springs of their own; one more mode has its own damping.
+    Its contacts are on springs of their own; one more mode has its own damping.
     """
     masses = dict.fromkeys(("x", "y", "z"), 0.002)
     springs = {Link("x"): 500.0, Link("y", "x"): 800.0}
@@ -135,7 +135,7 @@ def test_derivatives_of_the_equations(case, seen):
 
 @pytest.mark.slow
 def test_products_with_the_jacobian_are_those_of_the_matrix(monkeypatch):
-    """Several contacts: the backbone is the same where no matrix is assembled."""
+    """With several contacts, the backbone is the same if no matrix is assembled."""
     problem = block_problem()
     start = along_frequency(problem, 9.0, (40.0, 140.0))
     wanted = along_phase_resonance(problem, start, (4.0, 12.0))
@@ -153,7 +153,7 @@ def test_products_with_the_jacobian_are_those_of_the_matrix(monkeypatch):
     vector = np.random.default_rng(6).standard_normal(len(place))
     product = matrix @ vector
     np.testing.assert_allclose(products @ vector, product, atol=1e-12 * np.abs(product).max())
-    # The border is undone exactly, whatever is known of the inverse of what it is around.
+    # The border is eliminated exactly, whatever the preconditioner of the inner matrix.
     undone, inner = products.precondition(vector), products.inner.precondition
     assert matrix[-1] @ undone == pytest.approx(vector[-1], rel=1e-9)
     wanted_inner = inner(vector[:-1]) - undone[-1] * inner(matrix[:-1, -1])
@@ -173,7 +173,7 @@ def test_products_with_the_jacobian_are_those_of_the_matrix(monkeypatch):
     ("ratio", "off"), [(1e-6, 1.02), (1e-6, 0.9999), (1e-3, 0.95), (1e-3, 1.05), (0.2, 1.3)]
 )
 def test_linear_oscillator(ratio, off):
-    """Its backbone is its natural frequency, also from many half-power widths beside the peak."""
+    """The backbone is the natural frequency, also from many half-power widths away."""
     model, force = oscillator(ratio), 2.0
     natural = natural_frequencies(model)[0]
     problem = balance(model, Jenkins(1500.0, 0.0, 10.0), (1, 3), 64)
@@ -193,7 +193,7 @@ def test_linear_oscillator(ratio, off):
 
 
 def test_duffing_oscillator():
-    """m ω² = k + ¾ κ a² and c ω a = F: the folds of its responses are not on the backbone."""
+    """On the backbone m ω² = k + ¾ κ a² and c ω a = F: it has no folds, unlike its responses."""
     model = lumped_rig({"m": 1e-3}, {Link("m"): 40.0}, [[Link("m")]], 0.02)
     problem = balance(model, CubicSprings(100.0), (1,), 16)
     start = peak(problem, 1.5, (10.0, 60.0))
@@ -206,9 +206,9 @@ def test_duffing_oscillator():
 
 
 def test_jenkins_oscillator_of_one_harmonic():
-    """m ω² a = k a + A(a) and F = c ω a + B(a) with the law's first harmonic A cos - B sin.
+    """The law's first harmonic A cos - B sin gives m ω² a = k a + A(a) and F = c ω a + B(a).
 
-    The samples leave 1e-9 of these.
+    The samples cause errors of 1e-9.
     """
     model, law = oscillator(0.02), Jenkins(1500.0, 0.5, 10.0, 30.0)
     problem = balance(model, law, (1,), 65536)
@@ -236,18 +236,18 @@ def replaced(problem, samples):
 
 
 def test_only_friction_damps():
-    """F = 4 µN (1 - µN/(kt a))/π: amplitudes grow without bound towards 4 µN/π, and end there."""
+    """With F = 4 µN (1 - µN/(kt a))/π, amplitudes grow without bound as F approaches 4 µN/π."""
     model, law = oscillator(0.0), Jenkins(1500.0, 0.5, 10.0)
     problem, bound = balance(model, law, (1,), 4096), 4.0 * 5.0 / np.pi
     start = peak(problem, 0.5 * bound, (80.0, 200.0))
     backbone = along_phase_resonance(problem, start, (0.01 * bound, 0.95 * bound))
     assert backbone.message == ""
     wanted = (5.0 / 1500.0) / (1.0 - backbone.forces / bound)
-    # Of a corner of the force, twice per period: second order in the 4096 samples.
+    # The force has a corner twice per period: the error of 4096 samples is of second order.
     np.testing.assert_allclose(backbone.first_amplitudes(0), wanted, rtol=1e-5)
     control = ContinuationControl(max_points=60)
     beyond = along_phase_resonance(problem, start, (0.5 * bound, 2.0 * bound), control=control)
-    assert "upward in force" in beyond.message
+    assert "at increasing force" in beyond.message
     assert np.all(beyond.forces < 1.00001 * bound)
 
 
@@ -255,7 +255,7 @@ def test_only_friction_damps():
 
 
 def test_rig_of_one_harmonic_falls_from_stuck_to_sliding():
-    """The joint replaced by what its first harmonic is at its amplitude: a spring and a dashpot."""
+    """A spring and a dashpot replace the joint by its first harmonic at its amplitude."""
     problem, model, law = on_rig((1,), 4096), rig(), Jenkins(KT, 0.88, 60.0)
     start = peak(problem, 50.0, (20.0, 400.0))
     backbone = along_phase_resonance(problem, start, (1.0, 90.0))
@@ -278,7 +278,7 @@ def test_rig_of_one_harmonic_falls_from_stuck_to_sliding():
         joint = (cosine - 1j * sine) / amplitude
         ends = 0.99 * solution.frequency, 1.01 * solution.frequency
         frequency = brentq(lambda f, k=joint: motion(f, k)[0].real, *ends, xtol=1e-12)
-        # The samples leave 1e-7 of the joint's force, over 2ζ = 0.002 at the least.
+        # The samples cause an error of 1e-7 of the joint's force, over 2ζ = 0.002 at least.
         assert solution.frequency == pytest.approx(frequency, rel=1e-6)
         force = amplitude / abs(motion(frequency, joint)[1])
         assert solution.force == pytest.approx(force, rel=1e-4)
@@ -303,7 +303,7 @@ def test_any_response_leads_to_the_backbone(force, given):
 
 
 def work_of_forces(problem, solution):
-    """-π a Σ k Im(w_kᴴ x_k), the work of the periodic forces in a period."""
+    """Return -π a Σ k Im(w_kᴴ x_k), the work of the periodic forces in a period."""
     work = 0.0
     for harmonic, wave in problem.load.waves.items():
         moved = solution.motion[solution.resolution.harmonics.index(harmonic)]
@@ -313,7 +313,7 @@ def work_of_forces(problem, solution):
 
 @pytest.mark.slow
 def test_power_balances_with_the_samples():
-    """All power is spent: what the joint takes is summed sample by sample, to second order."""
+    """The joint's dissipation is summed sample by sample, with an error of second order."""
     left = []
     for samples in (128, 256, 512, 1024):
         problem = on_rig((1, 3, 5), samples)
@@ -333,9 +333,9 @@ def test_power_balances_with_the_samples():
 def test_motion_in_time_has_the_phase(place):
     """Event-driven integration of the rig under a force and a frequency of the backbone.
 
-    Where 5 f is the resonance of the stuck rig the backbone folds, back to forces that the rig has
-    passed: the motion there is as real as elsewhere. What differs is what harmonics beyond 31 do,
-    and most in the velocities of the kinetic energy.
+    Where 5 f is the resonance of the stuck rig, the backbone folds back to forces that it has
+    passed: the motion there is as real as elsewhere. Differences are due to harmonics above 31, and
+    are largest in the velocities of the kinetic energy.
     """
     model, samples = rig(0.02), 256
     problem = on_rig(tuple(range(1, 32, 2)), 1024, 0.02)
@@ -360,7 +360,7 @@ def test_motion_in_time_has_the_phase(place):
     last = slice(-samples - 1, -1)
     turns = np.exp(-2j * np.pi * np.arange(samples) / samples)
     amplitude = 2.0 / samples * turns @ motion.displacement[last, 0]
-    # A sine: displacement that lags it by a quarter is a negative cosine.
+    # The force is a sine: a displacement that lags it by a quarter is a negative cosine.
     assert amplitude.real < 0.0
     assert abs(amplitude.imag / amplitude.real) < 2e-3
     assert abs(amplitude) == pytest.approx(abs(solution.amplitude(0)), rel=3e-3)
@@ -372,7 +372,7 @@ def test_motion_in_time_has_the_phase(place):
 
 
 def test_the_output_decides_on_the_phase():
-    """The force's own point is the default; another displacement lags by a quarter elsewhere."""
+    """The default is the force's own point; another displacement lags by a quarter elsewhere."""
     problem, model = on_rig((1, 3), ratio=0.05), rig(0.05)
     start = peak(problem, 40.0, (20.0, 400.0))
     wanted = along_phase_resonance(problem, start, (20.0, 60.0))
@@ -399,7 +399,7 @@ def test_harmonics_and_samples_grow_to_a_tolerance():
 
 
 def test_a_response_starts_at_its_largest_passage():
-    """Between two resonances the phase is passed once more, where next to nothing moves."""
+    """Between two resonances the phase is passed once more, with hardly any motion."""
     model = rig()
     problem = balance(model, Jenkins(KT, 0.0, 60.0), (1,), 64)
     natural = natural_frequencies(model)
@@ -416,13 +416,13 @@ def test_a_response_starts_at_its_largest_passage():
     below = along_frequency(problem, 1.0, (10.0, 30.0))
     nowhere = along_phase_resonance(problem, below, (0.5, 2.0))
     assert nowhere.solutions == ()
-    assert "does not pass through the phase" in nowhere.message
+    assert "does not pass through phase resonance" in nowhere.message
 
 
-# --- Where there is none
+# --- No phase resonance
 
 
-def test_starts_that_lead_nowhere_say_so():
+def test_starts_without_phase_resonance_are_reported():
     undamped = balance(oscillator(0.0), Jenkins(1500.0, 0.0, 10.0), (1,), 64)
     nothing = along_phase_resonance(undamped, undamped.solve(90.0, 1.0), (0.5, 2.0))
     assert nothing.solutions == ()
@@ -432,12 +432,12 @@ def test_starts_that_lead_nowhere_say_so():
     assert far.solutions == ()
     assert "nearer to the peak" in far.message
     failed = replace(problem.solve(100.0, 1.0), message="it is not")
-    assert "the start is no solution: it is not" in (
+    assert "the start is not a solution: it is not" in (
         along_phase_resonance(problem, failed, (0.5, 2.0)).message
     )
 
 
-def test_mistakes_are_refused():
+def test_invalid_arguments_are_refused():
     problem, model = on_rig((1, 3)), rig()
     start = problem.solve(100.0, 10.0)
     for forces in ((0.0, 20.0), (20.0, 30.0), (1.0, 5.0)):
@@ -461,7 +461,7 @@ def test_mistakes_are_refused():
 
 
 def test_largest_kinetic_energy_of_many_harmonics():
-    """Against its values at many times of a period, from below."""
+    """Values at many times of a period approach it from below."""
     problem = on_rig(ODD, 256)
     solution = problem.solve(47.0, 60.0)
     velocity = solution.velocity(20000)
@@ -471,7 +471,7 @@ def test_largest_kinetic_energy_of_many_harmonics():
     assert largest == pytest.approx(energies.max(), rel=1e-5)
 
 
-def test_what_does_not_move_is_not_damped():
+def test_a_structure_at_rest_has_no_damping():
     problem = on_rig((1, 3))
     still = problem.solve(50.0, 0.0)
     assert damping_ratio(problem, still) == 0.0

@@ -1,4 +1,4 @@
-"""The papers' rig at the frequencies its numbers give, and reduced bodies as parts of a rig."""
+"""The papers' rig at the frequencies of its parameters, and reduced bodies in rigs."""
 
 import numpy as np
 import pytest
@@ -22,7 +22,7 @@ PAPER_C = two_mass_rig((21.2e-3, 1.2e-3), (1.4e3, 273e3), 1e-3)
 
 
 def test_the_thesis_rig_is_free_at_39_hz_and_stuck_at_214():
-    """The closed form of two masses: 39.08 Hz, and 214 Hz with kt 45 N/µm (400 is printed)."""
+    """The closed form of two masses gives 39.08 Hz, and 214 Hz with kt 45 N/µm (400 is printed)."""
     free, stuck = natural_frequencies(THESIS), natural_frequencies(THESIS, 45e3)
     assert free[0] == pytest.approx(39.08, abs=0.005)
     assert stuck[0] == pytest.approx(214.4, abs=0.05)
@@ -39,7 +39,7 @@ def test_the_thesis_rig_is_free_at_39_hz_and_stuck_at_214():
     ],
 )
 def test_the_rig_of_paper_c(held, first, second):
-    """The values its printed parameters give, to the digits stated."""
+    """The printed parameters give the stated values to their digits."""
     frequencies = natural_frequencies(PAPER_C, held)
     assert frequencies[0] == pytest.approx(first, abs=0.5 if first > 100.0 else 0.06)
     if second is not None:
@@ -61,7 +61,7 @@ def test_two_masses_are_the_roots_of_their_characteristic_equation():
 
 @pytest.mark.parametrize("ratio", [1e-3, np.array([0.01, 0.2])])
 def test_every_mode_is_damped_by_its_ratio(ratio):
-    """Complex eigenvalues of the first-order system, with the joint free."""
+    """Complex eigenvalues of the first-order system, with the joint free, give the ratios."""
     rig = two_mass_rig((21.2e-3, 1.2e-3), (1.4e3, 273e3), ratio)
     inverse = np.linalg.inv(rig.mass)
     first_order = np.block(
@@ -81,7 +81,7 @@ def test_a_rigid_motion_is_not_damped():
 
 
 def bar(elements):
-    """A bar of unit mass and stiffness per element, free at both ends."""
+    """Return a bar of unit mass and stiffness per element, free at both ends."""
     stiffness, mass = (np.zeros((elements + 1,) * 2) for _ in range(2))
     for start in range(elements):
         place = slice(start, start + 2)
@@ -91,9 +91,9 @@ def bar(elements):
 
 
 def test_a_reduced_body_in_a_rig_vibrates_as_the_full_one():
-    """All modes kept: ground - spring - holder - spring - bar, and a joint, to rounding.
+    """With all modes kept, ground - spring - holder - spring - bar agrees to rounding.
 
-    The bar's far end is joined to its own near end: a joint between two displacements.
+    A joint joins the far end of the bar to its near end: a joint between two displacements.
     """
     stiffness, mass = bar(6)
     full = reduce_body(stiffness, mass, np.array([6, 0]), modes=4)
@@ -112,7 +112,7 @@ def test_a_reduced_body_in_a_rig_vibrates_as_the_full_one():
     K += 300.0 * np.outer(*[np.eye(8)[6] - np.eye(8)[0]] * 2) + 20.0 * np.outer(*[np.eye(8)[0]] * 2)
     wanted = np.sqrt(sl.eigh(K, M, eigvals_only=True)) / (2.0 * np.pi)
     frequencies = natural_frequencies(rig, np.array([300.0, 20.0]))
-    # One of the five inner modes is left out: the lowest are as good as the full ones.
+    # One of the five inner modes is neglected: the lowest frequencies are as accurate as with all.
     np.testing.assert_allclose(frequencies[:3], wanted[:3], rtol=2e-3)
     assert np.all(frequencies >= wanted[:7] * (1.0 - 1e-12))
 
@@ -131,7 +131,7 @@ def test_a_force_on_a_named_point():
         unit_force(PAPER_C, "m3")
 
 
-def test_what_cannot_be_built_is_refused():
+def test_invalid_rigs_are_refused():
     with pytest.raises(RigError, match="give every point mass"):
         lumped_rig({"a": 0.0}, {Link("a"): 1.0}, [])
     with pytest.raises(RigError, match=r"damping ratio -0\.1"):

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fe_models.dynamics.curves.control import ContinuationControl
+from fe_models.dynamics.curves.curve_steps import ContinuationControl
 from fe_models.dynamics.curves.forced_response import along_frequency
 from fe_models.dynamics.periodic.harmonic_balance import HarmonicBalance
 from fe_models.dynamics.periodic.harmonics import Resolution
@@ -17,12 +17,12 @@ from tests.oracles.stop_shooting import shoot
 from wear.joints.elastic import ElasticStop
 from wear.joints.periodic.march import PeriodicMarch
 
-# Masses of 1 on springs of 1; the last meets a stop that is a hundred times as stiff.
+# Masses of 1 are on springs of 1; the last one meets a stop a hundred times as stiff.
 DAMPING, GAP, STIFFNESS, FORCE = 0.03, 1.0, 100.0, 0.1
 
 
 def two_masses(highest: int = 21) -> HarmonicBalance:
-    """Two masses in a row, damped in proportion to their stiffness."""
+    """Return two masses in a row, with damping in proportion to their stiffness."""
     model = lumped_rig(
         {"a": 1.0, "b": 1.0}, {Link("a"): 1.0, Link("b", "a"): 1.0}, [[Link("b")]], 0.0
     )
@@ -34,7 +34,7 @@ def two_masses(highest: int = 21) -> HarmonicBalance:
 
 @pytest.fixture(scope="module")
 def touching():
-    """A curve that folds where the stop is met, and the stability of all its motions."""
+    """Return a curve that folds where the stop is touched, and the stability of its motions."""
     control = ContinuationControl(max_points=75)
     branch = along_frequency(two_masses(), FORCE, (0.0796, 0.1273), control=control)
     of = Floquet(branch.problem).stability
@@ -43,37 +43,40 @@ def touching():
 
 @pytest.mark.slow
 def test_multipliers_are_those_of_shooting_within_their_error(touching):
-    """Of 21 harmonics alone some are off by as much as 1, and more than ten verdicts are wrong."""
+    """With 21 harmonics alone, errors reach 1, and more than ten verdicts are wrong."""
     branch, known = touching
     problem, compared, away = branch.problem, 0, 0.0
-    for motion, told in list(zip(branch.solutions, known, strict=True))[18::6]:
+    for motion, stability in list(zip(branch.solutions, known, strict=True))[18::6]:
         exact = shoot(problem, motion)
-        if told.verdict == "unknown" or exact is None:
+        if stability.verdict == "unknown" or exact is None:
             continue
         largest = abs(exact.multipliers[0])
-        assert told.verdict == ("stable" if largest < 1.0 else "unstable")
-        assert abs(told.largest - largest) <= 2.0 * told.error
-        assert told.error < 5e-3 * max(largest, 1.0)
+        assert stability.verdict == ("stable" if largest < 1.0 else "unstable")
+        assert abs(stability.largest - largest) <= 2.0 * stability.error
+        assert stability.error < 5e-3 * max(largest, 1.0)
         compared, away = compared + 1, max(away, exact.distance)
     assert compared >= 8
-    # The motions themselves are off by more than that.
+    # The error of the motions themselves is larger than that.
     assert away > 1e-3
 
 
-def test_a_motion_that_seven_harmonics_cut_short_is_judged_by_the_motion_in_time():
-    """The multiplier is that of shooting, though harmonics have the motion off by a hundredth."""
+def test_a_motion_of_seven_harmonics_has_the_stability_of_the_refined_motion():
+    """The multiplier is that of shooting, although the harmonics are in error by a hundredth."""
     problem = two_masses(highest=7)
     motion = problem.solve(0.105, FORCE)
-    told, exact = Floquet(problem).stability(motion), shoot(problem, motion)
+    stability, exact = Floquet(problem).stability(motion), shoot(problem, motion)
     assert exact.distance > 1e-2
-    assert told.verdict == ("stable" if abs(exact.multipliers[0]) < 1.0 else "unstable")
-    assert told.largest == pytest.approx(abs(exact.multipliers[0]), abs=2.0 * told.error)
-    assert told.error < 1e-3
+    assert stability.verdict == ("stable" if abs(exact.multipliers[0]) < 1.0 else "unstable")
+    assert stability.largest == pytest.approx(abs(exact.multipliers[0]), abs=2.0 * stability.error)
+    assert stability.error < 1e-3
 
 
 def barely_touching(stiffness, deep, frequency=0.2):
-    """A motion that reaches so ``deep`` into the stop, in the middle between two of 1024 times of a
-    period, the least deep for less than a 2048th of it. Without the stop it would be stable."""
+    """Return a motion that penetrates the stop by ``deep``, midway between two of 1024 times.
+
+    The smallest penetration lasts for less than a 2048th of the period. Without the stop the motion
+    would be stable.
+    """
     free, highest = two_masses().model, 601 / 2048
     point, angular = unit_force(free, "b"), 2.0 * np.pi * frequency
     dynamic = free.stiffness - angular**2 * free.mass + 1j * angular * free.damping
@@ -87,59 +90,59 @@ def barely_touching(stiffness, deep, frequency=0.2):
 @pytest.mark.parametrize(
     ("stiffness", "deep"), [(100.0, 1e-6), (300.0, 1e-6), (300.0, 1e-5), (1000.0, 1e-5)]
 )
-def test_a_stop_that_is_met_for_a_moment_only_is_not_passed_over(stiffness, deep):
+def test_a_brief_contact_with_a_stop_is_not_missed(stiffness, deep):
     problem, motion = barely_touching(stiffness, deep)
-    told, exact = Floquet(problem).stability(motion), shoot(problem, motion, steps=2048)
+    stability, exact = Floquet(problem).stability(motion), shoot(problem, motion, steps=2048)
     assert exact.distance < 1e-6
     largest = abs(exact.multipliers[0])
     assert largest > 1.05
-    assert told.verdict == "unstable"
-    assert told.largest == pytest.approx(largest, abs=2.0 * told.error)
-    assert told.error < 0.01
+    assert stability.verdict == "unstable"
+    assert stability.largest == pytest.approx(largest, abs=2.0 * stability.error)
+    assert stability.error < 0.01
 
 
 @pytest.mark.slow
 def test_liouville_holds_through_contact(touching):
-    """The product of all multipliers is what damping leaves in a period, exp(-T tr M⁻¹C)."""
+    """The product of all multipliers in a period is exp(-T tr M⁻¹C)."""
     branch, known = touching
-    for motion, told in list(zip(branch.solutions, known, strict=True))[20::15]:
-        if told.resolved:
+    for motion, stability in list(zip(branch.solutions, known, strict=True))[20::15]:
+        if stability.resolved:
             lost = np.exp(-DAMPING * np.trace(branch.problem.model.stiffness) / motion.frequency)
-            assert abs(np.prod(told.multipliers)) == pytest.approx(lost, rel=1e-4)
+            assert abs(np.prod(stability.multipliers)) == pytest.approx(lost, rel=1e-4)
 
 
 @pytest.mark.slow
 def test_few_verdicts_are_unknown(touching):
     _, known = touching
-    assert sum(told.verdict == "unknown" for told in known) <= 0.05 * len(known)
+    assert sum(stability.verdict == "unknown" for stability in known) <= 0.05 * len(known)
 
 
 @pytest.mark.slow
-def test_nothing_is_said_of_what_is_no_motion(touching):
-    """A motion that does not balance is near to none, and has no error that anybody knows."""
+def test_no_verdict_on_what_is_no_motion(touching):
+    """A motion that does not balance is not near a solution, and its error is unknown."""
     branch, _ = touching
     motion = branch.solutions[40]
-    told = Floquet(branch.problem).stability(replace(motion, residual=1e-2))
-    assert told.verdict == "unknown"
-    assert not told.resolved
+    stability = Floquet(branch.problem).stability(replace(motion, residual=1e-2))
+    assert stability.verdict == "unknown"
+    assert not stability.resolved
 
 
-def test_steps_that_are_joined_are_of_the_same_times():
-    """Half as many steps begin at every second time, wherever steps were divided."""
-    times = PeriodTimes.even(8, 2)
+def test_merged_steps_start_at_the_same_times():
+    """Half as many steps start at every second time, wherever steps were divided."""
+    times = PeriodTimes.uniform(8, 2)
     for place in (3, 6):
         marked = np.zeros(len(times.starts), bool)
         marked[place] = True
-        times = times.divided(marked)
+        times = times.with_divided(marked)
     half = times.halved()
     ends = np.append(half.starts, half.parts)
     np.testing.assert_array_equal(np.diff(ends), 4 ** (half.deepest - half.levels))
 
 
-def test_what_a_joint_does_for_less_than_a_step_is_seen():
+def test_joint_states_shorter_than_a_step_are_resolved():
     def regimes(times):
         share = times.starts / times.parts
         return ((share > 0.4301) & (share < 0.4341))[:, None]
 
-    times = PeriodTimes.following(regimes, 32, 5)
+    times = PeriodTimes.adapted(regimes, 32, 5)
     assert regimes(times).sum() > 10

@@ -1,4 +1,4 @@
-"""One sector in a wave that travels round a ring, against all sectors of it, put together here."""
+"""Sector in a travelling wave, against the whole ring, which is assembled here."""
 
 from dataclasses import replace
 
@@ -26,13 +26,13 @@ SECTORS, ORDER = 5, 2
 # The same times in every sector: 2/5 of a period later.
 SAMPLES, HARMONICS = 640, (0, 1, 2, 3, 4, 5, 7)
 SLIDER = Jenkins(stiffness=2e3, friction=0.5, normal_load=10.0)
-# A disk's point and a blade's, these joined by the disk, blades rubbing on each other.
+# Disk and blade point of each sector: the disk joins the sectors, and blades rub on each other.
 MASSES = {"disk": 1e-3, "blade": 2e-3}
 SPRINGS = {Link("disk"): 1e3, Link("blade", "disk"): 3e3, Link("next disk", "disk"): 1e3}
 JOINTS = [[Link("next blade", "blade")], [Link("disk")]]
 MORE = {"loss_factor": 0.01, "mass_factor": 2.0}
 BETWEEN = 0.02
-# Harmonic 5 has no nodal diameter, so that all sectors pull as one.
+# Harmonic 5 has no nodal diameter: all sectors move in phase.
 WAVES = {1: np.array([0.0, -1j]), 2: np.array([0.0, 0.3]), 5: np.array([0.1, 0.1j])}
 STATIC = np.array([0.0, 3.0])
 
@@ -42,7 +42,7 @@ def later(sector, harmonic):
 
 
 def of_all(waves, static):
-    """The load on all sectors by that on the first."""
+    """Return the load on all sectors, given that on the first."""
     waves = {
         h: np.concatenate([wave * later(i, h) for i in range(SECTORS)]) for h, wave in waves.items()
     }
@@ -50,7 +50,7 @@ def of_all(waves, static):
 
 
 def blades():
-    """A sector of blades, and the ring of all."""
+    """Return a sector of blades, and the ring of all sectors."""
     sector = lumped_sector(MASSES, SPRINGS, JOINTS, Ring(SECTORS, ORDER), 0.01)
     dashpot = {Link("next blade", "blade"): BETWEEN}
     sector = replace(sector, model=damped(sector.model, dashpots=dashpot, **MORE))
@@ -80,7 +80,7 @@ def wave_and_ring():
 
 
 def balances(sector, ring):
-    """The sector in a wave, and the whole ring."""
+    """Return the problems of the sector in a wave, and of the whole ring."""
     march, resolution = PeriodicMarch(SLIDER), Resolution(HARMONICS, SAMPLES)
     load = PeriodicLoad(WAVES, static=STATIC)
     return (
@@ -103,7 +103,7 @@ def test_blades_that_rub_move_as_those_of_the_whole_ring(wave_and_ring):
         assert np.abs(every.motion - moved).max() < 1e-10 * np.abs(moved).max()
         lost = SECTORS * energy_lost(wave, one)
         assert lost == pytest.approx(energy_lost(ring, every), rel=1e-10)
-        # Work of the forces: an account that knows nothing of how the energies are found.
+        # The work of the forces is independent of how energies are computed.
         forces = 15.0 * np.array([WAVES.get(h, np.zeros(2)) for h in HARMONICS])
         work = np.pi * np.array(HARMONICS) @ (one.motion.conj() * forces).imag.sum(axis=1)
         assert SECTORS * work == pytest.approx(lost, rel=2e-3)
@@ -145,7 +145,7 @@ def test_phase_resonance_is_that_of_all_sectors(wave_and_ring):
 
 def test_stability_is_that_of_all_sectors():
     sector, ring = blades()
-    # Of a loss factor nothing is known in time.
+    # A loss factor is not defined in time.
     sector = replace(sector, model=replace(sector.model, structural=None))
     problems = balances(sector, replace(ring, structural=None))
     for frequency in (100.0, 150.0):
@@ -156,7 +156,7 @@ def test_stability_is_that_of_all_sectors():
         assert np.allclose(np.abs(one.multipliers), np.abs(every.multipliers), atol=1e-8)
 
 
-def test_what_is_the_same_in_all_sectors_moves_no_joint_between_them():
+def test_equal_motion_of_all_sectors_moves_no_joint_between_them():
     sector = lumped_sector(MASSES, SPRINGS, JOINTS[:1], Ring(SECTORS, ORDER), 0.01)
     load = PeriodicLoad({1: np.array([0.0, -1j])}, static=STATIC)
     resolution = Resolution((0, 1, 3), 256)
@@ -164,20 +164,20 @@ def test_what_is_the_same_in_all_sectors_moves_no_joint_between_them():
         150.0, 15.0
     )
     assert motion.converged
-    # Springs from the ground to the disk and on to the blade.
+    # Springs join the ground to the disk, and the disk to the blade.
     assert motion.amplitude(1, harmonic=0) == pytest.approx(3.0 / 1e3 + 3.0 / 3e3, rel=1e-9)
 
 
-def test_a_ring_too_large_says_nothing_of_its_stability():
+def test_a_ring_too_large_has_no_verdict():
     sector = lumped_sector({"a": 1e-3}, {Link("a"): 1e3}, [[Link("a")]], Ring(300, 7), 0.01)
     load = PeriodicLoad({1: np.ones(1)})
     problem = HarmonicBalance.of_sector(sector, PeriodicMarch(SLIDER), load, Resolution((1,), 64))
-    told = Floquet(problem).stability(problem.solve(100.0, 1.0))
-    assert told.verdict == "unknown"
-    assert "300 modes" in told.message
+    stability = Floquet(problem).stability(problem.solve(100.0, 1.0))
+    assert stability.verdict == "unknown"
+    assert "300 modes" in stability.message
 
 
-# --- three directions, on a ring that turns -----------------------------------------------------
+# --- three directions, on a rotated ring ---------------------------------------------------------
 
 AXES = "xyz"
 HEAVY = 2e-3
@@ -192,7 +192,7 @@ def turned(sector):
 
 
 def test_shrouds_that_touch_move_as_those_of_the_whole_ring():
-    """Blades of one mass each, in axes that do not turn; contacts close along y of the first."""
+    """Blades of one mass each have fixed axes; contacts close along y of the first."""
     names = [f"tip {axis}" for axis in AXES]
     kept = np.arange(3)
     body = ReducedModel(
@@ -205,7 +205,7 @@ def test_shrouds_that_touch_move_as_those_of_the_whole_ring():
     every = range(SECTORS)
     stiffness, connection = np.zeros((3 * SECTORS,) * 2), np.zeros((3 * SECTORS,) * 2)
     for i in every:
-        # The sector's own axes, and where its x, z, y lead in those of all.
+        # Axes of the sector, and the directions of its x, z, y among those of all.
         rows, after = slice(3 * i, 3 * i + 3), slice(3 * ((i + 1) % SECTORS), None)
         after = slice(after.start, after.start + 3)
         stiffness[rows, rows] = turned(i) @ HELD @ turned(i).T
@@ -218,7 +218,7 @@ def test_shrouds_that_touch_move_as_those_of_the_whole_ring():
     ring = DynamicModel(mass, damping, stiffness, connection, ("",) * (3 * SECTORS))
     march, resolution = PeriodicMarch(CONTACT), Resolution((0, 1, 2, 3), 640)
     wave = np.array([1.0, 1j, 0.4])
-    # Presses the shrouds together, as they do not with the same load everywhere.
+    # This load presses the shrouds together; the same load everywhere does not.
     one = HarmonicBalance.of_sector(
         sector, march, PeriodicLoad({1: wave}, static=_balancing(sector.at(0))), resolution
     )
@@ -237,13 +237,13 @@ def test_shrouds_that_touch_move_as_those_of_the_whole_ring():
 
 
 def _balancing(model):
-    """The load of contacts that are pressed and have not moved."""
+    """Return the load that balances contacts which are pressed and have not moved."""
     force = CONTACT.respond(CONTACT.rest(1), np.zeros((1, 3))).force
     return force.ravel() @ model.connection
 
 
 def test_a_sector_cut_through_its_disk_has_the_frequencies_of_the_whole_one():
-    """Three masses of a rim, of which the last is the first one of the next sector."""
+    """Three masses of a rim, the last of which is the first of the next sector."""
     chain = 1e3 * np.array([[1.0, -1.0, 0.0], [-1.0, 2.0, -1.0], [0.0, -1.0, 1.0]])
     names = [f"{point} {axis}" for axis in "xy" for point in ("left", "middle", "right")]
     stiffness = np.kron(np.diag([1.0, 0.5]), chain) + 200.0 * np.eye(6)
@@ -255,7 +255,7 @@ def test_a_sector_cut_through_its_disk_has_the_frequencies_of_the_whole_one():
     found = np.sort(
         np.concatenate([natural_frequencies(sector.at(shift)) for shift in range(SECTORS)])
     )
-    # A ring of twice as many masses, the cut ones held by both of their springs.
+    # A ring of twice as many masses, in which both springs hold the masses at the cuts.
     count = 2 * SECTORS
     ground = np.diag([400.0, 200.0] * SECTORS)
     around = 2.0 * np.eye(count) - np.roll(np.eye(count), 1, 0) - np.roll(np.eye(count), -1, 0)
@@ -264,11 +264,11 @@ def test_a_sector_cut_through_its_disk_has_the_frequencies_of_the_whole_one():
     assert np.allclose(found, expected, rtol=1e-10)
 
 
-def test_what_a_travelling_wave_is_not_is_refused():
+def test_invalid_uses_of_a_wave_are_refused():
     sector, _ = blades()
     load = PeriodicLoad({1: np.array([0.0, 1.0])})
     wave = HarmonicBalance.of_sector(sector, PeriodicMarch(SLIDER), load, Resolution((1,), 64))
-    for use in (lambda: LinearMode.of(wave, 1), lambda: wave.alone):
+    for use in (lambda: LinearMode.of(wave, 1), lambda: wave.uniform_receptance):
         with pytest.raises(HarmonicBalanceError, match="only its responses"):
             use()
     with pytest.raises(RigError, match="2 sectors or more"):

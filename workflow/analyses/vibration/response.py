@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from scipy.optimize import minimize_scalar
 
-from fe_models.dynamics.curves.control import ContinuationControl
+from fe_models.dynamics.curves.curve_steps import ContinuationControl
 from fe_models.dynamics.curves.followed_curve import (
     curve_by_force,
     curve_by_frequency,
