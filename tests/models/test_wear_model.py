@@ -133,6 +133,11 @@ def test_a_state_of_another_model_is_refused(tmp_path, model):
         checkpoint.state()
 
 
+def test_cases_without_a_model_are_refused():
+    with pytest.raises(fretscale.UserError, match="only the wear of contacts"):
+        fretscale.wear_model(CASES / "sphere_normal.yaml")
+
+
 def test_contacts_are_found_by_name(model):
     named = fretscale.WearModel(model.structure, {"pad": model.contacts}, model.wear)
     assert named.contact("pad") is model.contacts

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from workflow.analyses.wear.case.base import WearCase
 from workflow.analyses.wear.model import wear_model as translated
-from workflow.errors import UserError
 from workflow.interface.cases import AnyCase, load_case
 from workflow.models.wear import WearModel
 
@@ -28,10 +26,4 @@ def wear_model(case: AnyCase, /, **overrides: Any) -> WearModel:
     >>> print(*(of.contact("intrados").coulomb.coefficient for of in (model, smoother)))
     0.4 0.2
     """
-    read = load_case(case, **overrides)
-    if not isinstance(read, WearCase):
-        raise UserError(
-            f"{read.title!r} is no case of the wear of contacts; allowed: analysis wear of a "
-            "dovetail, a mesh, resultants or bodies"
-        )
-    return translated(read)
+    return translated(load_case(case, **overrides))

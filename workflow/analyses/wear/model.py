@@ -5,12 +5,22 @@ from __future__ import annotations
 from workflow.analyses.wear.case.base import WearCase
 from workflow.analyses.wear.structures import structure_of
 from workflow.analyses.wear.translation import contact_of, wear_of
+from workflow.case.sections import Case
+from workflow.errors import UserError
 from workflow.models.contact import Contact
 from workflow.models.wear import WearModel
 
 
-def wear_model(case: WearCase) -> WearModel:
-    """Return the model that a case describes: its structure, its contacts and how they wear."""
+def wear_model(case: Case) -> WearModel:
+    """Return the model that a case describes: its structure, its contacts and how they wear.
+
+    Raises UserError for a case of another kind.
+    """
+    if not isinstance(case, WearCase):
+        raise UserError(
+            "only the wear of contacts has such a model; allowed: cases of analysis wear of a "
+            "dovetail, a mesh, resultants or bodies"
+        )
     names = case.contact_names
     contacts: Contact | dict[str, Contact] = contact_of(case, names[0])
     if len(names) > 1:
