@@ -11,7 +11,7 @@ from tests.workflow.mesh_scenes import run
 from tests.workflow.test_curved_mesh import PEAK, pressed
 from workflow.analyses.wear.structures.mesh.case import MeshCase
 from workflow.analyses.wear.structures.mesh.elements import folded_elements
-from workflow.analyses.wear.structures.mesh.model import MeshModel
+from workflow.analyses.wear.structures.mesh.model import mesh_assembly
 from workflow.kinds import load_case
 
 pytestmark = [pytest.mark.usefixtures("reads_here")]
@@ -48,9 +48,9 @@ def test_a_check_says_what_is_used_of_midsides(tmp_path):
 def test_only_bodies_with_curved_edges_have_midsides(tmp_path):
     case = load_case(pressed(tmp_path, 2, 2))
     assert isinstance(case, MeshCase)
-    assert all(body.midsides is None for body in MeshModel(case).meshed().bodies)
+    assert all(body.midsides is None for body in mesh_assembly(case).meshed().bodies)
     curved = case.model_copy(update={"mesh": case.mesh.model_copy(update={"order": 2})})
-    block, foot = MeshModel(curved).meshed().bodies
+    block, foot = mesh_assembly(curved).meshed().bodies
     assert block.midsides is None
     assert foot.midsides is not None
     arc = foot.mesh.boundaries["sole"]

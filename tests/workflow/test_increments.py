@@ -17,7 +17,7 @@ from workflow.analyses.wear import ANALYSIS
 from workflow.analyses.wear.case.base import MOST_INCREMENTS
 from workflow.analyses.wear.increments import decide_increments, differences
 from workflow.analyses.wear.structures.dovetail.model import dovetail_joint
-from workflow.analyses.wear.structures.mesh.model import MeshModel
+from workflow.analyses.wear.structures.mesh.model import mesh_assembly
 from workflow.analyses.wear.translation import structure_loads
 from workflow.case.changing import changed
 from workflow.errors import MethodFailed
@@ -91,8 +91,8 @@ def test_legs_of_a_mesh_get_what_each_asks_for(blocks):
     once, before, out, back = chosen.load_path.increments
     assert once == before == max(out, back)
     assert record["met"]
-    many = unworn(case, MeshModel, (88, 88))
-    assert np.max(differences(unworn(case, MeshModel, (out, back)), many)) <= 0.03
+    many = unworn(case, mesh_assembly, (88, 88))
+    assert np.max(differences(unworn(case, mesh_assembly, (out, back)), many)) <= 0.03
 
 
 @pytest.mark.slow

@@ -23,7 +23,7 @@ from tests.workflow.mesh_scenes import (
     write_case,
 )
 from workflow.analyses.wear.quantities import main_results
-from workflow.analyses.wear.structures.mesh.model import MeshModel
+from workflow.analyses.wear.structures.mesh.model import mesh_assembly
 from workflow.analyses.wear.translation import structure_loads
 from workflow.errors import MethodFailed
 from workflow.kinds import load_case
@@ -100,7 +100,7 @@ def test_cycle_of_another_peak_is_not_taken_from_the_cache(blocks, tmp_path, mon
     for leg, cache in ((4, "one"), (3, "one"), (3, "other")):
         monkeypatch.setenv("FRETSCALE_CACHE", str(tmp_path / cache))
         settings = [f"load_path.peak_leg={leg}", "nonlinearity.stiffness=relinearised"]
-        (history,) = structure_loads(load_case(blocks, settings), MeshModel).unworn()
+        (history,) = structure_loads(load_case(blocks, settings), mesh_assembly).unworn()
         forces.append(history.force)
     np.testing.assert_array_equal(forces[1], forces[2])
     assert np.abs(forces[1] - forces[0]).max() > 1e-6 * np.abs(forces[0]).max()
@@ -109,7 +109,9 @@ def test_cycle_of_another_peak_is_not_taken_from_the_cache(blocks, tmp_path, mon
 @pytest.mark.parametrize("stiffness", ["linear", "relinearised"])
 def test_peak_that_does_not_converge_is_told(blocks, stiffness, monkeypatch):
     """Neither the drift probe nor what a stiffness is taken at may pass for a solution."""
-    stage = structure_loads(load_case(blocks, [f"nonlinearity.stiffness={stiffness}"]), MeshModel)
+    stage = structure_loads(
+        load_case(blocks, [f"nonlinearity.stiffness={stiffness}"]), mesh_assembly
+    )
     monkeypatch.setattr(friction, "MAX_ITERATIONS", 1)
     with pytest.raises(MethodFailed, match="did not converge"):
         stage.probe([np.zeros(len(face.face)) for face in stage.faces])
@@ -195,7 +197,7 @@ def test_round_foot_in_the_plane_presses_as_hertz_says(section, tmp_path):
     modulus = 200e3 / (2.0 * (1.0 - 0.3**2))
     half = np.sqrt(4.0 * load * RADIUS / (np.pi * modulus))
     hertz = 2.0 * load / (np.pi * half)
-    (history,) = structure_loads(load_case(section), MeshModel).unworn()
+    (history,) = structure_loads(load_case(section), mesh_assembly).unworn()
     assert history.pressure[0].max() == pytest.approx(hertz, rel=0.05)
     assert summary["foot"]["peak_pressure"]["unworn"] == pytest.approx(hertz, rel=0.02)
 
@@ -266,7 +268,7 @@ def test_heights_are_those_of_the_paraboloid(blocks):
     np.save(blocks.with_name("gap.npy"), np.tile(axis[:, None] ** 2 / 20.0, 16))
     gaps = ("{shape: paraboloid, radius_x: 10}", "{shape: heights, file: gap.npy}")
     cases = [load_case(blocks, [f"structure.contacts.0.gap={gap}"]) for gap in gaps]
-    one, two = (MeshModel(case).meshed().interfaces[0] for case in cases)
+    one, two = (mesh_assembly(case).meshed().interfaces[0] for case in cases)
     np.testing.assert_allclose(one.gap, one.coordinates[:, 0] ** 2 / 20.0, atol=1e-15)
     # Linear between the centres of cells, and straight on beyond the last, half a cell inside.
     np.testing.assert_allclose(two.gap, one.gap, atol=(1.0 / 16.0) ** 2 / 20.0)

@@ -9,7 +9,7 @@ from fe_models.joints import friction
 from fe_models.meshes.structure_mesh import write_msh
 from tests.workflow.mesh_scenes import ABAQUS_FACES, write_case
 from workflow.analyses.wear.structures.dovetail.model import dovetail_joint
-from workflow.analyses.wear.structures.mesh.model import MeshModel
+from workflow.analyses.wear.structures.mesh.model import mesh_assembly
 from workflow.analyses.wear.translation import structure_loads
 from workflow.kinds import load_case
 
@@ -94,7 +94,7 @@ def test_dovetail_as_a_mesh_is_the_dovetail(tmp_path, small_path, ending, monkey
     monkeypatch.setenv("FRETSCALE_CACHE", str(tmp_path / "cache"))
     dovetail = load_case(small_path)
     ours = structure_loads(dovetail, dovetail_joint)
-    theirs = structure_loads(load_case(dovetail_as_mesh(tmp_path, dovetail, ending)), MeshModel)
+    theirs = structure_loads(load_case(dovetail_as_mesh(tmp_path, dovetail, ending)), mesh_assembly)
     assert theirs.peak == ours.peak
     for one, two in zip(ours.unworn(), theirs.unworn(), strict=True):
         assert one.interface.name == two.interface.name

@@ -10,7 +10,7 @@ from sa_solver.half_space.subsurface_influence import YY
 from tests.workflow.commands import invoke
 from tests.workflow.mesh_scenes import STEEL, refused, run
 from tests.workflow.plane_blocks import Blocks, solved
-from workflow.analyses.wear.structures.mesh.model import MeshModel
+from workflow.analyses.wear.structures.mesh.model import mesh_assembly
 from workflow.analyses.wear.translation import structure_loads
 from workflow.errors import CaseError
 from workflow.kinds import load_case, parse_case, template
@@ -92,17 +92,17 @@ def test_temperatures_of_nodes_that_are_all_alike(heated):
     """Forces of the structure are those of one temperature for all; a new file is a new load."""
     supports = settings(HELD)[1]
     models = [
-        MeshModel(load_case(heated, [supports, with_loads(load)])) for load in (HEATED, NODAL)
+        mesh_assembly(load_case(heated, [supports, with_loads(load)])) for load in (HEATED, NODAL)
     ]
     one, two = (
-        [body.loads[:, 1] for body in model.structure(model.mesh()).bodies] for model in models
+        [body.loads[:, 1] for body in model.structure(model.meshed()).bodies] for model in models
     )
     for uniform, nodal in zip(one, two, strict=True):
         np.testing.assert_allclose(nodal, uniform, atol=1e-12 * np.abs(uniform).max())
     key = models[1].key
     text = heated.with_name("t.csv").read_text("utf-8")
     heated.with_name("t.csv").write_text(text.replace("120.0", "121.0", 1), "utf-8")
-    assert MeshModel(load_case(heated, [supports, with_loads(NODAL)])).key != key
+    assert mesh_assembly(load_case(heated, [supports, with_loads(NODAL)])).key != key
 
 
 def test_check_tells_temperatures(heated):
@@ -177,7 +177,7 @@ def blocks(tmp_path):
 def first_cycle(path, *loads):
     supports = f"structure.supports={json.dumps(BASE)}"
     case = load_case(path, [supports, f"structure.loads={json.dumps(loads)}"])
-    return structure_loads(case, MeshModel).unworn_cycle
+    return structure_loads(case, mesh_assembly).unworn_cycle
 
 
 def test_rigid_face_that_does_not_turn_is_imposed_a_displacement(blocks):

@@ -9,7 +9,7 @@ from sa_solver.types import LoadHistory
 from tests.workflow.conftest import Run, invoke
 from workflow.analyses.contact.datasets import load_columns
 from workflow.analyses.wear.structures import structure_of
-from workflow.analyses.wear.structures.mesh.model import MeshModel
+from workflow.analyses.wear.structures.mesh.model import mesh_assembly
 from workflow.analyses.wear.structures.resultants.reading import read_resultants
 from workflow.analyses.wear.structures.resultants.writing import (
     write_resultants_csv,
@@ -143,7 +143,7 @@ def test_factors_of_a_mix_scale_the_loads_of_a_mesh(template_files):
         "structure.loads=[{kind: pressure, group: blade_top, pressure: 10, path: [1, 0]}, "
         f"{turning}]",
     ]
-    first, second = MeshModel(parse_case(template("mesh"), str(path), overrides)).load_cycles
+    first, second = mesh_assembly(parse_case(template("mesh"), str(path), overrides)).load_cycles
     assert (first.share, second.share) == (0.6, 0.4)
     np.testing.assert_allclose(second.amplitudes, first.amplitudes * [0.5, 0.25], rtol=1e-14)
     with pytest.raises(CaseError, match=r"load_path\.mix\.0\.factors: 2 factors for 1 loads"):

@@ -14,7 +14,7 @@ from tests.workflow.commands import invoke
 from tests.workflow.mesh_scenes import pressed_blocks, refused, run
 from tests.workflow.plane_blocks import RADIUS, Blocks, solved
 from workflow.analyses.wear.structures import structure_of
-from workflow.analyses.wear.structures.mesh.model import MeshModel
+from workflow.analyses.wear.structures.mesh.model import mesh_assembly
 from workflow.kinds import load_case
 
 pytestmark = pytest.mark.usefixtures("reads_here")
@@ -59,7 +59,7 @@ def test_a_form_from_scans_is_the_form(tmp_path):
     np.testing.assert_allclose(scanned.force[:, 2], pulled, rtol=0.0, atol=1e-3 * pulled.max())
     np.testing.assert_allclose(scanned.loads.P, [50.0, 25.0], rtol=1e-5)
     # Meshes that are written have the form on body 2.
-    mesh = MeshModel(load_case(path)).meshed()
+    mesh = mesh_assembly(load_case(path)).meshed()
     (face,), form = mesh.interfaces, form_of(mesh)
     np.testing.assert_allclose(form[1][face.nodes_2, 1], face.gap, atol=1e-12)
 
@@ -81,7 +81,7 @@ def test_planes_are_exact_on_nodes_and_cells(blocks):
     for body, flipped, sign in ((1, False, 1), (2, False, -1), (2, True, 1), (1, True, -1)):
         scan = {"file": "plane.npy", "flipped": flipped, **SCAN}
         case = load_case(with_surfaces(blocks, **{f"body_{body}": scan}))
-        model = MeshModel(case)
+        model = mesh_assembly(case)
         (face,) = model.meshed().interfaces
 
         def gap(x, y, sign=sign):
@@ -151,7 +151,7 @@ def test_half_a_face_takes_scans_that_are_their_own_image(tmp_path):
     for half, low in ((False, -40), (True, 0)):
         blocks = Blocks((low, 40), 40, (low // 2, 20), 20, (low // 2, 14), strips=127, half=half)
         path = with_surfaces(blocks.press(tmp_path, 1.0, 50.0), body_2={"file": "arc.npy", **scan})
-        (face,) = MeshModel(load_case(path)).meshed().interfaces
+        (face,) = mesh_assembly(load_case(path)).meshed().interfaces
         found.append(dict(zip(np.round(face.coordinates[:, 0], 6), face.gap, strict=True)))
     whole, part = found
     assert min(part) == 0.0

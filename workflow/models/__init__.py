@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 from sa_solver.lazy import lazy_names
 
 if TYPE_CHECKING:
+    from workflow.models.assembly import LegPath, MeshAssembly, TightenedBolt
     from workflow.models.contact import Contact, Wear
     from workflow.models.dovetail import DovetailJoint, DovetailMesh
     from workflow.models.gaps import AddedGap
@@ -25,12 +26,15 @@ __all__ = [
     "ContactFace",
     "DovetailJoint",
     "DovetailMesh",
+    "LegPath",
     "LoadCycle",
     "LoadSource",
+    "MeshAssembly",
     "Nonlinearity",
     "StructureLoads",
     "StructureModel",
     "TangentialLoops",
+    "TightenedBolt",
     "UncoupledSource",
     "Wear",
     "WearModel",
@@ -39,6 +43,7 @@ __all__ = [
 __getattr__, __dir__ = lazy_names(
     __name__,
     {
+        "assembly": ("LegPath", "MeshAssembly", "TightenedBolt"),
         "contact": ("Contact", "Wear"),
         "dovetail": ("DovetailJoint", "DovetailMesh"),
         "gaps": ("AddedGap",),

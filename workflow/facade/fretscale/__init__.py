@@ -11,6 +11,7 @@ What is modelled in Python
     - ``wear_model``: the model that a case describes.
     - ``DovetailJoint``, ``DovetailMesh``, ``Dovetail``, ``Mission``: the built-in blade root in its
       disk: the joint, its mesh, its section and its loads.
+    - ``MeshAssembly``, ``LegPath``, ``TightenedBolt``: bodies of a mesh or CAD file under loads.
     - ``UncoupledSource``, ``LoadSource``: the bases of loads of one's own, for ``ContactFace`` s.
     - ``Contact``, ``CoulombFriction``: what a contact is made of, and how it is computed.
     - ``Wear``, ``JumpSize``, ``Stop``: how far contacts wear, and in which steps.
@@ -118,6 +119,7 @@ if TYPE_CHECKING:
     from workflow.interface.observers import Checkpoint, Progress
     from workflow.interface.results import MainResult, Results, open  # noqa: A004
     from workflow.interface.running import run
+    from workflow.models.assembly import LegPath, MeshAssembly, TightenedBolt
     from workflow.models.contact import Contact, Wear
     from workflow.models.dovetail import DovetailJoint, DovetailMesh
     from workflow.models.gaps import AddedGap
@@ -142,8 +144,10 @@ __all__ = [
     "FretscaleError",
     "Group",
     "JumpSize",
+    "LegPath",
     "LoadSource",
     "MainResult",
+    "MeshAssembly",
     "MethodFailed",
     "Mission",
     "NotWritten",
@@ -152,6 +156,7 @@ __all__ = [
     "Progress",
     "Results",
     "Stop",
+    "TightenedBolt",
     "UncoupledSource",
     "UserError",
     "Values",
@@ -194,6 +199,7 @@ __getattr__, __dir__ = lazy_names(
         "workflow.interface.running": ("run",),
         "workflow.interface.modelling": ("wear_model",),
         "workflow.interface.observers": ("Checkpoint", "Progress"),
+        "workflow.models.assembly": ("LegPath", "MeshAssembly", "TightenedBolt"),
         "workflow.models.contact": ("Contact", "Wear"),
         "workflow.models.dovetail": ("DovetailJoint", "DovetailMesh"),
         "workflow.models.gaps": ("AddedGap",),

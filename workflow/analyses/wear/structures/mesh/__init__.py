@@ -27,9 +27,9 @@ MOST_NODES = 4000
 
 def _model(case: MeshCase) -> StructureModel:
     # Finite elements take a second to load: where they are used.
-    from workflow.analyses.wear.structures.mesh.model import MeshModel
+    from workflow.analyses.wear.structures.mesh.model import mesh_assembly
 
-    return MeshModel(case)
+    return mesh_assembly(case)
 
 
 def _extent(case: MeshCase) -> Extent:
@@ -61,12 +61,12 @@ def _choose(case: MeshCase) -> tuple[MeshCase, dict[str, Any] | None]:
         return case, None
     from fe_models.meshes.structure_mesh import MeshError
     from workflow.analyses.wear.increments import choose_increments
-    from workflow.analyses.wear.structures.mesh.model import MeshModel
+    from workflow.analyses.wear.structures.mesh.model import mesh_assembly
 
     extent = _extent(case)
     _memory(case, int(extent.nodes), int(extent.interface_nodes)).check()
     try:
-        return choose_increments(case, MeshModel)
+        return choose_increments(case, mesh_assembly)
     except MeshError as error:
         raise UserError(f"structure: {error}") from error
 

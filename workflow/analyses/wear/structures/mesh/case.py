@@ -40,7 +40,6 @@ from workflow.analyses.wear.structures.mesh.elements import (
 )
 from workflow.analyses.wear.structures.mesh.faces import (
     check_mirrored,
-    face_size,
     hardly_met,
     outline_of,
 )
@@ -63,6 +62,7 @@ from workflow.case.changing import changed
 from workflow.case.fields import AUTO
 from workflow.case.plain import counted, listed, told_of_body
 from workflow.case.sections import Length, Section, Title, disagreement, entry
+from workflow.models.faces import face_size
 
 if TYPE_CHECKING:
     from fe_models.geometry.imported import ImportedMesh

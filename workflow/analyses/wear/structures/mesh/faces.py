@@ -12,25 +12,11 @@ from workflow.analyses.wear.case.scanned import MIRRORED
 from workflow.case.input_files import read_heights
 from workflow.case.plain import counted, shape_in_words
 from workflow.case.sections import Section, disagreement
+from workflow.models.faces import face_size, planes_of_symmetry
 
-AXIS_NAMES = "xy"
 # Faces are shared but for rounding; and usually the smaller one all but for the clearance of a
 # bolt's hole, an eighth of what is under its head.
 SHARED, WHOLE = 1e-6, 0.8
-
-
-def face_size(face: Interface) -> tuple[float, float]:
-    """Extent of a face along x and y about its origin [mm]; of a line contact a slice of 1 mm.
-
-    Of one that planes of symmetry cut, whose origin they hold, the extent of the whole.
-    """
-    reach = 2.0 * np.abs(face.coordinates).max(axis=0)
-    return float(reach[0]), 1.0 if face.line else float(reach[1])
-
-
-def planes_of_symmetry(planes: Sequence[int]) -> str:
-    """Those across some axes of a contact's frame, in words."""
-    return " and ".join(f"a plane of symmetry across {AXIS_NAMES[axis]}" for axis in planes)
 
 
 def outline_of(mesh: StructureMesh, interface: Interface, gap: Section | None) -> str:
