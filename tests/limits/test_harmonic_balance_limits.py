@@ -155,7 +155,7 @@ def test_a_static_load_that_lifts_the_structure_off_has_no_equilibrium(load):
     problem = balance(body(normal=0.0), contact(), {"x": 1.0}, load)
     solution = problem.solve(30.0, 1.0)
     assert not solution.converged
-    assert "no rest under the constant load" in solution.message
+    assert "no static equilibrium" in solution.message
     assert "give a load that does not pull all joints apart" in solution.message
     branch = along_frequency(problem, 1.0, (30.0, 60.0))
     assert branch.message == solution.message
@@ -304,19 +304,18 @@ def test_the_third_harmonic_in_resonance_with_the_second_mode(held):
 @pytest.mark.parametrize("frequency", [np.nan, np.inf, -100.0, 0.0])
 def test_frequencies_that_are_none_are_refused(frequency):
     """At 0 Hz all harmonics are one: there is no cycle."""
-    with pytest.raises(HarmonicBalanceError, match="give a frequency above 0"):
+    with pytest.raises(HarmonicBalanceError, match="give a finite number above 0"):
         rig().solve(frequency, 60.0)
 
 
 @pytest.mark.parametrize("force", [np.nan, np.inf])
 def test_forces_that_are_none_are_refused(force):
-    with pytest.raises(HarmonicBalanceError, match="both finite"):
+    with pytest.raises(HarmonicBalanceError, match="give a finite number"):
         rig().solve(100.0, force)
-    model, resolution = body(), Resolution((0, 1), 16)
     good, bad = np.zeros(3), np.array([force, 0.0, 0.0])
-    for load in (PeriodicLoad({1: bad}), PeriodicLoad({1: good}, bad)):
-        with pytest.raises(HarmonicBalanceError, match="give finite ones"):
-            HarmonicBalance(model, PeriodicMarch(contact()), load, resolution)
+    for waves, static in (({1: bad}, None), ({1: good}, bad)):
+        with pytest.raises(HarmonicBalanceError, match="give finite numbers"):
+            PeriodicLoad(waves, static)
 
 
 @pytest.mark.parametrize(

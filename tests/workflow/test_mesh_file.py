@@ -169,7 +169,7 @@ def test_node_sets_that_are_no_faces(blocks, tmp_path):
     assert invoke("check", blocks, "--set", at_tip).exit_code == 0
     line = refused(blocks, at_tip, "structure.loads.1.at=[9, 0, 0]")
     assert "the 1 nodes of tip cannot carry its moment" in line
-    assert "tip is a node set that is no face" in refused(blocks, "structure.loads.0.group=tip")
+    assert "tip is a node set that is not a face" in refused(blocks, "structure.loads.0.group=tip")
     assert "tip is a node set" in refused(blocks, "structure.contacts.0.face_2=tip")
     overrides = "structure.supports.0.group=tip", "structure.supports.0.hold=normal"
     assert "node set tip has no area to hold normal" in refused(blocks, *overrides)

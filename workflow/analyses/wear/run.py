@@ -29,7 +29,7 @@ from workflow.analyses.wear.results import write_output
 from workflow.analyses.wear.structures import structure_of
 from workflow.analyses.wear.structures.resultants.source import ResultantsSource
 from workflow.analyses.wear.structures.resultants.writing import marched
-from workflow.analyses.wear.translation import face_contact
+from workflow.analyses.wear.translation import check_section, face_contact
 from workflow.analyses.wear.warnings import (
     warn_of_contact,
     warn_of_file,
@@ -89,6 +89,8 @@ def _compute(run: Run[WearCase], working: ExitStack) -> tuple[Outcome, Begun]:
     model = wear_model(case)
     source = model.loads(DiskStore())
     faces = meshed_faces(case, source, reporter)
+    for face in faces:
+        check_section(case, face)
     workers = working.enter_context(
         contact_workers(case, faces if _worn_apart(case, source) else ())
     )

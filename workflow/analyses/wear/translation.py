@@ -5,10 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TypeVar
 
-from sa_solver.types import Grid
 from wear.coupled import JumpSize, Stop
 from workflow.analyses.wear.case.base import WearCase
-from workflow.analyses.wear.case.sections import ContactStress
 from workflow.errors import UserError
 from workflow.models.contact import Contact, FaceContact, Wear, WearStepper
 from workflow.models.loads import ContactFace
@@ -54,9 +52,8 @@ def face_contact(
     case: WearCase, face: ContactFace, stepper: WearStepper | None = None
 ) -> FaceContact:
     """Return the contact of a face; it wears by the steps of the case unless others are given."""
-    contact = contact_of(case, face.face.name)
-    _check_section(case.stress, face.grid(contact.grid))
-    return FaceContact(face, contact, wear_of(case), stepper)
+    check_section(case, face)
+    return FaceContact(face, contact_of(case, face.face.name), wear_of(case), stepper)
 
 
 def structure_loads(
@@ -69,8 +66,9 @@ def structure_loads(
     return StructureLoads(model(case), lambda name: case.terms(name).friction.at(0.0), DiskStore())
 
 
-def _check_section(stress: ContactStress, grid: Grid) -> None:
-    """Refuse at once a section that could not be drawn at the end."""
+def check_section(case: WearCase, face: ContactFace) -> None:
+    """Raise UserError for a section of the stress that could not be drawn at the end."""
+    stress, grid = case.stress, face.grid(case.terms(face.face.name).grid)
     if stress.section == "none":
         return
     if stress.section == "y" and grid.line:
