@@ -69,7 +69,7 @@ class RayleighRatios(Section):
         from fe_models.dynamics.damping import rayleigh_factors
 
         mass, stiffness = rayleigh_factors(np.array(self.frequencies), np.array(self.ratios))
-        # Where the ratios are as the frequencies, rounding can make a factor slightly negative.
+        # At the bounds that the validator allows, rounding can make a factor slightly negative.
         return max(mass, 0.0), max(stiffness, 0.0)
 
 

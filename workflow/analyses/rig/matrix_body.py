@@ -336,7 +336,7 @@ class MatrixBody(JointedBody, Matrices):
     def reduced(
         self, done: Callable[[], None] = lambda: None
     ) -> tuple[ReducedModel, tuple[str, ...]]:
-        """Return the model, with the names of massless unknowns or of the lightest motions.
+        """Return the model, with names of unknowns without mass, or of its lightest motions.
 
         Without ``massless``, unknowns without mass follow the others statically and are removed
         from the model. With it, these motions are given mass and all unknowns stay; the names are
@@ -485,5 +485,5 @@ def _frequencies(files: MatrixFiles, stamps: Stamps) -> Array:
 
     try:
         return lowest_frequencies(files.read(), TOLD)
-    except (MatrixError, SolverError):  # what masses that are added may yet mend
+    except (MatrixError, SolverError):  # masses that the case adds may still cure this
         return np.empty(0)

@@ -69,11 +69,11 @@ class RigModel:
     order, and are empty where a case needs none. Masses ``in_a_row`` move along x.
 
     Two bodies in contact have ``pressing`` ``(n,)``, the forces of a normal load of 1 N (elsewhere
-    the load is the joints' own preload), and ``stretch`` ``(n,)``, which maps displacements to the
-    relative displacement of loops, in place of the joints' mean. Each of their joints has its place
-    ``places`` ``(j, 2)`` on the contact plane [mm], initial ``gap`` ``(j,)`` [mm] and ``area``
-    ``(j,)`` [mm²]; these are empty elsewhere. ``translations`` are rigid motions with the ground,
-    by direction; ``nodes`` are the joints of a reduced body.
+    the load is the preload of the joints), and ``stretch`` ``(n,)``, which maps displacements to
+    the relative displacement of loops, in place of the joints' mean. Each of their joints has its
+    place ``places`` ``(j, 2)`` on the contact plane [mm], initial ``gap`` ``(j,)`` [mm] and
+    ``area`` ``(j,)`` [mm²]; these are empty elsewhere. ``translations`` are rigid motions with the
+    ground, by direction; ``nodes`` are the joints of a reduced body.
 
     For a ring, ``sector`` is one sector, and ``model`` is the model for nodal diameter 0.
     """

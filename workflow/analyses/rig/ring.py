@@ -82,5 +82,5 @@ class RingOfSectors(Section):
 
 
 def with_next(names: tuple[str, ...], ring: Ring) -> tuple[str, ...]:
-    """Return names of a sector's displacements, and of those of the next that it does not share."""
+    """Return names of a sector's displacements, and of the next sector's that it does not share."""
     return (*names, *(f"{NEXT}{name}" for name in names if name not in ring.ties))

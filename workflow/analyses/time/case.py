@@ -266,7 +266,7 @@ class RigCase(TimeCase):
 
     @property
     def steps(self) -> float:
-        """Steps of time that are kept of each motion."""
+        """Number of time steps stored of each motion."""
         return _kept_time(self.excitation) / self.integration.step
 
     def outline(self) -> list[tuple[str, str]]:
@@ -309,7 +309,7 @@ def _longest_step(excitation: Harmonic | Hammer | Recorded) -> float:
 
 
 def _kept_time(excitation: Harmonic | Hammer | Recorded) -> float:
-    """Return the length of the motion that is kept [s]."""
+    """Return the length of the stored motion [s]."""
     if isinstance(excitation, Harmonic):
         return 1.0 / excitation.frequency
     if isinstance(excitation, Hammer):

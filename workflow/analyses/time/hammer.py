@@ -46,7 +46,7 @@ NOTHING_LEFT = 1e-3
 # Share of the energy dissipated in the record, at which a motion counts as decayed: a measure of
 # damping without a mode.
 DECAYED = 0.9
-# Points of a ring-down that are kept, as it is smooth.
+# Points of a ring-down in the results: few are enough, as it is smooth.
 RING_DOWN_POINTS = 400
 # Reason why a ring-down has no damping, and the result to use instead.
 TOO_SHORT = (

@@ -16,7 +16,7 @@ REDUCED_COLUMNS = 20
 def memory(case: JointCase | RigCase, displacements: int = 0) -> Memory:
     """Return the memory for the motions: every step, with all its columns, at every energy.
 
-    A reduced body has so many ``displacements``, once they are known.
+    ``displacements`` is their number in a reduced body, once it is known.
     """
     remedy = "raise integration.step, or shorten what is recorded"
     if isinstance(case, JointCase):

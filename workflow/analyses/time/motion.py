@@ -1,4 +1,4 @@
-"""Motions of a rig whose joints have aged, with the numbers and curves that are kept of them."""
+"""Motions of a rig whose joints have aged, with their numbers and curves."""
 
 from __future__ import annotations
 

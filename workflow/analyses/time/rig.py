@@ -257,7 +257,7 @@ class _SteadyStates:
 
 
 def _change(now: Array, before: Array) -> float:
-    """Return the larger relative change of energy and stroke; what stays at 0 has no change."""
+    """Return the larger relative change of energy and stroke; 0 for values that stay at 0."""
     if not np.isfinite(before).all():
         return np.inf
     scale = np.where(now > 0.0, now, 1.0)

@@ -16,7 +16,7 @@ CURVE_POINTS, SLOPES = 2000, 20
 def memory(case: VibrationCaseBase, displacements: int = 0, joints: int = 1) -> Memory:
     """Return the memory for all motions under a force, and for finding one of them.
 
-    ``displacements`` and ``joints`` are those of the structure, once they are known.
+    ``displacements`` and ``joints`` are their numbers in the structure, once they are known.
     """
     directions = 3 if case.contacts else 1
     functions = 2 * len(case.harmonics)

@@ -63,8 +63,8 @@ class Response:
     ``curves`` are along the frequency and ``numbers`` for the summary. ``nodes`` are results of
     each joint along the frequency. ``resonance`` is the cycle there, for joints with places.
     ``loops`` are along a cycle, one per resolution, the finest last. ``answers`` are motions at the
-    frequencies of the case, ``harmonics`` those of motions by group, and ``bifurcations`` are along
-    the curve.
+    frequencies of the case, ``harmonics`` are the coefficients of motions by group, and
+    ``bifurcations`` are along the curve.
     """
 
     force: float
@@ -132,7 +132,7 @@ class VibrationOutcome:
 class Contents:
     """Contents of ``results.h5`` of a vibration case.
 
-    ``responses`` are the groups by force, ``loops`` those of them with loops. ``places`` tells
+    ``responses`` are the groups by force, ``loops`` the groups that have loops. ``places`` tells
     whether joints have places, and so a cycle at resonance; ``joints`` is the number of joints if
     any slips or separates. There may be a ``backbone``, motions ``at`` chosen frequencies, and
     ``modes`` over their amplitude; with ``engine``, frequencies have engine speeds. A ring has

@@ -86,7 +86,7 @@ class _Description:
     steps: Steps
 
     def __call__(self, state: WearState, cycles: float, steps: int) -> WornState:
-        """Return the contact after so many ``cycles``, and the rig on it.
+        """Return the contact after a number of ``cycles``, and the rig on it.
 
         ``steps`` is the number of wear steps since the last state.
         """

@@ -42,7 +42,7 @@ class Contents:
 
 @dataclass(frozen=True)
 class WornState:
-    """The contact after so many ``cycles``, and the responses of the rig on it.
+    """The contact after a number of ``cycles``, and the responses of the rig on it.
 
     ``fields`` are by group, ``numbers`` for the summary.
     """

@@ -1,4 +1,4 @@
-"""Main results of a rig that wears its contact: contact and resonances after so many cycles."""
+"""Main results of a rig that wears its contact: contact and resonances over the cycles."""
 
 from __future__ import annotations
 

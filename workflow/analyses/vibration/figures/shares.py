@@ -105,7 +105,7 @@ def _shown(file: h5py.File, contents: Contents) -> list[h5py.Group]:
 
 
 def _names(file: h5py.File) -> list[str]:
-    """Return names of the joints by what they stretch, without the axes of joints with several."""
+    """Return names of the joints, without the axis for joints with several directions."""
     names = []
     for row in file["names/joints"][()]:
         first, *more = (name for name in map(bytes.decode, row) if name != "ground")
