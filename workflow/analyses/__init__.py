@@ -1,1 +1,1 @@
-"""What can be computed: a folder for each analysis; ``rig`` is shared by those that vibrate."""
+"""Analyses of the workflow, one folder each; ``rig`` is shared by those with vibration."""

@@ -1,4 +1,4 @@
-"""Contact of two bodies along a path of loads: no structure, no wear."""
+"""Contact of two bodies along a path of loads, without structure and wear."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ __all__ = ["ANALYSIS"]
 
 
 def _run(run: Run[BodiesCase]) -> None:
-    # Solvers take a second to load: where they are used.
+    # Imported here, as the solvers take a second to load.
     from workflow.analyses.contact.run import run_contact
 
     run_contact(run)
 
 
-# What contact cases are compared by where they expect nothing.
+# Quantities by which contact cases without expected values are compared.
 AT_THE_END = (
     *("states.-1.approach", "states.-1.central_pressure", "states.-1.shift_x"),
     *("states.-1.stick_radius", "states.-1.stick_half_width", "loop.energy"),
@@ -44,7 +44,7 @@ def _pictures() -> Pictures:
 
 
 def _figures_of(contents: Any) -> Mapping[str, Callable[[h5py.File], Figure]]:
-    # Plots take half a second to load: where they are drawn.
+    # Imported here, as plotting takes half a second to load.
     from workflow.analyses.contact.figures import figures_of
 
     return figures_of(contents)

@@ -1,7 +1,7 @@
-"""A contact case: two bodies without a structure, pressed and sheared along a path of loads.
+"""Contact cases: two bodies without a structure, pressed and sheared along a path of loads.
 
-A line contact, in plane strain, differs in the dimensions of its loads and its grid: a separate
-kind of case, though both are written ``analysis: contact``.
+A line contact, in plane strain, differs in the dimensions of its loads and its grid. It is a
+separate kind of case, though both are written ``analysis: contact``.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ Poisson = Annotated[float, Quantity("1", at_least=0.0, at_most=0.5)]
 RIGID = ElasticMaterial(young=np.inf, poisson=0.0)
 AREA_SHAPES = ("sphere", "ellipsoid")
 LINE_SHAPES = ("cylinder", "flat_rounded")
-# Of either dimension.
+# Shapes of contacts both over an area and along a line.
 PLANE, HEIGHTS = "plane", "heights"
 
 # --- bodies -------------------------------------------------------------------------------------
@@ -62,15 +62,15 @@ class Bodies(Section):
 
     @property
     def text(self) -> str:
-        """The shape in a few words."""
+        """Short description of the shape."""
         return shape_in_words(self)
 
     @abstractmethod
     def form_on(self, grid: Grid) -> Array:
-        """What the shape leaves of the gap before loading on ``grid``, ``(nx, ny)`` [mm]."""
+        """Return the gap of the shape before loading on ``grid``, ``(nx, ny)`` [mm]."""
 
     def gap_on(self, grid: Grid) -> Array:
-        """Gap before loading on ``grid``, ``(nx, ny)`` [mm]."""
+        """Return the gap before loading on ``grid``, ``(nx, ny)`` [mm], with measured surfaces."""
         form = self.form_on(grid)
         return form if self.surfaces is None else form + self.surfaces.gap(grid)
 
@@ -80,14 +80,14 @@ class Shape(Bodies):
 
     @abstractmethod
     def height(self, x: Array, y: Array) -> Array:
-        """Gap before loading [mm] at ``x`` and ``y``, which broadcast against each other."""
+        """Return the gap before loading [mm] at ``x`` and ``y``, which broadcast together."""
 
     def form_on(self, grid: Grid) -> Array:
         return self.height(grid.x, grid.y)
 
 
 class Plane(Shape):
-    """No form of its own: all of it is in the measured surfaces."""
+    """No form of its own: the whole form is in the measured surfaces."""
 
     shape: Literal["plane"] = entry("a plane all over the grid", "plane")
     surfaces: MeasuredSurfaces = entry("as measured, with all of their form")
@@ -118,7 +118,7 @@ class Ellipsoid(Shape):
 
 
 class Cylinder(Shape):
-    """Parabola x² / 2 R, the same all along y: a line contact."""
+    """Parabola x² / 2 R, constant along y: a line contact."""
 
     shape: Literal["cylinder"] = entry("cylinder, flat_rounded, plane or heights", "cylinder")
     radius: RoundingRadius = entry("relative, 1/R = 1/R1 + 1/R2 [mm]", "10 mm")
@@ -128,7 +128,7 @@ class Cylinder(Shape):
 
 
 class FlatRounded(Shape):
-    """Flat, and a parabola beyond either end of it: a line contact."""
+    """Flat with a parabola beyond either end: a line contact."""
 
     shape: Literal["flat_rounded"] = entry(
         "cylinder, flat_rounded, plane or heights", "flat_rounded"
@@ -185,14 +185,14 @@ class BodyMaterials(Section):
 
 
 def elastic(body: Body) -> ElasticMaterial:
-    """The material of a body as the solvers take it."""
+    """Return the material of a body in the form that the solvers need."""
     return RIGID if body == "rigid" else body.elastic()
 
 
 def unworn_contact(
     shape: Section, bodies: Sequence[ElasticBody | str], load: float, line: bool
 ) -> tuple[float, float] | None:
-    """Width [mm] and largest pressure [MPa] of a ball or cylinder, None for other shapes."""
+    """Return width [mm] and largest pressure [MPa] of a ball or cylinder, None for other shapes."""
     radius = getattr(shape, "radius", None)
     compliance = sum(
         (1.0 - body.elastic().poisson ** 2) / body.elastic().young
@@ -209,7 +209,7 @@ def unworn_contact(
 
 
 def check_bulk_stress(table: LoadTable, materials: BodyMaterials) -> None:
-    """Refuse bulk stress in a body that is rigid."""
+    """Refuse bulk stress in a rigid body."""
     for number in (1, 2):
         body, key = f"body_{number}", f"bulk_stress_{number}"
         if key in table.columns and getattr(materials, body) == "rigid":
@@ -224,7 +224,7 @@ def check_bulk_stress(table: LoadTable, materials: BodyMaterials) -> None:
 
 
 class HalfSpaceGrid(Section):
-    """How a contact is solved along its path."""
+    """Settings for the solution of a contact along its path."""
 
     grid: object  # each dimension narrows the cells and the size
     size: object
@@ -243,7 +243,7 @@ class HalfSpaceGrid(Section):
 
     @abstractmethod
     def centred(self) -> Grid:
-        """The grid, centred on the bodies."""
+        """Return the grid, centred on the bodies."""
 
 
 class ContactGrid(HalfSpaceGrid):
@@ -261,7 +261,7 @@ class ContactGrid(HalfSpaceGrid):
 
 
 class LineContactGrid(HalfSpaceGrid):
-    """Half-plane solution on strips centred on the bodies."""
+    """Half-plane solution on cells of a line contact, centred on the bodies."""
 
     grid: LineCells = entry(
         "strips along x; of heights as many as their file has", 512, default=(512, 1)
@@ -304,7 +304,7 @@ class BodiesCase(Case):
 
     @model_validator(mode="after")
     def _rubs_with_friction(self) -> Self:
-        """Refuse what slides, or would if it could, where nobody has said how."""
+        """Refuse shear, and pressure on dissimilar bodies, if no friction is given."""
         if "friction" in self.model_fields_set:
             return self
         pair = ElasticPair(elastic(self.materials.body_1), elastic(self.materials.body_2))
@@ -361,7 +361,7 @@ class BodiesCase(Case):
 
 
 class ContactCase(BodiesCase):
-    """Two bodies in contact over an area of both directions."""
+    """Two bodies in contact over an area."""
 
     about: ClassVar[str] = "a ball, ellipsoid or measured heights under any history of loads"
 
@@ -378,7 +378,7 @@ class ContactCase(BodiesCase):
 
 
 class LineContactCase(BodiesCase):
-    """Two bodies in contact along a line, in plane strain: everything is per length of it."""
+    """Two bodies in contact along a line, in plane strain: all quantities are per length of it."""
 
     about: ClassVar[str] = "a cylinder, flat or heights along a line under any history of loads"
 
@@ -395,10 +395,10 @@ class LineContactCase(BodiesCase):
 
 
 def touches_along_a_line(source: Source, ambiguous: tuple[str, ...]) -> bool:
-    """Whether two bodies touch along a line: by shape; ``ambiguous`` shapes may be both.
+    """Return whether two bodies touch along a line, by their shape.
 
-    Heights, planes and flats know no dimension: a grid of one size is that of a line contact.
-    Raises CaseError where the shape is none of them.
+    The ``ambiguous`` shapes, such as heights and planes, have no dimension: a grid of one size is
+    that of a line contact. Raises CaseError for an unknown shape.
     """
     if source.at(("structure", "kind")) != "bodies":
         return False
@@ -408,26 +408,26 @@ def touches_along_a_line(source: Source, ambiguous: tuple[str, ...]) -> bool:
 
 
 def check_surfaces(bodies: Bodies, grid: Grid) -> None:
-    """Raise unless measured surfaces fit the grid."""
+    """Raise an error unless measured surfaces fit the grid."""
     if bodies.surfaces is not None:
         bodies.surfaces.check(grid)
 
 
 def surface_doubts(bodies: Bodies, grid: Grid) -> Iterator[str]:
-    """About measured surfaces: their units, and roughness that the grid does not carry."""
+    """Warn about the units of measured surfaces, and about roughness that the grid loses."""
     if bodies.surfaces is not None:
         yield from bodies.surfaces.doubts(grid)
 
 
 def surfaces_in_words(bodies: Bodies, grid: Grid) -> list[tuple[str, str]]:
-    """A row for each measured surface."""
+    """Return an outline row for each measured surface."""
     surfaces = bodies.surfaces
     told = {} if surfaces is None else surfaces.told(surfaces.summary(grid))
     return [(f"surface {name[-1]}", text) for name, text in told.items()]
 
 
 def require_shape(file: str, grid: tuple[int, int]) -> None:
-    """Raise unless a file of heights has a value for each cell of ``grid``."""
+    """Raise an error unless a file of heights has a value for each cell of ``grid``."""
     try:
         shape = read_heights(file).shape
     except InputFileError as error:

@@ -1,4 +1,4 @@
-"""Loads, motions and tractions of a contact as datasets, whichever analysis has them.
+"""Datasets of loads, motions and tractions of a contact, for all analyses.
 
 Extensive quantities are in the units of a contact over an area.
 """
@@ -16,9 +16,9 @@ BODIES = "bodies"
 
 @dataclass(frozen=True)
 class Contents:
-    """What ``results.h5`` of a contact case holds: a ``line`` contact or one over an area.
+    """Contents of ``results.h5`` of a contact case: a ``line`` contact or one over an area.
 
-    ``increments`` are computed, not only prescribed.
+    ``increments`` is the number of computed increments, not of all in the path.
     """
 
     line: bool
@@ -45,7 +45,7 @@ RIGID_MOTIONS = {
     "tilt_y": ("rad", "rotation of body 1 relative to body 2 about y"),
     "twist": ("rad", "rotation of body 1 relative to body 2 about z"),
 }
-# Of a mix of missions.
+# Columns for a mix of missions.
 MISSIONS = {
     "share": ("1", "of the mission's cycles among all cycles of the mix"),
     "block": ("1", "mission of the mix, counted from 0"),
@@ -53,13 +53,13 @@ MISSIONS = {
 
 
 def load_columns(loads: LoadHistory) -> dict[str, Dataset]:
-    """The columns of a load history; those of a mix only where there is one."""
+    """Return the columns of a load history, with those of a mix only if there is one."""
     quantities = LOADS | MISSIONS if loads.mixed else LOADS
     return described(quantities, (getattr(loads, name) for name in quantities))
 
 
 def traction_fields(pressure: Array, shear: Array, slip: Array) -> dict[str, Dataset]:
-    """Tractions on body 2 and slip: ``(nx, ny)``, ``(2, nx, ny)`` and ``(2, nx, ny)``."""
+    """Return tractions on body 2 and slip: ``(nx, ny)``, ``(2, nx, ny)`` and ``(2, nx, ny)``."""
     return {
         "pressure": pressure_field(pressure),
         "shear": shear_field(shear),
@@ -68,16 +68,16 @@ def traction_fields(pressure: Array, shear: Array, slip: Array) -> dict[str, Dat
 
 
 def pressure_field(pressure: Array) -> Dataset:
-    """Pressure at points of a contact."""
+    """Return the pressure at points of a contact."""
     return Dataset(pressure, "MPa", "contact pressure")
 
 
 def shear_field(shear: Array) -> Dataset:
-    """Shear at points of a contact, x and y."""
+    """Return the shear at points of a contact, x and y."""
     what = "shear on body 2, x and y; in a wear run µp where the structure slips, else 0"
     return Dataset(shear, "MPa", what)
 
 
 def slip_field(slip: Array) -> Dataset:
-    """Slip at points of a contact, x and y."""
+    """Return the slip at points of a contact, x and y."""
     return Dataset(slip, "mm", "slip of body 2 over body 1 in the increment, x and y")

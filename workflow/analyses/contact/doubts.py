@@ -1,4 +1,4 @@
-"""Doubts about two bodies under loads: what presses and shears them, and the grid they are on."""
+"""Plausibility warnings about two bodies under loads: pressure, shear and grid."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from workflow.case.doubts import pressed
 from workflow.case.plain import plain
 from workflow.case.sections import ElasticBody
 
-# Shear below this share of what friction carries is hardly meant to do anything.
+# Shear below this share of the friction limit is hardly intended.
 HARDLY = 1e-3
-# Cells across a contact below which the grid does not see it at all.
+# Least number of cells across a contact with which the grid resolves it at all.
 FEWEST = 2.0
 # Rounding of forces that are meant to reach the limit of friction.
 ROUNDING = 1e-9
@@ -23,14 +23,14 @@ ROUNDING = 1e-9
 def about_pressure(
     path: str, pressure: float, bodies: Sequence[ElasticBody | str]
 ) -> Iterator[str]:
-    """About the largest pressure [MPa] that loads bring about, against what the bodies bear."""
+    """Warn about the largest pressure [MPa] under the loads, compared with the bodies' strength."""
     elastic = [body for body in bodies if isinstance(body, ElasticBody)]
     limits = [getattr(body, "yield_stress", None) for body in elastic]
     yield from pressed(path, pressure, limits, [body.elastic().young for body in elastic])
 
 
 def about_grid(width: float, sides: Sequence[float], cells: Sequence[int]) -> Iterator[str]:
-    """About a grid that an unworn contact of such a width [mm] does not fit."""
+    """Warn about a grid that is too small or too coarse for an unworn contact of ``width`` [mm]."""
     shown = f"the contact is about {plain(width, 'mm', 3)} wide"
     if width > min(sides):
         yield f"contact.size: {plain(min(sides), 'mm')}, but {shown}: take a larger one"
@@ -40,7 +40,7 @@ def about_grid(width: float, sides: Sequence[float], cells: Sequence[int]) -> It
 
 
 def about_shear(path: str, table: LoadTable, friction: float, unit: str) -> Iterator[str]:
-    """About tangential forces against what friction carries, where P is imposed."""
+    """Warn about tangential forces, compared with the friction limit, where P is imposed."""
     forces = {"Qx", "Qy"} & table.columns.keys()
     if not forces or "P" not in table.columns:
         return

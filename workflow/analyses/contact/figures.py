@@ -33,17 +33,17 @@ from workflow.pictures.scales import TO_MICRONS
 from workflow.pictures.style import BLACK, BLUE, GREEN, ORANGE
 from workflow.shell.results import grid_of
 
-# One per profile: those of a closed cycle lie on each other.
+# One style per profile, as those of a closed cycle coincide.
 DASHES = ("-", "--", "-.", ":", (0, (8, 2)), (0, (1, 3)))
 STICK, SLIP = "#9DC3DE", "#F2B48C"
-# Arrows along the longer side of a map.
+# Number of arrows along the longer side of a map.
 ARROWS = 17
-# Fewer points make no curve.
+# Least number of points of a curve.
 FEWEST_POINTS = 3
 
 
 def figures_of(contents: Contents) -> Figures:
-    """The figures of a run, by name."""
+    """Return the figures of a run, by name."""
     return {
         "profiles": profiles,
         **({} if contents.line else {"maps": maps}),
@@ -55,7 +55,7 @@ def figures_of(contents: Contents) -> Figures:
 
 
 def profiles(file: h5py.File) -> Figure:
-    """Pressure and, if any, shear along x through the centre, where the path turns."""
+    """Draw pressure and any shear along x through the centre, at turning points of the path."""
     names = _shown(file)
     along = _main_shear(file, names)
     sheared = any(file["contact"][BODIES][name]["shear"][along].any() for name in names)
@@ -92,7 +92,7 @@ def _profile_title(file: h5py.File, name: str) -> str:
 
 
 def _shown(file: h5py.File) -> list[str]:
-    """Names of the states to show: the turning points of the path, of many evenly chosen ones."""
+    """Return names of the states to show: the turning points of the path, evenly chosen if many."""
     names = list(file["contact"][BODIES])
     rows = file["history/increment"][()] - 1
     path = np.stack([column[()][rows] for column in file["path"].values()], axis=1)
@@ -105,14 +105,14 @@ def _shown(file: h5py.File) -> list[str]:
 
 
 def _main_shear(file: h5py.File, names: list[str]) -> int:
-    """The larger component of shear on the profile: 0 for x, 1 for y."""
+    """Return the larger component of shear on the profile: 0 for x, 1 for y."""
     fields = [file["contact"][BODIES][name]["shear"][()] for name in names]
     largest = [max(np.abs(middle(field[axis], 0)).max() for field in fields) for axis in (0, 1)]
     return int(largest[1] > largest[0])
 
 
 def _loads(file: h5py.File, name: str) -> str:
-    """Increment and the loads that are not 0, for a legend."""
+    """Return the increment and the loads that are not 0, for a legend."""
     increment = int(file["contact"][BODIES][name].attrs["increment"])
     history = file["history"]
     row = int(np.flatnonzero(history["increment"][()] == increment)[0])
@@ -126,7 +126,7 @@ def _loads(file: h5py.File, name: str) -> str:
 
 
 def _view(file: h5py.File, names: list[str], margin: float = MARGIN) -> View:
-    """What is in contact at these states, and a little around it."""
+    """Return the region in contact at these states, with a margin."""
     fields = [file["contact"][BODIES][name]["pressure"][()] for name in names]
     return view_of(fields, _grid(file), margin)
 
@@ -135,9 +135,9 @@ def _view(file: h5py.File, names: list[str], margin: float = MARGIN) -> View:
 
 
 def maps(file: h5py.File) -> Figure:
-    """Pressure, and where the contact sticks and slips with its shear, at the last state in touch.
+    """Draw pressure, stick and slip regions, and shear, at the last state in contact.
 
-    Without shear there is nothing to stick.
+    Without shear, only the pressure is drawn.
     """
     name = _last_touching(file)
     state, grid, view = file["contact"][BODIES][name], _grid(file), _view(file, [name])
@@ -159,7 +159,7 @@ def maps(file: h5py.File) -> Figure:
 
 
 def _last_touching(file: h5py.File) -> str:
-    """The last state, or of a path that ends with the bodies apart the last one in contact."""
+    """Return the name of the last state in contact, or of the last state if there is none."""
     names = list(file["contact"][BODIES])
     touching = [name for name in names if file["contact"][BODIES][name]["pressure"][()].any()]
     return (touching or names)[-1]
@@ -168,7 +168,7 @@ def _last_touching(file: h5py.File) -> str:
 def _draw_regions(
     figure: Figure, axis: Axes, state: h5py.Group, grid: Grid, view: View, turned: bool
 ) -> None:
-    """Where the contact sticks and slips, and its shear."""
+    """Draw the regions of stick and slip, with the shear."""
     pressed, sticks = state["pressure"][()] > 0.0, state["sticking"][()].astype(bool)
     # 0 open, 1 stick, 2 slip.
     regions = np.where(pressed, np.where(sticks, 1.0, 2.0), 0.0)
@@ -185,7 +185,7 @@ def _draw_regions(
 
 
 def _draw_arrows(axis: Axes, shear: Array, grid: Grid, view: View, turned: bool) -> None:
-    """The shear at places in view, ``ARROWS`` along its longer side."""
+    """Draw the shear at places in view, ``ARROWS`` along its longer side."""
     apart = max(view.size) / ARROWS
     places = []
     for direction in (0, 1):
@@ -215,16 +215,16 @@ def _draw_arrows(axis: Axes, shear: Array, grid: Grid, view: View, turned: bool)
 
 
 def forces(file: h5py.File) -> Figure:
-    """The force that does the most work against its motion, and the energy dissipated."""
+    """Draw the force with the most work against its motion, and the energy dissipated."""
     history = file["history"]
     force, motion = _driven(history)
     values, motions = history[force][()], history[motion][()]
     energy = np.cumsum(history["Edx"][()] + history["Edy"][()])
-    # Between turning points the path is not known.
+    # No line is drawn between turning points, as the path between them is not computed.
     line = "o-" if history.attrs["method"] == "full" else "o"
     figure = new_figure(_forces_title(history, energy[-1]), 6.0)
     left, right = figure.subplots(1, 2)
-    # A thousandth of mm or rad.
+    # To thousandths of mm or rad.
     moved, words = TO_MICRONS * motions, motion.replace("_", " ")
     left.plot(moved, values, line, color=BLUE, markersize=4)
     left.plot(moved[-1:], values[-1:], "D", color=ORANGE, label="last")
@@ -246,12 +246,12 @@ def _forces_title(history: h5py.Group, energy: float) -> str:
 
 
 def _in_millijoules(history: h5py.Group) -> str:
-    """Unit of the energies, N mm, in a word."""
+    """Return the unit of the energies, with mJ for N mm."""
     return str(history["Edx"].attrs["unit"]).replace("N mm", "mJ")
 
 
 def _driven(history: h5py.Group) -> tuple[str, str]:
-    """Force and motion with the largest product of ranges; shear goes before pressure."""
+    """Return force and motion with the largest product of ranges; shear goes before pressure."""
     pairs = list(zip(FORCES, MOTIONS, strict=True))
     work = {
         pair: float(np.ptp(history[pair[0]][()]) * np.ptp(history[pair[1]][()])) for pair in pairs

@@ -1,4 +1,4 @@
-"""The path of loads of two bodies: legs one after the other, or a file."""
+"""Load paths of two bodies: legs one after the other, or a file."""
 
 from __future__ import annotations
 
@@ -46,9 +46,9 @@ Increments = Annotated[int, Whole(1, 100_000)]
 
 
 class Leg(Section):
-    """A part of the path, passed at equal steps; what it does not name keeps its value.
+    """A part of the path, passed at equal steps; quantities that it does not name stay constant.
 
-    Forces are those on body 2, motions those of body 1 relative to body 2 far from the contact.
+    Forces act on body 2. Motions are of body 1 relative to body 2, far from the contact.
     """
 
     P: NormalForce | None = entry("normal force [N]", "60 N", default=None)
@@ -99,7 +99,7 @@ LegT = TypeVar("LegT", Leg, LineLeg)
 class LegsOrFile(Section, Generic[LegT]):
     """Legs one after the other from the unloaded state, or a file."""
 
-    # Whether the path leads back to where it begins, over and over.
+    # Whether the path returns to its beginning, as a cycle that repeats.
     closed: ClassVar[bool] = False
     in_schema: ClassVar[Mapping[str, Any]] = one_of("legs", "file")
 
@@ -112,7 +112,7 @@ class LegsOrFile(Section, Generic[LegT]):
 
     @model_validator(mode="after")
     def _can_be_followed(self) -> Self:
-        """Raise unless the path is given once, presses, and no two entries conflict."""
+        """Raise an error unless the path is given once, presses, and no two entries conflict."""
         if (self.file is None) == (not self.legs):
             problem = "both given" if self.legs else "neither given"
             raise disagreement(
@@ -131,7 +131,7 @@ class LegsOrFile(Section, Generic[LegT]):
         return self
 
     def table(self) -> LoadTable:
-        """Every increment of the path."""
+        """Return every increment of the path."""
         (leg_model,) = sections_of(type(self).model_fields["legs"].annotation)
         quantities = quantities_of(leg_model)
         if self.file is not None:
@@ -140,7 +140,7 @@ class LegsOrFile(Section, Generic[LegT]):
         return LoadTable(ramps(targets, [leg.increments for leg in self.legs], self.closed))
 
     def ranges(self) -> Iterator[str]:
-        """Between which values each load goes, from none."""
+        """Yield the range of values of each load, with 0 included."""
         (leg,) = sections_of(type(self).model_fields["legs"].annotation)
         units = {name: quantity.unit for name, quantity in quantities_of(leg).items()}
         for name, values in self.table().columns.items():
@@ -149,7 +149,7 @@ class LegsOrFile(Section, Generic[LegT]):
             yield f"{name} {upwards if low == 0.0 else between(low, high, units[name])}"
 
     def place(self, row: int) -> str:
-        """The entry that says how long increment ``row`` is."""
+        """Return the entry of the case that sets the length of increment ``row``."""
         if self.file is not None:
             return "load_path.file"
         ends = np.cumsum([leg.increments for leg in self.legs])

@@ -1,4 +1,4 @@
-"""The path of a contact case as a table: a row per increment, a column per entry that is given."""
+"""Path of a contact case as a table: a row per increment, a column per given entry."""
 
 from __future__ import annotations
 
@@ -11,17 +11,17 @@ import numpy as np
 from sa_solver.types import Array
 
 FORCES = ("P", "Qx", "Qy", "Mx", "My", "Mz")
-# Rigid motions conjugate to them, in the same order.
+# Rigid motions conjugate to the forces, in the same order.
 MOTIONS = ("approach", "shift_x", "shift_y", "tilt_x", "tilt_y", "twist")
-# Those of them that only press.
+# Forces and motions that only press the bodies together.
 PRESSING = ("P", "Mx", "My", "approach", "tilt_x", "tilt_y")
 
 
 @dataclass(frozen=True)
 class LoadTable:
-    """``columns`` ``(n,)`` by the names of ``FORCES``, ``MOTIONS`` and the two bulk stresses.
+    """Load table: ``columns`` ``(n,)`` by names of ``FORCES``, ``MOTIONS`` and bulk stresses.
 
-    In base units. What is not named is a force of 0, or no bulk stress.
+    All are in base units. Quantities without a column are forces of 0, or no bulk stress.
     """
 
     columns: dict[str, Array]
@@ -41,17 +41,17 @@ class LoadTable:
         return np.stack([self[motion] + self[force] for force, motion in pairs], axis=1)
 
     def __getitem__(self, name: str) -> Array:
-        """A column ``(n,)``, zeros if it is not named."""
+        """Return a column ``(n,)``, zeros if there is none of this name."""
         return self.columns.get(name, np.zeros(len(self)))
 
 
 def ramps(
     targets: Mapping[str, Sequence[float | None]], increments: Sequence[int], closed: bool = False
 ) -> dict[str, Array]:
-    """Columns that reach their ``targets`` linearly, each in its number of ``increments``.
+    """Return columns that reach their ``targets`` linearly, each in its number of ``increments``.
 
-    From 0, or from where the last of them leads if the path is ``closed``; where a target is None
-    the value stays. Columns without any target are left out.
+    They start from 0, or from the last target if the path is ``closed``. Where a target is None the
+    value stays. Columns without any target are left out.
     """
     columns = {}
     for name, ends in targets.items():
@@ -66,7 +66,7 @@ def ramps(
 
 
 def conflict(named: Container[str]) -> tuple[str, str] | None:
-    """The entry to look at and what is wrong with the columns ``named``, if anything is."""
+    """Return entry and message of a conflict among the columns ``named``, None without one."""
     for force, motion in zip(FORCES, MOTIONS, strict=True):
         if force in named and motion in named:
             return motion, f"given beside {force}; allowed: one of them on the whole path"

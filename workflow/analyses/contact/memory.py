@@ -1,4 +1,4 @@
-"""Memory a contact case needs."""
+"""Memory that a contact case needs."""
 
 from __future__ import annotations
 
@@ -7,13 +7,13 @@ from math import prod
 from workflow.analyses.contact.case import BodiesCase
 from workflow.shell.memory import Memory
 
-# Fields kept of a state, with tractions of longer increments to compare with, and spectra and
-# iterates alive during a solve, per cell.
+# Numbers per cell: fields kept of a state, with tractions of longer increments to compare with; and
+# spectra and iterates during a solve.
 STATE_FIELDS, SPECTRA = 13, 300
 
 
 def memory(case: BodiesCase) -> Memory:
-    """Of the states of all increments."""
+    """Return the memory for the states of all increments."""
     cells = prod(case.contact.centred().shape)
     increments = len(case.load_path.table())
     return Memory(

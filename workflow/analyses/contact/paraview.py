@@ -1,6 +1,6 @@
-"""A contact run for ParaView: ``contact.pvd``, the face at every computed increment.
+"""ParaView files of a contact run: ``contact.pvd``, the face at every computed increment.
 
-Its steps have the cells of the grid as points of a surface, of a line in line contacts
+Its steps have the cells of the grid as points of a surface, or of a line in line contacts
 (``contact/<increment>.vtp``). ``view.py`` shows them.
 """
 
@@ -33,7 +33,7 @@ VIEWS = {
 
 
 def write_contact(contents: Contents, file: h5py.File, folder: Path) -> list[Path]:
-    """Write the faces, their series over the increments, and the script; returns their paths."""
+    """Write the faces, their series over the increments, and the script; return their paths."""
     written = write_series(folder / "contact.pvd", INCREMENTS, _faces(file, folder))
     states = file["contact"][BODIES].values()
     last = max(float(state.attrs["increment"]) for state in states)

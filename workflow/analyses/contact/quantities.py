@@ -18,7 +18,7 @@ MOTIONS = {
     "tilt_y": "tilt about y",
     "twist": "twist about z",
 }
-# Of a contact over an area or a line, which has half widths; unit and description.
+# Quantities of a contact over an area or a line, which has half widths: unit and description.
 NUMBERS = {
     "peak_pressure": ("MPa", "largest pressure"),
     "central_pressure": ("MPa", "pressure in the middle"),
@@ -34,7 +34,7 @@ NUMBERS = {
 ROUNDING = 1e-9
 FORCES = "P", "Qx", "Qy"
 BY_INCREMENTS = "of the increments of the load"
-# What runs are compared by, beside the numbers.
+# Curves by which runs are compared, in addition to the numbers.
 CURVES = (
     CurvesOf(
         "pressure along x in the middle, last increment",
@@ -90,6 +90,6 @@ def main_results(case: BodiesCase, summary: Summary) -> list[Quantity]:
 
 
 def _large(numbers: Summary, names: tuple[str, ...]) -> list[str]:
-    """Those of the names whose numbers are more than rounding."""
+    """Return the names whose numbers are more than rounding."""
     largest = max(abs(numbers[name]) for name in names)
     return [name for name in names if abs(numbers[name]) > ROUNDING * largest]

@@ -1,4 +1,4 @@
-"""What a contact run leaves: results, summary, ParaView files and figures."""
+"""Output of a contact run: results, summary, ParaView files and figures."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ from workflow.shell.summary import finish
 
 ContactRun = Run[BodiesCase]
 
-# What the summary says of a history.
+# Attributes of a history in the summary.
 HISTORY = "method", "reason", "parts", "error", "error_of", "energy_error"
 BULK_STRESSES = {
     "bulk_stress_1": ("MPa", "stress along x in body 1 far below the contact"),
@@ -45,11 +45,11 @@ BULK_STRESSES = {
 
 @dataclass(frozen=True)
 class ContactOutcome:
-    """Everything a contact run found.
+    """All results of a contact run.
 
-    ``height`` ``(nx, ny)`` is the gap before loading [mm]; ``strain`` ``(n,)`` that of body 2 less
-    that of body 1 by bulk stress. ``convolutions`` are those of all solves, also of passes over the
-    path that were too coarse to be kept.
+    ``height`` ``(nx, ny)`` is the gap before loading [mm]. ``strain`` ``(n,)`` is the strain of
+    body 2 less that of body 1 by bulk stress. ``convolutions`` is the number in all solves,
+    including passes over the path that were too coarse to be kept.
     """
 
     case: BodiesCase
@@ -75,7 +75,7 @@ def _contents(outcome: ContactOutcome) -> Contents:
 
 
 def write_contact_results(outcome: ContactOutcome, run: ContactRun) -> None:
-    """Write ``results.h5`` with the states there are."""
+    """Write ``results.h5`` with the states that were computed."""
     case, grid, history = outcome.case, outcome.grid, outcome.history
     friction = case.friction.coefficient
     height = Dataset(outcome.height, "mm", "gap before loading")
@@ -93,13 +93,13 @@ def write_contact_results(outcome: ContactOutcome, run: ContactRun) -> None:
 
 
 def _path(table: LoadTable) -> dict[str, Dataset]:
-    """What the path imposes, ``(n,)`` each."""
+    """Return the loads and motions that the path imposes, ``(n,)`` each."""
     quantities = LOADS | RIGID_MOTIONS | BULK_STRESSES
     return {name: Dataset(column, *quantities[name]) for name, column in table.columns.items()}
 
 
 def _columns(history: History, friction: float) -> dict[str, Dataset]:
-    """Resultants, rigid motions and energies of the computed increments, ``(n,)`` each."""
+    """Return resultants, rigid motions and energies of the computed increments, ``(n,)`` each."""
     forces = np.array([state.resultants for state in history.states])
     motions = np.array([state.rigid for state in history.states])
     energies = np.array([state.energy for state in history.states])
@@ -113,7 +113,7 @@ def _columns(history: History, friction: float) -> dict[str, Dataset]:
 
 
 def _fields(state: ContactState, friction: float) -> dict[str, Dataset]:
-    """The contact in one increment."""
+    """Return fields of the contact in one increment."""
     sticking = stick_zone(state, friction)
     return {
         **traction_fields(state.traction[2], state.traction[:2], state.slip),
@@ -138,7 +138,7 @@ def _summary(outcome: ContactOutcome) -> dict[str, Any]:
 
 
 def _lines(summary: dict[str, Any], grid: Grid) -> Iterator[str]:
-    """The end of the run in a few lines."""
+    """Yield lines on the results, for the end of the run."""
     last, history = summary["states"][-1], summary["history"]
     some = len(summary["states"]) < summary["increments"]
     computed = f", {len(summary['states'])} of them computed" if some else ""

@@ -1,4 +1,4 @@
-"""A contact case: two bodies followed along their path of loads."""
+"""Runs of contact cases: two bodies followed along their path of loads."""
 
 from __future__ import annotations
 
@@ -24,9 +24,9 @@ from workflow.shell.reporter import Reporter
 def run_contact(run: ContactRun) -> None:
     """Run a contact case to its end.
 
-    Raises MethodFailed at an increment that does not converge or that no contact can carry; those
-    before it are written. Raises UserError where ``contact.history`` does not suit the path, or no
-    cells are left of the contact.
+    Raises MethodFailed at an increment that does not converge or that no contact can carry; the
+    increments before it are written. Raises UserError where ``contact.history`` does not suit the
+    path, or the contact is smaller than the cells.
     """
     outcome, message = _march(run.case, run.folder, run.reporter)
     if outcome.history.states:
@@ -44,7 +44,7 @@ def run_contact(run: ContactRun) -> None:
 def _march(
     case: BodiesCase, folder: OutputFolder, reporter: Reporter
 ) -> tuple[ContactOutcome, str]:
-    """What the path has led to, and why it ended early if it did."""
+    """Return the outcome of the path, and a message on why it ended early; empty if it did not."""
     grid, table = case.contact.centred(), case.load_path.table()
     for doubt in surface_doubts(case.structure, grid):
         reporter.warn(doubt)
@@ -90,7 +90,7 @@ def _march(
 
 
 def _check_grid(outcome: ContactOutcome, reporter: Reporter) -> None:
-    """Raises UserError where even the largest contact is a point on the grid."""
+    """Raise UserError where even the largest contact is a point on the grid."""
     pressures = [state.traction[2] for state in outcome.history.states]
     largest = max(pressures, key=np.count_nonzero)
     settings = outcome.case.contact
@@ -98,7 +98,7 @@ def _check_grid(outcome: ContactOutcome, reporter: Reporter) -> None:
 
 
 def _warn(outcome: ContactOutcome, reporter: Reporter) -> None:
-    """Long increments, contacts cut off by the border of the grid, pressures above yield."""
+    """Warn of long increments, contacts cut off by the grid, and pressures above yield."""
     states = outcome.history.states
     _warn_of_increments(outcome, reporter)
     if any(state.border_load > 0.0 for state in states):
@@ -115,7 +115,7 @@ def _warn(outcome: ContactOutcome, reporter: Reporter) -> None:
 
 
 def _warn_of_increments(outcome: ContactOutcome, reporter: Reporter) -> None:
-    """Long increments, by what they leave of shear and energy."""
+    """Warn of long increments, by the errors of shear and energy that they cause."""
     history, case = outcome.history, outcome.case
     accuracy = case.contact.accuracy
     if history.error is None or history.energy_error is None:

@@ -1,4 +1,4 @@
-"""How long a contact case takes."""
+"""Run time of a contact case."""
 
 from __future__ import annotations
 
@@ -7,13 +7,13 @@ from math import prod
 from workflow.analyses.contact.case import BodiesCase
 from workflow.shell.run_time import FRICTIONAL, RunTime, solves
 
-# Increments that matter are solved in one part and in two; where bodies are alike only the ends of
+# Solves per increment that matters: in one part and in two. Between similar bodies only the ends of
 # legs matter, in one part and in four.
 IN_TWO, IN_FOUR = 3, 5
 
 
 def run_time(case: BodiesCase) -> RunTime:
-    """Of all increments that matter, split once."""
+    """Return the time of all increments that matter, split once."""
     cells, materials, path = prod(case.contact.centred().shape), case.materials, case.load_path
     count = IN_TWO * len(path.table())
     if materials.body_1 == materials.body_2 and path.legs and case.contact.history != "full":

@@ -1,4 +1,4 @@
-"""The numbers of a contact run: of every computed increment, and of its last closed cycle."""
+"""Numbers of a contact run: of every computed increment, and of its last closed cycle."""
 
 from __future__ import annotations
 
@@ -15,20 +15,21 @@ from sa_solver.ties import first_largest
 from sa_solver.types import Array, Grid, Mask
 from workflow.analyses.contact.load_table import FORCES, MOTIONS, LoadTable
 
-# A cell sticks when its shear is below µp by more than this share: rounding of the slip circle.
+# A cell sticks where its shear is below µp by more than this share, which covers rounding.
 STICK_MARGIN = 1e-6
-# A cycle is closed where shear comes back to within this share of µ times the peak pressure.
+# A cycle is closed where shear returns to within this share of µ times the peak pressure.
 CLOSED = 0.05
-# Changes below this share, and forces and motions below it of the largest, are what solvers leave.
+# Relative changes below this value are rounding, and so are forces and motions below this share of
+# the largest.
 ROUNDING = 1e-6
-# Numbers that are no results, but of the solution.
+# Numbers about the solution that are no results.
 NO_RESULTS = {"residual", "border_load", "closure"}
 
 
 def state_summaries(grid: Grid, friction: float, history: History) -> list[dict[str, Any]]:
-    """Numbers of every computed increment, in base units; forces and energies of a line per mm.
+    """Return numbers of every computed increment in base units; for a line contact, per mm.
 
-    ``full_slip_force`` and ``full_slip_moment`` (about the grid's centre) are what friction carries
+    ``full_slip_force`` and ``full_slip_moment`` (about the grid's centre) are the friction limits
     at the present pressure; ``radial_shear_share`` is the largest shear along a radius from that
     centre over the largest shear.
     """
@@ -56,7 +57,8 @@ def increments_errors(
 ) -> dict[str, dict[str, float]]:
     """Estimate the error due to increments of the numbers of the ``last`` state and the ``loop``.
 
-    Relative, of those that they change; empty where increments do not matter or nobody knows.
+    Errors are relative, and given for the numbers that change. The result is empty where increments
+    do not matter, or there is no estimate.
     """
     if not history.others:
         return {}
@@ -73,7 +75,7 @@ def increments_errors(
 def _changes(
     numbers: Mapping[str, Any], others: Mapping[str, Any], share: float
 ) -> dict[str, float]:
-    """So much of the changes of all numbers, relative to these."""
+    """Return a ``share`` of the changes of all numbers, relative to the numbers."""
     largest = {
         name: max(abs(numbers.get(other, 0.0)) for other in group)
         for group in (FORCES, MOTIONS)
@@ -90,14 +92,14 @@ def _changes(
 
 
 def stick_zone(state: ContactState, friction: float) -> Mask:
-    """Cells ``(nx, ny)`` that are pressed and whose shear is below µp."""
+    """Return the mask ``(nx, ny)`` of cells that are pressed and whose shear is below µp."""
     pressure = state.traction[2]
     shear = np.hypot(*state.traction[:2])
     return (pressure > 0.0) & (shear < friction * pressure * (1.0 - STICK_MARGIN))
 
 
 def slides(state: ContactState, friction: float) -> bool:
-    """Whether the contact is pressed and slips everywhere."""
+    """Return whether the contact is pressed and slips everywhere."""
     pressed = bool((state.traction[2] > 0.0).any())
     return bool(state.sliding) or (pressed and not stick_zone(state, friction).any())
 
@@ -131,7 +133,7 @@ def _shear_summary(grid: Grid, friction: float, state: ContactState) -> dict[str
 
 
 def _extent(grid: Grid, cells: Mask, name: str) -> dict[str, float]:
-    """Area of ``cells``, and the radius of a disk or the half width of a strip as large."""
+    """Return the area of ``cells``, with the radius of an equal disk or half width of a line."""
     area = float(np.count_nonzero(cells)) * grid.cell_area
     if grid.line:
         return {f"{name}_area": area, f"{name}_half_width": 0.5 * area}
@@ -139,7 +141,7 @@ def _extent(grid: Grid, cells: Mask, name: str) -> dict[str, float]:
 
 
 def _centre(grid: Grid, cells: Mask) -> list[float] | None:
-    """Centroid of ``cells`` [mm]; None where there are none."""
+    """Return the centroid of ``cells`` [mm], None where there are none."""
     if not cells.any():
         return None
     along, across = np.broadcast_arrays(grid.x, grid.y)
@@ -149,12 +151,12 @@ def _centre(grid: Grid, cells: Mask) -> list[float] | None:
 def loop_summary(
     grid: Grid, friction: float, table: LoadTable, history: History, strain: Array
 ) -> dict[str, Any] | None:
-    """The last closed cycle of the path; None if no cycle closes.
+    """Return the last closed cycle of the path, None if no cycle closes.
 
-    ``energy`` is dissipated by slip, ``area`` the work ∮ F dδ (- Σ qx x S dε under bulk strain
+    ``energy`` is dissipated by slip. ``area`` is the work ∮ F dδ (- Σ qx x S dε under bulk strain
     ``strain`` ``(n,)``) by trapezoids, which needs every increment. ``amplitude`` is half the range
-    of ``motion``, the rigid motion that the cycle works on most, ``force_amplitude`` that of its
-    ``force``.
+    of ``motion``, the rigid motion with the most work in the cycle, and ``force_amplitude`` that of
+    its ``force``.
     """
     span = _last_cycle(friction, table, history)
     if span is None:
@@ -183,12 +185,12 @@ def loop_summary(
 
 
 def _last_cycle(friction: float, table: LoadTable, history: History) -> tuple[int, int] | None:
-    """First and last of the computed states of the last closed cycle."""
+    """Return the first and last state of the last closed cycle, None if there is none."""
     loads = np.stack([column[history.indices] for column in table.columns.values()], axis=1)
     for last in range(len(loads) - 1, 1, -1):
         same = np.flatnonzero(np.all(loads[: last - 1] == loads[last], axis=1))
         for first in same[::-1]:
-            # Between the two the load must have gone elsewhere, and the shear have come back.
+            # Between the two, the load must have changed, and the shear must have returned.
             moves = any(np.any(a != b) for a, b in pairwise(loads[first : last + 1]))
             ends = history.states[first], history.states[last]
             if moves and _shear_change(friction, *ends) <= CLOSED:
@@ -197,7 +199,7 @@ def _last_cycle(friction: float, table: LoadTable, history: History) -> tuple[in
 
 
 def _shear_change(friction: float, before: ContactState, after: ContactState) -> float:
-    """Largest change of shear over µ times the peak pressure."""
+    """Return the largest change of shear over µ times the peak pressure."""
     limit = friction * float(before.traction[2].max())
     change = np.hypot(*(after.traction[:2] - before.traction[:2])).max()
     return float(change / limit) if limit > 0.0 else 0.0

@@ -1,4 +1,4 @@
-"""Surfaces as they were measured, on top of the form of two bodies: case entries and heights."""
+"""Measured surfaces on top of the form of two bodies: case entries and heights."""
 
 from __future__ import annotations
 
@@ -30,18 +30,18 @@ from workflow.case.sections import Length, Section, disagreement, entry, one_of
 Shift = Annotated[float, Quantity("mm", at_least=-1e4, at_most=1e4, range_text="-10 to 10 m")]
 Angle = Annotated[float, Quantity("rad", at_least=-6.4, at_most=6.4, range_text="-360 to 360 deg")]
 Share = Annotated[float, Quantity("1", at_least=0.0, at_most=0.5)]
-# What a grid may lose of the roughness before that is doubted.
+# Share of the roughness that may be lost on a grid without a warning.
 LOST = 0.3
-# A height [mm] below which there is no roughness to lose.
+# Height [mm] below which a surface counts as smooth.
 SMOOTH = 1e-9
-# Where a case has them unless told otherwise.
+# Place of the measured surfaces in a case by default.
 KEY = "structure.surfaces"
-# Over the shorter side, heights of more are no roughness, nor are those of less [mm].
+# Bounds of plausible roughness: largest height over the shorter side, and least height [mm].
 STEEP, FINE = 0.1, 1e-7
 
 
 class MeasuredSurface(Section):
-    """Heights as they were measured, out of the body, of any number of points and pitch."""
+    """Heights out of the body as measured, with any number of points and pitch."""
 
     also_filled_in: ClassVar[tuple[str, ...]] = ("unit", "pitch")
 
@@ -98,22 +98,22 @@ class MeasuredSurface(Section):
         return self
 
     def read(self) -> Scan:
-        """As it is in the file. Raises InputFileError."""
+        """Return the scan as it is in the file. Raises InputFileError."""
         return _read(self.file, _stamp(self.file), self.unit, self.pitch)
 
     def scan(self) -> Scan:
-        """Levelled, and filled where points are missing. Raises InputFileError, InputError."""
+        """Return the levelled scan with gaps filled. Raises InputFileError, InputError."""
         return _prepared(self.read(), self.level, self.missing)
 
     def on(self, grid: Grid, number: int) -> Resampled:
-        """On the grid of the contact, as body 1 or 2. Raises InputError."""
+        """Return the surface on the grid of the contact, as body 1 or 2. Raises InputError."""
         below = (number == 1) != self.flipped
         scan = self.scan() if below else self.scan().turned_over
         return resampled(scan, grid, self.shift, self.angle, self.beyond)
 
     @property
     def place(self) -> str:
-        """How it lies on the face, in words; nothing where that is as it is measured."""
+        """Description of the position on the face, empty if it is the measured one."""
         parts = []
         if any(self.shift):
             x, y = (plain(by, "mm", 4) for by in self.shift)
@@ -126,7 +126,10 @@ class MeasuredSurface(Section):
 
 
 def _stamp(file: str) -> tuple[int, int] | None:
-    """What a file that has changed has another of; None where there is none."""
+    """Return modification time and size of a file, by which changes are noticed, or None.
+
+    None means that there is no such file.
+    """
     try:
         found = Path(split_dataset(file)[0]).stat()
     except OSError:
@@ -134,8 +137,8 @@ def _stamp(file: str) -> tuple[int, int] | None:
     return found.st_mtime_ns, found.st_size
 
 
-# Scans of millions of points take seconds, and are asked for wherever a case is looked at: as many
-# as two flanks have.
+# Scans of millions of points take seconds to read and are needed repeatedly. Both surfaces of two
+# flanks fit into the cache.
 @lru_cache(maxsize=4)
 def _read(file: str, stamp: object, unit: str | None, pitch: tuple[float, float] | None) -> Scan:
     return read_scan(file, unit, pitch)
@@ -147,9 +150,9 @@ def _prepared(scan: Scan, level: Level, missing: float) -> Scan:
 
 
 class SurfacesOfTwo(Section):
-    """Base of those of either body or both: heights out of it, which come on top of the form."""
+    """Base of measured surfaces of one or both bodies: heights out of them, on top of the form."""
 
-    # What body 1 and body 2 are called.
+    # Names of body 1 and body 2 in the case.
     names: ClassVar[tuple[str, str]]
 
     @model_validator(mode="after")
@@ -162,26 +165,30 @@ class SurfacesOfTwo(Section):
 
     @property
     def bodies(self) -> dict[str, MeasuredSurface]:
-        """Those that there are, by what their body is called."""
+        """The surfaces that are given, by name of their body."""
         both = {name: getattr(self, name) for name in self.names}
         return {name: surface for name, surface in both.items() if surface is not None}
 
     def of(self, number: int, grid: Grid) -> Resampled | None:
-        """That of body 1 or 2 on a grid; None where it has none. Raises InputError."""
+        """Return the surface of body 1 or 2 on a grid, None if it has none. Raises InputError."""
         surface: MeasuredSurface | None = getattr(self, self.names[number - 1])
         return None if surface is None else surface.on(grid, number)
 
     def on(self, grid: Grid) -> dict[str, Resampled]:
-        """Each on a grid, by body. Raises InputError."""
+        """Return each surface on a grid, by body. Raises InputError."""
         both = {name: self.of(number, grid) for number, name in enumerate(self.names, 1)}
         return {name: surface for name, surface in both.items() if surface is not None}
 
     def gap(self, grid: Grid) -> Array:
-        """What they add to the gap of the unloaded bodies ``(nx, ny)`` [mm]."""
+        """Return the change of the gap of the unloaded bodies by the surfaces ``(nx, ny)`` [mm]."""
         return -sum((on.heights for on in self.on(grid).values()), start=0.0 * (grid.x + grid.y))
 
     def check(self, grid: Grid, key: str = KEY, size: str = "contact.size") -> None:
-        """Refuse, at ``key``, those that the grid does not fit; ``size`` says how large it is."""
+        """Refuse surfaces that do not cover the grid.
+
+        The error is at ``key``, the entry of the surfaces; ``size`` is the entry of the grid's
+        size.
+        """
         for number, name in enumerate(self.names, 1):
             try:
                 self.of(number, grid)
@@ -190,7 +197,7 @@ class SurfacesOfTwo(Section):
                 raise disagreement(f"{file}: {error}", f"{key}.{name}.file", size) from error
 
     def summary(self, grid: Grid) -> dict[str, Any]:
-        """Numbers of each, in base units: points, pitch, share missing, and what the grid lost."""
+        """Return numbers of each surface in base units: points, pitch, missing share and others."""
         numbers = {}
         for name, on in self.on(grid).items():
             scan = self.bodies[name].read()
@@ -206,14 +213,14 @@ class SurfacesOfTwo(Section):
         return numbers
 
     def told(self, summary: Mapping[str, Mapping[str, Any]]) -> dict[str, str]:
-        """The same in a line each, by body."""
+        """Return the numbers of each surface as one line of text, by body."""
         return {
             name: f"{_in_words(numbers)}{self.bodies[name].place}"
             for name, numbers in summary.items()
         }
 
     def doubts(self, grid: Grid, key: str = KEY) -> Iterator[str]:
-        """About units, and grids that do not carry the roughness."""
+        """Warn about units, and about grids that lose the roughness."""
         for name, numbers in self.summary(grid).items():
             height = numbers["rms"]
             if height > STEEP * min(grid.size[: 1 if grid.line else 2]) or SMOOTH < height < FINE:
@@ -229,7 +236,7 @@ class SurfacesOfTwo(Section):
 
 
 class MeasuredSurfaces(SurfacesOfTwo):
-    """Those of the lower body, the upper one or both."""
+    """Measured surfaces of the lower body, the upper one or both."""
 
     names: ClassVar[tuple[str, str]] = ("body_1", "body_2")
     also_filled_in: ClassVar[tuple[str, ...]] = ("body_1",)

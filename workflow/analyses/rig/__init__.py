@@ -1,1 +1,1 @@
-"""Rigs and their joints: what analyses share that make them move."""
+"""Rigs and their joints, shared by all analyses with motion."""

@@ -29,12 +29,13 @@ def rig_model(
     ring: RingOfSectors | None = None,
     engine_order: int = 1,
 ) -> RigModel:
-    """The rig with its joints, of masses in a row driven at the ``mass`` of this number.
+    """Return the rig with its joints.
 
-    ``joint`` is that of the entries of joints that have no law of their own. A sector of a ``ring``
-    is driven by an ``engine_order``.
+    In a row of masses, the excitation acts on number ``mass``. ``joint`` is the law of the entries
+    of joints that have no law of their own. A sector of a ``ring`` is driven by an
+    ``engine_order``.
 
-    Raises UserError where its bodies cannot be what the case says.
+    Raises UserError where the bodies cannot be built as the case describes them.
     """
     if isinstance(structure, JointedBody):
         built = reduced_rig_model(structure, joint, reporter, ring, engine_order)
@@ -51,10 +52,10 @@ def known_rig(
     ring: RingOfSectors | None = None,
     engine_order: int = 1,
 ) -> RigModel | None:
-    """The same as far as it is known before a run, for what a case says of its places.
+    """Return the rig as far as it is known before a run, to check the places that a case names.
 
-    None of a structure whose bodies only a run meshes and reduces. Raises EntryError where the case
-    names what there is not.
+    Returns None for a structure whose bodies are meshed and reduced only by the run. Raises
+    EntryError where the case names a place that does not exist.
     """
     if isinstance(structure, JointedBody):
         built = known_rig_model(structure, joint, ring, engine_order)
@@ -65,9 +66,10 @@ def known_rig(
 
 
 def row_of_masses(rig: RowOfMasses, driven: int = 1, shared: bool = True) -> RigModel:
-    """Masses m1, m2, ... in a row from the ground on, with joints.
+    """Return masses m1, m2, ... in a row, counted from the ground, with joints.
 
-    Where there is a ``shared`` law that no entry has, one more is between the last and the ground.
+    If a law of the case is ``shared`` but no entry uses it, a joint with this law is added between
+    the last mass and the ground.
     """
     joined = joints_of(rig, shared)
     names = [f"m{number}" for number in range(1, len(rig.masses) + 1)]
@@ -95,9 +97,9 @@ def row_of_masses(rig: RowOfMasses, driven: int = 1, shared: bool = True) -> Rig
 
 
 def _damped(rig: RigModel, damping: Damping | None) -> RigModel:
-    """A rig with the damping that it has beside that of its modes.
+    """Return the rig with the damping that is given in addition to its modal damping.
 
-    Raises EntryError for dashpots at places that there are not.
+    Raises EntryError for dashpots at places that do not exist.
     """
     if damping is None:
         return rig

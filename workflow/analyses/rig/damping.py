@@ -37,12 +37,12 @@ class RayleighFactors(Section):
 
     @property
     def factors(self) -> tuple[float, float]:
-        """Of mass [1/s] and stiffness [s]."""
+        """Rayleigh factors of mass [1/s] and stiffness [s]."""
         return self.mass_factor, self.stiffness_factor
 
 
 class RayleighRatios(Section):
-    """The same by two damping ratios."""
+    """Damping in proportion to mass and stiffness, given by two damping ratios."""
 
     kind: Literal["ratios"] = entry("two damping ratios", "ratios")
     frequencies: tuple[ModeFrequency, ModeFrequency] = entry(
@@ -65,11 +65,11 @@ class RayleighRatios(Section):
 
     @property
     def factors(self) -> tuple[float, float]:
-        """Of mass [1/s] and stiffness [s]."""
+        """Rayleigh factors of mass [1/s] and stiffness [s]."""
         from fe_models.dynamics.damping import rayleigh_factors
 
         mass, stiffness = rayleigh_factors(np.array(self.frequencies), np.array(self.ratios))
-        # Of ratios as the frequencies rounding leaves a factor below zero.
+        # At the bounds that the validator allows, rounding can make a factor slightly negative.
         return max(mass, 0.0), max(stiffness, 0.0)
 
 
@@ -87,7 +87,7 @@ class Dashpot(Against):
 
 
 class Damping(Section):
-    """What is damped beside the modes, of the structure without its joints."""
+    """Damping of the structure without its joints, in addition to the modal damping."""
 
     rayleigh: Annotated[RayleighFactors | RayleighRatios, Field(discriminator="kind")] | None = (
         entry("in proportion to mass and stiffness", default=None)
@@ -102,7 +102,7 @@ class Damping(Section):
 
     @property
     def parts(self) -> Iterator[str]:
-        """What there is, in a few words each."""
+        """Short description of each kind of damping that is given."""
         if self.rayleigh is not None:
             mass, stiffness = self.rayleigh.factors
             yield f"Rayleigh {mass:.4g} 1/s and {stiffness:.4g} s"
@@ -113,7 +113,7 @@ class Damping(Section):
 
 
 def damping_text(ratios: Sequence[float], more: Damping | None) -> str:
-    """All damping of a rig in a few words."""
+    """Return a short description of all damping of a rig."""
     of_modes = ", ".join(shares(ratio) for ratio in ratios)
     plural = "s" if len(ratios) > 1 else ""
     return ", ".join([f"damping ratio{plural} {of_modes}", *(more.parts if more else ())])

@@ -1,4 +1,4 @@
-"""A doubt about masses, springs and frequencies of a rig: units that do not fit each other."""
+"""Plausibility warnings about masses, springs and frequencies of a rig: units that do not fit."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from workflow.analyses.rig.matrix_body import MatrixBody
 from workflow.analyses.rig.structure import FrictionRig, RowOfMasses, joints_of
 from workflow.case.sections import Section
 
-# Of a force at one frequency: so many times away from every mode it hardly is meant to be.
+# A force at one frequency that is this many times away from every mode is hardly intended.
 AWAY = 30.0
-# In the place of a stiffness that nobody gives [N/mm].
+# Stiffness of a stuck joint whose stiffness is not given [N/mm].
 RIGID = 1e12
 
 
@@ -24,10 +24,10 @@ def about_modes(
     stiffness: float = RIGID,
     shared: bool = True,
 ) -> Iterator[str]:
-    """About a ``span`` [Hz] in which a rig has no mode, be its joints of a stiffness open or stuck.
+    """Warn if a rig has no mode in a ``span`` [Hz], with its joints neither open nor stuck.
 
-    Some may have a ``shared`` law. Between both every mode moves as the joint slips. A reduced body
-    is not looked at.
+    ``stiffness`` [N/mm] is that of the stuck joints, and some joints may have a ``shared`` law. As
+    the joint slips, every mode moves between these two limits. Reduced bodies are not checked.
     """
     if not isinstance(structure, RowOfMasses | FrictionRig):
         return
@@ -43,16 +43,16 @@ def about_modes(
 
 
 def about_matrices(structure: Section, highest: float) -> Iterator[str]:
-    """About matrices that are hardly meant, by their masses and frequencies.
+    """Warn about matrices with implausible masses or frequencies.
 
-    They are to move up to the ``highest`` one [Hz].
+    ``highest`` is the highest frequency of the motion [Hz].
     """
     if isinstance(structure, MatrixBody):
         yield from structure.doubts(highest)
 
 
 def _stretches(structure: RowOfMasses | FrictionRig, shared: bool) -> Array:
-    """What joints stretch by ``(j, n)``."""
+    """Return the rows ``(j, n)`` that map displacements to the stretches of the joints."""
     unit = np.eye(len(structure.masses))
     if isinstance(structure, FrictionRig):
         return unit[-1:]
@@ -66,13 +66,13 @@ def _stretches(structure: RowOfMasses | FrictionRig, shared: bool) -> Array:
 
 
 def modes(structure: RowOfMasses | FrictionRig, stiffness: float, shared: bool = True) -> Array:
-    """Natural frequencies [Hz] of the masses in a row, whose joints have a stiffness [N/mm]."""
+    """Return natural frequencies [Hz] of masses in a row whose joints have a stiffness [N/mm]."""
     masses, springs = np.array(structure.masses), np.array(structure.springs)
     matrix = np.diag(springs + np.append(springs[1:], 0.0))
     matrix -= np.diag(springs[1:], 1) + np.diag(springs[1:], -1)
     for stretch in _stretches(structure, shared):
         matrix += stiffness * np.outer(stretch, stretch)
-    # Over the smallest mass, so that no slipped exponent overflows.
+    # Scaled by the smallest mass, so that a slipped exponent does not cause an overflow.
     least = masses.min()
     scale = np.sqrt(least / masses)
     squares = np.linalg.eigvalsh(scale[:, None] * matrix * scale)

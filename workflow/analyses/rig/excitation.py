@@ -1,4 +1,4 @@
-"""What drives a joint, or the rig that holds it."""
+"""Excitations of a joint, or of the rig that holds it."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ DrivingForce = Annotated[
 Change = Annotated[float, Quantity("1", above=0.0, at_most=0.1)]
 MassNumber = Annotated[int, Whole(1, 20)]
 
-# Times 1/duration: below the first zero of a half sine's spectrum, at 1.5, by so much that the
-# quotient of the spectra is still good.
+# Factor on 1/duration. The spectrum of a half sine has its first zero at 1.5; this limit is far
+# enough below it for an accurate quotient of the spectra.
 SEEN = 1.4
 
 # Columns of a recorded force.
@@ -40,7 +40,7 @@ class Drive(Section):
 
 
 class ForceOnMass(Section):
-    """What all excitations of a rig have."""
+    """Entries that all excitations of a rig have."""
 
     kind: str  # named first; each narrows it to its own name
     mass: MassNumber | None = entry(
@@ -120,7 +120,7 @@ class Recorded(ForceOnMass):
         return self
 
     def read(self) -> tuple[Array, Array]:
-        """Times [s] and forces [N] ``(s,)`` of the file. Raises InputFileError."""
+        """Return times [s] and forces [N] ``(s,)`` of the file. Raises InputFileError."""
         table = read_table_file(self.file)
         table.require(RECORDED, " and ".join(RECORDED))
         times, forces = (table.column(name, quantity) for name, quantity in RECORDED.items())

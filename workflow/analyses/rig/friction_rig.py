@@ -16,14 +16,14 @@ from workflow.analyses.rig.structure import FrictionRig
 from workflow.errors import UserError
 from workflow.shell.reporter import Reporter
 
-# What is looked at: displacements of the model, the last first of all.
+# Observed displacements of the model; the last one is the main one.
 SEEN = {"m1": "m1 x", "m2": "m2 x"}
 
 
 def friction_rig_model(rig: FrictionRig, reporter: Reporter) -> RigModel:
-    """The rig with its specimens, pressed together by the joint's normal load.
+    """Return the rig with its specimens, pressed together by the joint's normal load.
 
-    Raises UserError for a file that is no case of specimens, or one that cannot be meshed.
+    Raises UserError for a file that is not a specimens case, or for bodies that cannot be meshed.
     """
     with reporter.stage("reduction", "steps") as told:
         key, file = "structure.specimens", rig.specimens
@@ -47,7 +47,7 @@ def friction_rig_model(rig: FrictionRig, reporter: Reporter) -> RigModel:
         pressing=-unit_force(model, "m2 z"),
         stretch=unit_force(model, "upper target 1 x") - unit_force(model, "lower target 1 x"),
         places=face.coordinates,
-        # The upper one comes down to where the pads first meet.
+        # The upper specimen is lowered until the pads first touch.
         gap=face.gap - face.gap.min(),
         area=face.nodal_areas,
         translations=_translations(rig, specimens, model.names),
@@ -57,7 +57,10 @@ def friction_rig_model(rig: FrictionRig, reporter: Reporter) -> RigModel:
 def _translations(
     rig: FrictionRig, specimens: tuple[ReducedModel, ReducedModel], names: tuple[str, ...]
 ) -> dict[str, Translation]:
-    """Those of the rig with the ground, none of specimens that something else holds inside."""
+    """Return the rigid translations of the rig with the ground, by axis.
+
+    An axis is left out where a specimen is held to something other than the rig.
+    """
     found = {}
     for axis in AXES:
         with suppress(RigError):

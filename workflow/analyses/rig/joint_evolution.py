@@ -29,7 +29,7 @@ WEAR_CASES = tuple(wear.ANALYSIS.cases.values())
 
 
 class Logarithmic(Section):
-    """1 + change ln(1 + rate E)."""
+    """Factor 1 + change ln(1 + rate E)."""
 
     kind: Literal["logarithmic"] = entry("1 + change ln(1 + rate E)", "logarithmic")
     change: Change = entry("of the factor with the logarithm [1]", 0.26)
@@ -37,7 +37,7 @@ class Logarithmic(Section):
 
 
 class Arrhenius(Section):
-    """1 + change exp(-scale / E)."""
+    """Factor 1 + change exp(-scale / E)."""
 
     kind: Literal["arrhenius"] = entry("1 + change exp(-scale / E)", "arrhenius")
     change: Change = entry("of the factor in the end [1]", 1.32)
@@ -45,14 +45,14 @@ class Arrhenius(Section):
 
 
 class Linear(Section):
-    """1 + slope E, no less than 0."""
+    """Factor 1 + slope E, at least 0."""
 
     kind: Literal["linear"] = entry("1 + slope E", "linear")
     slope: Slope = entry("against energy [1/(N*mm)]", "0.24 1/kJ")
 
 
 class Exponential(Section):
-    """final + (1 - final) (share exp(-rate E) + (1 - share) exp(-second_rate E))."""
+    """Factor final + (1 - final) (share exp(-rate E) + (1 - share) exp(-second_rate E))."""
 
     kind: Literal["exponential"] = entry(
         "final + (1 - final) (share exp(-rate E) + (1 - share) exp(-second_rate E))",
@@ -79,7 +79,7 @@ Factor = Annotated[
 
 
 def _unfit(worn: WearCase) -> str:
-    """Why a wear case says nothing of a joint."""
+    """Return why a wear case cannot describe a joint, or an empty text if it can."""
     return "" if worn.loops.wanted else "leaves no table of loops; give loops.amplitude or force"
 
 
@@ -111,7 +111,7 @@ class JointEvolution(Section):
     def _file_is_of_a_whole_joint(self) -> JointEvolution:
         if self.file is None or not self.file.endswith(".csv"):
             return self
-        # Imported here: it reads units, which are of this package.
+        # Imported here to avoid a cycle: that module reads units, which belong to this package.
         from workflow.analyses.wear.loop_table import read_loop_table
 
         try:
@@ -126,7 +126,7 @@ class JointEvolution(Section):
 
     @property
     def text(self) -> str:
-        """What changes with the energy, and how, in a line."""
+        """Short description of the parameters that change with the energy, and of the laws."""
         if self.file is not None:
             return f"friction and stiffness of {Path(self.file).name}"
         given = {name: getattr(self, name) for name in type(self).model_fields if name != "file"}
@@ -135,5 +135,5 @@ class JointEvolution(Section):
 
     @property
     def is_empty(self) -> bool:
-        """Whether nothing changes."""
+        """Whether no parameter changes."""
         return all(getattr(self, name) is None for name in type(self).model_fields)

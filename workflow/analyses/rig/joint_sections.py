@@ -1,4 +1,4 @@
-"""A joint as a case gives it: its law with the parameters that it begins with."""
+"""Joints as a case gives them: a law with its initial parameters."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ Coefficient = Annotated[float, Quantity("1", at_least=0.0, at_most=10.0)]
 
 
 class Joint(Section):
-    """What all laws have: a friction limit, stiff as long as it sticks."""
+    """A joint with a friction limit, elastic as long as it sticks: entries of all friction laws."""
 
     law: str  # named first; each law narrows it to its own name
     normal_load: Preload = entry("that presses the joint [N]", "60 N")
@@ -36,7 +36,7 @@ class Joint(Section):
 
 
 class RisingJoint(Joint):
-    """A joint whose force goes on rising when all of it slides."""
+    """A joint whose force continues to rise when all of it slides."""
 
     residual_stiffness: ResidualStiffness = entry(
         "slope when all of it slides [N/mm]", "0.88 N/um", default=0.0
@@ -44,7 +44,7 @@ class RisingJoint(Joint):
 
 
 class BoucWenJoint(RisingJoint):
-    """Bouc and Wen's law, normalised: force µN ξ and the residual slope."""
+    """Bouc and Wen's law, normalised: force µN ξ, plus the residual slope."""
 
     law: Literal["bouc_wen"] = entry(
         "bouc_wen, jenkins, uniform_iwan or four_parameter_iwan; in a reduced structure "
@@ -72,7 +72,7 @@ class BoucWenJoint(RisingJoint):
 
 
 class JenkinsJoint(RisingJoint):
-    """A spring with a slider, and the residual slope beside it."""
+    """A spring with a slider, in parallel with the residual slope."""
 
     law: Literal["jenkins"] = entry("a spring with a slider", "jenkins")
     stiffness: JointStiffness = entry(
@@ -89,13 +89,13 @@ class IwanJoint(RisingJoint):
 
 
 class UniformIwanJoint(IwanJoint):
-    """Iwan's sliders, their limits spread evenly from nothing."""
+    """Iwan's sliders with limits spread evenly, starting from zero."""
 
     law: Literal["uniform_iwan"] = entry("sliders with limits spread evenly", "uniform_iwan")
 
 
 class FourParameterIwanJoint(IwanJoint):
-    """Segalman's Iwan joint: sliders spread by a power law, and a rest that slips at once."""
+    """Segalman's Iwan joint: sliders spread by a power law, others with one common limit."""
 
     law: Literal["four_parameter_iwan"] = entry("Segalman 2005", "four_parameter_iwan")
     chi: Annotated[float, Quantity("1", above=-1.0, at_most=10.0)] = entry(
@@ -137,7 +137,7 @@ class ElasticJoint(Section):
 
     @property
     def normal_load(self) -> float:
-        """Nothing presses it."""
+        """Normal load [N]: 0, as nothing presses this joint."""
         return 0.0
 
     @property
@@ -172,7 +172,7 @@ class PolynomialSpringJoint(ElasticJoint):
 
 
 class ElasticStopJoint(ElasticJoint):
-    """A spring that is met where a gap is closed."""
+    """A spring that takes load once a gap is closed."""
 
     law: Literal["elastic_stop"] = entry("a spring behind a gap", "elastic_stop")
     stiffness: JointStiffness = entry("once the gap is closed [N/mm]", "10 N/um")
@@ -186,13 +186,13 @@ class ElasticStopJoint(ElasticJoint):
 
 UniaxialJoint = BoucWenJoint | JenkinsJoint | UniformIwanJoint | FourParameterIwanJoint
 JointLaw = Annotated[UniaxialJoint, Field(discriminator="law")]
-# Those of a structure that moves in three directions too.
+# Laws for a structure that also moves in three directions.
 ContactLaw = Annotated[UniaxialJoint | FrictionContactJoint, Field(discriminator="law")]
-# Those of masses in a row, which move along one direction.
+# Laws for masses in a row, which move along one direction.
 RowLaw = Annotated[
     UniaxialJoint | PolynomialSpringJoint | ElasticStopJoint, Field(discriminator="law")
 ]
-# Those of steady vibrations, in which joints need not wear.
+# Laws for steady vibrations, in which joints need not wear.
 VibrationLaw = Annotated[
     UniaxialJoint | FrictionContactJoint | PolynomialSpringJoint | ElasticStopJoint,
     Field(discriminator="law"),

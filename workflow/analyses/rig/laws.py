@@ -1,4 +1,4 @@
-"""The laws of joints, by the names that cases have for them."""
+"""The laws of joints, by their names in cases."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ from workflow.analyses.rig.joint_sections import ElasticJoint, Joint
 LineLaw = BoucWen | Jenkins | UniformIwan | FourParameterIwan
 Elastic = PolynomialSpring | ElasticStop
 Law = LineLaw | FrictionContact | Elastic
-# Those of all joints of a structure: one, or several.
+# Law of all joints of a structure: a single law, or one per group of joints.
 Laws = Law | MixedLaw
-# What a case calls them.
+# Laws by their names in cases.
 LAWS: dict[str, type[Law]] = {
     "bouc_wen": BoucWen,
     "jenkins": Jenkins,
@@ -28,7 +28,7 @@ LAWS: dict[str, type[Law]] = {
     "polynomial_spring": PolynomialSpring,
     "elastic_stop": ElasticStop,
 }
-# What joints with the same parameters share: friction and gap are those of each.
+# Parameters that are split among joints with one law. Friction and gap are the same in each.
 SHARED = (
     *("stiffness", "residual_stiffness", "normal_stiffness", "normal_load"),
     *("quadratic", "cubic", "quartic", "quintic"),
@@ -36,20 +36,21 @@ SHARED = (
 
 
 def law_of(joint: Joint | ElasticJoint) -> Law:
-    """The law of a case. Raises :class:`wear.joints.parameters.JointError`."""
+    """Return the law of a joint of a case. Raises :class:`wear.joints.parameters.JointError`."""
     law: Law = LAWS[joint.law](**joint.model_dump(exclude={"law"}))
     return law
 
 
 def laws_of(joints: Sequence[Joint | ElasticJoint | None]) -> tuple[Law | None, ...]:
-    """Those of entries of joints, None of those without. Raises as :func:`law_of`."""
+    """Return the law of each entry of joints, None if it has none. Raises as :func:`law_of`."""
     return tuple(None if joint is None else law_of(joint) for joint in joints)
 
 
 def law_of_all(shared: Law | None, own: Sequence[Law | None], counts: Sequence[int]) -> Laws:
-    """The law of all joints of a structure, in entries of so many joints each.
+    """Return the law of all joints of a structure, whose entries have ``counts`` joints each.
 
-    Joints of an entry share evenly what is its ``own``, and those of all others what is ``shared``.
+    The joints of an entry with a law of its ``own`` share its parameters evenly. All other joints
+    share the parameters of the ``shared`` law.
     """
     sharing = sum(count for count, law in zip(counts, own, strict=True) if law is None)
     common = None if shared is None else shared_out(shared, sharing)
@@ -64,11 +65,11 @@ def law_of_all(shared: Law | None, own: Sequence[Law | None], counts: Sequence[i
 
 
 def grouped(law: Laws, joints: int) -> MixedLaw:
-    """The law of so many joints as groups of one law each."""
+    """Return the law of all ``joints`` as groups of joints with one law each."""
     return law if isinstance(law, MixedLaw) else MixedLaw((JointGroup(law, joints),))
 
 
 def shared_out(law: Law, joints: int) -> Law:
-    """The law of each of so many joints that share stiffness and load of ``law`` evenly."""
+    """Return the law of one joint where ``joints`` share stiffness and load of ``law`` evenly."""
     shares = {name: getattr(law, name) / joints for name in SHARED if hasattr(law, name)}
     return replace(law, **shares) if joints > 1 else law

@@ -1,4 +1,4 @@
-"""A body of a rig as matrices of another program: their files, their unknowns, their units."""
+"""Bodies of a rig as matrices of another program: their files, unknowns and units."""
 
 from __future__ import annotations
 
@@ -30,31 +30,31 @@ if TYPE_CHECKING:
     from fe_models.joints.reduction import ReducedModel
     from fe_models.matrices import OwnMatrices
 
-# Files with the times they were written at, and their sizes.
+# Files with their modification times and sizes.
 Stamps = tuple[tuple[str, int, int], ...]
 PARTS = "stiffness", "mass", "damping", "loads"
 SEVERAL = ".npz", ".mat", ".h5", ".hdf5", ".pch", ".bdf", ".op4"
 ENDINGS = (*SEVERAL, ".mtx")
 HDF5 = ".h5", ".hdf5", ".mat"
 HDF5_BEGINS = b"\x89HDF"
-# Unknowns up to which `check` builds the model itself; up to which it finds frequencies of the full
-# matrices, in seconds; and from which it is doubted that all are to be kept.
+# SMALL: most unknowns with which `check` builds the model itself. MODERATE: most unknowns whose
+# full matrices give frequencies within seconds. MANY: number from which keeping all is doubtful.
 SMALL, MODERATE, MANY = 600, 20_000, 2000
-# Dense matrices of a model at once, and of shapes over all unknowns; seconds of all that is done
-# with 1000 unknowns that are all kept.
+# Dense matrices held at once; sets of shapes over all unknowns; seconds of all work on 1000
+# unknowns that are all kept.
 DENSE_MATRICES, SHAPES, ALL_KEPT = 12, 3, 5.0
-# Of motions that are given a frequency: a share of it from which it is doubted.
+# Softening of massless motions (a share) from which a warning is given.
 SOFT = 0.03
-# Frequencies above rigid motions, and held unknowns, that are told.
+# Number of frequencies above rigid motions, and of held unknowns, that are reported.
 TOLD = 6
-# What no structure with joints is: its lowest elastic frequency [Hz], its mass [t].
+# Bounds of a plausible structure with joints: its lowest elastic frequency [Hz], its mass [t].
 SLOWEST, FASTEST = 0.05, 1e6
 LIGHTEST, HEAVIEST = 1e-9, 1e4
 
 
 @dataclass(frozen=True)
 class UnitName(Text):
-    """A unit that ``base`` has the dimension of."""
+    """A unit with the same dimension as ``base``."""
 
     base: str
 
@@ -82,7 +82,7 @@ class MatrixUnits(Section):
 
 
 class MatrixFiles(Section):
-    """Files of matrices: one of all, or one for each."""
+    """Files of matrices: one for all, or one for each."""
 
     also_filled_in: ClassVar[tuple[str, ...]] = ("file",)
 
@@ -118,28 +118,28 @@ class MatrixFiles(Section):
 
     @property
     def sources(self) -> dict[str, tuple[Path, str]]:
-        """File and name of each matrix that has its own."""
+        """File and dataset name of each matrix that has a file of its own."""
         given = {part: getattr(self, part) for part in PARTS}
         split = {part: split_dataset(text) for part, text in given.items() if text is not None}
         return {part: (Path(file), name) for part, (file, name) in split.items()}
 
     @property
     def stamps(self) -> Stamps:
-        """The files with when they were written and their sizes: what they are known again by."""
+        """The files with modification times and sizes, by which unchanged files are recognised."""
         files = {path for path, _ in self.sources.values()}
         files |= {Path(split_dataset(f)[0]) for f in (self.file, self.unknowns) if f is not None}
         states = ((path, path.stat()) for path in sorted(files))
         return tuple((str(path), state.st_mtime_ns, state.st_size) for path, state in states)
 
     def read(self) -> OwnMatrices:
-        """The matrices; of files that are as they were, as they were read.
+        """Return the matrices; unchanged files are not read again.
 
         Raises ``MatrixError`` and InputFileError.
         """
         return _read(self, self.stamps)
 
     def key_of(self, part: str) -> str:
-        """The entry that a ``part`` comes from, as far as there is one."""
+        """Return the entry of the case that a ``part`` comes from, or the first one given."""
         if part in PARTS:
             part = "file" if getattr(self, part) is None else part
         given = [name for name in ("file", *PARTS) if getattr(self, name) is not None]
@@ -160,7 +160,7 @@ def _read(files: MatrixFiles, stamps: Stamps) -> OwnMatrices:
 
 
 def _check_links(file: str) -> None:
-    """Refuse HDF5 that leads to other files."""
+    """Refuse HDF5 files that link to other files."""
     if file.endswith(HDF5):
         with Path(file).open("rb") as opened:
             head = opened.read(1024)
@@ -171,7 +171,7 @@ def _check_links(file: str) -> None:
 
 @contextmanager
 def refusing(body: MatrixBody) -> Iterator[None]:
-    """What is wrong with matrices, at the entry that they come from."""
+    """Report what is wrong with matrices at the entry of the case that they come from."""
     from fe_models.matrices import MatrixError
 
     try:
@@ -188,7 +188,7 @@ def refusing(body: MatrixBody) -> Iterator[None]:
 
 
 class LoadCase(Section):
-    """A load of the matrices: forces wherever its column has them."""
+    """A load of the matrices: forces wherever its column has non-zero values."""
 
     known_by: ClassVar[frozenset[str]] = frozenset({"load"})
 
@@ -198,7 +198,7 @@ class LoadCase(Section):
 
 
 def _way(value: object) -> str:
-    """How a force is given: by a load, unless there are points."""
+    """Return how a force is given: by a load, or else by points."""
     by_load = isinstance(value, LoadCase) or (isinstance(value, dict) and "load" in value)
     return "(load)" if by_load else "(points)"
 
@@ -254,7 +254,7 @@ class MatrixBody(JointedBody, Matrices):
 
     @model_validator(mode="after")
     def _is_a_structure(self) -> MatrixBody:
-        """Read the files with the case, and of few unknowns build the model."""
+        """Read the files together with the case, and build the model if there are few unknowns."""
         with refusing(self):
             matrices = self.matrices.read()
         self._check_points()
@@ -272,11 +272,11 @@ class MatrixBody(JointedBody, Matrices):
 
     @property
     def small(self) -> bool:
-        """Whether the model is soon built."""
+        """Whether the model is quick to build."""
         return len(self.matrices.read().unknowns) <= SMALL
 
     def _check_points(self) -> None:
-        """Refuse points that there are not."""
+        """Refuse points that do not exist."""
         wanted = {f"retained.{k}": point for k, point in enumerate(self.retained)}
         sections = {
             f"{name}.{k}": part
@@ -287,7 +287,7 @@ class MatrixBody(JointedBody, Matrices):
             for end in ("points", "against"):
                 point = getattr(part, end, None)
                 if point is not None:
-                    # That there is a next sector is known where joints are made.
+                    # Whether there is a next sector is checked where joints are built.
                     wanted[f"{key}.{end}"] = point.removeprefix(NEXT)
         for key, point in wanted.items():
             there = self.points if key.startswith("retained.") else self.places
@@ -299,32 +299,32 @@ class MatrixBody(JointedBody, Matrices):
 
     @property
     def points(self) -> list[str]:
-        """All points of the matrices, modes apart."""
+        """All points of the matrices, without modes."""
         unknowns = self.matrices.read().unknowns
         return list(dict.fromkeys(u.point for u in unknowns if u.direction != "modal"))
 
     @property
     def kept(self) -> list[str]:
-        """Those that the model has: the retained ones, or all."""
+        """Points of the model: the retained ones, or all."""
         if not self.retained:
             return self.points
         return [p for wanted in self.retained for p in matching(self.points, wanted)]
 
     @property
     def places(self) -> list[str]:
-        """These, and masses beside the body."""
+        """Points of the model, and masses that are not part of the body."""
         return [*self.kept, *(mass.name for mass in self.further_masses)]
 
     @property
     def joint_count(self) -> int:
-        """How many joints there are."""
+        """Number of joints."""
         return sum(
             len(matching(self.places, joint.points.removeprefix(NEXT))) for joint in self.joints
         )
 
     @property
     def laden(self) -> dict[str, float]:
-        """Masses added to displacements [t]."""
+        """Masses added to displacements, by name [t]."""
         laden: defaultdict[str, float] = defaultdict(float)
         for mass in self.masses:
             points = matching(self.kept, mass.points)
@@ -336,10 +336,11 @@ class MatrixBody(JointedBody, Matrices):
     def reduced(
         self, done: Callable[[], None] = lambda: None
     ) -> tuple[ReducedModel, tuple[str, ...]]:
-        """The model, and names of unknowns without mass, or of what moves most without it.
+        """Return the model, with names of unknowns without mass, or of its lightest motions.
 
-        The former follow the others statically and are none of the model; ``massless`` gives mass
-        to motions, and all unknowns stay.
+        Without ``massless``, unknowns without mass follow the others statically and are removed
+        from the model. With it, these motions are given mass and all unknowns stay; the names are
+        those of the unknowns that move most in them.
 
         Raises ``MatrixError``.
         """
@@ -364,7 +365,7 @@ class MatrixBody(JointedBody, Matrices):
         return model, light
 
     def memory(self) -> Memory:
-        """Of the model: dense matrices, and to reduce large ones their factors."""
+        """Return the memory of the model: dense matrices, and factors to reduce large ones."""
         matrices = self.matrices.read()
         size, retained = len(matrices.unknowns), set(self.kept)
         if not self.retained:
@@ -374,7 +375,7 @@ class MatrixBody(JointedBody, Matrices):
         return Memory(numbers, "retain fewer points, or modes", factor_bytes(size // 3))
 
     def build_time(self) -> float:
-        """Until the model is there [s]."""
+        """Return the time to build the model [s]."""
         size = len(self.matrices.read().unknowns)
         if self.retained:
             return factors(size / 3.0)
@@ -417,7 +418,7 @@ class MatrixBody(JointedBody, Matrices):
         return [*rows, *self._told_frequencies()]
 
     def _told_frequencies(self) -> list[tuple[str, str]]:
-        """The lowest frequencies without joints and what is added, where they are soon found."""
+        """Return the lowest frequencies without joints and additions, if quick to find."""
         lowest = self.lowest_frequencies()
         if lowest is None or not len(lowest):
             return []
@@ -425,13 +426,13 @@ class MatrixBody(JointedBody, Matrices):
         return [("modes", f"lowest without joints, masses and springs: {values} Hz")]
 
     def lowest_frequencies(self) -> Array | None:
-        """The lowest natural frequencies of the matrices [Hz], None where that takes long."""
+        """Return the lowest natural frequencies of the matrices [Hz], None if this takes long."""
         if len(self.matrices.read().unknowns) > MODERATE:
             return None
         return _frequencies(self.matrices, self.matrices.stamps)
 
     def doubts(self, highest: float) -> Iterator[str]:
-        """A line for each thing that is hardly meant, of motions up to a frequency [Hz]."""
+        """Yield plausibility warnings about entries, for motions up to ``highest`` [Hz]."""
         if self.massless is not None and highest > SOFT * self.massless:
             yield (
                 f"structure.massless: {plain(self.massless, 'Hz')}; at {plain(highest, 'Hz', 3)}, "
@@ -467,7 +468,7 @@ class MatrixBody(JointedBody, Matrices):
 
 
 def _resultant(matrices: OwnMatrices, number: int) -> str:
-    """The sum of the forces of a load, over the load."""
+    """Return the sum of the forces of a load, per unit load."""
     column = matrices.loads[:, number - 1]
     sums = [
         f"{sum(f for f, u in zip(column, matrices.unknowns, strict=True) if u.direction == axis):g}"
@@ -478,11 +479,11 @@ def _resultant(matrices: OwnMatrices, number: int) -> str:
 
 @lru_cache(4)
 def _frequencies(files: MatrixFiles, stamps: Stamps) -> Array:
-    """The lowest natural frequencies [Hz], rigid motions 0; none where they are not found."""
+    """Return the lowest natural frequencies [Hz], rigid motions as 0; empty if none are found."""
     from fe_models.matrices import MatrixError, lowest_frequencies
     from fe_models.solvers.linear_solver import SolverError
 
     try:
         return lowest_frequencies(files.read(), TOLD)
-    except (MatrixError, SolverError):  # what masses that are added may yet mend
+    except (MatrixError, SolverError):  # masses that the case adds may still cure this
         return np.empty(0)

@@ -1,4 +1,4 @@
-"""The places of a vibrating structure by their names, and what acts there."""
+"""The places of a vibrating structure by name, and the actions there."""
 
 from __future__ import annotations
 
@@ -13,28 +13,28 @@ from workflow.errors import EntryError
 class PlaceNames:
     """Points such as ``pad 17`` of displacements ``names`` such as ``pad 17 x``.
 
-    ``known_as`` are those that the structure knows by another name. The ``key`` that an error names
-    is where a case says the point.
+    ``known_as`` maps names to those that the structure uses for the same displacement. The ``key``
+    of each method is the entry of the case that names the point, for error messages.
     """
 
     def __init__(self, names: Sequence[str], known_as: Mapping[str, str] | None = None) -> None:
         self.names, self._known_as = tuple(names), known_as or {}
-        # Each once, in order.
+        # Each point once, in order.
         self._points = list(dict.fromkeys(name.rpartition(" ")[0] for name in self.names))
 
     def of(self, wanted: str, key: str) -> list[str]:
-        """The point of that name, or all of that kind. Raises EntryError if there is none."""
+        """Return the point of that name, or all of that kind. Raises EntryError if none exists."""
         found = matching(self._points, wanted)
         if not found:
             raise EntryError(key, f"'{wanted}': no such point; allowed: {known(self._points)}")
         return found
 
     def names_of(self, point: str) -> list[str]:
-        """The displacements of a point."""
+        """Return the displacements of a point."""
         return [name for name in self.names if name.rpartition(" ")[0] == point]
 
     def pairs(self, connection: Against, key: str) -> list[tuple[str, str | None]]:
-        """Each point and that against which it moves, None for the ground."""
+        """Return pairs of a point and the point against which it moves, None for the ground."""
         points = self.of(connection.points, f"{key}.points")
         if connection.against is None:
             return [(point, None) for point in points]
@@ -52,7 +52,7 @@ class PlaceNames:
         return list(zip(points, opposites, strict=True))
 
     def links(self, connection: Against, key: str) -> list[Link]:
-        """What stretches between each point and that against which it moves."""
+        """Return the link between each point and the point, or ground, against which it moves."""
         pairs, axis = self.pairs(connection, key), connection.direction[-1]
         for point in (end for pair in pairs for end in pair if end is not None):
             self.moving(point, axis, f"{key}.direction")
@@ -60,7 +60,7 @@ class PlaceNames:
         return [Link(self._known(link.second), self._known(link.first)) for link in every]
 
     def shared(self, moved: Moved, key: str) -> list[tuple[str, float]]:
-        """Displacements along a direction, and the even share of each with its sign."""
+        """Return displacements along a direction, and the signed even share of each."""
         points, axis = self.of(moved.points, f"{key}.points"), moved.direction[-1]
         sign = -1.0 if moved.direction.startswith("-") else 1.0
         return [
@@ -68,7 +68,7 @@ class PlaceNames:
         ]
 
     def moving(self, point: str, axis: str, key: str) -> str:
-        """The displacement of a point along an axis. Raises EntryError if it has none."""
+        """Return the displacement of a point along an axis. Raises EntryError if it has none."""
         name = f"{point} {axis}"
         if name not in self.names:
             axes = [other for other in "xyz" if f"{point} {other}" in self.names]
@@ -80,13 +80,16 @@ class PlaceNames:
 
 
 def in_a_row(masses: Sequence[str]) -> PlaceNames:
-    """Masses in a row, which move along x and whose displacements have the masses' names."""
+    """Return places of masses in a row; each has one displacement, along x, with its name."""
     along = {f"{name} x": name for name in masses}
     return PlaceNames(list(along), along)
 
 
 def link_along(point: str, opposite: str | None, direction: str) -> Link:
-    """What stretches when a point moves in a direction, from another or the ground."""
+    """Return the link that stretches when a point moves in a direction, away from its opposite.
+
+    The opposite is another point, or the ground (None).
+    """
     axis = direction[-1]
     ends = f"{point} {axis}", None if opposite is None else f"{opposite} {axis}"
     return Link(*reversed(ends)) if direction.startswith("-") else Link(*ends)

@@ -7,7 +7,7 @@ from typing import Literal
 from workflow.case.sections import Section, Title, entry
 
 NAMED = "m1, m2, ... of a rig; of a reduced body one kept point, such as pad 17, or all of a kind"
-# What points of the next sector of a ring are named by, as the library has it.
+# Prefix of points of the next sector of a ring, as in the library.
 NEXT = "next "
 Direction = Literal["x", "y", "z", "-x", "-y", "-z"]
 
@@ -25,7 +25,7 @@ class Moved(Points):
 
 
 class Against(Moved):
-    """What connects kept points with others or with the ground."""
+    """A connection of kept points with others or with the ground."""
 
     against: Title | None = entry(
         "other points, as many, or one for all; of a ring's sector also those of the next, as next "

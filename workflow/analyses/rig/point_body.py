@@ -1,4 +1,4 @@
-"""A body of a rig that is masses at points, which springs and joints connect."""
+"""Bodies of a rig that are masses at points, connected by springs and joints."""
 
 from __future__ import annotations
 
@@ -44,16 +44,16 @@ class PointBody(JointedBody):
 
     @property
     def point_names(self) -> tuple[str, ...]:
-        """Of the points."""
+        """Names of the points."""
         return tuple(point.name for point in self.points)
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Of displacements."""
+        """Names of the displacements."""
         return tuple(f"{point} {axis}" for point in self.point_names for axis in self.directions)
 
     def body(self) -> ReducedModel:
-        """The masses, that nothing holds."""
+        """Return the masses, not held by anything."""
         from fe_models.joints.reduction import ReducedModel
 
         size = len(self.names)
@@ -67,7 +67,7 @@ class PointBody(JointedBody):
 
     @property
     def joint_count(self) -> int:
-        """How many joints there are."""
+        """Number of joints."""
         return sum(
             len(matching(self.point_names, joint.points.removeprefix(NEXT)))
             for joint in self.joints

@@ -1,4 +1,4 @@
-"""A rig made of a reduced body: joints, masses and springs at the points that it is reduced to."""
+"""Rigs made of a reduced body with joints, masses and springs at its kept points."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def reduced_rig_model(
     ring: RingOfSectors | None = None,
     engine_order: int = 1,
 ) -> RigModel:
-    """The rig that a reduced body makes; ``joint`` is that of entries without a law of their own.
+    """Return the rig of a reduced body; ``joint`` is the law of entries without one of their own.
 
     Joints have three directions if any of them is a contact. The body may be a sector of a ``ring``
     that is driven by an ``engine_order``. Raises UserError for a file without such a body, and for
@@ -62,9 +62,10 @@ def known_rig_model(
     ring: RingOfSectors | None = None,
     engine_order: int = 1,
 ) -> RigModel | None:
-    """The same before a run, as far as its places; None where these are too many to look at.
+    """Return the rig as far as its places are known before a run, None if there are too many.
 
-    What a run reduces first, which may take long, is stood for: :mod:`.stand_in`.
+    A body that the run must reduce first, which may take long, is replaced by a stand-in:
+    :mod:`.stand_in`.
     """
     found = _known_body(body)
     return None if found is None else _rig_of(found, body, joint, ring, engine_order)
@@ -77,7 +78,7 @@ def _rig_of(
     ring: RingOfSectors | None,
     engine_order: int,
 ) -> RigModel:
-    """The rig on the model that was found of a body, which has not all names."""
+    """Return the rig on the model found for a body, from which massless names may be missing."""
     reduced, massless = found
     try:
         return _rig_on(reduced, body, [own or joint for own in own_laws(body)], ring, engine_order)
@@ -94,7 +95,7 @@ def _rig_on(
     of_ring: RingOfSectors | None,
     engine_order: int,
 ) -> RigModel:
-    """The rig on a reduced model, whose entries of joints have these laws."""
+    """Return the rig on a reduced model, whose entries of joints have these laws."""
     if reduced.names is None:
         raise EntryError(
             "structure.file",
@@ -133,7 +134,7 @@ def _rig_on(
         )
         for entry, contact, places in zip(joints, contacts, body.joints, strict=True)
     )
-    # That of joints which have the case's law, if there are any.
+    # The direction of joints which have the law of the case, if there are any.
     looked_at = min(entries, key=lambda entry: entry.own).along
     return RigModel(
         *(model, driven, seen[None], (label,), directions, looked_at, entries),
@@ -145,18 +146,18 @@ def _rig_on(
 
 
 def _nodes(reduced: ReducedModel, body: JointedBody, points: PlaceNames) -> JointNodes:
-    """Where the joints are."""
+    """Return names, normals and places of the joints."""
     assert reduced.names is not None
     names, normals = [], []
     for number, joint in enumerate(body.joints):
         found = points.of(joint.points, f"structure.joints.{number}.points")
-        # They close along their direction.
+        # Joints close along their direction.
         normal = np.eye(3)[AXES.index(joint.direction[-1])]
         names += found
         normals += [normal if joint.direction.startswith("-") else 0.0 - normal] * len(found)
     places = None
     of = {name.rpartition(" ")[0]: k for k, name in enumerate(reduced.names)}
-    # Points of a next sector and masses beside the body have none.
+    # Points of a next sector and masses that are not part of the body have no places.
     if reduced.places is not None and all(name in of for name in names):
         places = reduced.places[[of[name] for name in names]]
     if places is not None and not np.isfinite(places).all():
@@ -165,19 +166,22 @@ def _nodes(reduced: ReducedModel, body: JointedBody, points: PlaceNames) -> Join
 
 
 def _shape(model: DynamicModel, points: PlaceNames, moved: Moved, key: str) -> Array:
-    """Even shares ``(n,)`` of the displacements of points along a direction."""
+    """Return even shares ``(n,)`` of the displacements of points along a direction."""
     shares = points.shared(moved, key)
     return np.sum([share * unit_force(model, name) for name, share in shares], axis=0)
 
 
 def _translations(body: ReducedModel, model: DynamicModel) -> dict[str, Translation]:
-    """Those of the rig with the ground, none of a body that something else holds inside."""
+    """Return the rigid translations of the rig with the ground, by axis.
+
+    An axis is left out where the body is held to something other than the rig.
+    """
     found = {}
     for axis in AXES:
         with suppress(RigError):
             rigid = np.zeros(len(model.mass))
             rigid[: len(body.stiffness)] = translation_of(body, axis)
-            # Of masses beside the body those that move along the axis.
+            # Of the further masses, only those that move along the axis.
             rigid[len(body.stiffness) :] = along(model.names[len(body.stiffness) :], axis)
             found[axis] = Translation(rigid, model.mass @ rigid)
     return found
@@ -190,23 +194,27 @@ def _driven(
     points: _Points,
     sector: CyclicSector | None,
 ) -> Array:
-    """Forces ``(n,)`` of an excitation of 1 N, none where nothing is driven here."""
+    """Return forces ``(n,)`` of an excitation of 1 N, zeros where nothing is driven here."""
     driven: Moved | LoadCase | None = body.driven
     if driven is None:
         return np.zeros(len(model.mass))
     if isinstance(driven, Moved):
         return _shape(model, points, driven, "structure.driven")
     load = reduced.loads[:, driven.load - 1]
-    # Masses beside the body are none of its matrices.
+    # Masses that are not part of the body are not in its matrices.
     if sector is None:
         return np.pad(load, (0, len(model.mass) - len(load)))
-    # What is on a face on which the next sector begins acts there.
+    # Forces on the face shared with the next sector act on that sector.
     shared = np.pad(load, (0, len(sector.model.mass) - len(load)))
     return sector.force(shared, sector.ring.shift(1))
 
 
 def _along(contact: bool, places: JointPlaces, seen: Moved) -> int:
-    """The joints' direction that is looked at: their only one, or of two across the one seen."""
+    """Return the observed direction of the joints.
+
+    This is their only direction, or of a contact the one of its two tangential directions that is
+    observed.
+    """
     if not contact:
         return 0
     across, axis = _across(places.direction), seen.direction[-1]
@@ -214,7 +222,7 @@ def _along(contact: bool, places: JointPlaces, seen: Moved) -> int:
 
 
 def _across(direction: str) -> list[str]:
-    """The two axes across a direction."""
+    """Return the two axes perpendicular to a direction."""
     return [axis for axis in AXES if axis != direction[-1]]
 
 
@@ -224,7 +232,7 @@ def _across(direction: str) -> list[str]:
 def _reduced_body(
     body: JointedBody, reporter: Reporter, progress: Progress
 ) -> tuple[ReducedModel, tuple[str, ...]]:
-    """The model, and names of displacements without mass that are none of it."""
+    """Return the model, and names of displacements without mass that are not part of it."""
     if isinstance(body, PointBody):
         return body.body(), ()
     if isinstance(body, MatrixBody):
@@ -237,7 +245,7 @@ def _reduced_body(
 
 
 def _known_body(body: JointedBody) -> tuple[ReducedModel, tuple[str, ...]] | None:
-    """The model that a run would find, or what stands for it; None where neither is known."""
+    """Return the model that a run would find, or a stand-in; None where neither is known."""
     if isinstance(body, PointBody):
         return body.body(), ()
     if isinstance(body, MatrixBody) and body.small:
@@ -271,7 +279,7 @@ def _of_matrices(
 
 
 def _warn_of_slow(body: MatrixBody, reduced: ReducedModel, reporter: Reporter) -> None:
-    """Tell of modes so slow beside the fastest that they are taken for rigid motions."""
+    """Warn of modes so slow, relative to the fastest, that they are treated as rigid motions."""
     lowest = body.lowest_frequencies()
     if lowest is None or not (lowest > 0.0).any():
         return
@@ -291,7 +299,7 @@ def _warn_of_slow(body: MatrixBody, reduced: ReducedModel, reporter: Reporter) -
 
 
 def _told(massless: tuple[str, ...]) -> str:
-    """What is none of the model, behind a sentence."""
+    """Return a clause on displacements that are not in the model, to append to a message."""
     if not massless:
         return ""
     return (
@@ -307,9 +315,9 @@ def reduced_specimens(
     progress: Progress,
     target_distance: float | None = None,
 ) -> SpecimensModel:
-    """The specimens of the case in a ``file``, reduced, of which ``progress`` is told.
+    """Return the reduced specimens of the case in a ``file``; ``progress`` is called on the way.
 
-    Raises UserError for one that is no case of specimens, or that cannot be meshed.
+    Raises UserError for a file that is not a specimens case, or for bodies that cannot be meshed.
     """
     case = load_case(file, [SpecimensCase])
     model = SpecimensModel(case, target_distance)
@@ -327,7 +335,7 @@ def reduced_specimens(
 
 
 def _further_masses(body: JointedBody, names: Sequence[str]) -> dict[str, float]:
-    """Masses beside a body of these ``names``, by their displacements [t]."""
+    """Return masses that are not part of a body of these ``names``, by their displacements [t]."""
     points = {name.rpartition(" ")[0] for name in names}
     for number, mass in enumerate(body.further_masses):
         if mass.name in points:
@@ -342,15 +350,15 @@ def _further_masses(body: JointedBody, names: Sequence[str]) -> dict[str, float]
 
 
 class _Points(PlaceNames):
-    """The kept points of a body by name, and what is put there."""
+    """The kept points of a body by name, and the parts that are attached to them."""
 
     def joints(
         self, places: JointPlaces, contact: bool, directions: int, key: str
     ) -> list[list[Link]]:
-        """The links of every joint of an entry, as many as ``directions``.
+        """Return the links of every joint of an entry, ``directions`` per joint.
 
-        Of a contact that along its direction is the last of three; of others it is the first, and
-        nothing moves them in further ones.
+        In a contact, the given direction is the last of three. In other joints it is the first, and
+        the further ones are links that never stretch.
         """
         across = _across(places.direction) if contact else []
         axes, pairs = [*across, places.direction], self.pairs(places, key)
@@ -361,19 +369,19 @@ class _Points(PlaceNames):
         return [[*(link_along(*pair, axis) for axis in axes), *nowhere] for pair in pairs]
 
     def masses(self, body: JointedBody) -> dict[str, float]:
-        """Masses added to displacements [t]."""
+        """Return masses added to displacements [t]."""
         added: defaultdict[str, float] = defaultdict(float)
         for number, point_mass in enumerate(body.masses):
             points = self.of(point_mass.points, f"structure.masses.{number}.points")
             for name in self.names:
                 point, _, direction = name.rpartition(" ")
-                # Not to rotations.
+                # Rotations get no mass.
                 if point in points and direction in AXES:
                     added[name] += point_mass.mass / len(points)
         return added
 
     def springs(self, body: JointedBody) -> dict[Link, float]:
-        """Springs added between displacements [N/mm]."""
+        """Return springs added between displacements [N/mm]."""
         added: defaultdict[Link, float] = defaultdict(float)
         for number, spring in enumerate(body.springs):
             pairs = self.pairs(spring, f"structure.springs.{number}")

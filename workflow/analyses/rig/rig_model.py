@@ -1,4 +1,4 @@
-"""A rig: what vibrates, where it is driven, and what is seen of it."""
+"""Rigs: vibrating structures with their excitation and observed displacements."""
 
 from __future__ import annotations
 
@@ -24,15 +24,15 @@ from workflow.analyses.rig.laws import Laws, grouped
 from workflow.analyses.rig.place_names import PlaceNames, in_a_row
 from workflow.analyses.rig.structure import MODE
 
-# Natural frequencies that are reported, from the lowest on: those of a row of masses, all.
+# Most natural frequencies that are reported, from the lowest: enough for any row of masses.
 MOST_FREQUENCIES = 20
 
 
 @dataclass(frozen=True)
 class JointEntry:
-    """So many ``joints`` of one entry of a case; loops are along their direction ``along``.
+    """A number of ``joints`` of one entry of a case; loops are along their direction ``along``.
 
-    They may be ``contacts``, and have a law that is their ``own``.
+    The joints may be ``contacts``, and may have a law of their ``own``.
     """
 
     joints: int
@@ -43,10 +43,10 @@ class JointEntry:
 
 @dataclass(frozen=True)
 class JointNodes:
-    """Where the joints of a reduced body are.
+    """Points, normals and places of the joints of a reduced body.
 
-    ``names`` ``(j,)`` are those of their points, ``normals`` ``(j, 3)`` lead from what they meet
-    into the body, ``places`` ``(j, 3)`` are theirs [mm], None unless all are known.
+    ``names`` ``(j,)`` are the names of their points. ``normals`` ``(j, 3)`` point from the opposite
+    side into the body. ``places`` ``(j, 3)`` are coordinates [mm], None unless all are known.
     """
 
     names: tuple[str, ...]
@@ -55,7 +55,7 @@ class JointNodes:
 
     @property
     def alike(self) -> bool:
-        """Whether all have one normal."""
+        """Whether all joints have the same normal."""
         return bool((self.normals == self.normals[0]).all())
 
 
@@ -63,19 +63,19 @@ class JointNodes:
 class RigModel:
     """A vibrating structure with joints of ``directions`` directions.
 
-    ``driven`` ``(n,)`` are the forces of an excitation of 1 N; ``seen`` ``(k, n)`` takes
-    displacements to those that are kept, with ``labels`` ``(k,)``, the last of which is looked at.
-    Loops are those along the joints' direction number ``along``; ``entries`` are the joints of a
-    case, one entry after the other, none where they need none. Masses ``in_a_row`` move along x.
+    ``driven`` ``(n,)`` are the forces of an excitation of 1 N. ``seen`` ``(k, n)`` maps
+    displacements to the observed ones, with ``labels`` ``(k,)``; the last is the main one. Loops
+    are along the joints' direction number ``along``. ``entries`` describe the joints of a case in
+    order, and are empty where a case needs none. Masses ``in_a_row`` move along x.
 
-    Two bodies that touch have ``pressing`` ``(n,)``, the forces of a normal load of 1 N (elsewhere
-    the load is the joints' own preload); ``stretch`` ``(n,)``, which takes displacements to the one
-    that loops are drawn over, not the joints' mean; and of each joint its place ``places``
-    ``(j, 2)`` on the contact plane [mm], the initial ``gap`` ``(j,)`` [mm] and ``area`` ``(j,)``
-    [mm²], empty elsewhere. ``translations`` are those with the ground, by direction; ``nodes`` the
-    joints of a reduced body.
+    Two bodies in contact have ``pressing`` ``(n,)``, the forces of a normal load of 1 N (elsewhere
+    the load is the preload of the joints), and ``stretch`` ``(n,)``, which maps displacements to
+    the relative displacement of loops, in place of the joints' mean. Each of their joints has its
+    place ``places`` ``(j, 2)`` on the contact plane [mm], initial ``gap`` ``(j,)`` [mm] and
+    ``area`` ``(j,)`` [mm²]; these are empty elsewhere. ``translations`` are rigid motions with the
+    ground, by direction; ``nodes`` are the joints of a reduced body.
 
-    Of a ring ``sector`` is one, and ``model`` that of no nodal diameter.
+    For a ring, ``sector`` is one sector, and ``model`` is the model for nodal diameter 0.
     """
 
     model: DynamicModel
@@ -97,41 +97,41 @@ class RigModel:
 
     @property
     def linked(self) -> DynamicModel:
-        """With all that joints and dashpots may lead to, points of a next sector among it."""
+        """Model with all points that joints and dashpots may connect, next sector included."""
         return self.model if self.sector is None else self.sector.model
 
     @property
     def driven_so(self) -> DynamicModel:
-        """As harmonic 1 of the excitation drives it: of a sector at its nodal diameters."""
+        """Model as harmonic 1 of the excitation drives it: a sector at its nodal diameters."""
         if self.sector is None:
             return self.model
         return self.sector.at(self.sector.ring.shift(1))
 
     @property
     def joints(self) -> int:
-        """How many there are."""
+        """Number of joints."""
         return len(self.model.connection) // self.directions
 
     @property
     def shared(self) -> np.ndarray:
-        """Which joints ``(j,)`` have no law of their own, but that of the case."""
+        """Mask ``(j,)`` of the joints that have the law of the case."""
         own = np.repeat([entry.own for entry in self.entries], self.counts)
         return np.logical_not(own) if self.entries else np.ones(self.joints, bool)
 
     @property
     def contacts(self) -> np.ndarray:
-        """Which joints ``(j,)`` are friction contacts."""
+        """Mask ``(j,)`` of the joints that are friction contacts."""
         if not self.entries:
             return np.full(self.joints, self.directions > 1)
         return np.repeat([entry.contacts for entry in self.entries], self.counts)
 
     @property
     def counts(self) -> list[int]:
-        """Joints of every entry of the case."""
+        """Number of joints of every entry of the case."""
         return [entry.joints for entry in self.entries]
 
     def of_entry(self, number: int | None) -> tuple[slice, int]:
-        """Joints of an entry of the case, or all, and their direction that is looked at."""
+        """Return the joints of an entry of the case, or all, and their observed direction."""
         if number is None or not self.entries:
             return slice(0, self.joints), self.along
         first = sum(self.counts[:number])
@@ -140,19 +140,19 @@ class RigModel:
 
     @property
     def retained(self) -> Indices:
-        """The displacements of places ``(p,)``: all but the modes of reduced bodies."""
+        """Indices ``(p,)`` of displacements of places: all but the modes of reduced bodies."""
         modal = [re.fullmatch(MODE, name) is not None for name in self.model.names]
         return np.flatnonzero(np.logical_not(modal))
 
     @property
     def place_names(self) -> PlaceNames:
-        """Its places as a case names them: masses in a row move along x."""
+        """Places as a case names them: masses in a row move along x."""
         names = [self.model.names[place] for place in self.retained]
         return in_a_row(names) if self.in_a_row else PlaceNames(names)
 
     @property
     def stretched(self) -> list[str]:
-        """What every direction of every joint stretches by ``(j d,)``, such as ``m2 - m1``."""
+        """Stretch of every direction of every joint ``(j d,)`` as text, such as ``m2 - m1``."""
         return [
             " - ".join(
                 "+".join(self.linked.names[place] for place in np.flatnonzero(side)) or "ground"
@@ -163,34 +163,36 @@ class RigModel:
 
     @property
     def still(self) -> Array:
-        """Joints ``(j, d)`` that have not moved [mm]."""
+        """Zero displacements of the joints ``(j, d)`` [mm]."""
         return np.zeros((self.joints, self.directions))
 
     def preload(self, law: Laws) -> Array:
-        """The static load ``(n,)`` that balances joints that have not moved [N].
+        """Return the static load ``(n,)`` [N] that balances the joints before they move.
 
-        Displacements count from there: what the load has done to the structure before does not
-        matter, as it is linear.
+        Displacements count from this state. The deformation of the structure by the load before
+        does not matter, as the structure is linear.
         """
         force = law.respond(law.rest(self.joints), self.still).force
         return np.asarray(force.ravel() @ self.model.connection)
 
     def with_preload(self, law: Laws, force: ExcitationForce) -> CombinedForces:
-        """An excitation, with the static load that balances the joints at rest."""
+        """Return an excitation with the static load that balances the joints at rest."""
         preload = self.preload(law)
         if not preload.any():
             return CombinedForces((force,))
         return CombinedForces((force, ConstantForce(preload)))
 
     def loop(self, motion: Motion) -> tuple[Array, Array]:
-        """Mean displacement [mm] and force [N] ``(t,)`` of all joints that have the case's law,
-        along one direction."""
+        """Return mean displacement [mm] and total force [N] ``(t,)`` of joints with the case's law.
+
+        Both are along the direction number ``along``.
+        """
         stretch, force, shared = motion.joint_displacement, motion.joint_force, self.shared
         pulled = force[:, shared, self.along].sum(axis=1)
         return stretch[:, shared, self.along].mean(axis=1), pulled
 
     def by_entry(self, motion: Motion) -> tuple[Array, Array]:
-        """Mean displacements [mm] and forces [N] ``(t, e)`` of every entry of joints."""
+        """Return mean displacement [mm] and total force [N] ``(t, e)`` of each entry of joints."""
         entries = [self.of_entry(number) for number in range(len(self.entries))]
         stretch, force = motion.joint_displacement, motion.joint_force
         return (
@@ -199,11 +201,11 @@ class RigModel:
         )
 
     def looked_at(self, values: Array) -> Array:
-        """Displacement or acceleration ``(t,)`` that is looked at, of all of them ``(t, n)``."""
+        """Return the main observed displacement or acceleration ``(t,)`` of all ``(t, n)``."""
         return values @ self.seen[-1]
 
     def contact(self, motion: Motion) -> dict[str, Any]:
-        """How friction contacts press in a motion; nothing of joints along one direction."""
+        """Return the normal forces of friction contacts in a motion, empty for other joints."""
         if not self.contacts.any():
             return {}
         normal = motion.joint_force[:, self.contacts, 2]
@@ -215,11 +217,11 @@ class RigModel:
         }
 
     def free(self) -> list[float]:
-        """The lowest natural frequencies without the joints [Hz]."""
+        """Return the lowest natural frequencies without the joints [Hz]."""
         return _lowest(natural_frequencies(self.driven_so))
 
     def stuck(self, law: Laws, rest: Array | None = None) -> Array:
-        """Tangents ``(j, d, d)`` [N/mm] of joints that stick.
+        """Return tangents ``(j, d, d)`` [N/mm] of joints that stick.
 
         Where the load presses them, they are displaced by ``rest`` ``(j, d)`` [mm].
         """
@@ -229,11 +231,14 @@ class RigModel:
         return law.respond(state, still).tangent
 
     def stuck_damping(self, law: Laws, rest: Array | None = None) -> list[float]:
-        """Damping ratios of the lowest modes with all joints stuck: C is that of the open ones."""
+        """Return damping ratios of the lowest modes with all joints stuck.
+
+        The damping matrix C is that of the open joints.
+        """
         held, model = sl.block_diag(*self.stuck(law, rest)), self.driven_so
         stiffness = model.stiffness + model.connection.conj().T @ held @ model.connection
         squares, shapes = sl.eigh(stiffness, model.mass)
-        # Modes of a structure that moves freely have no damping ratio.
+        # Rigid motions of a free structure have no damping ratio.
         lowest = np.flatnonzero(squares > RIGID * squares[-1])[:MOST_FREQUENCIES]
         angular = np.sqrt(squares[lowest])
         lost = _taken(shapes, model.damping)[lowest]
@@ -243,9 +248,9 @@ class RigModel:
         return ratios
 
     def modes(self, law: Laws, rest: Array | None = None) -> dict[str, list[float]]:
-        """The lowest natural frequencies with all joints stuck, and with all sliding [Hz].
+        """Return the lowest natural frequencies with all joints stuck, and with all sliding [Hz].
 
-        Those that are open at rest stay open; see :meth:`stuck`.
+        Joints that are open at rest stay open; see :meth:`stuck`.
         """
         stuck = self.stuck(law, rest)
         sliding = np.zeros_like(stuck)
@@ -263,7 +268,7 @@ class RigModel:
 
 
 def _taken(shapes: Array, damping: Array) -> Array:
-    """sᴴ C s ``(m,)`` of shapes ``(n, m)``."""
+    """Return sᴴ C s ``(m,)`` of shapes ``(n, m)``."""
     return np.asarray(np.einsum("nm,nm->m", shapes.conj(), damping @ shapes).real)
 
 

@@ -1,4 +1,4 @@
-"""A body that is one of the like sectors of a ring, as a case gives it."""
+"""A body that is one of the equal sectors of a ring, as a case gives it."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ if TYPE_CHECKING:
 
 
 class CutFace(Section):
-    """Points of a sector that are points of the next one."""
+    """Points of a sector that coincide with points of the next one."""
 
     points: Title = entry("of the face on which the sector ends, such as right", "right")
     next_points: Title = entry("of the next sector, as many, which they are", "left")
 
 
 class RingOfSectors(Section):
-    """Like sectors in a ring, of which the body is one; a wave travels round them."""
+    """Equal sectors in a ring, of which the body is one; a wave travels round them."""
 
     sectors: Annotated[int, Whole(2, 1000)] = entry(
         "of the ring; the next one meets the force of the engine order later", 24
@@ -38,25 +38,25 @@ class RingOfSectors(Section):
 
     @property
     def text(self) -> str:
-        """The ring in a few words."""
+        """Short description of the ring."""
         turned = "" if self._about is None else f", turned about {self._about}"
         return f"one of {self.sectors} sectors{turned}"
 
     @property
     def _about(self) -> str | None:
-        """The axis about which sectors are turned, none of points whose axes turn with them."""
+        """Axis about which sectors are turned, None if the points' axes turn with their sector."""
         return None if self.axis == "turning" else self.axis
 
     def diameters(self, engine_order: int, harmonics: Sequence[int]) -> list[int]:
-        """Nodal diameters of harmonics, below zero where the wave travels from the next sector."""
+        """Return nodal diameters of harmonics, negative if the wave comes from the next sector."""
         from fe_models.dynamics.rings.sector import Ring
 
         return list(map(Ring(self.sectors, engine_order).diameters, harmonics))
 
     def of_order(self, engine_order: int, names: PlaceNames) -> Ring:
-        """The ring under an engine order, of a sector with these places.
+        """Return the ring under an engine order, for a sector with these places.
 
-        Raises EntryError for faces that do not fit each other.
+        Raises EntryError for faces that do not match.
         """
         from fe_models.dynamics.rings.sector import Ring
 
@@ -82,5 +82,5 @@ class RingOfSectors(Section):
 
 
 def with_next(names: tuple[str, ...], ring: Ring) -> tuple[str, ...]:
-    """Names of a sector's displacements, and of those of the next that are not its own."""
+    """Return names of a sector's displacements, and of the next sector's that it does not share."""
     return (*names, *(f"{NEXT}{name}" for name in names if name not in ring.ties))

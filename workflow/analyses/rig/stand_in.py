@@ -1,7 +1,7 @@
-"""What is known before a run of a body that only the run reduces: the names of its displacements.
+"""Stand-ins with the same displacement names, for bodies that are reduced only by the run.
 
-Masses with these names, that nothing holds, stand for it where a case is checked: its places are
-right, its motion is not.
+They consist of unsupported masses with these names, and are used where a case is checked: their
+places are right, their motion is not.
 """
 
 from __future__ import annotations
@@ -18,14 +18,14 @@ from workflow.case.loading import load_case
 
 
 def matrices_by_name(body: MatrixBody) -> ReducedModel | None:
-    """For large matrices; None where they keep more than is soon looked at."""
+    """Return a stand-in for large matrices, None if they keep too many unknowns."""
     matrices, wanted = body.matrices.read(), set(body.kept)
     names = [u.name for u in matrices.unknowns if u.point in wanted and u.direction != "modal"]
     return _named(names, body.modes or 0, matrices.loads.shape[1]) if body.retained else None
 
 
 def specimen_by_name(file: str) -> ReducedModel | None:
-    """For a specimen of the case in a file; None where it keeps more than is soon looked at."""
+    """Return a stand-in for a specimen of the case in a file, None if it keeps too many."""
     case = load_case(file, [SpecimensCase])
     counts = {PAD: (case.mesh.pad_elements + 1) ** 2, RING: case.geometry().ring_nodes}
     names = [

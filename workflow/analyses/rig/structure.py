@@ -1,4 +1,4 @@
-"""What holds the joints of a rig: masses in a row, a reduced body, or the rig's two specimens."""
+"""Structures that hold the joints of a rig: masses in a row, a reduced body, or two specimens."""
 
 from __future__ import annotations
 
@@ -28,9 +28,9 @@ from workflow.case.sections import Length, Section, Title, disagreement, entry
 if TYPE_CHECKING:
     from fe_models.joints.reduction import ReducedModel
 
-# Names of displacements that are those of modes, whichever body has them.
+# Names of modal displacements, of whichever body.
 MODE = r"(.* )?mode \d+"
-# Rows of specimens that a rig tells, and what it calls them.
+# Rows of a specimens outline that a rig shows, with their names there.
 OF_SPECIMENS = {
     "structure": "specimens",
     **{f"surface {body}": f"surface {body}" for body in (1, 2)},
@@ -69,7 +69,7 @@ class RowJoint(JointPlaces):
 
 
 class RowOfMasses(Section):
-    """Masses in a row on springs from the ground on, of which the last one has the joint."""
+    """Masses in a row on springs, counted from the ground, of which the last one has the joint."""
 
     refused: ClassVar[Mapping[str, str]] = {
         "joints": "given; allowed: leave them out: the contact that wears alone is the joint"
@@ -107,12 +107,12 @@ class RowOfMasses(Section):
 
     @property
     def text(self) -> str:
-        """The rig in a few words."""
+        """Short description of the rig."""
         return f"rig of {_on_springs(self.masses, self.springs)}"
 
 
 class Rig(RowOfMasses):
-    """Masses in a row on springs from the ground on, with joints anywhere between them."""
+    """Masses in a row on springs, counted from the ground, with joints anywhere between them."""
 
     refused: ClassVar[Mapping[str, str]] = {}
 
@@ -163,7 +163,7 @@ class AddedSpring(Against):
 
 
 class FurtherMass(Section):
-    """A mass that is no part of the body: a point of its own."""
+    """A mass at a point of its own that is not part of the body."""
 
     name: Title = entry("of the point, as joints, springs and forces name it", "damper")
     mass: Mass = entry("[t]", "50 g")
@@ -225,17 +225,17 @@ class JointedBody(Section, ABC):
     @property
     @abstractmethod
     def text(self) -> str:
-        """The structure in a few words."""
+        """Short description of the structure."""
 
     @property
     def driven_place(self) -> str:
-        """Where the force of an excitation acts, in a few words."""
+        """Short description of the place where the force of an excitation acts."""
         driven = self.driven
         return "no place" if driven is None else f"{driven.points} along {driven.direction}"
 
     @property
     def added(self) -> str:
-        """Where joints are, and what is added, in a few words."""
+        """Short description of the places of joints, and of masses and springs that are added."""
         added = [f"{1e3 * added.mass:g} kg at {added.points}" for added in self.masses]
         added += [f"{1e3 * added.mass:g} kg as {added.name}" for added in self.further_masses]
         added += [
@@ -245,7 +245,7 @@ class JointedBody(Section, ABC):
         return f"joints {joined(self.joints)}" + (f"; added: {', '.join(added)}" if added else "")
 
     def outline(self) -> list[tuple[str, str]]:
-        """Rows about the body itself."""
+        """Return rows about the body itself."""
         return []
 
 
@@ -270,7 +270,7 @@ class ReducedBody(JointedBody, StoredBody):
         return self
 
     def stored(self) -> ReducedModel:
-        """The model in a file that holds one. Raises InputFileError."""
+        """Return the model in a file that holds one. Raises InputFileError."""
         from fe_models.joints.reduction import load_reduced
 
         with open_hdf5(self.file):
@@ -310,23 +310,23 @@ class FrictionRig(Section):
 
     @property
     def text(self) -> str:
-        """The structure in a few words."""
+        """Short description of the structure."""
         rig = _on_springs(self.masses, self.springs)
         return f"specimens of {Path(self.specimens).name} in a rig of {rig}"
 
     def outline(self) -> list[tuple[str, str]]:
-        """Rows about the specimens."""
+        """Return rows about the specimens."""
         return outline_of(self.specimens, SpecimensCase, OF_SPECIMENS)
 
 
 def _on_springs(masses: Sequence[float], springs: Sequence[float]) -> str:
-    """Masses in a row, and the springs that hold them."""
+    """Return a description of masses in a row, and of the springs that hold them."""
     stiff = ", ".join(f"{1e-3 * spring:.6g}" for spring in springs)
     return f"{', '.join(f'{1e3 * mass:g}' for mass in masses)} kg on springs of {stiff} N/µm"
 
 
 def joined(joints: Sequence[JointPlaces]) -> str:
-    """Where joints are, and the laws of those that have their own."""
+    """Return a description of the places of joints, with the laws of those that have their own."""
     parts = []
     for joint in joints:
         between = "at " + joint.points if joint.against is None else _between(joint)
@@ -339,10 +339,10 @@ def _between(joint: JointPlaces) -> str:
 
 
 def joints_of(structure: Section, shared: bool = True) -> tuple[JointPlaces, ...]:
-    """The entries of joints of a structure, none of specimens that need none.
+    """Return the entries of joints of a structure, empty for specimens, which need none.
 
-    Where there is a ``shared`` law, of the case, and no entry has it, it is that of a joint between
-    the last mass of a row and the ground.
+    If a law of the case is ``shared`` but no entry uses it, an entry is added: a joint between the
+    last mass of a row and the ground.
     """
     if isinstance(structure, RowOfMasses):
         joints = structure.joints if isinstance(structure, Rig) else ()
@@ -353,7 +353,7 @@ def joints_of(structure: Section, shared: bool = True) -> tuple[JointPlaces, ...
 
 
 def own_laws(structure: Section, shared: bool = True) -> tuple[VibrationLaw | None, ...]:
-    """The law that each of these has of its own; one None for joints that need no entry."""
+    """Return the law that each entry of joints has of its own; one None if no entry is needed."""
     if isinstance(structure, FrictionRig):
         return (None,)
     return tuple(places.joint for places in joints_of(structure, shared))
@@ -362,14 +362,14 @@ def own_laws(structure: Section, shared: bool = True) -> tuple[VibrationLaw | No
 def joint_rows(
     shared: Joint | ElasticJoint | None, own: Sequence[Joint | ElasticJoint | None]
 ) -> list[tuple[str, str]]:
-    """The laws of joints with their parameters, for an outline."""
+    """Return the laws of joints with their parameters, for an outline."""
     numbered = [(f"joint {number}", law) for number, law in enumerate(own, start=1)]
     every = [("joint", shared), *numbered]
     return [(name, f"{law.law}, {entries(law)}") for name, law in every if law is not None]
 
 
 def refuse_own_joints(structure: Section, otherwise: str) -> None:
-    """Refuse laws that joints of a body have of their own; ``otherwise`` is what may be."""
+    """Refuse laws of individual joints of a body; ``otherwise`` names what is allowed."""
     if not isinstance(structure, JointedBody):
         return
     for number, law in enumerate(own_laws(structure)):
@@ -381,21 +381,21 @@ def refuse_own_joints(structure: Section, otherwise: str) -> None:
 
 
 def structure_outline(structure: RowOfMasses | JointedBody | FrictionRig) -> list[tuple[str, str]]:
-    """What holds the joints, and the bodies that another case describes."""
+    """Return outline rows on the structure, and on the bodies that another case describes."""
     damping = damping_text(structure.damping_ratio, structure.damping)
     below = [] if isinstance(structure, RowOfMasses) else structure.outline()
     return [("structure", f"{structure.text}, {damping}"), *below]
 
 
 def driven_place(structure: Section, mass: int | None) -> str:
-    """Where a force on a structure acts, in a few words."""
+    """Return a short description of the place where a force on a structure acts."""
     if isinstance(structure, JointedBody):
         return structure.driven_place
     return f"mass {mass or 1}"
 
 
 def refuse_undriven(structure: Section) -> None:
-    """Refuse a reduced body that says nowhere where a force acts."""
+    """Refuse a reduced body that does not state where a force acts."""
     if isinstance(structure, JointedBody) and structure.driven is None:
         raise disagreement(
             "missing; allowed: points and direction of the force", "structure.driven", "structure"
@@ -403,9 +403,9 @@ def refuse_undriven(structure: Section) -> None:
 
 
 def refuse_missing_mass(structure: Section, mass: int | None, key: str, otherwise: str) -> None:
-    """Refuse the number of a driven mass that a structure has not.
+    """Refuse the number of a driven mass that a structure does not have.
 
-    ``otherwise`` is said of a structure that is no row of masses.
+    ``otherwise`` is the text of the error for a structure that is not a row of masses.
     """
     if mass is None:
         return

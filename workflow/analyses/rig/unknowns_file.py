@@ -1,4 +1,4 @@
-"""A CSV file that says what the rows of matrices are, or names the nodes of matrices."""
+"""CSV files that describe the rows of matrices, or name the nodes of matrices."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ PLACE = Quantity("mm", at_least=-1e7, at_most=1e7)
 
 
 def given_unknowns(file: str | None) -> GivenUnknowns | None:
-    """What a file says of unknowns: columns point and direction, or node and point.
+    """Return the unknowns that a file describes: columns point and direction, or node and point.
 
-    With columns x, y and z, places too. Raises InputFileError.
+    With columns x, y and z, places are read too. Raises InputFileError.
     """
     from fe_models.matrices import GivenUnknowns, Unknown
 

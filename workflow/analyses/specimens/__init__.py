@@ -1,4 +1,4 @@
-"""Two specimens of a friction rig, reduced, worn under each normal force."""
+"""Two specimens of a friction rig, reduced, and worn under each normal force."""
 
 from workflow.analyses.specimens.case import SpecimensCase
 from workflow.analyses.specimens.memory import memory
@@ -10,14 +10,14 @@ __all__ = ["ANALYSIS"]
 
 
 def _run(run: Run[SpecimensCase]) -> None:
-    # Finite elements take a second to load: where they are used.
+    # Imported here, as finite elements take a second to load.
     from workflow.analyses.specimens.run import run_specimens
 
     run_specimens(run)
 
 
 def _pictures() -> Pictures:
-    # Plots take a second to load: where they are drawn.
+    # Imported here, as plotting takes a second to load.
     from workflow.analyses.specimens.figures import figures_of
     from workflow.analyses.specimens.paraview import write_specimens
 

@@ -1,4 +1,4 @@
-"""A case of two rig specimens: pressed together, fretted, and worn in cycle blocks."""
+"""Cases of two rig specimens: pressed together, fretted, and worn in cycle blocks."""
 
 from __future__ import annotations
 
@@ -45,13 +45,13 @@ if TYPE_CHECKING:
     from fe_models.geometry.specimens import Specimen
     from fe_models.meshes.structure_mesh import StructureMesh
 
-# Of matrices; the first if nothing is said.
+# Formats of matrices; the first one is the default.
 MATRIX_FORMATS = "npz", "mat", "mtx"
 Depth = Annotated[float, Quantity("mm", at_least=0.0, at_most=1e4)]
 
 
 class Form(Section):
-    """Radii of each strip, which is otherwise flat."""
+    """Radii of each strip, which is flat without them."""
 
     along: RoundingRadius = entry("of its section along the strip [mm]", "1000 mm")
     across: RoundingRadius = entry("of its section across the strip [mm]", "50 mm")
@@ -90,7 +90,7 @@ class Specimens(Section):
         return self
 
     def geometry(self, **settings: int) -> Specimen:
-        """The specimen as the mesher takes it, with ``pad_elements`` if they are known."""
+        """Return the specimen as the mesher needs it, with ``pad_elements`` if they are known."""
         from fe_models.geometry.specimens import Specimen
 
         radii = None if self.form is None else (self.form.along, self.form.across)
@@ -98,14 +98,14 @@ class Specimens(Section):
         return Specimen(**sizes, radii=radii, **settings)
 
 
-# A look at the case and the run that follows it share what they find.
+# A check of the case and the run that follows it share the mesh.
 @lru_cache(maxsize=1)
 def _meshed(specimen: Specimen, size: float) -> StructureMesh:
     return specimen.mesh(size)
 
 
 class FrettingLoads(Section):
-    """One normal force after the other, each on unworn specimens."""
+    """Normal forces one after the other, each on unworn specimens."""
 
     refused: ClassVar[Mapping[str, str]] = {
         "P": "of other cases; allowed: normal_forces, one after the other, such as [60 N]"
@@ -151,7 +151,7 @@ class Reduction(Section):
 
 
 class PadGrid(Section):
-    """The same contact on a half-space, over exactly the pad."""
+    """Half-space over exactly the pad, for the same contact."""
 
     grid: tuple[GridCells, GridCells] = entry("cells along x, y", [40, 40], default=(40, 40))
     link: Literal["corrected", "half_space"] = entry(
@@ -174,7 +174,7 @@ class ExplicitStep(Section):
 
 
 class Reported(Section):
-    """A number of cycles that a source reports, to find the wear coefficient that gives it."""
+    """A reported number of cycles, from which the wear coefficient that gives it is found."""
 
     normal_force: PressingForce = entry("one of load_path.normal_forces [N]", "17 N")
     steady: Literal["stiffness", "pressure"] = entry("what no longer changes then", "stiffness")
@@ -182,7 +182,7 @@ class Reported(Section):
 
 
 class SpecimensWear(TwoBodies[BodyWear], Laws):
-    """Wear of both specimens, node by node; ends by exactly one of cycles, energy."""
+    """Wear of both specimens, node by node; ends by exactly one of cycles and energy."""
 
     in_schema: ClassVar[Mapping[str, Any]] = one_of("cycles", "energy")
 
@@ -208,7 +208,7 @@ class SpecimensWear(TwoBodies[BodyWear], Laws):
 
     @model_validator(mode="after")
     def _reported_are_of_energy(self) -> SpecimensWear:
-        """Cycles that a source reports give coefficients if shapes scale with these."""
+        """Refuse reported cycles if the shapes do not scale with the wear coefficients."""
         for body in (self.body_1, self.body_2):
             if self.reported and (isinstance(body, WornByArchard) or body.evolution is not None):
                 raise disagreement(
@@ -220,7 +220,7 @@ class SpecimensWear(TwoBodies[BodyWear], Laws):
 
 
 class SpecimensOutput(Output):
-    """What is written beside summary, results and the reduced bodies."""
+    """Files that are written in addition to summary, results and reduced bodies."""
 
     matrices: Annotated[bool | tuple[str, ...], Formats(MATRIX_FORMATS)] = entry(
         "of the reduced bodies, for other programs: false, true (npz), or one or a list of npz, "
@@ -231,7 +231,7 @@ class SpecimensOutput(Output):
 
     @property
     def matrix_formats(self) -> tuple[str, ...]:
-        """The formats in which matrices are written: none where they are not wanted."""
+        """Formats in which matrices are written, empty where they are not wanted."""
         if isinstance(self.matrices, tuple):
             return self.matrices
         return MATRIX_FORMATS[:1] if self.matrices else ()
@@ -261,20 +261,20 @@ class SpecimensCase(WithScans, Case):
 
     @property
     def laws(self) -> tuple[WearLaw, WearLaw]:
-        """Those of body 1 and body 2."""
+        """Wear laws of body 1 and body 2."""
         return self.wear.body_1.described(), self.wear.body_2.described()
 
     def geometry(self) -> Specimen:
-        """The specimen as the mesher takes it."""
+        """Return the specimen as the mesher needs it."""
         return self.structure.geometry(pad_elements=self.mesh.pad_elements)
 
     def meshed(self) -> StructureMesh:
-        """Both specimens, made once, without surfaces as measured. Raises MeshError."""
+        """Return both specimens, meshed once, without measured surfaces. Raises MeshError."""
         return _meshed(self.geometry(), self.mesh.size)
 
     @property
     def pad_grid(self) -> Grid:
-        """The grid of the half-space."""
+        """Grid of the half-space."""
         side = self.structure.strip_width
         return Grid.covering((side, side), self.contact.grid)
 

@@ -1,4 +1,4 @@
-"""Figures of a run of specimens: pad, loops, kinetics, and the half-space beside them."""
+"""Figures of a run of specimens: pad, loops, kinetics, and comparison with the half-space."""
 
 from __future__ import annotations
 
@@ -24,19 +24,19 @@ from workflow.pictures.scales import PER_MICRON, TO_JOULES, TO_MICRONS
 from workflow.pictures.style import BLACK, BLUE, COLOUR_MAP, GREEN, ORANGE, PURPLE
 from workflow.shell.results import grid_of
 
-# As many normal forces as have a separate panel or colour.
+# Most normal forces that get a panel or colour of their own.
 MOST_LOADS = 4
 COLOURS = (BLUE, ORANGE, GREEN, PURPLE)
 SHAPES = "unworn", "worn"
 
 
 def figures_of(_: None) -> Figures:
-    """The figures of a run, by name."""
+    """Return the figures of a run, by name."""
     return {"pad": pad, "loops": loops, "kinetics": kinetics, "half_space": half_space}
 
 
 def _loads(file: h5py.File) -> list[h5py.Group]:
-    """Groups of the forces to show, in the order of the case."""
+    """Return groups of the forces to show, in the order of the case."""
     names = sorted(file["loads"], key=int)
     return [file["loads"][name] for name in spread(names, MOST_LOADS)]
 
@@ -53,7 +53,7 @@ def _states(load: h5py.Group) -> list[h5py.Group]:
 
 
 def pad(file: h5py.File) -> Figure:
-    """Pressure and path of slip on the pad under the first force: unworn, between, worn."""
+    """Draw pressure and slip path on the pad under the first force: unworn, between, worn."""
     load = _loads(file)[0]
     states = _three(load)
     figure = new_figure(f"The pad at {_force(load)}: {_pad_title(states)}", 7.2, compress=True)
@@ -72,7 +72,7 @@ def pad(file: h5py.File) -> Figure:
 
 
 def _three(load: h5py.Group) -> list[h5py.Group]:
-    """Unworn, the state whose largest pressure is half way, and the last one."""
+    """Return the unworn state, the one whose largest pressure is half way, and the last one."""
     states = _states(load)
     peaks = np.array([state["pressure"][()].max() for state in states])
     half = 0.5 * (peaks[0] + peaks[-1])
@@ -85,7 +85,7 @@ def _pad_title(states: list[h5py.Group]) -> str:
 
 
 def _draw_pad(figure: Figure, axis: Axes, file: h5py.File, field: Array, unit: str) -> None:
-    """A nodal field over the pad's triangles, on its own scale; white where it is 0."""
+    """Draw a nodal field over the pad's triangles, on its own scale; white where it is 0."""
     place, triangles = file["specimens/pad/coordinates"][()], file["specimens/pad/facets"][()]
     shown = triangles[np.any(field[triangles] > 0.0, axis=1)]
     axis.set_aspect("equal")
@@ -108,7 +108,7 @@ def _draw_pad(figure: Figure, axis: Axes, file: h5py.File, field: Array, unit: s
 
 
 def loops(file: h5py.File) -> Figure:
-    """Force against motion of the ring, unworn and worn, and the coupled cycle unworn."""
+    """Draw force against motion of the ring, unworn and worn, and the unworn coupled cycle."""
     loads = _loads(file)
     rows = -(-len(loads) // 2)
     figure = new_figure(_loops_title(loads), 1.0 + 4.0 * rows)
@@ -139,7 +139,7 @@ def _loops_title(loads: list[h5py.Group]) -> str:
 
 
 def _range(values: list[float]) -> str:
-    """Smallest and largest in three digits, once where they are the same."""
+    """Return the smallest and largest value in three digits, once where they are the same."""
     low, high = (f"{value:.3g}" for value in (min(values), max(values)))
     return low if low == high else f"{low} to {high}"
 
@@ -148,7 +148,7 @@ def _range(values: list[float]) -> str:
 
 
 def kinetics(file: h5py.File) -> Figure:
-    """Stiffness over cycles and over energy, area and evenness of pressure over cycles."""
+    """Draw stiffness over cycles and over energy, area and evenness of pressure over cycles."""
     loads = _loads(file)
     figure = new_figure(_kinetics_title(loads), 9.0)
     panels = figure.subplots(2, 2)
@@ -197,7 +197,7 @@ def _label_kinetics(panels: Any) -> None:
 
 
 def half_space(file: h5py.File) -> Figure:
-    """Pressure and shear along x through the middle of the pad, reduced model and half-space."""
+    """Draw pressure and shear along x through the pad's middle, reduced model and half-space."""
     load = _loads(file)[0]
     states = _states(load)
     figure = new_figure(f"Reduced specimens and half-space at {_force(load)}", 8.0)
@@ -217,7 +217,7 @@ def half_space(file: h5py.File) -> Figure:
 def _draw_profile(
     axis: Axes, file: h5py.File, state: h5py.Group, beside: h5py.Group, name: str
 ) -> None:
-    """Cells next to y = 0 of the half-space, nodes on it of the reduced model."""
+    """Draw cells next to y = 0 of the half-space, and nodes on it of the reduced model."""
     grid = grid_of(file["grid/pad"])
     place = file["specimens/pad/coordinates"][()]
     row = near_middle(place, 0)

@@ -1,15 +1,16 @@
-"""The contact of two specimens on a half-space, beside their reduced models.
+"""Contact of two specimens on a half-space, to compare with their reduced models.
 
-Same shape, loads, friction and motions: normal force imposed, no tilt, then body 2 moved along x
-and nothing else; pressure and shear one after the other, as if both materials were alike. The
-half-space goes on beyond the pad and below it without end; the specimens are finite and held at the
-ring. Linked to them (:mod:`wear.contact.link`), it moves by what they do beside it,
+Shape, loads, friction and motions are the same. The normal force is imposed without tilt, then body
+2 is moved along x only. Pressure and shear are solved one after the other, as if both materials
+were similar. The half-space extends beyond the pad and below it without end; the specimens are
+finite and held at the ring. With a link to them (:mod:`wear.contact.link`), the half-space is moved
+by the difference of the specimens to it,
 
     d = A f - K Π f,
 
-for the nodal forces f of each motion, the rigid approach and motion of the rings included: its own
-forces and motions are then those of the rings, on a finer grid. Beside half-spaces the pads are
-compared while tied: c_bulk = 1/k_specimens - 1/k_half-space, along z and x, positive or negative.
+for the nodal forces f of each motion, with the rigid approach and motion of the rings included. Its
+forces and motions are then at the rings, on a finer grid. The pads are also compared with
+half-spaces while tied: c_bulk = 1/k_specimens - 1/k_half-space, along z and x, of either sign.
 """
 
 from __future__ import annotations
@@ -32,9 +33,9 @@ from sa_solver.types import Array, ElasticPair, Grid, Indices
 from wear.contact.link import Link, fitted
 from workflow.errors import MethodFailed
 
-# A tied pad: any motion does, and a limit that no shear comes near.
+# For a tied pad: any motion, and a limit that no shear reaches.
 UNIT_MOTION, NO_LIMIT = 1e-3, 1e9
-# Coordinates of nodes in one row or column differ by rounding only [mm].
+# Coordinates of nodes in one row or column differ only by rounding below this [mm].
 SAME_PLACE = 1e-9
 
 State = TypeVar("State", NormalState, TangentialState)
@@ -42,13 +43,13 @@ State = TypeVar("State", NormalState, TangentialState)
 
 @dataclass(frozen=True)
 class HalfSpaceState:
-    """One cycle on one shape, as :class:`~fe_models.joints.reduced_contact.FrettingCycle` has it.
+    """One cycle on one shape, like :class:`~fe_models.joints.reduced_contact.FrettingCycle`.
 
     Fields ``(nx, ny)``: ``pressure`` [MPa], ``shear`` along x at the end of first loading [MPa] and
     ``slip`` of body 2 there [mm]; ``nodal_pressure`` and ``nodal_shear`` ``(n,)`` are their means
-    over the nodes of the pad. ``displacement`` [mm] and ``force`` [N] are first loading ``(k,)``,
-    ``stick_stiffness`` [N/mm] with all that touches stuck, ``energy`` of a cycle [N mm], ``misfit``
-    that of the link, None where there is none.
+    over the nodes of the pad. ``displacement`` [mm] and ``force`` [N] are first loading ``(k,)``.
+    ``stick_stiffness`` [N/mm] is for all cells in contact stuck, ``energy`` is that of a cycle [N
+    mm], and ``misfit`` that of the link, None without a link.
     """
 
     pressure: Array
@@ -67,11 +68,11 @@ class HalfSpaceState:
 
 @dataclass(frozen=True)
 class PadLink:
-    """What specimens add to the half-space: to its gap ``(nx, ny)``, and to sliding [mm].
+    """Correction of the half-space by the specimens: of gap ``(nx, ny)`` and sliding [mm].
 
-    ``moved`` ``(k, 2, nx, ny)`` is that of first loading to each of its points, ``stuck``
-    ``(2, nx, ny)`` per mm where all that touches sticks. ``misfit`` is what the fit of ``gap``
-    leaves of the half-spaces' deflection.
+    ``moved`` ``(k, 2, nx, ny)`` is for each point of first loading, ``stuck`` ``(2, nx, ny)`` per
+    mm of motion where all cells in contact stick. ``misfit`` is the residual of the fit of ``gap``,
+    relative to the half-spaces' deflection.
     """
 
     gap: Array
@@ -89,12 +90,12 @@ class BulkCompliance:
 
     @property
     def normal(self) -> float:
-        """c_bulk along z [mm/N]."""
+        """Bulk compliance c_bulk along z [mm/N]."""
         return 1.0 / self.specimens[0] - 1.0 / self.half_space[0]
 
     @property
     def tangential(self) -> float:
-        """c_bulk along x [mm/N]."""
+        """Bulk compliance c_bulk along x [mm/N]."""
         return 1.0 / self.specimens[1] - 1.0 / self.half_space[1]
 
 
@@ -108,7 +109,7 @@ class NodeGrid:
 
     @classmethod
     def of(cls, face: Face) -> NodeGrid:
-        """Rows and columns of a face that is meshed in squares."""
+        """Return rows and columns of a face that is meshed in squares."""
         digits = np.round(face.coordinates / SAME_PLACE).astype(np.int64)
         (x, row), (y, column) = (np.unique(column, return_inverse=True) for column in digits.T)
         order = np.full((len(x), len(y)), -1)
@@ -117,7 +118,7 @@ class NodeGrid:
         return cls(SAME_PLACE * x, SAME_PLACE * y, order)
 
     def smooth(self, nodal: Array) -> RectBivariateSpline:
-        """A smooth field through nodal values: straight pieces would leave ridges on a form."""
+        """Return a smooth field through nodal values; linear pieces would form ridges."""
         power = min(3, len(self.x) - 1, len(self.y) - 1)
         return RectBivariateSpline(self.x, self.y, nodal[self.order], kx=power, ky=power)
 
@@ -146,7 +147,7 @@ class PadHalfSpace:
         self._friction = friction
 
     def link(self, pair: ReducedPair, normal: NormalSolution, path: Array) -> PadLink:
-        """The link to specimens pressed as ``normal`` and moved to the points of ``path`` [mm]."""
+        """Return the link to specimens pressed as ``normal`` and moved along ``path`` [mm]."""
         shears = [pair.tangential(normal, d, self._friction).shear for d in path]
         pressed = self._linked(pair, normal, normal.force[None], Z)
         sheared = self._linked(pair, normal, np.array([*shears, pair.stuck_shear(normal)]), X)
@@ -159,9 +160,9 @@ class PadHalfSpace:
         )
 
     def _linked(self, pair: ReducedPair, normal: NormalSolution, forces: Array, axis: int) -> Link:
-        """That of nodal ``forces`` ``(t, n)`` along one axis, where ``normal`` presses.
+        """Return the link for nodal ``forces`` ``(t, n)`` along one axis, where ``normal`` presses.
 
-        Pressure and shear do not know of each other: of shear it is the part along the face.
+        Pressure and shear are not coupled: for shear, only the part along the face is used.
         """
         force = np.zeros((len(forces), 3, len(pair.face)))
         force[:, axis] = forces
@@ -177,9 +178,9 @@ class PadHalfSpace:
     ) -> HalfSpaceState:
         """Press the shape ``height`` ``(nx, ny)`` with ``force`` [N] and move along ``path``.
 
-        ``depth`` ``(n,)`` is worn off both bodies at the nodes [mm], ``path`` ``(k,)`` rising
-        displacements of body 2 along x [mm]; ``link`` that of the specimens on the same shape.
-        Raises :class:`MethodFailed` if a solve does not converge.
+        ``depth`` ``(n,)`` is the wear of both bodies together at the nodes [mm]. ``path`` ``(k,)``
+        are rising displacements of body 2 along x [mm]. ``link`` is the link to the specimens on
+        the same shape. Raises :class:`MethodFailed` if a solve does not converge.
         """
         worn = self._nodes.smooth(depth)(self.grid.x.ravel(), self.grid.y.ravel())
         shape = height + worn if link is None else height + worn + link.gap
@@ -188,7 +189,8 @@ class PadHalfSpace:
         moved = [None] * len(path) if link is None else link.moved
         states = [self._move(limit, d, by) for d, by in zip(path, moved, strict=True)]
         last, area = states[-1], self.grid.cell_area
-        # Body 1's shift against body 2 in sa_solver is body 2's here, backwards.
+        # In sa_solver, the shift of body 1 against body 2 has the opposite sign of body 2's motion
+        # here.
         shear, slip = last.shear[0], last.slip[0]
         return HalfSpaceState(
             pressure=normal.pressure,
@@ -206,7 +208,7 @@ class PadHalfSpace:
         )
 
     def tied(self) -> tuple[float, float]:
-        """Stiffness of the tied pad along z and x [N/mm]."""
+        """Return the stiffness of the tied pad along z and x [N/mm]."""
         flat = np.zeros(self.grid.shape)
         pressed = self._press(flat, approach=UNIT_MOTION)
         return pressed.P / UNIT_MOTION, self._stuck(np.ones(self.grid.shape, dtype=np.bool_))
@@ -215,13 +217,13 @@ class PadHalfSpace:
         return _converged(self._shift(limit, by, shift_x=-displacement))
 
     def _stuck(self, pressed: NDArray[np.bool_], link: PadLink | None = None) -> float:
-        """Stiffness along x of the cells ``pressed``, stuck [N/mm]."""
+        """Return the stiffness along x with the cells ``pressed`` stuck [N/mm]."""
         by = None if link is None else UNIT_MOTION * link.stuck
         return -self._move(np.where(pressed, NO_LIMIT, 0.0), UNIT_MOTION, by).Qx / UNIT_MOTION
 
 
 def bulk_compliance(pair: ReducedPair, half_space: PadHalfSpace) -> BulkCompliance:
-    """What the specimens give way beyond a half-space."""
+    """Return the compliance of the specimens in addition to that of a half-space."""
     tied = np.ones(len(pair.face))
     z, x = (float(np.linalg.solve(pair.block(axis), tied).sum()) for axis in (Z, X))
     return BulkCompliance((z, x), half_space.tied())

@@ -1,4 +1,4 @@
-"""The two specimens of a case: mesh, reduced models and their natural frequencies."""
+"""The two specimens of a case: mesh, reduced models and natural frequencies."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from sa_solver.types import Array, Grid, Progress, Tally, unseen
 from workflow.analyses.specimens.case import SpecimensCase
 from workflow.shell.cache import content_key, load_arrays, save_arrays
 
-# Rigid motions of a free body, and the natural frequencies above them that are compared.
+# Rigid motions of a free body, and number of natural frequencies above them to compare.
 RIGID_MOTIONS, FREQUENCIES = 6, 6
 
 
@@ -35,7 +35,7 @@ class SpecimenReduction:
 class SpecimensModel:
     """The specimens as the case gives them.
 
-    Their reduced models keep a target too if its distance from the contact is given [mm].
+    If a target distance from the contact is given [mm], their reduced models keep a target too.
     """
 
     def __init__(self, case: SpecimensCase, target_distance: float | None = None) -> None:
@@ -47,7 +47,10 @@ class SpecimensModel:
 
     @cached_property
     def mesh(self) -> StructureMesh:
-        """Both specimens; raises :class:`~fe_models.meshes.structure_mesh.MeshError`."""
+        """Mesh of both specimens.
+
+        Raises :class:`~fe_models.meshes.structure_mesh.MeshError`.
+        """
         mesh = self.case.meshed()
         (face,) = mesh.interfaces
         for scanned in self.case.scanned():
@@ -56,21 +59,21 @@ class SpecimensModel:
 
     @property
     def face(self) -> Interface:
-        """The pad."""
+        """Interface of the pad."""
         (face,) = self.mesh.interfaces
         return face
 
     def gap(self, grid: Grid) -> Array:
-        """Distance of the unloaded, unworn pads over the cells of a grid ``(nx, ny)`` [mm]."""
+        """Return the gap of the unloaded, unworn pads on the cells of a grid ``(nx, ny)`` [mm]."""
         gap = self.specimen.gap(grid.x, grid.y)
         surfaces = self.case.structure.surfaces
         return gap if surfaces is None else gap + surfaces.gap(grid)
 
     @cached_property
     def reduction(self) -> SpecimenReduction:
-        """Reduced models and frequencies, from the cache when they are there.
+        """Reduced models and frequencies, from the cache if they are there.
 
-        Form and surfaces as measured are a gap: all specimens share them.
+        Form and measured surfaces enter as a gap only, so that all specimens share these models.
         """
         case = self.case
         flat = replace(self.specimen, radii=None)
@@ -88,7 +91,7 @@ class SpecimensModel:
         )
 
     def prepare(self, progress: Progress) -> None:
-        """Reduce them now, and tell ``progress`` of the steps of it."""
+        """Reduce the specimens now, and report the steps to ``progress``."""
         self._progress = progress
         try:
             _ = self.reduction
@@ -96,17 +99,17 @@ class SpecimensModel:
             self._progress = unseen
 
     def node_count(self) -> int:
-        """Nodes of both bodies, midsides included."""
+        """Return the number of nodes of both bodies, with midside nodes."""
         return self.mesh.node_count(self.case.mesh.order)
 
     @cached_property
     def pair(self) -> ReducedPair:
-        """Both reduced models on the nodes of the pad, rings held."""
+        """Both reduced models on the nodes of the pad, with rings held."""
         one, two = (pad_stiffness(model, self.specimen) for model in self.reduction.models)
         return ReducedPair.from_stiffness(self.face, one, two)
 
     def _reduce(self, modes: int) -> dict[str, Any]:
-        """Everything that is worth keeping, by name."""
+        """Return all arrays to store in the cache, by name."""
         order, bodies = self.case.mesh.order, (1, 2)
         done = Tally(self._progress, STEPS + len(bodies))
         models = reduced_specimens(
@@ -129,7 +132,7 @@ class SpecimensModel:
         return arrays
 
     def _full_frequencies(self, number: int, known: dict[str, Any]) -> Array:
-        """Those of the finite elements; a specimen of the other's material has the other's."""
+        """Return frequencies of the finite elements, computed once if both materials are equal."""
         if number == 2 and self._materials[0] == self._materials[1]:
             return known["full/1"]
         body = self.mesh.bodies[number - 1]
@@ -140,7 +143,7 @@ class SpecimensModel:
 
 
 def _lowest(stiffness: Any, mass: Any) -> Array:
-    """The lowest frequencies of a free body above its rigid motions [Hz]."""
+    """Return the lowest frequencies of a free body above its rigid motions [Hz]."""
     return free_frequencies(stiffness, mass, RIGID_MOTIONS + FREQUENCIES)[RIGID_MOTIONS:]
 
 

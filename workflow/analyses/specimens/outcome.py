@@ -1,4 +1,4 @@
-"""What a run of specimens has found."""
+"""Results of a run of specimens."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ class KeptState:
 
 @dataclass(frozen=True)
 class MarchedCycle:
-    """The coupled cycle on the unworn shape beside the uncoupled one.
+    """The coupled cycle on the unworn shape, compared with the uncoupled one.
 
-    ``displacement`` of body 2's ring [mm] and ``force`` that moves it [N] ``(k,)`` over the closed
-    cycle; ``energy`` [N mm] and ``secant_stiffness`` [N/mm] at a small first motion, marched and
-    uncoupled; ``pressure_change`` is the largest change of a node's pressure in the cycle over the
-    largest pressure.
+    ``displacement`` of body 2's ring [mm] and ``force`` that moves it [N] are ``(k,)`` over the
+    closed cycle. ``energy`` [N mm] and ``secant_stiffness`` [N/mm] at a small first motion are for
+    the coupled and the uncoupled cycle. ``pressure_change`` is the largest change of a node's
+    pressure in the cycle over the largest pressure.
     """
 
     displacement: Array
@@ -38,7 +38,7 @@ class MarchedCycle:
 
 @dataclass(frozen=True)
 class LoadOutcome:
-    """Everything found under one normal ``force`` [N].
+    """All results under one normal ``force`` [N].
 
     ``blocks`` are all states, ``kept`` those with fields; ``half_space`` belongs to the first and
     last of them.
@@ -53,7 +53,7 @@ class LoadOutcome:
 
 @dataclass(frozen=True)
 class SpecimensOutcome:
-    """Everything a run of specimens found."""
+    """All results of a run of specimens."""
 
     model: SpecimensModel
     half_space: PadHalfSpace

@@ -1,7 +1,7 @@
-"""A run of specimens for ParaView: the pad as it wears, a time series for each normal force.
+"""ParaView files of a run of specimens: the pad as it wears, a series for each normal force.
 
-``load_<n>.pvd`` over the cycles, every step a mesh of the pad (``load_<n>/<state>.vtu``) with its
-fields at the nodes; Warp By Vector on ``worn_1`` or ``worn_2`` shows a body's worn shape.
+``load_<n>.pvd`` is over the cycles. Every step is a mesh of the pad (``load_<n>/<state>.vtu``) with
+its fields at the nodes. Warp By Vector on ``worn_1`` or ``worn_2`` shows a body's worn shape.
 ``view.py`` shows the first force.
 """
 
@@ -25,12 +25,12 @@ FIELDS = {
     "worn_1": "depth_1",
     "worn_2": "depth_2",
 }
-# Which way wear moves the surfaces, along the normal.
+# Sign along the normal of the motion of each surface by wear.
 INTO_BODY = {1: -1.0, 2: 1.0}
 
 
 def write_specimens(_: None, file: h5py.File, folder: Path) -> list[Path]:
-    """Write the pad's series of every normal force, and the script; returns the paths."""
+    """Write the pad's series of every normal force, and the script; return the paths."""
     written: list[Path] = []
     for number, load in file["loads"].items():
         steps = _steps(file, load, folder / f"load_{number}")
@@ -58,7 +58,7 @@ def _steps(file: h5py.File, load: h5py.Group, folder: Path) -> Iterator[Step]:
 
 
 def _write_view(file: h5py.File, folder: Path) -> Path:
-    """The script that shows the first normal force."""
+    """Write the script that shows the first normal force, and return its path."""
     number, load = next(iter(file["loads"].items()))
     series = f"load_{number}.pvd"
     states = load["states"].values()

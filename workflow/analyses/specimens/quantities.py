@@ -1,4 +1,4 @@
-"""Main results of two specimens: what each normal force makes of pads and stiffness."""
+"""Main results of two specimens: change of pads and stiffness under each normal force."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from workflow.shell.summary import estimate, told
 
 FREE = "free specimens"
 UNCOUPLED = "difference to a cycle with pressure and shear coupled"
-# Of the pads, unworn and worn: unit, text, everyday unit.
+# Quantities of the pads, unworn and worn: unit, text, everyday unit.
 STATE = {
     "stick_stiffness": ("N/mm", "tangential stiffness, all that touches stuck", "N/um"),
     "secant_stiffness": ("N/mm", "slope of the loop up to half of its force", "N/um"),
@@ -21,9 +21,9 @@ STATE = {
     "peak_pressure": ("MPa", "largest pressure", ""),
     "energy_per_cycle": ("N mm", "energy dissipated in a cycle", ""),
 }
-# Results of the unworn pads that a coupled cycle is put beside.
+# Results of the unworn pads that are compared with a coupled cycle.
 COUPLED = {"secant_stiffness": "secant_stiffness", "energy_per_cycle": "energy"}
-# What runs are compared by, beside the numbers.
+# Curves by which runs are compared, in addition to the numbers.
 CURVES = (
     CurvesOf(
         "tangential stiffness",
@@ -48,7 +48,7 @@ CURVES = (
 
 
 def main_results(case: SpecimensCase, summary: Summary) -> list[Quantity]:
-    """Of every normal force, and the first natural frequency of either specimen."""
+    """Return results under every normal force, and the first frequency of either specimen."""
     quantities = [
         quantity
         for number, force in enumerate(case.load_path.normal_forces)
@@ -62,7 +62,7 @@ def main_results(case: SpecimensCase, summary: Summary) -> list[Quantity]:
 
 
 def _under(group: str, number: int, summary: Summary) -> Iterator[Quantity]:
-    """Of one normal force."""
+    """Yield results under one normal force."""
     of, load = partial(Quantity, group), f"loads.{number}"
     for body in (1, 2):
         yield of(f"largest depth worn from body {body}", f"{load}.depths.{body - 1}", "mm")

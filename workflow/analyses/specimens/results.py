@@ -1,4 +1,4 @@
-"""What a run of specimens leaves: results, reduced models, summary, ParaView files and figures."""
+"""Output of a run of specimens: results, reduced models, summary, ParaView files and figures."""
 
 from __future__ import annotations
 
@@ -35,11 +35,11 @@ from workflow.shell.results import Along, On, ResultsWriter, run_results
 from workflow.shell.store import replacing_hdf5
 from workflow.shell.summary import finish
 
-# Name of the pad's grid, and of the two shapes that a half-space is put beside.
+# Name of the pad's grid, and of the two shapes that are compared with a half-space.
 PAD = "pad"
 SHAPES = "unworn", "worn"
 
-# Unit and description of what is written.
+# Unit and description of results.
 FREQUENCIES = {
     "full": ("Hz", "natural frequencies of the free body, finite elements"),
     "reduced": ("Hz", "natural frequencies of the free body, reduced model"),
@@ -51,10 +51,10 @@ KINETICS = {
     "peak_pressure": ("MPa", "largest pressure"),
     "pressure_deviation": ("1", "root mean square of pressure/mean - 1 over the pad"),
     "friction": ("1", "largest tangential over normal force"),
-    # Infinite where nothing slides.
+    # Infinite where no node slides.
     "stable_cycles": ("1", "cycles of constant shape beyond which errors of shape grow"),
 }
-# At the nodes of the pad or the cells of its grid; tractions are those of first loading.
+# Fields at the nodes of the pad or the cells of its grid; tractions are those of first loading.
 PAD_FIELDS = {
     "pressure": ("MPa", "contact pressure"),
     "shear_x": ("MPa", "shear on body 2 along x at the end of first loading"),
@@ -83,13 +83,13 @@ def write_specimens_output(outcome: SpecimensOutcome, run: Run[SpecimensCase]) -
                     save_reduced(stream, model)
                 _write_matrices(model, reduced, f"body_{number}", run.case.output.matrix_formats)
         _write_results(outcome, run)
-    run.draw(None)  # every run leaves the same
+    run.draw(None)  # every run has the same contents
     summary = _summary(outcome, reporter)
     finish(run, summary, _lines(summary))
 
 
 def _write_matrices(model: ReducedModel, folder: Path, stem: str, formats: tuple[str, ...]) -> None:
-    """Matrices for other programs, put into the folder once they are whole."""
+    """Write matrices for other programs, moved into the folder once they are complete."""
     with TemporaryDirectory(dir=folder) as beside:
         write_matrices(model, Path(beside), stem, formats)
         for path in Path(beside).iterdir():
@@ -131,7 +131,7 @@ def _put_load(writer: ResultsWriter, group: str, load: LoadOutcome, areas: Array
 
 
 def _kinetics(blocks: tuple[BlockState, ...], areas: Array) -> dict[str, Dataset]:
-    """Numbers at the start of every cycle block, ``(blocks + 1,)`` each."""
+    """Return numbers at the start of every cycle block, ``(blocks + 1,)`` each."""
     worn = [
         (*(d.max() for d in state.depths), *(d @ areas for d in state.depths), state.energy)
         for state in blocks
@@ -156,7 +156,7 @@ def _kinetics(blocks: tuple[BlockState, ...], areas: Array) -> dict[str, Dataset
 
 
 def _state(kept: KeptState, areas: Array) -> dict[str, Dataset]:
-    """The pad in a worn state, at its nodes."""
+    """Return fields of the pad in a worn state, at its nodes."""
     block, contact = kept.block, kept.block.contact
     fields = contact.normal.pressure, contact.tangential.shear / areas, contact.cycle_slip
     secant = np.array(kept.curve.secant_stiffness(SLOPE_SHARE))
@@ -177,7 +177,7 @@ def _summary(outcome: SpecimensOutcome, reporter: Reporter) -> dict[str, Any]:
                 f"{load['normal_force']:g} N: steady only near the end of the run; raise "
                 "wear.energy or wear.cycles to be sure"
             )
-    coefficients = wear.body_1.rate(1.0), wear.body_2.rate(1.0)  # what is reported is of energy
+    coefficients = wear.body_1.rate(1.0), wear.body_2.rate(1.0)  # reports need laws of energy
     return {
         "structure": {"nodes": model.node_count(), "pad_nodes": len(model.face)},
         **model.case.told_surfaces(),
@@ -191,7 +191,7 @@ def _summary(outcome: SpecimensOutcome, reporter: Reporter) -> dict[str, Any]:
 
 
 def _lines(summary: dict[str, Any]) -> Iterator[str]:
-    """The end of the run in a few lines."""
+    """Yield lines on the results, for the end of the run."""
     body = summary["frequencies"]["body_1"]
     for name in ("full", "reduced"):
         values = ", ".join(f"{value:.0f}" for value in body[name])

@@ -1,8 +1,8 @@
-"""A run of two specimens: reduced, fretted and worn under each normal force, and checked beside it.
+"""Runs of two specimens: reduced, fretted and worn under each normal force, and compared.
 
-Beside the wear in cycle blocks of the reduced pair, on the unworn and the worn shape: the same
-contact on a half-space; and, unworn, the same cycle marched with pressure and both directions of
-shear together, which the uncoupled method and Masing's rule leave out.
+The reduced pair wears in cycle blocks. On the unworn and the worn shape, the same contact is solved
+on a half-space. On the unworn shape, the same cycle is also computed with pressure and both
+directions of shear coupled, which the uncoupled method and Masing's rule neglect.
 """
 
 from __future__ import annotations
@@ -37,29 +37,31 @@ from workflow.shell.few_cells import check_cells
 from workflow.shell.reporter import Reporter
 from workflow.shell.steps import kept_steps
 
-# States of each force that are kept with their fields: the unworn one, the last, others between
-# them evenly over the logarithm of the cycles.
+# Number of states of each force that are stored with their fields: the unworn one, the last, and
+# others evenly spaced in the logarithm of the cycles.
 KEPT_STATES = 13
-# Points of first loading, denser where it begins (a power of even steps).
+# Points of first loading, denser at its beginning (a power of even steps).
 CURVE_POINTS, CURVE_POWER = 61, 2.0
 HALF_SPACE_POINTS = 13
-# Of surfaces as measured, where what is finer than the nodes of the pad is.
+# End of the message on measured surfaces finer than the nodes of the pad.
 FINER = "these wear, and only the half-space beside them has all that its grid carries"
-# Increments of the marched cycle in a quarter of it: 16 leave 2e-3 of the energy of Masing's loop.
+# Increments of the coupled cycle in a quarter of it: with 16, the energy of Masing's loop has an
+# error of 2e-3.
 QUARTER = 16
-# Of the work for a force, what wear is; the rest are the half-space and the marched cycle.
+# Share of the wear in the work for a force; the rest are the half-space and the coupled cycle.
 WEAR = 0.7
-# First motion of the marched cycle as a share of half the stroke: nearly all sticks.
+# First motion of the coupled cycle as a share of half the stroke: nearly all nodes stick.
 SMALL_MOTION = 1e-3
-# More cycle blocks than this, each some milliseconds, are a slip of the pen in the case.
+# Limit on cycle blocks, each of which takes milliseconds: more are most likely an error in the
+# case.
 MOST_BLOCKS = 20_000
 
 
 def run_specimens(run: Run[SpecimensCase]) -> None:
     """Run a case of specimens to its end.
 
-    Raises UserError where the mesher refuses or a cycle block would be unstable, MethodFailed where
-    a contact does not converge.
+    Raises UserError where meshing fails or a cycle block would be unstable, MethodFailed where a
+    contact does not converge.
     """
     try:
         with kept_steps(run) as steps:
@@ -153,7 +155,7 @@ def _beside(
     path: Array,
     state: BlockState,
 ) -> HalfSpaceState:
-    """The half-space under the shape of a state, linked to the specimens as the case asks for."""
+    """Return the half-space under the shape of a state, linked to the specimens if wanted."""
     link = None
     if model.case.contact.link == "corrected":
         link = half_space.link(model.pair, state.contact.normal, path)
@@ -163,7 +165,7 @@ def _beside(
 def _blocks(
     model: SpecimensModel, conditions: FrettingConditions, reporter: Reporter, steps: Steps
 ) -> Iterator[BlockState]:
-    """The states of a worn pair, up to the end that the case asks for."""
+    """Yield the states of a worn pair, up to the end that the case asks for."""
     case = model.case
     step = case.wear.step
     stepper = (
@@ -183,10 +185,10 @@ def _blocks(
 
 
 def _to_go(case: SpecimensCase, state: BlockState) -> float:
-    """The most cycles that the block after ``state`` may have; 0 at the end.
+    """Return the largest number of cycles of the block after ``state``; 0 at the end.
 
-    A run up to an energy ends with the first whole block that reaches it, and before anything wears
-    as soon as it does at the present rate.
+    A run up to an energy ends with the first whole block that reaches it. Where nothing wears yet,
+    the block ends as soon as the energy is reached at the present rate.
     """
     wear = case.wear
     if wear.cycles is not None:
@@ -198,7 +200,7 @@ def _to_go(case: SpecimensCase, state: BlockState) -> float:
 
 
 def _block(case: SpecimensCase, state: BlockState) -> float:
-    """Cycles of a whole block after ``state``."""
+    """Return the number of cycles of a whole block after ``state``."""
     step = case.wear.step
     return step.fraction * state.stable_cycles if step.cycles is None else step.cycles
 
@@ -206,7 +208,7 @@ def _block(case: SpecimensCase, state: BlockState) -> float:
 def _check(
     state: BlockState, number: int, conditions: FrettingConditions, case: SpecimensCase
 ) -> None:
-    """Raise unless the state has converged and the run comes to an end."""
+    """Raise an error unless the state has converged and the run comes to an end."""
     contact, force = state.contact, f"{conditions.force:g} N"
     if not contact.converged:
         raise MethodFailed(
@@ -223,7 +225,7 @@ def _check(
             f"mesh.pad_elements: a single node of the pad touches at {force}, too few to wear; "
             "raise it, or load_path.normal_forces"
         )
-    # As many as the run takes if they are as long as the first one.
+    # Number of blocks of the run if all are as long as the first one.
     needed = number or _to_go(case, state) / _block(case, state)
     if needed > MOST_BLOCKS:
         raise UserError(
@@ -233,7 +235,7 @@ def _check(
 
 
 def _chosen(blocks: tuple[BlockState, ...]) -> list[BlockState]:
-    """The states to keep with their fields."""
+    """Return the states to store with their fields."""
     if len(blocks) <= KEPT_STATES:
         return list(blocks)
     cycles = np.array([state.cycles for state in blocks])
@@ -243,14 +245,14 @@ def _chosen(blocks: tuple[BlockState, ...]) -> list[BlockState]:
 
 
 def rising(points: int) -> Array:
-    """Shares ``(points,)`` from 0 to 1, denser near 0."""
+    """Return shares ``(points,)`` from 0 to 1, denser near 0."""
     return np.linspace(0.0, 1.0, points) ** CURVE_POWER
 
 
 def first_loading(
     pair: ReducedPair, state: BlockState, conditions: FrettingConditions
 ) -> VirginCurve:
-    """First loading to half the stroke on a worn shape."""
+    """Return first loading to half the stroke on a worn shape."""
     path = 0.5 * conditions.stroke * rising(CURVE_POINTS)
     curve = pair.virgin_curve(state.contact.normal, path, conditions.friction)
     if not curve.converged:
@@ -262,7 +264,7 @@ def first_loading(
 
 
 def marched_cycle(pair: ReducedPair, gap: Array, conditions: FrettingConditions) -> MarchedCycle:
-    """March the cycle with everything coupled, and compare with the uncoupled method."""
+    """Solve the coupled cycle in increments, and compare with the uncoupled method."""
     small = 0.5 * SMALL_MOTION * conditions.stroke
     cycle = pair.coupled_cycle(gap, conditions, QUARTER, small)
     if not cycle.converged:

@@ -1,4 +1,4 @@
-"""The numbers of a run of specimens, in base units."""
+"""Numbers of a run of specimens, in base units."""
 
 from __future__ import annotations
 
@@ -13,16 +13,17 @@ from workflow.analyses.specimens.half_space import BulkCompliance, HalfSpaceStat
 from workflow.analyses.specimens.outcome import KeptState, LoadOutcome, SpecimensOutcome
 from workflow.analyses.specimens.wear import BlockState
 
-# Steady is what stays within this of its last value: of the stiffness, and of the mean pressure.
+# A quantity is steady while it stays within this value of its last one: relative to the stiffness,
+# and to the mean pressure.
 STEADY = 0.02
-# Up to this share of the force that slides the slope of the loop is read: most still sticks.
+# The slope of the loop is taken up to this share of the sliding force: most nodes still stick.
 SLOPE_SHARE = 0.5
-# What becomes steady after this share of the run would perhaps change in a longer one.
+# A quantity that becomes steady after this share of the run might change in a longer one.
 LATE = 0.8
 
 
 def frequencies(outcome: SpecimensOutcome) -> dict[str, Any]:
-    """Natural frequencies of each free specimen [Hz]."""
+    """Return natural frequencies of each free specimen [Hz]."""
     return {
         f"body_{number}": {"full": full.tolist(), "reduced": reduced.tolist()}
         for number, (full, reduced) in enumerate(outcome.model.reduction.frequencies, 1)
@@ -30,7 +31,7 @@ def frequencies(outcome: SpecimensOutcome) -> dict[str, Any]:
 
 
 def explanation(outcome: SpecimensOutcome) -> list[str]:
-    """Where specimens and half-space differ and why, in sentences."""
+    """Return sentences on where specimens and half-space differ, and why."""
     bulk, first = outcome.bulk, outcome.loads[0]
     (stiff_z, stiff_x), (half_z, half_x) = bulk.specimens, bulk.half_space
     ring = outcome.model.case.structure.ring_distance
@@ -57,7 +58,7 @@ def explanation(outcome: SpecimensOutcome) -> list[str]:
 
 
 def tied_pad(bulk: BulkCompliance) -> dict[str, Any]:
-    """Stiffness of the tied pad, of specimens and half-space, and the compliance between them."""
+    """Return the stiffness of the tied pad, specimens and half-space, and the bulk compliance."""
     rows = zip(bulk.specimens, bulk.half_space, (bulk.normal, bulk.tangential), strict=True)
     keys = "specimens", "half_space", "bulk_compliance"
     return {
@@ -67,7 +68,7 @@ def tied_pad(bulk: BulkCompliance) -> dict[str, Any]:
 
 
 def load_summary(outcome: SpecimensOutcome, load: LoadOutcome) -> dict[str, Any]:
-    """Everything about one normal force."""
+    """Return all numbers under one normal force."""
     end, areas = load.blocks[-1], outcome.model.pair.areas
     steady = steady_states(outcome.model.pair, load.blocks)
     return {
@@ -91,18 +92,18 @@ def load_summary(outcome: SpecimensOutcome, load: LoadOutcome) -> dict[str, Any]
 
 
 def _uncoupled(name: str, marched: float, uncoupled: float) -> dict[str, float]:
-    """A quantity of the coupled cycle beside that of the uncoupled one."""
+    """Return a quantity of the coupled cycle, with its value in the uncoupled one."""
     difference = float(uncoupled / marched - 1.0) if marched else 0.0
     return {name: marched, f"{name}_uncoupled": uncoupled, f"{name}_difference": difference}
 
 
 def _state_summary(outcome: SpecimensOutcome, load: LoadOutcome, place: int) -> dict[str, Any]:
-    """The specimens on one shape, and the half-space beside them; ``place`` 0 or -1."""
+    """Return numbers of specimens and half-space on one shape; ``place`` is 0 or -1."""
     state, beside = load.kept[place], load.half_space[place]
     contact, areas = state.block.contact, outcome.model.pair.areas
     normal = contact.normal
     return {
-        # With all that touches stuck, and as the slope of the loop.
+        # With all nodes in contact stuck, and as the slope of the loop.
         "stick_stiffness": contact.stick_stiffness,
         "secant_stiffness": state.curve.secant_stiffness(SLOPE_SHARE),
         "area": normal.area,
@@ -119,7 +120,7 @@ def _state_summary(outcome: SpecimensOutcome, load: LoadOutcome, place: int) -> 
 def _beside(
     outcome: SpecimensOutcome, state: KeptState, beside: HalfSpaceState
 ) -> dict[str, float]:
-    """The half-space, what its link to the specimens leaves, and how its fields differ."""
+    """Return numbers of the half-space, the misfit of its link, and differences of its fields."""
     areas, contact = outcome.model.pair.areas, state.block.contact
     shear = contact.tangential.shear / areas
     return {
@@ -136,13 +137,13 @@ def _beside(
 
 
 def pressure_deviation(areas: Array, pressure: Array) -> float:
-    """Root mean square of p/mean - 1 over the pad: 0 where the pressure is uniform."""
+    """Return the root mean square of p/mean - 1 over the pad, 0 for uniform pressure."""
     mean = np.average(pressure, weights=areas)
     return float(np.sqrt(np.average((pressure / mean - 1.0) ** 2, weights=areas)))
 
 
 def edge_share(pair: ReducedPair, pressure: Array) -> float:
-    """Mean pressure of the nodes on the border of the pad over that of the pad."""
+    """Return the mean pressure of the nodes on the border of the pad over that of the pad."""
     place = np.abs(pair.face.coordinates)
     border = np.any(place > place.max(axis=0) * (1.0 - 1e-9), axis=1)
     on_border = np.average(pressure[border], weights=pair.areas[border])
@@ -150,13 +151,13 @@ def edge_share(pair: ReducedPair, pressure: Array) -> float:
 
 
 def _difference(areas: Array, field: Array, other: Array) -> float:
-    """Root mean square of the difference of two nodal fields over that of the first."""
+    """Return the root mean square of the difference of two nodal fields over that of the first."""
     size = float(np.sum(areas * field**2))
     return float(np.sqrt(np.sum(areas * (field - other) ** 2) / size)) if size else 0.0
 
 
 def steady_states(pair: ReducedPair, blocks: tuple[BlockState, ...]) -> dict[str, BlockState]:
-    """First states from which stiffness and evenness of pressure stay within ``STEADY``."""
+    """Return the first states from which stiffness and pressure evenness stay within ``STEADY``."""
     stiffness = np.array([state.contact.stick_stiffness for state in blocks])
     pressures = (state.contact.normal.pressure for state in blocks)
     deviation = np.array([pressure_deviation(pair.areas, pressure) for pressure in pressures])
@@ -167,15 +168,15 @@ def steady_states(pair: ReducedPair, blocks: tuple[BlockState, ...]) -> dict[str
 
 
 def _settled(values: Array) -> int:
-    """First place from which all values are near the last one."""
+    """Return the first place from which all values are near the last one."""
     away = np.flatnonzero(np.abs(values - values[-1]) > STEADY)
     return int(away[-1]) + 1 if len(away) else 0
 
 
 def collapse(loads: list[dict[str, Any]]) -> dict[str, float] | None:
-    """Largest over smallest number of cycles, and energy, at which stiffness becomes steady.
+    """Return the ratio of largest to smallest cycles, and energy, until stiffness is steady.
 
-    None if it is so from the start under some force.
+    Returns None if the stiffness is steady from the start under some force.
     """
     steady = [load["steady"]["stiffness"] for load in loads]
     if min(state["energy"] for state in steady) == 0.0:
@@ -187,9 +188,10 @@ def collapse(loads: list[dict[str, Any]]) -> dict[str, float] | None:
 def reported_summary(
     reported: Reported, loads: list[dict[str, Any]], coefficients: tuple[float, float]
 ) -> dict[str, Any]:
-    """The wear coefficients that become steady after the reported cycles.
+    """Return the wear coefficients with which the pair becomes steady after the reported cycles.
 
-    Shape and energy depend on cycles times coefficients alone. None if it is steady unworn.
+    Shape and energy depend only on cycles times coefficients. The coefficients are None if the
+    unworn pair is steady.
     """
     (load,) = [load for load in loads if load["normal_force"] == reported.normal_force]
     cycles = load["steady"][reported.steady]["cycles"]
@@ -204,6 +206,6 @@ def reported_summary(
 
 
 def late(load: dict[str, Any]) -> bool:
-    """Whether something becomes steady so late that a longer run might show it steady later."""
+    """Return whether a quantity becomes steady so late that it may change in a longer run."""
     end = load["cycles"]
     return any(state["cycles"] > LATE * end > 0.0 for state in load["steady"].values())

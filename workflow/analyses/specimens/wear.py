@@ -1,4 +1,4 @@
-"""Wear of two reduced specimens in cycle blocks, in which their shape stays the same."""
+"""Wear of two reduced specimens in cycle blocks of constant shape."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ from wear.steps.steppers import ExplicitStepper
 
 @dataclass(frozen=True)
 class BlockState:
-    """A worn pair after so many ``cycles``, at the start of a cycle block.
+    """A worn pair after a number of ``cycles``, at the start of a cycle block.
 
-    ``state`` are its surfaces and energy, ``contact`` the cycle on them, ``wear`` ``(2, n)`` what
-    that takes off each body [mm] and ``stable_cycles`` the longest stable block.
+    ``state`` has its surfaces and energy, ``contact`` is the cycle on them, ``wear`` ``(2, n)`` the
+    loss of each body in that cycle [mm] and ``stable_cycles`` the longest stable block.
     """
 
     cycles: float
@@ -32,19 +32,19 @@ class BlockState:
 
     @property
     def depths(self) -> Array:
-        """Worn off each body ``(2, n)`` [mm]."""
+        """Worn depth of each body ``(2, n)`` [mm]."""
         return np.stack(self.state.surfaces.depths)
 
     @property
     def energy(self) -> float:
-        """Dissipated since the start [N mm]."""
+        """Energy dissipated since the start [N mm]."""
         return self.state.energy
 
 
 class PairCycle:
-    """A fretting cycle of a pair, as the wear of nodes takes it: see :mod:`wear.contact.nodes`.
+    """A fretting cycle of a pair in the form that nodal wear needs: see :mod:`wear.contact.nodes`.
 
-    By Masing's rule each node slides its whole way at one pressure.
+    By Masing's rule each node slides its whole path at one pressure.
     """
 
     def __init__(self, pair: ReducedPair, contact: FrettingCycle, friction: float) -> None:
@@ -61,7 +61,7 @@ class PairCycle:
 
 
 class FrettedPair:
-    """A pair under one cycle of loads, on whatever shape it has worn to; a step finds one cycle."""
+    """A pair under one cycle of loads, on its worn shape; each run step solves one cycle."""
 
     def __init__(
         self,
@@ -75,7 +75,7 @@ class FrettedPair:
         self._last: tuple[NodalState, PairCycle] | None = None
 
     def cycle_at(self, state: NodalState) -> PairCycle:
-        """The cycle on the surfaces of ``state``, begun from the contact that wore to it."""
+        """Return the cycle on the surfaces of ``state``, started from its last contact."""
         if self._last is None or self._last[0].surfaces is not state.surfaces:
             conditions = self._conditions
             guess = None if state.start is None else np.asarray(state.start)
@@ -85,11 +85,11 @@ class FrettedPair:
         return self._last[1]
 
     def contact_at(self, state: NodalState) -> NodalContact:
-        """The same as steps take it."""
+        """Return the contact in a state in the form that wear steps need."""
         return NodalContact(self._laws, (self.cycle_at(state),))
 
     def block(self, state: NodalState, cycles: float) -> BlockState:
-        """What is kept of a state after so many cycles."""
+        """Return the description of a state after a number of cycles."""
         contact = self.contact_at(state)
         return BlockState(
             cycles,
@@ -106,9 +106,9 @@ def wear_in_cycle_blocks(
     stepper: ExplicitStepper,
     to_go: Callable[[BlockState], float],
 ) -> Iterator[BlockState]:
-    """States of a contact of unworn ``gap`` ``(n,)`` that frets until nothing is ``to_go``.
+    """Yield states of a contact of unworn ``gap`` ``(n,)`` that frets until nothing is ``to_go``.
 
-    That gives the most cycles that the block after a state may have. Raises
+    ``to_go`` returns the most cycles that the block after a state may have. Raises
     :class:`~wear.steps.steppers.StabilityError` where a block of a given length would be unstable.
     """
     block = fretted.block(NodalState.unworn(gap), 0.0)

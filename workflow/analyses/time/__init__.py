@@ -10,14 +10,14 @@ __all__ = ["ANALYSIS"]
 
 
 def _run(run: Run[JointCase | RigCase]) -> None:
-    # Joint laws are compiled when they are first needed.
+    # Imported here, as joint laws are compiled when they are first imported.
     from workflow.analyses.time.run import run_time
 
     run_time(run)
 
 
 def _pictures() -> Pictures:
-    # Plots take a second to load: where they are drawn.
+    # Imported here, as plotting takes a second to load.
     from workflow.analyses.time.figures import figures_of
     from workflow.analyses.time.outcome import Contents
 

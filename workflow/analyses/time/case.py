@@ -51,7 +51,7 @@ JumpError = Annotated[float, Quantity("1", at_least=1e-10, at_most=0.1)]
 
 
 class SingleJoint(Section):
-    """Nothing but the joint."""
+    """A structure that is only the joint."""
 
     kind: Literal["joint"] = entry("what the structure is", "joint")
 
@@ -75,7 +75,7 @@ class Ageing(Section):
 
     @property
     def wanted(self) -> bool:
-        """Whether there is any."""
+        """Whether the joint is aged."""
         return self.energy is not None or self.cycles is not None
 
 
@@ -99,7 +99,7 @@ class Integration(Section):
 
 
 class Reported(Section):
-    """A value that the source reports, told beside what the run finds: nothing is asked of it."""
+    """A value that a source reports, shown next to the computed one without any requirement."""
 
     quantity: DottedPath = entry("path into summary.json", "states.-1.friction")
     value: Annotated[float, Quantity(None)] = entry(
@@ -147,7 +147,7 @@ class TimeCase(Case):
 
 
 class JointCase(TimeCase):
-    """A joint alone, moved to and fro until it is worn."""
+    """A joint alone, moved forward and backward until it is worn."""
 
     about: ClassVar[str] = "a friction joint alone, driven to and fro until it is worn"
 
@@ -234,7 +234,7 @@ class RigCase(TimeCase):
 
     @model_validator(mode="after")
     def _has_its_places(self) -> RigCase:
-        # Imported here: it builds the structure, as far as that is known.
+        # Imported here, as it loads the modules that build the structure.
         from workflow.analyses.rig.building import known_rig
 
         with in_its_place():
@@ -266,7 +266,7 @@ class RigCase(TimeCase):
 
     @property
     def steps(self) -> float:
-        """Steps of time that are kept of each motion."""
+        """Number of time steps stored of each motion."""
         return _kept_time(self.excitation) / self.integration.step
 
     def outline(self) -> list[tuple[str, str]]:
@@ -289,18 +289,18 @@ class RigCase(TimeCase):
             yield from about_modes("excitation.frequency", span, self.structure, stiffness)
         elif isinstance(excitation, Hammer):
             yield from about_modes("excitation.band", excitation.band, self.structure, stiffness)
-        # What the steps of time resolve.
+        # The highest frequency that the time steps resolve.
         yield from about_matrices(self.structure, 1.0 / (FEWEST_STEPS * self.integration.step))
 
 
-# Of the difference of two recorded times.
+# Tolerance on the difference of two recorded times, for rounding.
 ROUNDING = 1e-9
-# Steps in a period or a blow: with fewer the excitation itself is not seen.
+# Least number of steps in a period or a blow: fewer do not resolve the excitation.
 FEWEST_STEPS = 20
 
 
 def _longest_step(excitation: Harmonic | Hammer | Recorded) -> float:
-    """The longest step of time in which the excitation is still seen [s]."""
+    """Return the longest step of time that resolves the excitation [s]."""
     if isinstance(excitation, Harmonic):
         return 1.0 / (FEWEST_STEPS * excitation.frequency)
     if isinstance(excitation, Hammer):
@@ -309,7 +309,7 @@ def _longest_step(excitation: Harmonic | Hammer | Recorded) -> float:
 
 
 def _kept_time(excitation: Harmonic | Hammer | Recorded) -> float:
-    """Length of the motion that is kept [s]."""
+    """Return the length of the stored motion [s]."""
     if isinstance(excitation, Harmonic):
         return 1.0 / excitation.frequency
     if isinstance(excitation, Hammer):
@@ -318,7 +318,7 @@ def _kept_time(excitation: Harmonic | Hammer | Recorded) -> float:
 
 
 def joules(energy: float) -> str:
-    """An energy [N mm] as it is told."""
+    """Return an energy [N mm] as text in J."""
     return f"{1e-3 * energy:.5g} J"
 
 
@@ -334,7 +334,7 @@ def check_within(energies: tuple[float, ...], ageing: Ageing) -> None:
 def joint_outline(
     case: TimeCase, own: Sequence[Joint | ElasticJoint | None] = ()
 ) -> list[tuple[str, str]]:
-    """The joint, those with laws of their own, whether it evolves, and where it is looked at."""
+    """Return rows on the joint, joints with their own laws, the evolution, and the energies."""
     rows = joint_rows(case.joint, own)
     if not case.evolution.is_empty:
         rows.append(("evolution", case.evolution.text))
@@ -344,7 +344,7 @@ def joint_outline(
 
 
 def excitation_outline(case: RigCase) -> str:
-    """What drives a rig, in a line."""
+    """Return the excitation of a rig as one line of text."""
     excitation = case.excitation
     place = driven_place(case.structure, excitation.mass)
     if isinstance(excitation, Harmonic):
@@ -358,7 +358,7 @@ def excitation_outline(case: RigCase) -> str:
 
 
 def ageing_outline(ageing: Ageing) -> str:
-    """The end of the ageing."""
+    """Return the end of the ageing as text."""
     if ageing.cycles is not None:
         return f"to {times(ageing.cycles)} cycles"
     return f"to {joules(ageing.energy or 0.0)}"

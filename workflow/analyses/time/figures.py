@@ -1,4 +1,4 @@
-"""Figures of a case in time: loops, what wear makes of the joint, and how the rig responds."""
+"""Figures of a case in time: loops, evolution of the joint, and responses of the rig."""
 
 from __future__ import annotations
 
@@ -24,11 +24,11 @@ from workflow.pictures.panels import (
 from workflow.pictures.scales import PER_MICRON, TO_JOULES, TO_MICRONS
 from workflow.pictures.style import BLACK, BLUE, GREEN, HEADROOM, ORANGE, PURPLE
 
-# More curves than this in a panel overlap.
+# More curves than this in a panel would overlap.
 MOST_CURVES = 6
 # mm/s² to m/s².
 TO_METRES = 1e-3
-# Colour, file's unit to shown one, and label of the parameters.
+# Parameters: colour, factor from the unit of the file to that shown, and label.
 SHOWN = {
     "friction": (BLUE, 1.0, "coefficient of friction µ [1]"),
     "stiffness": (ORANGE, PER_MICRON, "stiffness kt [N/µm]"),
@@ -44,22 +44,22 @@ LAW_NAMES = {
 }
 # The first mode is shown up to this multiple of the highest frequency of its peaks.
 FIRST_MODE = 2.0
-# Motions are shown up to where they have fallen to this share of their largest.
+# Motions are shown until they have decayed to this share of their largest value.
 FADED = 0.02
-# Energies from here on have no decimals [J].
+# Energies from this value on are shown without decimals [J].
 LARGE_ENERGY = 1e3
-# Points of a time history that a picture can show.
+# Most points of a time history that a picture can resolve.
 MOST_POINTS = 20_000
 
 
 def figures_of(contents: Contents) -> Figures:
-    """The figures of a run, by name."""
+    """Return the figures of a run, by name."""
     groups = contents.curves
     drawn = {
         "loops": (loops, LOOP in groups),
         "frequency_response": (frequency_response, RESPONSE in groups),
         "ring_down": (ring_down, RING_DOWN in groups),
-        # A ring-down shows it too.
+        # A figure of the ring-down shows the motion too.
         "motion": (motion, MOTION in groups and RING_DOWN not in groups),
         "evolution": (evolution, bool(contents.evolution)),
     }
@@ -69,7 +69,7 @@ def figures_of(contents: Contents) -> Figures:
 
 
 def _states(file: h5py.File, contents: Contents, group: str) -> list[tuple[str, Any, h5py.Group]]:
-    """Label, colour and curves of the states that have such a group; of many, some."""
+    """Return label, colour and curves of the states that have a group; of many states, some."""
     states = file["states"]
     return [
         (_label(states[name], contents.aged), colour, states[name][group])
@@ -90,7 +90,7 @@ def _label(state: h5py.Group, aged: bool) -> str:
 
 
 def loops(file: h5py.File, contents: Contents) -> Figure:
-    """Force against displacement of the joint over a closed cycle, at several energies."""
+    """Draw force against displacement of the joint over a closed cycle, at several energies."""
     shown = _states(file, contents, LOOP)
     figure = new_figure(_loops_title([_area(loop) for _, _, loop in shown]), 7.0)
     axis = figure.subplots()
@@ -110,12 +110,12 @@ def _loops_title(energies: list[float]) -> str:
 
 
 def _area(loop: h5py.Group) -> float:
-    """Area of a closed loop [N mm]."""
+    """Return the area of a closed loop [N mm]."""
     return float(abs(np.trapezoid(loop["force"][()], loop["displacement"][()])))
 
 
 def evolution(file: h5py.File, contents: Contents) -> Figure:
-    """The parameters that change, over the dissipated energy; below them the cycles it takes."""
+    """Draw the parameters that change over the dissipated energy, and below them the cycles."""
     group = file["evolution"]
     present = [name for name in SHOWN if name in contents.evolution]
     panels = [name for name in present if np.ptp(group[name][()]) > 0.0]
@@ -145,7 +145,7 @@ def _draw_parameter(axis: Axes, file: h5py.File, name: str) -> None:
 
 
 def _draw_ageing(left: Axes, right: Axes, group: h5py.Group) -> None:
-    """Energy of a cycle, and the cycles it has taken, over the energy."""
+    """Draw the energy of a cycle, and the number of cycles so far, over the dissipated energy."""
     energy = TO_JOULES * group["energy"][()]
     left.plot(energy, group["energy_per_cycle"][()], color=BLUE)
     left.set(ylabel="energy of a cycle [mJ]", ylim=(0.0, HEADROOM * max(left.dataLim.y1, 1e-300)))
@@ -173,7 +173,7 @@ def _evolution_title(group: h5py.Group, panels: list[str], aged: bool) -> str:
 
 
 def frequency_response(file: h5py.File, contents: Contents) -> Figure:
-    """Acceleration over force: all of it, and the first mode larger."""
+    """Draw acceleration over force: over all frequencies, and the first mode enlarged."""
     shown = _states(file, contents, RESPONSE)
     figure = new_figure(_response_title(shown), 8.5)
     top, bottom = figure.subplots(2, 1)
@@ -196,13 +196,13 @@ def frequency_response(file: h5py.File, contents: Contents) -> Figure:
 
 
 def _within(response: h5py.Group, lowest: float, highest: float) -> Array:
-    """Magnitudes between two frequencies."""
+    """Return magnitudes between two frequencies."""
     frequency = response["frequency"][()]
     return TO_METRES * response["magnitude"][()][(frequency > lowest) & (frequency < highest)]
 
 
 def _first(response: h5py.Group, name: str) -> float:
-    """Frequency or peak of the first resonance."""
+    """Return frequency or peak of the first resonance."""
     return float(response.parent.attrs[f"first_{name}"])
 
 
@@ -217,12 +217,13 @@ def _response_title(shown: list[tuple[str, Any, h5py.Group]]) -> str:
     )
 
 
-# Of a ring-down, what is less is noise: in the frequency [%], and in the damping, as a share.
+# Least ranges of the axes of a ring-down, as smaller changes are noise: of the frequency [%], and
+# of the damping, as a share.
 LEAST_SOFTENING, LEAST_DAMPING = 0.1, 0.1
 
 
 def ring_down(file: h5py.File, contents: Contents) -> Figure:
-    """Frequency and damping of the first mode against its amplitude, and the motion itself."""
+    """Draw frequency and damping of the first mode against its amplitude, and the motion itself."""
     shown = _states(file, contents, MOTION)
     figure = new_figure("First mode of the ring-down against its amplitude", 9.0)
     places = figure.add_gridspec(2, 2, height_ratios=(1.0, 1.3))
@@ -252,14 +253,14 @@ def ring_down(file: h5py.File, contents: Contents) -> Figure:
 
 
 def _draw_history(axis: Axes, moved: h5py.Group, colour: Any, label: str) -> None:
-    """The displacement that is looked at, until it has faded."""
+    """Draw the main observed displacement until it has decayed."""
     end = _faded(moved)
     displacement = TO_MICRONS * moved["displacement"][:end, -1]
     axis.plot(moved["time"][:end], displacement, color=colour, label=label, linewidth=1.0)
 
 
 def _faded(moved: h5py.Group) -> int:
-    """Samples until what is looked at no longer moves."""
+    """Return the number of samples until the main observed displacement has decayed."""
     displacement = moved["displacement"][:, -1]
     away = np.abs(displacement - displacement[-1])
     large = np.flatnonzero(away > FADED * away.max())
@@ -270,7 +271,7 @@ def _faded(moved: h5py.Group) -> int:
 
 
 def motion(file: h5py.File, contents: Contents) -> Figure:
-    """Force, displacement and what the joint has dissipated, over time."""
+    """Draw force, displacement and the energy that the joint has dissipated, over time."""
     shown = _states(file, contents, MOTION)
     figure = new_figure("Motion of the rig under its excitation", 9.0)
     top, middle, bottom = figure.subplots(3, 1, sharex=True)
@@ -291,5 +292,5 @@ def motion(file: h5py.File, contents: Contents) -> Figure:
 
 
 def _seen(file: h5py.File) -> str:
-    """What is looked at: the last of what is kept of a motion."""
+    """Return the name of the main observed displacement, which is the last one."""
     return str(file.attrs["seen"][-1])

@@ -1,4 +1,4 @@
-"""A rig that is hit: frequency response and ring-down of its first mode, at every energy."""
+"""Hammer tests of a rig: frequency response and ring-down of its first mode, at every energy."""
 
 from __future__ import annotations
 
@@ -35,20 +35,20 @@ from workflow.errors import MethodFailed
 from workflow.shell.dataset import Dataset, Datasets
 from workflow.shell.reporter import Reporter
 
-# The second mode is looked for between these shares of its frequencies without the joint and with
+# The second mode is searched between these multiples of its frequencies without the joint and with
 # all of it stuck.
 BELOW_FREE, ABOVE_STUCK = 0.95, 1.05
-# A response that is still so large at the end of its record leaks into the frequency response.
+# A response that is still this large at the end of its record leaks into the frequency response.
 AT_REST = 0.05
-# A ring-down that is smaller than this share of the largest displacement, once the filter has
-# settled, is not that of the first mode but of what is left in the filter.
+# Share of the largest displacement. A ring-down that is smaller, once the filter has settled, shows
+# the filter and not the first mode.
 NOTHING_LEFT = 1e-3
-# Share of all that a joint dissipates in the record, after which a motion has decayed: a measure of
-# damping that needs no mode.
+# Share of the energy dissipated in the record, at which a motion counts as decayed: a measure of
+# damping without a mode.
 DECAYED = 0.9
-# Points of a ring-down that are kept: it is smooth.
+# Points of a ring-down in the results: few are enough, as it is smooth.
 RING_DOWN_POINTS = 400
-# Why a ring-down has no damping, and what there is instead.
+# Reason why a ring-down has no damping, and the result to use instead.
 TOO_SHORT = (
     "the motion has faded before the filter that follows its first mode has settled, so neither "
     "damping nor frequency over the amplitude is told; the frequency response is"
@@ -58,7 +58,7 @@ TOO_SHORT = (
 def run_hammer(
     case: RigCase, rig: RigModel, joint: JointModel, reporter: Reporter, steps: Steps
 ) -> TimeOutcome:
-    """Hit the rig at every energy, which stays what it is during the record.
+    """Hit the rig at every energy; the energy stays constant during the record.
 
     Raises MethodFailed where a motion is not found, or shows no resonance.
     """
@@ -122,7 +122,7 @@ def _state(
 
 
 def _response(frequency: Array, value: NDArray[np.complex128]) -> dict[str, Dataset]:
-    """A frequency response ``(n,)``."""
+    """Return datasets of a frequency response ``(n,)``."""
     size = "acceleration of what is looked at, over the excitation"
     return {
         "frequency": Dataset(frequency, "Hz", "frequency"),
@@ -134,9 +134,9 @@ def _response(frequency: Array, value: NDArray[np.complex128]) -> dict[str, Data
 def _peak(
     name: str, response: FrequencyResponse, lowest: float, highest: float, energy: float
 ) -> dict[str, float]:
-    """Frequency and height of the highest line between two frequencies [Hz].
+    """Return frequency and height of the highest line between two frequencies [Hz].
 
-    No mode is fitted to it: joints that slide make peaks of another shape.
+    No mode is fitted to it, as joints that slide give peaks of another shape.
     """
     inside = (response.frequency >= lowest) & (response.frequency <= highest)
     lines, heights = response.frequency[inside], np.abs(response.value[inside])
@@ -150,7 +150,7 @@ def _peak(
 
 
 def _decay_time(motion: Motion) -> float:
-    """Time in which the joints dissipate most of what they will [s]."""
+    """Return the time in which the joints dissipate most of their energy in the record [s]."""
     dissipated = motion.energies.joints.sum(axis=1)
     place = int(np.searchsorted(dissipated, DECAYED * dissipated[-1]))
     return float(motion.times[place] - motion.times[0])
@@ -159,9 +159,10 @@ def _decay_time(motion: Motion) -> float:
 def _ring_down(
     rig: RigModel, motion: Motion, hammer: given.Hammer, energy: float, reporter: Reporter
 ) -> dict[str, Dataset] | None:
-    """Frequency and damping of the first mode against its amplitude; None of a dead beat.
+    """Return frequency and damping of the first mode against its amplitude.
 
-    By the acceleration, as it is measured: what the joint creeps does not disturb it.
+    They are found from the acceleration, as in measurements, so that creep of the joint does not
+    matter. Returns None if the motion has no ring-down.
     """
     free = motion.times > hammer.duration
     step = float(motion.times[1] - motion.times[0])
@@ -184,7 +185,7 @@ def _ring_down(
 
 
 def _ends(decay: Datasets | None) -> dict[str, dict[str, float]] | None:
-    """A ring-down where it is largest and where it is smallest."""
+    """Return a ring-down where it is largest and where it is smallest."""
     if decay is None:
         return None
     return {
@@ -194,10 +195,10 @@ def _ends(decay: Datasets | None) -> dict[str, dict[str, float]] | None:
 
 
 def _change(states: Sequence[State]) -> dict[str, Any]:
-    """What wear makes of the first mode: ratios of the last state to the first; 1 up, -1 down.
+    """Return the change of the first mode by wear: ratios of last to first state, and signs.
 
-    Its damping is that of the largest amplitude that the ring-downs show. A joint that dissipates
-    nothing has no change.
+    A sign is 1 for a rise, -1 for a fall. The damping is that at the largest amplitude of the
+    ring-downs. A joint that dissipates nothing has no change.
     """
     if len(states) < 2:
         return {}

@@ -1,4 +1,4 @@
-"""A joint alone, at a prescribed stroke: aged by jumps in energy, with its loops on the way."""
+"""A joint alone at a prescribed stroke: aged by jumps in energy, with loops at several energies."""
 
 from __future__ import annotations
 
@@ -30,20 +30,20 @@ from workflow.errors import MethodFailed, UserError
 from workflow.shell.dataset import Dataset
 from workflow.shell.reporter import Reporter
 
-# Points of a loop: those of a cosine over a cycle, dense where the motion turns.
+# Points of a loop: those of a cosine over a cycle, dense at the reversals.
 LOOP_POINTS = 720
-# Cycles that a loop settles in from rest: the second one repeats itself for every law but
+# Cycles in which a loop settles from rest. From the second one on, cycles repeat for every law but
 # Bouc-Wen's, which takes a few more where it hardly slides.
 SETTLING = 20
-# Cycles integrated one by one beside the jumps, half way through the test.
+# Cycles integrated one by one, half way through the test, to check the jumps.
 STRETCH = 1000
-# Points of the evolution over the energy: evenly, and as many evenly over its logarithm from this
-# share on, as friction changes within a few cycles.
+# Points of the evolution over the energy: evenly spaced, and as many evenly in the logarithm from
+# this share on, as friction changes within a few cycles.
 CURVE_POINTS, CURVE_BEGIN = 101, 1e-6
 
 
 def run_joint(case: JointCase, reporter: Reporter, steps: Steps) -> TimeOutcome:
-    """Age a joint at its stroke, and look at it at the energies asked for.
+    """Age a joint at its stroke, and describe it at the energies of the case.
 
     Raises UserError where it never dissipates the energy, MethodFailed where it cannot be aged.
     """
@@ -79,9 +79,9 @@ def _state(model: JointModel, energy: float, cycles: float, amplitude: float) ->
 
 
 def steady_loop(law: Laws, amplitude: float) -> tuple[Array, Array, float]:
-    """A settled cycle between ± ``amplitude`` [mm]: displacement, force, and energy dissipated.
+    """Return a settled cycle between ± ``amplitude`` [mm]: displacement, force, and energy.
 
-    From a reversal on, its end included.
+    The cycle begins and ends at a reversal; the energy is the dissipated one.
     """
     phase = np.linspace(0.0, 2.0 * np.pi, LOOP_POINTS + 1)
     moved = amplitude * np.cos(phase)[:, None, None]
@@ -93,9 +93,9 @@ def steady_loop(law: Laws, amplitude: float) -> tuple[Array, Array, float]:
 
 
 def extracted(displacement: Array, force: Array, normal_load: float) -> dict[str, float | None]:
-    """What the loop would tell one who measures it; None where it does not."""
+    """Return parameters as a measurement would extract them from the loop, None where it cannot."""
     try:
-        # Two periods: a cycle then begins and ends at a reversal for sure.
+        # With two periods, a whole cycle surely begins and ends at a reversal.
         loops = measure_loops(
             np.concatenate([displacement, displacement[1:], displacement[1:2]]),
             np.concatenate([force, force[1:], force[1:2]]),
@@ -115,9 +115,9 @@ def extracted(displacement: Array, force: Array, normal_load: float) -> dict[str
 
 
 def aged(rate: Callable[[float], float], ageing: Ageing, breaks: tuple[float, ...]) -> LongTest:
-    """A long test to the end that the case asks for.
+    """Return a long test to the end that the case asks for.
 
-    Raises UserError where so much energy is never dissipated, MethodFailed where jumps fail.
+    Raises UserError where the energy is never dissipated, MethodFailed where jumps fail.
     """
     try:
         return long_test(
@@ -134,14 +134,14 @@ def aged(rate: Callable[[float], float], ageing: Ageing, breaks: tuple[float, ..
 
 
 def test_end(test: LongTest, ageing: Ageing) -> float:
-    """Energy at the end of a test [N mm]."""
+    """Return the energy at the end of a test [N mm]."""
     return test.final_energy if ageing.energy is None else ageing.energy
 
 
 def energies_within(
     energies: tuple[float, ...], last: float, reporter: Reporter
 ) -> Iterator[float]:
-    """The energies asked for that a test has reached, and its last."""
+    """Yield the energies of the case that a test reaches, and its last."""
     for energy in energies:
         if energy < last:
             yield energy
@@ -158,7 +158,10 @@ def evolution_curve(
     test: LongTest | None = None,
     rate: Callable[[float], float] | None = None,
 ) -> dict[str, Dataset]:
-    """Parameters over the energy up to the ``last``; cycles and energy per cycle where aged."""
+    """Return parameters over the energy up to the ``last``, with cycles if the joint is aged.
+
+    Cycles come with the energy per cycle.
+    """
     energy = np.array([0.0])
     if last > 0.0:
         even = np.linspace(0.0, last, CURVE_POINTS)
@@ -178,7 +181,7 @@ def evolution_curve(
 
 
 def _ageing_numbers(model: JointModel, test: LongTest, amplitude: float) -> dict[str, Any]:
-    """How good the jumps are: as stated, and beside cycles marched with their memory."""
+    """Return the accuracy of the jumps: as estimated, and against cycles computed one by one."""
     numbers: dict[str, Any] = {"error": test.error, "evaluations": test.evaluations}
     first = np.floor(0.5 * test.total_cycles)
     cycles = int(min(STRETCH, test.total_cycles - first))

@@ -1,4 +1,4 @@
-"""The joint of a case: the law that it begins with, and how wear changes its parameters."""
+"""The joint of a case: its initial law, and the evolution of its parameters by wear."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ from workflow.errors import UserError
 
 @dataclass(frozen=True)
 class JointModel:
-    """A joint that wears: its ``law`` with the parameters that ``evolution`` begins with.
+    """A joint that wears: its ``law`` with initial parameters, and their ``evolution``.
 
-    There are entries of so many joints, ``counts``: those without a law that is their ``own``, and
-    stays as it is, share stiffness and load of the joint evenly.
+    There are entries of ``counts`` joints each. Entries with a law of their ``own`` do not wear.
+    All other joints share stiffness and load of the law evenly.
     """
 
     law: Law
@@ -39,21 +39,21 @@ class JointModel:
         counts: Sequence[int] = (1,),
         own: Sequence[Joint | ElasticJoint | None] = (None,),
     ) -> JointModel:
-        """The joint of a case. Raises UserError where its table of loops cannot be taken."""
+        """Return the joint of a case. Raises UserError where its table of loops cannot be used."""
         return cls(law_of(case.joint), _evolution(case), counts, laws_of(own))
 
     @property
     def line_law(self) -> LineLaw:
-        """The law of a joint alone, which has one direction."""
+        """Law of a joint alone, which has one direction."""
         assert not isinstance(self.law, FrictionContact | ElasticLaw)
         return self.law
 
     def at(self, energy: float) -> Laws:
-        """The law of each joint after so much ``energy`` dissipated in those that wear [N mm]."""
+        """Return the law of each joint after a dissipated ``energy`` of those that wear [N mm]."""
         return law_of_all(self._whole(energy), self.own, self.counts)
 
     def parameters(self, energy: float) -> dict[str, float]:
-        """Parameters after so much dissipated ``energy`` [N mm], by name."""
+        """Return parameters after a dissipated ``energy`` [N mm], by name."""
         law = self._whole(energy)
         return {name: float(getattr(law, name)) for name in PARAMETERS if hasattr(law, name)}
 
@@ -63,7 +63,7 @@ class JointModel:
 
 
 def _evolution(case: TimeCase) -> JointEvolution:
-    """The wear functions of a case; tables of the joint's own loops are taken as they are."""
+    """Return the wear functions of a case; tables of measured loops are used unchanged."""
     section = case.evolution
     functions = {
         name: _function(factor, getattr(case.joint, name))
@@ -76,7 +76,7 @@ def _evolution(case: TimeCase) -> JointEvolution:
 
 
 def _function(factor: given.Factor, initial: float) -> WearFunction:
-    """A factor of a parameter that begins with an ``initial`` value."""
+    """Return the wear function for a factor of a parameter with an ``initial`` value."""
     if isinstance(factor, given.Logarithmic):
         return forms.LogarithmicEvolution(factor.change, factor.rate)
     if isinstance(factor, given.Arrhenius):
@@ -91,9 +91,9 @@ def _function(factor: given.Factor, initial: float) -> WearFunction:
 
 
 def _measured(file: str, case: TimeCase) -> dict[str, WearFunction]:
-    """Friction and stiffness of a table of loops.
+    """Return friction and stiffness of a table of loops.
 
-    A table's stiffness is the whole slope of the stuck joint, the residual one included.
+    The stiffness in a table is the whole slope of the stuck joint, residual stiffness included.
     """
     table = read_loop_table(Path(file))
     if table.per_length:

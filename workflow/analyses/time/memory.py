@@ -1,4 +1,4 @@
-"""Memory a case in time needs."""
+"""Memory that a case in time needs."""
 
 from __future__ import annotations
 
@@ -6,17 +6,17 @@ from workflow.analyses.rig.structure import ReducedBody, Rig
 from workflow.analyses.time.case import JointCase, RigCase
 from workflow.shell.memory import Memory
 
-# A rig in time: displacement, velocity, acceleration, forces, energies and what is made of them,
-# per mass and step, with the objects that hold a step while it is found.
+# Numbers per mass and step of a rig in time: displacement, velocity, acceleration, forces, energies
+# and their results, with the objects that hold a step while it is computed.
 STEP_COLUMNS = 60
-# The same per displacement of a reduced body, whose numbers are in large arrays.
+# Numbers per step and displacement of a reduced body, which are in large arrays.
 REDUCED_COLUMNS = 20
 
 
 def memory(case: JointCase | RigCase, displacements: int = 0) -> Memory:
-    """Of the motions: every step, with all its columns, at every energy.
+    """Return the memory for the motions: every step, with all its columns, at every energy.
 
-    A reduced body has so many ``displacements``, once they are known.
+    ``displacements`` is their number in a reduced body, once it is known.
     """
     remedy = "raise integration.step, or shorten what is recorded"
     if isinstance(case, JointCase):
@@ -24,7 +24,7 @@ def memory(case: JointCase | RigCase, displacements: int = 0) -> Memory:
     if isinstance(case.structure, Rig):
         columns = STEP_COLUMNS * len(case.structure.masses) * len(case.energies)
         return Memory(columns * case.steps, remedy)
-    # Of these motions little is kept once they are found.
+    # Little of these motions is kept once they are computed.
     motions = Memory(REDUCED_COLUMNS * displacements * case.steps, remedy)
     if isinstance(case.structure, ReducedBody):
         return motions

@@ -1,4 +1,4 @@
-"""Motions of a rig whose joints have aged: found, measured, and what is kept of them."""
+"""Motions of a rig whose joints have aged, with their numbers and curves."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ from workflow.errors import MethodFailed
 from workflow.shell.dataset import Dataset
 from workflow.shell.reporter import Reporter
 
-# Of the largest displacement, what steps may leave without a warning.
+# Error by time steps, as a share of the largest displacement, from which a warning is given.
 STEPS_LEAVE = 0.05
 
 
 def step_control(case: RigCase) -> TimeStepControl:
-    """Steps as the case asks for."""
+    """Return the step control that the case asks for."""
     return TimeStepControl(case.integration.step, case.integration.tolerance)
 
 
@@ -38,10 +38,10 @@ def motion_of(
     steps: Steps = COMPUTED,
     reached: Callable[[float], None] = lambda share: None,
 ) -> Motion:
-    """Motion of a rig whose joints have dissipated so much ``energy`` [N mm] before.
+    """Return the motion of a rig whose joints have dissipated an ``energy`` [N mm] before.
 
-    ``reached`` is told now and then about what share of it is found. Raises MethodFailed for one
-    that was not found to its end.
+    ``reached`` is called at times with the share of the motion that is done. Raises MethodFailed
+    for a motion that was not found to its end.
     """
     law = joint.at(energy)
     pulled = rig.with_preload(law, force)
@@ -52,7 +52,7 @@ def motion_of(
 
 
 def warn_of_steps(energy: float, error: float, reporter: Reporter) -> None:
-    """Warn where the steps leave much of a motion at so much ``energy`` [N mm]."""
+    """Warn where the time steps cause a large error of a motion at an ``energy`` [N mm]."""
     if error > STEPS_LEAVE:
         reporter.warn(
             f"at {joules(energy)} the steps of time leave an error of {error:.1%} of the largest "
@@ -61,7 +61,7 @@ def warn_of_steps(energy: float, error: float, reporter: Reporter) -> None:
 
 
 def motion_numbers(rig: RigModel, motion: Motion) -> dict[str, Any]:
-    """What a motion comes to."""
+    """Return numbers of a motion, for the summary."""
     return {
         "dissipated": float(motion.energies.joints[-1].sum()),
         "largest_displacement": float(np.abs(rig.looked_at(motion.displacement)).max()),
@@ -73,7 +73,7 @@ def motion_numbers(rig: RigModel, motion: Motion) -> dict[str, Any]:
 
 
 def motion_curves(rig: RigModel, motion: Motion, force: ExcitationForce) -> dict[str, Dataset]:
-    """What is kept of a motion."""
+    """Return the curves of a motion."""
     seen, pull = rig.seen.T, "force of the joint, or the sum of several, resisting"
     dissipated = motion.energies.joints.sum(axis=1)
     lost = "energy that the joint has dissipated since the beginning"

@@ -1,4 +1,4 @@
-"""What a case in time has found, whatever drove the joint: states at several energies."""
+"""Results of a case in time, whatever drove the joint: states at several energies."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from workflow.analyses.time.case import JointCase, RigCase
 from workflow.shell.dataset import Dataset, Datasets
 from workflow.shell.results import Along
 
-# The parameters of a joint that evolve, in the order in which they are told.
+# The parameters of a joint that evolve, in the order of reports.
 PARAMETERS = {
     "friction": ("1", "coefficient of friction"),
     "stiffness": ("N/mm", "slope of the stuck joint"),
@@ -20,7 +20,7 @@ PARAMETERS = {
 }
 # Groups of curves of a state.
 LOOP, MOTION, RESPONSE, RING_DOWN = "loop", "motion", "frequency_response", "ring_down"
-# What they are over; a loop is over nothing.
+# First axis of each group; loops have none.
 ALONG = {
     LOOP: None,
     MOTION: Along("time"),
@@ -31,10 +31,10 @@ ALONG = {
 
 @dataclass(frozen=True)
 class State:
-    """The joint after it has dissipated ``energy`` [N mm] in so many ``cycles``, if they are known.
+    """The joint after a dissipated ``energy`` [N mm] and a number of ``cycles``, if known.
 
-    ``parameters`` by the names of :data:`PARAMETERS`, ``numbers`` for the summary, and ``curves``
-    by group, the first axis of each along the curve.
+    ``parameters`` are by the names of :data:`PARAMETERS`, ``numbers`` are for the summary, and
+    ``curves`` are by group, with the first axis of each along the curve.
     """
 
     energy: float
@@ -46,11 +46,11 @@ class State:
 
 @dataclass(frozen=True)
 class TimeOutcome:
-    """Everything a case in time has found.
+    """All results of a case in time.
 
-    ``evolution`` are columns ``(k,)`` over the energy, from nothing to the last; ``numbers`` go
-    into the summary as they are. ``seen`` names the displacements that are kept of a rig, the last
-    of which is looked at.
+    ``evolution`` are columns ``(k,)`` over the energy, from 0 to the last; ``numbers`` go into the
+    summary unchanged. ``seen`` names the observed displacements of a rig, the last of which is the
+    main one.
     """
 
     case: JointCase | RigCase
@@ -61,7 +61,7 @@ class TimeOutcome:
 
     @property
     def contents(self) -> Contents:
-        """What ``results.h5`` holds of it."""
+        """Description of what ``results.h5`` holds of this outcome."""
         curves: dict[str, tuple[str, ...]] = {}
         for number, state in enumerate(self.states):
             for group in state.curves:
@@ -73,10 +73,10 @@ class TimeOutcome:
 
 @dataclass(frozen=True)
 class Contents:
-    """What ``results.h5`` of a case in time holds.
+    """Contents of ``results.h5`` of a case in time.
 
-    ``curves`` are the states that have each group of them, ``evolution`` the columns over the
-    energy, none where nothing changes. States of an ``aged`` joint know their cycles.
+    ``curves`` are the states that have each group of curves. ``evolution`` are the columns over the
+    energy, empty where nothing changes. States of an ``aged`` joint have a number of cycles.
     """
 
     curves: Mapping[str, tuple[str, ...]]
@@ -85,7 +85,7 @@ class Contents:
 
 
 def loop_curves(displacement: Array, force: Array) -> dict[str, Dataset]:
-    """A loop of the joint, or of several together."""
+    """Return a loop of the joint, or of several together."""
     moved = "displacement of the joint, or the mean of several, in a cycle"
     return {
         "displacement": Dataset(displacement, "mm", moved),

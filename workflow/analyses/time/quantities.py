@@ -1,4 +1,4 @@
-"""Main results of joints in time: what joint and rig do at every energy dissipated so far."""
+"""Main results of joints in time: joint and rig at every energy dissipated so far."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from workflow.shell.summary import estimate, told
 AGEING, IN_TIME = "jumps in energy, a bound", "displacement, by the steps in time"
 STEADY = "intervals between steady states"
 STIFFNESSES = "stiffness", "residual_stiffness"
-# Of a state, beside the joint's parameters: unit, text, everyday unit.
+# Quantities of a state in addition to the joint's parameters: unit, text, everyday unit.
 NUMBERS = {
     "cycles": ("1", "cycles so far", ""),
     "energy_per_cycle": ("N mm", "energy dissipated in a cycle", ""),
@@ -30,9 +30,9 @@ NUMBERS = {
     "stuck.0": ("Hz", "first natural frequency, joint stuck", ""),
     "sliding.0": ("Hz", "first natural frequency, joint sliding", ""),
 }
-# What the error of steps in time is told of.
+# Quantities to which the error of time steps applies.
 MOVED = "stroke", "largest_displacement"
-# What runs are compared by, beside the numbers.
+# Curves by which runs are compared, in addition to the numbers.
 CURVES = (
     CurvesOf("cycles", "evolution/energy", "evolution/cycles", ("N mm", "1")),
     CurvesOf("stiffness of the joint", "evolution/energy", "evolution/stiffness", ("N mm", "N/mm")),
@@ -60,7 +60,7 @@ CURVES = (
 
 
 def main_results(case: JointCase | RigCase, summary: Summary) -> list[Quantity]:
-    """Of every state, and of the whole life if the joint ages."""
+    """Return results of every state, and of the whole life if the joint ages."""
     whole = (
         Quantity("whole life", "cycles", "cycles", "1"),
         Quantity("whole life", "energy dissipated", "energy", "N mm", **_of_ageing(summary)),
@@ -75,7 +75,7 @@ def main_results(case: JointCase | RigCase, summary: Summary) -> list[Quantity]:
 
 
 def _of_ageing(summary: Summary) -> dict[str, Any]:
-    """The error of cycles and energies of a life, relative."""
+    """Return the relative error of cycles and energies of a life."""
     ageing, cycles = summary.get("ageing") or {}, summary.get("cycles")
     if cycles and "error" in ageing:  # in cycles
         return {"error": ageing["error"] / cycles, "error_of": AGEING}
@@ -83,7 +83,7 @@ def _of_ageing(summary: Summary) -> dict[str, Any]:
 
 
 def _when(number: int, summary: Summary) -> str:
-    """Of a state in words: the last of a joint that ages is where every life is compared."""
+    """Return text for the time of a state; "at the end" for the last one of a joint that ages."""
     ends = "cycles" in summary and number == len(summary["states"]) - 1
     return "at the end" if ends else f"at {joules(summary['states'][number]['energy'])}"
 

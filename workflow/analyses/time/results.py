@@ -1,4 +1,4 @@
-"""What a case in time leaves: results, tables, figures, and the summary."""
+"""Output of a case in time: results, tables, figures and the summary."""
 
 from __future__ import annotations
 
@@ -50,7 +50,10 @@ def _write_results(outcome: TimeOutcome, run: TimeRun) -> None:
 
 
 def _write_tables(outcome: TimeOutcome, folder: OutputFolder) -> None:
-    """The evolution, and the curves of every state, as CSV in base units; motions are too long."""
+    """Write the evolution and the curves of every state as CSV in base units.
+
+    Motions are left out, as they are too long.
+    """
     what = "parameters of the joint over the energy it has dissipated"
     write_curves(folder.reserve(f"{EVOLUTION}.csv", what), outcome.evolution)
     for number, state in enumerate(outcome.states):
@@ -86,7 +89,7 @@ def _state_summary(state: State) -> dict[str, Any]:
 
 
 def _lines(summary: dict[str, Any], case: TimeCase) -> Iterator[str]:
-    """The end of the run in a few lines."""
+    """Yield lines on the results, for the end of the run."""
     for state in summary["states"]:
         yield f"  {_state_line(state)}"
     for entry, told in zip(summary["reported"], case.reported, strict=True):
@@ -97,7 +100,7 @@ def _lines(summary: dict[str, Any], case: TimeCase) -> Iterator[str]:
 
 
 def _shown(value: float | None, written: float) -> str:
-    """A value in the unit that another was written in."""
+    """Return a value as text, in the unit that another was written in."""
     if value is None:
         return "none"
     number, unit = in_unit_of(written, value)
@@ -105,7 +108,7 @@ def _shown(value: float | None, written: float) -> str:
 
 
 def _state_line(state: Mapping[str, Any]) -> str:
-    """What a state is and does, in a line."""
+    """Return a state as one line of text."""
     parts = [f"{1e-3 * state['energy']:.5g} J"]
     if "cycles" in state:
         parts.append(f"{state['cycles']:.6g} cycles")

@@ -35,27 +35,28 @@ from workflow.analyses.time.outcome import LOOP, MOTION, State, TimeOutcome, loo
 from workflow.errors import MethodFailed
 from workflow.shell.reporter import Reporter
 
-# Cycles in a row that must change little before a state is steady: one alone may change little
-# while a slow mode turns.
+# Cycles in a row that must change little before a state is steady: a single one may do so while a
+# slow mode turns.
 IN_A_ROW = 3
-# Steady states that an ageing is first built on, beside that of no energy, and at most. Doubled
-# until the cycles agree; what a doubling changes is 2³ - 1 times the error that it leaves: cubics
-# between them are of order 3 to 4.
+# Number of steady states of an ageing at first, without that at energy 0, and at most. It is
+# doubled until the cycles agree. The change by a doubling is CHANGE = 2³ - 1 times the remaining
+# error, as cubics between the states are of order 3 to 4.
 FEWEST_STATES, MOST_STATES, CHANGE = 6, 48, 7.0
-# The first state that is settled takes as long as so many others, which begin from one nearby.
+# The first settled state takes as long as this many others, which start from a state nearby.
 FROM_REST = 4
-# The first of them, as a share of the last energy: friction that rises as ln E changes early.
+# First state after energy 0, as a share of the last energy: friction that rises as ln E changes
+# early.
 FIRST_STATE = 1e-6
 
 
 @dataclass(frozen=True)
 class SteadyCycle:
-    """The last of ``periods`` cycles, and where to go on from.
+    """The last of ``periods`` cycles, and the state from which to continue.
 
-    ``amplitudes`` ``(k,)`` of what is seen [mm]; of the joints ``stretch`` [mm] and ``force`` [N]
-    ``(t,)``, ``energy`` [N mm] that they dissipate, and how they press, ``contact``. ``change`` is
-    that of energy and stroke from the cycle before, ``error`` what the steps leave of the
-    displacement, both relative.
+    ``amplitudes`` ``(k,)`` are those of the observed displacements [mm]. Of the joints, ``stretch``
+    [mm] and ``force`` [N] are ``(t,)``, ``energy`` [N mm] is the dissipated one, and ``contact``
+    has the normal forces. ``change`` is the change of energy and stroke from the cycle before,
+    ``error`` the error of the displacement by time steps, both relative.
     """
 
     amplitudes: Array
@@ -70,10 +71,10 @@ class SteadyCycle:
 
 
 def run_rig(case: RigCase, reporter: Reporter, steps: Steps) -> TimeOutcome:
-    """Run a rig at all energies that are asked for.
+    """Run a rig at all energies of the case.
 
     Raises MethodFailed where a motion is not found or not steady, UserError where the joint can
-    never dissipate what it is to be aged by.
+    never dissipate the energy of the ageing.
     """
     rig = rig_model(case.structure, case.joint, case.excitation.mass, reporter)
     memory(case, len(rig.model.mass)).check()
@@ -160,11 +161,11 @@ def _steady_state(
 
 @dataclass(frozen=True)
 class _Settling:
-    """A rig on its way to a steady state, after so many ``periods``.
+    """A rig on its way to a steady state, after a number of ``periods``.
 
-    The next one begins at ``start``. ``now`` are energy and stroke of the last one, their
-    ``change`` has been small ``in_a_row`` so often, and ``steady`` is the last one if that is
-    enough.
+    The next period begins at ``start``. ``now`` are energy and stroke of the last one. Their
+    ``change`` has been small for ``in_a_row`` periods, and ``steady`` is the last period once that
+    is enough.
     """
 
     start: Start | None
@@ -177,7 +178,7 @@ class _Settling:
 
 @dataclass(frozen=True)
 class _SteadyStates:
-    """Steady states of a rig at any energy, each settled once, from the one that is nearest."""
+    """Steady states of a rig at any energy, each computed once, from the nearest one."""
 
     excitation: given.Harmonic
     integration: Integration
@@ -188,9 +189,9 @@ class _SteadyStates:
     settled: dict[float, SteadyCycle] = field(default_factory=dict)
 
     def at(self, energy: float, expected: int) -> SteadyCycle:
-        """The steady cycle after so much dissipated ``energy`` [N mm].
+        """Return the steady cycle after a dissipated ``energy`` [N mm].
 
-        About so many are ``expected`` in all.
+        ``expected`` is the approximate number of steady states in all, for the progress.
         """
         if energy not in self.settled:
             near = min(self.settled, key=lambda settled: abs(settled - energy), default=None)
@@ -204,18 +205,18 @@ class _SteadyStates:
     def _settle(self, energy: float, start: Start | None) -> SteadyCycle:
         excitation, rig, period = self.excitation, self.rig, 1.0 / self.excitation.frequency
         force = HarmonicForce(rig.driven, excitation.force, excitation.frequency)
-        # An even number, which a companion by steps of twice the length ends with.
+        # An even number, so that a step-doubling run ends with the period.
         steps = 2 * int(np.ceil(0.5 * period / self.integration.step - 1e-9))
         control = TimeStepControl(period / steps, self.integration.tolerance)
         if start is not None:
-            # Where a period begins, whatever came before: times must not lose their digits.
+            # Set the time back to the beginning of a period, as large times would lose digits.
             start = replace(start, time=0.0)
         first, settled = 1.0, 0.0
 
         def tell(change: float, periods: int) -> None:
             nonlocal first, settled
             if np.isfinite(change):
-                # It falls by about the same factor in each period.
+                # The change falls by about the same factor in each period.
                 first = max(first, change)
                 fallen = np.log(first / max(change, excitation.steady))
                 settled = max(settled, float(fallen / np.log(first / excitation.steady)))
@@ -256,7 +257,7 @@ class _SteadyStates:
 
 
 def _change(now: Array, before: Array) -> float:
-    """The larger relative change of energy and stroke; of what stays at nothing there is none."""
+    """Return the larger relative change of energy and stroke; 0 for values that stay at 0."""
     if not np.isfinite(before).all():
         return np.inf
     scale = np.where(now > 0.0, now, 1.0)
@@ -269,22 +270,22 @@ def _change(now: Array, before: Array) -> float:
 def _aged(
     case: RigCase, steady: _SteadyStates, joint: JointModel, reporter: Reporter
 ) -> tuple[Callable[[float], float], LongTest, dict[str, Any]]:
-    """Energy per cycle between steady states, the test that it makes, and its numbers.
+    """Return the energy per cycle between steady states, the long test, and its numbers.
 
-    Steady states are added between those there are until the cycles are as good as asked for.
+    Steady states are added between the existing ones until the cycles are accurate enough.
     """
     ageing, breaks = case.ageing, joint.evolution.breaks
     end = ageing.energy or _energy_of(ageing, steady)
     nodes = [0.0, *np.geomspace(FIRST_STATE * end, end, FEWEST_STATES).tolist()]
     before = np.inf
     while True:
-        # Once more in between, most often, and those that the case asks for.
+        # Usually the states are doubled once; those that the case asks for come on top.
         expected = len(case.energies) + 2 * len(nodes)
         rate = _between(nodes, [steady.at(energy, expected).energy for energy in nodes])
         test = aged(rate, ageing, (*breaks, *nodes[1:-1]))
         last = test_end(test, ageing)
         cycles = test.total_cycles
-        # By energy the cycles change, by cycles the energy.
+        # If the end is given by energy, the cycles change; if by cycles, the energy.
         now = cycles if ageing.energy is not None else last
         error = abs(now - before) / now / CHANGE
         if error <= ageing.tolerance or len(nodes) > MOST_STATES:
@@ -302,7 +303,7 @@ def _aged(
 
 
 def _energy_of(ageing: Ageing, steady: _SteadyStates) -> float:
-    """About the energy of so many cycles [N mm]."""
+    """Return the approximate energy of the cycles of the ageing [N mm]."""
     assert ageing.cycles is not None
     unworn = steady.at(0.0, FEWEST_STATES).energy
     energy = ageing.cycles * unworn
@@ -310,7 +311,7 @@ def _energy_of(ageing: Ageing, steady: _SteadyStates) -> float:
 
 
 def _between(energies: list[float], rates: list[float]) -> Callable[[float], float]:
-    """Energy of a cycle between those computed, over ln(E + E1); constant beyond the last."""
+    """Return the energy of a cycle, interpolated over ln(E + E1); constant beyond the last."""
     places, floor = np.asarray(energies), energies[1]
     curve = PchipInterpolator(np.log(places + floor), rates)
 

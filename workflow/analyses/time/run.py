@@ -1,4 +1,4 @@
-"""A case in time: a joint at a prescribed stroke, or in a rig that is excited, hit or driven."""
+"""Runs of cases in time: a joint at a prescribed stroke, or in a rig."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ from workflow.shell.steps import kept_steps
 def run_time(run: Run[JointCase | RigCase]) -> None:
     """Run a case in time to its end.
 
-    Raises UserError where joint or rig cannot be what the case says, MethodFailed where a motion
-    cannot be followed or is not steady.
+    Raises UserError where joint or rig cannot be built as the case describes them, MethodFailed
+    where a motion cannot be followed or is not steady.
     """
     folder, reporter = run.folder, run.reporter
     case = with_computed_wear(run)

@@ -1,4 +1,4 @@
-"""How long a case in time takes."""
+"""Run time of a case in time."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ from workflow.analyses.time.case import JointCase, RigCase
 from workflow.case.loading import load_case
 from workflow.shell.run_time import FIGURES, RunTime
 
-# A step of a rig in time; of a reduced body [s]. Chosen steps are parts of what the case gives.
+# Time of a step of a rig, and of a reduced body [s]; factor where steps may be split.
 STEP, REDUCED_STEP, CHOSEN = 8e-5, 1e-3, 5.0
-# Periods to a steady state, and steady states that an ageing is built on.
+# Periods to a steady state, and steady states of an ageing.
 PERIODS, AGEING = 30, 20
-# A joint alone, aged at its stroke [s].
+# Time of a joint alone, aged at its stroke [s].
 JOINT = 1.0
 
 
 def run_time(case: JointCase | RigCase) -> RunTime:
-    """Of all motions, or of the cycles up to steady ones."""
+    """Return the time of all motions, or of the cycles up to steady ones."""
     computed = _computed_wear(case.evolution.file)
     begun = 0.0 if computed is None else computed.seconds
     if isinstance(case, JointCase):

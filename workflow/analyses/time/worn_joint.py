@@ -1,4 +1,4 @@
-"""A joint whose friction and stiffness follow the wear of its contact, computed first."""
+"""Joints whose friction and stiffness follow the wear of their contact, which is computed first."""
 
 from __future__ import annotations
 
@@ -14,17 +14,17 @@ from workflow.shell.analysis import Run
 from workflow.shell.folder import OutputFolder
 from workflow.shell.reporter import Reporter
 
-# A joint is under the load of its table when they differ by less than this share.
+# A joint is under the load of its table if they differ by less than this share.
 SAME_LOAD = 0.01
 # Folder of the wear run inside that of the joint.
 WEAR = "wear"
 
 
 def with_computed_wear(run: Run[JointCase | RigCase]) -> JointCase | RigCase:
-    """The case with the table of loops that its wear case leaves; as it is if it names none.
+    """Return the case with the table of loops from its wear case, unchanged if it names none.
 
-    The wear case runs into ``wear`` in the folder, from where an earlier run of it there has got
-    to. Raises UserError if it is not one of a single contact.
+    The wear case runs in the subfolder ``wear``, where an earlier run is resumed. Raises UserError
+    if the case has more than a single contact.
     """
     case, file = run.case, run.case.evolution.file
     if file is None or not file.endswith(YAML):
@@ -50,9 +50,10 @@ def with_computed_wear(run: Run[JointCase | RigCase]) -> JointCase | RigCase:
 
 
 def warn_of_table(case: JointCase | RigCase, last: float, reporter: Reporter) -> None:
-    """Say where a table of loops is used beyond its energies, under another load, or for friction.
+    """Warn where a table of loops is used outside its energies, its load, or as friction.
 
-    ``last`` is the largest energy that the joint came to [N mm].
+    ``last`` is the largest energy of the joint [N mm]. The coefficient mu of loops that do not
+    slide as a whole is not the friction.
     """
     if case.evolution.file is None:
         return

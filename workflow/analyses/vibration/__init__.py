@@ -10,13 +10,13 @@ from workflow.shell.analysis import Analysis, Comparison, Pictures, Run, Summary
 
 __all__ = ["ANALYSIS"]
 
-# What the motions under every force are compared by: a resonance's frequency says little, where the
-# amplitude hardly changes with it.
+# Quantities by which motions under every force are compared between runs. The frequency of a
+# resonance is not among them: it says little where the amplitude hardly changes with frequency.
 MOTIONS = "amplitude", "energy_per_cycle", "loops.-1.energy"
 
 
 def _run(run: Run[VibrationCase]) -> None:
-    # Joint laws are compiled when they are first needed.
+    # Imported here, as joint laws are compiled when they are first imported.
     from workflow.analyses.vibration.run import run_vibration
 
     run_vibration(run)
@@ -28,7 +28,7 @@ def _quantities(case: VibrationCase, summary: Summary) -> list[str]:
 
 
 def _pictures() -> Pictures:
-    # Plots take a second to load: where they are drawn.
+    # Imported here, as plotting takes a second to load.
     from workflow.analyses.vibration.figures.response import figures_of
     from workflow.analyses.vibration.outcome import Contents
     from workflow.analyses.vibration.paraview import write_vibration

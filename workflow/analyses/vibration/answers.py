@@ -1,4 +1,4 @@
-"""Every motion under a force at the frequencies that a case asks for."""
+"""Motions under each force at the frequencies that a case asks for."""
 
 from __future__ import annotations
 
@@ -25,9 +25,9 @@ from workflow.analyses.vibration.response import (
 from workflow.shell.dataset import Dataset, Datasets
 from workflow.shell.reporter import Reporter
 
-# Of the vibration: a motion that changes more as harmonics are added is another one.
+# Share of the vibration. A motion that changes more as harmonics are added is another one.
 ANOTHER = 0.3
-# Told of each motion, beside its error.
+# Numbers that are reported for each motion, in addition to its error.
 GROUND = ("absolute_amplitude",)
 TOLD = "phase", "energy_per_cycle", "damping", "slip", "separated"
 
@@ -39,10 +39,10 @@ def answers_under(
     reporter: Reporter,
     steps: Steps,
 ) -> tuple[Answers | None, dict[str, Datasets]]:
-    """The motions of a branch at the frequencies of a case, and their harmonics by group.
+    """Return the motions of a branch at the frequencies of a case, and their harmonics by group.
 
-    None where the case asks for none. A frequency that the curve does not get to is told as a
-    warning, and so is a motion that is not found.
+    Returns None and no harmonics where the case asks for no frequencies. A frequency that the curve
+    does not reach gives a warning, and so does a motion that is not found.
     """
     if not case.at:
         return None, {}
@@ -77,8 +77,10 @@ def answers_under(
 def _accurate(
     branch: ResponseBranch, motion: HarmonicSolution, accuracy: Accuracy | None
 ) -> HarmonicSolution:
-    """The motion with its error, as accurate as asked for; as it was where harmonics that are added
-    lead to another one."""
+    """Return the motion with its error, refined to the accuracy that the case asks for.
+
+    The motion is not refined where added harmonics lead to another motion.
+    """
     found = accurate(branch.problem, motion, accuracy)
     problem = branch.problem.refined(found.resolution)
     before = problem.resolution.adopt(motion.coefficients, motion.resolution)
@@ -89,7 +91,7 @@ def _accurate(
 
 
 def _message(branch: ResponseBranch, frequency: float, found: tuple[HarmonicSolution, ...]) -> str:
-    """Why there is no motion, or not all; empty if there are all."""
+    """Return why there is no motion, or not all of them; empty if none is missing."""
     lost = [motion.message for motion in found if not motion.converged]
     if lost:
         return f"a motion is not found: {lost[0]}"

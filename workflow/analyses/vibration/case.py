@@ -1,4 +1,4 @@
-"""Vibration cases: a structure with joints under a harmonic force, its steady motions."""
+"""Vibration cases: steady motions of a structure with joints under a periodic force."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ from workflow.case.source import Source
 
 
 class VibrationCase(DrivenMass):
-    """Steady vibration of a structure on friction joints that stay as they are."""
+    """Steady vibration of a structure with joints that do not wear."""
 
     about: ClassVar[str] = "the steady vibration of a rig with friction joints, over frequency"
     also_filled_in: ClassVar[tuple[str, ...]] = ("forces", "joint")
@@ -119,23 +119,23 @@ class VibrationCase(DrivenMass):
 
     @property
     def own_laws(self) -> tuple[Joint | ElasticJoint | None, ...]:
-        """Of every entry of joints, None for that of the case."""
+        """Law of every entry of joints, None for entries that use the law of the case."""
         return own_laws(self.structure, self._shares)
 
     @property
     def laws(self) -> tuple[Joint | ElasticJoint, ...]:
-        """That of every entry of joints, or of joints that need no entry."""
+        """Law of every entry of joints, or of joints that need no entry."""
         every = (own or self.joint for own in self.own_laws)
         return tuple(law for law in every if law is not None)
 
     @property
     def _stuck(self) -> float:
-        # Nonlinear springs may take a mode anywhere above that without them.
+        # Nonlinear springs may raise a mode to any frequency above its value without them.
         return max(law.stiffness if isinstance(law, Joint) else RIGID for law in self.laws)
 
     @property
     def law_names(self) -> str:
-        """What these are called."""
+        """Names of the laws, each once."""
         return ", ".join(dict.fromkeys(law.law for law in self.laws))
 
     @property
@@ -238,7 +238,7 @@ class VibrationCase(DrivenMass):
         return self
 
     def _require_pad_contacts(self) -> None:
-        """Refuse joints that are not those of two pads."""
+        """Refuse joints that cannot be contacts between two pads."""
         (joint,) = self.laws
         if not isinstance(joint, FrictionContactJoint):
             raise disagreement(
@@ -288,7 +288,7 @@ class VibrationCase(DrivenMass):
 
     @property
     def waves(self) -> str:
-        """The ring, and nodal diameters of harmonics, in words."""
+        """Description of the ring, and nodal diameters of harmonics."""
         ring = self.ring
         assert ring is not None
         assert self.engine_order is not None
@@ -300,7 +300,7 @@ class VibrationCase(DrivenMass):
         return f"{ring.text}; nodal diameters: harmonic {', '.join(each)}"
 
     def _require_joints_of_loops(self) -> None:
-        """Refuse loops of an entry that there is not, and of several laws together."""
+        """Refuse loops of an entry that does not exist, and of several laws together."""
         if self.loops is None:
             return
         number, own = self.loops.joints, self.own_laws

@@ -1,4 +1,4 @@
-"""What vibration cases have in common: a structure, what drives it, frequencies, a resolution."""
+"""Parts common to all vibration cases: structure, excitation, frequencies and resolution."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ class VibrationCaseBase(Case):
     """A structure under forces a sin(2π frequency t), for all frequencies of a span."""
 
     also_filled_in: ClassVar[tuple[str, ...]] = ("forces",)
-    # Whether joints may have laws of their own, beside that of the case.
+    # Whether joints may have laws of their own, in addition to the law of the case.
     mixes_laws: ClassVar[bool] = False
     in_schema: ClassVar[Mapping[str, Any]] = one_of("forces", "excitation")
 
@@ -120,8 +120,8 @@ class VibrationCaseBase(Case):
         mass: int | None = None,
         ring: RingOfSectors | None = None,
     ) -> RigModel | None:
-        """The rig, as far as it is known before a run; places that it has not are refused."""
-        # Imported here: it builds the structure.
+        """Return the rig as far as it is known before a run, and refuse places it does not have."""
+        # Imported here, as it loads the modules that build the structure.
         from workflow.analyses.vibration.places import check_places
 
         highest, order = self.resolution.harmonics[-1], round(self.engine_order or 1)
@@ -129,7 +129,7 @@ class VibrationCaseBase(Case):
 
     @property
     def amount(self) -> Amount:
-        """What motions are followed by: a force, or the level of an excitation."""
+        """Quantity along which motions are followed: a force, or the level of an excitation."""
         return FORCE if self.excitation is None else LEVEL
 
     @property
@@ -155,11 +155,14 @@ class VibrationCaseBase(Case):
 
     @property
     def harmonics(self) -> tuple[int, ...]:
-        """Those of the motion: 0 too where the mean moves, and those that an excitation has."""
+        """Harmonics of the motion, with those of the excitation, and 0 where the mean moves."""
         return self.with_mean(self.resolution.harmonics)
 
     def with_mean(self, harmonics: Sequence[int]) -> tuple[int, ...]:
-        """Harmonics and those of the excitation; with 0 where joints or it move the mean."""
+        """Return the harmonics and those of the excitation, with 0 where the mean moves.
+
+        The mean moves by joints that are not symmetric, and by even harmonics of the excitation.
+        """
         excited: set[int] = set()
         if self.excitation is not None:
             excited = self.excitation.harmonics(self.resolution.harmonics[-1])
@@ -174,17 +177,17 @@ class VibrationCaseBase(Case):
 
     @property
     def _stuck(self) -> float:
-        """A stiffness [N/mm] that no joint has more of."""
+        """Upper bound on the stiffness of joints [N/mm]."""
         return RIGID
 
     @property
     def _shares(self) -> bool:
-        """Whether joints without a law of their own have one."""
+        """Whether there is a law for joints without a law of their own."""
         return True
 
     @property
     def driving(self) -> str:
-        """Forces, where they act, and their frequencies, for an outline."""
+        """Forces, their places and their frequencies, for an outline."""
         low, high = self.frequencies
         if self.excitation is not None:
             text = self.excitation.text(self.resolution.harmonics[-1])
@@ -195,7 +198,7 @@ class VibrationCaseBase(Case):
 
     @property
     def _engine(self) -> str:
-        """Of an engine order, for an outline."""
+        """Engine order and its speeds, for an outline."""
         if self.engine_order is None:
             return ""
         low, high = (60.0 * frequency / self.engine_order for frequency in self.frequencies)
@@ -203,7 +206,7 @@ class VibrationCaseBase(Case):
 
     @property
     def resolved(self) -> str:
-        """How the motion is found, for an outline."""
+        """Method by which the motion is found, for an outline."""
         resolution, harmonics = self.resolution, self.harmonics
         text = f"harmonic balance, {len(harmonics)} harmonics to {harmonics[-1]}"
         text += f", {resolution.samples} samples"
@@ -213,17 +216,17 @@ class VibrationCaseBase(Case):
 
     @property
     def _driven_mass(self) -> int | None:
-        """The number of the mass that is driven, as far as it is given."""
+        """Number of the driven mass, None if not given."""
         return None
 
 
 def wears(source: Source) -> bool:
-    """Whether the joints of a vibration case wear: it has a section on that."""
+    """Return whether the joints of a vibration case wear: it has a section wear or contact."""
     return any(source.at((section,)) is not None for section in ("wear", "contact"))
 
 
 class DrivenMass(VibrationCaseBase):
-    """The same of a structure that may be a row of masses, of which any is driven."""
+    """A vibration case whose structure may be a row of masses, of which any one is driven."""
 
     mass: MassNumber | None = entry(
         "of a row, that is driven, counted from the ground; without it the first", 1, default=None

@@ -1,4 +1,4 @@
-"""What drives a steady vibration, as a case gives it: forces, records, motions of the ground."""
+"""Excitations of a steady vibration, as a case gives them: forces, records, ground motions."""
 
 from __future__ import annotations
 
@@ -25,19 +25,19 @@ HIGHEST = 999
 Level = Annotated[float, Quantity("1", above=0.0, at_most=1e9)]
 Phase = Annotated[float, Quantity("rad", at_least=-6.3, at_most=6.3, range_text="-360 to 360 deg")]
 Harmonic = Annotated[int, Whole(1, HIGHEST)]
-# Columns of a record of one period, the second taken for the first where it is not there.
+# Columns of a record of one period. The phase is used in place of the time if it is there.
 TIME, TURN = Quantity("s", at_least=-1e9, at_most=1e9), Quantity("rad", at_least=-1e3, at_most=1e3)
 PULL = Quantity("N", at_least=-1e9, at_most=1e9)
 TURNED = 2.0 * np.pi
-# Of a turn: what rounding of a phase in degrees leaves.
+# Largest deviation from a whole turn, due to rounding of a phase in degrees.
 WHOLE_TURN = 1e-6
-# Of the largest: a harmonic of a record that is below is rounding.
+# Share of the largest harmonic of a record, below which a harmonic is rounding.
 NOTHING = 1e-9
 
 
 @dataclass(frozen=True)
 class Amount:
-    """What the excitation is multiplied by: its ``name``, ``unit`` and ``description``."""
+    """Factor of the excitation, with its ``name``, ``unit`` and ``description``."""
 
     name: str
     unit: str
@@ -45,15 +45,15 @@ class Amount:
 
     @property
     def receptance(self) -> tuple[str, str]:
-        """Unit of an amplitude over it, and that in figures."""
+        """Unit of an amplitude divided by the factor, as computed and as shown in figures."""
         return ("mm/N", "µm/N") if self.unit == "N" else ("mm", "µm")
 
     def told(self, number: float) -> str:
-        """A number of it in words."""
+        """Return the factor with its unit or name, as text."""
         return f"{number:g} N" if self.unit == "N" else f"{self.name} {number:g}"
 
     def under(self, number: float) -> str:
-        """The same of what happens under it."""
+        """Return the text "under" or "at" this factor, for what happens there."""
         return f"{'under' if self.unit == 'N' else 'at'} {self.told(number)}"
 
 
@@ -62,19 +62,19 @@ LEVEL = Amount("level", "1", "level by which the excitation is multiplied")
 
 
 def amount_in(numbers: Mapping[str, Any]) -> tuple[Amount, float]:
-    """Whether a response is to a force or a level, and which, by its numbers or attributes."""
+    """Return the kind of factor, force or level, and its value, from numbers of a response."""
     amount = FORCE if FORCE.name in numbers else LEVEL
     return amount, float(numbers[amount.name])
 
 
 def told_in(numbers: Mapping[str, Any]) -> str:
-    """The same in words."""
+    """Return the force or level of a response, as text."""
     amount, number = amount_in(numbers)
     return amount.told(number)
 
 
 def under_in(numbers: Mapping[str, Any]) -> str:
-    """The same of what happens under it."""
+    """Return the text "under" or "at" the force or level of a response."""
     amount, number = amount_in(numbers)
     return amount.under(number)
 
@@ -90,7 +90,7 @@ class ForceAt(Moved):
 
     @property
     def wave(self) -> complex:
-        """w of Re w exp(ikωt) [N]."""
+        """Complex amplitude w of the force Re w exp(ikωt) [N]."""
         return complex(-1j * self.amplitude * np.exp(1j * self.phase))
 
 
@@ -123,7 +123,10 @@ class RecordAt(Moved):
         return self
 
     def read(self) -> PeriodicRecord:
-        """The record of the file. Raises InputFileError, and ExcitationError for no period."""
+        """Return the record of the file.
+
+        Raises InputFileError, and ExcitationError if it is not one period.
+        """
         from fe_models.dynamics.periodic.record import PeriodicRecord
 
         table = read_table_file(self.file)
@@ -142,7 +145,7 @@ class RecordAt(Moved):
 
 
 class GroundMotion(Section):
-    """All that holds the structure moves along one direction."""
+    """Motion of everything that holds the structure, along one direction."""
 
     kind: str  # named first; each narrows it to its own name
     direction: Literal["x", "y", "z"] = entry("x, y or z", "x", default="x")
@@ -151,7 +154,7 @@ class GroundMotion(Section):
 
 
 class GroundDisplacement(GroundMotion):
-    """The ground moves by a given way, at any frequency."""
+    """Ground motion with the same displacement at every frequency."""
 
     kind: Literal["displacement"] = entry("displacement or acceleration", "displacement")
     amplitude: Annotated[float, Quantity("mm", above=0.0, at_most=1e3)] = entry(
@@ -160,7 +163,7 @@ class GroundDisplacement(GroundMotion):
 
 
 class GroundAcceleration(GroundMotion):
-    """The ground moves with a given acceleration, at any frequency."""
+    """Ground motion with the same acceleration at every frequency."""
 
     kind: Literal["acceleration"] = entry("a given acceleration", "acceleration")
     amplitude: Annotated[float, Quantity("mm/s^2", above=0.0, at_most=1e9)] = entry(
@@ -169,7 +172,7 @@ class GroundAcceleration(GroundMotion):
 
 
 class VibrationExcitation(Section):
-    """Forces, records and motions of the ground together, and how much of all of them."""
+    """Forces, records and ground motions together, and the levels that multiply them."""
 
     also_filled_in: ClassVar[tuple[str, ...]] = ("forces",)
 
@@ -194,22 +197,25 @@ class VibrationExcitation(Section):
 
     @property
     def moves_by_a_way(self) -> bool:
-        """Whether a motion of the ground is given whose forces change with the frequency."""
+        """Whether a ground displacement is given, whose forces change with the frequency."""
         return any(isinstance(motion, GroundDisplacement) for motion in self.base)
 
     def harmonics(self, highest: int) -> set[int]:
-        """Those that it has, of records up to their own or the ``highest``."""
+        """Return all harmonics of the excitation.
+
+        Records count up to their own highest harmonic, or else the ``highest``.
+        """
         every = {part.harmonic for part in (*self.forces, *self.base)}
         for record in self.records:
             every |= {order for order, _ in waves_of(record, highest)}
         return every
 
     def left_out(self, highest: int) -> list[float]:
-        """Of each record the share above the highest harmonic that is taken of it."""
+        """Return, for each record, the share above its highest harmonic that is left out."""
         return [record.read().left_out(record.highest or highest) for record in self.records]
 
     def text(self, highest: int) -> str:
-        """What there is, in a few words, of records up to their own or the ``highest`` harmonic."""
+        """Return a short description, with records up to their own or the ``highest`` harmonic."""
         levels = ", ".join(f"{level:g}" for level in self.levels)
         kinds = (
             (self.forces, "force"),
@@ -224,7 +230,7 @@ class VibrationExcitation(Section):
 
 
 def waves_of(record: RecordAt, highest: int) -> Iterator[tuple[int, complex]]:
-    """Harmonics of a record and their w of Re w exp(ikωt) [N], those that are not rounding."""
+    """Yield harmonics of a record and their w of Re w exp(ikωt) [N], without mere rounding."""
     amplitudes = record.read().amplitudes(record.highest or highest)
     most = float(np.abs(amplitudes).max())
     for order, amplitude in enumerate(amplitudes):

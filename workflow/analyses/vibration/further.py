@@ -1,4 +1,4 @@
-"""Branches of motions under a force that no end of the frequencies leads to."""
+"""Branches of motions under a force that are not reached from an end of the frequencies."""
 
 from __future__ import annotations
 
@@ -39,9 +39,9 @@ def further_from(
     reporter: Reporter,
     steps: Steps,
 ) -> list[tuple[FurtherBranch, Curves]]:
-    """Branches that a start leads to, beside those ``known`` under its force.
+    """Return branches that a start leads to, other than those ``known`` under its force.
 
-    A start that leads to no other is told as a warning.
+    A start that leads to no other branch gives a warning.
     """
     name = f"{case.amount.told(start.force)}, from {start.frequency:g} Hz"
     problem = max((branch.problem for branch in known), key=lambda of: of.resolution.samples)
@@ -71,7 +71,7 @@ def _curves(
     reporter: Reporter,
     steps: Steps,
 ) -> Curves:
-    """What is kept of a branch."""
+    """Return the curves of a branch, with its stability."""
     if branch.message:
         reporter.warn(f"{name}: {branch.message}")
     force = float(branch.forces[0])

@@ -18,14 +18,14 @@ from workflow.shell.dataset import Dataset, Datasets
 from workflow.shell.reporter import Reporter
 from workflow.shell.tables import DIGITS, heading, write_table
 
-# Group of the points of a curve, and of the motions at frequencies that were asked for.
+# Groups of results: points of a curve, and motions at the frequencies of a case.
 CURVE, ANSWER = "curve", "at_{:05d}"
 CONVENTION = "x(t) = sum of Re(c_k exp(i k 2 pi f t)), forces being sines at t = 0"
 MEGABYTE = 1e6
 
 
 def names_of(rig: RigModel) -> dict[str, Dataset]:
-    """Names of the places ``(p,)`` and of the joints' directions ``(j, d)``."""
+    """Return names of the places ``(p,)`` and of the joints' directions ``(j, d)``."""
     places = np.array([rig.model.names[place] for place in rig.retained], dtype=np.bytes_)
     joints = np.array(rig.stretched, dtype=np.bytes_).reshape(rig.joints, rig.directions)
     stretch = "of every direction of every joint: what it stretches by"
@@ -36,7 +36,7 @@ def names_of(rig: RigModel) -> dict[str, Dataset]:
 
 
 def harmonics_of(rig: RigModel, motion: HarmonicSolution) -> dict[str, Dataset]:
-    """Coefficients ``(k, p)`` of places and ``(k, j, d)`` of joints, of one motion."""
+    """Return coefficients ``(k, p)`` of places and ``(k, j, d)`` of joints, of one motion."""
     orders, parts = motion.resolution.harmonics, _coefficients(rig, motion)
     return {
         "frequency": Dataset(np.array(motion.frequency), "Hz", "f, of the motion"),
@@ -45,7 +45,10 @@ def harmonics_of(rig: RigModel, motion: HarmonicSolution) -> dict[str, Dataset]:
 
 
 def harmonics_along(rig: RigModel, branch: ResponseBranch, reporter: Reporter) -> Datasets:
-    """The same of all points of a curve, which come first; a motion lacks what it has 0 of."""
+    """Return coefficients of all points of a curve, with the points along the first axis.
+
+    Harmonics that a motion does not have are 0.
+    """
     orders = branch.problem.resolution.harmonics
     along: list[list[ComplexArray]] = []
     for motion in branch.solutions:
@@ -65,7 +68,7 @@ def harmonics_along(rig: RigModel, branch: ResponseBranch, reporter: Reporter) -
 
 
 def _coefficients(rig: RigModel, motion: HarmonicSolution) -> tuple[ComplexArray, ...]:
-    """Of places, and of the displacement and force of joints."""
+    """Return coefficients of places, and of the displacement and force of joints."""
     resolution, shape = motion.resolution, (-1, rig.joints, rig.directions)
     moved, pulled = (
         resolution.amplitudes(part).reshape(shape)
@@ -92,9 +95,9 @@ def _datasets(orders: Array, parts: tuple[ComplexArray, ...], along: str) -> dic
 
 
 def write_harmonics(path: Path, names: Datasets, response: Response) -> None:
-    """Write the motions at resonance and at the frequencies asked for, one harmonic a row.
+    """Write the motions at resonance and at the frequencies of the case, one harmonic per row.
 
-    The latter are counted from 1, as the rows of the table of them.
+    Motions at frequencies of the case are counted from 1, as the rows of their table.
     """
     rows = [
         row

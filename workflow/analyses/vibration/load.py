@@ -1,4 +1,4 @@
-"""The load of a vibration case on its rig, and where the ground is in a motion."""
+"""Loads of a vibration case on its rig, and the displacement of the ground in a motion."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from workflow.analyses.vibration.excitation import (
 )
 from workflow.errors import EntryError
 
-# What forces leave of each other, over all of them, where they cancel: rounding.
+# Share that rounding leaves of forces which cancel each other.
 CANCELLED = 1e-12
 
 
@@ -32,8 +32,8 @@ CANCELLED = 1e-12
 class MovingGround:
     """A harmonic of the ground's motion at level 1, along the translation ``rigid`` ``(n,)``.
 
-    ``amplitude`` is Re a exp(ikωt) of its displacement [mm], or of its acceleration [mm/s²] if it
-    is ``accelerated``.
+    ``amplitude`` is a in Re a exp(ikωt) of its displacement [mm], or of its acceleration [mm/s²] if
+    it is ``accelerated``.
     """
 
     harmonic: int
@@ -42,17 +42,17 @@ class MovingGround:
     rigid: Array
 
     def displacement(self, frequency: float) -> complex:
-        """Of the ground at a frequency [Hz]."""
+        """Return the complex displacement [mm] of the ground at a frequency [Hz]."""
         angular = 2.0 * np.pi * frequency * self.harmonic
         return -self.amplitude / angular**2 if self.accelerated else self.amplitude
 
 
 @dataclass(frozen=True)
 class Driving:
-    """The periodic ``load`` at level 1, but for what is static; and the ``ground`` that moves.
+    """The periodic ``load`` at level 1 without its static part, and the ``ground`` that moves.
 
-    ``amount`` says whether it is at 1 N or at level 1; of each record the share above the highest
-    harmonic that is taken of it is ``left_out``.
+    ``amount`` says whether the load is for 1 N or for level 1. ``left_out`` is, for each record,
+    the share above its highest harmonic.
     """
 
     load: PeriodicLoad
@@ -61,7 +61,7 @@ class Driving:
     left_out: tuple[float, ...] = ()
 
     def absolute(self, motion: HarmonicSolution) -> HarmonicSolution:
-        """A motion with the displacements that it has beside those relative to the ground."""
+        """Return a motion with absolute displacements, in place of those relative to the ground."""
         absolute = motion.motion.copy()
         for moving in self.ground:
             row = motion.resolution.harmonics.index(moving.harmonic)
@@ -70,9 +70,10 @@ class Driving:
 
 
 def driving_of(excitation: VibrationExcitation | None, rig: RigModel, highest: int) -> Driving:
-    """What drives a rig, without an excitation its own force; records up to a harmonic.
+    """Return the excitation of a rig; without an excitation in the case, that of its driven place.
 
-    Raises EntryError for places and directions that it has not.
+    Records are used up to the ``highest`` harmonic. Raises EntryError for places and directions
+    that the rig does not have.
     """
     if excitation is None:
         # The force is a sine: Re (-i) exp(iωt).
@@ -83,7 +84,7 @@ def driving_of(excitation: VibrationExcitation | None, rig: RigModel, highest: i
 def _driven_by(excitation: VibrationExcitation, rig: RigModel, highest: int) -> Driving:
     size = len(rig.model.mass)
     waves: defaultdict[int, ComplexArray] = defaultdict(lambda: np.zeros(size, dtype=complex))
-    # Of harmonic 1, the parts together, whatever they leave of each other.
+    # Sum of the sizes of all parts of harmonic 1, even where they cancel each other.
     parts = 0.0
     inertial: defaultdict[int, ComplexArray] = defaultdict(lambda: np.zeros(size, dtype=complex))
     for number, force in enumerate(excitation.forces):
@@ -129,6 +130,6 @@ def _driven_by(excitation: VibrationExcitation, rig: RigModel, highest: int) -> 
 
 
 def _shape(rig: RigModel, place: Moved, key: str) -> Array:
-    """Forces ``(n,)`` of 1 N at a place."""
+    """Return forces ``(n,)`` of 1 N at a place."""
     shares = rig.place_names.shared(place, key)
     return np.sum([share * unit_force(rig.model, name) for name, share in shares], axis=0)

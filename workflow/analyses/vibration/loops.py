@@ -27,9 +27,9 @@ from workflow.analyses.vibration.outcome import Curves
 from workflow.shell.dataset import Dataset
 from workflow.shell.reporter import Reporter
 
-# A loop is that of stuck joints where it loses less than this share of stroke times force range.
+# A loop counts as stuck where its energy is below this share of stroke times force range.
 STUCK_LOOP = 1e-4
-# Times that a loop is repeated: the record then holds whole cycles wherever it begins.
+# Repetitions of a loop, so that the record holds whole cycles wherever it begins.
 REPEATED = 3
 
 
@@ -40,7 +40,7 @@ def loops_of(
     reporter: Reporter,
     steps: Steps,
 ) -> tuple[Curves, ...]:
-    """Loops at the frequency that the case asks for, a resolution after the other."""
+    """Return loops at the frequency that the case asks for, one per resolution."""
     if case.loops is None:
         return ()
     frequency = case.loops.frequency
@@ -64,7 +64,7 @@ def loops_of(
 
 
 def _known(problem: HarmonicBalance, frequency: float, near: HarmonicSolution) -> HarmonicSolution:
-    """The motion at a frequency found from another one, with its error."""
+    """Return the motion at a frequency, found from a near one, with its error."""
     motion = problem.solve(frequency, near.force, near)
     if not motion.converged:
         return motion
@@ -74,9 +74,9 @@ def _known(problem: HarmonicBalance, frequency: float, near: HarmonicSolution) -
 def loop_of(
     model: VibrationModel, motion: HarmonicSolution, load: float, entry: int | None = None
 ) -> Curves:
-    """The loop of joints together in a motion, under a normal ``load`` [N].
+    """Return the loop of joints together in a motion, under a normal ``load`` [N].
 
-    They are those of an ``entry`` of the case, or all.
+    The joints are those of an ``entry`` of the case, or all.
     """
     rig = model.rig
     rows, along = rig.of_entry(entry)
@@ -106,7 +106,7 @@ def loop_of(
         "energy": float(motion.cycle.dissipated[rows].sum()),
         "slip": model.time_share(motion, SLIP, rows),
         "error": None if motion.error is None else motion.error.largest,
-        # Largest force that the harmonics leave out, over half of the range of the force.
+        # Largest force missing in the harmonics, over half of the range of the force.
         "deformation": float(np.abs(force - expansion).max()) / half if half > 0.0 else 0.0,
         **_slopes(model, motion, displacement, force, load, rows),
     }
@@ -114,7 +114,7 @@ def loop_of(
 
 
 def closed(values: Array) -> Array:
-    """Values ``(t,)`` of a cycle, the first repeated at the end."""
+    """Return values ``(t,)`` of a cycle with the first one repeated at the end."""
     return np.append(values, values[:1])
 
 
@@ -126,10 +126,10 @@ def _slopes(
     load: float,
     rows: slice,
 ) -> dict[str, float | None]:
-    """Stick slope and friction of a loop; no friction where it does not slide."""
+    """Return stick slope and friction of a loop, with friction None where it does not slide."""
     slope, friction = _stick_slope(model, motion, displacement, force, rows), None
     with suppress(MeasuredLoopError):
-        # Loops within the largest, of higher harmonics, are not those that are asked for.
+        # The widest loop is wanted: smaller loops inside are due to higher harmonics.
         loop = measure_loops(np.tile(displacement, REPEATED), np.tile(force, REPEATED)).widest
         if loop.energy.mean() > STUCK_LOOP * np.ptp(displacement) * np.ptp(force):
             slope = float(loop.stick_stiffness.mean()) if slope is None else slope
@@ -145,10 +145,11 @@ def _stick_slope(
     force: Array,
     rows: slice,
 ) -> float | None:
-    """Slope over the increments in which all joints that touch at rest stick; None without any.
+    """Return the slope over increments in which all touching joints stick, None without any.
 
-    A state is that at the end of an increment: a joint with one slider that sticks then has stuck
-    throughout. Joints of many sliders have no such increments but in a loop without slip.
+    The state belongs to the end of an increment: a joint with one slider that sticks then has stuck
+    throughout. Joints of many sliders have such increments only in a loop without slip. Joints that
+    are open at rest do not count.
     """
     sticks = (motion.cycle.states[:, rows][:, model.touching[rows]] == STICK).all(axis=1)
     groups = grouped(model.law, model.rig.joints).rows()

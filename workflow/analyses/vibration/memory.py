@@ -1,4 +1,4 @@
-"""Memory a vibration case needs."""
+"""Memory that a vibration case needs."""
 
 from __future__ import annotations
 
@@ -7,15 +7,16 @@ from workflow.analyses.vibration.case import VibrationCase
 from workflow.analyses.vibration.case_base import VibrationCaseBase
 from workflow.shell.memory import Memory
 
-# Points of a forced response, of each of which the samples of the joints' forces and the motion are
-# kept until the curve is found; derivatives of the forces are held by so many of them at once.
+# CURVE_POINTS: points of a forced response, for each of which the motion and the samples of the
+# joint forces are held until the curve is found. SLOPES: points for which derivatives of the forces
+# are held at once.
 CURVE_POINTS, SLOPES = 2000, 20
 
 
 def memory(case: VibrationCaseBase, displacements: int = 0, joints: int = 1) -> Memory:
-    """Of all motions under a force, and of what is held while one is found.
+    """Return the memory for all motions under a force, and for finding one of them.
 
-    The structure has so many ``displacements`` and ``joints``, once they are known.
+    ``displacements`` and ``joints`` are their numbers in the structure, once they are known.
     """
     directions = 3 if case.contacts else 1
     functions = 2 * len(case.harmonics)

@@ -1,4 +1,4 @@
-"""The structure of a vibration case with its joints: how it rests, and what it does if linear."""
+"""The structure of a vibration case with its joints: its state at rest and its linear limits."""
 
 from __future__ import annotations
 
@@ -32,20 +32,20 @@ from workflow.errors import MethodFailed
 from workflow.shell.dataset import Dataset
 from workflow.shell.reporter import Reporter
 
-# Frequencies of the linear limits, beside their own natural frequencies. Each takes the inverse of
-# a matrix of all joints' directions, which for many joints is slow.
+# Number of frequencies of the linear limits, in addition to the natural frequencies. Each takes the
+# inverse of a matrix of all joints' directions, which is slow for many joints.
 LINEAR_POINTS, FEWER_POINTS, FEW_DIRECTIONS = 2000, 200, 12
-# Beside an undamped natural frequency, over it: four digits of a peak that has no bound.
+# Relative distance from an undamped natural frequency: shows four digits of an unbounded peak.
 BESIDE = 1e-5
-# Frequencies at once: a matrix of all joints' directions is held for each.
+# Frequencies at once: each needs a matrix of all joints' directions.
 AT_ONCE = 20
-# Joints that are worth a thread of their own, and threads at most.
+# Joints for which a further thread pays off, and most threads.
 JOINTS_PER_THREAD, MOST_THREADS = 16, 8
 
 
 @dataclass(frozen=True)
 class VibrationModel:
-    """A structure, the ``law`` of each of its joints, and what drives it."""
+    """A structure, the ``law`` of each of its joints, and its excitation."""
 
     rig: RigModel
     law: Laws
@@ -54,14 +54,14 @@ class VibrationModel:
 
     @classmethod
     def of(cls, case: VibrationCase, reporter: Reporter) -> VibrationModel:
-        """The model of a case. Raises UserError for a structure or joints that cannot be."""
+        """Return the model of a case. Raises UserError for an impossible structure or joint."""
         order = round(case.engine_order or 1)
         rig = rig_model(case.structure, case.joint, case.mass, reporter, case.ring, order)
         return cls.on(case, rig, _law(case, rig))
 
     @classmethod
     def on(cls, case: VibrationCase, rig: RigModel, law: Laws) -> VibrationModel:
-        """The model of a case on a rig whose joints have this law."""
+        """Return the model of a case on a rig whose joints have this law."""
         memory(case, len(rig.model.mass), rig.joints).check()
         threads = max(1, min(rig.joints // JOINTS_PER_THREAD, os.cpu_count() or 1, MOST_THREADS))
         static = rig.preload(law)
@@ -81,7 +81,10 @@ class VibrationModel:
 
     @cached_property
     def rest(self) -> HarmonicSolution:
-        """The structure under its static load alone. Raises MethodFailed if it does not rest."""
+        """State of the structure under its static load alone.
+
+        Raises MethodFailed if the joints cannot balance it.
+        """
         rest = self.problem.solve(1.0, 0.0)
         if not rest.converged:
             raise MethodFailed(
@@ -91,18 +94,21 @@ class VibrationModel:
         return rest
 
     def time_share(self, motion: HarmonicSolution, state: int, rows: slice = slice(None)) -> float:
-        """Share of the cycle in which joints that touch at rest, of these, have a state."""
+        """Return the share of the cycle in which joints have a ``state``.
+
+        This is the mean over those joints of ``rows`` that touch at rest.
+        """
         states = motion.cycle.states[:, rows][:, self.touching[rows]]
         return float((states == state).mean()) if states.size else 0.0
 
     @property
     def resting(self) -> Array | None:
-        """Displacements ``(j, d)`` of joints by the static load, if a load presses them [mm]."""
+        """Displacements ``(j, d)`` of joints by the static load [mm], None without such a load."""
         return None if self.rig.pressing is None else self.rest.coefficients[:, 0]
 
     @cached_property
     def touching(self) -> np.ndarray:
-        """Which joints ``(j,)`` touch at rest."""
+        """Mask ``(j,)`` of the joints that touch at rest."""
         touching = np.ones(self.rig.joints, dtype=bool)
         for group, rows in grouped(self.law, self.rig.joints).rows():
             if isinstance(group.law, FrictionContact):
@@ -111,22 +117,22 @@ class VibrationModel:
 
     @property
     def undamped(self) -> bool:
-        """Whether only the joints bound a resonance."""
+        """Whether only the joints limit a resonance."""
         receptance = self._first
         return not (receptance.damping.any() or receptance.loss.any())
 
     @property
     def _first(self) -> Receptance:
-        """The structure at harmonic 1: of a sector at its nodal diameters."""
+        """Receptance of the structure at harmonic 1: for a sector, at its nodal diameters."""
         return self.problem.receptance.of(1)
 
     @cached_property
     def _natural(self) -> dict[str, list[float]]:
-        """The lowest natural frequencies [Hz] with the joints free, stuck and sliding."""
+        """Lowest natural frequencies [Hz] with the joints free, stuck and sliding."""
         return {"free": self.rig.free(), **self.rig.modes(self.law, self.resting)}
 
     def numbers(self) -> dict[str, Any]:
-        """Natural frequencies, and how joints touch, for the summary."""
+        """Return natural frequencies, and the contact of joints at rest, for the summary."""
         rig = self.rig
         numbers: dict[str, Any] = {
             **self._natural,
@@ -143,14 +149,14 @@ class VibrationModel:
         return numbers
 
     def diameters(self) -> dict[str, Dataset] | None:
-        """Natural frequencies by nodal diameters, of a sector of a ring."""
+        """Return natural frequencies by nodal diameters for a sector of a ring, else None."""
         sector = self.rig.sector
         if sector is None:
             return None
         return frequencies_by_diameters(sector, self.rig.stuck(self.law, self.resting))
 
     def contact(self) -> dict[str, Dataset] | None:
-        """Where joints are and how they rest, if they have places."""
+        """Return places of the joints and their state at rest, None if they have no places."""
         rig = self.rig
         if rig.pressing is None:
             return None
@@ -167,10 +173,10 @@ class VibrationModel:
         }
 
     def linear(self, span: tuple[float, float]) -> dict[str, Dataset]:
-        """Amplitude over force, or level, of what is looked at, with the joints free, and stuck.
+        """Return the linear limits: observed amplitude over force or level, joints free and stuck.
 
-        That of harmonic 1. At the natural frequencies too; without damping, where these have no
-        bound, beside them.
+        Both are for harmonic 1. The natural frequencies are among the points; without damping,
+        where the amplitude has no bound there, points close to them are used.
         """
         natural = np.array([*self._natural["free"], *self._natural["stuck"]])
         if self.undamped:
@@ -192,16 +198,16 @@ class VibrationModel:
         }
 
     def _limits(self, frequency: Array) -> Array:
-        """Amplitudes over force ``(2, f)`` [mm/N], joints free and stuck."""
+        """Return amplitudes over force ``(2, f)`` [mm/N], with joints free and stuck."""
         seen = self.rig.seen[-1] @ self._first.at_points
         moved, held, _ = self._moved(frequency)
         return np.abs(np.array([moved @ seen, held @ seen]))
 
     def stuck_slope(self, frequency: float) -> float:
-        """Slope [N/mm] of the loop of all joints together, had all that touch at rest stuck.
+        """Return the slope [N/mm] of the loop of all joints if all that touch at rest stuck.
 
-        Their force along it over what opens between the targets, in a rig that has these; the part
-        in phase, where damping leaves another.
+        This is their force along the loop over the relative displacement of the targets, in a rig
+        with targets. Only the part in phase counts; damping adds another.
         """
         assert self.rig.stretch is not None
         _, held, pulled = self._moved(np.array([frequency]))
@@ -210,13 +216,15 @@ class VibrationModel:
         return float((along.sum() / opened).real)
 
     def _moved(self, frequency: Array) -> tuple[Array, Array, Array]:
-        """Motion of all points under harmonic 1 of the load ``(f, n)``, joints free, and stuck, and
-        the forces of these ``(f, m)``: k u, with u = (1 + R k)⁻¹ u_free.
+        """Return motions of all points under harmonic 1 of the load, and forces of stuck joints.
+
+        The motions ``(f, n)`` are with joints free and stuck. The forces ``(f, m)`` are k u, with u
+        = (1 + R k)⁻¹ u_free.
         """
         receptance = self._first
         angular = 2.0 * np.pi * frequency
         steady = receptance.at(angular)
-        # Turned so that a sine is real.
+        # Multiplied by i, so that a sine is real.
         moved = steady.respond(1j * self.problem.first_wave(angular))
         tangent = sl.block_diag(*self.rig.stuck(self.law, self.resting))
         free = moved @ receptance.at_joints.T
@@ -227,10 +235,10 @@ class VibrationModel:
 
 
 def _law(case: VibrationCase, rig: RigModel) -> Laws:
-    """The law of each joint: those of an entry, or of all, share stiffness and load evenly.
+    """Return the law of each joint: joints of an entry, or all, share stiffness and load evenly.
 
     Between two bodies that a load presses together, joints have the gap of the bodies and no load
-    of their own, and may share stiffness by their areas.
+    of their own. They may share the stiffness by their areas.
     """
     if not isinstance(case.structure, FrictionRig):
         shared, *own = laws_of([case.joint, *case.own_laws])

@@ -1,4 +1,4 @@
-"""Modes of a vibration case: their frequency and damping over the amplitude."""
+"""Modes of a vibration case: frequency and damping over the amplitude."""
 
 from __future__ import annotations
 
@@ -24,15 +24,15 @@ from workflow.errors import MethodFailed, UserError
 from workflow.shell.dataset import Dataset
 from workflow.shell.reporter import Reporter
 
-# Of the largest motion of a mode: what is looked at does not take part in it.
+# Share of the largest motion of a mode, below which the observed point does not take part.
 STILL = 1e-6
-# Share of the damping of a mode from which on its error counts: that of a mode with almost none is
-# of no use to anybody.
+# Damping ratio below which the relative error of a damping ratio no longer counts: modes with
+# almost no damping would otherwise show large errors that do not matter.
 LEAST_DAMPING = 1e-4
 
 
 def refuse_missing_modes(case: VibrationCase, model: VibrationModel) -> None:
-    """Refuse the number of a mode that the structure has not, before any curve is followed."""
+    """Refuse a mode number that the structure does not have, before any curve is followed."""
     for number in () if case.modes is None else case.modes.numbers:
         try:
             LinearMode.of(model.problem, number)
@@ -48,10 +48,10 @@ def mode_of(
     reporter: Reporter,
     steps: Steps,
 ) -> Curves:
-    """A mode over the amplitudes that are asked for, with the harmonics of the ``problem``.
+    """Return a mode over the amplitudes of the case, with the harmonics of the ``problem``.
 
-    Raises MethodFailed for a mode in which what is looked at stays still, or that is not found at
-    the least amplitude. One that ends before the largest is told as a warning.
+    Raises MethodFailed for a mode in which the observed point does not move, or that is not found
+    at the least amplitude. A curve that ends before the largest amplitude gives a warning.
     """
     assert case.modes is not None
     linear = LinearMode.of(problem, number)
@@ -62,7 +62,7 @@ def mode_of(
             f"{model.rig.labels[-1]}, whose amplitude counts; look at another place, or leave the "
             "mode out"
         )
-    # Amplitudes of the mode by those of what is looked at, as the linear mode has them.
+    # Convert observed amplitudes to modal ones, by the shape of the linear mode.
     least, largest = (amplitude / moved for amplitude in case.modes.amplitudes)
     control = step_control(case, progress_along((least, largest), True, "t^0.5 mm", reporter))
     branch = along_nonlinear_mode(problem, linear, (least, largest), control, steps)
@@ -92,7 +92,7 @@ def mode_of(
 
 
 def _error(motion: ModeMotion) -> float:
-    """The largest of vibration, frequency and damping, as a share."""
+    """Return the largest relative error of vibration, frequency and damping."""
     damping = motion.damping_error / max(abs(motion.damping_ratio), LEAST_DAMPING)
     return max(motion.vibration_error, motion.frequency_error, damping)
 

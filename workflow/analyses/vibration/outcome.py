@@ -1,4 +1,4 @@
-"""What a vibration case has found: the motions under every force, and their backbone."""
+"""Results of a vibration case: motions under every force, and further curves."""
 
 from __future__ import annotations
 
@@ -12,17 +12,17 @@ import numpy as np
 from workflow.analyses.vibration.case import VibrationCase
 from workflow.shell.dataset import Datasets
 
-# Groups of a response, beside its own curves.
+# Groups of a response, in addition to its own curves.
 NODES, RESONANCE, LOOPS = "nodes", "resonance", "loops"
-# Motions at the frequencies that a case asks for, and what is known of motions by their harmonics.
+# Motions at the frequencies of the case, and harmonics of motions.
 AT, HARMONICS = "at", "harmonics"
 # Natural frequencies by nodal diameters.
 DIAMETERS = "nodal_diameters"
-# What a ring is, in the summary.
+# Properties of the ring, in the summary.
 RING = "ring"
-# Branches that no end of the frequencies leads to.
+# Branches that are not reached from an end of the frequencies.
 FURTHER = "further_branches"
-# Where stability changes along a curve, and what is known of each.
+# Points of a curve at which the stability changes.
 BIFURCATIONS = "bifurcations"
 Bifurcations = tuple[Mapping[str, Any], ...]
 # Motions along the force at a frequency.
@@ -33,9 +33,10 @@ MODES = "modes"
 
 @dataclass(frozen=True)
 class Curves:
-    """``datasets`` by name, the first axis of each along the curve.
+    """A curve: ``datasets`` by name, with the first axis of each along the curve.
 
-    ``numbers`` are attributes beside them, ``bifurcations`` those of the curve.
+    ``numbers`` are attributes of the curve, ``bifurcations`` the points where its stability
+    changes.
     """
 
     datasets: Datasets
@@ -47,8 +48,8 @@ class Curves:
 class Answers:
     """The motions under a force at the frequencies that a case asks for.
 
-    ``datasets`` by name, a row for each motion, by frequency and in the order of the curve.
-    ``numbers`` are those of each frequency, for the summary.
+    ``datasets`` by name have a row for each motion, by frequency and in the order of the curve.
+    ``numbers`` has the values of each frequency, for the summary.
     """
 
     datasets: Datasets
@@ -59,11 +60,11 @@ class Answers:
 class Response:
     """The motions under one ``force`` [N].
 
-    ``curves`` along the frequency, ``numbers`` for the summary; ``nodes``, what each joint does
-    along the frequency too, and of joints with places ``resonance``, along the cycle there;
-    ``loops``, along a cycle, by
-    the resolutions in which they were found, the finest last; ``answers`` at the frequencies
-    asked for; ``harmonics`` of motions, by what they are of; ``bifurcations`` along the curve.
+    ``curves`` are along the frequency and ``numbers`` for the summary. ``nodes`` are results of
+    each joint along the frequency. ``resonance`` is the cycle there, for joints with places.
+    ``loops`` are along a cycle, one per resolution, the finest last. ``answers`` are motions at the
+    frequencies of the case, ``harmonics`` are the coefficients of motions by group, and
+    ``bifurcations`` are along the curve.
     """
 
     force: float
@@ -79,15 +80,15 @@ class Response:
 
 @dataclass(frozen=True)
 class VibrationOutcome:
-    """Everything a vibration case has found.
+    """All results of a vibration case.
 
-    ``labels`` of what is seen, the last of which is looked at; ``names`` of the places and joints
-    whose harmonics there are. ``linear`` are the limits of joints
-    that are free and stuck, over frequency; ``contact`` is where joints are and how they rest, if
-    they have places; ``backbone`` the curve of phase resonance and ``force_sweeps`` motions along
-    the force, if they were asked for, ``modes`` curves over their amplitude; ``further`` branches,
-    as the responses; ``diameters`` natural frequencies of a ring, if the body is a sector of one.
-    ``numbers`` go into the summary as they are.
+    ``labels`` name the observed displacements, the last of which is the main one; ``names`` are the
+    places and joints with harmonics. ``linear`` are the limits with joints free and stuck, over
+    frequency. ``contact`` has the places of joints and their state at rest, if they have places.
+    ``backbone`` is the curve of phase resonance, ``force_sweeps`` are motions along the force, and
+    ``modes`` are curves over their amplitude, if the case asks for them. ``further`` are branches
+    with the same curves as responses, and ``diameters`` natural frequencies of a ring, if the body
+    is a sector of one. ``numbers`` go into the summary unchanged.
     """
 
     case: VibrationCase
@@ -105,13 +106,13 @@ class VibrationOutcome:
 
     @property
     def _joints(self) -> int:
-        """How many there are, 0 where none of them ever slips or is apart."""
+        """Number of joints, 0 where none of them ever slips or separates."""
         shares = [r.nodes[name].values for r in self.responses for name in ("slip", "separated")]
         return shares[0].shape[1] if any(share.any() for share in shares) else 0
 
     @property
     def contents(self) -> Contents:
-        """What ``results.h5`` holds of it."""
+        """Description of what ``results.h5`` holds of this outcome."""
         names = [f"{number:05d}" for number in range(len(self.responses))]
         loops = (n for n, response in zip(names, self.responses, strict=True) if response.loops)
         return Contents(
@@ -129,12 +130,13 @@ class VibrationOutcome:
 
 @dataclass(frozen=True)
 class Contents:
-    """What ``results.h5`` of a vibration case holds.
+    """Contents of ``results.h5`` of a vibration case.
 
-    ``responses`` by force, and those of them with ``loops``. Of joints with ``places`` there is the
-    cycle at resonance; so many ``joints`` slip or are apart at times. There may be a ``backbone``,
-    motions ``at`` chosen frequencies, and ``modes`` over their amplitude; frequencies may be those
-    of an ``engine``. A ring has natural frequencies by nodal ``diameters``.
+    ``responses`` are the groups by force, ``loops`` the groups that have loops. ``places`` tells
+    whether joints have places, and so a cycle at resonance; ``joints`` is the number of joints if
+    any slips or separates. There may be a ``backbone``, motions ``at`` chosen frequencies, and
+    ``modes`` over their amplitude; with ``engine``, frequencies have engine speeds. A ring has
+    natural frequencies by nodal ``diameters``.
     """
 
     responses: tuple[str, ...]
@@ -149,7 +151,7 @@ class Contents:
 
 
 def trend(values: Sequence[float]) -> float:
-    """1 where values rise and never fall, -1 where they fall and never rise, else 0."""
+    """Return 1 where values rise and never fall, -1 where they fall and never rise, else 0."""
     finite = [value for value in values if np.isfinite(value)]
     signs = {float(np.sign(after - before)) for before, after in pairwise(finite)} - {0.0}
     return signs.pop() if len(signs) == 1 else 0.0

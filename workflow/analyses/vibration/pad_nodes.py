@@ -1,4 +1,4 @@
-"""Nodes of a contact that are in rows and columns, found from their places."""
+"""Rows and columns of the nodes of a contact, found from their places."""
 
 from __future__ import annotations
 
@@ -6,15 +6,15 @@ import numpy as np
 
 from sa_solver.types import Array, Indices
 
-# Of the pad's side: nodes closer than that are in one row, and rows are further apart, as those of
-# fewer than 50 elements are.
+# Share of the pad's side. Nodes closer than this are in one row; rows of fewer than 50 elements are
+# further apart.
 ROW_SHARE = 0.01
 
 
 def rows_and_columns(x: Array, y: Array) -> Indices | None:
-    """Numbers of the nodes ``(nx, ny)``, x and y ascending, of places ``(j,)`` each [mm].
+    """Return node numbers ``(nx, ny)``, x and y ascending, for places ``(j,)`` each [mm].
 
-    None where they are not in two or more rows and columns, each crossing with one node.
+    Returns None unless there are two or more rows and columns with one node at each crossing.
     """
     row, column = _lines(x), _lines(y)
     shape = int(row.max()) + 1, int(column.max()) + 1
@@ -26,7 +26,7 @@ def rows_and_columns(x: Array, y: Array) -> Indices | None:
 
 
 def _lines(places: Array) -> Indices:
-    """Which line every node is on ``(j,)``, counted from the smallest coordinate."""
+    """Return the number of the line of every node ``(j,)``, from the smallest coordinate."""
     order = np.argsort(places, kind="stable")
     new = np.diff(places[order]) > ROW_SHARE * np.ptp(places)
     lines = np.zeros(len(places), dtype=np.int64)

@@ -1,12 +1,12 @@
-"""A vibration case for ParaView: the pad through a cycle at resonance, a series for each force.
+"""ParaView files of a vibration case: the pad through a cycle at resonance, one series per force.
 
-``cycle_<n>.pvd`` over the time of a cycle [s], every step a mesh of the pad
-(``cycle_<n>/<step>.vtu``) with its fields at the nodes. Vectors are those of the interface frame:
-body 2 relative to body 1, and the force of body 1 on body 2. Warp By Vector on ``vibration``,
-``displacement`` less its mean over the cycle, shows its vibration. The axes are those of the face,
-and so the global ones of these files. ``view.py`` shows the largest force. ``state`` is 0 where a
-node sticks, 1 where it slips and 2 where it is apart: between the nodes it means nothing, so that
-it is best seen on points or glyphs.
+``cycle_<n>.pvd`` is over the time of a cycle [s]. Every step is a mesh of the pad
+(``cycle_<n>/<step>.vtu``) with its fields at the nodes. Vectors are in the interface frame: body 2
+relative to body 1, and the force of body 1 on body 2. Warp By Vector on ``vibration``, which is
+``displacement`` less its mean over the cycle, shows the vibration. The axes of the face are the
+global axes of these files. ``view.py`` shows the largest force. ``state`` is 0 where a node sticks,
+1 where it slips and 2 where it is apart. It has no meaning between the nodes, so show it on points
+or glyphs.
 """
 
 from __future__ import annotations
@@ -28,17 +28,17 @@ from workflow.pictures.vtk import SECONDS, Fields, Step, attach, quadrilaterals,
 if TYPE_CHECKING:
     import pyvista
 
-# Steps of a cycle that are played smoothly, and do not fill the disk.
+# Number of steps that play smoothly and use little disk space.
 MOST_STEPS = 48
-# A joint counts its closing positive, which is body 2 along -z, and resists: its force on body 2 is
-# against the displacement.
+# A joint counts its closing as positive, which moves body 2 along -z. It resists: its force on body
+# 2 is opposite to the displacement.
 TO_FRAME = np.array([1.0, 1.0, -1.0])
 
 
 def write_vibration(contents: Contents, file: h5py.File, folder: Path) -> list[Path]:
-    """Write the cycle of every force and the script; returns the paths.
+    """Write the cycle of every force and the script, and return the paths.
 
-    Nothing where joints have no places.
+    Writes nothing where joints have no places.
     """
     if not contents.places:
         return []
@@ -50,7 +50,7 @@ def write_vibration(contents: Contents, file: h5py.File, folder: Path) -> list[P
 
 
 def _write_view(contents: Contents, file: h5py.File, folder: Path) -> Path:
-    """The script that shows the cycle under the largest force."""
+    """Write the script that shows the cycle under the largest force, and return its path."""
     largest = max(contents.responses, key=lambda n: amount_in(file["responses"][n].attrs)[1])
     series, motion = f"cycle_{largest}.pvd", "vibration [mm]"
     views = [
@@ -72,7 +72,7 @@ def _cycle(contact: h5py.Group, response: h5py.Group, folder: Path) -> Iterator[
 
 
 def shown_samples(count: int) -> range:
-    """The samples of a cycle that are shown, of so many: in even steps, a whole number if can be.
+    """Return the samples of a cycle to show, in even steps that divide the cycle if possible.
 
     >>> shown_samples(256)
     range(0, 256, 8)
@@ -96,7 +96,7 @@ def _fields(contact: h5py.Group, cycle: h5py.Group, step: int, mean: Array) -> F
 
 
 def pad_mesh(places: h5py.Group) -> pyvista.UnstructuredGrid:
-    """Quadrilaterals between the nodes, or the nodes alone if they are not in rows and columns."""
+    """Return quadrilaterals between the nodes, or the nodes alone if not in rows and columns."""
     import pyvista
 
     x, y = places["x"][()], places["y"][()]

@@ -1,4 +1,4 @@
-"""Places that a vibration case names, held against its structure before anything runs."""
+"""Check of the places that a vibration case names, before anything runs."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ def check_places(
     ring: RingOfSectors | None = None,
     engine_order: int = 1,
 ) -> RigModel | None:
-    """The rig of a case, as far as it is known before a run; what is not there is refused.
+    """Return the rig of a case as far as it is known before a run, and refuse unknown places.
 
-    Records are taken up to the ``highest`` harmonic; see :func:`known_rig` for the rest.
+    Records are used up to the ``highest`` harmonic; see :func:`known_rig` for the other parameters.
     """
     with in_its_place():
         rig = known_rig(structure, joint, mass, ring, engine_order)

@@ -15,7 +15,7 @@ from workflow.shell.summary import estimate, told
 
 LINEAR, RECORDS = "linear limits", "left_out_of_records"
 ERROR = "joints' vibration or energy lost, by harmonics and samples"
-# Of the motion at resonance: unit, text, everyday unit.
+# Quantities of the motion at resonance: unit, text, everyday unit.
 NUMBERS = {
     "resonance": ("Hz", "resonance", ""),
     "amplitude": ("mm", "amplitude at resonance", ""),
@@ -24,7 +24,8 @@ NUMBERS = {
     "damping": ("1", "damping ratio at resonance", "%"),
     "slip": ("1", "share of the cycle in which joints slip", "%"),
 }
-# A resonance's frequency hardly depends on the amplitude: the error is that of the motion.
+# A resonance's frequency hardly depends on the amplitude, so the error of the motion is not its
+# error.
 WITH_ERROR = "amplitude", "absolute_amplitude", "receptance", "energy_per_cycle"
 LOOP = {
     "energy": ("N mm", "energy of the loop", ""),
@@ -32,12 +33,12 @@ LOOP = {
     "stiffness": ("N/mm", "stick slope of the loop", "N/um"),
     "friction": ("1", "friction coefficient of the loop", ""),
 }
-# Where the ground moves, or the frequency is that of an engine.
+# Quantities at resonance where the ground moves, or the frequency is that of an engine.
 BESIDE = {
     "absolute_amplitude": ("mm", "absolute amplitude at resonance", ""),
     "speed": ("rad/s", "speed of the engine at resonance", "rpm"),
 }
-# Of a motion at a frequency that was asked for.
+# Quantities of a motion at a frequency of the case.
 ANSWER = {
     "amplitude": ("mm", "amplitude", ""),
     "absolute_amplitude": ("mm", "absolute amplitude", ""),
@@ -45,12 +46,12 @@ ANSWER = {
     "energy_per_cycle": ("N mm", "energy dissipated in a cycle", ""),
 }
 LOOP_WITH_ERROR = "energy", "stroke"
-# Of a mode over its amplitude.
+# Quantities of a mode over its amplitude.
 MODE = {
     "linear_frequency": ("Hz", "frequency of the linear mode", ""),
     "most_damped": ("1", "largest damping ratio", "%"),
 }
-# What runs are compared by, beside the numbers.
+# Curves by which runs are compared, in addition to the numbers.
 CURVES = (
     CurvesOf(
         "amplitude",
@@ -68,7 +69,7 @@ CURVES = (
 
 
 def main_results(case: VibrationCase, summary: Summary) -> list[Quantity]:
-    """Of the responses to all forces, their finest loops, and the limits stuck and sliding."""
+    """Return results of all responses, their finest loops, and the limits stuck and sliding."""
     limits = (
         Quantity(LINEAR, f"first natural frequency, joints {state}", f"{state}.0", "Hz")
         for state in ("stuck", "sliding", "free")
@@ -97,7 +98,7 @@ def main_results(case: VibrationCase, summary: Summary) -> list[Quantity]:
 def of_response(
     group: str, path: str, response: Mapping[str, Any], summary: Summary
 ) -> Iterator[Quantity]:
-    """The response to a force or level, which is at a ``path`` of the summary."""
+    """Yield results of the response to a force or level, at a ``path`` of the summary."""
     numbers = NUMBERS | {name: told for name, told in BESIDE.items() if name in response}
     if amount_in(response)[0] is LEVEL:
         numbers |= {"receptance": ("mm", "amplitude over level at resonance", "")}
@@ -116,7 +117,7 @@ def _of_mode(group: str, path: str, summary: Summary) -> Iterator[Quantity]:
 def _of_answers(
     group: str, path: str, response: Mapping[str, Any], summary: Summary
 ) -> Iterator[Quantity]:
-    """Motions at the frequencies that were asked for: of several that coexist, each."""
+    """Yield results of motions at the frequencies of the case, of each one that coexists."""
     for place, answer in enumerate(response.get(AT, ())):
         count = len(answer["motions"])
         for number in range(count):

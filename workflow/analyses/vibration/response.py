@@ -1,4 +1,4 @@
-"""The motions of a structure with joints under one force: its curve, its resonance, its loops."""
+"""Motions of a structure with joints under one force: curve, resonance and loops."""
 
 from __future__ import annotations
 
@@ -43,23 +43,24 @@ from workflow.errors import MethodFailed
 from workflow.shell.dataset import Dataset, Datasets
 from workflow.shell.reporter import FORECAST, Reporter
 
-# Times of a period from which amplitudes are taken: between them harmonic 1 is 5e-6 larger.
+# Times of a period from which amplitudes are taken. The true amplitude of harmonic 1 is at most
+# 5e-6 larger.
 TIMES = 1024
-# Of the frequency at which the amplitude is largest.
+# Tolerance on the frequency of the largest amplitude, relative to it.
 RESONANCE_TOLERANCE = 1e-6
-# Error of a motion by its harmonics and samples that is warned of where no tolerance is given.
+# Error of a motion, due to harmonics and samples, that gives a warning if there is no tolerance.
 LARGEST_ERROR = 0.05
-# Points of a curve, usually, where the frequency or the force grows by a factor of e; this counts
-# until so large a share of the curve is known.
+# Usual number of points of a curve while the frequency or the force grows by a factor of e. It
+# weighs as much as this known share of the curve in predictions.
 POINTS, BEGUN = 50, 0.2
-# Why a curve may end at a resonance.
+# Reason why a curve may end at a resonance.
 UNBOUNDED = "; without damping what the joints do not hold back has no bound at resonance"
 
 
 def step_control(
     case: VibrationCase, watch: Callable[[float], None] = lambda parameter: None
 ) -> ContinuationControl:
-    """How the case wants its curves followed, by whom each new point is told to."""
+    """Return the step control of curves that the case asks for; ``watch`` gets each new point."""
     steps = case.continuation
     return ContinuationControl(
         first=steps.first_step,
@@ -77,10 +78,10 @@ def step_control(
 def progress_along(
     span: tuple[float, float], upward: bool, unit: str, reporter: Reporter
 ) -> Callable[[float], None]:
-    """Tells how far a curve has got along a ``span``, by its points.
+    """Return a callback that reports the progress of a curve along a ``span``, from its points.
 
-    The rest has as many points for its logarithm as what is behind, and the usual ones to begin
-    with. Points that turn back are still ahead.
+    The rest is assumed to have as many points per logarithm as the part behind. At the beginning,
+    the usual number counts. Points that turn back do not reduce the progress.
     """
     begin, end = span if upward else span[::-1]
     length = abs(float(np.log(end / begin)))
@@ -99,7 +100,7 @@ def progress_along(
 
 
 def accuracy_of(case: VibrationCase) -> Accuracy | None:
-    """How accurate the case wants its motions, None where their resolution is given."""
+    """Return the accuracy of motions that the case asks for, None if the resolution is given."""
     tolerance = case.resolution.tolerance
     if tolerance is None:
         return None
@@ -110,10 +111,10 @@ def accuracy_of(case: VibrationCase) -> Accuracy | None:
 def response_under(
     case: VibrationCase, model: VibrationModel, force: float, reporter: Reporter, steps: Steps
 ) -> tuple[Response, ResponseBranch]:
-    """What the structure does under a force, and the branch of motions that it was taken from.
+    """Return the response under a force, and the branch of motions that it was taken from.
 
-    Raises MethodFailed where there is no motion at all. A curve that ends before its span does is
-    told as a warning.
+    Raises MethodFailed where there is no motion at all. A curve that ends before its span does
+    gives a warning.
     """
     accuracy, upward = accuracy_of(case), case.continuation.start == "lower"
     told = case.amount.told(force)
@@ -147,7 +148,7 @@ def response_under(
         reporter.warn(f"{told}: no resonance, the largest motion is at an end of the curve")
     reporter.doing(f"{told}: resonance")
     peak = steps("resonance", lambda: _resonance(model, branch, curves))
-    # The peak may have been found before the resolution grew.
+    # The peak may have been found before the resolution was refined.
     problem = branch.problem.refined(peak.resolution)
     resonance = steps("accurate resonance", lambda: accurate(problem, peak, accuracy))
     warn_of_stroke(model, f"{told}: at resonance", resonance, reporter)
@@ -167,7 +168,7 @@ def response_under(
 
 
 def warn_of_error(motion: str, error: float, case: VibrationCase, reporter: Reporter) -> None:
-    """Warn of a motion that is less accurate than the case wants, or than any should be."""
+    """Warn of a motion that is less accurate than the case asks for, or than any should be."""
     tolerance = case.resolution.tolerance
     if tolerance is None and error > LARGEST_ERROR:
         reporter.warn(
@@ -184,10 +185,10 @@ def warn_of_error(motion: str, error: float, case: VibrationCase, reporter: Repo
 def force_sweep(
     case: VibrationCase, model: VibrationModel, frequency: float, reporter: Reporter, steps: Steps
 ) -> Curves:
-    """The motions at a frequency from the least force of a case to the largest.
+    """Return the motions at a frequency from the least force of a case to the largest.
 
-    Raises MethodFailed where there is none under the least. A curve that ends before the largest is
-    told as a warning.
+    Raises MethodFailed where there is none under the least force. A curve that ends before the
+    largest force gives a warning.
     """
     span = case.amounts[0], case.amounts[-1]
     control = step_control(case, progress_along(span, True, case.amount.unit, reporter))
@@ -230,7 +231,7 @@ def backbone_of(
     reporter: Reporter,
     steps: Steps,
 ) -> Curves | None:
-    """The curve of phase resonance through all forces, from the motions under one of them."""
+    """Return the curve of phase resonance through all forces, from motions under one of them."""
     span = case.amounts[0], case.amounts[-1]
     control = step_control(case, progress_along(span, True, case.amount.unit, reporter))
     backbone = along_phase_resonance(
@@ -271,7 +272,7 @@ def _numbers(
     problem: HarmonicBalance,
     resonance: HarmonicSolution,
 ) -> dict[str, Any]:
-    """What a force does, for the summary."""
+    """Return numbers of the response to a force, for the summary."""
     every = (*branch.solutions, resonance)
     amplitudes, resolution = amplitudes_of(model, resonance), resonance.resolution
     return {
@@ -296,7 +297,7 @@ def _numbers(
 def _beside(
     case: VibrationCase, model: VibrationModel, resonance: HarmonicSolution
 ) -> dict[str, Any]:
-    """Of a moving ground, an engine and a ring what there is to tell."""
+    """Return numbers that only a moving ground, an engine or a ring has."""
     numbers: dict[str, Any] = {}
     if model.driving.ground:
         absolute = amplitudes_of(model, model.driving.absolute(resonance))
@@ -312,7 +313,7 @@ def _beside(
 def curves_of(
     case: VibrationCase, model: VibrationModel, branch: ResponseBranch | FurtherBranch
 ) -> dict[str, Dataset]:
-    """What structure and joints do along a branch, over the frequency."""
+    """Return results of structure and joints along a branch, over the frequency."""
     along = "frequency of the force, in the order of the curve"
     frequencies = {"frequency": Dataset(branch.frequencies, "Hz", along)}
     if case.engine_order is not None:
@@ -322,7 +323,7 @@ def curves_of(
 
 
 def _of_the_last(amplitudes: Dataset) -> Dataset:
-    """Amplitude ``(n,)`` of what is looked at, of all that is seen ``(n, k)``."""
+    """Return the main observed amplitude ``(n,)`` of all observed ones ``(n, k)``."""
     last = amplitudes.values[:, -1]
     return Dataset(last, "mm", "half of the way to and fro of what is looked at")
 
@@ -330,7 +331,7 @@ def _of_the_last(amplitudes: Dataset) -> Dataset:
 def motion_columns(
     model: VibrationModel, problem: HarmonicBalance, motions: Sequence[HarmonicSolution]
 ) -> dict[str, Dataset]:
-    """What structure and joints do along a curve, ``(n,)`` each; amplitudes ``(n, k)``."""
+    """Return results of structure and joints along a curve ``(n,)``, amplitudes ``(n, k)``."""
 
     def column(of: Callable[[HarmonicSolution], Array | float], unit: str, what: str) -> Dataset:
         return Dataset(np.array([of(motion) for motion in motions]), unit, what)
@@ -363,24 +364,24 @@ def motion_columns(
 
 
 def _phase(solution: HarmonicSolution, seen: Array) -> float:
-    """Angle of harmonic 1 over that of a sine, -i."""
+    """Return the phase of harmonic 1 relative to a sine, whose coefficient is -i."""
     first = solution.motion[solution.resolution.harmonics.index(1)] @ seen
     return float(np.angle(1j * first))
 
 
 def amplitudes_of(model: VibrationModel, solution: HarmonicSolution) -> Array:
-    """Half of the way to and fro ``(k,)`` of what is seen [mm]."""
+    """Return observed amplitudes ``(k,)``: half of the peak-to-peak displacement [mm]."""
     seen = replace(solution, motion=solution.motion @ model.rig.seen.T)
     return np.asarray(0.5 * np.ptp(seen.displacement(TIMES), axis=0))
 
 
 def amplitude_of(model: VibrationModel, solution: HarmonicSolution) -> float:
-    """Of what is looked at [mm]."""
+    """Return the main observed amplitude [mm]."""
     return float(amplitudes_of(model, solution)[-1])
 
 
 def _nodes(branch: ResponseBranch) -> dict[str, Dataset]:
-    """What each joint does along the curve."""
+    """Return results of each joint along the curve."""
     cycles = [motion.cycle for motion in branch.solutions]
     slip = np.array([(cycle.states == SLIP).mean(axis=0) for cycle in cycles])
     separated = np.array([(cycle.states == SEPARATED).mean(axis=0) for cycle in cycles])
@@ -394,7 +395,7 @@ def _nodes(branch: ResponseBranch) -> dict[str, Dataset]:
 
 
 def _cycle(solution: HarmonicSolution) -> dict[str, Dataset]:
-    """Displacements, forces and states of all joints in a cycle."""
+    """Return displacements, forces and states of all joints in a cycle."""
     displacement = (solution.resolution.basis @ solution.coefficients).transpose(1, 0, 2)
     states = solution.cycle.states.astype(np.int8)
     moved = "of each joint along x, y and its closing, at times of a cycle"
@@ -409,7 +410,7 @@ def _cycle(solution: HarmonicSolution) -> dict[str, Dataset]:
 def warn_of_stroke(
     model: VibrationModel, told: str, motion: HarmonicSolution, reporter: Reporter
 ) -> None:
-    """Warn where contacts move further than contacts of fixed pairs of nodes may, if placed."""
+    """Warn if contacts with places slide further than contacts of fixed pairs of nodes may."""
     if not len(model.rig.places):
         return
     moved = motion.resolution.basis @ motion.coefficients
@@ -428,9 +429,9 @@ def warn_of_stroke(
 
 
 def _resonance(model: VibrationModel, branch: ResponseBranch, curves: Datasets) -> HarmonicSolution:
-    """The motion in which what is looked at moves most: between the points beside the largest.
+    """Return the motion with the largest observed amplitude, searched around the largest point.
 
-    Where the curve folds there, or ends, the largest point itself.
+    Where the curve folds or ends there, this is the largest point itself.
     """
     sizes = curves["amplitude"].values[:, -1]
     place = int(np.argmax(sizes))
@@ -458,7 +459,7 @@ def _resonance(model: VibrationModel, branch: ResponseBranch, curves: Datasets) 
 def accurate(
     problem: HarmonicBalance, motion: HarmonicSolution, accuracy: Accuracy | None
 ) -> HarmonicSolution:
-    """The motion with its error; as accurate as asked for, if that is asked for."""
+    """Return the motion with its error, refined to the accuracy if one is asked for."""
     while True:
         error = resolution_error(problem, motion)
         motion, present = replace(motion, error=error), problem.resolution

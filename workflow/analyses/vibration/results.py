@@ -1,4 +1,4 @@
-"""What a vibration case leaves: results, tables, files for ParaView, figures, and the summary."""
+"""Output of a vibration case: results, tables, ParaView files, figures and the summary."""
 
 from __future__ import annotations
 
@@ -108,7 +108,7 @@ def _put_response(writer: ResultsWriter, place: str, amount: Amount, response: R
 def _put_bifurcations(
     writer: ResultsWriter, place: str, bifurcations: Bifurcations, amount: Amount
 ) -> None:
-    """Those of the curve at a place, if there are any."""
+    """Write the bifurcations of the curve at a place, if there are any."""
     if bifurcations:
         kinds = [str(found["kind"]) for found in bifurcations]
         datasets = bifurcation_datasets(bifurcations, amount)
@@ -118,7 +118,7 @@ def _put_bifurcations(
 def put_response_curves(
     writer: ResultsWriter, place: str, amount: Amount, response: Response
 ) -> None:
-    """The curves of a response and its numbers."""
+    """Write the curves of a response and its numbers."""
     numbers = {amount.name: response.force, **response.numbers}
     writer.put(place, response.curves, Along("frequency"), **numbers)
 
@@ -127,7 +127,7 @@ def put_response_curves(
 
 
 def _write_tables(outcome: VibrationOutcome, folder: OutputFolder) -> None:
-    """Responses, backbone, force sweeps and what else there is as CSV."""
+    """Write responses, backbone, force sweeps and all other curves as CSV."""
     _write_responses(outcome, folder)
     if outcome.diameters is not None:
         path = folder.reserve(f"{DIAMETERS}.csv", "natural frequencies, over nodal diameters")
@@ -161,7 +161,7 @@ def _write_tables(outcome: VibrationOutcome, folder: OutputFolder) -> None:
 
 
 def _write_responses(outcome: VibrationOutcome, folder: OutputFolder) -> None:
-    """Responses, their harmonics and loops, the finest, and motions as asked for."""
+    """Write responses, their harmonics, their finest loops, and motions at given frequencies."""
     for number, response in enumerate(outcome.responses):
         under = f"{outcome.case.amount.under(response.force)}"
         path = folder.reserve(f"frf_{number:05d}.csv", f"response {under}, over frequency")
@@ -180,7 +180,7 @@ def _write_responses(outcome: VibrationOutcome, folder: OutputFolder) -> None:
 
 
 def _every_bifurcation(outcome: VibrationOutcome) -> Iterator[tuple[str, Mapping[str, Any]]]:
-    """All bifurcations, each with the name of the curve that it is on."""
+    """Yield all bifurcations, each with the name of the curve that it is on."""
     for response in outcome.responses:
         yield from (
             (outcome.case.amount.told(response.force), found) for found in response.bifurcations
@@ -236,7 +236,7 @@ def _response_summary(amount: Amount, response: Response) -> dict[str, Any]:
 
 
 def _lines(outcome: VibrationOutcome) -> Iterator[str]:
-    """The end of the run in a few lines."""
+    """Yield lines on the results, for the end of the run."""
     if outcome.case.ring is not None:
         yield f"  {outcome.case.waves}"
     for response in outcome.responses:
@@ -254,7 +254,7 @@ def _lines(outcome: VibrationOutcome) -> Iterator[str]:
 
 
 def _response_line(case: VibrationCase, response: Response, label: str) -> str:
-    """What a force does."""
+    """Return a line on the response to a force."""
     numbers = response.numbers
     parts = [
         f"{case.amount.told(response.force)}: resonance {numbers['resonance']:.5g} Hz",
@@ -273,7 +273,7 @@ def _response_line(case: VibrationCase, response: Response, label: str) -> str:
 
 
 def _beside(numbers: Mapping[str, Any]) -> str:
-    """What there is to tell of a moving ground, and of an engine."""
+    """Return text on a moving ground and on an engine, empty without these."""
     text = ""
     if "absolute_amplitude" in numbers:
         absolute = TO_MICRONS * numbers["absolute_amplitude"]
@@ -284,7 +284,7 @@ def _beside(numbers: Mapping[str, Any]) -> str:
 
 
 def _answer_lines(answers: Answers, label: str) -> Iterator[str]:
-    """A line for each motion at a frequency that was asked for."""
+    """Yield a line for each motion at a frequency of the case."""
     for numbers in answers.numbers:
         at = f"    at {numbers['frequency']:g} Hz"
         if numbers["message"]:

@@ -1,4 +1,4 @@
-"""What is known of a ring of which a vibration case has one sector: its nodal diameters."""
+"""Natural frequencies of a ring, by nodal diameters, where a case has one of its sectors."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ OF_EACH = "lowest natural frequencies of each number of nodal diameters"
 
 
 def frequencies_by_diameters(sector: CyclicSector, stuck: Array) -> dict[str, Dataset]:
-    """Natural frequencies ``(d, m)`` with joints free and as ``stuck`` ``(j, d, d)``."""
+    """Return natural frequencies ``(d, m)`` with joints free and as ``stuck`` ``(j, d, d)``."""
     most = range(sector.ring.sectors // 2 + 1)
     models = [sector.at(number) for number in most]
     free, held = (

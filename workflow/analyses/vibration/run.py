@@ -1,4 +1,4 @@
-"""A vibration case: the steady motions of a structure along frequency, force by force."""
+"""Runs of vibration cases: steady motions along frequency, force by force."""
 
 from __future__ import annotations
 
@@ -27,16 +27,16 @@ from workflow.shell.analysis import Run
 from workflow.shell.reporter import Reporter
 from workflow.shell.steps import kept_steps
 
-# Of a record's force, a share above its highest harmonic that is warned of.
+# Share of a record's force above its highest harmonic that gives a warning.
 LEFT_OUT = 0.05
 
 
 def run_vibration(run: Run[VibrationCase]) -> None:
     """Run a vibration case to its end.
 
-    Raises UserError where joint or structure cannot be what the case says, MethodFailed where it
-    does not rest, or a force has no motion at all. A curve that ends before its span does is told
-    as a warning.
+    Raises UserError where a joint or structure is impossible, and MethodFailed where it has no
+    state at rest, or a force has no motion at all. A curve that ends before its span does gives a
+    warning.
     """
     try:
         with kept_steps(run) as steps:
@@ -80,7 +80,7 @@ def _outcome(case: VibrationCase, reporter: Reporter, steps: Steps) -> Vibration
                         known.append(other)
                         further.append(found)
             if case.backbone and backbone is None:
-                # From the least force on which there is a phase resonance.
+                # The backbone starts from the least force that has a phase resonance.
                 with curves.next("backbone"), reporter.stage("backbone"):
                     backbone = backbone_of(case, model, branch, reporter, steps)
         for frequency in case.force_sweeps:
@@ -88,7 +88,7 @@ def _outcome(case: VibrationCase, reporter: Reporter, steps: Steps) -> Vibration
                 sweeps.append(force_sweep(case, model, frequency, reporter, steps))
         for number in numbered:
             with curves.next(f"mode {number}"), reporter.stage("mode"):
-                # As many harmonics as the largest force needed.
+                # Use as many harmonics as the largest force needed.
                 found = mode_of(case, number, model, branch.problem, reporter, steps)
                 modes.append(found)
     return VibrationOutcome(
@@ -108,7 +108,7 @@ def _outcome(case: VibrationCase, reporter: Reporter, steps: Steps) -> Vibration
 
 
 def _tell_what_is_left_out(case: VibrationCase, model: VibrationModel, reporter: Reporter) -> None:
-    """Of records, and the stability of a large structure that nobody has asked for."""
+    """Report the parts of records that are left out, and stability that is not computed."""
     for number, share in enumerate(model.driving.left_out):
         reporter.log(f"record {number + 1}: {share:.2%} above its highest harmonic left out")
         if share > LEFT_OUT:
@@ -122,9 +122,10 @@ def _tell_what_is_left_out(case: VibrationCase, model: VibrationModel, reporter:
 
 @dataclass
 class _Curves:
-    """So many curves, taken as equal parts of the work.
+    """A number of curves, taken as equal parts of the work.
 
-    Where resolutions are ``growing`` with the force, the second is taken as twice the first, ...
+    Where resolutions are ``growing`` with the force, the second counts twice as much as the first,
+    the third three times, and so on.
     """
 
     count: int
@@ -133,20 +134,20 @@ class _Curves:
     begun: int = 0
 
     def next(self, name: str) -> AbstractContextManager[None]:
-        """The next one is followed."""
+        """Return a context for the next curve."""
         begin, self.begun = self.begun, min(self.begun + 1, self.count)
         return self.reporter.part(
             self._share(min(begin, self.count - 1)), self._share(self.begun), name
         )
 
     def _share(self, begun: int) -> float:
-        """Of the work, what so many curves are."""
+        """Return the share of the work of the first ``begun`` curves."""
         equal = begun / self.count
         return equal * (begun + 1) / (self.count + 1) if self.growing else equal
 
 
 def _across(case: VibrationCase, responses: list[Response]) -> dict[str, Any]:
-    """What the forces show together: where the peak is lowest, and whether resonances move on."""
+    """Return results of all forces together: the lowest receptance, and the trend of resonances."""
     resonances = [response.numbers["resonance"] for response in responses]
     lowest = min(responses, key=lambda response: response.numbers["receptance"])
     return {

@@ -1,4 +1,4 @@
-"""How long a vibration case takes."""
+"""Run time of a vibration case."""
 
 from __future__ import annotations
 
@@ -14,26 +14,27 @@ from workflow.analyses.vibration.case_base import VibrationCaseBase
 from workflow.case.loading import load_case
 from workflow.shell.run_time import RunTime
 
-# Points of a curve, usually, where the frequency or the force grows by a factor of e.
+# Usual number of points of a curve while the frequency or the force grows by a factor of e.
 POINTS = 50
-# Points that a motion at a frequency is as dear as.
+# Number of points of a curve that take as long as a motion at one frequency.
 ANSWER = 5
-# A point of a rig with one joint; the same where harmonics grow to a tolerance [s].
+# Time of a point of a rig with one joint, and where harmonics grow to a tolerance [s].
 POINT, GROWING_POINT = 5e-3, 3e-2
-# A point of so many unknowns, and the linear limits of so many directions, of joints [s].
+# Time of a point with MANY_UNKNOWNS unknowns of joints, and of the linear limits with DIRECTIONS
+# directions of joints [s].
 MANY, MANY_UNKNOWNS, MANY_POWER = 0.37, 4000.0, 1.5
 LIMITS, DIRECTIONS, CUBE = 25.0, 363.0, 3
-# Times that of modes that a damping matrix mixes: each harmonic is a solution of all of them.
+# Factor where a damping matrix couples the modes: each harmonic is then a solve with all of them.
 MIXED = 40.0
-# Stability of a point with one joint, and of so many directions of joints of which most slip [s];
-# directions up to which it is found unless the case says otherwise.
+# Time of the stability of a point with one joint, and with DIRECTIONS directions of joints of which
+# most slip [s]; most directions for which stability is computed by default.
 STABILITY, MANY_STABILITY, FEW_DIRECTIONS = 4e-2, 1.2, 12
-# Joints of a reduced body whose points are not counted.
+# Joints assumed for a reduced body whose points are not counted.
 JOINTS = 100
 
 
 def run_time(case: VibrationCase) -> RunTime:
-    """Of the structure, its linear limits, and all curves."""
+    """Return the time of the structure, its linear limits, and all curves."""
     span = log(case.frequencies[1] / case.frequencies[0])
     curves = len(case.amounts) * span
     if case.backbone or case.force_sweeps:
@@ -47,7 +48,7 @@ def run_time(case: VibrationCase) -> RunTime:
 
 
 def structure_time(case: VibrationCaseBase) -> float:
-    """Until curves can be followed [s]."""
+    """Return the time until curves can be followed [s]."""
     limits = LIMITS * (_directions(case) / DIRECTIONS) ** CUBE
     if isinstance(case.structure, FrictionRig):
         return limits + reduction_of(case.structure.specimens)
@@ -59,7 +60,7 @@ def structure_time(case: VibrationCaseBase) -> float:
 
 
 def point_time(case: VibrationCaseBase) -> float:
-    """Of a point of a curve [s]."""
+    """Return the time of a point of a curve [s]."""
     unknowns = _directions(case) * 2 * len(case.harmonics)
     structure, mixed = case.structure, 1.0
     if isinstance(structure, MatrixBody) and structure.matrices.damping is not None:
@@ -69,7 +70,7 @@ def point_time(case: VibrationCaseBase) -> float:
 
 
 def stability_time(case: VibrationCase) -> float:
-    """Of the stability of a point of a curve [s]."""
+    """Return the time of the stability of a point of a curve [s]."""
     directions = _directions(case)
     many = case.stability == "auto" and directions > FEW_DIRECTIONS
     if case.stability == "none" or many:
@@ -78,7 +79,7 @@ def stability_time(case: VibrationCase) -> float:
 
 
 def _directions(case: VibrationCaseBase) -> int:
-    """Of all joints."""
+    """Return the number of directions of all joints."""
     if isinstance(case.structure, RowOfMasses):
         return len(joints_of(case.structure, shared=False)) or 1
     joints = JOINTS

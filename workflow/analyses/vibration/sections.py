@@ -1,4 +1,4 @@
-"""Sections of vibration cases: how motions are found, followed and told."""
+"""Sections of vibration cases: resolution, continuation, loops, modes and further branches."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ Step = Annotated[float, Quantity("1", at_least=1e-12, at_most=10.0)]
 
 @dataclass(frozen=True)
 class HarmonicNumbers(Entry):
-    """How many odd harmonics from the first on, or the harmonics themselves: read as these."""
+    """A number of odd harmonics, counted from harmonic 1, or a list of harmonics."""
 
     @property
     def allowed(self) -> str:
@@ -53,7 +53,7 @@ class HarmonicNumbers(Entry):
 
 
 class MotionResolution(Section):
-    """Harmonics of the motion, and samples of a period in which the joint's force is found."""
+    """Harmonics of the motion, and samples per period for the joint force."""
 
     harmonics: Annotated[Sequence[int], HarmonicNumbers()] = entry(
         "how many odd ones, or a list; those to begin with if there is a tolerance; for contacts "
@@ -83,7 +83,7 @@ class MotionResolution(Section):
 
 
 class Continuation(Section):
-    """How a curve of motions is followed: steps are shares of the motion and of the frequency."""
+    """Continuation of a curve of motions; steps are shares of the motion and of the frequency."""
 
     first_step: Step = entry("with which a curve begins [1]", 0.02, default=0.02)
     shortest_step: Step = entry("at which the curve is given up [1]", 1e-6, default=1e-6)
@@ -139,7 +139,7 @@ class LoopsAt(Section):
 
     @property
     def text(self) -> str:
-        """Where they are found, and how finely."""
+        """Frequency, joints and resolution of the loops, for an outline."""
         highest = " and to ".join(str(harmonics[-1]) for harmonics in self.harmonics)
         of = "" if self.joints is None else f", of joint {self.joints}"
         return f"at {self.frequency:g} Hz{of}" + (f", harmonics to {highest}" if highest else "")
@@ -156,7 +156,7 @@ class LoopsAt(Section):
 
 
 class NonlinearModes(Section):
-    """Modes with joints, over their amplitude: with neither a force nor a phase to choose."""
+    """Modes with joints, over their amplitude: no force or phase has to be chosen."""
 
     numbers: Annotated[tuple[Annotated[int, Whole(1, 1000)], ...], Field(min_length=1)] = entry(
         "of the modes with joints as stiff as at rest, from the lowest, 1, on", [1], default=(1,)
@@ -175,14 +175,14 @@ class NonlinearModes(Section):
 
     @property
     def text(self) -> str:
-        """Which, and over what."""
+        """Numbers and amplitudes of the modes, for an outline."""
         least, largest = (1e3 * amplitude for amplitude in self.amplitudes)
         modes = ", ".join(map(str, self.numbers))
         return f"{modes}, at amplitudes of {least:g} to {largest:g} µm"
 
 
 class FurtherStart(Section):
-    """Where a branch is looked for that does not come from an end of the frequencies."""
+    """A start of the search for a branch not reached from an end of the frequencies."""
 
     force: DrivingForce = entry("one of forces, or of the excitation's levels [N]", "40 N")
     frequency: Frequency = entry("of motions that may be on it [Hz]", "200 Hz")

@@ -1,4 +1,4 @@
-"""Which motions of a curve are stable, and where that changes."""
+"""Stability of the motions of a curve, and the points where it changes."""
 
 from __future__ import annotations
 
@@ -21,20 +21,20 @@ from workflow.analyses.vibration.model import VibrationModel
 from workflow.shell.dataset import Dataset, Datasets
 from workflow.shell.reporter import Reporter
 
-# What the column says of a motion.
+# Values of the column of stability.
 CODES = {"stable": 1, "unknown": 0, "unstable": -1}
-# Motions whose stability is found in one step of a run.
+# Motions whose stability is computed in one step of a run.
 TOGETHER = 20
-# At a fold of the motion itself a multiplier is 1, and passes it: a fold of which neither is true,
-# this far from 1, is of the harmonics that are taken.
+# At a true fold of the motion, a multiplier passes through 1. If all are at least this far from 1,
+# and their number beyond 1 does not change, the fold is due to missing harmonics.
 AWAY = 0.1
 
 
 @dataclass(frozen=True)
 class CurveStability:
-    """Of the motions of a curve: ``columns`` ``(n,)`` each, and its ``bifurcations``.
+    """Stability of a curve: ``columns`` ``(n,)`` each along it, and its ``bifurcations``.
 
-    ``numbers`` are for the summary. All is empty where stability is not looked for.
+    ``numbers`` are for the summary. All are empty where stability is not computed.
     """
 
     columns: Datasets
@@ -46,7 +46,7 @@ NOT_LOOKED_FOR = CurveStability({}, {}, ())
 
 
 def looked_for(case: VibrationCase, model: VibrationModel) -> bool:
-    """Whether stability is found: as the case says, or else where it is cheap."""
+    """Return whether stability is computed: as the case says, or else where it is cheap."""
     if case.stability == "auto":
         return Floquet(model.problem).cheap
     return case.stability == "every"
@@ -62,9 +62,9 @@ def stability_along(
     reporter: Reporter,
     steps: Steps,
 ) -> CurveStability:
-    """The stability of motions along a curve of this ``name``, and its bifurcations.
+    """Return the stability of motions along a curve of this ``name``, and its bifurcations.
 
-    ``amplitude`` of a motion [mm] is what these are told with.
+    ``amplitude`` returns the amplitude of a motion [mm], which is reported with bifurcations.
     """
     if not looked_for(case, model):
         return NOT_LOOKED_FOR
@@ -96,9 +96,9 @@ def stability_along(
 def _warn_of_folds(
     name: str, bifurcations: Sequence[Mapping[str, Any]], reporter: Reporter
 ) -> None:
-    """Warn of folds that more harmonics would not have.
+    """Warn of folds that would vanish with more harmonics.
 
-    Only where the motions on both sides are known: others deny no fold.
+    Only folds with known stability on both sides are checked.
     """
     for each in bifurcations:
         before, after = each["unstable_before"], each["unstable_after"]
@@ -118,7 +118,7 @@ def _stability_of(floquet: Floquet, motions: tuple[HarmonicSolution, ...]) -> tu
 
 
 def _columns(known: Sequence[Stability]) -> dict[str, Dataset]:
-    """Columns of motions; those of multipliers only where something is known of any."""
+    """Return columns of motions; multipliers are left out where none is known."""
     of = "of a small deviation in a period"
     verdicts = np.array([CODES[at.verdict] for at in known])
     columns = {"stability": Dataset(verdicts, "1", "1 stable, -1 unstable, 0 unknown")}
@@ -144,7 +144,7 @@ def _columns(known: Sequence[Stability]) -> dict[str, Dataset]:
 
 
 def _described(bifurcation: Bifurcation, amplitude: float, amount: Amount) -> dict[str, Any]:
-    """A bifurcation, of a motion of this amplitude [mm], for summary and tables."""
+    """Return a bifurcation with the amplitude of its motion [mm], for summary and tables."""
     motion, multiplier = bifurcation.motion, bifurcation.multiplier
     return {
         "kind": bifurcation.kind,
@@ -159,7 +159,7 @@ def _described(bifurcation: Bifurcation, amplitude: float, amount: Amount) -> di
 
 
 def columns_for(amount: Amount) -> dict[str, tuple[str, str]]:
-    """What is known of a bifurcation beside its kind: unit, and what it is."""
+    """Return the columns of a bifurcation other than its kind: name, unit and description."""
     return {
         "frequency": ("Hz", "of the force"),
         amount.name: (amount.unit, amount.description),
@@ -174,7 +174,7 @@ def columns_for(amount: Amount) -> dict[str, tuple[str, str]]:
 def bifurcation_datasets(
     bifurcations: Sequence[Mapping[str, Any]], amount: Amount
 ) -> dict[str, Dataset]:
-    """Columns ``(n,)`` of bifurcations, without their kinds."""
+    """Return columns ``(n,)`` of bifurcations, without their kinds."""
     return {
         name: Dataset(_numbers([found[name] for found in bifurcations]), unit, what)
         for name, (unit, what) in columns_for(amount).items()
@@ -182,7 +182,7 @@ def bifurcation_datasets(
 
 
 def _numbers(values: Sequence[float | None]) -> Array:
-    """Numbers ``(n,)``, NaN for what is not known."""
+    """Return numbers ``(n,)``, NaN for unknown ones."""
     if None not in values:
         return np.array(values)
     return np.array([np.nan if value is None else value for value in values])

@@ -1,4 +1,4 @@
-"""Vibration of a structure that wears the contacts it moves on: motion, wear, motion."""
+"""Vibration of a structure whose contacts wear by it: motion and wear in turn."""
 
 from workflow.analyses.vibration.memory import memory
 from workflow.analyses.vibration_wear.case import (
@@ -14,14 +14,14 @@ __all__ = ["ANALYSIS"]
 
 
 def _run(run: Run[VibrationWearCase | FrictionRigWearCase | ReducedWearCase]) -> None:
-    # Joint laws are compiled when they are first needed.
+    # Imported here, as joint laws are compiled when they are first imported.
     from workflow.analyses.vibration_wear.run import run_vibration_wear
 
     run_vibration_wear(run)
 
 
 def _pictures() -> Pictures:
-    # Plots take a second to load: where they are drawn.
+    # Imported here, as plotting takes a second to load.
     from workflow.analyses.vibration_wear.figures import figures_of
     from workflow.analyses.vibration_wear.outcome import Contents
     from workflow.analyses.vibration_wear.paraview import write_vibration_wear

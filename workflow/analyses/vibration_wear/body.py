@@ -1,4 +1,4 @@
-"""A reduced body as a vibrating structure whose joints are contacts that wear."""
+"""Reduced bodies as vibrating structures whose joints are contacts that wear."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ from workflow.shell.reporter import Reporter
 
 
 def body_model(case: ReducedWearCase, reporter: Reporter) -> VibrationModel:
-    """The body before the first cycle.
+    """Return the body before the first cycle.
 
-    Raises UserError for a structure, points or areas that cannot be.
+    Raises UserError for an impossible structure, or for wrong points or areas.
     """
     unworn, joint = case.unworn, case.joint
     rig = rig_model(case.structure, unworn.joint, None, reporter)
@@ -42,7 +42,7 @@ def body_model(case: ReducedWearCase, reporter: Reporter) -> VibrationModel:
         pressing=_pressing(case, rig, law),
         stretch=along.mean(axis=0),
         places=on_plane(rig.nodes),
-        # Below 0 where a load has closed it.
+        # Negative where a load has closed it.
         gap=np.broadcast_to(law.clearance, area.shape),
         area=area,
     )
@@ -50,9 +50,9 @@ def body_model(case: ReducedWearCase, reporter: Reporter) -> VibrationModel:
 
 
 def _pressing(case: ReducedWearCase, rig: RigModel, law: FrictionContact) -> Array:
-    """Forces ``(n,)`` of a normal load of 1 N: on the points that it presses, or on the contacts.
+    """Return forces ``(n,)`` of a normal load of 1 N, on the points it presses or the contacts.
 
-    The latter balance what each contact carries before it wears, at no displacement.
+    Forces on the contacts balance the load of each contact before it wears, without displacement.
     """
     pressed = case.joint.pressed
     if pressed is None:
@@ -62,9 +62,9 @@ def _pressing(case: ReducedWearCase, rig: RigModel, law: FrictionContact) -> Arr
 
 
 def on_plane(nodes: JointNodes) -> Array:
-    """Places ``(j, 2)`` along the axes across the normal, from their middle.
+    """Return places ``(j, 2)`` along the axes across the normal, from their middle.
 
-    None ``(0, 2)`` where they are not known, or have several normals.
+    Empty ``(0, 2)`` where the places are not known, or there are several normals.
     """
     if nodes.places is None or not nodes.alike:
         return np.empty((0, 2))

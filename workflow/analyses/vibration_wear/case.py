@@ -1,4 +1,4 @@
-"""Vibration cases whose contact wears: their forced response, computed anew as wear grows."""
+"""Vibration cases whose contact wears: forced responses, computed again as wear grows."""
 
 from __future__ import annotations
 
@@ -37,19 +37,19 @@ from workflow.case.source import Source
 if TYPE_CHECKING:
     from workflow.analyses.rig.rig_model import RigModel
 
-# Rows of the contact's own case that are told, and what they are called.
+# Rows of the outline of the contact's own case that are shown, with their names here.
 OF_CONTACT = {
     "structure": "shape",
     "material": "material",
     "friction": "friction",
     "wear law": "wear law",
 }
-# Of the cases with wear, what a vibration case of one state has no use for.
+# Entries of cases with wear that a vibration case of one state does not use.
 NOT_OF_A_STATE = ("assumed", "measured", "expect")
 
 
 def _unfit(bodies: BodiesWearCase) -> str:
-    """Why the contact of a wear case cannot be the joint of a rig."""
+    """Return why the contact of a wear case cannot be the joint of a rig; empty if it can."""
     if not isinstance(bodies.load_path, Reciprocation):
         return "a cycle of legs or a file; take load_path: {P, stroke}, of which P counts"
     if bodies.material(1) != bodies.material(2):
@@ -80,7 +80,7 @@ class WornContact(Section):
 
 
 class WearByVibration(Section):
-    """The force under which the contact wears, and the cycles after which responses are found."""
+    """The force that wears the contact, and the cycles after which responses are computed."""
 
     also_filled_in: ClassVar[tuple[str, ...]] = ("force",)
 
@@ -102,12 +102,12 @@ class WearByVibration(Section):
 
     @property
     def where(self) -> str:
-        """The frequency of the motion that wears, in words."""
+        """Frequency of the motion that wears, as text."""
         return f"at {self.frequency:g} Hz"
 
 
 class WearOfNodes(WearByVibration):
-    """The same of contacts at nodes, at resonance too; with the error of steps between them."""
+    """Wear of contacts at nodes, at resonance too, with a bound on the error of wear steps."""
 
     also_filled_in: ClassVar[tuple[str, ...]] = ("force", "frequency")
     in_schema: ClassVar[Mapping[str, Any]] = one_of("frequency", "at_resonance")
@@ -145,7 +145,7 @@ class WearOfNodes(WearByVibration):
 
 
 class WearOfBody(TwoBodies[BodyWear], Laws, WearOfNodes):
-    """The same with the laws of both bodies."""
+    """Wear of contacts at nodes of a reduced body, with the wear laws of both bodies."""
 
     body_1: BodyWear = entry("what the points of the joints meet: others, or the ground")
     body_2: BodyWear = entry("the body at the points of the joints")
@@ -190,7 +190,7 @@ class VibrationWearCaseBase(VibrationCaseBase):
 
     @property
     def wearing(self) -> float:
-        """The force [N], or the level, under which the contact wears."""
+        """Force [N], or level, under which the contact wears."""
         amount = self.wear.force if self.excitation is None else self.wear.level
         assert amount is not None
         return amount
@@ -213,7 +213,7 @@ class VibrationWearCaseBase(VibrationCaseBase):
             yield from about_modes("wear.frequency", span, self.structure)
 
     def _of_a_state(self, joint: Joint, mass: int | None = None) -> VibrationCase:
-        """The vibration case with this joint, driven at the mass of this number."""
+        """Return the vibration case with this joint, driven at the mass of this number."""
         shared = [name for name in VibrationCaseBase.model_fields if name not in NOT_OF_A_STATE]
         entries = {name: getattr(self, name) for name in shared}
         if isinstance(self.structure, RowOfMasses):
@@ -235,7 +235,7 @@ class VibrationWearCase(VibrationWearCaseBase, DrivenMass):
         return self
 
     def with_joint(self, normal_load: float, friction: float, stiffness: float) -> VibrationCase:
-        """The vibration case of one state of the contact, whose joint is described by these."""
+        """Return the vibration case of one state of the contact, given by its joint parameters."""
         joint = JenkinsJoint(
             law="jenkins", normal_load=normal_load, friction=friction, stiffness=stiffness
         )
@@ -279,7 +279,7 @@ class NodesWearCase(VibrationWearCaseBase):
         return self
 
     def _check_contacts(self, rig: RigModel) -> None:
-        """Raise EntryError for contacts that the rig has not."""
+        """Raise EntryError for contacts that the rig does not have."""
 
     @property
     def contacts(self) -> bool:
@@ -287,13 +287,13 @@ class NodesWearCase(VibrationWearCaseBase):
 
     @property
     def _law(self) -> FrictionContactJoint:
-        """That of all contacts before they wear."""
+        """Law of all contacts before they wear."""
         shared = FrictionContactJoint.model_fields.keys() & PadContacts.model_fields.keys()
         return FrictionContactJoint(**self.joint.model_dump(include=shared))
 
     @property
     def unworn(self) -> VibrationCase:
-        """The vibration case before the first cycle."""
+        """Vibration case before the first cycle."""
         return self._of_a_state(self._law)
 
     def outline(self) -> list[tuple[str, str]]:
@@ -336,7 +336,7 @@ class ReducedWearCase(NodesWearCase):
 
     @property
     def laws(self) -> tuple[WearLaw, WearLaw]:
-        """Those of body 1 and body 2."""
+        """Wear laws of body 1 and body 2."""
         return self.wear.body_1.described(), self.wear.body_2.described()
 
     def outline(self) -> list[tuple[str, str]]:

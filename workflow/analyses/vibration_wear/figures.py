@@ -1,4 +1,4 @@
-"""Figures of a vibration case with wear: responses as wear grows, what changes, and the scar."""
+"""Figures of a vibration case with wear: responses as wear grows, evolution and scar."""
 
 from __future__ import annotations
 
@@ -39,17 +39,17 @@ from workflow.pictures.scales import PER_MICRON, TO_JOULES, TO_MICRONS
 from workflow.pictures.style import BLACK, BLUE, GREEN, ORANGE, PURPLE
 from workflow.shell.results import grid_of
 
-# More curves, or panels, than this overlap.
+# More curves, or panels, than this would overlap.
 MOST_STATES, MOST_FORCES = 6, 3
-# Where the unworn contact stands on an axis of logarithms: so far before the first worn one.
+# Place of the unworn contact on a logarithmic axis, relative to the first worn one.
 BEFORE = 0.1
-# What is shown along the pad: of these datasets, the latter two per area of each node.
+# Datasets that are shown along the pad; the latter two are divided by the area of each node.
 PROFILE = {
     "gap": "gap without load [µm]",
     "normal_force": "pressure at rest [MPa]",
     "energy": "energy per cycle\nand area [mJ/mm²]",
 }
-# What leads from peak to peak.
+# Line from peak to peak.
 PEAKS: dict[str, Any] = {
     "color": BLACK,
     "marker": "o",
@@ -59,14 +59,14 @@ PEAKS: dict[str, Any] = {
     "label": "all peaks, in turn",
 }
 FORCE_COLOURS = (BLUE, ORANGE, GREEN, PURPLE)
-# What is shown over the cycles, two on a panel: dataset, scale and label.
+# Curves over the cycles, two on a panel: dataset, scale and label.
 Curve = tuple[str, float, str]
 MOTION: tuple[Curve, Curve] = (
     ("stroke", TO_MICRONS, "stroke under the force that wears [µm]"),
     ("energy_per_cycle", 1.0, "energy per cycle [mJ]"),
 )
 DEPTH: Curve = ("depth", TO_MICRONS, "largest worn depth [µm]")
-# For titles: dataset, scale, unit and what it is.
+# Numbers in titles: dataset, scale, unit and description.
 STUCK = "stuck", 1.0, "Hz", "First natural frequency, contact stuck"
 STIFFNESS = "stiffness", PER_MICRON, "N/µm", "Stiffness of the stuck contact"
 DEEPEST = "depth", TO_MICRONS, "µm", "Largest worn depth"
@@ -76,7 +76,7 @@ AT_NODES = DEPTH, ("touching", 1.0, "nodes in contact")
 
 
 def figures_of(contents: Contents) -> Figures:
-    """The figures of a run, by name."""
+    """Return the figures of a run, by name."""
     return {
         "frequency_response": frequency_response,
         "evolution": partial(evolution, contents=contents),
@@ -87,9 +87,9 @@ def figures_of(contents: Contents) -> Figures:
 
 
 def frequency_response(file: h5py.File) -> Figure:
-    """Amplitude of the last mass over the force, a panel per force, a curve for every state.
+    """Draw the last mass's amplitude over the force, a panel per force and a curve per state.
 
-    A line leads from peak to peak; where motions are unstable curves are dashed.
+    A line leads from peak to peak. Curves are dashed where motions are unstable.
     """
     forces, amount = list(file.attrs["forces"]), _amount(file)
     shown = spread(range(len(forces)), MOST_FORCES)
@@ -120,19 +120,19 @@ def frequency_response(file: h5py.File) -> Figure:
 
 
 def _peak(response: h5py.Group) -> tuple[float, float]:
-    """Frequency [Hz] and amplitude [mm] at resonance; none at an end of the curve."""
+    """Return frequency [Hz] and amplitude [mm] at resonance, NaN at an end of the curve."""
     frequency, at = response["frequency"][()], float(response.attrs["resonance"])
     inside = frequency.min() < at < frequency.max()
     return (at, float(response.attrs["amplitude"])) if inside else (np.nan, np.nan)
 
 
 def _amount(file: h5py.File) -> Amount:
-    """What responses are to: forces, or levels of an excitation."""
+    """Return the kind of factor of the responses: forces, or levels of an excitation."""
     return LEVEL if file.attrs.get("amount") == LEVEL.name else FORCE
 
 
 def evolution(file: h5py.File, contents: Contents) -> Figure:
-    """Stiffness, resonances, motion and scar against cycles; the unworn contact at the left."""
+    """Draw stiffness, resonances, motion and scar against cycles, from the unworn contact on."""
     history, forces = file[EVOLUTION], list(file.attrs["forces"])
     cycles = history["cycles"][()]
     place = np.append(BEFORE * cycles[1], cycles[1:])
@@ -155,7 +155,7 @@ def evolution(file: h5py.File, contents: Contents) -> Figure:
 
 
 def scar(file: h5py.File) -> Figure:
-    """Worn depth, pressure at rest and energy of a cycle, across the middle along x."""
+    """Draw worn depth, pressure at rest and energy of a cycle, across the middle along x."""
     grid = grid_of(file["grid"])
     middle, along = grid.shape[1] // 2, grid.x[:, 0]
     figure = new_figure(_change(file, *DEEPEST), 9.0)
@@ -175,7 +175,7 @@ def scar(file: h5py.File) -> Figure:
 
 
 def profile(file: h5py.File) -> Figure:
-    """Gap, pressure at rest and energy of a cycle of nodes along the pad's middle and diagonal."""
+    """Draw gap, pressure at rest and energy of a cycle along the pad's middle and diagonal."""
     places = {name: file[PLACES][name][()] for name in ("x", "y", "area")}
     sections = _sections(places["x"], places["y"])
     figure = new_figure(_change(file, *DEEPEST), 9.0)
@@ -195,9 +195,10 @@ def profile(file: h5py.File) -> Figure:
 
 
 def _sections(x: Array, y: Array) -> list[tuple[Array, Indices, str]]:
-    """Lines of nodes: places along each, numbers of its nodes, and what it is.
+    """Return lines of nodes: places along each, numbers of its nodes, and a label.
 
-    Where nodes are not in rows and columns, all of them over their distance from the middle.
+    Where nodes are not in rows and columns, there is one line of all nodes over their distance from
+    the middle.
     """
     numbers = rows_and_columns(x, y)
     if numbers is None:
@@ -210,7 +211,7 @@ def _sections(x: Array, y: Array) -> list[tuple[Array, Indices, str]]:
 
 
 def loops(file: h5py.File, contents: Contents) -> Figure:
-    """Loops under the force that wears; of a half-space also that of the tangential problem."""
+    """Draw loops under the force that wears; for a half-space, the full tangential problem too."""
     figure = new_figure(_change(file, *LOOP_ENERGY), 7.0)
     axis = figure.subplots()
     for state, colour in _states(file):
@@ -235,7 +236,7 @@ def _loop(group: h5py.Group) -> tuple[Array, Array]:
 
 
 def _draw_pair(axis: Axes, place: Array, history: h5py.Group, curves: Sequence[Curve]) -> None:
-    """Two curves on one panel, each on its own scale; where they lie on each other, both show."""
+    """Draw two curves on one panel, each on its own scale, both visible where they coincide."""
     right = axis.twinx()
     sides = zip((axis, right), curves, (("o-", BLUE), ("s:", ORANGE)), strict=True)
     for side, (name, scale, label), (line, colour) in sides:
@@ -246,7 +247,7 @@ def _draw_pair(axis: Axes, place: Array, history: h5py.Group, curves: Sequence[C
 
 
 def _states(file: h5py.File) -> list[tuple[h5py.Group, Any]]:
-    """The states that are shown, each with its colour."""
+    """Return the states to show, each with its colour."""
     return [(file[WORN][name], colour) for name, colour in shaded(sorted(file[WORN]), MOST_STATES)]
 
 
@@ -256,7 +257,7 @@ def _cycles(state: h5py.Group) -> str:
 
 
 def _change(file: h5py.File, name: str, scale: float, unit: str, what: str) -> str:
-    """What became of a number from the first state to the last, for a title."""
+    """Return a title on the change of a number from the first state to the last."""
     history = file[EVOLUTION]
     cycles = history["cycles"][()]
     values = scale * history[name][()].reshape(len(cycles), -1)[:, 0]

@@ -1,7 +1,8 @@
-"""A vibration case whose contact wears: motion, wear, motion, and the responses on the way.
+"""Runs of vibration cases whose half-space contact wears: motion and wear in turn.
 
-Wear steps take their slips from the rig's motion on the surfaces before them, and know the motion
-on those after them: their error estimate covers what the motion changes, and sets their length.
+Wear steps take their slips from the rig's motion on the surfaces at their beginning, and the motion
+at their end is known too. The error estimate of the steps thus covers the change of the motion, and
+sets their length.
 """
 
 from __future__ import annotations
@@ -48,17 +49,17 @@ from workflow.shell.dataset import Dataset
 from workflow.shell.few_cells import check_cells
 from workflow.shell.reporter import Reporter
 
-# Of the motion at which all of the contact slides: where loops in partial slip are compared.
+# Share of the motion of full slip, at which loops in partial slip are compared.
 PARTIAL = 0.5
 
 
 def wear_half_space(
     case: VibrationWearCase, reporter: Reporter, steps: Steps
 ) -> VibrationWearOutcome:
-    """All that is kept of a run.
+    """Return the outcome of a run.
 
-    Raises UserError where contact or rig cannot be what the case says, and what contact problems
-    and motions raise that are not found.
+    Raises UserError where contact or rig cannot be built as the case describes them. Errors of
+    contact problems and motions without a solution pass through.
     """
     bodies = load_case(case.contact.file, [BodiesWearCase])
     rig, wear = row_of_masses(case.structure, case.mass or 1), case.wear
@@ -77,7 +78,7 @@ def wear_half_space(
 
 @dataclass(frozen=True)
 class _Description:
-    """Finds what is kept of a state."""
+    """A callable that builds the description of a state."""
 
     case: VibrationWearCase
     contact: VibratingContact
@@ -85,7 +86,10 @@ class _Description:
     steps: Steps
 
     def __call__(self, state: WearState, cycles: float, steps: int) -> WornState:
-        """The contact after so many cycles, in ``steps`` since the last, and the rig on it."""
+        """Return the contact after a number of ``cycles``, and the rig on it.
+
+        ``steps`` is the number of wear steps since the last state.
+        """
         cycle = self.contact.at(state)
         with self.reporter.stage("half-space loops"):
             amplitudes = 0.5 * cycle.stroke, PARTIAL * cycle.full_slip
@@ -105,7 +109,10 @@ class _Description:
         return WornState(cycles, numbers | linear, _fields(cycle, loop), responses)
 
     def _responses(self, cycle: ContactCycle) -> tuple[float, tuple[Response, ...], dict[str, Any]]:
-        """The error of the cycle's motion, the responses to all forces, natural frequencies."""
+        """Return the error of the cycle's motion, the responses to all forces, and frequencies.
+
+        The frequencies are the natural ones with joints free, stuck and sliding.
+        """
         load, friction, rig = self.contact.load, cycle.friction, self.contact.rig
         stiffness = cycle.slipping.stiffness
         case = self.case.with_joint(load, friction, stiffness)
@@ -154,7 +161,7 @@ class _Description:
 
 
 def _energy_error(cycle: ContactCycle, loop: TangentialLoop) -> float:
-    """By how much the sliders lose more in a loop than the whole tangential problem, relative."""
+    """Return the excess energy of the sliders over the full tangential problem, relative."""
     by_sliders = float(cycle.sliders.loop_energy(loop.amplitude).sum())
     larger = max(by_sliders, loop.energy)
     return (by_sliders - loop.energy) / larger if larger > 0.0 else 0.0
@@ -175,7 +182,7 @@ def _fields(cycle: ContactCycle, loop: TangentialLoop) -> dict[str, dict[str, Da
 
 
 def _contact_fields(cycle: ContactCycle) -> dict[str, Dataset]:
-    """Fields of the grid."""
+    """Return fields of the grid."""
     normal, surfaces = cycle.slipping.normal, cycle.state.surfaces
     gap = np.maximum(normal.gap, 0.0) * (normal.pressure == 0.0)
     sticks = "motion of the joint from rest up to which each cell sticks"
@@ -190,7 +197,7 @@ def _contact_fields(cycle: ContactCycle) -> dict[str, Dataset]:
 
 
 def _slider_fields(cycle: ContactCycle) -> dict[str, Dataset]:
-    """The sliders that the contact is to the rig, ``(n,)`` each."""
+    """Return the sliders that represent the contact in the rig, ``(n,)`` each."""
     slipping = cycle.slipping
     reach = cycle.friction * slipping.reach
     lost = "that it dissipates in a cycle under the force that wears"

@@ -22,7 +22,7 @@ from workflow.errors import EntryError
 WearingFriction = Annotated[float, Quantity("1", above=0.0, at_most=10.0)]
 Area = Quantity("mm^2", above=0.0, at_most=1e8)
 NodeGap = Quantity("mm", at_least=0.0, at_most=1e3)
-# Columns of a file of nodes beside the points.
+# Columns of a file of nodes, in addition to the points.
 AREA, GAP = "area", "gap"
 
 
@@ -38,9 +38,9 @@ class PadContacts(Joint):
 
 @dataclass(frozen=True)
 class NodeTable:
-    """What a file says of contacts by their ``points``, in its order.
+    """Contents of a file about contacts by their ``points``, in its order.
 
-    ``area`` ``(n,)`` [mm²] and ``gap`` ``(n,)`` [mm] are None where it has no such column.
+    ``area`` ``(n,)`` [mm²] and ``gap`` ``(n,)`` [mm] are None if the file has no such column.
     """
 
     table: TableFile
@@ -49,7 +49,10 @@ class NodeTable:
     gap: Array | None
 
     def order(self, points: Sequence[str]) -> list[int]:
-        """The rows of these points. Raises InputFileError unless each has one, and no other."""
+        """Return the rows of these points.
+
+        Raises InputFileError unless each point has one row, and there are no others.
+        """
         rows = {point: row for row, point in enumerate(self.points)}
         for point, row in rows.items():
             if point not in points:
@@ -63,7 +66,7 @@ class NodeTable:
 
 
 def read_nodes(file: str) -> NodeTable:
-    """What a CSV file says of the contacts at nodes. Raises InputFileError."""
+    """Return the contents of a CSV file about contacts at nodes. Raises InputFileError."""
     table = read_table_file(file)
     table.require(("point",), "a column point, and area or gap")
     table.check({"point": None, AREA: Area.unit, GAP: NodeGap.unit})
@@ -133,9 +136,9 @@ class NodeContacts(PadContacts):
         return self
 
     def of_points(self, points: Sequence[str]) -> tuple[Array, Array]:
-        """Area [mm²] and gap [mm] of contacts at these points ``(j,)``.
+        """Return area [mm²] and gap [mm] of contacts at these points ``(j,)``.
 
-        Raises EntryError for a file of nodes that has others.
+        Raises EntryError for a file of nodes with other points.
         """
         count = len(points)
         area, gap = np.full(count, (self.area or 0.0) / count), np.zeros(count)

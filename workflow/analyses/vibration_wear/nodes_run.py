@@ -1,4 +1,4 @@
-"""A structure that wears its contacts at nodes: motion, wear, motion, responses on the way."""
+"""Runs of structures that wear their contacts at nodes: motion and wear in turn."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ from workflow.shell.reporter import Reporter
 def wear_nodes(
     case: FrictionRigWearCase | ReducedWearCase, reporter: Reporter, steps: Steps
 ) -> VibrationWearOutcome:
-    """All that is kept of a run."""
+    """Return the outcome of a run."""
     wear = case.wear
     unworn, laws = _unworn(case, reporter)
     search = partial(resonance_that_wears, case) if wear.at_resonance else None
@@ -81,7 +81,7 @@ def wear_nodes(
 def _unworn(
     case: FrictionRigWearCase | ReducedWearCase, reporter: Reporter
 ) -> tuple[VibrationModel, tuple[WearLaw, WearLaw]]:
-    """The structure before the first cycle, and the laws of body 1 and body 2."""
+    """Return the structure before the first cycle, and the wear laws of body 1 and body 2."""
     if isinstance(case, ReducedWearCase):
         return body_model(case, reporter), case.laws
     specimens = load_case(case.structure.specimens, [SpecimensCase])
@@ -89,9 +89,10 @@ def _unworn(
 
 
 def resonance_that_wears(case: NodesWearCase, problem: HarmonicBalance) -> HarmonicSolution:
-    """The phase resonance under what wears: the largest of the response within the frequencies.
+    """Return the phase resonance under the force that wears.
 
-    Raises :class:`wear.steps.stepping.ContactFailure` where there is none.
+    This is the resonance with the largest response within the frequencies. Raises
+    :class:`wear.steps.stepping.ContactFailure` where there is none.
     """
     force, upward = case.wearing, case.continuation.start == "lower"
     branch = along_frequency(
@@ -107,7 +108,7 @@ def resonance_that_wears(case: NodesWearCase, problem: HarmonicBalance) -> Harmo
 
 
 def _nodes(rig: RigModel) -> WornNodes:
-    """Where the contacts are, as far as it is known."""
+    """Return the places of the contacts, as far as they are known."""
     area = {"area": Dataset(rig.area, "mm^2", "that belongs to each node")}
     nodes = rig.nodes
     if nodes is None:
@@ -132,7 +133,10 @@ def _worn_state(
     reporter: Reporter,
     steps: Steps,
 ) -> WornState:
-    """The pads in a state, ``reached`` by so many cycles in all and steps since the last."""
+    """Return the pads in a state.
+
+    ``reached`` is the number of cycles in all, and of wear steps since the last state.
+    """
     cycles, taken = reached
     loop = loop_of(cycle.model, cycle.motion, case.laws[0].normal_load)
     error, responses = responses_to_all(case, cycle.model, cycle.motion, reporter, steps)
@@ -147,7 +151,8 @@ def _worn_state(
         "depth": float(depth.max()),
         "step_error": step_error(state, cycle.areas),
         "friction": float(np.max(cycle.law.friction)),
-        # Not of the loop: nodes that hardly touch slip at once, and it may never stick as a whole.
+        # Not the slope of the loop: nodes with little load slip at once, so that the contact may
+        # never stick as a whole.
         "stiffness": cycle.model.stuck_slope(cycle.motion.frequency),
         "stroke": loop.numbers["stroke"],
         "frequency": motion.frequency,

@@ -1,4 +1,4 @@
-"""What a vibration case with wear has found: the contact and the responses, state by state."""
+"""Results of a vibration case with wear: contact and responses, state by state."""
 
 from __future__ import annotations
 
@@ -15,21 +15,21 @@ from workflow.analyses.vibration.outcome import Response
 from workflow.analyses.vibration_wear.case import VibrationWearCaseBase
 from workflow.shell.dataset import Dataset, Datasets
 
-# Groups of a state, and the one that holds the states.
+# Groups of a state.
 CONTACT, SLIDERS, RESPONSES = "contact", "sliders", "responses"
 LOOP, HALF_SPACE = "loop", "half_space_loop"
-# The same of specimens, whose contact is at nodes, and the group of what does not wear.
+# Groups for contacts at nodes: fields of a state, and data that do not wear.
 NODES, PLACES = "nodes", "places"
 WORN, EVOLUTION = "worn", "evolution"
 # Coordinates of nodes in space, where they are known.
 POSITION = "position"
-# What wear steps have left before the first.
+# Error of wear steps before the first one.
 NOTHING_WORN = {"depth": 0.0}
 
 
 @dataclass(frozen=True)
 class Contents:
-    """What ``results.h5`` of such a case holds.
+    """Contents of ``results.h5`` of a vibration case with wear.
 
     The contact is ``at_nodes``, or on a grid with loops of its tangential problem. Nodes are
     ``placed`` where their coordinates are known, and ``on_plane`` where they have one normal.
@@ -42,9 +42,9 @@ class Contents:
 
 @dataclass(frozen=True)
 class WornState:
-    """The contact after so many ``cycles``, and what the rig does on it.
+    """The contact after a number of ``cycles``, and the responses of the rig on it.
 
-    ``fields`` by group; ``numbers`` for the summary.
+    ``fields`` are by group, ``numbers`` for the summary.
     """
 
     cycles: float
@@ -55,9 +55,9 @@ class WornState:
 
 @dataclass(frozen=True)
 class WornNodes:
-    """Nodes of a contact: what of them does not wear, and ``names`` ``(j,)`` where they have any.
+    """Nodes of a contact: data that do not wear, and ``names`` ``(j,)`` if the nodes have any.
 
-    ``datasets`` are area, and as far as they are known position, normal, and x and y on the plane.
+    ``datasets`` are the area and, as far as known, position, normal, and x and y on the plane.
     """
 
     datasets: Datasets
@@ -78,9 +78,9 @@ class VibrationWearOutcome:
 
     @property
     def evolution(self) -> dict[str, Dataset]:
-        """Numbers that every state of this kind has, against cycles ``(k,)``.
+        """Numbers of all states, against cycles ``(k,)``.
 
-        Those by force are ``(k, forces)``.
+        Numbers for each force are ``(k, forces)``.
         """
         rows = [
             {
@@ -122,12 +122,12 @@ class VibrationWearOutcome:
 
 
 def step_error(state: worn.WornState, areas: Array | float = 1.0) -> float:
-    """What wear steps leave of depth or volume, the larger; ``areas`` as for ``step_errors``."""
+    """Return the larger wear-step error of depth and volume; ``areas`` as for ``step_errors``."""
     return max((step_errors(state, areas) or NOTHING_WORN).values())
 
 
 def depth_fields(depth_1: Array, depth_2: Array) -> dict[str, Dataset]:
-    """What each body has lost, at cells or nodes."""
+    """Return the worn depths of both bodies, at cells or nodes."""
     return {
         "depth_1": Dataset(depth_1, "mm", "worn from body 1"),
         "depth_2": Dataset(depth_2, "mm", "worn from body 2"),
@@ -135,12 +135,12 @@ def depth_fields(depth_1: Array, depth_2: Array) -> dict[str, Dataset]:
 
 
 def path_field(path: Array) -> Dataset:
-    """How far surfaces slip over each other, at cells or nodes."""
+    """Return the slip path of a cycle, at cells or nodes."""
     return Dataset(path, "mm", "of slip in a cycle under the force that wears")
 
 
 def wearing_loop(displacement: Array, force: Array) -> dict[str, Dataset]:
-    """The loop of the joint in the motion that wears it."""
+    """Return the loop of the joint in the motion that wears it."""
     moved = "of the joint or the mean of all, or between the targets, under the force that wears"
     return {
         "displacement": Dataset(displacement, "mm", moved),

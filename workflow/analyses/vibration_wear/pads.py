@@ -1,9 +1,9 @@
-"""Contacts at the nodes of a vibrating structure: how they move, and what that takes off each.
+"""Contacts at the nodes of a vibrating structure: their motion, and the wear by it.
 
-They are those of two specimens in a rig, or at the joints of any reduced body. In a cycle of the
-steady motion by harmonic balance the contact of a node slides along a path and dissipates an
-energy; what both bodies lose by it is up to their laws. The gap grows by the depth, and rest and
-motion are found anew.
+The contacts are those of two specimens in a rig, or at the joints of any reduced body. In a cycle
+of the steady motion by harmonic balance, the contact of a node slides along a path and dissipates
+an energy; the wear laws of both bodies give their losses. The gap grows by the depth, and the state
+at rest and the motion are then computed again.
 """
 
 from __future__ import annotations
@@ -28,10 +28,10 @@ from wear.surfaces import Surfaces
 from workflow.analyses.vibration.excitation import FORCE, Amount
 from workflow.analyses.vibration.model import VibrationModel
 
-# Of the frequency of a resonance: by so much it moves from one state to the next. What Newton's
-# method finds farther away may be of another mode.
+# Relative change of a resonance's frequency from one state to the next. Farther away, Newton's
+# method may find another mode.
 CLOSE = 0.05
-# Pads of the last states: those before and after a step.
+# Number of stored cycles: those before and after a step.
 KEPT = 2
 
 
@@ -39,8 +39,8 @@ KEPT = 2
 class PadCycle:
     """Pads of one shape in a cycle of their ``motion`` under the force that wears them.
 
-    ``model`` is the rig on them. For wear each node slides its path at one pressure, with which it
-    dissipates what it does (:class:`wear.contact.nodes.NodalCycle`).
+    ``model`` is the rig on them. For wear, each node slides its path at one pressure, chosen so
+    that it dissipates its energy (:class:`wear.contact.nodes.NodalCycle`).
     """
 
     model: VibrationModel
@@ -48,17 +48,17 @@ class PadCycle:
 
     @property
     def energy(self) -> Array:
-        """What each contact dissipates in a cycle ``(j,)`` [N mm]."""
+        """Energy that each contact dissipates in a cycle ``(j,)`` [N mm]."""
         return self.motion.cycle.dissipated
 
     @property
     def areas(self) -> Array:
-        """Of each node ``(j,)`` [mm²]."""
+        """Area of each node ``(j,)`` [mm²]."""
         return self.model.rig.area
 
     @property
     def law(self) -> FrictionContact:
-        """That of each contact."""
+        """Law of the contacts."""
         assert isinstance(self.model.law, FrictionContact)
         return self.model.law
 
@@ -73,7 +73,7 @@ class PadCycle:
 
     @cached_property
     def pressure(self) -> Array:
-        """Of each node while it slides ``(1, j)`` [MPa]."""
+        """Pressure of each node while it slides ``(1, j)`` [MPa]."""
         sliding = np.asarray(self.friction) * self.areas * self.path
         pressure = np.divide(
             self.energy, sliding, out=np.zeros_like(self.path), where=self.path > 0.0
@@ -82,12 +82,12 @@ class PadCycle:
 
     @property
     def start(self) -> HarmonicSolution:
-        """The motion about rest, from which that of pads that rest elsewhere may begin."""
+        """Motion about the state at rest, as a start for the motion about another such state."""
         return _moved_by(self.motion, -self.model.problem.rest.displacement)
 
     @cached_property
     def path(self) -> Array:
-        """Way that each slider moves in a cycle while it is pressed ``(j,)`` [mm]."""
+        """Path of each slider in a cycle while it is pressed ``(j,)`` [mm]."""
         motion = self.motion
         moved = (motion.resolution.basis @ motion.coefficients).transpose(1, 0, 2)
         force = motion.cycle.samples
@@ -97,15 +97,15 @@ class PadCycle:
         return np.asarray((steps * (pressed | np.roll(pressed, 1, axis=0))).sum(axis=0))
 
     def stable_cycles(self, depth_per_pressure: Array) -> float:
-        """Cycles beyond which an explicit step would let an error of the shape grow.
+        """Return the number of cycles beyond which an explicit step would let a shape error grow.
 
-        A depth δ that is wrong changes the normal forces by -K δ, K = (1/kn + C)⁻¹: the contact
-        springs in series with the elastic bodies, whose compliance C is not negative, be it under
-        constant load or not. Depths per cycle change by -D K δ with D = w/A, w being the depth per
-        pressure. The eigenvalues of D K lie between 0 and max kn D: in ΔN = 1/(max kn D) an Euler
-        step multiplies errors by 1 - x, x between 0 and 1, and a step of second order by 1 - x +
-        x²/2. Both are stable up to twice that length. The largest w is that of all nodes, as those
-        that do not touch yet may touch before the step ends.
+        A depth δ that is wrong changes the normal forces by -K δ, with K = (1/kn + C)⁻¹: the
+        contact springs in series with the elastic bodies, whose compliance C is not negative, under
+        constant load or not. Depths per cycle change by -D K δ with D = w/A, where w is the depth
+        per pressure. The eigenvalues of D K lie between 0 and max kn D. With ΔN = 1/(max kn D), an
+        Euler step multiplies errors by 1 - x, with x between 0 and 1, and a step of second order by
+        1 - x + x²/2. Both are stable up to twice that length. The largest w of all nodes counts, as
+        nodes that are open may touch before the step ends.
         """
         stiffest = float(np.max(self.law.normal_stiffness / self.areas))
         fastest = stiffest * float(depth_per_pressure.max())
@@ -116,9 +116,10 @@ class PadCycle:
 class WearingPads:
     """Pads that wear under a ``force`` [N], or level, at a ``frequency`` [Hz].
 
-    ``amount`` says which it is. ``unworn`` is the rig before, ``laws`` are those of body 1 and
-    body 2. Without a frequency it is that of phase resonance in every state, near that of the state
-    before, or where there is none close by found by ``search`` on the equations of the motion.
+    ``amount`` tells whether it is a force or a level. ``unworn`` is the rig before wear, ``laws``
+    are the wear laws of body 1 and body 2. Without a frequency, every state has that of its phase
+    resonance. This is followed from the state before or, if none is close, found by ``search`` on
+    the equations of the motion.
     """
 
     unworn: VibrationModel
@@ -132,13 +133,14 @@ class WearingPads:
     )
 
     def begin(self) -> NodalState:
-        """The state before the first cycle."""
+        """Return the state before the first cycle."""
         return NodalState.unworn(self.unworn.rig.gap)
 
     def at(self, state: NodalState) -> PadCycle:
-        """The cycle of the pads in a state, its motion solved for from that which wore to it.
+        """Return the cycle of the pads in a state.
 
-        Raises :class:`wear.steps.stepping.ContactFailure` where no motion is found.
+        The motion is solved from that of the state before. Raises
+        :class:`wear.steps.stepping.ContactFailure` where no motion is found.
         """
         for surfaces, cycle in self._solved:
             if surfaces is state.surfaces:
@@ -154,7 +156,7 @@ class WearingPads:
         return cycle
 
     def contact_at(self, state: NodalState) -> NodalContact:
-        """The same as wear steps take it."""
+        """Return the contact in a state in the form that wear steps need."""
         return NodalContact(self.laws, (self.at(state),))
 
     def _motion(self, problem: HarmonicBalance, start: HarmonicSolution | None) -> HarmonicSolution:
@@ -173,7 +175,7 @@ class WearingPads:
     def _followed(
         self, problem: HarmonicBalance, start: HarmonicSolution
     ) -> HarmonicSolution | None:
-        """The phase resonance close to that of another state, None if there is none."""
+        """Return the phase resonance close to that of another state, None if there is none."""
         settled = problem.solve(start.frequency, self.force, start)
         if not settled.converged:
             return None
@@ -184,14 +186,14 @@ class WearingPads:
 
 
 def _moved_by(motion: HarmonicSolution, mean: Array) -> HarmonicSolution:
-    """A motion whose joints' mean displacement is another by so much ``(j, d)`` [mm]."""
+    """Return a motion with the joints' mean displacement shifted by ``mean`` ``(j, d)`` [mm]."""
     coefficients = motion.coefficients.copy()
     coefficients[:, motion.resolution.harmonics.index(0)] += mean
     return replace(motion, coefficients=coefficients)
 
 
 def worn_model(unworn: VibrationModel, depth: Array) -> VibrationModel:
-    """The rig whose contacts have lost a ``depth`` ``(j,)`` [mm]: only their law is new."""
+    """Return the rig with contacts worn by a ``depth`` ``(j,)`` [mm]: only their law is new."""
     rig, problem = unworn.rig, unworn.problem
     assert isinstance(unworn.law, FrictionContact)
     assert isinstance(problem.joints, PeriodicMarch)

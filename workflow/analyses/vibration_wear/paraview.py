@@ -1,8 +1,9 @@
-"""A contact that a rig wears for ParaView: ``contact.pvd``, its faces over the cycles.
+"""ParaView files of a contact that a rig wears: ``contact.pvd``, its faces over the cycles.
 
 Every step is the contact as it wears (``contact/<state>``): the cells of the grid as points of a
 surface, or the nodes of the contacts. Warp By Vector on ``worn_1`` or ``worn_2`` shows a body's
-worn shape; the axes are those of the face, of a reduced body its own. ``view.py`` shows them.
+worn shape. The axes are those of the face, or of the body where this is reduced. ``view.py`` shows
+the fields.
 """
 
 from __future__ import annotations
@@ -42,16 +43,16 @@ if TYPE_CHECKING:
 
 SERIES = "contact.pvd"
 FACE = Frame(np.zeros(3), np.eye(3))
-# Which way wear moves the surfaces, along the normal.
+# Sign along the normal of the motion of each surface by wear.
 INTO_BODY = {1: -1.0, 2: 1.0}
-# Energy per area and cycle, which nodes have as energy alone.
+# Unit of energy per area and cycle; results at nodes have plain energy.
 PER_AREA = "N/mm"
 
 
 def write_vibration_wear(contents: Contents, file: h5py.File, folder: Path) -> list[Path]:
-    """Write the states, their series over the cycles, and the script; returns their paths.
+    """Write the states, their series over the cycles, and the script; return their paths.
 
-    Nothing where nobody knows where the nodes are.
+    Writes nothing where the places of the nodes are not known.
     """
     if not contents.placed:
         return []
@@ -84,7 +85,7 @@ def _nodes(file: h5py.File, folder: Path) -> Iterator[Step]:
 
 
 def _body_mesh(places: h5py.Group) -> pyvista.UnstructuredGrid:
-    """Quadrilaterals between nodes in rows and columns, each normal's apart; or nodes alone."""
+    """Return quadrilaterals between nodes in rows and columns, for each normal; or nodes alone."""
     import pyvista
 
     position, normals = places[POSITION][()], places["normal"][()]
@@ -104,10 +105,10 @@ def _body_mesh(places: h5py.Group) -> pyvista.UnstructuredGrid:
 def _fields(
     contact: h5py.Group, shown: dict[str, Array], of: Any, gap: str, normal: Array
 ) -> Fields:
-    """Of a state: at rest pressure and gap, of a cycle path and energy, and what is worn.
+    """Return fields of a state: pressure and gap at rest, slip and energy of a cycle, and wear.
 
-    ``gap`` is what the one in the results is called: at rest, or that of bodies without load.
-    ``normal`` ``(3,)``, or that of each point, leads out of body 1.
+    ``gap`` is the name of the gap in the results: at rest, or of bodies without load. ``normal``
+    ``(3,)``, or one for each point, points out of body 1.
     """
     depths = {body: of(contact[f"depth_{body}"]) for body in INTO_BODY}
     fields: Fields = {
@@ -124,7 +125,7 @@ def _fields(
 
 
 def _write_view(file: h5py.File, folder: Path) -> Path:
-    """The script, which begins at the last state."""
+    """Write the script, which begins at the last state, and return its path."""
     states = list(file[WORN].values())
     last = states[-1][NODES if NODES in states[-1] else CONTACT]
     most = 1 if np.max(last["depth_1"][()]) >= np.max(last["depth_2"][()]) else 2

@@ -1,4 +1,4 @@
-"""Main results of a rig that wears its contact: contact and resonances after so many cycles."""
+"""Main results of a rig that wears its contact: contact and resonances over the cycles."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from workflow.shell.summary import number_at, told
 
 WORN = "depth or volume, by the wear steps, and by harmonics and samples of the motion that wears"
 MOTION = "joints' vibration or energy lost, by harmonics and samples"
-# Of a state: unit, text, everyday unit.
+# Quantities of a state: unit, text, everyday unit.
 NUMBERS = {
     "cycles": ("1", "cycles under the force that wears", ""),
     "depth": ("mm", "largest depth worn, both bodies together", ""),
@@ -31,14 +31,14 @@ NUMBERS = {
     "frequency": ("Hz", "frequency of the motion that wears", ""),
     "energy_per_cycle": ("N mm", "energy dissipated in a cycle", ""),
 }
-# Parts of the error of each, which add up, and what that is of.
+# Parts of the error of each quantity, which add up, and a description of that error.
 ERRORS = {
     "depth": (("step_error", "error"), WORN),
     "volume": (("step_error", "error"), WORN),
     "stroke": (("error",), MOTION),
     "energy_per_cycle": (("error",), MOTION),
 }
-# What runs are compared by, beside the numbers.
+# Curves by which runs are compared, in addition to the numbers.
 CURVES = (
     CurvesOf("worn depth", "evolution/cycles", "evolution/depth", ("1", "mm")),
     CurvesOf("worn volume", "evolution/cycles", "evolution/volume", ("1", "mm^3")),
@@ -57,7 +57,7 @@ CURVES = (
 
 
 def main_results(case: VibrationWearCaseBase, summary: Summary) -> list[Quantity]:
-    """Of every state, the unworn one first."""
+    """Return results of every state, the unworn one first."""
     states = enumerate(summary["states"])
     return told(summary, chain.from_iterable(_of_state(n, state, summary) for n, state in states))
 
@@ -77,7 +77,7 @@ def _of_state(number: int, state: Summary, summary: Summary) -> Iterator[Quantit
 
 
 def _error(name: str, place: str, summary: Summary) -> dict[str, Any]:
-    """The error of a number of a state and what it is of; nothing where a part is not known."""
+    """Return the error of a number of a state with its description, empty if a part is unknown."""
     parts, what = ERRORS.get(name, ((), ""))
     known = [number_at(summary, f"{place}.{part}") for part in parts]
     errors = [abs(part) for part in known if part is not None]

@@ -1,4 +1,4 @@
-"""What a vibration case with wear leaves: results, tables, figures, and the summary."""
+"""Output of a vibration case with wear: results, tables, figures and the summary."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ from workflow.shell.tables import DIGITS, heading, write_curves, write_table
 
 VibrationWearRun = Run[VibrationWearCase | FrictionRigWearCase | ReducedWearCase]
 
-# What rises, falls, or neither, beside the resonance under the least force.
+# Quantities whose trend is reported, in addition to the resonance under the least force.
 TRENDS = ("stiffness", "peak_pressure", "touching")
 # N mm to J, N/mm to N/µm, mm to µm.
 TO_JOULES, PER_MICRON, TO_MICRONS = 1e-3, 1e-3, 1e3
@@ -92,7 +92,7 @@ def _write_results(outcome: VibrationWearOutcome, run: VibrationWearRun) -> None
 
 
 def _named(nodes: WornNodes) -> dict[str, Dataset]:
-    """The names of nodes that have any."""
+    """Return the names of nodes, empty if they have none."""
     names = np.array(nodes.names, dtype=np.bytes_)
     return {"name": Dataset(names, "1", "of the point of each contact")} if nodes.names else {}
 
@@ -101,7 +101,7 @@ def _named(nodes: WornNodes) -> dict[str, Dataset]:
 
 
 def _write_tables(outcome: VibrationWearOutcome, folder: OutputFolder) -> None:
-    """The evolution, and the responses of every state to every force, as CSV in base units."""
+    """Write the evolution and the responses of every state to every force as CSV, in base units."""
     under, what = outcome.case.amount.under, "contact and resonances, over the cycles"
     write_curves(folder.reserve(f"{EVOLUTION}.csv", what), outcome.evolution)
     for number, state in enumerate(outcome.states):
@@ -115,7 +115,7 @@ def _write_tables(outcome: VibrationWearOutcome, folder: OutputFolder) -> None:
 
 
 def _write_nodes(nodes: WornNodes, number: int, state: WornState, folder: OutputFolder) -> None:
-    """What each node has lost and dissipates in a state, a row for each."""
+    """Write depths and energies of the nodes in a state, a row for each node."""
     what = f"nodes after {state.cycles:g} cycles: gaps, depths, energies of a cycle"
     path = folder.reserve(f"{NODES}_{number:05d}.csv", what)
     columns: dict[str, Any] = {heading("point", ""): nodes.names} if nodes.names else {}
@@ -153,7 +153,7 @@ def _of_state(amount: Amount, state: WornState) -> dict[str, Any]:
 
 
 def _line(amount: Amount, state: WornState) -> str:
-    """A state in a line."""
+    """Return a state as one line of text."""
     numbers = state.numbers
     resonances = ", ".join(
         f"{response.numbers['resonance']:.4g} Hz {amount.under(response.force)}"

@@ -1,4 +1,4 @@
-"""A vibration case whose contact wears: motion, wear, motion, and the responses on the way."""
+"""Runs of vibration cases whose contact wears."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ from workflow.shell.steps import kept_steps
 
 
 def run_vibration_wear(run: VibrationWearRun) -> None:
-    """Run such a case to its end.
+    """Run a vibration case with wear to its end.
 
-    Raises UserError where contact, specimens or rig cannot be what the case says, MethodFailed
-    where rest, a contact problem or a motion is not found.
+    Raises UserError where contact, specimens or rig cannot be built as the case describes them, and
+    MethodFailed where the state at rest, a contact problem or a motion is not found.
     """
     case, reporter = run.case, run.reporter
     try:

@@ -1,4 +1,4 @@
-"""How long a vibration case takes whose contact wears."""
+"""Run time of a vibration case whose contact wears."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from workflow.analyses.vibration.run_time import POINTS, point_time, structure_t
 from workflow.analyses.vibration_wear.case import VibrationWearCaseBase
 from workflow.shell.run_time import RunTime
 
-# Points of a curve that wear to a state takes as long as.
+# Number of points of a curve that take as long as the wear to a state.
 WEAR = 60
 
 
 def run_time(case: VibrationWearCaseBase) -> RunTime:
-    """Of the structure, and of the wear to every state and the curves in it."""
+    """Return the time of the structure, the wear to every state, and the curves in each."""
     span = log(case.frequencies[1] / case.frequencies[0])
     states = len(case.wear.cycles) + 1
     points = states * (WEAR + POINTS * span * len(case.amounts))

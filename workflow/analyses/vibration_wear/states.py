@@ -1,4 +1,4 @@
-"""Motion, wear, motion: the states of a contact that wears in a rig, and the responses in each."""
+"""States of a contact that wears in a rig, with the responses in each: motion and wear in turn."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from workflow.analyses.vibration.response import response_under, warn_of_error
 from workflow.analyses.vibration_wear.outcome import WornState
 from workflow.shell.reporter import Reporter
 
-# Of the work for a state, what the wear to it is; the rest are the responses in it.
+# Share of the wear in the work for a state; the rest are the responses in it.
 WEAR = 0.2
 
 
@@ -31,9 +31,10 @@ def worn_states(
     reporter: Reporter,
     steps: Steps,
 ) -> tuple[WornState, ...]:
-    """The states after so many cycles each, the unworn one before them.
+    """Return the unworn state, and the states after each number of cycles.
 
-    ``describe`` makes them, of a state, its cycles, and the steps since the last one.
+    ``describe`` returns the description of a state, from the state, its cycles, and the number of
+    steps since the last one.
     """
     total, done = numbers[-1], 0.0
     states = []
@@ -61,7 +62,7 @@ def worn_states(
 
 
 def _tell(reporter: Reporter, stretch: float, cycles: float) -> None:
-    """So many ``cycles`` of a ``stretch`` have worn."""
+    """Report that a number of ``cycles`` of a ``stretch`` have worn."""
     reporter.reached(cycles / stretch, f"{cycles:.3g} of {stretch:.3g} cycles")
 
 
@@ -72,7 +73,7 @@ def responses_to_all(
     reporter: Reporter,
     steps: Steps,
 ) -> tuple[float, tuple[Response, ...]]:
-    """The error of the ``motion`` that wears, and what its state does under each force."""
+    """Return the error of the ``motion`` that wears, and the responses to each force."""
     error = resolution_error(model.problem.refined(motion.resolution), motion).largest
     warn_of_error("the motion that wears", error, case, reporter)
     with reporter.stage("response"):

@@ -1,11 +1,11 @@
-"""A half-space contact in a vibrating rig: what it is to the rig, and how the motion wears it.
+"""Half-space contacts in a vibrating rig: the joint that they form, and the wear by the motion.
 
-The surfaces of the present make the joint: under its load every cell of the grid is an elementary
-contact with its pressure, or its gap, and the shift at which it begins to slip, and all of them
-together, tied by the half-space, are so many sliders in parallel
-(:mod:`sa_solver.cycles.partial_slip`). The rig's steady motion by harmonic balance says what each
-slider dissipates, and so how far every cell slips in a cycle. That slip, and the pressure that wear
-itself changes, wear the surfaces.
+The present surfaces define the joint. Under its load, every cell of the grid is an elementary
+contact with its pressure, or its gap, and the shift at which it begins to slip. All cells together,
+coupled by the half-space, are equivalent to a number of sliders in parallel
+(:mod:`sa_solver.cycles.partial_slip`). The rig's steady motion by harmonic balance gives the energy
+that each slider dissipates, and thus the slip of every cell in a cycle. This slip, together with
+the pressure that changes by wear, wears the surfaces.
 """
 
 from __future__ import annotations
@@ -38,22 +38,22 @@ from workflow.analyses.wear.structures.bodies.case import (
 )
 from workflow.analyses.wear.structures.bodies.source import gap_of
 
-# Contacts of the last states: those before and after a step.
+# Number of stored contacts: those before and after a step.
 KEPT = 2
 # Share by which friction may change in a wear step.
 FRICTION_CHANGE = 0.03
-# Steps of each branch of the loop that the half-space is led through.
+# Steps of each branch of the half-space loop.
 LOOP_INCREMENTS = 12
 
 
 @dataclass(frozen=True)
 class ContactCycle:
-    """The contact in one state of its surfaces, and how it moves in the rig.
+    """The contact in one state of its surfaces, and its motion in the rig.
 
-    ``sliders`` are its law, ``motion`` that of the rig under the force that wears, in a
-    cycle of which the sliders dissipate ``by_slider`` ``(n,)`` [N mm] and the cells slip by
-    ``path`` ``(nx, ny)`` [mm], ``adjusted`` by a factor so that they dissipate exactly
-    as much. ``wearing`` is what wear steps take.
+    ``sliders`` are its law, ``motion`` is the motion of the rig under the force that wears. In a
+    cycle, the sliders dissipate ``by_slider`` ``(n,)`` [N mm] and the cells slip by ``path`` ``(nx,
+    ny)`` [mm], which is multiplied by a factor ``adjusted`` so that both dissipate the same energy.
+    ``wearing`` is the contact in the form that wear steps need.
     """
 
     state: WearState
@@ -73,7 +73,7 @@ class ContactCycle:
 
     @property
     def displacement(self) -> Array:
-        """Of the joint through the cycle ``(t,)`` [mm]."""
+        """Displacement of the joint through the cycle ``(t,)`` [mm]."""
         return np.asarray(self.motion.resolution.basis @ self.motion.coefficients[0, :, 0])
 
     @property
@@ -83,15 +83,15 @@ class ContactCycle:
 
     @property
     def stroke(self) -> float:
-        """Way of the joint from end to end [mm]."""
+        """Displacement of the joint from end to end [mm]."""
         return float(np.ptp(self.displacement))
 
 
 class VibratingContact:
     """The contact of a ``case`` in a ``rig`` whose joint it is.
 
-    It wears under a ``force`` [N], or level, of what is ``driving`` it at a ``frequency`` [Hz];
-    its motion is found at a ``resolution``.
+    It wears under a ``force`` [N], or level, of the excitation ``driving`` at a ``frequency`` [Hz];
+    its motion is computed at a ``resolution``.
     """
 
     def __init__(
@@ -116,11 +116,11 @@ class VibratingContact:
 
     @property
     def settings(self) -> WearGrid:
-        """Its grid, as the case has it."""
+        """Settings of the grid, as the case has them."""
         return self._case.contact
 
     def unworn(self) -> WearState:
-        """The surfaces before the first cycle, pressed."""
+        """Return the surfaces before the first cycle, pressed together."""
         gap = gap_of(self._case.structure, self.grid)(self.grid.x, self.grid.y)
         unworn = WearState.unworn(np.ascontiguousarray(np.broadcast_to(gap, self.grid.shape)))
         cycle = self.at(unworn)
@@ -130,9 +130,10 @@ class VibratingContact:
         return replace(unworn, starts=starts, depth_rate=depth_rate, volume_rate=volume_rate)
 
     def at(self, state: WearState) -> ContactCycle:
-        """The contact in a state, its motion solved for from that which wore to it.
+        """Return the contact in a state.
 
-        Raises ContactFailure where contact or motion are not found.
+        The motion is solved from that of the state before. Raises ContactFailure where contact or
+        motion are not found.
         """
         for solved in self._solved:
             same = solved.state.surfaces is state.surfaces
@@ -142,13 +143,13 @@ class VibratingContact:
         return self._solved[-1]
 
     def wearing(self, state: WearState) -> WearingContact:
-        """The same for wear steps."""
+        """Return the contact in a state in the form that wear steps need."""
         return self.at(state).wearing
 
     def alike_cycles(self, state: WearState, most: float) -> float:
-        """Cycles, ``most`` or fewer, in which friction hardly changes; or one.
+        """Return the number of cycles, at most ``most``, in which friction hardly changes; or 1.
 
-        A wear step takes the friction of its beginning.
+        A wear step uses the friction at its beginning.
         """
         cycle, cycles = self.at(state), most
         per_cycle = float(cycle.by_slider.sum())
@@ -160,7 +161,7 @@ class VibratingContact:
         return min(1.0, most)
 
     def problem(self, sliders: Jenkins, resolution: Resolution) -> HarmonicBalance:
-        """The balance of the rig held by ``sliders``."""
+        """Return the balance of the rig held by ``sliders``."""
         return HarmonicBalance(
             self.rig.model,
             ParallelSliders(sliders),
@@ -170,7 +171,7 @@ class VibratingContact:
         )
 
     def loop(self, cycle: ContactCycle, amplitude: float) -> TangentialLoop:
-        """The half-space's own loop of an amplitude [mm]: the whole tangential problem.
+        """Return the half-space loop of an amplitude [mm], from the full tangential problem.
 
         Raises ContactFailure if it does not converge.
         """
@@ -221,7 +222,7 @@ class VibratingContact:
         return motion
 
     def _path(self, slipping: PartialSlip, sliders: Jenkins, lost: Array) -> tuple[Array, float]:
-        """Path of every cell in a cycle, and the factor that keeps the energy."""
+        """Return the path of every cell in a cycle, and the factor that equates the energies."""
         limit = sliders.limit
         travel = np.divide(lost, limit, out=np.zeros_like(lost), where=limit > 0.0)
         path = slipping.travelled(travel)
@@ -233,7 +234,7 @@ class VibratingContact:
         return factor * path, factor
 
     def _cycle(self, path: Array) -> SlidingCycle:
-        """One increment: the load stays, and so does the pressure on surfaces that do not move."""
+        """Return a cycle of one increment, as neither load nor pressure changes in the cycle."""
         nothing, pressed = np.zeros(1), np.array([self.load])
         loads = LoadHistory(pressed, *(nothing,) * 7, sliding=np.zeros(1, dtype=bool))
         return SlidingCycle(loads, path[None], drive=Drive.by_forces(self._tilt))

@@ -1,4 +1,4 @@
-"""Figure of a vibration case: frequencies over the speed of an engine, and an order of it."""
+"""Figure of a vibration case: frequencies over the speed of an engine, with its orders."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ from workflow.analyses.vibration.outcome import Contents
 from workflow.pictures.panels import legend_below, new_figure, shaded
 from workflow.pictures.style import BLACK
 
-# More resonances than this overlap.
+# More resonances than this would overlap.
 MOST_DOTS = 8
-# Orders drawn beside that of the excitation, as multiples of it.
+# Orders drawn in addition to that of the excitation, as multiples of it.
 MULTIPLES = 2, 3
 STYLES = {"free": ":", "stuck": "--"}
 
 
 def engine_orders(file: h5py.File, contents: Contents) -> Figure:
-    """The line of the excitation's order, those of its harmonics, and the resonances on it."""
+    """Draw the line of the excitation's order, those of its harmonics, and the resonances on it."""
     order = float(file.attrs["engine_order"])
     responses = [file["responses"][name] for name in contents.responses]
     frequencies = np.concatenate([response["frequency"][()] for response in responses])

@@ -1,4 +1,4 @@
-"""Figure of a vibration case: the loops under all forces at one frequency, and their slopes."""
+"""Figure of a vibration case: loops under all forces at one frequency, with their slopes."""
 
 from __future__ import annotations
 
@@ -15,19 +15,20 @@ from workflow.analyses.vibration.outcome import Contents
 from workflow.pictures.panels import legend_below, new_figure, shaded
 from workflow.pictures.scales import PER_MICRON, TO_MICRONS
 
-# More loops than this overlap.
+# More loops than this would overlap.
 MOST_LOOPS = 8
 COARSE: dict[str, Any] = {"linestyle": (0, (2, 1)), "linewidth": 1.0}
-# Of the way on which the tallest loop would gain its height if it stuck: what the branches show.
+# Width of the panel of branches, relative to the displacement at which the tallest loop would gain
+# its height if it stuck.
 REACH = 1.6
 HEADROOM = 1.08
 
 
 def loops(file: h5py.File, contents: Contents) -> Figure:
-    """Force against displacement in a cycle, and the rising branches from one reversal on.
+    """Draw force against displacement in a cycle, and the rising branches from one reversal.
 
-    Of coarser resolutions than the last the force is shown, thin and dashed, as their harmonics
-    alone give it: too few of them deform the loop.
+    For resolutions coarser than the last, the force in the harmonics alone is shown, thin and
+    dashed: too few harmonics deform the loop.
     """
     chosen = shaded(contents.loops, MOST_LOOPS)
     shown = [file["responses"][name] for name, _ in chosen]
@@ -55,7 +56,7 @@ def _label(left: Axes, right: Axes, response: h5py.Group) -> None:
 
 
 def _resolutions(response: h5py.Group) -> list[h5py.Group]:
-    """Loops of a force, the finest last."""
+    """Return the loops of a force, the finest last."""
     return [response["loops"][name] for name in sorted(response["loops"])]
 
 
@@ -64,7 +65,7 @@ def _finest(response: h5py.Group) -> h5py.Group:
 
 
 def _harmonics(loop: h5py.Group) -> str:
-    """How many harmonics the motion has, the mean apart."""
+    """Return the number of harmonics of the motion, without the mean, as text."""
     return str(int(np.count_nonzero(loop.attrs["harmonics"])))
 
 
@@ -73,9 +74,9 @@ def _curve(loop: h5py.Group, force: str = "force") -> tuple[Array, Array]:
 
 
 def rising_branch(displacement: Array, force: Array) -> tuple[Array, Array]:
-    """The branch of a closed cycle ``(t,)`` from its smallest to its largest displacement.
+    """Return the branch of a closed cycle ``(t,)`` from its smallest to its largest displacement.
 
-    Both are counted from the reversal at which it begins.
+    Both displacement and force are counted from the reversal at which the branch begins.
     """
     displacement, force = displacement[:-1], force[:-1]
     first = int(displacement.argmin())
@@ -95,13 +96,13 @@ def _draw_branch(axis: Axes, loop: h5py.Group, colour: Any, label: str) -> None:
 
 
 def _slope(loop: h5py.Group) -> float:
-    """Slope of stick [N/µm], NaN where there is none."""
+    """Return the slope of stick [N/µm], NaN where there is none."""
     slope = PER_MICRON * float(loop.attrs.get("stiffness", np.nan))
     return slope if slope > 0.0 else np.nan
 
 
 def _bound(axis: Axes, shown: list[h5py.Group]) -> None:
-    """Show the part in which branches bend, not the way on which they slide."""
+    """Limit the axes to the part in which branches bend, without most of the sliding."""
     heights = [float(np.ptp(loop["force"][()])) for loop in shown]
     ways = [height / _slope(loop) for height, loop in zip(heights, shown, strict=True)]
     longest = max((way for way in ways if np.isfinite(way)), default=np.nan)
@@ -121,7 +122,7 @@ def _title(shown: list[h5py.Group]) -> str:
 
 
 def _lost(response: h5py.Group) -> str:
-    """Energy of a loop, in words."""
+    """Return the energy of a loop, as text."""
     loop = _finest(response).attrs
     energy = f"{loop['energy']:.3g} mJ" if loop["slip"] > 0.0 else "nothing"
     return f"{energy} {under_in(response.attrs)}"

@@ -19,15 +19,15 @@ QUANTITIES = {
     "damping": (TO_PERCENT, "damping ratio [%]"),
 }
 PHASE: dict[str, Any] = {"color": BLACK, "label": "phase resonance", "linewidth": 1.2}
-# Rows: of more modes some are drawn.
+# Most rows: of more modes only some are drawn.
 MOST_MODES = 4
 ROW_HEIGHT = 3.6
-# Of what a mode's curve takes of a panel's height.
+# Margin above and below a mode's curve, relative to its height.
 ROOM = 0.1
 
 
 def modes(file: h5py.File, contents: Contents) -> Figure:
-    """A row for each mode, over the amplitude of what is looked at, with phase resonance beside."""
+    """Draw a row for each mode, over the observed amplitude, together with phase resonance."""
     shown = spread(contents.modes, MOST_MODES)
     figure = new_figure(_title(file, contents), 1.2 + ROW_HEIGHT * len(shown))
     panels = figure.subplots(len(shown), 2, squeeze=False, sharex="row")
@@ -53,7 +53,7 @@ def modes(file: h5py.File, contents: Contents) -> Figure:
 
 
 def _title(file: h5py.File, contents: Contents) -> str:
-    """What the first mode does."""
+    """Return a title on the first mode."""
     first = file[MODES][contents.modes[0]].attrs
     begin, end = first["frequency"]
     return (

@@ -1,4 +1,4 @@
-"""Figures of a vibration case: the forced response, its resonances, and what the contacts do."""
+"""Figures of a vibration case: forced response, resonances and states of the joints."""
 
 from __future__ import annotations
 
@@ -34,20 +34,21 @@ from workflow.pictures.panels import (
 from workflow.pictures.scales import TO_MICRONS
 from workflow.pictures.style import BLACK, BLUE, HEADROOM, ORANGE
 
-# More curves than this overlap.
+# More curves than this would overlap.
 MOST_CURVES = 8
 TO_PERCENT = 1e2
 LIMIT: dict[str, Any] = {"color": BLACK, "linewidth": 0.8}
 STYLES = {"free": ":", "stuck": "--"}
 ASKED: dict[str, Any] = {"markersize": 4.5, "markerfacecolor": "white"}
-# Phases begin within half a turn of the lag at resonance, a quarter of one [°].
+# A full turn, and a quarter of one, which is the lag at resonance [°]. Phases begin within half a
+# turn of that lag.
 TURN, QUARTER = 360.0, 90.0
-# Room above the highest peak and below the lowest response, as factors.
+# Factors for the room above the highest peak and below the lowest response.
 ABOVE, BELOW = 3.0, 0.5
 
 
 def figures_of(contents: Contents) -> Figures:
-    """The figures of a run, by name."""
+    """Return the figures of a run, by name."""
     many = contents.joints > MOST_JOINTS
     drawn = {
         "frequency_response": (frequency_response, True),
@@ -67,20 +68,20 @@ def figures_of(contents: Contents) -> Figures:
 
 
 def _shown(file: h5py.File, contents: Contents) -> list[tuple[h5py.Group, Any]]:
-    """The responses, of many some, each with its colour."""
+    """Return the responses to show, each with its colour; of many responses, only some."""
     chosen = shaded(contents.responses, MOST_CURVES)
     return [(file["responses"][name], colour) for name, colour in chosen]
 
 
 def _seen(file: h5py.File) -> str:
-    """What the amplitude is of; against the ground, where that moves."""
+    """Return the name of the observed displacement, which is relative to a moving ground."""
     first, *_ = file["responses"].values()
     against = " against the ground" if "absolute_amplitude" in first else ""
     return f"{file.attrs['seen'][-1]}{against}"
 
 
 def _amount_of(file: h5py.File) -> Amount:
-    """What responses are to: forces, or levels of an excitation."""
+    """Return the kind of factor of the responses: forces, or levels of an excitation."""
     first, *_ = file["responses"].values()
     return amount_in(first.attrs)[0]
 
@@ -89,8 +90,10 @@ def _amount_of(file: h5py.File) -> Amount:
 
 
 def frequency_response(file: h5py.File, contents: Contents) -> Figure:
-    """Amplitude of what is looked at over the force, a curve per force, with linear limits; and
-    its phase."""
+    """Draw the observed amplitude over the force, a curve per force, with limits and phase.
+
+    The limits are those of the linear structure, with joints free and stuck.
+    """
     figure = new_figure(_title(file), 9.0)
     axis, phase = figure.subplots(2, 1, sharex=True, height_ratios=(2.4, 1.0))
     peaks, lows = [], []
@@ -131,7 +134,7 @@ def frequency_response(file: h5py.File, contents: Contents) -> Figure:
 
 
 def _draw_phase(axis: Axes, motions: h5py.Group, **look: Any) -> None:
-    """The phase of harmonic 1 along a curve, without jumps by a turn."""
+    """Draw the phase of harmonic 1 along a curve, without jumps by a turn."""
     phases = np.degrees(np.unwrap(motions["phase"][()]))
     phases -= TURN * np.round((phases[0] + QUARTER) / TURN)
     draw_motions(axis, motions, motions["frequency"][()], phases, **look)
@@ -140,9 +143,9 @@ def _draw_phase(axis: Axes, motions: h5py.Group, **look: Any) -> None:
 def _draw_further(
     axis: Axes, file: h5py.File, contents: Contents, phase: Axes | None = None
 ) -> list[h5py.Group]:
-    """Branches beside the shown responses, in the colours of their forces; these branches.
+    """Draw further branches in the colours of their forces, and return these branches.
 
-    Beside a panel of the ``phase`` amplitudes are over the force.
+    With a panel for the ``phase``, amplitudes are divided by the force.
     """
     amount = _amount_of(file).name
     colours = {response.attrs[amount]: colour for response, colour in _shown(file, contents)}
@@ -161,7 +164,7 @@ def _draw_further(
 
 
 def _over_frequency(axis: Axes, file: h5py.File) -> None:
-    """Logarithmic axes over the frequencies of all curves."""
+    """Set logarithmic axes over the frequencies of all curves."""
     responses = file["responses"].values()
     frequencies = np.concatenate([response["frequency"][()] for response in responses])
     axis.set(xscale="log", yscale="log", xlabel="frequency [Hz]")
@@ -184,7 +187,7 @@ def _title(file: h5py.File) -> str:
 
 
 def resonance(file: h5py.File, contents: Contents) -> Figure:
-    """Amplitudes with the backbone of phase resonance; frequency and damping against force."""
+    """Draw amplitudes with the backbone of phase resonance; frequency and damping against force."""
     figure = new_figure(_resonance_title(file), 8.0)
     places = figure.add_gridspec(2, 2, width_ratios=(1.25, 1.0))
     axis = figure.add_subplot(places[:, 0])
@@ -229,7 +232,7 @@ def _draw_amplitudes(axis: Axes, file: h5py.File, contents: Contents) -> None:
 
 
 def _draw_peaks(axis: Axes, file: h5py.File, name: str, factor: float, colour: str) -> None:
-    """The value at the peak of each response as a dot."""
+    """Draw the value at the peak of each response as a dot."""
     peaks = [response.attrs for response in file["responses"].values()]
     forces = [amount_in(peak)[1] for peak in peaks]
     values = [factor * peak[name] for peak in peaks]

@@ -1,4 +1,4 @@
-"""Figure of a ring of sectors: natural frequencies over nodal diameters, and what is driven."""
+"""Figure of a ring of sectors: natural frequencies over nodal diameters, with engine orders."""
 
 from __future__ import annotations
 
@@ -11,14 +11,17 @@ from workflow.analyses.vibration.outcome import DIAMETERS, Contents
 from workflow.pictures.panels import legend_below, new_figure, whole_ticks
 from workflow.pictures.style import BLACK, BLUE, ORANGE
 
-# Lowest modes that are drawn: beyond, they lie on each other.
+# Most modes that are drawn, from the lowest. More would overlap.
 MOST_MODES = 8
-# Room above the highest of what is drawn.
+# Factor for the room above the highest frequency that is drawn.
 ABOVE = 1.15
 
 
 def nodal_diameters(file: h5py.File, contents: Contents) -> Figure:
-    """Free and stuck, and engine orders at the speed of the resonance, folded at N/2."""
+    """Draw frequencies with joints free and stuck, and engine orders folded at N/2.
+
+    The engine orders are those at the speed of the resonance.
+    """
     group = file[DIAMETERS]
     sectors, order = int(group.attrs["sectors"]), int(file.attrs["engine_order"])
     numbers = file["responses"][contents.responses[-1]].attrs

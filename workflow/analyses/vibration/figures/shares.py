@@ -1,4 +1,4 @@
-"""Figures of a vibration case: for how much of the period joints slip and are apart."""
+"""Figures of a vibration case: shares of the period in which joints slip and are apart."""
 
 from __future__ import annotations
 
@@ -26,19 +26,19 @@ from workflow.pictures.panels import new_figure, plain_ticks, spread, whole_tick
 from workflow.pictures.scales import TO_MICRONS
 from workflow.pictures.style import BLACK, BLUE, COLOUR_MAP, ORANGE
 
-# Forces beside each other, and joints below each other, that are still readable.
+# Most columns of forces, and most rows of joints, that are still readable.
 MOST_FORCES, MOST_JOINTS = 3, 6
 TO_PERCENT = 1e2
-# What a joint does for a share of the period, from the bottom of its panel.
+# States of a joint that fill the period, from the bottom of its panel.
 DOES = {"sticks, or is pressed": BLUE, "slips": ORANGE, "is apart": "#B8B8B8"}
-# Heights of the response and of what is below it [inch].
+# Heights of the response, of the panels below it, and of the margins [inch].
 RESPONSE, STRIP, MAP, AROUND = 2.2, 1.5, 2.6, 1.6
 
 
 def joint_states(file: h5py.File, contents: Contents) -> Figure:
-    """For how much of the period each of a few joints sticks, slips and is apart.
+    """Draw for how much of the period each of a few joints sticks, slips and is apart.
 
-    Those that do nothing but stick, as springs, are left out.
+    Joints that always stick, such as springs, are left out.
     """
     names, shown = _names(file), _shown(file, contents)
     joints = _changing(shown)
@@ -66,7 +66,7 @@ def joint_states(file: h5py.File, contents: Contents) -> Figure:
 
 
 def node_shares(file: h5py.File, contents: Contents) -> Figure:
-    """For how much of the period each of many joints slips and is apart; and how many do what."""
+    """Draw shares of the period in which many joints slip and are apart, and counts by state."""
     shown = _shown(file, contents)
     figure = new_figure(_most_at_once(shown), AROUND + RESPONSE + 2.0 * MAP + STRIP)
     panels = figure.subplots(
@@ -105,7 +105,7 @@ def _shown(file: h5py.File, contents: Contents) -> list[h5py.Group]:
 
 
 def _names(file: h5py.File) -> list[str]:
-    """What each joint stretches by; of those of several directions without these."""
+    """Return names of the joints, without the axis for joints with several directions."""
     names = []
     for row in file["names/joints"][()]:
         first, *more = (name for name in map(bytes.decode, row) if name != "ground")
@@ -114,7 +114,7 @@ def _names(file: h5py.File) -> list[str]:
 
 
 def _changing(shown: list[h5py.Group]) -> list[int]:
-    """Joints that slip or are apart at times; the first where none does under these forces."""
+    """Return joints that slip or separate at times, or the first if none does."""
     shares = [response[f"nodes/{name}"][()] for response in shown for name in ("slip", "separated")]
     return [int(j) for j in np.flatnonzero(np.any([s.any(axis=0) for s in shares], axis=0))] or [0]
 
@@ -123,7 +123,7 @@ def _changing(shown: list[h5py.Group]) -> list[int]:
 
 
 def _along(response: h5py.Group) -> tuple[Array, Indices]:
-    """Edges of columns ``(c + 1,)`` over the frequency, and the motion in each: the largest."""
+    """Return edges of columns ``(c + 1,)`` over the frequency, and the largest motion in each."""
     frequency = response["frequency"][()]
     edges = np.geomspace(frequency.min(), frequency.max(), COLUMNS + 1)
     middle = np.sqrt(edges[1:] * edges[:-1])
@@ -131,7 +131,7 @@ def _along(response: h5py.Group) -> tuple[Array, Indices]:
 
 
 def _shares(response: h5py.Group, points: Indices) -> tuple[Array, Array]:
-    """Shares of the period ``(c, j)`` in which joints slip, and are apart."""
+    """Return shares of the period ``(c, j)`` in which joints slip, and are apart."""
     return response["nodes/slip"][()][points], response["nodes/separated"][()][points]
 
 
@@ -154,11 +154,11 @@ def _draw_stack(
     joint: int,
     colours: tuple[str, ...] = tuple(DOES.values()),
 ) -> None:
-    """Shares ``(c, j)`` of one joint on each other [%]."""
+    """Draw shares ``(c, j)`` of one joint on top of each other [%]."""
     below = np.zeros(len(edges))
     axis.grid(visible=False)
     for share, colour in zip(shares, colours, strict=True):
-        # Each column is as wide as it is.
+        # Repeat the last value, as there is one edge more than columns.
         above = below + TO_PERCENT * np.append(share[:, joint], share[-1, joint])
         axis.fill_between(edges, below, above, step="post", color=colour, linewidth=0.0)
         below = above
@@ -177,7 +177,7 @@ def _draw_map(axis: Axes, edges: Array, shares: Array) -> Any:
 
 
 def _order(file: h5py.File, contents: Contents) -> tuple[Indices, Any, str]:
-    """The joints from the bottom up, ticks for them, and what they are ordered by."""
+    """Return the joints from the bottom up, ticks for them, and a label of their order."""
     if not contents.places:
         return np.arange(contents.joints), None, "joints by number"
     distance = np.hypot(file["contact/x"][()], file["contact/y"][()])
@@ -188,7 +188,7 @@ def _order(file: h5py.File, contents: Contents) -> tuple[Indices, Any, str]:
 
 
 def _label(panels: Any, response: h5py.Group) -> None:
-    """Scales and labels that the panels of all forces share."""
+    """Set scales and labels that the panels of all forces share."""
     amount, _ = amount_in(response.attrs)
     top = panels[0, 0]
     top.set(xscale="log", yscale="log")
@@ -202,7 +202,7 @@ def _label(panels: Any, response: h5py.Group) -> None:
 
 
 def _most_slipping(shown: list[h5py.Group], names: list[str]) -> str:
-    """Which joint slips longest, or is apart longest where none slips."""
+    """Return text on the joint that slips longest, or is apart longest where none slips."""
     response = shown[-1]
     for word, name in (("slips", "slip"), ("is apart", "separated")):
         shares = response[f"nodes/{name}"][()]
@@ -216,7 +216,7 @@ def _most_slipping(shown: list[h5py.Group], names: list[str]) -> str:
 
 
 def _most_at_once(shown: list[h5py.Group]) -> str:
-    """How many slip and are apart at some time of a cycle, at most."""
+    """Return text on the most joints that slip, and are apart, at some time of a cycle."""
     texts = []
     for name, word in (("slip", "slip"), ("separated", "are apart")):
         shares = shown[-1][f"nodes/{name}"][()]

@@ -1,4 +1,4 @@
-"""Curves of motions in figures: unstable parts dashed, and a mark where stability changes."""
+"""Curves of motions in figures: unstable parts dashed, and marks where stability changes."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from sa_solver.types import Array
 from workflow.analyses.vibration.outcome import BIFURCATIONS
 from workflow.pictures.style import BLACK
 
-# How motions are drawn by what the column says of them: the lesser of two ends counts.
+# Line styles by code of stability. Between two points, the smaller code counts.
 LINES: dict[int, Any] = {1: "-", 0: ":", -1: "--"}
 WORDS = {0: "stability unknown", -1: "unstable"}
-# Marks of bifurcations, and what they are called.
+# Marks of bifurcations, with their names.
 MARKS = {
     "fold": ("s", "fold"),
     "branching": ("^", "another branch leaves"),
@@ -28,7 +28,7 @@ MARK: dict[str, Any] = {"markersize": 6, "linestyle": "none", "zorder": 5}
 
 
 def draw_motions(axis: Axes, group: h5py.Group, x: Array, y: Array, **look: Any) -> None:
-    """A curve of motions ``(n,)``, solid as far as nothing is said of their stability."""
+    """Draw a curve of motions ``(n,)``, dashed if unstable; solid if stability is not computed."""
     codes = _codes(group)
     if not codes.any():
         axis.plot(x, y, "-", **look)
@@ -42,18 +42,18 @@ def draw_motions(axis: Axes, group: h5py.Group, x: Array, y: Array, **look: Any)
 
 
 def _codes(group: h5py.Group) -> np.ndarray:
-    """What the column says of each motion; nothing where it is not there."""
+    """Return the codes of stability of the motions, empty if there is no such column."""
     return np.asarray(group["stability"][()]) if "stability" in group else np.zeros(0, int)
 
 
 def _runs(flags: np.ndarray) -> list[tuple[int, int]]:
-    """First and past-the-last index of each run of true ``flags``."""
+    """Return first and past-the-last index of each run of true ``flags``."""
     edges = np.flatnonzero(np.diff(np.concatenate([[0], flags.astype(int), [0]])))
     return [(int(first), int(last)) for first, last in zip(edges[::2], edges[1::2], strict=True)]
 
 
 def mark_bifurcations(axis: Axes, group: h5py.Group, x: str, factor: float, colour: Any) -> None:
-    """Marks on the curve of a group, over frequency or force: amplitude times a factor."""
+    """Mark bifurcations on the curve of a group, over ``x``: the amplitude times a factor."""
     if BIFURCATIONS not in group:
         return
     found = group[BIFURCATIONS]
@@ -64,7 +64,7 @@ def mark_bifurcations(axis: Axes, group: h5py.Group, x: str, factor: float, colo
 
 
 def explain_stability(axis: Axes, groups: list[h5py.Group]) -> None:
-    """Entries of the legend for what is drawn of the stability of these curves."""
+    """Add entries to the legend for the lines and marks of stability on these curves."""
     known = [codes for codes in map(_codes, groups) if codes.any()]
     codes = {int(code) for of_curve in known for code in of_curve}
     for code, word in WORDS.items():

@@ -1,4 +1,4 @@
-"""Figures of a vibration case: which nodes of a contact stick, slip and lift off."""
+"""Figures of a vibration case: nodes of a contact that stick, slip and lift off."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ from workflow.pictures.panels import new_figure, plain_ticks, spread
 from workflow.pictures.scales import TO_MICRONS
 from workflow.pictures.style import BLACK, BLUE, ORANGE
 
-# As many forces as have a readable map each, over frequency and of the pad.
+# Most forces with readable maps: over frequency, and of the pad.
 MOST_MAPS, MOST_PADS = 3, 6
-# What a node does in a cycle, from 0 on, and its colour (Okabe and Ito's, and greys).
+# States of a node in a cycle, numbered from 0, with colours (Okabe and Ito's, and greys).
 KINDS = {
     "sticks": BLUE,
     "slips, up to half of the cycle": "#F0E442",
@@ -36,21 +36,21 @@ CELLS: dict[str, Any] = {
     "vmax": len(KINDS) - 0.5,
 }
 HALF = 0.5
-# Shares of a cycle, of few samples: rounding.
+# Tolerance on shares of a cycle, for rounding.
 ROUNDING = 1e-9
-# Columns of a map over frequency: more than its pixels at three maps in a row.
+# Columns of a map over frequency: more than its pixels with three maps in a row.
 COLUMNS = 480
-# Where the pad is looked at, over the frequency of the peak: an octave below and above, or at the
-# end of the curve.
+# Frequencies of the maps of the pad, over that of the peak: an octave below and above, or the end
+# of the curve.
 OCTAVES = {"below": 0.5, "at the peak": 1.0, "above": 2.0}
 MOST_TICKS = 6
-# Heights of what is around the maps of the pad, and of these [inch]; more columns than ``WIDE`` ask
-# for less.
+# Heights of the margins of the maps of the pad, and of the maps [inch]. With more columns than
+# ``WIDE`` the maps are lower.
 AROUND_PADS, PAD_ROWS, WIDE = 2.4, 6.6, 4
 
 
 def node_states(file: h5py.File, contents: Contents) -> Figure:
-    """The state of every node over frequency, below the response, under some forces."""
+    """Draw the state of every node over frequency, below the response, under some forces."""
     shown = [file["responses"][name] for name in spread(contents.responses, MOST_MAPS)]
     figure = new_figure(_title(shown), 8.5)
     panels = figure.subplots(
@@ -79,7 +79,7 @@ def node_states(file: h5py.File, contents: Contents) -> Figure:
 
 
 def pad_states(file: h5py.File, contents: Contents) -> Figure:
-    """The state of the nodes on the pad: below, at and above the peak of each force."""
+    """Draw the state of the nodes on the pad: below, at and above the peak of each force."""
     shown = [file["responses"][name] for name in spread(contents.responses, MOST_PADS)]
     height = PAD_ROWS * min(1.0, WIDE / len(shown))
     figure = new_figure(_title(shown), AROUND_PADS + height, compress=True)
@@ -98,7 +98,7 @@ def pad_states(file: h5py.File, contents: Contents) -> Figure:
 
 
 def kinds_of(response: h5py.Group) -> Indices:
-    """What every node does at every point of a curve ``(p, j)``, as places in ``KINDS``."""
+    """Return the state of every node at every point of a curve ``(p, j)``: index in ``KINDS``."""
     slip, apart = response["nodes/slip"][()], response["nodes/separated"][()]
     kinds = np.where(slip <= ROUNDING, STICKS, SLIPS_LONG)
     kinds[(slip > ROUNDING) & (slip <= HALF)] = SLIPS_BRIEFLY
@@ -130,9 +130,9 @@ def _draw_over_frequency(axis: Axes, response: h5py.Group, order: Indices) -> No
 
 
 def largest_at(frequency: Array, amplitude: Array, wanted: Array) -> Indices:
-    """Points ``(w,)`` of a curve ``(p,)`` nearest to the frequencies that are ``wanted``.
+    """Return points ``(w,)`` of a curve ``(p,)`` nearest to the frequencies ``wanted``.
 
-    Where the curve folds it has several motions at a frequency: the largest is taken.
+    Where the curve folds, it has several motions at a frequency: the largest is taken.
     """
     before, after = frequency[:-1], frequency[1:]
     low, high = np.minimum(before, after), np.maximum(before, after)
@@ -144,7 +144,7 @@ def largest_at(frequency: Array, amplitude: Array, wanted: Array) -> Indices:
 
 
 def _point_near(response: h5py.Group, frequency: float) -> int:
-    """Point of a curve nearest to a frequency, which is taken into its span."""
+    """Return the point of a curve nearest to a frequency, after clipping that to its span."""
     curve, amplitude = response["frequency"][()], response["amplitude"][:, -1]
     inside = np.clip([frequency], curve.min(), curve.max())
     return int(largest_at(curve, amplitude, inside)[0])
@@ -154,7 +154,7 @@ def _point_near(response: h5py.Group, frequency: float) -> int:
 
 
 def _draw_pad(axis: Axes, contact: h5py.Group, kinds: Indices) -> None:
-    """One coloured cell per node; one dot where the nodes are not in rows and columns."""
+    """Draw one coloured cell per node, or dots where the nodes are not in rows and columns."""
     x, y = contact["x"][()], contact["y"][()]
     axis.set_aspect("equal")
     axis.grid(visible=False)
@@ -167,7 +167,7 @@ def _draw_pad(axis: Axes, contact: h5py.Group, kinds: Indices) -> None:
 
 
 def _edges(lines: Array) -> Array:
-    """Ends of the cells around ascending ``lines``, the first and last of which are whole."""
+    """Return edges of the cells around ascending ``lines``, with whole first and last cells."""
     between = 0.5 * (lines[1:] + lines[:-1])
     return np.concatenate([[2.0 * lines[0] - between[0]], between, [2.0 * lines[-1] - between[-1]]])
 
