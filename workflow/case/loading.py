@@ -109,9 +109,9 @@ class CaseFile(File):
 
 
 def outline_of(file: str, model: type[AnyCase], rows: Mapping[str, str]) -> list[tuple[str, str]]:
-    """Return those rows of the outline of the case in ``file`` that ``rows`` renames.
+    """Return rows of the outline of the case in ``file``, under new names.
 
-    Another case names the file.
+    ``rows`` maps the names of the rows to return to their new names.
     """
     found = load_case(file, [model]).outline()
     return [(rows[name], text) for name, text in found if name in rows]

@@ -199,7 +199,7 @@ class _Parser(RoundTripParser):
 
 @lru_cache(KEPT)
 def _nodes(text: str) -> Any:
-    """Return ``text`` as ruamel's nodes, which nobody changes; parsing a case takes 20 ms."""
+    """Return ``text`` as ruamel's nodes, cached because parsing takes 20 ms; do not change them."""
     yaml = YAML(typ="rt", pure=True)
     yaml.Parser = _Parser
     return yaml.load(text)

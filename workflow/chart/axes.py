@@ -46,7 +46,7 @@ EXPLICIT = 0.9, 0.45
 TIME_STEPS = 4.0, 2.0, 1.0, 0.5, 0.25
 # Number of rungs of jumps and errors left out in 3-D, where a cycle takes seconds.
 COARSER_3D = 2
-# Numbers of odd harmonics of a forced response, and samples per odd harmonic for the highest.
+# Numbers of odd harmonics of a forced response, and samples of a period for each of them.
 ODD_HARMONICS, SAMPLES_PER_HARMONIC = (1, 2, 3, 5, 8, 15, 30), 32
 SAMPLES = (32, 64, 128, 256, 512, 1024, 2048)
 

@@ -29,7 +29,7 @@ NOT_STRUCTURAL = {
 CONDENSED = ("mesh", "condensation", "reduction")
 LOADED = {"load_path", "friction"}
 FRICTION = "structural friction"
-# Stage of figures, which a production run would switch off.
+# Stage that is not counted, because charts switch figures off.
 PICTURES = "paraview and figures"
 # A finished stage in ``run.log``.
 STAGE = re.compile(r"\d\d:\d\d:\d\d (?P<name>[a-z][a-z ,-]*): (?P<seconds>\d+\.\d\d) s")

@@ -9,7 +9,7 @@ from math import inf, isfinite
 
 
 def efficient(costs: Sequence[float], errors: Sequence[float]) -> list[bool]:
-    """Return which points are efficient: no cheaper or equally cheap point is more accurate.
+    """Return which points are efficient: none as cheap is more accurate, nor the reverse.
 
     Of points with equal cost and error, the first counts.
     """

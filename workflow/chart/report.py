@@ -35,7 +35,7 @@ def write_chart(chart: Chart, out: Path) -> dict[str, Path]:
     return {"figure": drawn[-1], "table": table} if drawn else {"table": table}
 
 
-# --- what to choose -----------------------------------------------------------------------------
+# --- recommended settings -----------------------------------------------------------------------
 
 
 def sentences(chart: Chart) -> list[str]:

@@ -80,7 +80,7 @@ def _number(text: str) -> float | None:
         return None
 
 
-# --- what is printed ----------------------------------------------------------------------------
+# --- report -------------------------------------------------------------------------------------
 
 
 def report(loops: MeasuredLoops) -> list[str]:
@@ -210,7 +210,7 @@ def _strokes(loops: MeasuredLoops) -> str:
     return f"strokes of {least if least == most else f'{least} to {most}'} um"
 
 
-# --- what is written ----------------------------------------------------------------------------
+# --- files --------------------------------------------------------------------------------------
 
 
 def write_loops(loops: MeasuredLoops, out: Path, title: str, force: bool) -> list[Path]:

@@ -143,7 +143,7 @@ class _Offered:
         one, two = self.imported.axes
         return np.array([vector[one], 0.0, vector[two]])
 
-    # --- what is held and loaded ----------------------------------------------------------------
+    # --- supports and loads ---------------------------------------------------------------------
 
     def _supports(self) -> Iterator[SaidSupport]:
         """Yield the supports, one per group, without the axes along which the group is moved."""

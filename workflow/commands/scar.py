@@ -78,7 +78,7 @@ def _rectangle(text: str, scan: Scan) -> Mask:
     return inside
 
 
-# --- what is printed ----------------------------------------------------------------------------
+# --- report -------------------------------------------------------------------------------------
 
 
 def report(scar: Scar) -> list[str]:
@@ -138,7 +138,7 @@ def _doubts(scar: Scar) -> list[str]:
     return doubts
 
 
-# --- what is written ----------------------------------------------------------------------------
+# --- files --------------------------------------------------------------------------------------
 
 
 def write_scar(scar: Scar, out: Path, title: str, force: bool) -> list[Path]:

@@ -186,7 +186,7 @@ class _Search:
             energy=scars[0].energy,
         )
 
-    # -- what is told --------------------------------------------------------------------------
+    # -- report --------------------------------------------------------------------------------
 
     def _fitted(self, scars: ScarFit, found: Fit) -> Fitted:
         series = [

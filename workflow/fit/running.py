@@ -45,7 +45,7 @@ def run_fit(
         raise UserError(f"{out}/{there[0]}: exists; give another folder, or --force")
     file = given.file
     if isinstance(file, ProfileFit):
-        from workflow.fit.profiles import fit_profiles  # all that runs a case
+        from workflow.fit.profiles import fit_profiles  # imports all solvers
 
         return fit_profiles(given, file, out, loudness)
     if isinstance(file, JointFit):

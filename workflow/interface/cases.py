@@ -72,7 +72,7 @@ class Check:
 
     Examples
     --------
-    Printed, it is what ``fretscale check`` says:
+    Fields of the summary; printed, it is the output of ``fretscale check``:
 
     >>> import fretscale
     >>> checked = fretscale.check("cases/sphere_normal.yaml")

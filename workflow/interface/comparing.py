@@ -67,7 +67,7 @@ class ComparedResult(NamedTuple):
 
     Examples
     --------
-    Hertz's bodies move by P to the power 2/3, so twice the load is 0.59 more:
+    The approach of Hertz grows with P to the power 2/3, so by 0.59 for twice the load:
 
     >>> import fretscale, tempfile
     >>> coarse = fretscale.load_case(
@@ -104,7 +104,7 @@ class Comparison:
 
     Examples
     --------
-    Two loads on one ball, as tables and pages have them:
+    Two loads on one ball:
 
     >>> import fretscale, tempfile
     >>> coarse = fretscale.load_case(

@@ -61,7 +61,7 @@ class Values(NDArrayOperatorsMixin):
 
     Examples
     --------
-    The pressures on cells of 1/16 mm together are the load of 400 N:
+    The pressures on cells of 1/16 mm add up to the load of 400 N:
 
     >>> import fretscale, tempfile
     >>> coarse = fretscale.load_case(
@@ -152,7 +152,7 @@ class Group(Mapping[str, "Group | Values"]):
 
     Examples
     --------
-    What lies in it has names, and may be reached by paths:
+    Access by names and by paths:
 
     >>> import fretscale, tempfile
     >>> coarse = fretscale.load_case(

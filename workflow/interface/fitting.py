@@ -36,7 +36,7 @@ def fit(
 
     Examples
     --------
-    Volumes that four tests wore:
+    Worn volumes of four tests:
 
     >>> import fretscale, pathlib, tempfile
     >>> with tempfile.TemporaryDirectory() as folder:
@@ -70,7 +70,8 @@ class FittedParameter(NamedTuple):
     """Free parameter in ``unit``: its ``value``, standard ``deviation`` and 95 % bounds.
 
     The bounds are ``lower`` and ``upper``. Numbers are None where the data do not determine the
-    parameter; ``doubt`` then says why. ``shares`` are the contributions of each kind of data.
+    parameter; ``doubt`` then says why. ``shares`` are the contributions of each kind of data to
+    the variance.
 
     Examples
     --------

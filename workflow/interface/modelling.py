@@ -19,7 +19,7 @@ def wear_model(case: AnyCase, /, **overrides: Any) -> WearModel:
 
     Examples
     --------
-    The same joint with another friction on both flanks:
+    The same joint with another coefficient of friction on both flanks:
 
     >>> from dataclasses import replace
     >>> import fretscale

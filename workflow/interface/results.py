@@ -48,7 +48,7 @@ class MainResult(NamedTuple):
 
     Examples
     --------
-    The load that was asked for:
+    The applied load:
 
     >>> import fretscale, tempfile
     >>> coarse = fretscale.load_case(
@@ -103,7 +103,7 @@ class Results(Group):
 
     Examples
     --------
-    On a grid so coarse the largest pressure is within 1 % of Hertz's, 1450 MPa:
+    On this coarse grid the largest pressure is within 1 % of Hertz's, 1450 MPa:
 
     >>> import fretscale, tempfile
     >>> coarse = fretscale.load_case(

@@ -98,7 +98,7 @@ def _sampled(sweep: Sweep) -> dict[str, list[Any]]:
 
     For parameters of a fit this holds before their correlation is applied.
     """
-    from scipy.stats import qmc  # half a second
+    from scipy.stats import qmc  # takes half a second to import
 
     varied, fitted = sweep.file.variations(), sweep.fitted
     count = len(varied) + (len(fitted.parameters) if fitted else 0)

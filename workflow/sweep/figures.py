@@ -125,7 +125,7 @@ def _curve(summary: dict[str, Any], name: str, quantity: str, scale: float) -> t
     return np.array(summary["kinetics"]["cycles"]), scale * worn
 
 
-# --- against what varies ------------------------------------------------------------------------
+# --- against varied entries ---------------------------------------------------------------------
 
 
 @dataclass(frozen=True)

@@ -127,7 +127,7 @@ class _Range(_Between):
 
 
 class _Uniform(_Between):
-    """Every value between two ends is as likely."""
+    """Uniform distribution between two ends."""
 
     kind: Literal["uniform"] = entry("of the distribution", "uniform")
 
@@ -139,7 +139,7 @@ Uniform = create_model("Uniform", __base__=_Uniform, **_FIRST, **_LAST)  # type:
 
 
 class Normal(Section):
-    """Normal distribution; its tails go on without end, and a case may refuse what they bring."""
+    """Normal distribution; its tails are unbounded, so that a case may refuse extreme values."""
 
     kind: Literal["normal"] = entry("of the distribution", "normal")
     mean: AnyAmount = entry("of the values", "30 mm")
@@ -152,7 +152,7 @@ class Normal(Section):
 
 
 class LogNormal(Section):
-    """Logarithms are normal: 68 % of the values are within ``factor`` of the median."""
+    """Lognormal distribution: 68 % of the values are within ``factor`` of the median."""
 
     kind: Literal["lognormal"] = entry("of the distribution", "lognormal")
     median: PositiveAmount = entry("half of the values are below it", "1e4 um^3/J")
