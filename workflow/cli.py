@@ -37,7 +37,7 @@ All commands: `fretscale -h`; a case of few lines: `fretscale new KIND --short`.
 
 
 def _loud(command: Command) -> Command:
-    """The switches of all commands that compute."""
+    """Add the switches of all commands that compute."""
     for switch, level, text in (
         ("-v/--verbose", "VERBOSE", "Say all that goes to the log, too."),
         ("-q/--quiet", "QUIET", "Say nothing but errors and warnings."),
@@ -55,7 +55,7 @@ def _loudness(level: str | None) -> Loudness:
 
 @contextmanager
 def _repeatable(out: Path) -> Iterator[None]:
-    """What Ctrl-C says of a command that finds what it has done again in a folder."""
+    """Complete the message of Ctrl-C for a command that reuses its finished runs."""
     try:
         yield
     except KeyboardInterrupt as stop:
@@ -285,7 +285,7 @@ def check(case: str, overrides: tuple[str, ...], out: Path | None, force: bool) 
 
 
 def _fitted(line: str, indent: int) -> str:
-    """A line as wide as the terminal, what is more below it; where there is none, as it is."""
+    """Return a line wrapped to the width of the terminal; unchanged if there is no terminal."""
     if sys.stdout is None or not sys.stdout.isatty():
         return line
     width = shutil.get_terminal_size().columns
@@ -354,7 +354,7 @@ def describe(
     from workflow.commands.describe import read_file, write_assembly, write_offer
 
     imported = read_file(file, size, unit)
-    # What is not in the case is told when that is written.
+    # Contents that are not in the case are listed when the case is written.
     for line in describe_bodies(imported if case is None else replace(imported, left=())):
         click.echo(line)
     if out is not None:
@@ -366,14 +366,14 @@ def describe(
 
 
 def _kinds() -> dict[str, str]:
-    """What ``new`` writes: each kind of case, and other files, in a line of plain words."""
+    """Return each kind of file that ``new`` writes, with a line about it."""
     from workflow.commands.new import offered
 
     return offered()
 
 
 class _Kind(click.ParamType):
-    """A kind of case, which a shell completes."""
+    """Kind of case, completed by the shell."""
 
     name = "kind"
 
@@ -388,7 +388,7 @@ class _Kind(click.ParamType):
 
 
 class _KindsInHelp(click.Command):
-    """A command whose help ends with the kinds of case that there are."""
+    """Command whose help ends with the kinds of case."""
 
     def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         with formatter.section("KIND is one of"):
@@ -445,7 +445,7 @@ for _command in (loops, scar, fit):
 
 
 def main() -> None:
-    """Entry point of the command."""
+    """Run the command line; this is the entry point of the command."""
     from workflow.shell.signals import end_tidily, hear_no_more
     from workflow.shell.streams import hold_standard_streams, spell_what_streams_lack
 
@@ -454,7 +454,7 @@ def main() -> None:
     end_tidily()
     try:
         cli(prog_name="fretscale")
-    except KeyboardInterrupt:  # pressed again while the first one was told
+    except KeyboardInterrupt:  # pressed again while the first interruption was being reported
         sys.exit(errors.INTERRUPTED)
     finally:
         hear_no_more()

@@ -1,6 +1,6 @@
-"""The analyses there are. A new one is a folder in ``workflow/analyses`` and a name here.
+"""Registry of analyses. A new analysis is a folder in ``workflow/analyses`` and a name here.
 
-Each is loaded when it is asked for: to run a contact nobody waits for the entries of vibrations.
+Each analysis is imported on demand, so that a contact run need not load the vibration entries.
 """
 
 from __future__ import annotations
@@ -25,45 +25,45 @@ ANALYSES: Mapping[str, str] = {
     "vibration": "vibration",
     "vibration_wear": "vibration",
 }
-"""The folder of each analysis, and how its cases call it in ``analysis``."""
+"""Folder of each analysis, and the word for it in the entry ``analysis`` of its cases."""
 
 NOTHING: Mapping[str, tuple[type[Section], str]] = {}
 
 
 def analyses(called: str | None = None) -> list[Analysis[Any]]:
-    """Those whose cases call them so; all of them if none does."""
+    """Return the analyses with this word in their cases; all of them if none has it."""
     names = [name for name, word in ANALYSES.items() if word == called] or list(ANALYSES)
     return [import_module(f"workflow.analyses.{name}").ANALYSIS for name in names]
 
 
 def kinds(called: str | None = None) -> dict[str, type[Case]]:
-    """Every kind of case, by the name that ``fretscale new`` has for it, or those so called."""
+    """Return the kinds of case of these analyses, by their names in ``fretscale new``."""
     return {name: case for analysis in analyses(called) for name, case in analysis.cases.items()}
 
 
 def about() -> dict[str, str]:
-    """What each kind of case is about, in a line of plain words."""
+    """Return what each kind of case is about, in one plain line."""
     return {name: case.about for name, case in kinds().items()}
 
 
 def analysis_of(case: Case) -> Analysis[Any]:
-    """The analysis of a case."""
+    """Return the analysis of a case."""
     own = analyses(case.analysis)
     return next(analysis for analysis in own if type(case) in analysis.cases.values())
 
 
 def kind_of(case: Case) -> str:
-    """The name of a case's kind."""
+    """Return the name of a case's kind."""
     return next(name for name, model in kinds(case.analysis).items() if type(case) is model)
 
 
 def load_case(path: str | Path, overrides: Sequence[str] = ()) -> Case:
-    """The case of whatever kind in a file: see :func:`workflow.case.loading.load_case`."""
+    """Return the case of any kind in a file: see :func:`workflow.case.loading.load_case`."""
     return loading.load_case(path, _those_called, overrides)
 
 
 def parse_case(text: str, name: str, overrides: Sequence[str] = ()) -> Case:
-    """The same, from text."""
+    """Return the case of any kind in a text."""
     return loading.parse_case(text, name, _those_called, overrides)
 
 
@@ -72,12 +72,15 @@ def _those_called(called: object) -> list[type[Case]]:
 
 
 def template(kind: str, short: bool = False) -> str:
-    """A commented case of a kind, ready to run: with all its entries, or only those it needs."""
+    """Return a commented case of a kind with all entries, or if ``short`` the required ones."""
     model = kinds()[kind]
     return short_template(model) if short else write_template(model)
 
 
 def json_schema(others: Mapping[str, tuple[type[Section], str]] = NOTHING) -> dict[str, Any]:
-    """JSON schema of a case of any kind, or of other files by name, with a line about each."""
+    """Return the JSON schema of a case of any kind, and of the files in ``others``.
+
+    ``others`` has a model and a line about it for each name.
+    """
     cases = {name: (case, case.about) for name, case in kinds().items()}
     return write_schema({**cases, **others})

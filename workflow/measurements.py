@@ -1,4 +1,4 @@
-"""Commands for what was measured: loops, scars, and fits of parameters.
+"""Commands for measurements: loops, scars, and fits of parameters.
 
 Everything heavy is imported inside the commands, so that ``--help`` answers at once.
 """

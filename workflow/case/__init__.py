@@ -1,1 +1,1 @@
-"""The engine of cases: YAML with units in, a frozen model in base units out, or why not."""
+"""Engine of cases: reads YAML with units into a frozen model in base units, or explains errors."""

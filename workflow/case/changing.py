@@ -1,4 +1,4 @@
-"""A case with other values at some of its entries, not validated again."""
+"""Copies of a case with other values at some of its entries, which are not validated again."""
 
 from __future__ import annotations
 
@@ -11,7 +11,10 @@ Chosen = TypeVar("Chosen", bound=Section)
 
 
 def changed(section: Chosen, values: Mapping[str, Any]) -> Chosen:
-    """The section with other values at dotted paths; the caller knows which go together."""
+    """Return a copy of the section with other values at dotted paths.
+
+    The values are not validated: the caller makes sure that they fit together.
+    """
     for path, value in values.items():
         name, _, below = path.partition(".")
         inner = changed(getattr(section, name), {below: value}) if below else value

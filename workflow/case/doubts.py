@@ -1,7 +1,8 @@
-"""Values that a case may have, but hardly is meant to: most of them a forgotten or mistaken unit.
+"""Plausibility warnings: values that a case may have, but that are probably a mistaken unit.
 
-What is usual is told here, by entry, wider than anything that machines, rigs or laboratories have.
-What two entries say together is the business of each kind of case (``Case.doubts``).
+This module holds the plausible range of single entries. The ranges are wider than anything that
+machines, rigs or laboratories have. Each kind of case checks combinations of its entries itself
+(``Case.doubts``).
 """
 
 from __future__ import annotations
@@ -19,24 +20,25 @@ from workflow.case.fields import Quantity
 from workflow.case.plain import between, plain, said_in
 from workflow.case.sections import Case, entry_of
 
-# Cells so many times longer than wide waste most of them.
+# Aspect ratio of cells above which a grid wastes most of them.
 SQUARE = 5.0
-# Pressures below this [MPa], and beyond so many times the yield stress, are none of a test; beyond
-# this share of Young's modulus nothing stays as it is.
+# Pressures below WEAK [MPa] and above BEYOND times the yield stress do not occur in tests. No
+# material bears more than the share STRENGTH of its Young's modulus.
 WEAK, BEYOND, STRENGTH = 1e-3, 5.0, 0.1
-# Roundings that fall off by less than this [mm] are rougher than they are round.
+# Roundings that fall off by less than this [mm] are smaller than the roughness.
 ROUND = 1e-4
-# Strokes over so many widths of the contact are rare even where wear is wanted.
+# Ratio of stroke to contact width that tests hardly ever exceed, even tests of wear.
 LONG = 50.0
-# Heights that rise by more than this share of a face are no roughness, nor are those of less [mm].
+# Measured heights are not roughness if they span more than the share STEEP of a face, or less
+# than FINE [mm].
 STEEP, FINE = 0.3, 1e-5
 
 
 @dataclass(frozen=True)
 class Usual:
-    """What is usual of the entries whose dotted paths match: from ``low`` to ``high``, base unit.
+    """Plausible range of entries whose dotted paths match: from ``low`` to ``high`` in ``unit``.
 
-    A value 0 says that there is none of it, and is not doubted.
+    A value of 0 means that the effect is absent, and gives no warning.
     """
 
     path: str
@@ -46,7 +48,7 @@ class Usual:
 
 
 USUAL = (
-    # From soft polymers to diamond; rubber is not the business of half-spaces.
+    # From soft polymers to diamond; rubber deforms too much for half-spaces.
     Usual("materials.*.young", "MPa", 300.0, 1.3e6),
     Usual("materials.*.poisson", "1", 0.1, 0.5),
     Usual("materials.*.density", "t/mm^3", 5e-10, 2.3e-8),
@@ -62,15 +64,15 @@ USUAL = (
     # 100 to 25,000 rpm.
     Usual("*.rotation_speed", "rad/s", 10.0, 2600.0),
     Usual("structure.loads.*.speed", "rad/s", 10.0, 2600.0),
-    # Of remote displacements, whose squares are left out.
+    # Rotations of remote displacements are linearized: their squares are neglected.
     Usual("structure.loads.*.rotation.*", "rad", 1e-8, 0.05),
     Usual("load_path.airfoil_mass", "t", 5e-6, 0.1),
-    # Of a joint that frets.
+    # The stroke of a joint that frets.
     Usual("drive.stroke", "mm", 1e-4, 1.0),
     Usual("*.stroke", "mm", 1e-4, 30.0),
     Usual("loops.amplitude", "mm", 1e-5, 1.0),
     Usual("*.amplitude", "mm", 1e-6, 10.0),
-    # Interfaces have 0.1 to 1000 N/um, and springs of rigs more or less.
+    # Interfaces have 0.1 to 1000 N/um; springs of rigs cover a wider range.
     Usual("joint.stiffness", "N/mm", 50.0, 1e7),
     Usual("joint.normal_stiffness", "N/mm", 50.0, 1e7),
     Usual("structure.springs.*", "N/mm", 0.05, 1e7),
@@ -100,7 +102,8 @@ USUAL = (
     Usual("stress.life.depth", "mm", 1e-3, 1.0),
 )
 
-# Units that a number may be meant in, the likeliest first, and their sizes in the base unit.
+# Units that the number may have been meant in, the likeliest first, with their size in base
+# units.
 MEANT: dict[str, tuple[tuple[str, float], ...]] = {
     "MPa": (("GPa", 1e3), ("Pa", 1e-6), ("kPa", 1e-3)),
     "t/mm^3": (("kg/m³", 1e-12), ("g/cm³", 1e-9), ("t/mm³", 1.0)),
@@ -115,14 +118,14 @@ MEANT: dict[str, tuple[tuple[str, float], ...]] = {
 
 
 def doubts_of(case: Case) -> Iterator[str]:
-    """A line for each value that is hardly meant, by itself or beside others."""
+    """Yield a plausibility warning for each value, or combination of values, that is unlikely."""
     yield from _unusual(case)
     yield from _hardly_round(case)
     yield from case.doubts()
 
 
 def _unusual(case: Case) -> Iterator[str]:
-    """A line for each entry that has an unusual value: what it is, what is usual, what is meant."""
+    """Yield a warning for each value outside its usual range, with the range and a likely unit."""
     for path, number, quantity in _quantities(case):
         usual = next(
             (u for u in USUAL if u.unit == quantity.unit and fnmatchcase(path, u.path)), None
@@ -134,7 +137,7 @@ def _unusual(case: Case) -> Iterator[str]:
 
 
 def _hardly_round(section: BaseModel, path: str = "") -> Iterator[str]:
-    """Doubts about rounded edges and ends of faces, anywhere in a section, that are flat."""
+    """Yield warnings about rounded edges and ends of faces in a section that are nearly flat."""
     for name in ("edge", "end"):
         width, radius = (getattr(section, f"{name}_{of}", None) for of in ("width", "radius"))
         if width is not None and radius is not None and 0.5 * width**2 / radius < ROUND:
@@ -153,7 +156,7 @@ def _hardly_round(section: BaseModel, path: str = "") -> Iterator[str]:
 
 
 def _quantities(section: BaseModel, path: str = "") -> Iterator[tuple[str, float, Quantity]]:
-    """All numbers that a section gives, with their places."""
+    """Yield path, value and quantity of every number in a section."""
     for name, field in type(section).model_fields.items():
         value, quantity = getattr(section, name), entry_of(field)
         items = enumerate(value) if isinstance(value, tuple) else [("", value)]
@@ -166,7 +169,7 @@ def _quantities(section: BaseModel, path: str = "") -> Iterator[tuple[str, float
 
 
 def _question(number: float, usual: Usual) -> str:
-    """What may have been meant, as a question; nothing where no other unit makes it usual."""
+    """Return the value that was probably meant, as a question; empty if no unit is plausible."""
     for written in (number / said_in(number, usual.unit)[0], number):
         for unit, size in MEANT.get(usual.unit, ()):
             if usual.low <= written * size <= usual.high and written * size != number:
@@ -178,7 +181,7 @@ def _question(number: float, usual: Usual) -> str:
 
 
 def uneven_cells(sides: tuple[float, float], cells: tuple[int, int]) -> Iterator[str]:
-    """A doubt about a grid over a face whose cells are far from square, unless it is a line."""
+    """Yield a warning if the cells of an area grid are far from square."""
     if 1 in cells:
         return
     dx, dy = (side / count for side, count in zip(sides, cells, strict=True))
@@ -193,9 +196,9 @@ def uneven_cells(sides: tuple[float, float], cells: tuple[int, int]) -> Iterator
 def pressed(
     path: str, pressure: float, yields: Iterable[float | None], moduli: Iterable[float] = ()
 ) -> Iterator[str]:
-    """A doubt about a load that presses with ``pressure`` [MPa] on bodies that yield at these.
+    """Yield a warning if ``pressure`` [MPa] is implausible for these yield stresses [MPa].
 
-    Where that is not known, of these Young's ``moduli`` [MPa].
+    If no yield stress is known, Young's ``moduli`` [MPa] give the limit.
     """
     if 0.0 < pressure < WEAK:
         yield f"{path}: presses with about {plain(pressure, 'MPa', 3)} at most: is its unit right?"
@@ -213,9 +216,9 @@ def pressed(
 
 
 def hertz(load: float, radius: float, modulus: float, line: bool) -> tuple[float, float]:
-    """Half width of contact [mm] and largest pressure [MPa] of a ball, or a cylinder along a line.
+    """Return half width [mm] and peak pressure [MPa] of a ball, or of a cylinder for a ``line``.
 
-    As :mod:`sa_solver.reference.hertz` has them, which takes too long to load for a check.
+    :mod:`sa_solver.reference.hertz` has the same formulas, but is slow to import for a mere check.
     """
     if line:
         half_width = sqrt(4.0 * load * radius / (pi * modulus))
@@ -225,7 +228,7 @@ def hertz(load: float, radius: float, modulus: float, line: bool) -> tuple[float
 
 
 def long_stroke(path: str, stroke: float, width: float) -> Iterator[str]:
-    """A doubt about a stroke over a contact of such a width [mm]."""
+    """Yield a warning if the stroke [mm] is very large compared with the contact ``width`` [mm]."""
     if stroke > LONG * width:
         yield (
             f"{path}: {plain(stroke, 'mm')}, {stroke / width:.0f} times the width of the contact, "
@@ -234,7 +237,7 @@ def long_stroke(path: str, stroke: float, width: float) -> Iterator[str]:
 
 
 def heights(path: str, values: Array, sides: tuple[float, float]) -> Iterator[str]:
-    """A doubt about the heights of a file over a face with such sides [mm]."""
+    """Yield a warning if heights [mm] of a file are implausible for a face of these sides [mm]."""
     reach = float(np.ptp(values))
     if reach > STEEP * min(sides):
         other = "µm"
@@ -249,6 +252,6 @@ def heights(path: str, values: Array, sides: tuple[float, float]) -> Iterator[st
 
 
 def idle_steps(path: str, step: float | None, cycles: float) -> Iterator[str]:
-    """A doubt about a wear step of more cycles than all."""
+    """Yield a warning if the wear step has more cycles than the whole run."""
     if step is not None and step > cycles:
         yield f"{path}: {step:g} cycles, of {cycles:g} in all: one jump; usual: ten or more"

@@ -1,4 +1,4 @@
-"""What pydantic finds wrong, as one line: place, key, what is wrong, what is allowed."""
+"""Validation errors of pydantic as one line each: place, key, what is wrong, what is allowed."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from workflow.case.sections import KINDS_ARE_NAMED_BY, Section, sections_of
 from workflow.case.source import KeyPath, Source, child, dotted, split_path
 from workflow.case.writing import scalar
 
-# The one of KINDS_ARE_NAMED_BY that a section takes from that around it.
+# The key of KINDS_ARE_NAMED_BY that a section inherits from the section around it.
 INHERITED = "law"
 
-# Lines about a text: the same mistake mostly is in many places.
+# Largest number of lines about one text: the same mistake is often repeated in many places.
 MOST_LINES = 20
 
-# What to say about pydantic's own errors, in the words of a case.
+# Sentences that replace pydantic's own messages, in the terms of a case.
 SENTENCES = {
     "literal_error": "not known; allowed: {expected}",
     "bool_type": "not a switch; allowed: true or false",
@@ -34,13 +34,13 @@ LISTS = ("tuple_type", "too_long", "too_short")
 
 
 class Explanation:
-    """What is wrong with one text, read as one kind of case."""
+    """Explanations of the validation errors of one text, read as one kind of case."""
 
     def __init__(self, source: Source, case: type[Section]) -> None:
         self.source, self.case = source, case
 
     def lines(self, errors: Sequence[ErrorDetails]) -> list[str]:
-        """The lines of text about ``errors``, in the order of the file; of many, the first."""
+        """Return the lines about ``errors`` in the order of the file, ``MOST_LINES`` at most."""
         errors = [details for details in errors if not _only_follows(details)]
         by_line = sorted(errors, key=lambda details: self.source.where(self._path(details))[0])
         errors, left = by_line[:MOST_LINES], len(by_line[MOST_LINES:])
@@ -48,13 +48,14 @@ class Explanation:
             self._path(details) for details in errors if details["type"] == "extra_forbidden"
         ]
         meant = {(*path[:-1], near) for path in unknown if (near := self._nearest(path))}
-        # A misspelt key is unknown and its right spelling missing; one line is enough.
+        # A misspelt key is reported as unknown and its right spelling as missing; one line is
+        # enough.
         reported = [d for d in errors if d["type"] != "missing" or self._path(d) not in meant]
         lines = [line for _, line in sorted({self._line_about(details) for details in reported})]
         return [*lines, f"{self.source.name}: and {left} more like these"] if left else lines
 
     def _line_about(self, details: ErrorDetails) -> tuple[int, str]:
-        """Line number, for sorting, and the line of text about one error."""
+        """Return the line number, for sorting, and the line of text about one error."""
         path, message = self._explain(details)
         number, place = self.source.where(path)
         key = dotted(path)
@@ -63,7 +64,7 @@ class Explanation:
         return number, f"{place}: {key}: {message}"
 
     def _explain(self, details: ErrorDetails) -> tuple[KeyPath, str]:
-        """Path of the entry to look at, and the sentence about it."""
+        """Return the path of the entry to look at, and the sentence about the error."""
         kind, value = details["type"], shown(details["input"])
         context: dict[str, Any] = details.get("ctx", {})
         path = self._path(details)
@@ -83,7 +84,7 @@ class Explanation:
         return path, f"{value}: {sentence}{example}"
 
     def _disagreeing(self, path: KeyPath, keys: Sequence[str]) -> KeyPath:
-        """The entry to point at: one that an override has set, else the first."""
+        """Return the path of the entry to point at: one set by an override, else the first."""
         paths = [(*path, *split_path(key)) for key in keys]
         overridden = [p for p in paths if self.source.is_override(p)]
         return (overridden or paths or [path])[0]
@@ -104,7 +105,7 @@ class Explanation:
         return fields[0] if fields else None
 
     def _example(self, path: KeyPath) -> str:
-        """How the entry at a path is written, or what a section has below it."""
+        """Return an example of the entry at a path, or the keys of the section at that path."""
         field = self._field_at(path)
         if field is None:
             return ""
@@ -128,17 +129,17 @@ class Explanation:
         return f"unknown key; allowed: {', '.join(self._known(path))}"
 
     def _nearest(self, path: KeyPath) -> str | None:
-        """The known key that an unknown one at ``path`` resembles most."""
+        """Return the known key that resembles the unknown key at ``path`` most."""
         near = difflib.get_close_matches(str(path[-1]), self._known(path), n=1)
         return near[0] if near else None
 
     def _known(self, path: KeyPath) -> list[str]:
-        """Every key allowed beside the one at ``path``."""
+        """Return all keys that are allowed in the section that contains ``path``."""
         models = self._models_at(path[:-1])
         return list(dict.fromkeys(name for model in models for name in model.model_fields))
 
     def _wrong_kind(self, path: KeyPath, key: str) -> tuple[KeyPath, str]:
-        """A missing or unknown choice between kinds of section."""
+        """Explain a missing or unknown choice between kinds of section."""
         models = self._models_at(path)
         known = [kind for model in models for kind in get_args(model.model_fields[key].annotation)]
         value = self.source.at((*path, key))
@@ -146,7 +147,7 @@ class Explanation:
         return (*path, key), f"{wrong}; allowed: {', '.join(known)}"
 
     def _models_at(self, path: Iterable[str | int]) -> list[type[Section]]:
-        """The models for the section at ``path``: of the kind it names, or of all kinds."""
+        """Return the models for the section at ``path``: of the kind it names, or of all kinds."""
         node: Any = self.source.data
         models: list[type[Section]] = [self.case]
         for key in path:
@@ -155,24 +156,24 @@ class Explanation:
                 fields = [m.model_fields[key] for m in models if key in m.model_fields]
                 models = [section for f in fields for section in sections_of(f.annotation)]
             fitting = [m for m in models if _is_kind(m, node)]
-            # Of kinds known by their keys the first, as where a case is read.
+            # Where kinds are known by their keys, the first is chosen, as in reading a case.
             models = fitting[:1] if fitting and fitting[0].known_by else fitting or models
         return models
 
     def _path(self, details: ErrorDetails) -> KeyPath:
-        """Where an error is, without the kinds that pydantic puts in where it chose a section."""
+        """Return the path of an error without the kinds that pydantic inserts."""
         path: list[str | int] = []
         node: Any = self.source.data
         tag_seen = False
         loc, last = details["loc"], len(details["loc"]) - 1
-        # Then the last part is a key, even where it reads like a kind.
+        # For these errors the last part is a key, even if it has the same name as a kind.
         named = details["type"] in ("missing", "extra_forbidden", "entry")
         for index, key in enumerate(loc):
             is_kind = key in [child(node, name) for name in KINDS_ARE_NAMED_BY]
             if is_kind and not tag_seen and not (named and index == last):
                 tag_seen = True
                 continue
-            # A tag of ours, as (section).
+            # A tag that fretscale adds, such as (section).
             if isinstance(key, str) and key.startswith("(") and not (named and index == last):
                 continue
             path.append(key)
@@ -181,7 +182,7 @@ class Explanation:
 
 
 def _only_follows(details: ErrorDetails) -> bool:
-    """Whether a list is too short only by its items that are wrong, which are told."""
+    """Return whether a list is too short only because of wrong items, which are reported."""
     given = details["input"]
     if details["type"] != "too_short" or not isinstance(given, list | tuple):
         return False
@@ -189,14 +190,14 @@ def _only_follows(details: ErrorDetails) -> bool:
 
 
 def _within(node: Any, key: str | int) -> Any:
-    """The entry ``key`` of a section, with the law of the section where it has none of its own."""
+    """Return the entry ``key`` of a section; a section without a law inherits that of ``node``."""
     inner = child(node, key)
     law = child(node, INHERITED)
     return {INHERITED: law} | inner if law is not None and isinstance(inner, dict) else inner
 
 
 def _is_kind(model: type[Section], node: Any) -> bool:
-    """Whether the kind or law that ``node`` names, or a key of it, is that of ``model``."""
+    """Return whether ``node`` names the kind or law of ``model``, or has a key that only it has."""
     if model.known_by:
         return isinstance(node, dict) and bool(model.known_by & node.keys())
     choices = [name for name in KINDS_ARE_NAMED_BY if name in model.model_fields]

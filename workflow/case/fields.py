@@ -1,7 +1,7 @@
-"""Kinds of entry in a case: quantity, whole number, text. Each knows what it takes.
+"""Kinds of entry in a case, such as quantities, whole numbers and texts, with their validation.
 
-They are written as annotations, ``Annotated[float, Quantity("mm", above=0)]``, so that the type
-seen by the rest of the program is the plain ``float``, in base units.
+They are written as annotations, ``Annotated[float, Quantity("mm", above=0)]``, so that the rest
+of the program sees a plain ``float`` in base units.
 """
 
 from __future__ import annotations
@@ -20,18 +20,18 @@ from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
 from workflow.case import units
 
-# Files of several arrays, and behind a colon the one that is meant.
+# Files that hold several arrays, with the name of one array after a colon.
 OF_SEVERAL = r"(.*\.(?:h5|hdf5|npz|mat|op4|pch|bdf)):(.*)"
 DOTTED = r"[\w-]+(\.[\w-]+)*"
 NO_CONTEXT: Mapping[str, Any] = {}
 NOT_OF_KIND = "not a file of this kind"
-Auto = Literal["auto"]  # of an entry that is chosen before the run
+Auto = Literal["auto"]  # Type of an entry whose value is chosen before the run.
 AUTO: Auto = "auto"
-LONGEST_SHOWN = 60  # of a wrong value in a message, which must stay one readable line
+LONGEST_SHOWN = 60  # Length of a wrong value in a message, which must stay one readable line.
 
 
 def shown(value: object) -> str:
-    """``value`` as it goes into a one-line message."""
+    """Return ``value`` as text for a one-line message."""
     if isinstance(value, dict):
         return "a section"
     if isinstance(value, list | tuple):
@@ -46,7 +46,7 @@ def shown(value: object) -> str:
 
 
 class Entry(ABC):
-    """An annotation that validates one value; ``allowed`` is the sentence about what it takes."""
+    """Annotation that validates one value; ``allowed`` is a sentence about accepted values."""
 
     @property
     @abstractmethod
@@ -59,7 +59,7 @@ class Entry(ABC):
     def json_schema(self) -> dict[str, Any]: ...
 
     def refusal(self, value: object, wrong: str) -> PydanticCustomError:
-        """The error: the value, what is wrong with it, what is allowed."""
+        """Return the error about a value: the value, what is wrong with it, what is allowed."""
         message = f"{shown(value)}: {wrong}; allowed: {self.allowed}"
         return PydanticCustomError("entry", "{message}", {"message": message})
 
@@ -75,7 +75,7 @@ class Entry(ABC):
 
 
 class Written(float):
-    """A number in base units that remembers the ``text`` it was written as, with its unit."""
+    """Number in base units that remembers the ``text`` it was written as, with its unit."""
 
     def __new__(cls, number: float, text: str = "") -> Self:
         written = super().__new__(cls, number)
@@ -86,12 +86,12 @@ class Written(float):
 
     @property
     def unit(self) -> str:
-        """The unit it was written in."""
+        """Unit that the number was written in."""
         return units.split(self.text)[1]
 
 
 def in_unit_of(written: float, number: float) -> tuple[float, str]:
-    """``number``, in base units, in the unit of ``written``; "" where that was a bare number."""
+    """Return ``number`` in the unit of ``written``, with the unit; as it is for a bare number."""
     if not isinstance(written, Written):
         return number, ""
     return number / units.to_base(f"1 {written.unit}", None), written.unit
@@ -99,11 +99,11 @@ def in_unit_of(written: float, number: float) -> tuple[float, str]:
 
 @dataclass(frozen=True)
 class Quantity(Entry):
-    """A number in the base unit ``unit``, or a text with any unit of that dimension.
+    """Number in the base unit ``unit``, given as a bare number or as text with any compatible unit.
 
-    ``unit`` is ``"1"`` for a ratio, and ``None`` for any dimension: then the number remembers how
-    it was written. The limits are in the base unit; ``range_text`` says them in everyday units
-    where those differ.
+    ``unit`` is ``"1"`` for a ratio, and ``None`` for any dimension: the number then remembers how
+    it was written. The limits are in the base unit; ``range_text`` states them in everyday units
+    where these differ.
     """
 
     unit: str | None
@@ -133,7 +133,7 @@ class Quantity(Entry):
         return " and ".join(part for part in (lower, upper) if part) or f"any number{unit}"
 
     def contains(self, number: float) -> bool:
-        """Whether ``number``, in the base unit, is within the limits."""
+        """Return whether ``number``, in the base unit, is within the limits."""
         return self.above < number < self.below and self.at_least <= number <= self.at_most
 
     def parse(self, value: object) -> float:
@@ -176,7 +176,7 @@ class Quantity(Entry):
 
 @dataclass(frozen=True)
 class Whole(Entry):
-    """A whole number from ``at_least`` to ``at_most``."""
+    """Whole number from ``at_least`` to ``at_most``."""
 
     at_least: int
     at_most: int
@@ -200,7 +200,7 @@ class Whole(Entry):
 
 @dataclass(frozen=True)
 class Rows(Whole):
-    """The cells of a grid along y: one row in a line contact."""
+    """Number of cells of a grid along y: 1 in a line contact."""
 
     @property
     def allowed(self) -> str:
@@ -214,7 +214,7 @@ class Rows(Whole):
 
 
 class OrAuto:
-    """What annotates ``X | Auto``: a value X as annotated, or the word auto."""
+    """Annotation of ``X | Auto``: accepts a value of the annotated type X, or the word auto."""
 
     def __get_pydantic_core_schema__(
         self, source: Any, handler: GetCoreSchemaHandler
@@ -236,7 +236,7 @@ class OrAuto:
 
 @dataclass(frozen=True)
 class OrAlone:
-    """What annotates a list whose first value may stand alone, for one with the ``rest``."""
+    """Annotation of a list whose first value may be given alone; ``rest`` then follows it."""
 
     rest: tuple[int, ...] = ()
 
@@ -263,7 +263,7 @@ class OrAlone:
 class Formats(Entry):
     """Formats of files out of ``choices``: true for the first, false for none, one, or several.
 
-    Several, and one, are a tuple.
+    One or several formats become a tuple.
     """
 
     choices: tuple[str, ...]
@@ -293,7 +293,7 @@ class Formats(Entry):
 
 @dataclass(frozen=True)
 class Word(Entry):
-    """One of some ``words``: of a list, whose items cannot be of a literal type."""
+    """One of several ``words``, for items of lists, where a literal type cannot be used."""
 
     words: tuple[str, ...]
 
@@ -331,7 +331,7 @@ class Text(Entry):
 
 @dataclass(frozen=True)
 class Value(Entry):
-    """Whatever a leaf of a case can be."""
+    """Any value that an entry of a case can have."""
 
     @property
     def allowed(self) -> str:
@@ -354,7 +354,7 @@ AnyValue = Annotated[Any, Value()]
 
 
 def is_finite(number: float) -> bool:
-    """Whether a number, a whole one of any length, is finite as a float."""
+    """Return whether a number is finite as a float, for whole numbers of any length too."""
     try:
         return math.isfinite(number)
     except OverflowError:
@@ -363,7 +363,7 @@ def is_finite(number: float) -> bool:
 
 @dataclass(frozen=True)
 class Path(Entry):
-    """Keys joined by dots, such as ``wear.blade.coefficient``; list entries by their number."""
+    """Keys joined by dots, such as ``wear.blade.coefficient``; items of a list by their number."""
 
     allowed = "keys joined by dots, such as wear.blade.coefficient"
 
@@ -378,10 +378,10 @@ class Path(Entry):
 
 @dataclass(frozen=True)
 class File(Entry):
-    """A file there is, relative to the folder of the case; read as its absolute path.
+    """Existing file, given relative to the folder of the case and stored as its absolute path.
 
-    Data in a file of several are named after a colon: ``gaps.h5:scan/gap``. The folder comes from
-    the validation context, entry ``folder``.
+    A dataset of a file with several is named after a colon: ``gaps.h5:scan/gap``. The folder is the
+    entry ``folder`` of the validation context.
     """
 
     endings: tuple[str, ...]
@@ -391,7 +391,7 @@ class File(Entry):
         return f"a file {', '.join(self.endings)}, as seen from the folder of the case"
 
     def wrong_name(self, name: str) -> str:
-        """Why a file of this name is not taken; empty if it is."""
+        """Return why a file of this name is refused; empty if it is accepted."""
         return "" if name.endswith(self.endings) else NOT_OF_KIND
 
     def parse(self, value: object, context: Mapping[str, Any] = NO_CONTEXT) -> str:
@@ -419,7 +419,7 @@ class File(Entry):
 
 
 def unreadable(path: Pathname) -> str:
-    """Why a file cannot be read, empty if it can: a pipe, say, would be waited for."""
+    """Return why a file cannot be read, empty if it can; reading a pipe or device would block."""
     try:
         if path.is_dir():
             return "a directory"
@@ -435,6 +435,6 @@ def unreadable(path: Pathname) -> str:
 
 
 def split_dataset(text: str) -> tuple[str, str]:
-    """File and dataset of ``file.h5:dataset``; an empty dataset where there is none."""
+    """Return file and dataset of ``file.h5:dataset``; the dataset is empty if none is named."""
     match = re.fullmatch(OF_SEVERAL, text, re.DOTALL)
     return (match[1], match[2]) if match else (text, "")

@@ -1,4 +1,4 @@
-"""Files that a case or a command names: rows of CSV, and fields of heights."""
+"""Readers of files that a case or a command names: CSV rows, arrays and fields of heights."""
 
 from __future__ import annotations
 
@@ -21,25 +21,25 @@ if TYPE_CHECKING:
     import h5py
 
 COMMENT = "#"
-# Control characters that no text has; a page break and Windows' end of file may be in it.
+# Control characters that no text has; a form feed and the end-of-file mark of Windows are allowed.
 NO_TEXT = re.compile(r"[\x00-\x08\x0e-\x19\x1b-\x1f\x7f]")
 QUOTED = re.compile(r'"[^"]*"')
 DECIMAL_COMMA = re.compile(r"^([-+]?\d*),(\d+(?:[eE][-+]?\d+)?)$")
 # Blanks between a heading and its unit in brackets.
 BEFORE_UNIT = re.compile(r"\s+(?=[\[(])")
-# What h5py makes of links that lead nowhere; damage ends in more ways.
+# Exceptions that h5py raises for dangling links; a damaged file raises others too.
 HDF5_ERRORS = OSError, RuntimeError, LookupError
 
 
 class InputFileError(UserError, ValueError):
-    """A file that cannot be taken; ``file:line: what is wrong; what is allowed``."""
+    """File that cannot be used; the message is ``file:line: what is wrong; what is allowed``."""
 
 
 def text_of(file: str | Path) -> str:
     """Return the text of a file in UTF-8, UTF-16 or, where it is neither, in Latin-1.
 
-    Byte order marks are passed over. UTF-16 without one is known by its zero bytes, which other
-    text has not. Raises InputFileError.
+    Byte order marks are skipped. UTF-16 without a mark is recognized by its zero bytes, which other
+    text does not have. Raises InputFileError.
     """
     allowed = "; allowed: text in UTF-8, UTF-16 or Latin-1"
     if wrong := unreadable(Path(file)):
@@ -67,14 +67,14 @@ def _utf_8_or_latin_1(raw: bytes) -> str:
 
 
 def csv_rows(file: str | Path, blanks: bool = False) -> list[tuple[int, tuple[str, ...]]]:
-    """Line number and cells of every row of a CSV file that is neither empty nor a comment.
+    """Return line number and cells of every row of a CSV file that is neither empty nor a comment.
 
-    Comments begin with ``#``. Cells end at semicolons, tabs or commas, whichever the first row has
-    in this order; with ``blanks`` at blanks where it has none of them. Beside semicolons a comma
-    within a number is a decimal comma, as programs write it that are set to such a language.
-    Raises InputFileError.
+    Comments begin with ``#``. The separator is a semicolon, a tab or a comma, the first of these
+    that the first row has; with ``blanks``, white space if it has none of them. Where semicolons
+    separate the cells, a comma within a number is a decimal comma, as programs write it in some
+    languages. Raises InputFileError.
     """
-    # Empty in place of comments, so that they still count.
+    # Comments become empty lines, so that line numbers stay right.
     lines = [
         "\n" if line.lstrip().startswith(COMMENT) else line
         for line in io.StringIO(text_of(file), newline="")
@@ -101,7 +101,10 @@ def csv_rows(file: str | Path, blanks: bool = False) -> list[tuple[int, tuple[st
 
 
 def check_widths(file: str | Path, rows: Sequence[tuple[int, tuple[str, ...]]], first: str) -> None:
-    """Raise InputFileError unless all rows have as many cells as the first, called so."""
+    """Raise InputFileError unless all rows have as many cells as the first.
+
+    Messages call the first row ``first``.
+    """
     count = len(rows[0][1])
     for line, cells in rows:
         if len(cells) != count:
@@ -111,13 +114,13 @@ def check_widths(file: str | Path, rows: Sequence[tuple[int, tuple[str, ...]]], 
 
 
 def number_in(place: str, cell: str) -> float:
-    """The number that a cell says. Raises InputFileError where it is none, or not finite."""
+    """Return the number in a cell; raise InputFileError if it is not a finite number."""
     if DECIMAL_COMMA.match(cell):
         raise InputFileError(
             f"{place}: {cell}: a decimal comma; allowed: a point, or semicolons between the cells"
         )
     try:
-        # Python would take 1_000 for a number.
+        # Python would accept 1_000 as a number.
         number = float("" if "_" in cell else cell)
     except ValueError:
         raise InputFileError(f"{place}: {shown(cell)}: not a number; allowed: numbers") from None
@@ -127,9 +130,9 @@ def number_in(place: str, cell: str) -> float:
 
 
 def read_heights(file: str) -> Array:
-    """Heights ``(nx, ny)`` [mm] of ``.npy``, ``.csv`` or ``.h5:dataset``; a list is one column.
+    """Return heights ``(nx, ny)`` [mm] of ``.npy``, ``.csv`` or ``.h5:dataset``.
 
-    Raises InputFileError.
+    A list is one column. Raises InputFileError.
     """
     heights = _read_csv(file) if file.endswith(".csv") else read_array(file)
     if heights.dtype.kind not in "iuf" or heights.ndim not in (1, 2) or heights.size == 0:
@@ -147,7 +150,7 @@ def read_heights(file: str) -> Array:
 
 
 def read_array(file: str) -> np.ndarray:
-    """The array in ``.npy``, ``.npz:array`` or ``.h5:dataset``. Raises InputFileError."""
+    """Return the array in ``.npy``, ``.npz:array`` or ``.h5:dataset``; raise InputFileError."""
     name, array = split_dataset(file)
     if name.endswith(".h5"):
         return _read_dataset(name, array)
@@ -159,7 +162,7 @@ def read_array(file: str) -> np.ndarray:
             if array in found:
                 return np.asarray(found[array])
             there = ", ".join(found)
-    except Exception as error:  # what is no such file, or a damaged one, ends in a dozen ways
+    except Exception as error:  # numpy raises many kinds of exception for other or damaged files
         raise _unreadable(name, error) from error
     raise InputFileError(f"{name}: {array or 'which array?'}: allowed with a colon: {there}")
 
@@ -179,10 +182,11 @@ def _read_dataset(file: str, dataset: str) -> np.ndarray:
 
 @contextmanager
 def open_hdf5(file: str) -> Iterator[h5py.File]:
-    """An HDF5 file to read, with all that it leads to in it.
+    """Open an HDF5 file for reading; it must contain all of its data itself.
 
-    Raises InputFileError, also for damage that is met while it is read. Links to other files would
-    bring in numbers that nobody has named; what they lead to may be missing, which HDF5 reads as 0.
+    Raises InputFileError, also for damage that is found during reading. Links to other files are
+    refused: they bring in numbers of files that the user has not named, and HDF5 reads missing ones
+    as 0.
     """
     import h5py
 
@@ -199,7 +203,7 @@ def open_hdf5(file: str) -> Iterator[h5py.File]:
 
 
 def _astray(opened: h5py.File, name: str, link: Any) -> str | None:
-    """What is wrong with a link of the file, None for one that leads to something in it."""
+    """Return what is wrong with a link in the file; None if it leads to data in the file."""
     import h5py
 
     if isinstance(link, h5py.ExternalLink):

@@ -1,8 +1,8 @@
-"""Scans of instruments that surfalize 0.19 reads wrongly or not at all, read from their bytes.
+"""Readers of instrument files that surfalize 0.19 reads wrongly or not at all.
 
-It takes the two counts before the heights of ``.plu`` for heights, millimetres in ``.tmd`` for
-micrometres, and knows only some blocks of ``.opd``. The layouts are those that Gwyddion documents
-(modules sensofar, rmitmd and opdfile).
+Surfalize reads the two counts before the heights of ``.plu`` as heights, takes the millimetres of
+``.tmd`` for micrometres, and knows only some blocks of ``.opd``. The layouts follow the
+documentation of Gwyddion (modules sensofar, rmitmd and opdfile).
 """
 
 from __future__ import annotations
@@ -16,16 +16,16 @@ from sa_solver.errors import InputError
 from sa_solver.surfaces.scans import Scan
 from sa_solver.types import Array
 
-# Sensofar's heights and steps are in um, Wyko's wavelength in nm and its steps in mm.
+# Sensofar stores heights and steps in um; Wyko stores the wavelength in nm and the step in mm.
 MICRON, NANOMETRE = 1e-3, 1e-6
 PLU_TOPOGRAPHY, PLU_MISSING = 3, 1000001.0
 TMD_MAGIC = b"Binary TrueMap Data File v2.0"
 OPD_HEIGHTS = "RAW DATA", "RAW_DATA", "OPD", "Raw", "SAMPLE_DATA"
 OPD_ARRAY, OPD_BLOCK = 3, 24
-# Types of numbers by their kind of block and size, of pixels by their size.
+# Data types of numbers by kind of block and size, and of pixels by size.
 OPD_NUMBERS = {(6, 2): "<h", (6, 4): "<i", (7, 4): "<f", (8, 8): "<d", (12, 4): "<i"}
 OPD_PIXELS = {1: "u1", 2: "<i2", 4: "<f4"}
-# What a pixel counts from on as missing; Wyko writes 1e38, which is less in 4 bytes.
+# Smallest pixel value that means missing; Wyko writes 1e38, which is slightly less in 4 bytes.
 OPD_MISSING = {1: np.inf, 2: 32766.0, 4: 9.9e37}
 
 

@@ -1,4 +1,4 @@
-"""The JSON schema of our files, by which editors complete and check them."""
+"""JSON schema of cases, sweeps and fits, with which editors complete and check them."""
 
 from __future__ import annotations
 
@@ -14,10 +14,11 @@ DIALECT = "https://json-schema.org/draft/2020-12/schema"
 
 
 def json_schema(models: Mapping[str, tuple[type[Section], str]]) -> dict[str, Any]:
-    """Schema (draft 2020-12) of a file of any of these models, by name with a line about each.
+    """Return the schema (draft 2020-12) of a file of any of these models.
 
-    Exactly one fits a file: by the fixed words of its analysis and its structure's kind and shape,
-    and by the entries that only one of them has.
+    ``models`` has a model and a line about it for each name. Exactly one model fits a file: the
+    fixed words of its analysis and of the kind and shape of its structure decide, and the entries
+    that only one model has.
     """
     inputs: Any = [(name, "validation", TypeAdapter(model)) for name, (model, _) in models.items()]
     made, schema = TypeAdapter.json_schemas(inputs, schema_generator=_Generator)
@@ -36,7 +37,7 @@ def json_schema(models: Mapping[str, tuple[type[Section], str]]) -> dict[str, An
 
 
 class _Generator(GenerateJsonSchema):
-    """Leaves out what says nothing: titles made of keys, and null as a default."""
+    """Generator that leaves out redundant parts: titles made from keys, and null as a default."""
 
     def field_title_should_be_set(self, schema: Any) -> bool:
         return False

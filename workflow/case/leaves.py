@@ -1,4 +1,4 @@
-"""Entries of a case one by one: where they are, what they are, and their values in words."""
+"""Single entries of a case: their paths, descriptions and values as text."""
 
 from __future__ import annotations
 
@@ -24,19 +24,19 @@ from workflow.case.sections import (
 )
 from workflow.case.writing import scalar
 
-# At the end of the description of an entry: its base unit.
+# The base unit, which ends the description of an entry.
 UNIT = re.compile(r"\s*\[[^\]]*\]$")
-# In a path: which one of a list.
+# The number of a list item within a path.
 NUMBERS = re.compile(r"\.\d+(?=\.|$)")
-# What a case gives has no error, and so all its digits.
+# Values given in a case have no error, and so are shown with all digits.
 GIVEN = 0.0
 
 
 @dataclass(frozen=True)
 class Leaf:
-    """An entry that is no section: its dotted ``path``, what it is, its value, and that in words.
+    """Entry that is not a section: its path, description ``what``, ``value`` and value as ``text``.
 
-    ``told`` are values that the case does not take as everybody does who says nothing.
+    ``told`` is whether the value differs from the default, or has no default.
     """
 
     path: str
@@ -47,7 +47,7 @@ class Leaf:
 
 
 def leaves_of(section: BaseModel, above: str = "") -> Iterator[Leaf]:
-    """All entries of a section that are set, in the order in which they are written."""
+    """Yield all entries of a section that are set, in the order in which they are written."""
     for name, field in entries_of(type(section)).items():
         value, path = getattr(section, name), f"{above}{name}"
         quantity = entry_of(field)
@@ -65,7 +65,7 @@ def leaves_of(section: BaseModel, above: str = "") -> Iterator[Leaf]:
 
 
 def _what(section: type[BaseModel], name: str, field: FieldInfo) -> str:
-    """What an entry is; of that which names the kind of a section, what this kind is."""
+    """Return the description of an entry; for the key of a section's kind, that of the kind."""
     kinds = get_args(field.annotation) if get_origin(field.annotation) is Literal else ()
     if name in KINDS_ARE_NAMED_BY and len(kinds) == 1:
         return (section.__doc__ or "").partition("\n")[0].rstrip(".").replace("``", "")
@@ -73,9 +73,9 @@ def _what(section: type[BaseModel], name: str, field: FieldInfo) -> str:
 
 
 def taken(case: Case) -> list[tuple[str, str]]:
-    """A row of what a case takes without being told, as one would write it; none if all is told.
+    """Return one row with the defaults that a case relies on; no row if it gives every value.
 
-    Of each item of a list alike, once. What is written beside the results is left out.
+    Equal items of a list appear once. Sections on output and comparison (``LAST``) are left out.
     """
     texts = dict.fromkeys(
         f"{NUMBERS.sub('.*', path)} {scalar(value) if unit is None else plain(value, unit)}"
@@ -88,20 +88,20 @@ def taken(case: Case) -> list[tuple[str, str]]:
 def _not_given(
     section: BaseModel, above: str, given: bool
 ) -> Iterator[tuple[str, Any, str | None]]:
-    """Path, value and unit of all entries that are not ``given`` and have a value nevertheless."""
+    """Yield path, value and unit of all entries that are not given but have a value."""
     for name, field in entries_of(type(section)).items():
         quantity, here = entry_of(field), given and name in section.model_fields_set
         unit = quantity.unit if isinstance(quantity, Quantity) else None
         for place, item in _items(getattr(section, name), f"{above}{name}"):
             if isinstance(item, Section):
-                if getattr(item, "wanted", True):  # else none of it is used
+                if getattr(item, "wanted", True):  # an unwanted section is not used
                     yield from _not_given(item, f"{place}.", here)
             elif not here and item != ():
                 yield place, item, unit if isinstance(item, float) else None
 
 
 def _items(value: Any, path: str) -> Iterator[tuple[str, Any]]:
-    """A value, or each of a list of sections by its number; nothing where it is not set."""
+    """Yield a value, or each item of a list of sections with its number; nothing if not set."""
     if value is None:
         return
     if isinstance(value, tuple) and any(isinstance(item, Section | tuple) for item in value):
@@ -112,7 +112,7 @@ def _items(value: Any, path: str) -> Iterator[tuple[str, Any]]:
 
 
 def in_words(value: Any, unit: str | None, name: str = "") -> str:
-    """A value of an entry, in a unit that suits it."""
+    """Return the value of an entry as text, in a unit that suits its size."""
     if isinstance(value, tuple):
         return ", ".join(in_words(item, unit, name) for item in value) or "none"
     if isinstance(value, bool):

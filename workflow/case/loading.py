@@ -1,4 +1,4 @@
-"""A case file to a ``Case``, or to the lines that say why not."""
+"""Reading of case files into a ``Case``, with errors that list everything that is wrong."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ from workflow.errors import CaseError
 AnyCase = TypeVar("AnyCase", bound=Case)
 AnySection = TypeVar("AnySection", bound=Section)
 YAML = ".yaml"
-# Commands that take a file, and the key by which such a file is known.
+# Commands that take a file, and the key by which such a file is recognized.
 KNOWN_BY = {"sweep": "case", "fit": "fit", "run": "analysis"}
 
 Kinds = Sequence[type[AnyCase]] | Callable[[object], Sequence[type[AnyCase]]]
-"""Kinds of cases, or what gives those of the analysis that a case calls by a word."""
+"""Kinds of cases, or a function that returns those that belong to the word of an analysis."""
 
 
 def load_case(
@@ -32,11 +32,12 @@ def load_case(
     overrides: Sequence[str] = (),
     within: Sequence[str] = (),
 ) -> AnyCase:
-    """The case in file ``path``, one of ``kinds``, with overrides (``"wear.cycles=1e4"``) on top.
+    """Return the case in file ``path``, one of ``kinds``, with overrides applied.
 
-    Raises ``CaseError`` with one line ``file:line: key: what is wrong; allowed: ...`` for each
-    thing wrong, ``--set key=value`` in the place of file and line where an override is at fault.
-    ``within`` are the cases that led to this one, each named by the one before.
+    Overrides are texts such as ``"wear.cycles=1e4"``. Raises ``CaseError`` with one line
+    ``file:line: key: what is wrong; allowed: ...`` for each error; ``--set key=value`` replaces
+    file and line where an override is at fault. ``within`` are the cases that led to this one,
+    each named by the one before.
     """
     return parse_case(read_text(Path(path)), str(path), kinds, overrides, within)
 
@@ -48,9 +49,9 @@ def parse_case(
     overrides: Sequence[str] = (),
     within: Sequence[str] = (),
 ) -> AnyCase:
-    """As ``load_case``, from ``text``; ``name`` stands for the file in messages.
+    """Return the case in ``text``, as ``load_case`` does; ``name`` stands for the file in messages.
 
-    Files that the case names are looked for from the folder of ``name``.
+    Relative file names in the case start from the folder of ``name``.
     """
     source = Source(name, text, overrides)
     check_command(source, "run")
@@ -59,7 +60,7 @@ def parse_case(
 
 
 def validated(source: Source, model: type[AnySection], within: Sequence[str] = ()) -> AnySection:
-    """What the source says, as a ``model``. Raises ``CaseError``, a line for each thing wrong."""
+    """Return the source as a ``model``; raise ``CaseError`` with a line for each error."""
     known = (*within, os.path.realpath(source.name))
     context = {"folder": str(Path(source.name).parent), "within": known}
     try:
@@ -69,19 +70,19 @@ def validated(source: Source, model: type[AnySection], within: Sequence[str] = (
 
 
 class OtherKind(CaseError):
-    """A case whose analysis or structure is none of those asked for."""
+    """Case whose analysis or structure is not one of those that are accepted here."""
 
 
 @dataclass(frozen=True)
 class CaseFile(File):
-    """A file that, where it is one of YAML, is a case of ``what``, one of ``kinds``.
+    """File that, if it is YAML, is a case of one of ``kinds``; messages call it a case of ``what``.
 
-    It is read with the case that names it: what is wrong there is told before anything runs.
+    It is read together with the case that names it, so that its errors are reported before any run.
     """
 
     kinds: tuple[type[Case], ...]
     what: str
-    # What is wrong with such a case where it is named, empty for nothing.
+    # Returns why a valid case cannot be used here; empty if it can.
     unfit: Callable[[Any], str] = lambda case: ""
 
     @property
@@ -108,13 +109,16 @@ class CaseFile(File):
 
 
 def outline_of(file: str, model: type[AnyCase], rows: Mapping[str, str]) -> list[tuple[str, str]]:
-    """Rows of the outline of the case in a file that another case names, and what to call them."""
+    """Return rows of the outline of the case in ``file``, under new names.
+
+    ``rows`` maps the names of the rows to return to their new names.
+    """
     found = load_case(file, [model]).outline()
     return [(rows[name], text) for name, text in found if name in rows]
 
 
 def _kind_of_case(source: Source, kinds: Sequence[type[AnyCase]]) -> type[AnyCase]:
-    """The kind that the source means by its analysis and structure, whatever else is wrong."""
+    """Return the kind that the source means by its analysis and structure, despite other errors."""
     for path in (("analysis",), ("structure", "kind")):
         words = dict.fromkeys(word for kind in kinds for word in words_of(kind, *path))
         word = word_at(source, path, tuple(words))
@@ -125,7 +129,7 @@ def _kind_of_case(source: Source, kinds: Sequence[type[AnyCase]]) -> type[AnyCas
 
 
 def check_command(source: Source, command: str) -> None:
-    """Raise OtherKind where the file is known to be one that another command takes."""
+    """Raise OtherKind if the file is of a type that another command takes."""
     taken_by = next((word for word, key in KNOWN_BY.items() if source.at((key,)) is not None), None)
     if taken_by is not None and taken_by != command:
         raise OtherKind(
@@ -135,7 +139,7 @@ def check_command(source: Source, command: str) -> None:
 
 
 def word_at(source: Source, path: KeyPath, allowed: tuple[str, ...]) -> str:
-    """The word at ``path``, one of those ``allowed``; else raises :class:`OtherKind`."""
+    """Return the word at ``path``, one of those ``allowed``; else raise :class:`OtherKind`."""
     value = source.at(path)
     if isinstance(value, str) and value in allowed:
         return value

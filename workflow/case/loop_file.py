@@ -17,10 +17,10 @@ NEEDED = ("displacement", "force")
 
 
 def read_loop_file(path: Path, names: Mapping[str, str]) -> dict[str, Array]:
-    """The columns ``(t,)`` of ``BASE_UNITS`` that a file has, in these units.
+    """Return the columns ``(t,)`` of ``BASE_UNITS`` that a file has, in these units.
 
-    ``names`` gives those named otherwise; other columns are left alone. Raises UserError with the
-    line.
+    ``names`` maps a column of ``BASE_UNITS`` to its heading in the file, where they differ; other
+    columns are ignored. Raises UserError with the line.
     """
     called = {key: names.get(key, key) for key in BASE_UNITS}
     try:
@@ -37,8 +37,8 @@ def read_loop_file(path: Path, names: Mapping[str, str]) -> dict[str, Array]:
 
 
 def account(loops: MeasuredLoops) -> str:
-    """Return lines on what the loops of a record contain, and what is left out of them."""
-    # Without the rounding of a difference of sums.
+    """Return lines on the loops found in a record, and on the work outside them."""
+    # Differences of sums are not exactly zero; shares below rounding count as zero.
     work = float(loops.work[-1])
     before, between, after = (one if abs(one) > 1e-9 * work else 0.0 for one in loops.left_out)
     count = len(loops.energy)

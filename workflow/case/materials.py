@@ -1,4 +1,4 @@
-"""Materials that a case may name in place of their numbers, each with where these are from."""
+"""Materials that a case may name instead of giving their numbers, each with its source."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from dataclasses import dataclass
 class KnownMaterial:
     """Young's modulus [GPa], Poisson's ratio, density [kg/m^3] and yield stress [MPa] at 20 °C.
 
-    ``yield_stress`` is None where none is known, ``state`` what the values are of, ``also`` other
-    names of it.
+    ``yield_stress`` is None where none is known, ``state`` is the condition that the values hold
+    for, ``also`` are other names of the material.
     """
 
     young: float
@@ -24,7 +24,7 @@ class KnownMaterial:
     also: tuple[str, ...] = ()
 
     def in_base_units(self) -> dict[str, float | None]:
-        """The entries of a case [MPa, 1, t/mm^3, MPa]."""
+        """Return the values as entries of a case, in MPa, 1, t/mm^3 and MPa."""
         return {
             "young": 1e3 * self.young,
             "poisson": self.poisson,
@@ -98,7 +98,7 @@ MATERIALS = {
 
 
 def near(name: str) -> str | None:
-    """The known material that is meant by another name of it, or by one like it."""
+    """Return the known material whose name, or alternative name, is closest to ``name``."""
     names = {
         _plain(called): key for key, known in MATERIALS.items() for called in (key, *known.also)
     }
@@ -107,5 +107,5 @@ def near(name: str) -> str | None:
 
 
 def _plain(name: str) -> str:
-    """Letters and digits alone."""
+    """Return the name in lower case with letters and digits only."""
     return re.sub(r"[^a-z0-9]", "", name.lower())

@@ -1,4 +1,4 @@
-"""Numbers in base units as one would say them: 115 GPa, 4430 kg/m³, 50 µm, 6000 rpm."""
+"""Numbers in base units as readable text: 115 GPa, 4430 kg/m³, 50 µm, 6000 rpm."""
 
 from __future__ import annotations
 
@@ -9,44 +9,44 @@ from workflow.case.readable import everyday_unit, pretty, suited_unit
 from workflow.case.sections import Section, quantities_of
 from workflow.case.units import to_base
 
-# Moments are said in other units than energies, which have the same base unit: from so much on.
+# Moments and energies share a base unit; from SAID_FROM on, a value is shown as a moment.
 MOMENT, SAID_FROM, SAID_IN = "N*mm", 1e3, "N*m"
 
-# Numbers from here on are grouped by thousands.
+# Size from which numbers are grouped by thousands.
 GROUPED = 1e4
 
 
 def plain(number: float, unit: str | None, digits: int = 6) -> str:
-    """A number in the base unit ``unit`` as it is said; of other units as it is."""
+    """Return a number in the base unit ``unit`` as text in a readable unit, where there is one."""
     size, name = said_in(number, unit)
     return f"{number / size:.{digits}g} {name}".rstrip()
 
 
 def times(number: float) -> str:
-    """How often, such as cycles: 1,080,000, or 2500."""
+    """Return a count, for example of cycles, as text: 1,080,000, or 2500."""
     grouped = "," if abs(number) >= GROUPED else ""
     return f"{number:{grouped}.0f}" if number == round(number) else f"{number:{grouped}.6g}"
 
 
 def counted(number: int, thing: str) -> str:
-    """So many of a thing: 1 run, 3 runs."""
+    """Return a number with its noun in the right form: 1 run, 3 runs."""
     return f"{number} {thing}" if number == 1 else f"{number} {thing}s"
 
 
 def listed(things: Sequence[str]) -> str:
-    """Several things in a sentence: a, b and c."""
+    """Return several things joined for a sentence: a, b and c."""
     *before, last = things
     return f"{', '.join(before)} and {last}" if before else last
 
 
 def between(low: float, high: float, unit: str | None) -> str:
-    """Two numbers in the unit of the larger one."""
+    """Return a range as text, both numbers in the unit of the larger one."""
     size, name = said_in(max(low, high, key=abs), unit)
     return f"{low / size:.6g} to {high / size:.6g} {name}".rstrip()
 
 
 def said_in(number: float, unit: str | None) -> tuple[float, str]:
-    """Size, in the base unit, and name of the unit that a number is said in."""
+    """Return size, in the base unit, and name of the unit in which a number is shown."""
     if unit is None or unit == "1":
         return 1.0, ""
     if unit == MOMENT:
@@ -57,7 +57,7 @@ def said_in(number: float, unit: str | None) -> tuple[float, str]:
 
 
 def entries(section: Section, left_out: Sequence[str] = ()) -> str:
-    """The quantities of a section that are given, in a line."""
+    """Return the quantities that a section gives, as one line."""
     texts = []
     for name, quantity in quantities_of(type(section)).items():
         value = getattr(section, name)
@@ -71,21 +71,21 @@ def entries(section: Section, left_out: Sequence[str] = ()) -> str:
 
 
 def shape_in_words(section: Section) -> str:
-    """The shape that a section gives, with its sizes or the file that it is in."""
+    """Return the shape of a section, with its sizes or the name of its file."""
     shape, file = getattr(section, "shape", ""), getattr(section, "file", None)
     sizes = entries(section) if file is None else f"of {PurePath(file).name}"
     return f"{shape.replace('_', ' ')}{' ' if file else ', '}{sizes}".rstrip(", ")
 
 
 def _of_entry(name: str, number: float, unit: str | None) -> str:
-    """A number of an entry, which by its ``name`` may have a unit that it is always said in."""
+    """Return a number of an entry as text; some names of entries imply a fixed unit."""
     if unit and (everyday := everyday_unit(unit, name)):
         return f"{number / to_base(f'1 {everyday}', unit):.6g} {pretty(everyday)}"
     return plain(number, unit)
 
 
 def alike(title: str, texts: dict[str, str]) -> list[tuple[str, str]]:
-    """Rows of a ``title``, one for all whose text is the same: those of blade and disk, say."""
+    """Return rows called ``title``, one for all names with the same text, such as two bodies."""
     names: dict[str, list[str]] = {}
     for name, text in texts.items():
         names.setdefault(text, []).append(name)
@@ -93,7 +93,7 @@ def alike(title: str, texts: dict[str, str]) -> list[tuple[str, str]]:
 
 
 def of_bodies(title: str, section: Section) -> list[tuple[str, str]]:
-    """Rows of a ``title`` with the quantities of every body that a ``section`` has."""
+    """Return rows called ``title`` with the quantities of every body in a ``section``."""
     bodies = {name: getattr(section, name) for name in type(section).model_fields}
     texts = {
         name: told_of_body(body) if isinstance(body, Section) else body
@@ -104,11 +104,11 @@ def of_bodies(title: str, section: Section) -> list[tuple[str, str]]:
 
 
 def told_of_body(body: Section) -> str:
-    """The quantities of a body, a known material with its name."""
+    """Return the quantities of a body, after the name of its material if it has one."""
     name = getattr(body, "material", None)
     return ", ".join(text for text in (name, entries(body)) if text)
 
 
 def shares(share: float) -> str:
-    """A share in per cent."""
+    """Return a share in per cent, as text."""
     return f"{100.0 * share:.3g} %"

@@ -1,6 +1,6 @@
-"""Numbers in base units as people read them: 0.00283 mm is 2.83 µm.
+"""Numbers in base units as readable text: 0.00283 mm is 2.83 µm.
 
-With no more digits than an estimated error leaves.
+The number of digits follows from the estimated error.
 """
 
 from __future__ import annotations
@@ -10,8 +10,8 @@ from typing import NamedTuple
 
 from workflow.case.units import to_base
 
-# The units that a base unit may be shown or said in, each from so many of it on; the first from
-# nothing on.
+# Units in which a base unit is shown, each with the smallest number of it that is shown so. The
+# first is for all smaller values.
 SHOWN: dict[str, tuple[tuple[str, float], ...]] = {
     "mm": (("nm", 0.0), ("um", 0.1), ("mm", 0.1), ("m", 10.0)),
     "mm^2": (("um^2", 0.0), ("mm^2", 1e-3)),
@@ -30,19 +30,20 @@ SHOWN: dict[str, tuple[tuple[str, float], ...]] = {
     "1/MPa": (("um^3/J", 0.0), ("mm^3/J", 1.0)),
     "1/(N*mm)": (("1/kJ", 0.0), ("1/J", 1.0)),
 }
-# What is read in a unit of its own though its base unit says otherwise, by a part of its name.
+# Quantities with a fixed display unit, found by a part of their name.
 EVERYDAY = {
     "N*mm": (("moment", "N*m"), ("Mx", "N*mm"), ("My", "N*mm"), ("Mz", "N*mm")),
     "N/mm": (("stiffness", "N/um"), ("springs", "N/um")),
 }
-# Digits where nothing is known of the error, at least and at most; counts up to so many have all.
+# Digits if the error is unknown, and the least and most digits; counts below LARGEST_COUNT are
+# shown in full.
 DIGITS, LEAST_DIGITS, MOST_DIGITS = 4, 2, 6
 LARGEST_COUNT = 1e10
 POWERS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 class Readable(NamedTuple):
-    """A number as text, and the unit it is in, "" for none."""
+    """Number as text, and its unit, "" for none."""
 
     number: str
     unit: str
@@ -52,9 +53,9 @@ class Readable(NamedTuple):
 
 
 def readable(value: float, unit: str, error: float | None = None, everyday: str = "") -> Readable:
-    """A ``value`` in the base ``unit`` in the unit that suits it, or in an ``everyday`` one.
+    """Return ``value``, in the base ``unit``, as text in a suitable unit, or in ``everyday``.
 
-    With digits down to its relative ``error``. What is not finite is told in words.
+    The relative ``error`` limits the digits. Values that are not finite become words.
     """
     if not math.isfinite(value):
         return Readable("not a number" if math.isnan(value) else "infinite", "")
@@ -63,19 +64,19 @@ def readable(value: float, unit: str, error: float | None = None, everyday: str 
 
 
 def everyday_unit(unit: str | None, name: str) -> str:
-    """The unit in which a quantity of that name is always told, "" where there is none."""
+    """Return the fixed unit for quantities of this name, "" if there is none."""
     return next((shown for part, shown in EVERYDAY.get(unit or "", ()) if part in name), "")
 
 
 def suited(value: float, unit: str, everyday: str = "") -> tuple[str, float]:
-    """The unit in print that suits a value in a base ``unit``, and how large it is."""
+    """Return the printed name and the size, in the base ``unit``, of a suitable unit."""
     base = unit.replace(" ", "*")
     shown = everyday or suited_unit(value, unit)
     return pretty(shown), to_base(f"1 {shown}", base) if shown != base else 1.0
 
 
 def pretty(unit: str) -> str:
-    """A unit in print: µm² for um^2."""
+    """Return a unit as it is printed: µm² for um^2."""
     if unit in ("", "1"):
         return ""
     unit = unit.replace("^2", "²").replace("^3", "³").replace("*", "·").replace(" ", "·")
@@ -85,7 +86,7 @@ def pretty(unit: str) -> str:
 
 
 def percent(share: float) -> str:
-    """A share in per cent, with two digits."""
+    """Return a share in per cent with two digits, as text."""
     if share == 0.0:
         return "0 %"
     if abs(share) < 1e-4:
@@ -95,19 +96,19 @@ def percent(share: float) -> str:
 
 
 def suited_unit(value: float, unit: str) -> str:
-    """The largest of the units of a base ``unit`` of which there are enough."""
+    """Return the largest unit for a base ``unit`` in which the value is not too small a number."""
     fitting = base = unit.replace(" ", "*")
     for unit, least in SHOWN.get(base, ()):
         if least == 0.0 or abs(value) >= least * to_base(f"1 {unit}", base) * (1.0 - 1e-9):
             fitting = unit
-    if value == 0.0 and base in SHOWN:  # of nothing there is as much in every unit
+    if value == 0.0 and base in SHOWN:  # zero is the same in every unit
         ladder = [unit for unit, _ in SHOWN[base]]
         return base if base in ladder else ladder[len(ladder) // 2]
     return fitting
 
 
 def _text(value: float, error: float | None, whole: bool) -> str:
-    """Down to the first digit of the error; plain ``whole`` numbers are counts, with all digits."""
+    """Return a number down to the first digit of its error; a ``whole`` count has all digits."""
     if value == 0.0:
         return "0"
     digits = DIGITS
@@ -121,13 +122,13 @@ def _text(value: float, error: float | None, whole: bool) -> str:
     elif error is not None:
         digits = MOST_DIGITS
     text, power = _plain(value, digits)
-    if (not error or digits == MOST_DIGITS) and "." in text:  # these noughts tell nothing
+    if (not error or digits == MOST_DIGITS) and "." in text:  # trailing zeros carry no information
         text = text.rstrip("0").rstrip(".")
     return text + power
 
 
 def _plain(value: float, digits: int) -> tuple[str, str]:
-    """So many digits, and the power of ten beside them where it takes one to read them."""
+    """Return the number with this many digits, and the power of ten if one is needed to read it."""
     rounded = float(f"{value:.{digits}g}")
     exponent = math.floor(math.log10(abs(rounded)))
     if -4 <= exponent < 7:

@@ -1,8 +1,8 @@
-"""Measured surfaces in files: profilometers' own, tables of points, and bare heights.
+"""Measured surfaces in files: formats of profilometers, tables of points, and bare heights.
 
-Profilometers' files say their units and pitch themselves. Most are read and written by surfalize,
-those that it reads wrongly by :mod:`workflow.case.instrument_files`. Their lines go along x and
-follow each other along y.
+Files of profilometers contain their units and pitch. Most are read and written by surfalize;
+those that it reads wrongly are read by :mod:`workflow.case.instrument_files`. Their lines run
+along x and follow each other along y.
 """
 
 from __future__ import annotations
@@ -36,8 +36,8 @@ from workflow.errors import UserError, one_line
 if TYPE_CHECKING:
     from types import ModuleType
 
-# Of the many that the library reads, those that a second reader (SurfaceTopography 1.27) takes for
-# the same heights and pitch. Of .nms, .zmg and .zon it does not: pitch, sign and missing points.
+# The formats of surfalize for which a second reader (SurfaceTopography 1.27) finds the same heights
+# and pitch. For .nms, .zmg and .zon the two differ in pitch, sign or missing points.
 PROFILOMETER = (
     *(".x3p", ".sur", ".al3d", ".plu", ".plux", ".sdf", ".opd", ".os3d", ".tmd", ".gwy"),
     *(".vk4", ".vk6", ".vk7"),
@@ -48,18 +48,18 @@ BARE = ".npy", ".npz", ".h5"
 ENDINGS = (*PROFILOMETER, *TEXT, *BARE)
 UNITS = "m", "mm", "um", "nm"
 TO_MICRONS = 1e3
-# Points along a direction below which there is no surface to speak of.
+# Fewest points along a direction for which a surface can be described.
 FEWEST = 4
-# Share of a step by which the points of a table may lie beside a regular grid.
+# Share of a step by which the points of a table may deviate from a regular grid.
 REGULAR = 0.01
 NOT_MEASURED = "", "nan"
-# What no scan is: heights below the least of any float that was meant (counts that were read as
-# such are), heights of many times its size, and points [mm] that far apart or near. Probes resolve
-# a tenth of a nanometre.
+# Limits of plausible scans. Smaller heights than LEAST_HEIGHT are counts that were read as floats;
+# a range above STEEPEST times the size, and steps outside PITCHES [mm], mean a wrong unit. Probes
+# resolve a tenth of a nanometre.
 LEAST_HEIGHT, STEEPEST, PITCHES = 1e-30, 10.0, (1e-7, 1e2)
-# Points so near [mm] are those of a probe of atomic force, or their unit is wrong.
+# Points closer than this [mm] come from an atomic force microscope, or have a wrong unit.
 NEAR = 1e-5
-# What Gwyddion writes above heights, in the language of its user.
+# Header that Gwyddion writes above heights, in the language of its user.
 GWYDDION = re.compile(
     r"\s*#.*\n"
     r"# (?:Width|Šířka|Breite|Anchura|Largeur|Larghezza|幅|폭|Largura|Ширина):"
@@ -72,11 +72,11 @@ HEADINGS = "headings such as x [mm], y [mm], z [um] in the first row"
 
 
 def read_scan(file: str, unit: str | None, pitch: tuple[float, float] | None) -> Scan:
-    """The scan in a file, its heights and pitch in mm, NaN where points are missing.
+    """Return the scan in a file, with heights and pitch in mm and NaN where points are missing.
 
-    ``unit`` of the heights and ``pitch`` [mm] are for files of bare heights, which do not say them:
-    ``.npy``, ``.npz:array``, ``.h5:dataset`` and text, rows along x and columns along y. Text with
-    headings ``x, y, z`` is a table of points of a regular grid, each in any order; three columns
+    ``unit`` of the heights and ``pitch`` [mm] are for files of bare heights, which do not contain
+    them: ``.npy``, ``.npz:array``, ``.h5:dataset`` and text, rows along x and columns along y. Text
+    with headings ``x, y, z`` is a table of points of a regular grid, in any order; three columns
     without headings are such points in ``unit``. Raises InputFileError.
     """
     name, _ = split_dataset(file)
@@ -95,7 +95,7 @@ def read_scan(file: str, unit: str | None, pitch: tuple[float, float] | None) ->
 
 
 def _bare(file: str, heights: Array, unit: str | None, pitch: tuple[float, float] | None) -> Scan:
-    """Heights in rows along x. Raises InputFileError."""
+    """Return the scan of heights in rows along x; raise InputFileError."""
     if unit is None or pitch is None:
         missing = " and ".join(key for key, at in (("unit", unit), ("pitch", pitch)) if at is None)
         raise InputFileError(
@@ -117,7 +117,7 @@ def _check_own_units(file: str, unit: str | None, pitch: tuple[float, float] | N
 
 
 def _checked(file: str, read: Callable[[], Scan]) -> Scan:
-    """What is read, once it is a surface. Raises InputFileError."""
+    """Return the scan from ``read`` if it is a plausible surface; else raise InputFileError."""
     try:
         scan = read()
     except InputError as error:
@@ -136,7 +136,7 @@ def _checked(file: str, read: Callable[[], Scan]) -> Scan:
 
 
 def _implausible(scan: Scan) -> str:
-    """Describe what no measured surface has; empty where there is nothing of the kind."""
+    """Return a description of what no measured surface has; empty if the scan is plausible."""
     heights = np.abs(scan.heights[scan.measured])
     range_, size = float(np.ptp(scan.heights[scan.measured])), max(scan.size)
     tiny = heights[(heights > 0.0) & (heights < LEAST_HEIGHT)]
@@ -154,7 +154,10 @@ def _implausible(scan: Scan) -> str:
 
 
 def _read_text(file: str, unit: str | None, pitch: tuple[float, float] | None) -> Scan:
-    """Gwyddion's text, a table of points, or bare heights. Raises InputFileError."""
+    """Return a scan in text: of Gwyddion, a table of points, or bare heights.
+
+    Raises InputFileError.
+    """
     rows = csv_rows(file, blanks=True)
     if not rows:
         raise InputFileError(f"{file}:1: empty; allowed: rows of heights, or of points x, y, z")
@@ -183,7 +186,7 @@ def _read_text(file: str, unit: str | None, pitch: tuple[float, float] | None) -
 
 
 def _read_gwyddion(file: str, header: dict[str, str]) -> Scan:
-    """Heights in lines along x, below their width, height and unit."""
+    """Return heights in lines along x, which follow their width, height and unit."""
     lines = _read_matrix(file)
     sizes = (f"{header['width']} {header['x_unit']}", f"{header['height']} {header['y_unit']}")
     try:
@@ -204,7 +207,7 @@ def _is_word(cell: str) -> bool:
 
 
 def _read_matrix(file: str) -> Array:
-    """Heights in rows along x; NaN where a cell is empty or says so."""
+    """Return heights in rows along x, with NaN where a cell is empty or says so."""
     rows = csv_rows(file, blanks=True)
     check_widths(file, rows, "first row")
     return np.array([[_height(f"{file}:{line}", cell) for cell in row] for line, row in rows])
@@ -220,9 +223,9 @@ def _height(place: str, cell: str) -> float:
 
 
 def _read_points(table: TableFile, unit: str) -> Scan:
-    """A table of points x, y, z that lie on a regular grid, in any order; some may be missing.
+    """Return a scan from points x, y, z of a regular grid, in any order; some may be missing.
 
-    ``unit`` is that of columns whose headings have none.
+    ``unit`` is the unit of columns whose headings have none.
     """
     table.check(dict.fromkeys(("x", "y", "z"), "mm"))
     table.require(("x", "y", "z"), HEADINGS)
@@ -253,16 +256,16 @@ def _read_points(table: TableFile, unit: str) -> Scan:
 
 
 def _steps(table: TableFile, name: str, at: Array) -> tuple[np.ndarray, float]:
-    """Numbers of the steps ``(n,)`` that points lie at, and the step [mm]; 1 where all are alike.
+    """Return the step number ``(n,)`` of each point, and the step [mm], which is 1 for one place.
 
-    The step is that between the most neighbours. Raises InputFileError for points beside it.
+    The step is the median distance of neighbours. Raises InputFileError for points off the grid.
     """
     places = np.unique(at)
     if len(places) == 1:
         return np.zeros(len(at), dtype=np.int64), 1.0
     gaps = np.diff(places)
     coarse = float(np.median(gaps[gaps > REGULAR * gaps.max()]))
-    # From end to end, which rounding of a single step is small against.
+    # The step from end to end: the rounding of a single step is small compared with it.
     step = float(np.ptp(places)) / max(round(float(np.ptp(places)) / coarse), 1)
     numbers = (at - places[0]) / step
     beside = np.abs(numbers - np.rint(numbers)) > max(REGULAR, 1e-9)
@@ -277,7 +280,7 @@ def _steps(table: TableFile, name: str, at: Array) -> tuple[np.ndarray, float]:
 
 
 def _surfalize(file: Path) -> ModuleType:
-    """The library. Raises InputFileError where it is not installed."""
+    """Return the library; raise InputFileError where it is not installed."""
     try:
         import surfalize
     except ImportError:
@@ -294,12 +297,12 @@ def _read_profilometer(file: Path) -> Scan:
     if wrong := unreadable(file):
         raise InputFileError(f"{file}: {wrong}; allowed: a scan")
     try:
-        # Numbers that overflow are found in the heights.
+        # Overflowing numbers are found later, in the heights.
         with np.errstate(over="ignore", invalid="ignore"):
             return own(file.read_bytes()) if own else _by_library(library, file)
     except InputError as error:
         raise InputFileError(f"{file}: {error}; allowed: a scan in this format") from error
-    except Exception as error:  # damage ends in a dozen ways
+    except Exception as error:  # damaged files raise many kinds of exception
         raise InputFileError(
             f"{file}: cannot be read as {shown(file.suffix)} ({one_line(error)}); allowed: a scan "
             "in this format: export it again, or as .x3p"
@@ -308,8 +311,8 @@ def _read_profilometer(file: Path) -> Scan:
 
 def _by_library(library: Any, file: Path) -> Scan:
     with warnings.catch_warnings():
-        # It would take a file that is none of its kind by the first reader that makes numbers of
-        # it.
+        # For a file that does not match its suffix, the library would try other readers and use
+        # the first that yields numbers.
         warnings.filterwarnings("error", message="The file suffix indicates")
         warnings.filterwarnings("ignore", message="The surface has different pixel size")
         try:
@@ -327,7 +330,7 @@ def _by_library(library: Any, file: Path) -> Scan:
 
 
 def write_scan(file: Path, scan: Scan) -> None:
-    """Write a scan in the format that the file's ending says, one of ``WRITTEN`` or ``.npz``.
+    """Write a scan in the format of the file's ending, one of ``WRITTEN`` or ``.npz``.
 
     ``.npz`` has ``heights`` ``(nx, ny)`` and ``pitch`` ``(2,)`` in mm. Raises UserError.
     """
@@ -342,9 +345,9 @@ def write_scan(file: Path, scan: Scan) -> None:
         raise UserError(
             f"{file}: one height and missing points, of which .sur keeps neither; allowed: .x3p"
         )
-    # A surface of one height leaves the library 0 / 0, which it writes rightly nevertheless.
+    # For a surface of one height the library computes 0 / 0, but still writes it correctly.
     with warnings.catch_warnings(), np.errstate(invalid="ignore"):
         warnings.filterwarnings("ignore", message="The surface has different pixel size")
         steps = [TO_MICRONS * step for step in scan.pitch]
-        # The unit in .sur is Latin-1, which other programs do not know in UTF-8.
+        # The unit in .sur is Latin-1; other programs do not recognize it in UTF-8.
         _surfalize(file).Surface(lines, *steps).save(str(file), encoding="latin-1")

@@ -1,7 +1,7 @@
-"""What every kind of case is made of: the base of all sections, and those that all kinds share.
+"""Base classes of all cases and their sections, and the sections that all kinds of case share.
 
-Each field carries its description, with the base unit in brackets, and an example as one would
-write it. JSON schema, template and error messages are made from these; nothing is said twice.
+Each field carries its description, with the base unit in brackets, and an example as a user would
+write it. JSON schema, template and error messages are generated from these.
 """
 
 from __future__ import annotations
@@ -49,10 +49,11 @@ Stress = Annotated[
     float, Quantity("MPa", above=0.0, at_most=2e6, range_text="above 0 and at most 2000 GPa")
 ]
 GridCells = Annotated[int, Whole(8, 4096)]
-# Cells along x and y of a contact that may be a line contact, and of one that is: a number alone.
+# Cells along x and y: of a contact that may be a line contact, and of a line contact. One number
+# alone means a line contact.
 FaceCells = Annotated[tuple[GridCells, Annotated[int, Rows(8, 4096)]], OrAlone((1,))]
 LineCells = Annotated[tuple[GridCells, Annotated[int, Whole(1, 1)]], OrAlone((1,))]
-# Of figures; the first if nothing is said.
+# Formats of figures; the first is the default.
 FIGURE_FORMATS = "png", "svg", "pdf"
 Title = Annotated[str, Text()]
 DottedPath = Annotated[str, Path()]
@@ -63,19 +64,22 @@ KINDS_ARE_NAMED_BY = ("kind", "law", "shape", "scope")
 
 
 def entry(description: str, example: object = None, **settings: Any) -> Any:
-    """A field with its description and, for a leaf, an example as one would write it."""
+    """Return a field with its description and, for a leaf, an example as a user would write it."""
     examples = None if example is None else [example]
     return Field(description=description, examples=examples, **settings)
 
 
 def disagreement(message: str, *keys: str) -> PydanticCustomError:
-    """Entries that are fine one by one but not together; the first key is the one to look at."""
+    """Return the error about entries that are valid one by one but not together.
+
+    The first of ``keys`` is the entry to look at.
+    """
     return PydanticCustomError("disagreement", "{message}", {"message": message, "keys": keys})
 
 
 @contextmanager
 def in_its_place() -> Iterator[None]:
-    """What does not suit other entries of a case is refused where it stands."""
+    """Turn an EntryError into an error at the entry that it names."""
     try:
         yield
     except EntryError as error:
@@ -83,12 +87,12 @@ def in_its_place() -> Iterator[None]:
 
 
 def one_of(*keys: str) -> dict[str, Any]:
-    """In a JSON schema: at least one of these keys is there."""
+    """Return the JSON schema of sections that have at least one of these keys."""
     return {"anyOf": [{"required": [key]} for key in keys]}
 
 
 def together(*keys: str) -> dict[str, Any]:
-    """In a JSON schema: where one of these keys has a value the others are there."""
+    """Return the JSON schema of sections that have all of these keys if they have one of them."""
     return {
         "allOf": [
             {
@@ -101,24 +105,24 @@ def together(*keys: str) -> dict[str, Any]:
 
 
 class Section(BaseModel):
-    """A section of a case: frozen, every key known, every number finite."""
+    """Section of a case: frozen, with known keys and finite numbers only."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, defer_build=True)
 
     # Whether a template fills in optional entries that most cases give.
     filled_in: ClassVar[bool] = True
-    # Keys by which it is known from other kinds of the same section, where no word names them.
+    # Keys that distinguish it from other kinds of the same section, where no word names the kind.
     known_by: ClassVar[frozenset[str]] = frozenset()
-    # Those that it fills in here beside them.
+    # Further optional entries that a template fills in here.
     also_filled_in: ClassVar[tuple[str, ...]] = ()
-    # What a JSON schema says of it beside its entries: see ``one_of`` and ``together``.
+    # Conditions in the JSON schema, besides those of the entries: see ``one_of`` and ``together``.
     in_schema: ClassVar[Mapping[str, Any]] = {}
-    # Keys that who knows other kinds of case may try here, and what to say of them.
+    # Keys that users of other kinds of case may try here, and the answer to them.
     refused: ClassVar[Mapping[str, str]] = {}
 
 
 class MaterialName(Text):
-    """The name of a known material."""
+    """Name of a known material."""
 
     allowed = "a name that `fretscale materials` lists"
 
@@ -127,7 +131,7 @@ class MaterialName(Text):
 
 
 class ElasticBody(Section):
-    """Base of the materials of a case: one that is known by name, numbers, or both."""
+    """Base of the materials of a case: given by name, by numbers, or both."""
 
     refused: ClassVar[Mapping[str, str]] = {
         "density": "no mass is moved here; allowed: leave it out"
@@ -142,7 +146,7 @@ class ElasticBody(Section):
     @model_validator(mode="before")
     @classmethod
     def _named(cls, data: Any) -> Any:
-        """Fill in what is known of a material by its name, which may stand alone."""
+        """Fill in the values of a material known by its name, which may be given alone."""
         given = data if isinstance(data, dict) else {}
         if data is None or isinstance(data, str | int | float):
             data = {"material": data}
@@ -175,7 +179,7 @@ class ElasticBody(Section):
         return reference
 
     def elastic(self) -> ElasticMaterial:
-        """The same material as the solvers take it; no yield stress is an infinite one."""
+        """Return the material for the solvers; no yield stress becomes an infinite one."""
         properties = {k: v for k, v in self.model_dump().items() if v is not None}
         properties.pop("material", None)
         return ElasticMaterial(**properties)
@@ -190,7 +194,7 @@ class Friction(Section):
 
 
 class Output(Section):
-    """What is written beside summary and results."""
+    """Files that are written in addition to summary and results."""
 
     paraview: StrictBool = entry("files for ParaView", True, default=True)
     figures: Annotated[bool | tuple[str, ...], Formats(FIGURE_FORMATS)] = entry(
@@ -200,14 +204,14 @@ class Output(Section):
 
     @property
     def figure_formats(self) -> tuple[str, ...]:
-        """The formats in which figures are written: none where they are not wanted."""
+        """Formats in which figures are written; none if figures are switched off."""
         if isinstance(self.figures, tuple):
             return self.figures
         return FIGURE_FORMATS[:1] if self.figures else ()
 
 
 class Expectation(Section):
-    """A value the run must reproduce, checked by ``fretscale verify``."""
+    """Value that the run must reproduce, checked by ``fretscale verify``."""
 
     quantity: DottedPath = entry("path into summary.json", "intrados.depth")
     value: Annotated[float, Quantity(None)] = entry(
@@ -230,7 +234,7 @@ class Expectation(Section):
 
 
 class MeasuredHeadings(Section):
-    """Headings of a table that was measured, without their units."""
+    """Headings of a measured table, without their units."""
 
     at: Title | None = entry("of what the curve goes along, if not at", "energy", default=None)
     values: Title | None = entry(
@@ -244,7 +248,7 @@ MeasuredNumbers = tuple[Annotated[float, Quantity(None)], ...]
 
 
 class Measured(Section):
-    """Points that were measured, to be shown beside a curve of the results."""
+    """Measured points, shown together with a curve of the results."""
 
     also_filled_in: ClassVar[tuple[str, ...]] = "at", "values"
 
@@ -288,7 +292,7 @@ class Measured(Section):
 
 
 class OutputWithoutFields(Output):
-    """What is written beside summary and results, of a case that has no fields."""
+    """Files that are written in addition to summary and results, for a case without fields."""
 
     paraview: StrictBool = entry("files for ParaView: there are none", False, default=False)
 
@@ -302,8 +306,8 @@ class OutputWithoutFields(Output):
         return paraview
 
 
-# The order in which sections are written that several kinds of case have. Those of one kind alone
-# stand before the last of these, in the order in which the kind declares them.
+# Order in which the sections that several kinds of case have are written. Those of one kind only
+# come before the sections of LAST, in the order in which the kind declares them.
 FIRST = (
     *("title", "analysis", "structure", "materials", "friction", "load_path", "mesh"),
     *("joint", "evolution", "drive", "excitation", "energies", "ageing", "integration"),
@@ -315,9 +319,9 @@ LAST = ("output", "assumed", "reported", "measured", "expect")
 
 
 class Case(Section, ABC):
-    """Base of all kinds of case: what the shell needs of any of them."""
+    """Base of all kinds of case, with what the commands need of each of them."""
 
-    # What a case of this kind is about, in a line of plain words.
+    # What a case of this kind is about, in one plain line.
     about: ClassVar[str]
 
     title: Title = entry("one line", "Ball on a flat, pressed and sheared")
@@ -336,27 +340,27 @@ class Case(Section, ABC):
 
     @classmethod
     def suits(cls, source: Source) -> bool:
-        """Whether the source means this kind and none of the others of its analysis.
+        """Return whether the source means this kind and not another one of its analysis.
 
-        Decides where their kinds of structure do not distinguish them. May raise CaseError.
+        This decides where the kinds of structure do not distinguish the cases. May raise CaseError.
         """
         return True
 
     @abstractmethod
     def outline(self) -> list[tuple[str, str]]:
-        """What would run, in a few rows of name and text."""
+        """Return what would run, in a few rows of name and text."""
 
     def doubts(self) -> Iterator[str]:
-        """A line for each thing that entries together can, but are hardly meant to say.
+        """Yield a warning for each combination of entries that is possible but implausible.
 
-        It begins with one of them. What is unusual of a single one is known elsewhere
-        (:mod:`workflow.case.doubts`).
+        Each line begins with one of the entries. Warnings about single entries are in
+        :mod:`workflow.case.doubts`.
         """
         yield from ()
 
     @property
     def cores(self) -> int:
-        """Processes of a run that compute at the same time."""
+        """Number of processes of a run that compute at the same time."""
         return 1
 
     @model_validator(mode="after")
@@ -372,7 +376,7 @@ class Case(Section, ABC):
 
 
 def _has(node: object, path: str) -> bool:
-    """Whether ``path`` leads from ``node`` to an entry."""
+    """Return whether ``path`` leads from ``node`` to an entry."""
     for key in path.split("."):
         if isinstance(node, BaseModel) and key in type(node).model_fields:
             node = getattr(node, key)
@@ -384,7 +388,7 @@ def _has(node: object, path: str) -> bool:
 
 
 def sections_of(annotation: object) -> Iterator[type[Section]]:
-    """The section models an annotation admits: none for a leaf, several for a union of kinds."""
+    """Yield the section models that an annotation admits: none for a leaf, several for a union."""
     if isinstance(annotation, type) and issubclass(annotation, Section):
         yield annotation
     for argument in get_args(annotation):
@@ -392,7 +396,7 @@ def sections_of(annotation: object) -> Iterator[type[Section]]:
 
 
 def entries_of(model: type[BaseModel]) -> dict[str, FieldInfo]:
-    """The fields of a model, in the order in which they are written."""
+    """Return the fields of a model, in the order in which they are written."""
     fields = model.model_fields
     if not issubclass(model, Case):
         return dict(fields)
@@ -401,7 +405,7 @@ def entries_of(model: type[BaseModel]) -> dict[str, FieldInfo]:
 
 
 def words_of(model: type[Section], *path: str) -> tuple[str, ...]:
-    """The words that an entry of a fixed choice admits, such as ``structure.kind``."""
+    """Return the words that an entry of a fixed choice admits, such as ``structure.kind``."""
     *sections, name = path
     models: list[type[Section]] = [model]
     for section in sections:
@@ -413,7 +417,7 @@ def words_of(model: type[Section], *path: str) -> tuple[str, ...]:
 
 
 def entry_of(field: FieldInfo) -> Entry | None:
-    """The quantity, whole number or text of a leaf field; ``None`` for sections and choices."""
+    """Return the quantity, whole number or text of a leaf field; None for sections and choices."""
     parts = [*field.metadata, field.annotation]
     while parts:
         part = parts.pop(0)
@@ -424,7 +428,7 @@ def entry_of(field: FieldInfo) -> Entry | None:
 
 
 def files_of(section: BaseModel) -> Iterator[str]:
-    """The files that the entries of a section name, wherever in it."""
+    """Yield the files that the entries of a section name, at any depth."""
     for name, field in type(section).model_fields.items():
         value = getattr(section, name)
         for item in value if isinstance(value, tuple) else (value,):
@@ -435,6 +439,6 @@ def files_of(section: BaseModel) -> Iterator[str]:
 
 
 def quantities_of(model: type[Section]) -> dict[str, Quantity]:
-    """The quantities among the fields of ``model``, by name."""
+    """Return the quantities among the fields of ``model``, by name."""
     entries = {name: entry_of(field) for name, field in model.model_fields.items()}
     return {name: quantity for name, quantity in entries.items() if isinstance(quantity, Quantity)}

@@ -1,4 +1,4 @@
-"""The text of a case as plain data, and the place where each entry was written."""
+"""Text of a case as plain data, with the place where each entry was written."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ from workflow.case.fields import DOTTED, shown, unreadable
 from workflow.errors import CaseError
 
 KeyPath = tuple[str | int, ...]
-# Keys that a message has as they are.
+# Keys that messages show unquoted.
 WORD = r"\w(?:[\w -]{0,58}\w)?"
 
-# In the place of the file of a case that is the data of a program, and has no lines.
+# Stands for the file of a case that was built in Python and so has no lines.
 IN_PYTHON = "the case"
 
-# Sections in which a text stands for a section with nothing but that entry.
+# Sections in which a text stands for a section with this entry only.
 SHORT: dict[KeyPath, str] = {("materials",): "material"}
 
 LARGEST_FILE = 1_000_000  # bytes; cases have a few thousand
@@ -34,8 +34,8 @@ MOST_ENTRIES = 10_000  # after expanding YAML aliases, which can grow without bo
 DEEPEST = 20  # levels; a case has four
 TOO_MUCH = "nested too deeply or too long for a case"
 LONGEST_NUMBER = 9  # digits of a place in a list, far beyond the longest
-LONGEST_REASON = 100  # of what the YAML parser has to say
-KEPT = 64  # texts whose nodes are kept: a sweep reads one case for each of its runs
+LONGEST_REASON = 100  # characters of a reason that the YAML parser gives
+KEPT = 64  # parsed texts in the cache: a sweep reads one case for each of its runs
 
 
 class Source:
@@ -59,9 +59,9 @@ class Source:
             self._set(override)
 
     def where(self, path: KeyPath) -> tuple[int, str]:
-        """Line of ``path`` or of what contains it, and the text that names the place.
+        """Return the line of ``path``, or of what contains it, and the text that names the place.
 
-        For an entry that an override has set the line is 0.
+        The line is 0 for an entry that an override has set.
         """
         for length in range(len(path), -1, -1):
             part = path[:length]
@@ -72,18 +72,18 @@ class Source:
         return 1, _place(self.name, 1)
 
     def is_override(self, path: KeyPath) -> bool:
-        """Whether ``path``, or a section around it, was set by an override."""
+        """Return whether ``path``, or a section around it, was set by an override."""
         return self.where(path)[0] == 0
 
     def at(self, path: Iterable[str | int]) -> Any:
-        """The data at ``path``; ``None`` if there is none."""
+        """Return the data at ``path``; ``None`` if there is none."""
         node: Any = self.data
         for key in path:
             node = child(node, key)
         return node
 
     def _set(self, override: str) -> None:
-        """Put ``key=value`` into the data, making sections on the way."""
+        """Put ``key=value`` into the data, creating missing sections."""
         quoted = shown(override)
         written = quoted[1:].removesuffix(quoted[0])
         label = f"--set {written}"
@@ -99,15 +99,15 @@ class Source:
             node[path[-1]] = value
         else:
             raise CaseError(f"{label}: no such entry; allowed: keys joined by dots")
-        # What the file or an earlier override said there and below is gone.
+        # The override replaces what the file or earlier overrides gave at this path and below.
         self._lines = {p: line for p, line in self._lines.items() if p[: len(path)] != path}
         self._overrides = {p: o for p, o in self._overrides.items() if p[: len(path)] != path}
         self._overrides[path] = written
 
     def _section_of(self, path: KeyPath, written: str) -> tuple[KeyPath, Any]:
-        """The section or list of an entry, made where there is none, and the path as it is there.
+        """Return the path of an entry and the section or list that contains it, created if missing.
 
-        Numbers of a path are places in lists, and words elsewhere.
+        Numbers in a path are places in lists, and keys in sections.
         """
         node: Any = self.data
         walked: KeyPath = ()
@@ -126,14 +126,14 @@ class Source:
 
 
 class _Reading:
-    """One pass over ruamel's nodes, which know their lines, to plain Python objects."""
+    """Conversion of ruamel's nodes, which know their lines, to plain Python objects."""
 
     def __init__(self, name: str) -> None:
         self.name = name
         self.lines: dict[KeyPath, int] = {}
 
     def plain(self, node: Any, path: KeyPath, line: int) -> Any:
-        """``node`` as dictionaries, lists and scalars; its lines are noted in ``lines``."""
+        """Return ``node`` as dictionaries, lists and scalars, and record its lines in ``lines``."""
         self.lines[path] = line
         if len(path) > DEEPEST or len(self.lines) > MOST_ENTRIES:
             raise CaseError(f"{_place(self.name, line)}: {TOO_MUCH}")
@@ -161,7 +161,7 @@ class _Reading:
 
 
 def read_text(path: Path) -> str:
-    """The text of a case file; raises ``CaseError``."""
+    """Return the text of a case file; raise ``CaseError`` if it cannot be read."""
     if wrong := unreadable(path):
         raise CaseError(f"{path}: {wrong}; allowed: a case file in YAML")
     with path.open("rb") as file:
@@ -176,11 +176,11 @@ def read_text(path: Path) -> str:
 
 
 class _TooMuch(MarkedYAMLError):
-    """What no case can be, told as soon as it is met: ruamel takes minutes for a megabyte of it."""
+    """Text too large for a case, reported at once: ruamel takes minutes for a megabyte of it."""
 
 
 class _Parser(RoundTripParser):
-    """Ruamel's parser, as far as a case may go."""
+    """Parser of ruamel that stops at the limits of a case."""
 
     def __init__(self, loader: Any) -> None:
         super().__init__(loader)
@@ -191,7 +191,7 @@ class _Parser(RoundTripParser):
         self._nodes += isinstance(event, NodeEvent)
         self._depth += isinstance(event, CollectionStartEvent)
         self._depth -= isinstance(event, CollectionEndEvent)
-        # Keys are nodes too.
+        # Keys count as nodes too.
         if self._depth > DEEPEST + 1 or self._nodes > 2 * MOST_ENTRIES + 1:
             raise _TooMuch(problem_mark=event.start_mark)
         return event
@@ -199,14 +199,14 @@ class _Parser(RoundTripParser):
 
 @lru_cache(KEPT)
 def _nodes(text: str) -> Any:
-    """``text`` as ruamel's nodes, which are only read: it takes twenty milliseconds for a case."""
+    """Return ``text`` as ruamel's nodes, cached because parsing takes 20 ms; do not change them."""
     yaml = YAML(typ="rt", pure=True)
     yaml.Parser = _Parser
     return yaml.load(text)
 
 
 def parse_yaml(text: str, name: str) -> Any:
-    """``text`` as ruamel's nodes; YAML 1.2, where ``1e5`` is a number and ``yes`` a word."""
+    """Return ``text`` as ruamel's nodes; in YAML 1.2 ``1e5`` is a number and ``yes`` a word."""
     try:
         return _nodes(text)
     except _TooMuch as error:
@@ -220,7 +220,7 @@ def parse_yaml(text: str, name: str) -> Any:
         line = text.count("\n", 0, error.position) + 1
         raise CaseError(f"{_place(name, line)}: unprintable character; allowed: text") from None
     except (YAMLError, ValueError, TypeError, LookupError, AttributeError) as error:
-        # Odd tags and monstrous numbers end up here: ruamel has no one kind for them.
+        # Odd tags and huge numbers raise these: ruamel has no common exception for them.
         raise CaseError(f"{_place(name, 1)}: not YAML: {_one_line(error)}") from None
 
 
@@ -230,7 +230,7 @@ def _marked(error: MarkedYAMLError, name: str) -> str:
 
 
 def _place(name: str, line: int) -> str:
-    """File and line; what is no file has no lines."""
+    """Return file and line; texts that are not files have no line."""
     return name if name == IN_PYTHON or name.startswith("--set ") else f"{name}:{line}"
 
 
@@ -247,13 +247,13 @@ def _one_line(reason: object) -> str:
 
 
 def _line_of(node: CommentedMap | CommentedSeq, key: Any, otherwise: int) -> int:
-    """Line of an entry, counted from 1; one merged in from elsewhere has none of its own."""
+    """Return the line of an entry, counted from 1; ``otherwise`` for one merged from elsewhere."""
     position = (node.lc.data or {}).get(key)
     return position[0] + 1 if position else otherwise
 
 
 def child(node: Any, key: str | int) -> Any:
-    """The entry ``key`` of a section or list; ``None`` if there is none."""
+    """Return the entry ``key`` of a section or list; ``None`` if there is none."""
     if isinstance(node, dict):
         return node.get(str(key))
     if isinstance(node, list) and isinstance(key, int) and key < len(node):
@@ -262,7 +262,7 @@ def child(node: Any, key: str | int) -> Any:
 
 
 def split_path(text: str) -> KeyPath:
-    """The keys of a dotted path; numbers are places in a list."""
+    """Return the keys of a dotted path; numbers are places in a list."""
     return tuple(
         int(key) if key.isdecimal() and len(key) <= LONGEST_NUMBER else key
         for key in text.split(".")
@@ -270,7 +270,7 @@ def split_path(text: str) -> KeyPath:
 
 
 def dotted(path: Iterable[str | int]) -> str:
-    """A path as it goes into a message, keys joined by dots; odd and long ones are quoted."""
+    """Return a path for a message, keys joined by dots; odd and long keys are quoted."""
     return ".".join(
         str(key) if isinstance(key, int) or re.fullmatch(WORD, key) else shown(key) for key in path
     )

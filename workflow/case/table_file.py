@@ -1,9 +1,9 @@
-"""Tables of numbers in CSV files that come with a case or a command: one dialect for all of them.
+"""Tables of numbers in CSV files that come with a case or a command, all in the same dialect.
 
-The first row has the headings, each a name with a unit in brackets, or without one in the base
-unit; the second row may have the units instead, as measuring programs write them. Lines that begin
-with ``#`` are comments, empty ones and a byte-order mark are passed over. Encodings and separators
-are those of :func:`workflow.case.input_files.csv_rows`.
+The first row has the headings, each a name with a unit in brackets; without one, the column is in
+the base unit. Alternatively the second row has the units, as measuring programs write them. Lines
+that begin with ``#`` are comments; empty lines and a byte-order mark are skipped. Encodings and
+separators are those of :func:`workflow.case.input_files.csv_rows`.
 """
 
 from __future__ import annotations
@@ -24,16 +24,16 @@ from workflow.case.input_files import InputFileError, check_widths, csv_rows, nu
 from workflow.case.units import UnitError, to_base
 
 HEADING = re.compile(r"(?P<name>[^\[\]]*?)\s*(?:\[\s*(?P<unit>[^\[\]]*?)\s*\])?")
-# Other ways to write a unit, taken for one where it is: "force (left)" is a name.
+# Other notations of a unit. They count only if the text is a unit: "force (left)" is a name.
 ELSEWHERE = re.compile(r"(?P<name>.+?)\s*(?:\((?P<in_brackets>.+)\)|\s(?:in|/)\s+(?P<after>\S+))")
 
-# A row of units below the names: each as it is or in any brackets, and what stands for none.
+# A row of units below the names, bare or in brackets, and the sign for no unit.
 BRACKETS, NO_UNIT = re.compile(r"^[\[(]\s*(.*?)\s*[\])]$"), "-"
 
 
 @dataclass(frozen=True)
 class TableFile:
-    """A file as it is written: ``headings`` in their ``line``, and ``rows``, each with its line."""
+    """CSV file as written: ``headings`` with their ``line``, and ``rows``, each with its line."""
 
     file: str
     line: int
@@ -50,17 +50,17 @@ class TableFile:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """The headings without their units."""
+        """Headings without their units."""
         return tuple(_name_and_unit(heading)[0] for heading in self.headings)
 
     def unit(self, name: str) -> str:
-        """Unit of a column, empty without one."""
+        """Return the unit of a column, empty if it has none."""
         return _name_and_unit(self.headings[self.names.index(name)])[1]
 
     def check(self, units: Mapping[str, str | None]) -> None:
         """Raise InputFileError unless all columns are among those of ``units``.
 
-        Each given once, in a unit that can be converted to the base unit; None is text.
+        Each may be given once, in a unit that can be converted to its base unit; None means text.
         """
         for name, heading in zip(self.names, self.headings, strict=True):
             if name not in units:
@@ -70,7 +70,7 @@ class TableFile:
             self._check_column(name, units[name])
 
     def require(self, names: Iterable[str], allowed: str) -> None:
-        """Raise InputFileError, which says what is ``allowed``, unless there are such columns."""
+        """Raise InputFileError, which says what is ``allowed``, unless all columns exist."""
         missing = [name for name in names if name not in self.names]
         if missing:
             there = ", ".join(shown(heading) for heading in self.headings)
@@ -82,15 +82,16 @@ class TableFile:
             )
 
     def cells(self, name: str) -> list[str]:
-        """Texts of a column that there is, as they are written."""
+        """Return the texts of an existing column, as they are written."""
         place = self.names.index(name)
         return [cells[place] for _, cells in self.rows]
 
     def column(self, name: str, quantity: Quantity) -> Array:
-        """Numbers ``(n,)`` of a column that there is, in the base unit of ``quantity``.
+        """Return the numbers ``(n,)`` of an existing column, in the base unit of ``quantity``.
 
         Conversion is exact, as in a case. Raises InputFileError for a column that is given twice, a
-        unit of another kind, and what is no number or outside the limits of ``quantity``.
+        unit of another dimension, and values that are not numbers or outside the limits of
+        ``quantity``.
         """
         base = quantity.unit or "1"
         self._check_column(name, base)
@@ -107,14 +108,14 @@ class TableFile:
         return np.array(numbers)
 
     def whole(self, name: str) -> list[int]:
-        """A column of whole numbers. Raises InputFileError."""
+        """Return a column of whole numbers; raise InputFileError for others."""
         numbers = self.column(name, Quantity("1"))
         for row in np.flatnonzero(numbers != np.rint(numbers)).tolist():
             raise self.refusal(row, name, "not a whole number", "whole numbers")
         return [int(number) for number in numbers]
 
     def once(self, name: str) -> Indices:
-        """A column of whole numbers ``(n,)``, each of them once. Raises InputFileError."""
+        """Return a column of whole numbers ``(n,)``; raise InputFileError if one occurs twice."""
         numbers = np.array(self.whole(name), dtype=np.int64)
         _, first = np.unique(numbers, return_index=True)
         for row in np.setdiff1d(np.arange(len(self)), first).tolist():
@@ -122,7 +123,7 @@ class TableFile:
         return numbers
 
     def refusal(self, row: int, name: str, wrong: str, allowed: str) -> InputFileError:
-        """The error about one cell; a column that the file does not give is named alone."""
+        """Return the error about one cell; for a missing column it names the column only."""
         line, cells = self.rows[row]
         value = f"{cells[self.names.index(name)]}: " if name in self.names else ""
         return InputFileError(f"{self.file}:{line}: {name}: {value}{wrong}; allowed: {allowed}")
@@ -135,7 +136,7 @@ class TableFile:
 
 
 def read_table_file(file: str | Path) -> TableFile:
-    """Headings and rows of a CSV file. Raises InputFileError where it is none."""
+    """Return headings and rows of a CSV file; raise InputFileError for any other file."""
     rows = csv_rows(file)
     if len(rows) < 2:
         line = rows[0][0] if rows else 1
@@ -151,7 +152,7 @@ def read_table_file(file: str | Path) -> TableFile:
 
 
 def read_columns(file: str, allowed: Mapping[str, Quantity]) -> dict[str, Array]:
-    """All columns ``(n,)`` of a file by name, each one of the ``allowed``, in base units.
+    """Return all columns ``(n,)`` of a file by name, in base units; each must be ``allowed``.
 
     Raises InputFileError.
     """
@@ -170,7 +171,7 @@ def check_unit(place: str, unit: str, base: str) -> None:
 
 
 def _units_below(headings: tuple[str, ...], cells: tuple[str, ...]) -> tuple[str, ...]:
-    """Units in a second row of headings, empty for a column without; none if it has no units."""
+    """Return the units in a second row of headings, "" for none; empty if it is no such row."""
     units = tuple(BRACKETS.sub(r"\1", cell) for cell in cells)
     units = tuple("" if unit == NO_UNIT else unit for unit in units)
     if not any(units) or any(_name_and_unit(heading)[1] for heading in headings):
@@ -180,13 +181,13 @@ def _units_below(headings: tuple[str, ...], cells: tuple[str, ...]) -> tuple[str
             to_base(f"1 {unit}", None)
         except UnitError:
             return ()
-    # A number among them makes them the first row of the table.
+    # A row that contains a number is the first row of the table.
     return () if any(unit[0] in "0123456789.+" for unit in filter(None, units)) else units
 
 
 @cache
 def _name_and_unit(heading: str) -> tuple[str, str]:
-    """Name and unit of a heading: in brackets, in parentheses, or behind ``in`` or a slash."""
+    """Return name and unit of a heading: in brackets, parentheses, or after ``in`` or a slash."""
     if match := ELSEWHERE.fullmatch(heading):
         unit = (match["in_brackets"] or match["after"]).strip()
         with suppress(UnitError):

@@ -1,4 +1,4 @@
-"""The case that ``fretscale new`` writes: the examples of a model, each with its description."""
+"""Templates that ``fretscale new`` writes: the examples of a model, each with its description."""
 
 from __future__ import annotations
 
@@ -29,11 +29,11 @@ HEADER = f"""\
 SHORT_HEADER = """\
 # What must be given; `fretscale new KIND` shows every entry that there is, and its default.
 """
-# Of the bodies of a case of few lines.
+# Material of the bodies in a short case.
 MATERIAL = "Ti-6Al-4V"
-# Optional entries the template fills in: a material that can yield, the length of a run, legs that
-# press, a face with all edges rounded, a joint whose friction rises and
-# a mass and expands.
+# Optional entries that the template fills in, so that it describes a material that can yield, the
+# length of a run, legs that press, a face with rounded edges, a joint whose friction rises, and a
+# body that has mass and expands.
 FILLED_IN = (
     *("yield_stress", "cycles", "legs", "P", "gap", "end_width", "end_radius"),
     *("friction", "density", "expansion"),
@@ -41,20 +41,20 @@ FILLED_IN = (
 
 
 def template(model: type[Section], header: str = HEADER) -> str:
-    """A commented case of a kind, or another file, ready to run, with every entry there is."""
+    """Return a commented case or other file, ready to run, with every entry of ``model``."""
     return header + render(_rows(model, set()))
 
 
 def short_template(model: type[Section]) -> str:
-    """Return a case of a kind, ready to run, with what must be given and no more.
+    """Return a case of a kind, ready to run, with required entries only.
 
-    Materials are named; all else has its default.
+    Materials are given by name; all other entries have their defaults.
     """
     return SHORT_HEADER + render(_needed(model))
 
 
 def _needed(model: type[Section]) -> list[Row]:
-    """Return the entries of a section that must be given, or that its template fills in."""
+    """Return the entries of a section that are required, or that its template fills in."""
     filled_in = (*(FILLED_IN if model.filled_in else ()), *model.also_filled_in)
     rows = []
     for name, field in entries_of(model).items():
@@ -74,7 +74,7 @@ def _needed(model: type[Section]) -> list[Row]:
 
 
 def _rows(model: type[Section], shown: set[tuple[type[Section], ...]]) -> list[Row]:
-    """The entries of a section, and after each that may be of other kinds those not yet shown."""
+    """Return the entries of a section, each followed by its other kinds that are not yet shown."""
     filled_in = (*(FILLED_IN if model.filled_in else ()), *model.also_filled_in)
     rows = []
     for name, field in entries_of(model).items():
@@ -97,12 +97,12 @@ def _row(
     filled_in: tuple[str, ...],
     shown: set[tuple[type[Section], ...]],
 ) -> Row:
-    """The entry as one would write it; of several kinds the first."""
+    """Return the entry as a user would write it; where it has several kinds, the first."""
     sections = list(sections_of(field.annotation))
     value: Any = _rows(sections[0], shown) if sections else (field.examples or [None])[0]
     off = not field.is_required() and field.default in (None, ()) and name not in filled_in
     if sections and all(row.off for row in value):
-        # A section of nothing but optional entries is optional as a whole.
+        # A section with optional entries only is optional as a whole.
         value, off = [replace(row, off=False) for row in value], True
     if sections and get_origin(field.annotation) is tuple:
         value = [value]
@@ -115,7 +115,7 @@ def _other(
     first: type[Section],
     shown: set[tuple[type[Section], ...]],
 ) -> Row:
-    """An entry of another kind than the ``first``: the key that names its kind, and what is new."""
+    """Return an entry of another kind than the ``first``, with its kind and its new entries."""
     rows = _rows(model, shown)
     above = {key: field.description for key, field in first.model_fields.items()}
     named = [replace(row, off=False, comment="") for row in rows if row.key in KINDS_ARE_NAMED_BY]

@@ -1,8 +1,8 @@
-"""Texts such as ``115 GPa`` to numbers in the base units mm, N, s, MPa, tonne, rad.
+"""Conversion of texts such as ``115 GPa`` to the base units mm, N, s, MPa, tonne, rad.
 
-The only place that knows other units. Conversion is in decimal arithmetic, so that ``115 GPa`` is
-exactly 115000.0. Angles count as a separate dimension: ``45 %`` is no angle, ``100 Hz`` is no
-rotation speed.
+No other module knows other units. Conversion is in decimal arithmetic, so that ``115 GPa`` is
+exactly 115000.0. Angles count as a separate dimension: ``45 %`` is not an angle, and ``100 Hz`` is
+not a rotation speed.
 """
 
 from __future__ import annotations
@@ -18,15 +18,15 @@ if TYPE_CHECKING:
     from pint import UnitRegistry
 
 QUANTITY_PATTERN = r"^\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(\S.*?)?\s*$"
-# The same for editors, which know of a unit only that there is one.
+# The same for editors, which check only that there is a unit.
 ABOVE_ZERO_WITH_UNIT = (
     r"^\s*\+?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?\s*(?:1\s*/\s*)?[A-Za-zµμ°%(].*$"
 )
 WITH_UNIT = ABOVE_ZERO_WITH_UNIT.replace(r"\+?", "[-+]?", 1)
 LONGEST_UNIT = 40  # no unit is longer; keeps pint from chewing on prose
 
-# Units that nearly every case is written in, by their size in root units and their dimension. Pint,
-# which knows all others, takes a third of a second to load; a test holds these against it.
+# Units in which nearly every case is written, with their size in root units and their dimension.
+# Pint knows all others but takes a third of a second to load; a test compares these with it.
 RADIAN, METER, GRAM, SECOND = "radian", "meter", "gram", "second"
 LENGTH, MASS, TIME, ANGLE = {METER: 1}, {GRAM: 1}, {SECOND: 1}, {RADIAN: 1}
 FREQUENCY = {SECOND: -1}
@@ -65,7 +65,7 @@ FREQUENT: dict[str, tuple[str, dict[str, int]]] = {
     "%": ("1e-2", {}),
     "Hz": ("1", FREQUENCY),
 }
-# Other ways to write what is frequent: superscripts, dots, spaces, and newtons times lengths.
+# Other spellings of frequent units: superscripts, dots, spaces, and newtons times lengths.
 SPELLINGS = (
     ("²", "^2"),
     ("³", "^3"),
@@ -79,7 +79,7 @@ SPELLINGS = (
 BELOW = re.compile(r"/[^()/]*[*·⋅ ]")  # mm³/N·m, which is (mm³/N)·m
 FACTOR_PATTERN = re.compile(r"(?P<unit>[A-Za-z%]+)(?:\^(?P<power>[1-9]))?")
 
-# Offered when a unit is not known; pint knows many more.
+# Suggested when a unit is not known; pint knows many more.
 COMMON_UNITS = (
     *("mm", "um", "m", "N", "kN", "MPa", "GPa", "Pa", "kg", "g", "t", "s", "h", "J", "mJ"),
     *(
@@ -99,7 +99,7 @@ COMMON_UNITS = (
 
 
 class UnitError(ValueError):
-    """A text that is not a quantity, or not one of the wanted dimension."""
+    """Text that is not a quantity, or not one of the wanted dimension."""
 
 
 class _Unit(NamedTuple):
@@ -108,9 +108,10 @@ class _Unit(NamedTuple):
 
 
 def to_base(text: str, unit: str | None) -> float:
-    """The number that ``text`` is in the base unit ``unit``.
+    """Return ``text`` as a number in the base unit ``unit``.
 
-    ``unit`` ``None`` takes any dimension, ``"1"`` a ratio such as ``2 %``. Raises ``UnitError``.
+    For ``unit`` ``None`` any dimension is accepted, for ``"1"`` a ratio such as ``2 %``. Raises
+    ``UnitError``.
     """
     number, written = split(text)
     known = _parse(written)
@@ -125,7 +126,7 @@ def to_base(text: str, unit: str | None) -> float:
 
 
 def split(text: str) -> tuple[Decimal, str]:
-    """Number and unit of ``text``; raises ``UnitError`` if one of them is missing."""
+    """Return number and unit of ``text``; raise ``UnitError`` if one of them is missing."""
     match = re.match(QUANTITY_PATTERN, text)
     if match is None:
         raise UnitError("not a number with a unit")
@@ -140,7 +141,7 @@ def split(text: str) -> tuple[Decimal, str]:
 
 
 def _base_factor(powers: dict[str, Decimal]) -> Decimal:
-    """Size in root units of the base unit of a dimension: mm and tonne instead of m and g."""
+    """Return the size in root units of the base unit of a dimension: mm and tonne, not m and g."""
     base = {"meter": Decimal("1e-3"), "gram": Decimal("1e6")}
     one = Decimal(1)
     return prod((base.get(root, one) ** power for root, power in powers.items()), start=one)
@@ -148,7 +149,7 @@ def _base_factor(powers: dict[str, Decimal]) -> Decimal:
 
 @cache
 def _parse(unit: str) -> _Unit:
-    """Factor and dimension of ``unit``, or ``UnitError``."""
+    """Return factor and dimension of ``unit``; raise ``UnitError`` if it is unknown."""
     if len(unit) > LONGEST_UNIT:
         raise UnitError("not a number with a unit")
     if unit == "1":
@@ -160,7 +161,7 @@ def _parse(unit: str) -> _Unit:
 
 
 def _frequent(unit: str) -> _Unit | None:
-    """Products and quotients of frequent units, such as kg/m^3 and 1/J; None for anything else."""
+    """Return a product or quotient of frequent units, such as kg/m^3; None for any other."""
     factor, powers = Decimal(1), dict[str, Decimal]()
     unit = re.sub(r"/\(([^()*/]+)\*([^()*/]+)\)", r"/\1/\2", unit)  # 1/(N*mm) is 1/N/mm
     unit = re.sub(r"^\(([^()*/]+)\*([^()*/]+)\)", r"\1*\2", unit)
@@ -182,14 +183,14 @@ def _frequent(unit: str) -> _Unit | None:
 
 
 def _by_pint(unit: str) -> _Unit:
-    """Factor and dimension as pint knows them, or ``UnitError``."""
+    """Return factor and dimension according to pint; raise ``UnitError`` if it is unknown."""
     registry = _registry()
     try:
         parsed = registry.parse_units(unit)
         # Temperature scales and decibels have no factor; multiplying them is an error in pint.
         _ = registry.Quantity(Decimal(1), parsed) * registry.Quantity(Decimal(1), "meter")
         factor, root = registry.get_root_units(parsed)
-    except Exception as error:  # pint lets a dozen kinds through, from its tokenizer to decimal's
+    except Exception as error:  # pint raises a dozen kinds, from its tokenizer's to decimal's
         raise UnitError(_unknown(unit)) from error
     powers = {name: Decimal(str(power)) for name, power in root._units.items()}
     return _Unit(Decimal(str(factor)), powers)
@@ -203,7 +204,7 @@ def _unknown(unit: str) -> str:
 
 @cache
 def _registry() -> UnitRegistry:
-    """Pint's registry. Importing and building it takes 0.6 s, so only when a unit is met."""
+    """Return pint's registry, built on first use because importing and building it takes 0.6 s."""
     import pint
 
     return pint.UnitRegistry(non_int_type=Decimal)

@@ -1,4 +1,4 @@
-"""A ``Case`` as YAML: every entry with its description, which names its base unit."""
+"""Writer of cases as YAML: every entry with its description, which names its base unit."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ HEADER = """\
 # The case as run, every default written out. Base units: mm, N, s, MPa, tonne (t), rad.
 # Optional entries that are not set are left out.
 """
-# Texts that need no quotes in YAML: words and quantities, no number, switch, date or null.
+# Texts that need no quotes in YAML: words and quantities, but no number, switch, date or null.
 PLAIN_TEXT = re.compile(
     r"(?!(?:true|false|yes|no|on|off|y|n|null)$)[A-Za-z][\w./-]*", re.ASCII | re.I
 )
@@ -27,7 +27,7 @@ INDENT = "  "
 
 @dataclass(frozen=True)
 class Row:
-    """One entry to write; ``off`` leaves it in as a comment."""
+    """Entry to be written; ``off`` writes it as a comment."""
 
     key: str
     value: Any  # scalar, list of values, rows of a section, or a list of sections as rows
@@ -36,12 +36,12 @@ class Row:
 
 
 def dump_case(case: Case) -> str:
-    """``case`` in base units; ``parse_case`` of the result is equal to ``case``."""
+    """Return ``case`` as YAML in base units; ``parse_case`` of the result equals ``case``."""
     return HEADER + render(rows_of(case))
 
 
 def rows_of(section: BaseModel) -> list[Row]:
-    """The entries of ``section`` that are set."""
+    """Return the entries of ``section`` that are set."""
     fields = entries_of(type(section))
     return [
         Row(name, _value(getattr(section, name)), field.description or "")
@@ -59,7 +59,7 @@ def _value(value: Any) -> Any:
 
 
 def render(rows: list[Row]) -> str:
-    """``rows`` as YAML text, a blank line before each section."""
+    """Return ``rows`` as YAML text, with a blank line before each section."""
     blocks = ["\n".join(_lines([row])) for row in rows]
     spaced = [f"\n{b}" if _is_section(r.value) else b for r, b in zip(rows, blocks, strict=True)]
     return "\n".join(spaced) + "\n"
@@ -80,7 +80,7 @@ def _entry_lines(row: Row) -> Iterator[str]:
         yield from (INDENT + line for line in _lines(row.value))
         return
     for item in row.value:
-        other = isinstance(item, Row)  # an item of another kind, left in as a comment
+        other = isinstance(item, Row)  # an item of another kind, written as a comment
         first, *rest = _lines(item.value if other else item)
         sign = "# " if other else ""
         yield _commented(f"{INDENT}{sign}- {first}", item.comment if other else "")
@@ -88,7 +88,7 @@ def _entry_lines(row: Row) -> Iterator[str]:
 
 
 def _is_section(value: Any) -> bool:
-    """Whether ``value`` is rows, or a list of sections given as rows."""
+    """Return whether ``value`` is rows, or a list of sections given as rows."""
     if not isinstance(value, list) or not value:
         return False
     return isinstance(value[0], Row) or _is_section(value[0])
@@ -99,7 +99,7 @@ def _commented(text: str, comment: str) -> str:
 
 
 def scalar(value: Any) -> str:
-    """A number, switch, text or list of them in YAML 1.1 and 1.2 alike."""
+    """Return a number, switch, text or list of them, valid in YAML 1.1 and 1.2."""
     if isinstance(value, list | tuple):
         return f"[{', '.join(map(scalar, value))}]"
     if isinstance(value, Written):
@@ -112,6 +112,6 @@ def scalar(value: Any) -> str:
 
 
 def _float(value: float) -> str:
-    """The shortest text that reads back as ``value``; YAML 1.1 wants a point in ``1.0e-08``."""
+    """Return the shortest text that reads back as ``value``, with the point that YAML 1.1 needs."""
     mantissa, exponent, power = repr(value).partition("e")
     return mantissa + ("" if "." in mantissa else ".0") * bool(exponent) + exponent + power

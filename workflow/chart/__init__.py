@@ -1,4 +1,4 @@
-"""Error against cost: each approximation of a case on a ladder of settings, and what to choose."""
+"""Error-cost charts: the settings of each approximation of a case, and which of them to choose."""
 
 from workflow.chart.run import Chart, accuracy_of, chart_case
 

@@ -1,8 +1,8 @@
-"""The approximations that can be charted: for each a ladder of settings, from coarse to fine.
+"""Approximations that can be charted, each with a ladder of settings from coarse to fine.
 
-A rung is a few ``--set`` overrides about the case's own settings, everything else as written. A
-rung that the case's schema refuses is left out, and an axis on which fewer than two rungs are left
-does not apply to the case.
+A rung of a ladder is a few ``--set`` overrides of the case; all other settings stay as written. A
+rung that the case's schema refuses is left out, and an axis with fewer than two rungs does not
+apply to the case.
 """
 
 from __future__ import annotations
@@ -22,40 +22,41 @@ from workflow.kinds import load_case
 # in 3-D, once for every increment of every jump where the contact wears.
 CONTACT_GRIDS = 1 / 8, 1 / 4, 1 / 2, 1.0, 2.0, 4.0
 WEAR_GRIDS = 1 / 4, 1 / 2, 1.0, 2.0
-FEWEST_CELLS = 16  # with fewer, the contact is hardly there
+FEWEST_CELLS = 16  # with fewer, the contact is hardly resolved
 TOLERANCES = 1e-3, 1e-4, 1e-5, 1e-6
-# How far the finest rung of a tolerance is beyond that of the case.
+# Ratio of the tolerance of the finest rung to that of the case.
 FINER_TOLERANCE = 1e-2
 INCREMENTS = 1 / 4, 1 / 2, 1.0, 2.0
 INCREMENTS_2D = 1 / 4, 1 / 2, 1.0, 2.0, 4.0, 8.0
 DRIFTS = 0.2, 0.1, 0.05, 0.02, 0.01
-# Condensing the structure takes about the fourth power of the refinement in 3-D.
+# The time to condense the structure grows as about the fourth power of the refinement in 3-D.
 MESHES_3D = 0.5, 0.5**0.5, 1.0, 2.0**0.5
 MESHES_2D = 0.5, 0.5**0.5, 1.0, 2.0**0.5, 2.0, 2.0**1.5, 4.0
-# Of finite elements alone, whose nodes carry the contact: refinements, and where their order is.
+# Refinements of a mesh whose nodes carry the contact without a half-space, and the path of its
+# order.
 MESHES_ALONE = 1.0, 2.0, 4.0, 8.0
 ORDER = "mesh.order"
-# Links to the structure, and its meshes to be linked to in the plane.
+# Links of half-spaces to the structure, and refinements of its mesh for them in plane problems.
 LINKS = {"half_space": "half-space", "corrected": "corrected"}
 MESHES_LINKED = 0.5, 1.0, 2.0, 4.0
 JUMPS = 5, 10, 20, 40, 80, 160
 ERRORS = 0.1, 0.03, 0.01, 3e-3, 1e-3
 EXPLICIT = 0.9, 0.45
-# Multiples of a step of time.
+# Multiples of the time step.
 TIME_STEPS = 4.0, 2.0, 1.0, 0.5, 0.25
-# Where a cycle takes seconds: so many rungs of jumps and errors fewer, and the longest explicit.
+# Number of rungs of jumps and errors left out in 3-D, where a cycle takes seconds.
 COARSER_3D = 2
-# Of a forced response; the finest harmonic is seen in so many samples per odd one.
+# Numbers of odd harmonics of a forced response, and samples of a period for each of them.
 ODD_HARMONICS, SAMPLES_PER_HARMONIC = (1, 2, 3, 5, 8, 15, 30), 32
 SAMPLES = (32, 64, 128, 256, 512, 1024, 2048)
 
 
 @dataclass(frozen=True)
 class Rung:
-    """One setting: ``name`` identifies it on its axis, ``branch`` the line that it belongs to.
+    """One setting: ``name`` identifies it on its axis, ``branch`` is the line that it belongs to.
 
     ``step`` goes to zero with the error, in any unit; None where nothing converges. ``of_limit`` is
-    the jump of explicit steps over their stability limit.
+    the ratio of an explicit step to its stability limit.
     """
 
     name: str
@@ -70,13 +71,13 @@ AS_WRITTEN = Rung("as written", ())
 
 @dataclass(frozen=True)
 class Axis:
-    """A named approximation.
+    """Named approximation with its ladder of settings.
 
-    ``ladder`` gives the rungs of a case, coarse to fine; the last is what all are held against.
-    ``order`` is the highest order of convergence that is believed of it, None for a choice, whose
-    last rung is right by definition. ``closed_form`` says that the ladder ends at an exact solution
-    where there is one. On an axis that ``moves_states`` the computed increments are others on each
-    rung; one across ``sections`` compares the middle of the faces per length.
+    ``ladder`` yields the rungs of a case, coarse to fine; the last is the reference for all.
+    ``order`` is the highest order of convergence that the estimate assumes, None for a choice
+    whose last rung is right by definition. ``closed_form`` says that the ladder ends at an exact
+    solution where there is one. On an axis that ``moves_states`` the rungs compute different
+    increments; one across ``sections`` compares the middle of the faces per length.
     """
 
     name: str
@@ -90,7 +91,7 @@ class Axis:
 
 @dataclass(frozen=True)
 class Setting:
-    """A rung on its case: ``text`` is the case as written out, by which equal ones are known."""
+    """Rung applied to its case; ``text`` is the case as YAML, which identifies equal settings."""
 
     rung: Rung
     case: Case
@@ -98,15 +99,15 @@ class Setting:
 
     @classmethod
     def of(cls, case: Path, base: Sequence[str], rung: Rung = AS_WRITTEN) -> Setting:
-        """The rung about a case file with the overrides ``base``. Raises CaseError."""
+        """Return the setting of a rung on a case file with overrides ``base``; raise CaseError."""
         changed = load_case(case, (*base, *rung.overrides))
         return cls(rung, changed, dump_case(changed))
 
 
 def axes_of(case: Path, base: Sequence[str], names: Sequence[str]) -> dict[Axis, list[Setting]]:
-    """Rungs of the axes called ``names``, without names of all that apply.
+    """Return the rungs of the axes called ``names``; without names, of all axes that apply.
 
-    Raises :class:`UserError` for an axis that there is not or that does not apply.
+    Raises :class:`UserError` for an axis that does not exist or does not apply.
     """
     baseline = Setting.of(case, base)
     wanted = [axis for axis in AXES if not names or axis.name in names]
@@ -130,7 +131,7 @@ def _applying(
 
 
 def _settings(axis: Axis, baseline: Setting, case: Path, base: Sequence[str]) -> list[Setting]:
-    """Rungs of the axis that the case admits, its own settings among them and each once."""
+    """Return the rungs of the axis that the case admits, with its own settings, each once."""
     settings: dict[str, Setting] = {}
     for rung in axis.ladder(baseline.case):
         try:
@@ -144,7 +145,7 @@ def _settings(axis: Axis, baseline: Setting, case: Path, base: Sequence[str]) ->
 
 
 def entry_at(case: Case, path: str) -> Any:
-    """The entry at a dotted path, None where this kind of case has none."""
+    """Return the entry at a dotted path, None where this kind of case has none."""
     node: Any = case
     for key in path.split("."):
         node = getattr(node, key, None)
@@ -152,7 +153,7 @@ def entry_at(case: Case, path: str) -> Any:
 
 
 def _is_line(case: Case) -> bool:
-    """Whether the contacts are line contacts."""
+    """Return whether the contacts are line contacts."""
     size = entry_at(case, "contact.size")
     return entry_at(case, "structure.dimension") == 2 or isinstance(size, float)
 
@@ -198,7 +199,7 @@ def _histories(case: Case) -> Iterator[Rung]:
 
 
 def _increments(case: Case) -> Iterator[Rung]:
-    """The loads of a wear cycle in fewer and in more increments."""
+    """Yield rungs with fewer and with more increments for the loads of a wear cycle."""
     increments = entry_at(case, "load_path.increments")
     if increments is None:
         return
@@ -207,7 +208,7 @@ def _increments(case: Case) -> Iterator[Rung]:
 
 
 def _in_increments(increments: int | Sequence[int], factor: float) -> Rung:
-    """Loads in so many times the increments of a cycle, or of each of its legs."""
+    """Return the rung with ``factor`` times the increments of a cycle, or of each of its legs."""
     legs = (increments,) if isinstance(increments, int) else increments
     counts = [max(1, round(factor * count)) for count in legs]
     value = counts[0] if isinstance(increments, int) else counts
@@ -215,14 +216,14 @@ def _in_increments(increments: int | Sequence[int], factor: float) -> Rung:
 
 
 def _legs(case: Case) -> Iterator[Rung]:
-    """The full history of a contact case in fewer and in more increments."""
+    """Yield rungs of the full history of a contact case with fewer and with more increments."""
     legs = entry_at(case, "load_path.legs")
     full = "contact.history=full"
     if not legs or all(leg.increments == 1 for leg in legs):
         yield Rung("full", (full,), branch="full")
         return
     for factor in INCREMENTS:
-        # A leg of one increment is a single load, which no finer ones would follow better.
+        # A leg of one increment is a single load, which finer increments would not follow better.
         counts = [leg.increments for leg in legs]
         counts = [n if n == 1 else max(1, round(factor * n)) for n in counts]
         overrides = [f"load_path.legs.{k}.increments={n}" for k, n in enumerate(counts)]
@@ -234,7 +235,7 @@ def _legs(case: Case) -> Iterator[Rung]:
 
 
 def _steppers(case: Case) -> Iterator[Rung]:
-    """Fixed jumps and automatic ones of each kind, and explicit ones in shares of their limit."""
+    """Yield rungs of explicit steps in shares of their limit, then automatic and fixed jumps."""
     cycles = entry_at(case, "wear.cycles")
     if entry_at(case, "wear.step.kind") is None:
         return
@@ -271,7 +272,7 @@ def _couplings(case: Case) -> Iterator[Rung]:
 
 
 def _time_steps(case: Case) -> Iterator[Rung]:
-    """Longer and shorter steps; those in which the excitation is not seen are refused."""
+    """Yield longer and shorter steps; the case refuses those that do not resolve the excitation."""
     base_step = entry_at(case, "integration.step")
     if base_step is None:
         return
@@ -284,7 +285,7 @@ def _time_steps(case: Case) -> Iterator[Rung]:
 
 
 def _harmonics(case: Case) -> Iterator[Rung]:
-    """Fewer and more odd harmonics, in samples that show the highest."""
+    """Yield fewer and more odd harmonics, with enough samples for the highest."""
     samples = entry_at(case, "resolution.samples")
     if samples is None:
         return
@@ -296,7 +297,7 @@ def _harmonics(case: Case) -> Iterator[Rung]:
 
 
 def _samples(case: Case) -> Iterator[Rung]:
-    """Fewer and more samples of the case's harmonics; too few of them are refused."""
+    """Yield fewer and more samples of the case's harmonics; the case refuses too few."""
     harmonics = entry_at(case, "resolution.harmonics")
     if harmonics is None:
         return
@@ -319,7 +320,7 @@ def _meshes(case: Case) -> Iterator[Rung]:
 
 
 def _refined(case: Case, factors: Sequence[float]) -> Iterator[Rung]:
-    """Elements as much finer, where the case says how fine they are."""
+    """Yield rungs of a mesh that is finer by each factor, where the case gives its fineness."""
     for factor in factors:
         if (nodes := entry_at(case, "mesh.flank_nodes")) is not None:
             counts = [max(3, 1 + round(factor * (count - 1))) for count in nodes]
@@ -332,7 +333,7 @@ def _refined(case: Case, factors: Sequence[float]) -> Iterator[Rung]:
             overrides = f"mesh.pad_elements={elements}", f"mesh.size={size!r}"
             yield Rung(f"{elements} elements on the pad", overrides, 1.0 / factor)
         elif entry_at(case, "structure.kind") == "mesh" and entry_at(case, "mesh.size"):
-            size = entry_at(case, "mesh.size") / factor  # of elements of a CAD file
+            size = entry_at(case, "mesh.size") / factor  # size of the elements of a CAD file
             yield Rung(f"elements of {size:.3g} mm", (f"mesh.size={size!r}",), 1.0 / factor)
 
 
@@ -343,8 +344,8 @@ def _orders(case: Case) -> Iterator[Rung]:
 
 
 def _links(case: Case) -> Iterator[Rung]:
-    """Half-spaces linked to the structure by forces alone, and by its nodes too, on its meshes."""
-    # Specimens wear by finite elements, their half-space is for comparison: it has no method.
+    """Yield rungs of half-spaces linked to the structure by forces, or corrected by its nodes."""
+    # Specimens wear by finite elements; their half-space is for comparison and has no method.
     if entry_at(case, "contact.method") not in ("normal", "full"):
         return
     factors = MESHES_LINKED if _is_line(case) else MESHES_3D
@@ -356,9 +357,9 @@ def _links(case: Case) -> Iterator[Rung]:
 
 
 def _alone(case: Case) -> Iterator[Rung]:
-    """The half-space's methods, and finite elements alone on finer and finer meshes.
+    """Yield the half-space's methods, then meshes of finite elements alone, finer and finer.
 
-    Those are of second order, in elements and in twice the increments.
+    The latter use elements and wear steps of second order, and twice the increments.
     """
     kind = entry_at(case, "structure.kind")
     plane = False
@@ -379,8 +380,8 @@ def _alone(case: Case) -> Iterator[Rung]:
         yield Rung(f"{mesh.name} alone", overrides, mesh.step, branch="alone")
 
 
-# Orders: pressures that end like a square root keep a grid from second order, friction that follows
-# a path in increments is first order, and so is a residual in its tolerance.
+# Orders of convergence: the square-root end of a pressure keeps a grid from second order, friction
+# along a path of increments is of first order, and so is a residual in its tolerance.
 AXES = (
     Axis("grid", "cells of the contact grid", _grids, order=2.0, closed_form=True),
     Axis("tolerance", "tolerance of the contact solver", _tolerances, order=1.0),

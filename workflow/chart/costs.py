@@ -1,4 +1,4 @@
-"""What a finished run has cost."""
+"""Costs of finished runs: seconds, convolutions and contact solves."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from workflow.case.sections import Case
 from workflow.shell.folder import OutputFolder
 from workflow.shell.store import read_bytes
 
-# Sections of a case that the structural stages do not look at.
+# Sections of a case that do not affect the structural stages.
 NOT_STRUCTURAL = {
     "title",
     "contact",
@@ -24,12 +24,12 @@ NOT_STRUCTURAL = {
     "measured",
     "expect",
 }
-# Stages whose results runs of the same structure find in the cache, whatever its friction and how
-# its load path is divided; and the one whose first result they find where these are the same too.
+# Stages whose results are cached for all runs of the same structure, whatever its friction and the
+# increments of its load path. The first result of FRICTION is cached for equal friction and path.
 CONDENSED = ("mesh", "condensation", "reduction")
 LOADED = {"load_path", "friction"}
 FRICTION = "structural friction"
-# Nobody waits for pictures that are switched off.
+# Stage that is not counted, because charts switch figures off.
 PICTURES = "paraview and figures"
 # A finished stage in ``run.log``.
 STAGE = re.compile(r"\d\d:\d\d:\d\d (?P<name>[a-z][a-z ,-]*): (?P<seconds>\d+\.\d\d) s")
@@ -37,7 +37,7 @@ STAGE = re.compile(r"\d\d:\d\d:\d\d (?P<name>[a-z][a-z ,-]*): (?P<seconds>\d+\.\
 
 @dataclass(frozen=True)
 class Cost:
-    """Seconds that a user waits, convolutions, and contacts solved."""
+    """Cost of a run: waiting time in seconds, number of convolutions, and of contact solves."""
 
     seconds: float
     convolutions: int
@@ -45,9 +45,9 @@ class Cost:
 
 
 def stage_seconds(log: str) -> dict[str, list[float]]:
-    """Seconds of each stage of a run, in turn, from the text of its ``run.log``.
+    """Return the seconds of each stage of a run, in order, from the text of its ``run.log``.
 
-    The log goes on where a run was resumed; the summary counts from there.
+    A resumed run continues its log, but its summary counts from the resumption only.
     """
     seconds: dict[str, list[float]] = {}
     for line in log.splitlines():
@@ -59,9 +59,9 @@ def stage_seconds(log: str) -> dict[str, list[float]]:
 def costs(
     cases: Sequence[Case], folders: Sequence[Path], summaries: Sequence[Mapping[str, Any]]
 ) -> list[Cost]:
-    """Cost of each run, with what it took from the cache at the price of the run that computed it.
+    """Return the cost of each run, as if nothing came from the cache.
 
-    That is the longest of all runs of the same structure.
+    A cached stage costs as much as the longest such stage among all runs of the same structure.
     """
     stages = [
         stage_seconds(read_bytes(OutputFolder(folder).log).decode("utf-8", "replace"))
@@ -80,11 +80,11 @@ def costs(
 def _cacheable_stages(
     case: Case, stages: Mapping[str, Sequence[float]]
 ) -> dict[str, tuple[str, float]]:
-    """Stages of a run that may be in the cache: by what, and their seconds here."""
+    """Return the stages of a run that may be cached, each with its cache key and seconds."""
     condensed = case.model_dump_json(exclude=NOT_STRUCTURAL | LOADED)
     cacheable = {name: (condensed, max(stages[name])) for name in CONDENSED if name in stages}
     if FRICTION in stages:
-        # The first is the unworn cycle; those after it are of worn faces and never kept.
+        # The first solve is of the unworn cycle; later ones are of worn faces and never cached.
         cacheable[FRICTION] = case.model_dump_json(exclude=NOT_STRUCTURAL), stages[FRICTION][0]
     return cacheable
 
@@ -99,7 +99,7 @@ def _seconds(
 
 
 def _work(summary: Mapping[str, Any]) -> tuple[int, int]:
-    """Convolutions and contact solves of a run."""
+    """Return the convolutions and contact solves of a run."""
     work = summary.get("work", {})
     convolutions = work.get("convolutions", summary.get("convolutions", 0))
     return int(convolutions), int(work.get("contact_solves", len(summary.get("states", ()))))

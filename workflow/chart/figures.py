@@ -1,4 +1,4 @@
-"""Figures of a chart: error against cost of each axis, and of all together."""
+"""Figures of a chart: error against cost for each axis, and for all together."""
 
 from __future__ import annotations
 
@@ -23,22 +23,22 @@ MARKERS = ("o", "s", "^", "D", "v", "P", "X", "<", ">")
 HEIGHT = 6.6
 LEGEND_COLUMNS = 4
 LEGEND_SIZE = 10
-# Errors and costs that nothing else bounds are drawn this far from the next point.
+# Factor between the extreme errors or costs and the limits of the axes.
 MARGIN = 3.0
-# Rungs whose costs and errors agree to so many decimals of their logarithm are at one place.
+# Decimals of the logarithms of cost and error to which rungs must agree to share one mark.
 PLACE = 2
-# Quantities that are drawn one by one: more would hide the rungs.
+# Largest number of quantities that are drawn one by one: more would hide the rungs.
 MOST_QUANTITIES = 4
-# Errors of all axes are drawn down to this share of the accuracy: less decides nothing.
+# Errors of all axes are drawn down to this share of the accuracy; smaller ones decide nothing.
 DEEPEST = 1e-3
-# Smallest error drawn where nothing but references ran.
+# Smallest error drawn where only references ran.
 SMALLEST = 1e-12
-# Room for the name of the dearest rung, over the width of what is drawn.
+# Room for the name of the most expensive rung, relative to the width of the plot.
 LAST_NAME = 0.25
 
 
 def write_chart_figures(chart: Chart, folder: Path) -> list[Path]:
-    """Draw a figure for each axis and one for all, as PNG files; returns their paths."""
+    """Draw a figure for each axis and one for all, as PNG files, and return their paths."""
     ladders = [ladder for ladder in chart.ladders if ladder.rungs]
     drawn: dict[str, Callable[[], Figure]] = {
         f"chart_{ladder.axis.name}": partial(axis_figure, ladder, chart.accuracy)
@@ -50,7 +50,7 @@ def write_chart_figures(chart: Chart, folder: Path) -> list[Path]:
 
 
 def axis_figure(ladder: Ladder, accuracy: float) -> Figure:
-    """Error against seconds and against convolutions, a line for each branch."""
+    """Draw error against seconds and against convolutions, with a line for each branch."""
     chosen = ladder.cheapest(accuracy)
     ending = "none is known to be enough" if chosen is None else f"{chosen.name} is enough"
     title = f"{ladder.axis.name}: {ladder.axis.what}; for {100 * accuracy:g} % {ending}"
@@ -78,7 +78,7 @@ def axis_figure(ladder: Ladder, accuracy: float) -> Figure:
 
 
 def all_figure(chart: Chart) -> Figure:
-    """The efficient rungs of all axes, each varied alone about the case's own settings."""
+    """Draw the efficient rungs of all axes, each varied alone about the case's own settings."""
     ladders = [ladder for ladder in chart.ladders if ladder.rungs]
     lowest = max(_bottom(ladders), DEEPEST * chart.accuracy)
     title = f"All axes, each varied alone; errors below {100 * lowest:.1g} % on the dotted line"
@@ -99,7 +99,7 @@ def all_figure(chart: Chart) -> Figure:
 
 
 def _panels(figure: Figure, ladders: Sequence[Ladder]) -> list[tuple[Axes, str]]:
-    """Axes for each cost that the runs say."""
+    """Return axes for each cost that is known for the runs."""
     rungs = [rung for ladder in ladders for rung in ladder.rungs]
     known = [cost for cost in COSTS if any(getattr(rung.point.cost, cost) for rung in rungs)]
     axes = figure.subplots(1, len(known), sharey=True, squeeze=False)
@@ -107,20 +107,20 @@ def _panels(figure: Figure, ladders: Sequence[Ladder]) -> list[tuple[Axes, str]]
 
 
 def _bottom(ladders: Sequence[Ladder]) -> float:
-    """Where what has no error is drawn: below every error and floor."""
+    """Return the height at which rungs without an error are drawn, below every error and floor."""
     errors = [rung.error for ladder in ladders for rung in ladder.rungs]
     seen = [*errors, *(ladder.floor for ladder in ladders)]
     return min((error for error in seen if ROUNDING < error < inf), default=SMALLEST) / MARGIN
 
 
 def _top(ladders: Sequence[Ladder], accuracy: float) -> float:
-    """Above every error."""
+    """Return a height above every error."""
     errors = [rung.error for ladder in ladders for rung in ladder.rungs if isfinite(rung.error)]
     return MARGIN * max([accuracy, *errors])
 
 
 def _place(rung: Judged, cost: str, bottom: float) -> Place:
-    """Cost and error of a rung in the figure."""
+    """Return cost and error of a rung in the figure."""
     spent = float(getattr(rung.point.cost, cost))
     return max(spent, 1e-2), max(rung.error, bottom)
 
@@ -128,7 +128,7 @@ def _place(rung: Judged, cost: str, bottom: float) -> Place:
 def _draw_line(
     axis: Axes, rungs: Sequence[Judged], cost: str, bottom: float, number: int, label: str | None
 ) -> None:
-    """A branch: full marks are resolved rungs, hollow ones are not."""
+    """Draw a branch, with full marks for resolved rungs and hollow marks for others."""
     if not rungs:
         return
     colour, marker = COLOURS[number % len(COLOURS)], MARKERS[number % len(MARKERS)]
@@ -150,9 +150,9 @@ def _draw_line(
 
 
 def _names(rungs: Sequence[Judged], cost: str, bottom: float) -> list[tuple[str, Place]]:
-    """Names of marks and their places, the case's own and the efficient ones first.
+    """Return names of marks and their places, first the case's own, then the efficient ones.
 
-    Marks of one place are named together.
+    Marks at the same place share one name.
     """
     frontier = _frontier(rungs, cost)
     first = sorted(rungs, key=lambda rung: (not rung.point.baseline, rung not in frontier))
@@ -175,13 +175,13 @@ def _draw_baseline(axis: Axes, rungs: Sequence[Judged], cost: str, bottom: float
 
 
 def _frontier(rungs: Sequence[Judged], cost: str) -> list[Judged]:
-    """The efficient rungs, the cheapest first."""
+    """Return the efficient rungs, the cheapest first."""
     efficient = [rung for rung in rungs if getattr(rung, f"by_{cost}")]
     return sorted(efficient, key=lambda rung: rung.bound, reverse=True)
 
 
 def _draw_frontier(axis: Axes, rungs: Sequence[Judged], cost: str, bottom: float) -> None:
-    """Steps down: what can be had for no more than a cost."""
+    """Draw the efficient frontier as steps: the smallest error for no more than a given cost."""
     places = [_place(rung, cost, bottom) for rung in _frontier(rungs, cost)]
     if places:
         spent, errors = zip(*places, strict=True)
@@ -197,7 +197,7 @@ def _draw_floor(axis: Axes, ladder: Ladder) -> None:
 
 
 def _draw_quantities(axis: Axes, ladder: Ladder, cost: str) -> None:
-    """Error of each quantity where it is resolved: how fast it falls is the method's order."""
+    """Draw the error of each quantity where it is resolved; its slope shows the order."""
     for number, (quantity, reference) in enumerate(ladder.references.items(), 1):
         places = [
             (_place(rung, cost, 0.0)[0], abs(rung.point.values[quantity] / reference.value - 1.0))
@@ -210,7 +210,7 @@ def _draw_quantities(axis: Axes, ladder: Ladder, cost: str) -> None:
 
 
 def _finish(axis: Axes, cost: str, accuracy: float, ends: tuple[float, float]) -> None:
-    """Scales and labels; ``ends`` are the lowest and the highest error shown."""
+    """Set scales and labels; ``ends`` are the lowest and the highest error shown."""
     axis.axhline(accuracy, color=BLACK, lw=1.0, ls="--", label=f"required: {100 * accuracy:g} %")
     axis.set(xlabel=COSTS[cost], xscale="log", yscale="log", ylim=(ends[0] / 1.6, ends[1]))
     low, high = axis.get_xlim()

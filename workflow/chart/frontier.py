@@ -1,4 +1,4 @@
-"""What is worth its cost: efficient points, and the cheapest combination of several axes."""
+"""Efficient points of error against cost, and the cheapest combination of several axes."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ from math import inf, isfinite
 
 
 def efficient(costs: Sequence[float], errors: Sequence[float]) -> list[bool]:
-    """Which points are on the frontier: nothing as cheap is more accurate, nor the reverse.
+    """Return which points are efficient: none as cheap is more accurate, nor the reverse.
 
-    Of points alike in both the first counts.
+    Of points with equal cost and error, the first counts.
     """
     order = sorted(range(len(costs)), key=lambda k: (costs[k], errors[k], k))
     on_frontier, best = [False] * len(costs), inf
@@ -23,7 +23,7 @@ def efficient(costs: Sequence[float], errors: Sequence[float]) -> list[bool]:
 
 @dataclass(frozen=True)
 class Option:
-    """A choice on one axis: its cost over that of the case's own settings, and its error."""
+    """Choice on one axis: its cost relative to that of the case's own settings, and its error."""
 
     name: str
     ratio: float
@@ -32,7 +32,7 @@ class Option:
 
 @dataclass(frozen=True)
 class Combination:
-    """A choice on every axis: rungs by the axis' name, errors added, costs multiplied."""
+    """Choice on every axis: rungs by name of the axis, sum of the errors, product of the costs."""
 
     rungs: Mapping[str, str] = field(default_factory=dict)
     error: float = 0.0
@@ -40,10 +40,10 @@ class Combination:
 
 
 def cheapest(axes: Mapping[str, Sequence[Option]], accuracy: float) -> Combination | None:
-    """The cheapest choice on every axis whose errors add up to ``accuracy`` at most, if any.
+    """Return the cheapest choice on every axis whose errors add up to at most ``accuracy``.
 
-    Each axis was varied alone: that errors add is a bound as far as they do not feed each other,
-    and that costs multiply an estimate.
+    Returns None if there is none. Each axis was varied alone: the sum of the errors is a bound as
+    far as the errors do not interact, and the product of the costs is an estimate.
     """
     kept = [Combination()]
     for axis, options in axes.items():
@@ -55,7 +55,7 @@ def cheapest(axes: Mapping[str, Sequence[Option]], accuracy: float) -> Combinati
             )
             for choice, option in product(kept, options)
         ]
-        # What is no frontier point so far is none of any longer combination either.
+        # A combination that is not efficient so far cannot become part of an efficient one.
         ratios, errors = [c.seconds_ratio for c in grown], [c.error for c in grown]
         kept = list(compress(grown, efficient(ratios, errors)))
     met = [choice for choice in kept if isfinite(choice.error) and choice.error <= accuracy]

@@ -1,4 +1,4 @@
-"""The rungs of an axis side by side: what they are held against, and which are efficient."""
+"""Comparison of the rungs of an axis: their references, errors and efficiency."""
 
 from __future__ import annotations
 
@@ -11,20 +11,20 @@ from workflow.chart.costs import Cost
 from workflow.chart.frontier import Option, efficient
 from workflow.shell.convergence import Convergence, richardson
 
-# Changes of a quantity below this share of it are rounding, and no sign of convergence or its lack.
+# Relative changes of a quantity below this are rounding, and say nothing about convergence.
 ROUNDING = 1e-12
-# Times of the same run differ by this share at least, even on a machine that does little else.
+# Relative scatter of the run times of the same run, even on an otherwise idle machine.
 TIMING = 0.1
-# Seconds of a log have two digits behind the point.
+# Seconds in a log have two decimals.
 SHORTEST = 1e-2
 
 
 @dataclass(frozen=True)
 class Point:
-    """A rung that has run.
+    """Rung that has run.
 
-    ``values`` by quantity; ``extras`` are reported beside them. ``baseline`` marks the settings of
-    the case itself.
+    ``values`` are by quantity; ``extras`` are only reported. ``baseline`` marks the settings of the
+    case itself.
     """
 
     rung: Rung
@@ -37,10 +37,10 @@ class Point:
 
 @dataclass(frozen=True)
 class Reference:
-    """What a quantity is held against: a closed form, or the value of the last rung.
+    """Reference value of a quantity: a closed form, or the value of the last rung.
 
-    ``order`` and ``floor`` are those of the last rungs: ``floor`` estimates, relative to the value,
-    how far a last rung is from the limit itself; it is 0 for a closed form and for a choice.
+    ``order`` and ``floor`` come from the last rungs: ``floor`` estimates the error of the
+    reference, relative to its value; it is 0 for a closed form and for a choice.
     """
 
     value: float
@@ -51,11 +51,11 @@ class Reference:
 
 @dataclass(frozen=True)
 class Judged:
-    """A rung beside the references.
+    """Rung with its errors relative to the references.
 
-    ``error`` is its largest relative difference, that of ``worst``; with the floor of the reference
-    no more than ``bound``. ``unresolved``: less than the references themselves are known to.
-    ``seconds`` is the cost that choices go by: see :func:`seconds_by_work`.
+    ``error`` is its largest relative difference, that of the quantity ``worst``; ``bound`` adds the
+    floor of the reference. ``unresolved`` means that the error is smaller than the uncertainty of
+    the references. ``seconds`` is the cost that decides: see :func:`seconds_by_work`.
     """
 
     point: Point
@@ -74,7 +74,7 @@ class Judged:
 
 @dataclass(frozen=True)
 class Ladder:
-    """An axis with everything that ran on it; ``failed`` has an error for each that did not."""
+    """Axis with all of its runs; ``failed`` has an error message for each run that failed."""
 
     axis: Axis
     rungs: tuple[Judged, ...]
@@ -83,25 +83,25 @@ class Ladder:
 
     @property
     def floor(self) -> float:
-        """How well the references are known, at worst."""
+        """Largest uncertainty of the references, relative."""
         return max((reference.floor for reference in self.references.values()), default=nan)
 
     @property
     def baseline(self) -> Judged | None:
-        """The settings of the case itself, where they ran."""
+        """Rung with the settings of the case itself, or None if it did not run."""
         return next((rung for rung in self.rungs if rung.point.baseline), None)
 
     @property
     def scatter(self) -> float:
-        """Share by which the measured times disagree with the order of the work they measure."""
+        """Relative scatter of the times: by how much they contradict the order of the work."""
         excess = [rung.point.cost.seconds / rung.seconds - 1.0 for rung in self.rungs]
         return max([TIMING, *excess])
 
     def cheapest(self, accuracy: float) -> Judged | None:
-        """Return the rung of least cost whose error is at most ``accuracy`` for sure.
+        """Return the rung of least cost whose error is certainly at most ``accuracy``.
 
-        On a branch that is the coarsest such rung, whatever the clock says. Branches are compared
-        by seconds, and by convolutions where their seconds differ by no more than times do.
+        On a branch this is the coarsest such rung, whatever the measured times are. Branches are
+        compared by seconds, and by convolutions where their seconds differ within the scatter.
         """
         met = [rung for rung in self.rungs if rung.bound <= accuracy]
         met = [rung for rung in met if not any(_finer(rung.point, other.point) for other in met)]
@@ -110,7 +110,7 @@ class Ladder:
         return min(quick, key=lambda rung: rung.point.cost.convolutions, default=None)
 
     def options(self) -> list[Option]:
-        """Return the rungs as choices, their costs over that of the case's own settings."""
+        """Return the rungs as choices, with costs relative to that of the case's own settings."""
         baseline = self.baseline
         if baseline is None:
             return []
@@ -118,10 +118,10 @@ class Ladder:
 
 
 def seconds_by_work(points: Sequence[Point]) -> list[float]:
-    """Return the seconds of each rung, no more than those of any finer rung of its branch.
+    """Return the seconds of each rung, at most those of any finer rung of its branch.
 
-    A coarser rung does less of the same work: by what it took longer, the machine was busy with
-    something else. Seconds are logged to a hundredth, and none are fewer.
+    A coarser rung does less of the same work: if it took longer, the machine was busy otherwise.
+    Seconds are logged to a hundredth, which is the smallest value returned.
     """
     seconds = [max(point.cost.seconds, SHORTEST) for point in points]
     return [
@@ -145,12 +145,12 @@ def judge(
     failed: Mapping[str, str],
     finest: str = "",
 ) -> Ladder:
-    """Hold the points of an axis, coarse to fine, against the last of them.
+    """Compare the points of an axis, coarse to fine, with the last of them.
 
-    Where that is a choice and not the ``finest`` rung there is, nothing is known of the errors.
+    If the axis is a choice and the last point is not the ``finest`` rung, the errors are unknown.
 
-    Quantities in ``exact`` are held against those values instead, where the axis goes to them.
-    Quantities that are 0 in the reference, or that a point does not have, are left out.
+    Quantities in ``exact`` are compared with those values instead, where the axis converges to
+    them. Quantities that are 0 in the reference, or that a point does not have, are left out.
     """
     shared = [q for q in points[-1].values if all(q in point.values for point in points)]
     references = {q: _reference(axis, points, q, exact) for q in shared}
@@ -190,7 +190,7 @@ def _reference(
 
 
 def _convergence(axis: Axis, points: Sequence[Point], quantity: str) -> Convergence:
-    """Of the branch that the last point belongs to; one that refines nothing is a choice."""
+    """Return the convergence on the branch of the last point; one without steps is a choice."""
     last = points[-1]
     branch = [p for p in points if p.rung.branch == last.rung.branch and p.rung.step is not None]
     if axis.order is None or not branch:
@@ -201,7 +201,7 @@ def _convergence(axis: Axis, points: Sequence[Point], quantity: str) -> Converge
 
 
 def _errors(point: Point, references: Mapping[str, Reference]) -> dict[str, float]:
-    """Relative difference of each quantity to its reference."""
+    """Return the relative difference of each quantity from its reference."""
     return {
         quantity: abs(point.values[quantity] - reference.value) / abs(reference.value)
         for quantity, reference in references.items()

@@ -1,4 +1,4 @@
-"""Names beside the marks of a figure, as many as there is room for."""
+"""Names next to the marks of a figure, as many as there is room for."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from matplotlib.transforms import Bbox
 Place = tuple[float, float]
 
 NAME_SIZE = 9
-# Where a name may begin or end beside its mark [points], the first that is free.
+# Offsets [points] and alignment of a name from its mark; the first free one is used.
 BESIDE: tuple[tuple[int, int, str], ...] = (
     (10, 6, "left"),
     (10, -14, "left"),
@@ -24,10 +24,10 @@ HALF_MARK = 5.0
 
 
 def name_marks(axis: Axes, names: Iterable[tuple[str, Place]], marks: Sequence[Place]) -> None:
-    """Write each name beside its place, off all ``marks`` and off the names before it.
+    """Write each name next to its place, clear of all ``marks`` and of earlier names.
 
-    Names that find no room are left out, so the ones that matter most come first. The figure must
-    have its layout.
+    Names without room are left out, so the most important ones must come first. The layout of the
+    figure must be computed before.
     """
     taken = [_box(axis, place) for place in marks]
     for name, place in names:
@@ -49,7 +49,7 @@ def name_marks(axis: Axes, names: Iterable[tuple[str, Place]], marks: Sequence[P
 
 
 def _box(axis: Axes, place: Place) -> Bbox:
-    """Of a mark [pixels]."""
+    """Return the box of a mark [pixels]."""
     x, y = axis.transData.transform(place)
     return Bbox.from_extents(x - HALF_MARK, y - HALF_MARK, x + HALF_MARK, y + HALF_MARK)
 

@@ -1,4 +1,4 @@
-"""A chart as files and on the terminal: tables, ``summary.json``, figures, what to choose."""
+"""Output of a chart: tables, ``summary.json``, figures, and recommended settings."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from workflow.shell.folder import OutputFolder
 from workflow.shell.tables import write_table
 from workflow.shell.versions import versions
 
-# Columns of text where the tables go to a file.
+# Width in columns of tables that go to a file.
 FILE_WIDTH = 120
 
 
 def write_chart(chart: Chart, out: Path) -> dict[str, Path]:
-    """Write ``chart.csv``, ``figures`` and, last, ``summary.json``; what of it tells most."""
+    """Write ``chart.csv``, ``figures`` and, last, ``summary.json``; return the main paths."""
     from workflow.chart.figures import write_chart_figures
 
     folder = OutputFolder(out, KIND)
@@ -31,15 +31,15 @@ def write_chart(chart: Chart, out: Path) -> dict[str, Path]:
     with folder.filling("figures", "errors against costs") as figures:
         drawn = write_chart_figures(chart, figures)
     folder.write_summary(_summary(chart))
-    # The last one is of all axes.
+    # The last figure shows all axes.
     return {"figure": drawn[-1], "table": table} if drawn else {"table": table}
 
 
-# --- what to choose -----------------------------------------------------------------------------
+# --- recommended settings -----------------------------------------------------------------------
 
 
 def sentences(chart: Chart) -> list[str]:
-    """What to take for the required accuracy: on each axis, and on all together."""
+    """Return what to choose for the required accuracy, on each axis and on all together."""
     lines = [_choice(ladder, chart.accuracy) for ladder in chart.ladders]
     return [*lines, _together(chart)] if len(chart.ladders) > 1 else lines
 
@@ -66,7 +66,7 @@ def _costs(rung: Judged) -> str:
 
 
 def _error(ladder: Ladder, rung: Judged) -> str:
-    """The error of a rung in words, with what is not known of it."""
+    """Return the error of a rung in words, with its uncertainty."""
     if rung.error == 0.0:
         known = f"known to {percent(ladder.floor)}" if ladder.floor else "by definition"
         return f"the reference, {known}"
@@ -77,7 +77,7 @@ def _error(ladder: Ladder, rung: Judged) -> str:
 
 
 def combination(chart: Chart) -> Combination | None:
-    """The cheapest rung on every axis with errors that add up to no more than the accuracy."""
+    """Return the cheapest rung on every axis whose errors add up to at most the accuracy."""
     options = {ladder.axis.name: ladder.options() for ladder in chart.ladders}
     return cheapest(options, chart.accuracy)
 
@@ -98,7 +98,7 @@ def _together(chart: Chart) -> str:
 
 
 def percent(share: float) -> str:
-    """A share in per cent, with two digits."""
+    """Return a share in per cent with two digits, as text."""
     return f"{100 * share:.2g} %" if isfinite(share) else "an unknown error"
 
 
@@ -106,7 +106,7 @@ def percent(share: float) -> str:
 
 
 def show(chart: Chart) -> None:
-    """Tables and sentences on the terminal."""
+    """Print tables and sentences on the terminal."""
     console = Console(highlight=False, markup=False)
     if not console.is_terminal:
         console.width = FILE_WIDTH
@@ -131,7 +131,7 @@ def _table(ladder: Ladder) -> Table:
 
 
 def _reference(ladder: Ladder) -> str:
-    """How well the references are known, for a title."""
+    """Return how accurately the references are known, for a title."""
     if ladder.references and not isfinite(ladder.floor):
         return " (nothing to hold the rungs against)"
     if ladder.axis.order is None or not ladder.references:
@@ -152,7 +152,7 @@ def _marks(rung: Judged) -> list[str]:
 
 
 def _write_table(chart: Chart, path: Path) -> None:
-    """One row for each rung; a quantity that its axis does not have is empty."""
+    """Write one row for each rung; a quantity that its axis does not have is empty."""
     cells = [_cells(ladder, rung) for ladder in chart.ladders for rung in ladder.rungs]
     names = dict.fromkeys(name for part in zip(*cells, strict=True) for row in part for name in row)
     rows = [head | values | tail for head, values, tail in cells]
@@ -160,7 +160,7 @@ def _write_table(chart: Chart, path: Path) -> None:
 
 
 def _cells(ladder: Ladder, rung: Judged) -> tuple[dict[str, Any], dict[str, Any], dict[str, Any]]:
-    """What a rung is, the quantities that its axis has, and what came of it."""
+    """Return the cells of a rung: its settings, its quantities, and its errors and costs."""
     point, cost = rung.point, rung.point.cost
     head = {
         "axis": ladder.axis.name,
@@ -235,5 +235,5 @@ def _rung_summary(rung: Judged) -> dict[str, Any]:
 
 
 def _finite(value: float) -> float | None:
-    """JSON has no infinity."""
+    """Return a finite value, or None, because JSON has no infinity."""
     return value if isfinite(value) else None

@@ -1,8 +1,8 @@
-"""The rungs of a chart: their runs, one at a time, and what these are compared by.
+"""Runs of the rungs of a chart, and the quantities by which they are compared.
 
-Every axis is varied alone about the case's own settings. Rungs are run one at a time, so that their
-times do not disturb each other, with all cores and threads of the machine; a finished one is taken
-as it is and an interrupted one goes on.
+Every axis is varied alone about the case's own settings. Rungs run one at a time, so that their
+times do not disturb each other, with all cores and threads of the machine. Finished runs are
+reused and interrupted ones resumed.
 """
 
 from __future__ import annotations
@@ -39,22 +39,22 @@ from workflow.shell.summary import number_at
 
 CACHE = "FRETSCALE_CACHE"
 ACCURACY = Quantity("1", above=0.0, at_most=1.0)
-# What the folder of a chart is called, those in it, and the run of the case as it is written.
+# Name of the folder of a chart, of its subfolders, and of the run of the case as written.
 KIND, LOG = "chart", "chart.log"
 RUNS, STRUCTURES, BASELINE = "runs", "structures", "own"
 # Entry of an interface in the summary: the longest stable explicit step of the unworn contact.
 LIMIT = "explicit_limit"
-# Quantities of a computed increment counted from the first, which is another one with other steps.
+# A state counted from the first increment, which is a different state with other increments.
 FROM_THE_FIRST = re.compile(r"states\.\d")
-# A run that ends in less than this share of the time that it took was there before.
+# A run that ends in less than this share of its recorded time is reused from an earlier chart.
 KEPT = 0.5
-# Explicit steps beyond this number are left out: as many cycles are solved, most of a day in 3-D.
+# Explicit runs of more steps are left out: each step solves a cycle, most of a day in 3-D.
 MOST_STEPS = 5000
 
 
 @dataclass(frozen=True)
 class Chart:
-    """The ladders of a case, the required accuracy, and whether no run failed."""
+    """Ladders of a case, the required accuracy, and whether all runs were complete."""
 
     title: str
     ladders: tuple[Ladder, ...]
@@ -64,7 +64,7 @@ class Chart:
 
 @dataclass(frozen=True)
 class _Run:
-    """A finished run of a setting; ``summary`` with the middle sections of wear in it."""
+    """Finished run of a setting; ``summary`` includes the middle sections of wear."""
 
     case: Case
     finished: Finished
@@ -73,7 +73,7 @@ class _Run:
 
 
 def accuracy_of(text: str) -> float:
-    """A share such as ``1 %`` or ``0.01``. Raises UserError."""
+    """Return a share such as ``1 %`` or ``0.01`` as a number; raise UserError for others."""
     value = float(text) if text.replace(".", "", 1).isdecimal() else text
     try:
         return ACCURACY.parse(value)
@@ -93,9 +93,9 @@ def chart_case(
 ) -> Chart:
     """Run the ladders of ``axes``, by default of all that apply, in folders below ``out/runs``.
 
-    The structural cache lies in ``out`` too: what a run takes from it is charged to it at the price
-    of the run that computed it. ``quantities`` are dotted paths into ``summary.json``. Raises
-    :class:`UserError` where an axis does not apply or a quantity is nowhere to be found.
+    The structural cache is in ``out`` too; a run that reads from it is charged the cost of the run
+    that computed the result. ``quantities`` are dotted paths into ``summary.json``. Raises
+    :class:`UserError` if an axis does not apply or a quantity does not exist.
     """
     base = (*overrides, *_plain(load_case(case, overrides), quantities))
     settings = axes_of(case, base, axes)
@@ -122,7 +122,7 @@ def chart_case(
 
 
 def _plain(case: Case, quantities: Sequence[str]) -> Iterator[str]:
-    """Overrides that leave out what no quantity needs, and any choice of settings but one."""
+    """Yield overrides that switch off what no quantity needs, and that fix automatic settings."""
     yield from ("output.paraview=false", "output.figures=false")
     for entry, overrides in analysis_of(case).comparison.plain.items():
         if not any(f".{entry}." in path for path in quantities):
@@ -130,18 +130,18 @@ def _plain(case: Case, quantities: Sequence[str]) -> Iterator[str]:
     if hasattr(case, "fidelity"):
         yield "fidelity=fixed"
         case = changed(case, {"fidelity": "fixed"})
-    # What else is open is chosen for the case as it is written, and stays on all rungs.
+    # Open settings are chosen once, for the case as written, and fixed on all rungs.
     _, record = analysis_of(case).choose(case)
     for entry, value in (record or {"chosen": {}})["chosen"].items():
         yield f"{entry}={json.dumps(value)}"
 
 
 def _claim(folder: OutputFolder, case: Case) -> None:
-    """Make sure of the folder. Raises UserError where it holds anything but a chart."""
+    """Prepare the folder; raise UserError if it contains anything but a chart."""
     folder.refuse_foreign()
     structures = folder.reserve(STRUCTURES, "what runs of the same structure share")
     if kept_in(folder.root / RUNS / BASELINE, case) != "finished":
-        # It is the first to run, and is to pay for its structure itself.
+        # The case as written runs first, and must compute its structure itself to measure its cost.
         for path in [] if structures.is_symlink() else kept_files(structures):
             path.unlink()
 
@@ -149,7 +149,7 @@ def _claim(folder: OutputFolder, case: Case) -> None:
 def _jobs(
     case: Path, base: Sequence[str], settings: Mapping[Axis, list[Setting]]
 ) -> dict[str, Job]:
-    """A job for each different case, by its text; the case's own settings come first."""
+    """Return a job for each different case, by its text; the case's own settings come first."""
     baseline = Setting.of(case, base)
     jobs = {baseline.text: Job(BASELINE, case, tuple(base))}
     for axis, rungs in settings.items():
@@ -168,9 +168,9 @@ def _run(
     quantities: Sequence[str],
     reporter: Reporter,
 ) -> tuple[list[Finished], dict[str, str]]:
-    """How the jobs ended, and why some were left out, by their name.
+    """Return how the jobs ended, and by name why some were left out.
 
-    The first one shows whether there are such ``quantities``, before all others are run.
+    The first run shows whether the ``quantities`` exist, before all others start.
     """
     progress = _Progress(jobs, reporter)
     baseline, *others = jobs.values()
@@ -188,7 +188,7 @@ def _run(
 
 
 def _too_long(setting: Setting, summary: Mapping[str, Any]) -> str:
-    """Why nobody would wait for explicit steps, as far as the run of the case itself knows it."""
+    """Return why explicit steps would take too long, judged by the run of the case as written."""
     share, case = setting.rung.of_limit, setting.case
     limits = [limit for name in summary if (limit := number_at(summary, f"{name}.{LIMIT}"))]
     if share is None or not limits:
@@ -199,9 +199,9 @@ def _too_long(setting: Setting, summary: Mapping[str, Any]) -> str:
 
 
 class _Progress:
-    """Reports each run as it ends, and how long the others will take.
+    """Reporter of each run as it ends, and of the remaining time.
 
-    They are weighed by the time that a check tells of them: from rung to rung that grows.
+    Runs are weighted by their time estimates, because the time grows from rung to rung.
     """
 
     def __init__(self, jobs: Mapping[str, Job], reporter: Reporter) -> None:
@@ -211,12 +211,12 @@ class _Progress:
         self._times = {n: analysis_of(case).run_time(case).seconds for n, case in cases.items()}
 
     def leave_out(self, names: Iterable[str]) -> None:
-        """Runs that there will not be."""
+        """Remove runs that will not take place."""
         for name in names:
             self._times.pop(name, None)
 
     def running(self, names: Sequence[str]) -> None:
-        """What runs now."""
+        """Report the names of the runs in progress."""
         self._reporter.doing(f"{self._ended} of {self._total}, now {', '.join(names)}")
 
     def __call__(self, finished: Finished) -> None:
@@ -237,7 +237,7 @@ class _Progress:
 
 
 def _runs(ended: Sequence[Finished]) -> dict[str, _Run]:
-    """What has run, by the name of the job."""
+    """Return the finished runs, by the name of the job."""
     completed = [(finished, finished.summary) for finished in ended if finished.summary is not None]
     cases = [finished.job.load() for finished, _ in completed]
     folders = [finished.folder for finished, _ in completed]
@@ -271,7 +271,7 @@ def _ladder(
     errors: Mapping[str, str],
     picked: Sequence[str],
 ) -> Ladder:
-    """The rungs of an axis that ran or did not."""
+    """Return the ladder of an axis, with its finished and its failed rungs."""
     rungs = [(setting.rung, jobs[setting.text].name) for setting in settings]
     completed = [(rung, runs[name]) for rung, name in rungs if name in runs]
     failed = {rung.name: errors[name] for rung, name in rungs if name in errors}
@@ -295,13 +295,13 @@ def _ladder(
 
 
 def _quantities(axis: Axis, run: _Run, picked: Sequence[str]) -> list[str]:
-    """What the rungs of an axis are compared by."""
+    """Return the quantities by which the rungs of an axis are compared."""
     comparison = analysis_of(run.case).comparison
     if axis.sections:
         return comparison.sections(run.summary)
     paths = list(picked)
     if not paths:
-        # Nothing is relative to 0.
+        # A relative error of a quantity that is 0 is not defined.
         by_default = comparison.quantities(run.case, run.summary)
         paths = [path for path in by_default if number_at(run.summary, path)]
     if axis.moves_states:
@@ -315,7 +315,7 @@ def _numbers(summary: Mapping[str, Any], paths: Sequence[str]) -> dict[str, floa
 
 
 def _extras(run: _Run, last: _Run) -> dict[str, float]:
-    """What is reported of a run beside the quantities, and how far its fields are from the last."""
+    """Return further numbers of a run, and how far its fields are from those of the last run."""
     comparison, folder = analysis_of(run.case).comparison, run.finished.folder
     beside = _numbers(run.summary, comparison.extras(run.summary))
     return beside | comparison.apart(folder, last.finished.folder, run.summary)

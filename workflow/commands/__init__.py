@@ -1,1 +1,1 @@
-"""Commands that work on other files than cases: measured loops, meshes."""
+"""Commands that work on files other than cases, such as measured loops, scans and meshes."""

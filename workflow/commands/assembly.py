@@ -1,4 +1,4 @@
-"""What a mesh or CAD file holds, to be looked at: surfaces, named faces and points of bodies."""
+"""Contents of a mesh or CAD file for display: surfaces, named faces and points of its bodies."""
 
 from __future__ import annotations
 
@@ -16,18 +16,19 @@ from workflow.pictures.vtk import write_xml
 if TYPE_CHECKING:
     import pyvista
 
-# Name of all facets of a body's surface; no file can have it.
+# Boundary that contains all facets of a body's surface; no file can use this name.
 SURFACE = "\0"
-TRIANGLE, LINE = 5, 3  # of VTK
+TRIANGLE, LINE = 5, 3  # cell types of VTK
 
 
 @dataclass(frozen=True)
 class Shown:
-    """A body as it is drawn: its surface, and what the file names on it.
+    """Body as it is drawn: its surface, and what the file names on it.
 
-    ``corners`` ``(m, dim, 3)`` [mm] are those of the facets of its surface, ``normals`` ``(m, 3)``
-    of them outward, ``facets`` ``(m,)`` their numbers in the mesh. ``faces`` are facets by name,
-    rows of these, ``points`` places ``(k, 3)`` of the node sets that are no faces.
+    ``corners`` ``(m, dim, 3)`` [mm] are the corners of the facets of its surface, ``normals``
+    ``(m, 3)`` their outward normals, and ``facets`` ``(m,)`` their numbers in the mesh. ``faces``
+    has the facets of each named face, as rows of these arrays; ``points`` has the places ``(k, 3)``
+    of the node sets that are not faces.
     """
 
     name: str
@@ -45,7 +46,7 @@ class Shown:
 
 
 def shown_bodies(imported: ImportedMesh) -> list[Shown]:
-    """All bodies of a file."""
+    """Return all bodies of a file."""
     return [_shown(imported, name) for name in imported.bodies]
 
 
@@ -72,15 +73,16 @@ def _shown(imported: ImportedMesh, name: str) -> Shown:
 
 
 def write_vtu(imported: ImportedMesh, path: Path) -> None:
-    """Write the bodies for ParaView: facets and nodes, with what they belong to."""
+    """Write the bodies for ParaView: facets and nodes, with the groups that they belong to."""
     write_xml(grid_of(imported), path)
 
 
 def grid_of(imported: ImportedMesh) -> pyvista.UnstructuredGrid:
-    """Facets of the surfaces of all bodies as cells, each once; in the plane the elements too.
+    """Return the facets of all surfaces as cells, each once; for plane meshes the elements too.
 
-    ``body`` numbers the bodies from 1, ``face`` the boundaries of each as the picture does, 0 where
-    there is none; arrays of each name are 1 where it is. ``node`` are the file's own numbers.
+    ``body`` numbers the bodies from 1. ``face`` numbers the boundaries of each body as the picture
+    does, 0 for none. An array for each name is 1 on that group. ``node`` has the node numbers of
+    the file.
     """
     import pyvista
 
@@ -109,9 +111,9 @@ def grid_of(imported: ImportedMesh) -> pyvista.UnstructuredGrid:
 
 
 def _cells(shown: Shown, offset: int) -> tuple[Indices, Indices, Indices]:
-    """Cells of a body as VTK lists them, their kinds, and which facet of the surface each is.
+    """Return the cells of a body in VTK's format, their types, and their rows in its surface.
 
-    Elements, which a plane body has among them, are -1 there.
+    Elements, which only plane bodies list, have the row -1.
     """
     mesh = shown.body.mesh
     plane = mesh.dim() == 2
@@ -125,6 +127,6 @@ def _cells(shown: Shown, offset: int) -> tuple[Indices, Indices, Indices]:
 
 
 def _mark(data: Any, name: str, here: Mask) -> None:
-    """Let an array be 1 at these, too: several bodies may have a group of one name."""
+    """Set an array to 1 on these entries too: several bodies may share the name of a group."""
     before = data[name] if name in data else np.zeros(len(here), dtype=np.int8)
     data[name] = (before + here).clip(max=1).astype(np.int8)

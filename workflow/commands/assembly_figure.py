@@ -1,4 +1,4 @@
-"""Picture of the bodies of a mesh or CAD file: together, and one by one with their named faces."""
+"""Figure of the bodies of a mesh or CAD file: together, and one by one with their named faces."""
 
 from __future__ import annotations
 
@@ -20,16 +20,16 @@ from workflow.commands.assembly import Shown
 from workflow.pictures.panels import new_figure
 from workflow.pictures.style import AMBER, BLACK, BLUE, GREEN, ORANGE, PURPLE, SKY, write_figures
 
-# Of faces, then the same lighter and darker: so many can be told apart.
+# Colours of faces, which then repeat lighter and darker.
 COLOURS = (BLUE, ORANGE, GREEN, PURPLE, AMBER, SKY)
 SHADES = (0.0, -0.45, 0.55)
 GREY = "#C8C8C8"
-# Where the eye is: the second sees what the first does not.
+# Directions of view: the second shows what the first does not.
 EYES = {"from above": np.array([1.0, -1.6, 1.1]), "from below": np.array([-1.0, 1.6, -1.1])}
-# Light that faces turned away from the eye have left, and the edges that are drawn up to so many.
+# Brightness of faces turned away from the eye, and number of facets up to which edges are drawn.
 DIMMEST, MOST_EDGES = 0.55, 6000
 PANEL_HEIGHT, LEGEND_LINES, LINE_HEIGHT = 3.6, 14, 0.26
-# Faces and bodies beyond these are counted in the picture and listed by the command.
+# Further faces and bodies are only counted in the figure; the command lists them.
 MOST_FACES, MOST_BODIES = 18, 12
 
 
@@ -39,7 +39,7 @@ def write_figure(bodies: Sequence[Shown], title: str, path: Path) -> None:
 
 
 def figure(bodies: Sequence[Shown], title: str) -> Figure:
-    """All bodies above, then each by itself, seen from two sides; in the plane from one."""
+    """Draw all bodies together, then each alone, from two sides; plane bodies from one."""
     plane = bodies[0].corners.shape[1] == 2
     shown = list(bodies[:MOST_BODIES])
     rows = (len(shown) > 1) + len(shown)
@@ -59,13 +59,13 @@ def _counted(count: int) -> str:
 
 
 def _height(body: Shown) -> float:
-    """Of a row [inches]: its legend may be longer than its panels are high."""
+    """Return the height of a row [inches]: its legend may be higher than its panels."""
     lines = len(_entries(body))
     return PANEL_HEIGHT + max(0, lines - LEGEND_LINES) * LINE_HEIGHT
 
 
 def _entries(body: Shown) -> list[str]:
-    """Lines of the legend of a body."""
+    """Return the lines of the legend of a body."""
     faces = [f"{n} {name}" for n, name in enumerate(body.faces, 1)]
     over = len(faces) - MOST_FACES
     left = [f"and {over} more"] * (over > 0)
@@ -117,7 +117,7 @@ def _draw_body(part: Any, body: Shown, plane: bool) -> None:
 
 
 def _colour(number: int) -> tuple[float, float, float]:
-    """Of a face or a body by its number from 0, lighter or darker where they repeat."""
+    """Return the colour of a face or body by its number from 0, lighter or darker on repetition."""
     base = np.array(to_rgb(COLOURS[number % len(COLOURS)]))
     shade = SHADES[number // len(COLOURS) % len(SHADES)]
     mixed = base + shade * (1.0 - base) if shade > 0.0 else base * (1.0 + shade)
@@ -126,7 +126,7 @@ def _colour(number: int) -> tuple[float, float, float]:
 
 
 def _screen(eye: Array) -> Array:
-    """Directions to the right, up and to the eye ``(3, 3)``."""
+    """Return the directions to the right, up and to the eye ``(3, 3)``."""
     to_eye = eye / np.linalg.norm(eye)
     right = np.cross([0.0, 0.0, 1.0], to_eye)
     right /= np.linalg.norm(right)
@@ -136,7 +136,7 @@ def _screen(eye: Array) -> Array:
 def _draw_surface(
     axis: Axes, corners: Array, normals: Array, fill: Array, eye: Array, where: str
 ) -> Array:
-    """Facets that are turned to the eye, the farthest first; returns right and up."""
+    """Draw the facets that face the eye, the farthest first; return the directions right and up."""
     screen = _screen(eye)
     lengths = np.linalg.norm(normals, axis=1, keepdims=True)
     towards = (normals / np.where(lengths > 0.0, lengths, 1.0)) @ screen[2]
@@ -167,7 +167,7 @@ def _to_scale(axis: Axes, places: Array) -> None:
 
 
 def _draw_triad(axis: Axes, screen: Array) -> None:
-    """The axes, in the lower left corner."""
+    """Draw the coordinate axes in the lower left corner."""
     for letter, direction in zip("xyz", screen[:2].T, strict=True):
         axis.annotate(
             letter,
@@ -184,7 +184,7 @@ def _draw_triad(axis: Axes, screen: Array) -> None:
 
 
 def _fill_plane(axis: Axes, body: Shown, colour: Any) -> None:
-    """All elements of a plane body."""
+    """Draw all elements of a plane body."""
     places = body.body.points[:, [0, 2]]
     triangles = list(places[body.body.mesh.t.T])
     many = len(triangles) > MOST_EDGES
@@ -200,7 +200,7 @@ def _fill_plane(axis: Axes, body: Shown, colour: Any) -> None:
 
 
 def _number_faces(axis: Axes, body: Shown, screen: Array, eye: Array | None) -> None:
-    """The number of each face where it is seen, in the middle of what is; alike ones together."""
+    """Write the number of each face in the middle of its visible part; equal places share one."""
     labels: dict[int, list[str]] = {}
     middles = body.corners.mean(axis=1)
     for number, rows in enumerate(list(body.faces.values())[:MOST_FACES], start=1):
@@ -223,6 +223,6 @@ def _number_faces(axis: Axes, body: Shown, screen: Array, eye: Array | None) -> 
 
 
 def _mark_points(axis: Axes, body: Shown, screen: Array) -> None:
-    """Node sets that are no faces, as dots."""
+    """Draw the node sets that are not faces, as dots."""
     for places in body.points.values():
         axis.plot(*(places @ screen.T).T, ".", color=BLACK, ms=4.0)

@@ -1,4 +1,4 @@
-"""``fretscale loops`` of a wear run: its computed loops, read as measured ones are."""
+"""``fretscale loops`` of a wear run: its computed loops, evaluated as measured loops are."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ WIDTH = 15
 
 
 def report_of_run(path: Path) -> list[str]:
-    """A row for each loop of the run in the folder ``path``.
+    """Return a row for each loop of the run in the folder ``path``.
 
-    Raises UserError for a folder without loops, results that are not those of its run, and loops of
+    Raises UserError for a folder without loops, results that do not belong to its run, and loops of
     too few increments.
     """
     run = OutputFolder(path)
@@ -38,7 +38,7 @@ def report_of_run(path: Path) -> list[str]:
 
 
 def report_of_loops(loops: h5py.Group) -> list[str]:
-    """The same of the group of loops in the results. Raises UserError for too few increments."""
+    """Return a row for each loop in the group of loops; raise UserError for too few increments."""
     return [
         *(line for name, group in loops.items() for line in _rows(name, group)),
         "kt is the slope right after a reversal, as of measured loops; stuck is that of the "

@@ -1,4 +1,4 @@
-"""``fretscale describe``: what a case may name of a mesh or CAD file, listed and drawn."""
+"""``fretscale describe``: names in a mesh or CAD file that a case may use, listed and drawn."""
 
 from __future__ import annotations
 
@@ -20,8 +20,9 @@ FIGURE, PARAVIEW = "assembly.png", "assembly.vtu"
 
 
 def read_file(file: Path, size: str | None, unit: str | None) -> ImportedMesh:
-    """Bodies of a mesh or CAD file; ``size`` with its unit, ``unit`` of lengths in the file.
+    """Return the bodies of a mesh or CAD file.
 
+    ``size`` is the element size as text with a unit, ``unit`` the unit of lengths in the file.
     Raises UserError.
     """
     if unit is not None and unit not in SIZES:
@@ -48,7 +49,7 @@ def write_assembly(imported: ImportedMesh, out: Path, title: str, force: bool) -
 def write_offer(
     imported: ImportedMesh, file: Path, size: str | None, case: Path, force: bool
 ) -> list[str]:
-    """Write a case of what a file says; returns lines that tell what it does not have of it."""
+    """Write a case from the contents of a file; return lines on contents that it leaves out."""
     from workflow.commands.offered_case import offered_case
 
     if case.exists() and not force:
@@ -60,7 +61,7 @@ def write_offer(
 
 
 def _length(text: str) -> float:
-    """A length in mm. Raises UserError."""
+    """Return a length in mm; raise UserError for other texts."""
     value = float(text) if text.replace(".", "", 1).isdecimal() else text
     try:
         return TypeAdapter(Length).validate_python(value)

@@ -1,6 +1,6 @@
-"""The group of all commands: its help, and how each of them ends.
+"""Group of all commands: its help, and how each command ends.
 
-Whatever ends a command early ends it in one line and an exit code (``workflow.errors``). Imports
+Any error ends a command with one line and an exit code (``workflow.errors``). This module imports
 nothing heavy, so that the command line answers at once.
 """
 
@@ -18,9 +18,9 @@ import click
 from sa_solver.errors import FretscaleError
 from workflow import errors
 
-# How a command goes on that was stopped.
+# How to continue a command that was stopped.
 ADVICE = "a run continues with `fretscale resume DIR`, many with the same command"
-# Commands as the help lists them.
+# Commands in the order and groups of the help.
 LISTED = {
     "A case": ("new", "check", "run", "resume"),
     "What came out": ("report", "compare"),
@@ -31,7 +31,7 @@ LISTED = {
 
 
 class OneLineGroup(click.Group):
-    """A group of commands whose failures are one line on stderr and an exit code."""
+    """Group of commands whose failures become one line on stderr and an exit code."""
 
     def main(self, *args: Any, **settings: Any) -> NoReturn:
         settings["standalone_mode"] = False
@@ -43,9 +43,9 @@ class OneLineGroup(click.Group):
         except (FretscaleError, OSError, ImportError, MemoryError) as error:
             message, code = _ending(error)
         except SystemExit as ended:
-            if not ended.code:  # a shell has been told how to complete a command
+            if not ended.code:  # click has printed the shell completion of a command
                 raise
-            # What click and rich make of a pipe that was closed.
+            # click and rich end this way when a pipe was closed.
             message, code = _ending(BrokenPipeError(errno.EPIPE, os.strerror(errno.EPIPE)))
         except click.Abort as abort:
             left = f": {stop}" if (stop := abort.__cause__) and stop.args else ""
@@ -67,7 +67,7 @@ class OneLineGroup(click.Group):
 
 
 def _say(lines: Sequence[str]) -> None:
-    """Say why a command ended, if anybody can read it; then nothing is left to be written."""
+    """Print why a command ended, if stderr can be written, and flush all output."""
     with suppress(OSError):
         for line in lines:
             click.echo(line, err=True)
@@ -77,18 +77,18 @@ def _say(lines: Sequence[str]) -> None:
         try:
             stream.flush()
         except OSError:
-            # Python would try again as it ends, and say that it cannot.
+            # Python would flush again at exit and report that it cannot.
             os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
 
 
 def _ending(error: Exception) -> tuple[str, int]:
-    """What to say of ``error``, one line for each thing wrong, and the exit code."""
+    """Return the message about ``error``, one line per problem, and the exit code."""
     if isinstance(error, MemoryError):
         return f"out of memory: {error}".rstrip(": "), errors.OutOfMemory.exit_code
     if isinstance(error, FretscaleError):
         return str(error), errors.exit_code(error)
     if isinstance(error, BrokenPipeError) and error.filename is None:
-        return "", errors.NotWritten.exit_code  # as `head` leaves it: who reads has had enough
+        return "", errors.NotWritten.exit_code  # as for `head`: the reader needs no more
     if isinstance(error, OSError) and error.errno in errors.UNWRITTEN:
         written = f"output: {error.strerror}"
         if error.filename is not None:
@@ -104,7 +104,7 @@ def _ending(error: Exception) -> tuple[str, int]:
 
 
 def _usage(error: click.ClickException) -> str:
-    """A usage error in one line."""
+    """Return a usage error in one line."""
     context = getattr(error, "ctx", None)
     hint = f"; see `{context.command_path} --help`" if context else ""
     return " ".join(error.format_message().split()).rstrip(".") + hint

@@ -24,7 +24,7 @@ from workflow.shell.folder import OutputFolder
 from workflow.shell.lock import locked
 
 TABLE, FIGURE = "loops.csv", "loops.png"
-# More cycles than this are not all printed.
+# Largest number of cycles that are printed.
 MOST_ROWS = 12
 WIDTH = 14
 
@@ -32,8 +32,8 @@ WIDTH = 14
 def loops_of_file(path: Path, columns: Sequence[str], normal_load: str | None) -> MeasuredLoops:
     """Measure the loops in a file.
 
-    ``columns`` are texts ``KEY=NAME`` for columns that are called otherwise; ``normal_load`` such
-    as ``60 N`` is for a file without one. Raises UserError.
+    ``columns`` are texts ``KEY=NAME`` for columns with other headings; ``normal_load``, such as
+    ``60 N``, is for a file without that column. Raises UserError.
     """
     record = read_loop_file(path, _names(columns))
     try:
@@ -44,7 +44,7 @@ def loops_of_file(path: Path, columns: Sequence[str], normal_load: str | None) -
 
 
 def _names(columns: Sequence[str]) -> dict[str, str]:
-    """Names of columns by what they are."""
+    """Return the headings of columns by the quantity that they hold."""
     names: dict[str, str] = {}
     for text in columns:
         key, equals, name = (part.strip() for part in text.partition("="))
@@ -58,7 +58,7 @@ def _names(columns: Sequence[str]) -> dict[str, str]:
 
 
 def _normal_load(path: Path, column: Array | None, text: str | None) -> Array | float | None:
-    """The normal load of the file or of the command."""
+    """Return the normal load of the file or of the command."""
     if text is None:
         return column
     if column is not None:
@@ -73,18 +73,18 @@ def _normal_load(path: Path, column: Array | None, text: str | None) -> Array | 
 
 
 def _number(text: str) -> float | None:
-    """A bare number; None of anything else."""
+    """Return a bare number as a float; None for other texts."""
     try:
         return float(text)
     except ValueError:
         return None
 
 
-# --- what is printed ----------------------------------------------------------------------------
+# --- report -------------------------------------------------------------------------------------
 
 
 def report(loops: MeasuredLoops) -> list[str]:
-    """The table of loops, the means of each step with standard errors, and what to know of them."""
+    """Return the table of loops, the means of each step with standard errors, and notes."""
     steps = loops.steps
     many = len(steps) > 1
     columns = _shown(loops)
@@ -103,7 +103,7 @@ def report(loops: MeasuredLoops) -> list[str]:
 
 
 def _means(step: MeasuredLoops, names: Sequence[str], number: str) -> list[list[str]]:
-    """Rows of a step: its means and, of several loops, their standard errors."""
+    """Return the rows of a step: its means and, for several loops, their standard errors."""
     columns = _shown(step)
     beside = [number] if number else []
     given = [columns.get(name) for name in names]
@@ -131,12 +131,12 @@ class _Column(NamedTuple):
 
 
 def _cell(value: float, bound: bool) -> str:
-    """A number, of a lower bound with its sign; nothing for what is not known."""
+    """Return a number as text, with ``>`` for a lower bound, and ``-`` if it is not known."""
     return f"{'>' if bound else ''}{value:.4g}" if np.isfinite(value) else "-"
 
 
 def _shown(loops: MeasuredLoops) -> dict[str, _Column]:
-    """Columns by heading; means are those of loops that are alike."""
+    """Return the columns by heading; the mean stiffness is given only if all loops are similar."""
     per_micron = 1e-3
     some = bool(loops.sliding.any())
     kt = loops.stick_stiffness * per_micron
@@ -165,14 +165,14 @@ def _column(values: Array, bounds: Mask | None = None) -> _Column:
 
 
 def _few(count: int) -> list[int]:
-    """All cycles, or some of them from the first to the last."""
+    """Return all cycles, or some of them from the first to the last."""
     if count <= MOST_ROWS:
         return list(range(count))
     return np.unique(np.linspace(0, count - 1, MOST_ROWS).round().astype(int)).tolist()
 
 
 def _notes(loops: MeasuredLoops) -> list[str]:
-    """What the numbers mean."""
+    """Return notes on the meaning of the numbers."""
     count = int(loops.step[-1]) + 1
     notes = [account(loops), "kt is the slope right after a reversal, residual stiffness included"]
     if count > 1:
@@ -204,17 +204,17 @@ def _notes(loops: MeasuredLoops) -> list[str]:
 
 
 def _strokes(loops: MeasuredLoops) -> str:
-    """Strokes of the loops that do not slide."""
+    """Return the strokes of the loops that do not slide, as text."""
     stuck = 1e3 * loops.stroke[loops.sliding == 0.0]
     least, most = f"{stuck.min():.4g}", f"{stuck.max():.4g}"
     return f"strokes of {least if least == most else f'{least} to {most}'} um"
 
 
-# --- what is written ----------------------------------------------------------------------------
+# --- files --------------------------------------------------------------------------------------
 
 
 def write_loops(loops: MeasuredLoops, out: Path, title: str, force: bool) -> list[Path]:
-    """Write a row per cycle, as a table of loops for joint laws, and the figure.
+    """Write a table of loops for joint laws, with a row per cycle, and the figure.
 
     Raises UserError for a folder that has them already, unless ``force``.
     """
@@ -229,15 +229,15 @@ def write_loops(loops: MeasuredLoops, out: Path, title: str, force: bool) -> lis
 
 
 def _rows(loops: MeasuredLoops) -> Iterator[dict[str, float]]:
-    """A row per loop whose stiffness is known, in base units.
+    """Yield a row in base units for each loop whose stiffness is known.
 
-    Columns that the record does not have are left out; of loops that do not slide, among some that
-    do, friction is what is mobilised, as in the table of a wear run.
+    Columns that the record does not have are left out. If only some loops slide, the friction of
+    the others is the mobilised one, as in the table of a wear run.
     """
     reversals, work = loops.reversals, loops.work
     values: dict[str, Array] = {
         "cycles": np.arange(1.0, len(loops.energy) + 1.0),
-        # Since the first loop of the record began.
+        # Energy since the first loop of the record began.
         "energy": work[reversals[:, 2]] - work[reversals.min()],
         "kt": loops.stick_stiffness,
         "energy_per_loop": loops.energy,

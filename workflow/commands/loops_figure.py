@@ -1,4 +1,4 @@
-"""Figure of measured loops: how they were read, and what they give cycle by cycle."""
+"""Figure of measured loops: how they were evaluated, and the results cycle by cycle."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ from workflow.pictures.panels import legend_below, new_figure
 from workflow.pictures.scales import PER_MICRON, TO_MICRONS
 from workflow.pictures.style import BLACK, BLUE, GREEN, ORANGE, write_figures
 
-# More loops than this are drawn as every so many.
+# Largest number of loops drawn; of more loops, every second, third and so on is drawn.
 MOST_LOOPS = 40
-# Steps of like loops too.
+# Largest number of steps drawn, in the same way.
 MOST_STEPS = 12
 HEADROOM = 1.15
 
@@ -29,7 +29,7 @@ def write_figure(loops: MeasuredLoops, name: str, path: Path) -> None:
 
 
 def figure(loops: MeasuredLoops, name: str) -> Figure:
-    """Loops, with lines laid through the middle one of each step; stiffness, friction, energy."""
+    """Draw loops with the lines fitted to them, and stiffness, friction and energy per cycle."""
     drawn = new_figure(_title(loops, name), 7.0)
     left, right = drawn.subfigures(1, 2, squeeze=False, width_ratios=(1.4, 1.0))[0]
     axis = left.subplots()
@@ -55,7 +55,7 @@ def _draw_loops(axis: Axes, loops: MeasuredLoops) -> None:
 
 
 def _draw_step(axis: Axes, loops: MeasuredLoops, members: Indices, labelled: bool) -> None:
-    """The middle one of the loops of a step, with the lines laid through it."""
+    """Draw the middle loop of a step, with the lines fitted to it."""
     middle = int(members[len(members) // 2])
     pair = loops.branches[middle]
     several = loops.step[-1] > 0
@@ -65,14 +65,14 @@ def _draw_step(axis: Axes, loops: MeasuredLoops, members: Indices, labelled: boo
         told = labelled and number == 0
         _draw_stick(axis, loops, middle, branch, "stick slope kt" if told else None)
         if loops.sliding[middle] > 0.0:
-            # Of small strokes that stick there is no such line: whichever is first has the name.
+            # Small strokes that stick have no such line: the first one drawn has the label.
             named = "sliding, slope kr"
             new = named not in axis.get_legend_handles_labels()[1]
             _draw_sliding(axis, loops, middle, branch, named if new else None)
 
 
 def _curve(loops: MeasuredLoops, *branches: LoopBranch) -> tuple[Array, Array]:
-    """Displacement [µm] and force [N] along branches."""
+    """Return displacement [µm] and force [N] along branches."""
     samples = np.concatenate([branch.samples for branch in branches])
     return TO_MICRONS * loops.record.displacement[samples], loops.record.force[samples]
 
@@ -80,7 +80,7 @@ def _curve(loops: MeasuredLoops, *branches: LoopBranch) -> tuple[Array, Array]:
 def _draw_stick(
     axis: Axes, loops: MeasuredLoops, cycle: int, branch: LoopBranch, label: str | None
 ) -> None:
-    """The slope at the beginning of a branch, over half of the height of the loop."""
+    """Draw the slope at the beginning of a branch, over half of the height of the loop."""
     if np.isnan(loops.stick_stiffness[cycle]):
         return
     moved, force = _curve(loops, branch)
@@ -92,7 +92,7 @@ def _draw_stick(
 def _draw_sliding(
     axis: Axes, loops: MeasuredLoops, cycle: int, branch: LoopBranch, label: str | None
 ) -> None:
-    """The sliding line over the part of a branch that it is laid through."""
+    """Draw the sliding line over the part of a branch that it was fitted to."""
     moved, force = _curve(loops, branch)
     reach = moved[-1] - branch.sense * TO_MICRONS * loops.sliding[cycle] * loops.stroke[cycle]
     there = branch.sense * (moved - reach) >= 0.0
@@ -103,7 +103,7 @@ def _draw_sliding(
 
 
 def _friction(loops: MeasuredLoops) -> tuple[Array, str]:
-    """What the record says of friction, and what to call it."""
+    """Return the friction in the record, and its label."""
     values = np.where(loops.sliding > 0.0, loops.friction_force, loops.force)
     known = not np.isnan(loops.normal_load).any()
     values = values / loops.normal_load if known else values

@@ -1,4 +1,4 @@
-"""The materials that a case may name, as ``fretscale materials`` lists them."""
+"""List of the materials that a case may name, for ``fretscale materials``."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ HEAD = "name", "young", "poisson", "density", "yield", "state"
 
 
 def known_materials() -> Iterator[str]:
-    """A table with units, then where the values are from."""
+    """Yield the lines of a table with units, then the sources of the values."""
     yield "materials: {body_1: Ti-6Al-4V, body_2: {material: Ti-6Al-4V, yield_stress: 830 MPa}}"
     yield ""
     rows = [HEAD]

@@ -1,4 +1,4 @@
-"""``fretscale new``: a case or another file to begin with, and the files that it names."""
+"""``fretscale new``: a template of a case or another file, and the files that it names."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ flank,4000,0,0,0,0,0,0,0
 flank,8000,-3200,0,0,0,0,60,0
 flank,4000,1600,0,0,0,0,60,0
 """
-# Of specimens: few nodes, for a first run of minutes.
+# Mesh of few nodes for specimens, so that a first run takes minutes.
 COARSE = "\nmesh: {pad_elements: 4, size: 2 mm}  # coarse; by default 10 and 1 mm\n"
-# Files that a template names beside it: the kind of a short case, empty for none, and more text.
+# Files that a template names: name, kind of the short case (empty for none), and further text.
 COMPANIONS: Mapping[str, tuple[str, str, str]] = {
     "resultants": ("loads.csv", "", LOADS),
     "vibration_wear": ("specimens_wear.yaml", "bodies_wear", ""),
@@ -31,12 +31,12 @@ COMPANIONS: Mapping[str, tuple[str, str, str]] = {
 
 
 def offered() -> dict[str, str]:
-    """Return every kind of file that can be begun with, and what it is about."""
+    """Return every kind of file that has a template, with a line about it."""
     return {**about(), SWEEP: ABOUT, **{name: what for name, (_, what) in FITS.items()}}
 
 
 def text_of(kind: str, short: bool = False) -> str:
-    """Return the commented template of a kind, or a ``short`` case of what must be given alone.
+    """Return the commented template of a kind, or a ``short`` case with required entries only.
 
     Raises UserError where there is no such kind, or no short one.
     """
@@ -50,10 +50,10 @@ def text_of(kind: str, short: bool = False) -> str:
 
 
 def write_new(kind: str, file: Path, short: bool = False) -> Path | None:
-    """Write the template of a kind to ``file``, and beside it an example of what it names.
+    """Write the template of a kind to ``file``, and an example of the file that it names.
 
-    Returns the path of the example, None where there is none, or where such a file is there: that
-    is left as it is. Raises UserError where ``file`` itself exists.
+    Returns the path of the example. Returns None where the template names no file, or where the
+    file exists: it is then left unchanged. Raises UserError where ``file`` itself exists.
     """
     text = text_of(kind, short)
     try:

@@ -1,4 +1,4 @@
-"""A case of ``kind: mesh`` with what a file says: what it does not say is left to fill in."""
+"""Draft of a case of ``kind: mesh`` from the contents of a file, with gaps to be filled in."""
 
 from __future__ import annotations
 
@@ -18,25 +18,25 @@ from fe_models.readers.scene import SaidContact, SaidLoad, SaidSupport, Vector
 from sa_solver.types import Array
 
 TO_FILL = "fill in"
-# Increments of a leg to begin with.
+# Default number of increments of a leg.
 INCREMENTS = 4
-# Faces look at each other to this cosine, and are this share of their size apart.
+# Largest cosine between normals of opposite faces, and largest distance as a share of their size.
 OPPOSITE, NEAR = -0.95, 0.02
-# Young's moduli above this one are of another unit than MPa.
+# Larger Young's moduli are in another unit than MPa.
 STIFFEST = 2e6
 AXES = "xyz"
 
 
 @dataclass(frozen=True)
 class Offer:
-    """The text of a case, and lines on what is not in it."""
+    """Text of a case, and lines on contents of the file that are not in it."""
 
     text: str
     ignored: list[str]
 
 
 def offered_case(imported: ImportedMesh, file: str, size: str | None) -> Offer:
-    """A case of what a mesh file says, which goes by the name ``file`` from where the case is."""
+    """Return a case from a mesh file, whose name relative to the case is ``file``."""
     return _Offered(imported, file, size).offer()
 
 
@@ -44,14 +44,14 @@ class _Offered:
     def __init__(self, imported: ImportedMesh, file: str, size: str | None) -> None:
         self.imported, self.file, self.size = imported, file, size
         self.scene = imported.scene
-        # A unit that the file states is not one of the case.
+        # A unit that the file states itself is not repeated in the case.
         self.given = imported.unit.source == GIVEN
         self.ignored = list(self.scene.ignored)
         self.plane = len(imported.axes) == 2
         self.loads = [load for load in map(self._placed, self.scene.loads) if load is not None]
         self.supports = list(self._supports())
         held = {self._owner(support.group) for support in self.supports}
-        # Those that are held come first: body 1 is.
+        # Supported bodies come first, so that body 1 is supported.
         self.order = sorted(imported.bodies, key=lambda name: name not in held)
         said = [pair for pair in self.scene.contacts if self._is_known(pair)]
         self.contacts = [self._ordered(pair) for pair in said or self._facing()]
@@ -108,7 +108,7 @@ class _Offered:
         return next(iter(self._owners(group)), "")
 
     def _patch(self, group: str) -> Patch | None:
-        """Size and place of a group that is a face."""
+        """Return size and place of a group; None if it is not a face."""
         name = self._owner(group)
         body = self.imported.bodies[name]
         if group in (body.mesh.boundaries or {}):
@@ -119,7 +119,7 @@ class _Offered:
         return None
 
     def _is_known(self, pair: SaidContact) -> bool:
-        """Whether both faces are, each on a body of its own; or it is told why not."""
+        """Return whether the faces are on two bodies; if not, note why the contact is ignored."""
         for face in pair.faces:
             if len(self._owners(face)) != 1 or self._patch(face) is None:
                 self.ignored.append(f"{pair.line}: contact face {face} is no face of one body")
@@ -130,23 +130,23 @@ class _Offered:
         return one != two
 
     def _axes(self, axes: str) -> str:
-        """Axes of the file by the names that a case has for them: those of a plane are x and z."""
+        """Return axes of the file by their names in a case, which are x and z in the plane."""
         if not self.plane:
             return "".join(sorted(set(axes)))
         names = {AXES[axis]: name for axis, name in zip(self.imported.axes, "xz", strict=True)}
         return "".join(sorted({names[axis] for axis in axes if axis in names}))
 
     def _vector(self, vector: Vector) -> Array:
-        """A vector of the file along the axes of a case."""
+        """Return a vector of the file along the axes of a case."""
         if not self.plane:
             return np.array(vector)
         one, two = self.imported.axes
         return np.array([vector[one], 0.0, vector[two]])
 
-    # --- what is held and loaded ----------------------------------------------------------------
+    # --- supports and loads ---------------------------------------------------------------------
 
     def _supports(self) -> Iterator[SaidSupport]:
-        """All axes held of a group together, without those along which it is moved."""
+        """Yield the supports, one per group, without the axes along which the group is moved."""
         moved = {
             (load.group, AXES[int(np.argmax(np.abs(load.value)))])
             for load in self.loads
@@ -164,7 +164,7 @@ class _Offered:
         return (support for support in together.values() if support.axes)
 
     def _placed(self, load: SaidLoad) -> SaidLoad | None:
-        """A load as a case has it: along its axes, a traction as a force; None if it cannot."""
+        """Return a load in the form of a case, a traction as a force; None if it has none."""
         if load.group and len(self._owners(load.group)) != 1:
             self.ignored.append(f"{load.line}: {load.group} is not on one body")
             return None
@@ -193,12 +193,12 @@ class _Offered:
     # --- contacts -------------------------------------------------------------------------------
 
     def _ordered(self, pair: SaidContact) -> SaidContact:
-        """Faces in the order of their bodies."""
+        """Return the contact with its faces in the order of their bodies."""
         one, two = sorted(pair.faces, key=lambda face: self.order.index(self._owner(face)))
         return replace(pair, faces=(one, two))
 
     def _facing(self) -> Iterator[SaidContact]:
-        """Pairs of boundaries of two bodies that lie on each other, where the file names none."""
+        """Yield pairs of boundaries of two bodies that touch, for a file that names no contacts."""
         places = {
             (name, boundary): patch(body, boundary)
             for name, body in self.imported.bodies.items()
@@ -218,7 +218,7 @@ class _Offered:
                 yield SaidContact((face_1, face_2), None, "by their places")
 
     def _sliding(self, normal: Array) -> list[float]:
-        """Where body 2 would slide: along what is pushed or moved, else along an axis."""
+        """Return the sliding direction of body 2: along a load or motion, else along an axis."""
         pushed = [
             np.array(load.value) / np.linalg.norm(load.value)
             for load in self.loads
@@ -292,14 +292,14 @@ class _Offered:
 
     @property
     def _forces(self) -> str:
-        """What forces of the file are taken as, and all that follows from these."""
+        """Units in which forces and stresses of the file are read."""
         unit = self.imported.unit
         force = "N" if unit.force == 1.0 else "pounds"
         return f"forces in {force}, stresses in {force} on a square {unit.name}."
 
     @property
     def _coefficient(self) -> float | None:
-        """The friction of most contacts: the first that has any."""
+        """Friction of most contacts: that of the first that has any."""
         return next((p.friction for p in self.contacts if p.friction is not None), None)
 
     def _friction(self) -> Iterator[str]:
@@ -308,7 +308,7 @@ class _Offered:
 
     @property
     def _steps(self) -> int:
-        """Legs of the load path before the one back."""
+        """Number of legs of the load path before the one back."""
         return max(self.scene.steps, 1)
 
     def _legs(self) -> Iterator[str]:
@@ -332,10 +332,10 @@ def _numbers(values: Sequence[Any]) -> str:
 
 
 def _number(value: float) -> str:
-    """All digits that a file has; adding zero turns -0 into 0."""
+    """Return a number with all digits that a file has; adding zero turns -0 into 0."""
     return f"{value + 0.0:.12g}"
 
 
 def _text(text: str) -> str:
-    """A name as YAML has it: in quotes unless it is plain words."""
+    """Return a name for YAML: in quotes unless it consists of plain words."""
     return text if re.fullmatch(r"[A-Za-z][\w.\-]*( [\w.\-]+)*", text) else json.dumps(text)

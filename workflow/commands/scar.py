@@ -27,10 +27,10 @@ LENGTHS = "lengths from the middle, XMIN,XMAX,YMIN,YMAX such as '-0.3 mm,0.3 mm,
 def scar_of_files(
     before: Path, after: Path, worn: str | None, bare: tuple[str, str, str] | None
 ) -> Scar:
-    """Measure what was lost between two files of scans.
+    """Measure the wear between two files of scans.
 
-    ``worn`` is the text of a rectangle on the second; ``bare`` unit and pitch along x and y of
-    files that do not say theirs. Raises UserError.
+    ``worn`` is a rectangle on the second scan, as text; ``bare`` has unit and pitch along x and y
+    for files that do not contain them. Raises UserError.
     """
     first, second = (_read(path, bare) for path in (before, after))
     where = None if worn is None else _rectangle(worn, second)
@@ -55,7 +55,7 @@ def _read(path: Path, bare: tuple[str, str, str] | None) -> Scan:
 
 
 def _length(place: str, text: str) -> float:
-    """A length [mm], a bare number is in mm."""
+    """Return a length [mm]; a bare number is in mm."""
     try:
         return to_base(text if any(c.isalpha() for c in text) else f"{text} mm", "mm")
     except UnitError as error:
@@ -63,7 +63,7 @@ def _length(place: str, text: str) -> float:
 
 
 def _rectangle(text: str, scan: Scan) -> Mask:
-    """The points of a scan within a rectangle. Raises UserError."""
+    """Return the points of a scan within a rectangle; raise UserError if there are none."""
     parts = [part.strip() for part in text.split(",")]
     if len(parts) != 4:
         raise UserError(f"--worn {text}: not four; allowed: {LENGTHS}")
@@ -78,11 +78,11 @@ def _rectangle(text: str, scan: Scan) -> Mask:
     return inside
 
 
-# --- what is printed ----------------------------------------------------------------------------
+# --- report -------------------------------------------------------------------------------------
 
 
 def report(scar: Scar) -> list[str]:
-    """What was lost, with 95 % bounds, how the scans were laid over each other, and doubts."""
+    """Return lines on the wear with 95 % bounds, the alignment of the scans, and warnings."""
     mean = "(the largest mean of 3 x 3 points)"
     volume, deepest = PER_MICRON * scar.volume, TO_MICRONS * scar.deepest
     if scar.volume_error is None or scar.depth_error is None:
@@ -138,7 +138,7 @@ def _doubts(scar: Scar) -> list[str]:
     return doubts
 
 
-# --- what is written ----------------------------------------------------------------------------
+# --- files --------------------------------------------------------------------------------------
 
 
 def write_scar(scar: Scar, out: Path, title: str, force: bool) -> list[Path]:
@@ -175,5 +175,5 @@ def _table(scar: Scar) -> list[str]:
 
 
 def _cell(value: float | None, digits: int) -> str:
-    """A number in a table, nothing where it is unknown."""
+    """Return a number for the table, empty if it is unknown."""
     return "" if value is None else f"{value:.{digits}g}"

@@ -1,4 +1,4 @@
-"""Figure of a measured scar: its depth from above, and along two lines through the deepest."""
+"""Figure of a measured scar: its depth from above, and on two lines through the deepest point."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from workflow.pictures.panels import legend_below, new_figure
 from workflow.pictures.scales import TO_MICRONS
 from workflow.pictures.style import BLACK, BLUE, COLOUR_MAP, write_figures
 
-# µm³ in a mm³.
+# Number of µm³ in a mm³.
 PER_CUBE = 1e9
 
 
@@ -24,7 +24,7 @@ def write_figure(scar: Scar, name: str, path: Path) -> None:
 
 
 def figure(scar: Scar, name: str) -> Figure:
-    """The map with what counts as worn, and the depth along x and along y."""
+    """Draw the map with the worn area, and the depth along x and along y."""
     error = "" if scar.volume_error is None else f" ± {PER_CUBE * scar.volume_error:.2g}"
     drawn = new_figure(f"{name}: {PER_CUBE * scar.volume:.4g}{error} µm³ worn", 6.0)
     left, right = drawn.subfigures(1, 2, squeeze=False, width_ratios=(1.2, 1.0))[0]

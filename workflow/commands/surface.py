@@ -1,4 +1,4 @@
-"""``fretscale surface``: the surface of a body of a wear run as a profilometer would have it."""
+"""``fretscale surface``: the surface of a worn body as a profilometer would measure it."""
 
 from __future__ import annotations
 
@@ -24,9 +24,10 @@ from workflow.shell.store import replacing
 def write_surface(
     folder: Path, file: Path, body: str, unworn: bool, interface: str | None, force: bool
 ) -> str:
-    """Write heights of ``body`` 1 or 2, out of it, after the last jump or ``unworn``; says what.
+    """Write the heights of ``body`` 1 or 2, after the last jump or ``unworn``; return a summary.
 
-    The upper body is turned over about x, as it lies under an instrument. Raises UserError.
+    Heights are positive out of the body. The upper body is turned over about x, as it lies under an
+    instrument. Raises UserError.
     """
     if file.exists() and not force:
         raise UserError(f"{file}: exists; allowed: another name, or --force")
@@ -41,7 +42,7 @@ def write_surface(
     if grid.line:
         raise UserError(f"{folder}: a line contact; allowed: a contact over an area")
     lower = _measured_lower(load_case(run.case), name, grid)
-    # In the frame body 1 begins flat, and all of the gap is body 2's.
+    # In this frame body 1 is flat at first, and body 2 has the whole initial gap.
     out = heights + lower if body == "1" else -(heights + lower)
     scan = Scan(out, grid.pitch)
     with replacing(file) as place:
@@ -53,7 +54,7 @@ def write_surface(
 def _place(
     folder: Path, results: h5py.File, interface: str | None, unworn: bool
 ) -> tuple[str, str]:
-    """The interface, and the jump in it. Raises UserError."""
+    """Return the name of the interface and the jump in it; raise UserError."""
     faces = [
         name
         for name, face in results.get("surfaces", {}).items()
@@ -80,7 +81,7 @@ def _chosen(faces: Sequence[str], interface: str | None) -> str:
 
 
 def _measured_lower(case: Case, name: str, grid: Grid) -> Array | float:
-    """What was measured of body 1 of an interface, on the grid [mm]; 0 where nothing was."""
+    """Return the measured heights of body 1 of an interface on the grid [mm], 0 if not measured."""
     for face in getattr(case, "scanned", tuple)():
         if face.name == name and (lower := face.surfaces.of(1, grid)) is not None:
             heights: Array = lower.heights

@@ -1,4 +1,4 @@
-"""Finished runs side by side: their main results, what differs in their cases, their curves."""
+"""Comparison of finished runs: their main results, differences of their cases, and curves."""
 
 from workflow.comparing.compared import Comparison, compare
 

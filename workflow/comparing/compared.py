@@ -1,4 +1,4 @@
-"""What finished runs have in common and where they differ."""
+"""Data of a comparison: common quantities of finished runs, and differences of their cases."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ NOTHING = "–"
 
 @dataclass(frozen=True)
 class ComparedRun:
-    """A run, by the name that tells it from the others."""
+    """Run with the name that distinguishes it from the others."""
 
     name: str
     folder: Path
@@ -35,9 +35,9 @@ class ComparedRun:
 
 @dataclass(frozen=True)
 class Row:
-    """A quantity in every run, None where a run has none: what it is, and its value.
+    """Quantity in every run with its value, None where a run has none.
 
-    All have one base unit. The first run is what the others are held against.
+    All values have the same base unit. The first run is the reference for the others.
     """
 
     quantities: tuple[Quantity | None, ...]
@@ -49,17 +49,17 @@ class Row:
 
     @property
     def everyday(self) -> str:
-        """The unit to show it in: that of the largest."""
+        """Unit in which the row is shown: that of the largest value."""
         largest = max(abs(value) for value in self.values if value is not None)
         return self.first.everyday or suited_unit(largest, self.first.unit)
 
     @property
     def errors(self) -> tuple[float | None, ...]:
-        """Estimated errors, relative; None where nobody knows."""
+        """Estimated relative errors; None where they are not known."""
         return tuple(q.error if q is not None else None for q in self.quantities)
 
     def difference(self, number: int) -> float | None:
-        """Of a run to the first one, relative; None where they cannot be compared."""
+        """Return the relative difference of a run from the first one; None if there is none."""
         first, value = self.values[0], self.values[number]
         if number == 0 or first is None or value is None:
             return None
@@ -68,7 +68,7 @@ class Row:
         return (value - first) / abs(first) if first else math.inf
 
     def beyond(self, number: int) -> bool | None:
-        """Whether the difference is more than both estimated errors; None where nobody knows."""
+        """Return whether the difference exceeds both estimated errors; None if one is not known."""
         first, value = self.values[0], self.values[number]
         one, other = self.errors[0], self.errors[number]
         if number == 0 or first is None or value is None or one is None or other is None:
@@ -78,9 +78,9 @@ class Row:
 
 @dataclass(frozen=True)
 class Comparison:
-    """Runs of one analysis, their main results, and entries of their cases that are not alike.
+    """Runs of one analysis, their main results, and entries in which their cases differ.
 
-    ``entries`` are in words, one for every run, by dotted path.
+    ``entries`` are texts, one for every run, by dotted path.
     """
 
     analysis: Analysis[Any]
@@ -94,9 +94,9 @@ class Comparison:
 
 
 def compare(folders: Sequence[str | Path]) -> Comparison:
-    """Compare the finished runs in two folders or more, all of one analysis.
+    """Compare the finished runs in two or more folders, all of one analysis.
 
-    Raises UserError for what is no finished run, or not as it was left, and for other analyses.
+    Raises UserError for folders without a finished run, changed results, and other analyses.
     """
     paths = [Path(folder) for folder in folders]
     if len({path.resolve() for path in paths}) < max(len(paths), 2):
@@ -115,7 +115,7 @@ def compare(folders: Sequence[str | Path]) -> Comparison:
 
 
 def _names(paths: Sequence[Path]) -> list[str]:
-    """The last parts of the paths, as many as it takes to tell them apart."""
+    """Return the last parts of the paths, as many as distinguish them."""
     whole = [path.resolve() for path in paths]
     if len({path.name for path in whole}) == len(whole):
         return [path.name for path in whole]
@@ -124,9 +124,9 @@ def _names(paths: Sequence[Path]) -> list[str]:
 
 
 def _rows(analysis: Analysis[Any], runs: Sequence[ToldRun]) -> tuple[Row, ...]:
-    """Quantities of all runs by group, name and unit, in the order of the first run.
+    """Return quantities of all runs by group, name and unit, in the order of the first run.
 
-    Of a line contact and of one over an area the same name may have two units, and so two rows.
+    In a line contact and in one over an area, a name may have different units, and so two rows.
     """
     of_runs = [
         {(q.group, q.name, q.unit): q for q in analysis.quantities(run.case, run.summary)}
@@ -147,7 +147,7 @@ def _rows(analysis: Analysis[Any], runs: Sequence[ToldRun]) -> tuple[Row, ...]:
 
 
 def _entries(runs: Sequence[ToldRun]) -> dict[str, tuple[str, ...]]:
-    """Entries of the cases that are not alike, in words."""
+    """Return the entries in which the cases differ, as text."""
     leaves = [{leaf.path: leaf for leaf in leaves_of(run.case)} for run in runs]
     paths = dict.fromkeys(path for of_run in leaves for path in of_run)
     entries = {}
@@ -156,7 +156,7 @@ def _entries(runs: Sequence[ToldRun]) -> dict[str, tuple[str, ...]]:
             continue
         found = [of_run.get(path) for of_run in leaves]
         if any(leaf is None or found[0] is None or leaf.value != found[0].value for leaf in found):
-            # All digits where fewer do not tell them apart.
+            # Show all digits where rounded texts are equal.
             exact = len({None if leaf is None else leaf.text for leaf in found}) == 1
             entries[path] = tuple(
                 NOTHING if leaf is None else str(leaf.value) if exact else leaf.text

@@ -1,4 +1,4 @@
-"""Curves of several runs over each other."""
+"""Figures with the curves of several runs."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ from workflow.shell.folder import OutputFolder
 INCHES = 7.0, 4.6
 COLOURS = BLUE, ORANGE, GREEN, PURPLE, SKY, AMBER, BLACK
 STYLES = "-", "--", "-.", ":"
-# More curves than this in a panel cannot be told apart.
-# Times by which what curves reach may differ for both to be seen on one axis.
+# Ratio of the ranges of curves above which a logarithmic axis shows them.
 FAR_APART = 50.0
+# More curves than this in a panel cannot be distinguished.
 MOST = len(COLOURS) * len(STYLES)
 
 Curves = dict[str, dict[str, Curve]]
@@ -30,7 +30,10 @@ Curves = dict[str, dict[str, Curve]]
 
 
 def figures_of(comparison: Comparison) -> dict[str, Callable[[], Figure]]:
-    """What draws each figure, by its title: of curves that at least two runs have, in one unit."""
+    """Return a drawing function for each title of curves that two runs or more have in common.
+
+    Curves of one title must have the same units.
+    """
     shared: Curves = {}
     for run in comparison.runs[:MOST]:
         with h5py.File(OutputFolder(run.folder).results) as file:
@@ -44,7 +47,7 @@ def figures_of(comparison: Comparison) -> dict[str, Callable[[], Figure]]:
 
 
 def _alike(curves: dict[str, Curve]) -> dict[str, Curve]:
-    """Those that have the units of the first: forces of line contacts are per mm."""
+    """Return the curves with the units of the first: forces of line contacts are per mm."""
     units = _units(next(iter(curves.values())))
     return {name: curve for name, curve in curves.items() if _units(curve) == units}
 
@@ -82,9 +85,9 @@ def _draw(title: str, curves: dict[str, Curve]) -> Figure:
 
 
 def _far_apart(values: Sequence[Array]) -> bool:
-    """Whether some reach so much less than others that they cannot be seen beside them.
+    """Return whether some curves are too small to be seen on the same linear axis as others.
 
-    Only what is nowhere below 0 can be shown by logarithms.
+    A logarithmic axis is possible only if no value is negative.
     """
     reached = [_largest(those) for those in values]
     seen = min(reached) * FAR_APART >= max(reached) or min(reached) == 0.0

@@ -1,4 +1,4 @@
-"""A comparison as text on the terminal, as a table, and on a page."""
+"""Display of a comparison: text on the terminal, a table, and an HTML page."""
 
 from __future__ import annotations
 
@@ -32,20 +32,20 @@ from workflow.report.page import (
 )
 from workflow.shell.tables import write_table
 
-# What marks a difference of more than both estimated errors.
+# Mark of a difference that exceeds both estimated errors.
 BEYOND = "!"
 MEANING = (
     f"{BEYOND} marks differences to the first run that are more than the estimated errors of both "
     "together; where one of them is not known, nothing is marked."
 )
-# Times more or less are told as a factor, of two digits, not in per cent.
+# Ratios beyond LARGE are shown as a factor of two digits, not in per cent.
 LARGE, FACTOR_DIGITS = 5.0, 0.05
-# Columns of text where it goes to a file.
+# Width in columns of text that goes to a file.
 FILE_WIDTH = 140
 
 
 def show(comparison: Comparison) -> None:
-    """Differences of the cases, and all quantities side by side, on the terminal."""
+    """Print the differences of the cases and all quantities on the terminal."""
     console = Console(highlight=False, markup=False)
     if not console.is_terminal:
         console.width = FILE_WIDTH
@@ -53,7 +53,7 @@ def show(comparison: Comparison) -> None:
 
 
 def text_of(comparison: Comparison) -> str:
-    """The same as a text."""
+    """Return the comparison as text."""
     console = Console(file=StringIO(), width=FILE_WIDTH, highlight=False, markup=False)
     with console.capture() as printed:
         _print(comparison, console)
@@ -81,7 +81,7 @@ def _print(comparison: Comparison, console: Console) -> None:
 
 
 def _text(row: Row, number: int) -> str:
-    """A value, and how far it is from that of the first run."""
+    """Return a value, and its difference from that of the first run."""
     quantity, value = row.quantities[number], row.values[number]
     if quantity is None or value is None:
         return NOTHING
@@ -98,7 +98,7 @@ def _apart(row: Row, number: int) -> Iterator[str]:
 
 
 def _signed(difference: float) -> str:
-    """A relative difference in per cent, a large one as a factor."""
+    """Return a relative difference in per cent, a large one as a factor."""
     if not math.isfinite(difference):
         return "from 0"
     factor = 1.0 + difference
@@ -117,7 +117,7 @@ def write_csv(comparison: Comparison, path: Path) -> None:
 
 
 def columns_of(comparison: Comparison) -> dict[str, list[Any]]:
-    """All quantities in base units; estimated errors and differences are relative."""
+    """Return all quantities in base units; estimated errors and differences are relative."""
     rows, names = comparison.rows, comparison.names
     columns: dict[str, list[Any]] = {
         "of": [row.first.group for row in rows],
@@ -138,7 +138,7 @@ def columns_of(comparison: Comparison) -> dict[str, list[Any]]:
 
 
 def comparison_page(comparison: Comparison, figures: dict[str, str]) -> str:
-    """The whole page; ``figures`` are SVG texts by their titles."""
+    """Return the whole page; ``figures`` are SVG texts by their titles."""
     names = comparison.names
     pictures = [picture(svg, title, captioned=False) for title, svg in figures.items()]
     parts = [

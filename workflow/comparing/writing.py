@@ -1,4 +1,4 @@
-"""The files of a comparison: table, page and figures in a folder of their own."""
+"""Writing of a comparison to a folder: table, page and figures."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ TABLE, PAGE, FIGURES = "compare.csv", "compare.html", "curves"
 
 
 def write_comparison(comparison: Comparison, out: Path, force: bool = False) -> list[Path]:
-    """Write ``compare.csv``, ``compare.html`` and figures of curves; the paths of the first two.
+    """Write ``compare.csv``, ``compare.html`` and figures; return the paths of the first two.
 
-    Raises UserError for a folder that has them already, unless ``force``, or that is of nothing of
-    ours.
+    Raises UserError for a folder that has them already, unless ``force``, or that fretscale did not
+    write.
     """
-    # Plots take a second to load: where they are drawn.
+    # Imported here because plotting libraries take a second to load.
     from workflow.comparing.figures import figures_of
     from workflow.pictures.style import write_figures
 

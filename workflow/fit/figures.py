@@ -16,25 +16,25 @@ from workflow.fit.fitting import ENERGY, Fitted, FittedSeries
 from workflow.pictures.panels import legend_below, new_figure, volume_unit
 from workflow.pictures.style import BLACK, BLUE, ORANGE, write_figures
 
-# Of a row of panels, and of title and legend [inches].
+# Heights of a row of panels, and of title and legend [inches].
 ROW, REST = 3.0, 1.3
-# Standard deviations that residuals are shown to at least, and the lines of 95 %.
+# Smallest range of residuals shown, and the 95 % lines, both in standard deviations.
 LEAST, LINES = 3.0, 1.96
-# Energies over such a range are spread by their logarithm.
+# Ratio of energies above which their axis is logarithmic.
 DECADES = 1e3
-# Points of a curve, and the first after no energy, over the smallest of the data.
+# Number of points of a curve; the first point after zero energy, relative to the smallest datum.
 POINTS, EARLIEST = 200, 1e-6
-# Left of no energy, over the smallest of the data.
+# Margin to the left of zero energy, relative to the smallest datum.
 MARGIN = 0.2
 
 
 def write_figure(fitted: Fitted, path: Path) -> None:
-    """Draw the fit."""
+    """Draw the fit and write it to ``path``."""
     write_figures([(path.stem, partial(figure, fitted))], path.parent)
 
 
 def figure(fitted: Fitted) -> Figure:
-    """A row for each kind of data: these with the curve on the left, residuals on the right."""
+    """Return the figure: a row per kind of data, with data and curve left and residuals right."""
     drawn = new_figure(fitted.given.file.title, REST + ROW * len(fitted.series))
     axes = drawn.subplots(
         len(fitted.series), 2, squeeze=False, sharex="row", width_ratios=(1.6, 1.0)
@@ -106,7 +106,7 @@ def _label(axis: Axes, series: FittedSeries) -> None:
     energy = series.along.factor * series.column.against
     if _is_wide(series):
         smallest = energy[energy > 0.0].min()
-        # Linear up to the first of them, so that no energy has its place too.
+        # Linear up to the smallest energy, so that zero energy has its place too.
         axis.set_xscale("symlog", linthresh=smallest)
         axis.set_xlim(
             -MARGIN * smallest if energy.min() == 0.0 else smallest / 2.0, 2.0 * energy.max()
@@ -119,10 +119,10 @@ def _is_wide(series: FittedSeries) -> bool:
 
 
 def _spread(series: FittedSeries) -> Array:
-    """Places of the curve ``(m,)``, as they are drawn: none beyond the data."""
+    """Return the places of the curve ``(m,)``, none of them beyond the data."""
     energy = series.column.against
     if series.along != ENERGY:
-        return energy  # there and back: it is a loop
+        return energy  # forward and backward, since it is a loop
     if not _is_wide(series):
         return np.linspace(energy.min(), energy.max(), POINTS)
     smallest = energy[energy > 0.0].min()
@@ -133,7 +133,7 @@ def _spread(series: FittedSeries) -> Array:
 
 
 def _scale(series: FittedSeries) -> tuple[float, str]:
-    """Factor and unit in which values are drawn."""
+    """Return the factor and unit in which values are drawn."""
     if series.unit == "1":
         return 1.0, "1"
     if series.unit == "mm^3":

@@ -1,4 +1,4 @@
-"""From the file of a fit to its result: data, problem, solution, and what speaks against it."""
+"""Fits of joints and of wear volumes: data, problem, solution, and warnings about the result."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ from workflow.fit.measured import Column, read_columns
 from workflow.fit.schema import FREE, FitInput, JointFit, WearFit
 from workflow.pictures.scales import TO_JOULES, TO_MICRONS
 
-# Columns of the parameters of a joint.
+# Columns that hold the parameters of a joint.
 MEASURED = {
     "friction": "mu",
     "stiffness": "kt",
@@ -41,7 +41,7 @@ MEASURED = {
     "normal_load": "P",
 }
 INITIAL = "initial"
-# Units in which parameters are told: those of a joint at first, and all others.
+# Units in which parameters are reported: first those of a joint, then all others.
 JOINT_UNITS = {
     "friction": "1",
     "stiffness": "N/um",
@@ -58,9 +58,9 @@ UNITS = {
     "intercept": "um^3",
 }
 VOLUMES = {"volume": "both", "volume_1": "body_1", "volume_2": "body_2"}
-# From here on a single value decides a parameter, and its scatter is anybody's guess.
+# Share of one value in a parameter above which a warning says that the parameter rests on it.
 ALONE = 0.9
-# Places in a message.
+# Largest number of places in a message.
 MOST_NAMED = 5
 # Law of the worn volume: power of the amplitude.
 POWERS = {"energy": 0.0, "energy_amplitude": 1.0, "amplitude_power": None}
@@ -68,19 +68,19 @@ POWERS = {"energy": 0.0, "energy_amplitude": 1.0, "amplitude_power": None}
 
 @dataclass(frozen=True)
 class Parameter:
-    """A free parameter: its ``path`` in a case, the ``unit`` it is told in, and its estimate."""
+    """Free parameter: its ``path`` in a case, the ``unit`` of its report, and its estimate."""
 
     path: str
     unit: str
     estimate: Estimate
 
     def shown(self, number: float) -> float:
-        """A number of the base unit in the one that it is told in."""
+        """Return a number given in the base unit in the unit of the report."""
         return number / (1.0 if self.unit == "1" else to_base(f"1 {self.unit}", None))
 
 
 class Along(NamedTuple):
-    """What values were measured along: its name, base unit, and factor and unit it is shown in."""
+    """Quantity along which values were measured: name, base unit, display factor and unit."""
 
     name: str
     base: str
@@ -94,10 +94,10 @@ DISPLACEMENT = Along("displacement", "mm", TO_MICRONS, "µm")
 
 @dataclass(frozen=True)
 class FittedSeries:
-    """One kind of data: what it is called, what was measured, and where.
+    """One kind of data: its name, the measured values, and where they were measured.
 
-    ``curve`` takes places ``(m,)`` of what they were measured ``along`` to what all values of the
-    parameters make of them; None where it depends on more.
+    ``curve`` takes places ``(m,)`` on the axis ``along`` to a function from parameter values to
+    the fitted curve; None where the curve depends on more than the place.
     """
 
     name: str
@@ -108,17 +108,17 @@ class FittedSeries:
 
     @property
     def order(self) -> Array:
-        """What tells neighbours ``(n,)``: the energy, or the way along a loop."""
+        """Order of neighbouring values ``(n,)``: by energy, or by the path along a loop."""
         against = self.column.against
         return against if self.along == ENERGY else np.arange(len(against), dtype=np.float64)
 
 
 @dataclass(frozen=True)
 class Fitted:
-    """The result: the fit, its parameters by their paths in a case, data, and ``doubts``.
+    """Result of a fit: the solution, parameters by their paths in a case, data, and ``doubts``.
 
-    ``tests`` has what each file says of a parameter, by path, where there are several tables. Of a
-    fit through runs ``told`` and ``runs`` say how many there were, and what is wrong for them.
+    ``tests`` has the estimates of each file for a parameter, by path, where there are several
+    tables. For a fit through runs, ``told`` and ``runs`` report their number and errors.
     """
 
     given: FitInput
@@ -131,7 +131,7 @@ class Fitted:
     runs: Mapping[str, Any] = field(default_factory=dict)
 
     def shown_tests(self, path: str) -> list[tuple[str, float, float, float]]:
-        """Files of a parameter's :class:`Common`: name, share, own value and its deviation."""
+        """Return name, share, own value and deviation per file for a parameter's ``tests``."""
         common, shown = self.tests[path], self.by_path[path].shown
         return [
             (
@@ -149,12 +149,12 @@ class Fitted:
 
     @property
     def places(self) -> tuple[str, ...]:
-        """``file:line`` of all data ``(n,)``."""
+        """Source ``file:line`` of each value ``(n,)``."""
         return tuple(place for series in self.series for place in series.column.places)
 
     @property
     def by_path(self) -> dict[str, Parameter]:
-        """The parameters by their paths."""
+        """Parameters by their paths."""
         return {parameter.path: parameter for parameter in self.parameters}
 
 
@@ -166,7 +166,7 @@ def solved(
     notes: Sequence[str],
     told: Sequence[str] = (),
 ) -> Fitted:
-    """The result of a fit whose parameters have these ``paths`` and units."""
+    """Return the result of a fit whose parameters have these ``paths`` and units."""
     called = {one.name: path for one, (path, _) in zip(fitted.estimates, paths, strict=True)}
     parameters = tuple(
         Parameter(path, unit, replace(estimate, doubt=_in_paths(estimate.doubt, called)))
@@ -199,9 +199,10 @@ def solved(
 def _tests(
     fitted: Fit, parameters: Sequence[Parameter], series: Sequence[FittedSeries], files: Indices
 ) -> dict[str, Common]:
-    """What each table says of the parameters; loops are records that differ as strokes do.
+    """Return what each table says about the parameters, by path; empty for records of loops.
 
-    The place of a profile is its own, and no other's.
+    Records of loops differ only as their strokes do. Parameters that place a single profile are
+    left out, since no other table contains them.
     """
     if series[0].along == DISPLACEMENT or len(np.unique(files)) < 2:
         return {}
@@ -212,7 +213,7 @@ def _tests(
 
 
 def _contradictions(fitted: Fitted) -> list[str]:
-    """Parameters on which the files do not agree."""
+    """Return warnings about parameters on which the files do not agree."""
     told = []
     for path, common in fitted.tests.items():
         # One false alarm in a thousand fits, whatever the number of parameters.
@@ -232,13 +233,13 @@ def _contradictions(fitted: Fitted) -> list[str]:
 
 
 def _named(places: Sequence[str]) -> str:
-    """The first of some places."""
+    """Return the first few of the places, as text."""
     more = " ..." if len(places) > MOST_NAMED else ""
     return ", ".join(places[:MOST_NAMED]) + more
 
 
 def _products(fitted: Fit, parameters: Sequence[Parameter]) -> list[str]:
-    """What is known of pairs of parameters of which only the product counts."""
+    """Return the products of pairs of parameters that only matter as a product."""
     names = [parameter.estimate.name for parameter in parameters]
     told = []
     for place, parameter in enumerate(parameters):
@@ -253,7 +254,7 @@ def _products(fitted: Fit, parameters: Sequence[Parameter]) -> list[str]:
 
 
 def _in_paths(text: str, called: Mapping[str, str]) -> str:
-    """A text with the paths of parameters in place of their names."""
+    """Return a text with the paths of parameters in place of their names."""
     return re.sub(r"[\w.]+", lambda word: called.get(word[0], word[0]), text)
 
 
@@ -261,7 +262,7 @@ def _in_paths(text: str, called: Mapping[str, str]) -> str:
 
 
 def fit_joint(given: FitInput, file: JointFit) -> Fitted:
-    """How the parameters of a joint evolve. Raises as :func:`workflow.fit.running.run_fit`."""
+    """Fit the evolution of a joint's parameters; raise as :func:`workflow.fit.running.run_fit`."""
     names = [MEASURED[name] for name in file.evolution.given]
     columns = read_columns(file.measurements, names, beside=("residual_stiffness",), ascending=True)
     for name in file.evolution.given:
@@ -301,7 +302,7 @@ def fit_joint(given: FitInput, file: JointFit) -> Fitted:
 
 
 def _evolution_data(file: JointFit, name: str, section: Section, column: Column) -> EvolutionData:
-    """The data of a parameter of the joint, and what of its function is held."""
+    """Return the data of a parameter of the joint, and the fixed entries of its function."""
     entries = {INITIAL: getattr(file.joint, name), **section.model_dump(exclude={"kind"})}
     held = {key: float(value) for key, value in entries.items() if value != FREE}
     return EvolutionData(
@@ -315,7 +316,7 @@ def _evolution_data(file: JointFit, name: str, section: Section, column: Column)
 
 
 def _joint_path(name: str) -> tuple[str, str]:
-    """Path in a case and unit of a parameter of :func:`evolution_problem`."""
+    """Return path in a case and unit of a parameter of :func:`evolution_problem`."""
     of, _, parameter = name.rpartition(".")
     if parameter == INITIAL:
         return f"joint.{of}", JOINT_UNITS[of]
@@ -326,7 +327,7 @@ def _joint_path(name: str) -> tuple[str, str]:
 def _without_residual(
     file: JointFit, columns: dict[str, Column]
 ) -> tuple[dict[str, Column], list[str]]:
-    """The columns with a stiffness as the law has it, and what to say of that."""
+    """Return the columns with the stiffness as the law defines it, and notes about it."""
     if file.law == "bouc_wen" or "kt" not in columns:
         return columns, []
     kt = columns["kt"]
@@ -345,7 +346,7 @@ def _without_residual(
 
 
 def fit_wear(given: FitInput, file: WearFit) -> Fitted:
-    """Wear coefficients of volumes. Raises as :func:`workflow.fit.running.run_fit`."""
+    """Fit wear coefficients to volumes; raise as :func:`workflow.fit.running.run_fit`."""
     columns = read_columns(file.measurements, list(VOLUMES), beside=("amplitude",))
     if "volume" in columns and len(columns) > 1:
         raise UserError(
@@ -388,7 +389,7 @@ def fit_wear(given: FitInput, file: WearFit) -> Fitted:
 
 
 def _wear_path(name: str) -> tuple[str, str]:
-    """Path and unit of a parameter of :func:`volume_problem`."""
+    """Return path and unit of a parameter of :func:`volume_problem`."""
     of, _, parameter = name.rpartition(".")
     where = ".".join(part for part in ("wear", of, parameter) if part)
     return where, UNITS.get(parameter, "1")

@@ -1,4 +1,4 @@
-"""``fit: joint_law``: a joint law from measured loops, step by step of their strokes."""
+"""``fit: joint_law``: a joint law from measured loops, fitted to all steps of equal stroke."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ from workflow.pictures.scales import TO_MICRONS
 
 
 def fit_loops(given: FitInput, file: LoopFit) -> Fitted:
-    """A law of loops. Raises as :func:`workflow.fit.running.run_fit`."""
+    """Fit a joint law to loops; raise as :func:`workflow.fit.running.run_fit`."""
     entries = file.joint.model_dump(exclude={"law"})
-    # A normal load that is not given is that of each record.
+    # NaN stands for the normal load of each record.
     entries["normal_load"] = np.nan if file.joint.normal_load is None else entries["normal_load"]
     held = {key: float(value) for key, value in entries.items() if value != FREE}
     names = [_loop_name(file, number) for number in range(1, len(file.measurements) + 1)]
@@ -58,7 +58,7 @@ def fit_loops(given: FitInput, file: LoopFit) -> Fitted:
 
 
 def _measured(one: LoopMeasurement) -> MeasuredLoops:
-    """The loops of a record. Raises UserError."""
+    """Return the loops of a record; raise UserError if it has none."""
     names = {k: v for k, v in one.columns.model_dump().items() if v is not None}
     record = read_loop_file(Path(one.file), names)
     columns = (record.get("normal_load"), record.get("time"))
@@ -69,14 +69,14 @@ def _measured(one: LoopMeasurement) -> MeasuredLoops:
 
 
 def _fitted_steps(measured: MeasuredLoops) -> list[MeasuredLoops]:
-    """All steps of a record, or some of them from the first to the last."""
+    """Return all steps of a record, or some of them from the first to the last."""
     steps = measured.steps
     count = min(len(steps), MOST_LOOPS)
     return [steps[place] for place in np.linspace(0, len(steps) - 1, count).round().astype(int)]
 
 
 def _doubts(measured: MeasuredLoops, fitted: int) -> list[str]:
-    """Yield what in the steps of a record contradicts one law for all of them."""
+    """Return warnings about steps of a record that no single law can describe."""
     steps, doubts = measured.steps, []
     if fitted < len(steps):
         doubts.append(
@@ -104,7 +104,7 @@ def _loop_name(file: LoopFit, number: int) -> str:
 
 
 def _loop_column(loops: Sequence[LoopData], file: str, number: int) -> Column:
-    """Loops of a record as a column; their places are named by stroke and displacement."""
+    """Return the loops of a record as a column, with places named by stroke and displacement."""
     name = Path(file).name
     places = tuple(
         f"{name}, stroke of {2.0 * TO_MICRONS * loop.amplitude:.3g} um, at {TO_MICRONS * x:.3g} um"
@@ -121,6 +121,6 @@ def _loop_column(loops: Sequence[LoopData], file: str, number: int) -> Column:
 
 
 def _loop_path(name: str) -> tuple[str, str]:
-    """Path and unit of a parameter of :func:`loop_problem`."""
+    """Return path and unit of a parameter of :func:`loop_problem`."""
     of, _, parameter = name.rpartition(".")
     return (f"{of}.{parameter}", "N") if of else (f"joint.{name}", JOINT_UNITS.get(name, "1"))

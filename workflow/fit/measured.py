@@ -1,7 +1,7 @@
-"""Tables that were measured, as a fit takes them: columns with units, and where each value stands.
+"""Measured tables for a fit: columns with units, and the file and line of each value.
 
-A unit is asked for here, where other tables have the base unit without one: energies of tests are
-written in J, kJ or mJ, and one taken for another makes a rate that looks like any other.
+Units are required here, although other tables may omit the base unit: energies of tests are
+written in J, kJ or mJ, and a confused unit gives a rate that looks as plausible as any other.
 """
 
 from __future__ import annotations
@@ -24,12 +24,13 @@ from workflow.fit.measurement import Measurement
 
 ENERGY, PLACE = "energy", "x"
 OF_DEVIATIONS = "_deviation"
-# What a loop tells only where all slides as its branches end, and the column of computed loops
-# that says so. Nothing acts beside these contacts: where they stick, nothing is left of them.
+# Columns that are meaningful only for loops whose branches end in sliding, and the column of
+# computed loops that marks these. Computed contacts have no spring in parallel: where they stick,
+# their residual stiffness is 0.
 OF_SLIDING, RESIDUAL, SLIDING = ("mu", "residual_stiffness"), "residual_stiffness", "sliding"
-# Likeness from which on a heading is a slip of the pen for that of deviations.
+# Similarity above which a heading is taken for a misspelt column of deviations.
 NEARLY = 0.85
-# Base units and limits of what may be read.
+# Base units and limits of the columns.
 QUANTITIES = {
     ENERGY: Quantity("N*mm", at_least=0.0, at_most=1e15, range_text="0 to 1e12 J"),
     "mu": Quantity("1", at_least=0.0, at_most=10.0),
@@ -54,10 +55,10 @@ QUANTITIES = {
 class Column:
     """Values of one kind from all files that have them, in base units.
 
-    ``values`` ``(n,)``, ``against`` what they were measured ``(n,)``, and their ``deviations``
-    ``(n,)`` or None if they are not known. ``others`` are beside them by name, ``places`` are
-    ``file:line`` and ``files`` the number of the file of each. Rows ``left_out`` are of loops that
-    do not slide as a whole, ``file:line`` too.
+    ``against`` ``(n,)`` is the abscissa of the ``values`` ``(n,)``; ``deviations`` ``(n,)`` is None
+    if they are not known. ``others`` are further columns by name, ``places`` the ``file:line`` and
+    ``files`` the file number of each value. ``left_out`` has the ``file:line`` of loops that do not
+    slide as a whole.
     """
 
     against: Array
@@ -71,7 +72,7 @@ class Column:
 
 @dataclass(frozen=True)
 class _Part:
-    """The same of one file."""
+    """Values of one kind from one file, with the fields of :class:`Column`."""
 
     against: Array
     values: Array
@@ -88,9 +89,9 @@ def read_columns(
     ascending: bool = False,
     along: str = ENERGY,
 ) -> dict[str, Column]:
-    """The columns of ``names`` that the files have, with those ``beside`` them where there are.
+    """Return the columns of ``names`` that the files have, with the columns ``beside`` if present.
 
-    They were measured ``along`` another column, in the order of which the rows of a file are where
+    Values were measured ``along`` another column, by which the rows of a file must be sorted if
     ``ascending``. Raises InputFileError, with file and line.
     """
     parts: dict[str, list[tuple[int, _Part]]] = {}
@@ -143,7 +144,7 @@ def _parts(
 
 
 def _of_sliding(table: TableFile, name: str, part: _Part, slides: Mask) -> _Part:
-    """The rows of loops that slide as a whole: the others have only mobilised some friction."""
+    """Return the rows of loops that slide as a whole; others mobilise only part of the friction."""
     if not slides.any():
         raise InputFileError(
             f"{table.place}: {name}: no loop slides as a whole (column {SLIDING}), so that it is "
@@ -161,7 +162,7 @@ def _of_sliding(table: TableFile, name: str, part: _Part, slides: Mask) -> _Part
 
 
 def _section(measurement: Measurement, name: str) -> dict[str, Any]:
-    """What is given of a section, by key."""
+    """Return the given entries of a section, by key."""
     section: Section = getattr(measurement, name)
     return {key: value for key, value in section.model_dump().items() if value is not None}
 
@@ -173,7 +174,7 @@ def _numbers(table: TableFile, called: Mapping[str, str], name: str) -> Array:
 
 
 def _check_unit(table: TableFile, heading: str, quantity: Quantity) -> None:
-    """Ask for a unit of what has a dimension."""
+    """Raise InputFileError if a column with a dimension has no unit."""
     if quantity.unit != "1" and not table.unit(heading):
         example = {"N*mm": "J", "N/mm": "N/um"}.get(str(quantity.unit), quantity.unit)
         raise InputFileError(
@@ -183,7 +184,7 @@ def _check_unit(table: TableFile, heading: str, quantity: Quantity) -> None:
 
 
 def _check_slips(table: TableFile, headings: Sequence[str]) -> None:
-    """Refuse what is nearly a column of deviations: it would be passed over without a word."""
+    """Raise InputFileError for a misspelt column of deviations, which would be ignored."""
     known = [f"{heading}{OF_DEVIATIONS}" for heading in headings]
     for name in table.names:
         near = difflib.get_close_matches(name, known, n=1, cutoff=NEARLY)
@@ -194,7 +195,7 @@ def _check_slips(table: TableFile, headings: Sequence[str]) -> None:
 
 
 def _check_order(table: TableFile, against: Array, heading: str, along: str) -> None:
-    """Refuse an energy that falls, and a place that does not rise."""
+    """Raise InputFileError where the energy falls, or the place does not rise."""
     steps = np.diff(against)
     wrong = np.flatnonzero(steps < 0.0 if along == ENERGY else steps <= 0.0)
     if wrong.size:
@@ -209,7 +210,7 @@ def _check_order(table: TableFile, against: Array, heading: str, along: str) -> 
 def _deviations(
     table: TableFile, called: Mapping[str, str], name: str, given: float | None
 ) -> Array | None:
-    """Standard deviations of a column: a column of their own, one number for all, or unknown."""
+    """Return the standard deviations of a column: from their column, one number, or None."""
     heading = f"{called[name]}{OF_DEVIATIONS}"
     if heading not in table.names:
         return None if given is None else np.full(len(table), given)
@@ -224,7 +225,7 @@ def _deviations(
 
 
 def _joined(name: str, parts: Sequence[tuple[int, _Part]]) -> Column:
-    """One column of those of all files."""
+    """Return the columns of all files as one."""
     known = [part.deviations for _, part in parts if part.deviations is not None]
     if known and len(known) < len(parts):
         unknown = next(part for _, part in parts if part.deviations is None)

@@ -1,4 +1,4 @@
-"""What the files of all fits have: a table that was measured, and names of its columns."""
+"""Common part of the files of all fits: a measured table, and the names of its columns."""
 
 from __future__ import annotations
 
@@ -15,6 +15,6 @@ KIND = "joint_evolution, joint_law, wear_coefficient or wear_profiles"
 
 
 class Measurement(Section):
-    """A table that was measured."""
+    """Measured table."""
 
     file: Csv = entry("CSV, headings with units, as seen from this folder", "measured.csv")

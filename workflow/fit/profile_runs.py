@@ -1,4 +1,4 @@
-"""Runs of the tests of a fit: each in a folder of its own, taken up where the fit was stopped."""
+"""Runs of the tests of a fit, each in its folder, which an interrupted fit resumes."""
 
 from __future__ import annotations
 
@@ -27,25 +27,25 @@ Pair = tuple[float, float]
 """Wear coefficients of body 1 and body 2 [1/MPa]."""
 
 WEAR, UNIT = "wear", "um^3/J"
-# Of a coefficient that is run: far below what any fit tells, and a name for the folder.
+# Digits of a coefficient in a run: far finer than any fit, and short enough for a folder name.
 SIGNIFICANT = 5
-# What no fit reads of a run.
+# Overrides that switch off output of a run that no fit reads.
 QUIET = ("output.paraview=false", "output.figures=false", "output.report=false")
-# Depths of two bodies over their coefficients that differ by more, over the largest, are not of one
-# law of the dissipated energy.
+# Largest difference, relative to the largest depth, of depths divided by coefficients for which
+# both bodies still follow one law of the dissipated energy.
 ALIKE = 1e-6
-# Share of the cycles of a case that a run may be short of.
+# Share of the cycles of a case that may be missing in its run.
 WHOLE = 1e-6
-# Of the hash that tells other entries from those of the case.
+# Digits of the hash that distinguishes runs with changed entries.
 DIGITS = 8
 
 
 @dataclass(frozen=True)
 class RunScar:
-    """What a run has worn along x ``(m,)`` [mm], both bodies together: ``depth`` ``(m,)`` [mm].
+    """Wear of a run along x ``(m,)`` [mm]: ``depth`` ``(m,)`` [mm] of both bodies together.
 
-    ``coefficient`` [1/MPa] is the sum of those of the bodies, ``energy`` [N mm] what it has
-    dissipated, ``warnings`` what it has warned of.
+    ``coefficient`` [1/MPa] is the sum of the coefficients of both bodies, ``energy`` [N mm] the
+    dissipated energy of the run, and ``warnings`` are those of the run.
     """
 
     coefficient: float
@@ -56,12 +56,12 @@ class RunScar:
 
 
 class TestRuns:
-    """Runs of the cases of some ``tests`` below a folder ``root``; the same run is made once.
+    """Runs of the cases of the ``tests`` of a fit below a folder ``root``, each run only once.
 
-    Raises CaseError for cases that no fit can be made through.
+    Raises CaseError for cases that cannot be used in a fit.
     """
 
-    __test__ = False  # not a test of pytest's
+    __test__ = False  # tells pytest that this is not a test
 
     def __init__(self, given: FitInput, file: ProfileFit, root: Path, reporter: Reporter) -> None:
         self._given, self._file, self._root, self._reporter = given, file, root, reporter
@@ -74,25 +74,25 @@ class TestRuns:
 
     @property
     def count(self) -> int:
-        """Of the cases."""
+        """Number of different cases."""
         return len(self._numbers)
 
     def place(self, number: int, key: str) -> str:
-        """File and line of an entry of a test, and its path."""
+        """Return file and line of an entry of a test, and its path."""
         where = self._given.source.where(("measurements", number, key))[1]
         return f"{where}: measurements.{number}.{key}"
 
     def own(self, number: int) -> Pair:
-        """The coefficients that the case of a test has."""
+        """Return the coefficients in the case of a test."""
         wear = self.cases[number].wear
         return wear.body_1.coefficient, wear.body_2.coefficient
 
     def scars(
         self, wanted: Sequence[Pair], finer: Mapping[str, Any] | None = None, alike: bool = True
     ) -> list[RunScar]:
-        """The scar of each test with the coefficients ``wanted`` of it, and entries changed.
+        """Return the scar of each test with coefficients ``wanted`` and entries ``finer``.
 
-        Where ``alike``, both bodies are to wear alike but for their coefficients. Raises
+        If ``alike``, the depths of both bodies must be in proportion to their coefficients. Raises
         MethodFailed for a run that fails.
         """
         jobs = [self._job(k, pair, finer or {}) for k, pair in enumerate(wanted)]
@@ -127,7 +127,7 @@ class TestRuns:
         return Job(name, Path(test.case), tuple(overrides))
 
     def _case(self, number: int, test: ProfileMeasurement) -> Any:
-        """The case of a test. Raises CaseError."""
+        """Return the case of a test; raise CaseError if it cannot be used."""
         case, place = Job("", Path(test.case)).load(), self.place(number, "case")
         bodies = [getattr(getattr(case, "wear", None), name, None) for name in ("body_1", "body_2")]
         if analysis_of(case).name != WEAR or None in bodies:
@@ -177,13 +177,13 @@ class TestRuns:
 
 
 def _wear_alike(depths: Sequence[Array], pair: Pair) -> bool:
-    """Whether depths over the coefficients are one."""
+    """Return whether the depths of the bodies are in proportion to their coefficients."""
     crossed = [depth * other for depth, other in zip(depths, reversed(pair), strict=True)]
     return bool(np.abs(crossed[0] - crossed[1]).max() <= ALIKE * np.abs(crossed[0]).max())
 
 
 def rounded(pair: Sequence[float]) -> Pair:
-    """Coefficients as they are run."""
+    """Return the coefficients as they are rounded for a run."""
     size = to_base(f"1 {UNIT}", None)
     first, second = (float(f"{value / size:.{SIGNIFICANT}g}") * size for value in pair)
     return first, second

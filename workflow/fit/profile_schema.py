@@ -1,4 +1,4 @@
-"""The file of a fit to worn depths and profiles, through runs of cases."""
+"""Schema of the file of a fit to worn depths and profiles, through runs of cases."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ Deviation = Annotated[float, Quantity("mm", above=0.0, range_text="above 0 um")]
 
 
 class ProfileHeadings(Section):
-    """What the columns of a file are called, where not as here."""
+    """Headings of the columns of a file, where they differ from the names here."""
 
     x: Heading | None = entry("place along the contact", "position", default=None)
     depth: Heading | None = entry("worn off both bodies", "wear", default=None)
@@ -23,7 +23,7 @@ class ProfileHeadings(Section):
 
 
 class ProfileDeviations(Section):
-    """Standard deviations of depths; without them the residuals tell the scatter."""
+    """Standard deviations of depths; if not given, they are estimated from the residuals."""
 
     depth: Deviation | None = entry("of both bodies [mm]", "0.2 um", default=None)
     depth_1: Deviation | None = entry("of body 1 [mm]", "0.2 um", default=None)
@@ -31,9 +31,9 @@ class ProfileDeviations(Section):
 
 
 class ProfileMeasurement(Measurement):
-    """A profile across a scar: x, and depth, or depth_1 and depth_2 of the bodies.
+    """Profile across a scar: x, and depth, or depth_1 and depth_2 of the bodies.
 
-    Depth is above 0 where something is worn.
+    Depth is positive where material is worn off.
     """
 
     case: Annotated[str, File((".yaml", ".yml"))] = entry(

@@ -1,8 +1,9 @@
-"""Wear coefficients from depths and profiles: runs of the tests until more would change nothing.
+"""Wear coefficients from depths and profiles, with runs of the tests until they are enough.
 
-The first runs are those of the cases as they are written. Each further one has the coefficients
-that the fit through all before it has found, until leaving out the nearest run changes these by
-little beside their standard deviations. The last runs are made once more with finer steps or grid.
+The first runs have the coefficients of the cases. Each further run has the coefficients of the fit
+through all earlier runs. The runs are enough when leaving out the nearest run changes the
+coefficients little compared with their standard deviations. The last runs are repeated with finer
+steps or grid.
 """
 
 from __future__ import annotations
@@ -35,16 +36,16 @@ BOTH = "both"
 BODIES = {"depth": BOTH, "depth_1": "body_1", "depth_2": "body_2"}
 ALONG = Along("position", "mm", 1.0, "mm")
 RUNS, LOG = "runs", "fit.log"
-# Change for want of runs, over the standard deviation, at which they are enough, or relative; and
-# rounds before giving up.
+# Largest acceptable error due to too few runs, relative to the standard deviation or to the value,
+# and the largest number of rounds.
 ENOUGH, LEAST, MOST_ROUNDS = 0.1, 3e-4, 8
-# Change by finer runs, over the standard deviation, from which on bounds are too small.
+# Change by finer runs, relative to the standard deviation, above which bounds are too small.
 TOO_COARSE = 0.5
 
 
 @dataclass(frozen=True)
 class _Profile:
-    """A measured profile: the number of its test, of which body it is, and its data."""
+    """Measured profile: the number of its test, its body, and its data."""
 
     name: str
     test: int
@@ -53,7 +54,7 @@ class _Profile:
 
 
 def fit_profiles(given: FitInput, file: ProfileFit, out: Path | None, loudness: Loudness) -> Fitted:
-    """Fit what the file names, with runs below ``out``.
+    """Fit the profiles that the file names, with runs below ``out``.
 
     Raises CaseError and InputFileError with file and line, UserError for data or cases that allow
     no fit, MethodFailed for a run that fails.
@@ -102,7 +103,7 @@ def _check_bodies(given: FitInput, profiles: Sequence[_Profile]) -> None:
 
 
 class _Search:
-    """The fit of some profiles through the runs that it needs."""
+    """Fit of profiles through the runs that it needs."""
 
     def __init__(
         self, given: FitInput, file: ProfileFit, profiles: Sequence[_Profile], runs: TestRuns
@@ -112,7 +113,7 @@ class _Search:
         self._scars: list[list[RunScar]] = [[] for _ in runs.tests]
 
     def through(self) -> Fitted:
-        """Runs and fits in turn, and what is told of the last."""
+        """Return the result, after alternating runs and fits until the runs are enough."""
         wanted, settled = [self._begin(number) for number in range(len(self._scars))], False
         for _ in range(MOST_ROUNDS):
             made, last = wanted, self._run(wanted)
@@ -140,11 +141,11 @@ class _Search:
         return self._runs.scars(wanted, finer, alike=BOTH not in self._bodies)
 
     def _is_known(self, number: int, pair: Pair) -> bool:
-        """Whether a run of these coefficients is there: another would tell nothing."""
+        """Return whether a run of these coefficients exists: another would add no information."""
         return sum(pair) in [scar.coefficient for scar in self._scars[number]]
 
     def _begin(self, number: int) -> Pair:
-        """Coefficients of the case, which are to be above 0 where they are fitted."""
+        """Return the coefficients of the case, which must be above 0 where they are fitted."""
         first, second = pair = rounded(self._runs.own(number))
         own = {BOTH: first + second, "body_1": first, "body_2": second}
         for body in self._bodies:
@@ -156,7 +157,7 @@ class _Search:
         return pair
 
     def _next(self, number: int, scars: ScarFit, found: Fit) -> Pair:
-        """Coefficients of the next run of a test: those found, less what a threshold takes."""
+        """Return the coefficients of the next run: the fitted ones, reduced by a threshold."""
         first, second = self._runs.own(number)
         fitted = dict(zip(scars.bodies, found.values.tolist(), strict=False))
         pair = fitted.get("body_1", first), fitted.get("body_2", second)
@@ -168,7 +169,7 @@ class _Search:
         return rounded([begun * value for value in pair])
 
     def _data(self, scars: Sequence[Sequence[RunScar]]) -> tuple[ScarData, ...]:
-        """The profiles with the scars of runs, by test."""
+        """Return the profiles with the scars of the runs of their tests."""
         return tuple(self._with_scars(one, scars[one.test]) for one in self._profiles)
 
     def _with_scars(self, one: _Profile, scars: Sequence[RunScar]) -> ScarData:
@@ -185,7 +186,7 @@ class _Search:
             energy=scars[0].energy,
         )
 
-    # -- what is told --------------------------------------------------------------------------
+    # -- report --------------------------------------------------------------------------------
 
     def _fitted(self, scars: ScarFit, found: Fit) -> Fitted:
         series = [
@@ -202,13 +203,13 @@ class _Search:
     def _with_runs(
         self, fitted: Fitted, scars: ScarFit, missing: Array, by_finer: Array, settled: bool
     ) -> Fitted:
-        """The result with how many runs it took, and their errors."""
+        """Return the result with the number of runs and the errors due to them."""
         how = ", ".join(f"{path}: {scalar(value)}" for path, value in self._file.finer.items())
         told, doubts, numbers = [], list(fitted.doubts), {}
         for place in range(_count(scars)):
             parameter, off, finer = fitted.parameters[place], missing[place], by_finer[place]
             deviation = float(np.sqrt(fitted.fit.covariance[place, place]))
-            # A coefficient is fitted as its logarithm: what it is off by is relative.
+            # A coefficient is fitted as its logarithm, so its error is relative already.
             size = (
                 1.0 if fitted.fit.problem.unknowns[place].logarithmic else fitted.fit.values[place]
             )
@@ -236,19 +237,19 @@ class _Search:
 
 
 def _computed(scars: Sequence[RunScar]) -> ComputedScars:
-    """Scars of runs along the places of the first."""
+    """Return the scars of runs, interpolated to the places of the first."""
     x = scars[0].x
     depth = np.stack([np.interp(x, scar.x, scar.depth) for scar in scars])
     return ComputedScars(np.array([scar.coefficient for scar in scars]), x, depth)
 
 
 def _count(scars: ScarFit) -> int:
-    """Of the unknowns that are of the wear, not of a scan: they come first."""
+    """Return the number of unknowns of the wear, which come before those of single scans."""
     return len(scars.bodies) + scars.threshold
 
 
 def _are_enough(scars: ScarFit, found: Fit, missing: Array) -> bool:
-    """Whether runs are near enough to what was found; NaN, of a single one, is not."""
+    """Return whether the runs are near enough to the solution; NaN, for a single run, is not."""
     count = _count(scars)
     deviations = np.sqrt(np.diag(found.covariance))[:count]
     sizes = np.where(scars.problem.logarithmic, 1.0, np.abs(found.values))[:count]
@@ -256,7 +257,7 @@ def _are_enough(scars: ScarFit, found: Fit, missing: Array) -> bool:
 
 
 def _path(name: str) -> tuple[str, str]:
-    """Path and unit of an unknown of :func:`scar_problem`."""
+    """Return path and unit of an unknown of :func:`scar_problem`."""
     _, _, parameter = name.rpartition(".")
     if parameter in UNITS:
         return f"wear.{name}", UNITS[parameter]

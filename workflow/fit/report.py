@@ -1,4 +1,4 @@
-"""What a fit says: on the terminal, in ``summary.json``, and in tables."""
+"""Report of a fit: text on the terminal, ``summary.json``, and tables."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ from workflow.fit.section import entries_of, told
 from workflow.shell.tables import heading
 from workflow.shell.versions import versions
 
-# Correlations are told on the terminal from here on.
+# Smallest correlation that is printed.
 CLOSE = 0.9
-# Share of a series in a parameter that is not worth telling.
+# Share of a series in a parameter below which it is not printed.
 LITTLE = 0.005
 GAP = "  "
 HEADINGS = ("parameter", "value", "+-", "95 % bounds", "decided by")
 
 
 def report(fitted: Fitted) -> list[str]:
-    """The table of parameters, and what to know of them."""
+    """Return the table of parameters, followed by notes."""
     rows = [HEADINGS, *(_row(fitted, parameter) for parameter in fitted.parameters)]
     told_rows = [row for row in rows if len(row) > 1]
     widths = [max(len(row[k]) for row in told_rows) for k in range(len(HEADINGS))]
@@ -44,7 +44,7 @@ def _row(fitted: Fitted, parameter: Parameter) -> tuple[str, ...]:
 
 
 def _decided(fitted: Fitted, parameter: Parameter) -> str:
-    """Which series tell a parameter, the most important first."""
+    """Return the series that determine a parameter, the most important first."""
     names = [series.name for series in fitted.series]
     shares = parameter.estimate.shares.tolist()
     order = sorted(range(len(names)), key=lambda k: -shares[k])
@@ -67,7 +67,7 @@ def _series(fitted: Fitted) -> list[str]:
 
 
 def _tests(fitted: Fitted) -> list[str]:
-    """What each file says of the parameters."""
+    """Return what each file says about the parameters."""
     lines = []
     for path in fitted.tests:
         files = ", ".join(
@@ -80,7 +80,7 @@ def _tests(fitted: Fitted) -> list[str]:
 
 
 def _scatter(fitted: Fitted, place: int) -> float:
-    """Of a series, in the unit that it is told in: the root of the mean square."""
+    """Return the root mean square deviation of a series, in the unit of the report."""
     here = fitted.fit.problem.places == place
     root = float(np.sqrt(np.mean(fitted.fit.deviations[here] ** 2)))
     return Parameter("", fitted.series[place].unit, fitted.parameters[0].estimate).shown(root)
@@ -103,7 +103,7 @@ def _notes(fitted: Fitted) -> list[str]:
 
 
 def _close(fitted: Fitted) -> list[tuple[str, str, float]]:
-    """Pairs of parameters with a large correlation."""
+    """Return the pairs of parameters with a large correlation."""
     correlation = fitted.fit.correlation
     paths = [parameter.path for parameter in fitted.parameters]
     return [
@@ -118,7 +118,7 @@ def _close(fitted: Fitted) -> list[tuple[str, str, float]]:
 
 
 def summary(fitted: Fitted, section: str) -> dict[str, Any]:
-    """What ``summary.json`` has, in the units told beside each number."""
+    """Return the contents of ``summary.json``; each number has its unit next to it."""
     found = fitted.fit
     return {
         "title": fitted.given.file.title,
@@ -185,7 +185,7 @@ def _of_tests(fitted: Fitted, path: str) -> dict[str, Any]:
 
 
 def _in_a_case(fitted: Fitted, parameter: Parameter) -> dict[str, Any]:
-    """What a sweep needs of a parameter: its entries, and between which values it may be."""
+    """Return what a sweep needs about a parameter: its entries, and its limits."""
     unknown = fitted.fit.problem.unknowns[fitted.parameters.index(parameter)]
     limits = unknown.lower, unknown.upper
     return {
@@ -199,7 +199,7 @@ def _finite(value: float) -> float | None:
 
 
 def parameter_columns(fitted: Fitted) -> dict[str, Sequence[Any]]:
-    """The table of parameters, a row each."""
+    """Return the table of parameters, with a row for each."""
     rows = [_of_parameter(fitted, parameter) for parameter in fitted.parameters]
     return {
         "parameter": [parameter.path for parameter in fitted.parameters],
@@ -213,7 +213,7 @@ def parameter_columns(fitted: Fitted) -> dict[str, Sequence[Any]]:
 
 
 def data_columns(fitted: Fitted) -> dict[str, Any]:
-    """The table of all data, a row each, in the base units of their series."""
+    """Return the table of all data, with a row for each, in the base units of their series."""
     found = fitted.fit
     series = [s.name for s in fitted.series for _ in s.column.places]
     against = np.concatenate([s.column.against for s in fitted.series])

@@ -1,4 +1,4 @@
-"""``fretscale fit``: read, fit, tell, write."""
+"""``fretscale fit``: reads, fits and writes."""
 
 from __future__ import annotations
 
@@ -34,10 +34,10 @@ def run_fit(
     force: bool = False,
     loudness: Loudness = Loudness.QUIET,
 ) -> Fitted:
-    """Fit what the file of a fit names; runs that it needs are kept below ``out``.
+    """Fit what the file of a fit names, with the runs that it needs below ``out``.
 
     Raises CaseError and InputFileError with file and line, UserError for data that allow no fit or
-    a folder that has another, unless ``force``, ConvergenceError where no start leads to a
+    a folder with another fit, unless ``force``, ConvergenceError where no start leads to a
     solution, MethodFailed for a run that fails.
     """
     there = [] if out is None else [name for name in (*FILES, SUMMARY) if (out / name).exists()]
@@ -45,7 +45,7 @@ def run_fit(
         raise UserError(f"{out}/{there[0]}: exists; give another folder, or --force")
     file = given.file
     if isinstance(file, ProfileFit):
-        from workflow.fit.profiles import fit_profiles  # all that runs a case
+        from workflow.fit.profiles import fit_profiles  # imports all solvers
 
         return fit_profiles(given, file, out, loudness)
     if isinstance(file, JointFit):
@@ -54,7 +54,7 @@ def run_fit(
 
 
 def write_fit(fitted: Fitted, out: Path, force: bool = False) -> list[Path]:
-    """Write section, tables, figure and summary into a folder; returns their paths.
+    """Write section, tables, figure and summary into a folder; return their paths.
 
     Raises UserError for a folder that has them already, unless ``force``.
     """

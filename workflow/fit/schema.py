@@ -1,4 +1,4 @@
-"""The file of a fit: which measurements, what is free, and of which law."""
+"""Schema of the file of a fit: measurements, free parameters, and the law."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ Free = Literal["free"]
 
 @dataclass(frozen=True)
 class FreeOr(Entry):
-    """The word free, or a quantity that is held."""
+    """Word ``free``, or a quantity that is held fixed."""
 
     quantity: Quantity
 
@@ -51,7 +51,7 @@ class FreeOr(Entry):
 
 
 def _or_free(annotated: Any) -> FreeOr:
-    """The entry of a case, or free."""
+    """Return the type of an entry that is either the annotated quantity or the word ``free``."""
     return FreeOr(get_args(annotated)[1])
 
 
@@ -69,7 +69,7 @@ RESIDUAL = "slope when all slides"
 
 
 class JointHeadings(Section):
-    """What the columns of a file are called, where not as `fretscale loops` calls them."""
+    """Headings of the columns of a file, where they differ from those of `fretscale loops`."""
 
     filled_in: ClassVar[bool] = False
 
@@ -81,7 +81,7 @@ class JointHeadings(Section):
 
 
 class JointDeviations(Section):
-    """Standard deviations of what was measured; without them the residuals tell the scatter."""
+    """Standard deviations of the measured values; if not given, estimated from the residuals."""
 
     filled_in: ClassVar[bool] = False
 
@@ -100,7 +100,7 @@ class JointDeviations(Section):
 
 
 class JointMeasurement(Measurement):
-    """What loops said of a joint as it wore: energy, and mu, kt, residual_stiffness or P."""
+    """Table of loops of a joint as it wore: energy, and mu, kt, residual_stiffness or P."""
 
     columns: JointHeadings = entry("other headings", default=JointHeadings())
     deviations: JointDeviations = entry(
@@ -109,7 +109,7 @@ class JointMeasurement(Measurement):
 
 
 class NewJoint(Section):
-    """The joint before it has dissipated anything."""
+    """Joint before it has dissipated any energy."""
 
     normal_load: Annotated[float | Free, _or_free(Preload)] = entry(
         "that presses the joint [N]", "free", default=FREE
@@ -194,13 +194,13 @@ class FreeEvolution(Section):
 
     @property
     def given(self) -> dict[str, Section]:
-        """The functions by the parameter that they are of."""
+        """Functions by the parameter that they describe."""
         sections = {name: getattr(self, name) for name in type(self).model_fields}
         return {name: section for name, section in sections.items() if section is not None}
 
 
 class JointFit(Section):
-    """How a joint's parameters follow the energy that it has dissipated."""
+    """Evolution of a joint's parameters with the energy that it has dissipated."""
 
     title: Title = entry("one line", "Joint of the friction rig, test 1")
     fit: Literal["joint_evolution"] = entry(KIND, "joint_evolution")
@@ -229,7 +229,7 @@ class JointFit(Section):
 
 
 class WearHeadings(Section):
-    """What the columns of a file are called, where not as here."""
+    """Headings of the columns of a file, where they differ from the names here."""
 
     energy: Heading | None = entry("dissipated in the test", "E", default=None)
     amplitude: Heading | None = entry("of the slip: half the stroke", "delta", default=None)
@@ -242,7 +242,7 @@ Deviation = Annotated[float, Quantity("mm^3", above=0.0, range_text="above 0 um^
 
 
 class WearDeviations(Section):
-    """Standard deviations of volumes; without them the residuals tell the scatter."""
+    """Standard deviations of volumes; if not given, they are estimated from the residuals."""
 
     volume: Deviation | None = entry("of both bodies [mm^3]", "1e5 um^3", default=None)
     volume_1: Deviation | None = entry("of body 1 [mm^3]", "1e5 um^3", default=None)
@@ -300,7 +300,7 @@ class WearFit(Section):
 
 
 class LoopHeadings(Section):
-    """What the columns of a file are called, where not as `fretscale loops` takes them."""
+    """Headings of the columns of a file, where they differ from those of `fretscale loops`."""
 
     displacement: Heading | None = entry("between the two sides", "LDV difference", default=None)
     force: Heading | None = entry("that resists it", "load cell", default=None)
@@ -309,7 +309,7 @@ class LoopHeadings(Section):
 
 
 class LoopMeasurement(Measurement):
-    """A record of loops, of one stroke or of several."""
+    """Record of loops, of one stroke or of several."""
 
     columns: LoopHeadings = entry("other headings", default=LoopHeadings())
 
@@ -320,7 +320,7 @@ FreeResidual = Annotated[float | Free, _or_free(ResidualStiffness)]
 
 
 class FreeJoint(Section):
-    """What all laws have."""
+    """Base of the joint laws, with the entries that all of them have."""
 
     law: str  # named first; each law narrows it to its own name
     normal_load: Annotated[float | Free, _or_free(Preload)] | None = entry(
@@ -376,7 +376,7 @@ class FreeFourParameterIwan(FreeJoint):
 
 
 class LoopFit(Section):
-    """A joint law from measured hysteresis loops."""
+    """Joint law from measured hysteresis loops."""
 
     title: Title = entry("one line", "Joint of the friction rig, as new")
     fit: Literal["joint_law"] = entry(KIND, "joint_law")
@@ -400,7 +400,7 @@ KINDS: Mapping[str, type[AnyFile]] = {
 
 @dataclass(frozen=True)
 class FitInput:
-    """The file of a fit, read, and where its entries were written."""
+    """File of a fit as read, with the places of its entries."""
 
     name: str
     file: AnyFile
@@ -409,12 +409,12 @@ class FitInput:
 
 
 def load_fit(path: Path) -> FitInput:
-    """Read the file of a fit. Raises CaseError, a line ``file:line: key: ...`` for each thing."""
+    """Read the file of a fit; raise CaseError with a line ``file:line: key: ...`` per error."""
     return parse_fit(read_text(path), str(path))
 
 
 def parse_fit(text: str, name: str) -> FitInput:
-    """As :func:`load_fit`, of a text; ``name`` stands for the file in messages."""
+    """Return a fit from ``text``, as :func:`load_fit`; ``name`` stands for the file in messages."""
     source = Source(name, text)
     check_command(source, "fit")
     kind = KINDS[word_at(source, ("fit",), tuple(KINDS))]
@@ -422,5 +422,5 @@ def parse_fit(text: str, name: str) -> FitInput:
 
 
 def text_of(entries: Mapping[str, Any]) -> str:
-    """Entries of a program as a text."""
+    """Return entries given in Python as a text."""
     return json.dumps(entries)

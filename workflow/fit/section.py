@@ -1,7 +1,7 @@
-"""The result of a fit as a section of a case, ready to paste, bounds beside its numbers.
+"""Result of a fit as a section of a case, ready to paste, with bounds in comments.
 
-What the data do not determine stands there as a comment without a value, so that a case with it is
-refused until somebody decides it.
+A parameter that the data do not determine appears as a comment without a value, so that a case with
+the section is refused until the user fills it in.
 """
 
 from __future__ import annotations
@@ -17,21 +17,21 @@ from workflow.fit.profile_schema import ProfileFit
 from workflow.fit.schema import FREE, JointFit, LoopFit, WearFit
 from workflow.kinds import load_case
 
-# Of a deviation; the value ends with the same digit. Of numbers without one, or beyond it.
+# Digits of a deviation; the value ends with the same digit. MOST_DIGITS limits other numbers.
 DIGITS, MOST_DIGITS = 2, 9
-# The same of what a case is to have: correlated parameters are known together far better than each
-# alone, and rounding one of them would move the curve.
+# Digits of a deviation for values in a case: correlated parameters are known together far better
+# than each alone, and rounding one of them would change the curve.
 IN_SECTION = 4
-# Numbers between them are written without a power of ten.
+# Numbers between these limits are written without a power of ten.
 SMALL, LARGE = 1e-3, 1e6
 LEFT_OUT = "undetermined"
 BOUNDS = "95 %: "
-# Left out of a section where there is no second exponential.
+# Entries left out of a section without a second exponential.
 SECOND = ("share", "second_rate")
 
 
 def rounded(value: float, deviation: float, of_deviation: int = DIGITS) -> str:
-    """A value to the last of so many digits of its deviation."""
+    """Return a value rounded to the given number of digits of its deviation."""
     if value == 0.0 or deviation <= 10.0 ** (DIGITS - MOST_DIGITS) * abs(value):
         return number_text(value, MOST_DIGITS)
     last = math.floor(math.log10(deviation)) - of_deviation + 1
@@ -41,7 +41,7 @@ def rounded(value: float, deviation: float, of_deviation: int = DIGITS) -> str:
 
 
 def number_text(value: float, digits: int) -> str:
-    """A number with so many digits, its power of ten as YAML has it."""
+    """Return a number with this many digits, with the power of ten in YAML's notation."""
     if SMALL <= abs(value) < LARGE:
         return f"{float(f'{value:.{digits}g}'):.{MOST_DIGITS}g}"
     if value == 0.0:
@@ -51,12 +51,12 @@ def number_text(value: float, digits: int) -> str:
 
 
 def quantity(text: str, unit: str) -> float | str:
-    """An entry of a case: a number, or one with its unit."""
+    """Return an entry of a case: a number, or a text of number and unit."""
     return float(text) if unit == "1" else f"{text} {unit}"
 
 
 def told(parameter: Parameter) -> tuple[str, str, str]:
-    """Value, deviation and bounds of a parameter that is determined, without the unit."""
+    """Return value, deviation and bounds of a determined parameter, without the unit."""
     estimate = parameter.estimate
     deviation = parameter.shown(estimate.deviation)
     lower, upper = map(parameter.shown, estimate.bounds)
@@ -65,12 +65,12 @@ def told(parameter: Parameter) -> tuple[str, str, str]:
 
 
 def bounds_text(lower: float, upper: float, deviation: float) -> str:
-    """Bounds with the digits of the deviation."""
+    """Return bounds, rounded to the digits of the deviation."""
     return f"{rounded(lower, deviation)} to {rounded(upper, deviation)}"
 
 
 def section_of(fitted: Fitted) -> str:
-    """The sections of a case, as YAML."""
+    """Return the sections of a case, as YAML."""
     file = fitted.given.file
     if isinstance(file, ProfileFit):
         rows = _profiles(fitted, file)
@@ -82,7 +82,7 @@ def section_of(fitted: Fitted) -> str:
 
 
 def _row(fitted: Fitted, path: str, key: str) -> Row:
-    """The entry of a parameter that is free."""
+    """Return the entry of a free parameter."""
     parameter = fitted.by_path[path]
     if not parameter.estimate.determined:
         return Row(key, LEFT_OUT, parameter.estimate.doubt, off=True)
@@ -93,7 +93,7 @@ def _row(fitted: Fitted, path: str, key: str) -> Row:
 
 
 def _held(value: float | str, unit: str, key: str) -> Row:
-    """The entry of a parameter that was held at a ``value`` in base units."""
+    """Return the entry of a parameter that was held at a ``value`` in base units."""
     if isinstance(value, str):
         return Row(key, value)
     number = value if unit == "1" else Parameter("", unit, None).shown(value)  # type: ignore[arg-type]
@@ -132,7 +132,7 @@ def _law(fitted: Fitted, file: LoopFit) -> list[Row]:
 
 
 def _function(fitted: Fitted, name: str, section: Section) -> list[Row]:
-    """The entries of a function of the energy."""
+    """Return the entries of a function of the energy."""
     rows = []
     for key, value in section.model_dump().items():
         if key in SECOND and getattr(section, "share", None) == 1.0:
@@ -146,7 +146,7 @@ def _function(fitted: Fitted, name: str, section: Section) -> list[Row]:
 
 
 def entries_of(fitted: Fitted, path: str) -> list[str]:
-    """The entries of a case that have the parameter: none of what no case has."""
+    """Return the entries of a case that contain the parameter; none if no case has it."""
     file, name = fitted.given.file, path.rpartition(".")[2]
     if isinstance(file, WearFit | ProfileFit):
         if path.startswith("wear.both.") or name not in ("coefficient", "threshold"):
@@ -181,7 +181,7 @@ def _bodies(fitted: Fitted) -> list[str]:
 
 
 def _profiles(fitted: Fitted, file: ProfileFit) -> list[Row]:
-    """As of volumes, with what the case of the first test has held."""
+    """Return the section of wear, with fixed values from the case of the first test."""
     wear: Any = load_case(Path(file.measurements[0].case)).wear  # type: ignore[attr-defined]
     rows, bodies = [Row("law", wear.law)], _bodies(fitted)
     if wear.reference_amplitude is not None:
@@ -196,7 +196,7 @@ def _profiles(fitted: Fitted, file: ProfileFit) -> list[Row]:
 
 
 def _threshold(fitted: Fitted, body: str) -> list[Row]:
-    """The evolution of a body, if the fit asks for a threshold: its own, or that of all."""
+    """Return the evolution of a body if the fit has a threshold, its own or a common one."""
     own = f"wear.{body}.threshold"
     path = own if own in fitted.by_path else "wear.threshold"
     if path not in fitted.by_path:
@@ -206,7 +206,7 @@ def _threshold(fitted: Fitted, body: str) -> list[Row]:
 
 
 def _body(fitted: Fitted, body: str) -> list[Row]:
-    """The entries of a body; of both together that of each is left to be decided."""
+    """Return the entries of a body; the shares of both bodies together are left to the user."""
     entries = [_row(fitted, f"wear.{body}.coefficient", "coefficient")]
     entries += _threshold(fitted, body)
     if (path := f"wear.{body}.intercept") in fitted.by_path:

@@ -1,4 +1,4 @@
-"""The files of a fit that ``fretscale new`` writes."""
+"""Templates of the files of fits, for ``fretscale new``."""
 
 from __future__ import annotations
 
@@ -22,5 +22,5 @@ HEADER = f"""\
 
 
 def fit_template(kind: str) -> str:
-    """A commented file of a fit, one of ``FITS``."""
+    """Return a commented file of a fit, one of ``FITS``."""
     return template(FITS[kind][0], HEADER)

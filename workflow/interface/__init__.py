@@ -1,4 +1,4 @@
-"""What ``import fretscale`` offers: cases from files and dictionaries, runs, and their results.
+"""Python interface of fretscale: cases from files and dictionaries, runs, and their results.
 
-The package of that name, in ``workflow/facade``, only hands on what is here.
+The package ``fretscale`` in ``workflow/facade`` only re-exports these names.
 """

@@ -18,9 +18,9 @@ from workflow.errors import CaseError
 from workflow.shell.measured import check_measured
 
 AnyCase = str | os.PathLike[str] | Mapping[str, Any] | Case
-"""A case: the path of its file, its entries as nested dictionaries, or one that was loaded."""
+"""Case: the path of its file, its entries as nested dictionaries, or a loaded case."""
 
-# In the place of the dots of an entry, where it is the name of an argument.
+# Replaces the dots of a path where it is the name of an argument.
 BETWEEN = "__"
 
 
@@ -28,13 +28,13 @@ def load_case(case: AnyCase, /, **overrides: Any) -> Case:
     """Read and check a case.
 
     A dictionary has the entries of a case file; values are numbers in the base units (N, mm, s,
-    MPa, tonne) or texts with a unit, and files are looked for from the current folder. An override
-    is an entry with ``__`` for each dot: ``wear__cycles=1e6`` is what ``--set wear.cycles=1e6`` is
-    on the command line. Entries of lists, and those whose names are no words, go in as
-    ``**{"load_path.0.P": "2 kN"}``.
+    MPa, tonne) or texts with a unit, and relative file names start from the current folder. An
+    override is an entry with ``__`` for each dot: ``wear__cycles=1e6`` corresponds to
+    ``--set wear.cycles=1e6`` on the command line. Entries of lists, and entries whose names are not
+    Python names, are passed as ``**{"load_path.0.P": "2 kN"}``.
 
-    Returns the frozen case, its entries as attributes, in base units. Raises :class:`CaseError`,
-    a line for each thing wrong, in the words of the command.
+    Returns the frozen case, with its entries as attributes in base units. Raises
+    :class:`CaseError` with a line for each error, as on the command line.
 
     Examples
     --------
@@ -63,16 +63,16 @@ def load_case(case: AnyCase, /, **overrides: Any) -> Case:
 
 @dataclass(frozen=True)
 class Check:
-    """What a case would run.
+    """Summary of what a case would run.
 
-    ``title`` is its own, ``memory`` the upper estimate of what it needs [bytes], ``seconds`` the
-    order of magnitude of its time [s] and ``time`` the same in words, with what of it cannot be
-    known before the run, ``outline`` what would run in rows of name and text, ``doubts`` what looks
-    like a slip.
+    ``title`` is the title of the case and ``outline`` has rows of name and text on what would run.
+    ``memory`` is an upper estimate of the memory [bytes]. ``seconds`` is the order of magnitude of
+    the run time [s]; ``time`` is the same as text, with what cannot be known before the run.
+    ``doubts`` are plausibility warnings.
 
     Examples
     --------
-    Printed, it is what ``fretscale check`` says:
+    Fields of the summary; printed, it is the output of ``fretscale check``:
 
     >>> import fretscale
     >>> checked = fretscale.check("cases/sphere_normal.yaml")
@@ -95,10 +95,10 @@ class Check:
 
 
 def check(case: AnyCase, /, **overrides: Any) -> Check:
-    """What a case would run, in what memory and time; nothing is computed.
+    """Return what a case would run, with its memory and run time, without computing anything.
 
-    Takes what :func:`load_case` takes. Raises :class:`CaseError`; :class:`OutOfMemory` where the
-    machine has too little.
+    Takes the arguments of :func:`load_case`. Raises :class:`CaseError`, or :class:`OutOfMemory`
+    where the machine has too little memory.
 
     Examples
     --------
@@ -117,12 +117,12 @@ def check(case: AnyCase, /, **overrides: Any) -> Check:
 
 
 def _text(value: object) -> str:
-    """A value as one would write it behind ``--set key=``."""
+    """Return a value as a user would write it after ``--set key=``."""
     return value if isinstance(value, str) else json.dumps(_plain(value))
 
 
 def _plain(value: Any, path: tuple[str | int, ...] = ()) -> Any:
-    """A value as JSON has it. Raises :class:`CaseError`."""
+    """Return a value with JSON types only; raise :class:`CaseError` for other types."""
     if value is None or isinstance(value, bool | int | float | str):
         return value
     if isinstance(value, Mapping):
@@ -131,7 +131,7 @@ def _plain(value: Any, path: tuple[str | int, ...] = ()) -> Any:
         return [_plain(below, (*path, number)) for number, below in enumerate(value)]
     if isinstance(value, os.PathLike):
         return os.fspath(value)
-    if hasattr(value, "tolist"):  # of numpy
+    if hasattr(value, "tolist"):  # arrays and numbers of numpy
         return _plain(value.tolist(), path)
     raise CaseError(
         f"{IN_PYTHON}: {dotted(path)}: of type {type(value).__name__}; "

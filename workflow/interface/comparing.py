@@ -1,4 +1,4 @@
-"""Finished runs side by side, from a program."""
+"""Comparison of finished runs in Python."""
 
 from __future__ import annotations
 
@@ -17,15 +17,15 @@ if TYPE_CHECKING:
     import pandas as pd
 
 AnyRun = str | os.PathLike[str] | Results
-"""A finished run: its folder, or its results."""
+"""Finished run: its folder, or its results."""
 
 
 def compare(*runs: AnyRun) -> Comparison:
-    """Put two finished runs or more of one analysis side by side; the first is the reference.
+    """Compare two or more finished runs of one analysis; the first is the reference.
 
-    Each is a folder or what :func:`fretscale.run` and :func:`fretscale.open` give. Raises
-    :class:`UserError` for less than two, one twice, a folder without a finished run, and runs of
-    different analyses.
+    Each run is a folder or the results of :func:`fretscale.run` or :func:`fretscale.open`. Raises
+    :class:`UserError` for fewer than two runs, one given twice, a folder without a finished run,
+    and runs of different analyses.
 
     Examples
     --------
@@ -58,16 +58,16 @@ def compare(*runs: AnyRun) -> Comparison:
 
 
 class ComparedResult(NamedTuple):
-    """A main result in every run, in the base ``unit`` of the first that has it.
+    """Main result in every run, in the base ``unit`` of the first run that has it.
 
-    ``of`` is empty for whole runs. ``values`` are None where a run has none. ``errors`` are
-    estimated ones and ``differences`` those to the first run, both relative and None where there is
-    none; ``beyond`` is whether a difference is more than both estimated errors, None where nobody
-    knows.
+    ``of`` is the part that the result belongs to, empty for the whole run, and ``name`` its name.
+    ``values`` are None where a run has none. ``errors`` are estimates and ``differences`` are from
+    the first run; both are relative, and None where not known. ``beyond`` is whether a difference
+    exceeds both estimated errors, None where one of them is not known.
 
     Examples
     --------
-    Hertz's bodies move by P to the power 2/3, so twice the load is 0.59 more:
+    The approach of Hertz grows with P to the power 2/3, so by 0.59 for twice the load:
 
     >>> import fretscale, tempfile
     >>> coarse = fretscale.load_case(
@@ -96,15 +96,15 @@ class ComparedResult(NamedTuple):
 
 
 class Comparison:
-    """Finished runs side by side, as ``fretscale compare`` has them; printed, they are its text.
+    """Comparison of finished runs; printed, it is the text of ``fretscale compare``.
 
-    ``names`` are those of the runs, ``results`` the main results of all,
-    ``comparison["depth"]`` the one of that name, or of ``"flank, depth"``, and ``entries`` in words
-    what differs in the cases, by dotted path.
+    ``names`` are the names of the runs and ``results`` the main results of all of them.
+    ``comparison["depth"]`` is the result of that name, as is ``comparison["flank, depth"]``, with
+    its part. ``entries`` has the differences of the cases as text, by dotted path.
 
     Examples
     --------
-    Two loads on one ball, as tables and pages have them:
+    Two loads on one ball:
 
     >>> import fretscale, tempfile
     >>> coarse = fretscale.load_case(
@@ -137,7 +137,7 @@ class Comparison:
         raise KeyError(f"{name}: not there; allowed: {_listed(self.results)}")
 
     def pandas(self) -> pd.DataFrame:
-        """The table that ``compare.csv`` has, a row for each result, by what it is of and its name.
+        """Return the table of ``compare.csv``, a row for each result, indexed by part and name.
 
         Values are in base units; errors and differences are relative.
         """
@@ -150,7 +150,7 @@ class Comparison:
         """Write ``compare.html``, ``compare.csv`` and curves into a folder ``out``.
 
         Returns the path of the page. Raises :class:`UserError` for a folder that has them already,
-        unless ``force``, or that is of something else.
+        unless ``force``, or that holds something else.
         """
         _, page = write_comparison(self._compared, Path(out), force)
         return page

@@ -1,4 +1,4 @@
-"""What lies in ``results.h5``, read when it is needed: as numpy, xarray and pandas have it."""
+"""Contents of ``results.h5``, read on demand, as numpy, xarray and pandas objects."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
 
-# What tells numbered groups apart: the first that all have; else their number.
+# Attributes that distinguish numbered groups: the first that all groups have, else their number.
 TOLD_APART_BY = ("cycles", "increment", "force", "level", "energy", "frequency")
 NUMBER = "number"
 
 
 @dataclass(frozen=True)
 class File:
-    """``results.h5`` as it was when it was opened, which another run may have replaced since."""
+    """File ``results.h5`` in its state when opened, since another run may replace it later."""
 
     path: Path
     written: tuple[int, ...]
@@ -40,7 +40,7 @@ class File:
 
     @contextmanager
     def reading(self) -> Iterator[h5py.File]:
-        """The file, open. Raises :class:`UserError` where it is not the same any more."""
+        """Open the file for reading; raise :class:`UserError` if it has changed."""
         if not self.path.exists() or _written(self.path) != self.written:
             raise UserError(f"{self.path}: replaced or removed since it was opened; open it again")
         with h5py.File(self.path) as file:
@@ -53,14 +53,15 @@ def _written(path: Path) -> tuple[int, ...]:
 
 
 class Values(NDArrayOperatorsMixin):
-    """A dataset: its ``values`` are read when they are needed, the rest is known at once.
+    """Dataset whose ``values`` are read on demand; the rest is known at once.
 
-    Numpy takes it as the array that it is; ``[...]`` reads a part of it. ``unit`` is "1" for none.
-    ``dims`` are the names of its axes, "" for one without; ``coordinates`` their values by name.
+    Numpy treats it as an array; ``[...]`` reads a part of it. ``unit`` is "1" for none. ``dims``
+    are the names of its axes, "" for an unnamed one; ``coordinates`` are the values along the axes,
+    by name.
 
     Examples
     --------
-    The pressures on cells of 1/16 mm together are the load of 400 N:
+    The pressures on cells of 1/16 mm add up to the load of 400 N:
 
     >>> import fretscale, tempfile
     >>> coarse = fretscale.load_case(
@@ -92,7 +93,7 @@ class Values(NDArrayOperatorsMixin):
 
     @cached_property
     def values(self) -> NDArray[Any]:
-        """All of it."""
+        """All values of the dataset."""
         return np.asarray(self[()])
 
     def __array__(self, dtype: Any = None, copy: bool | None = None) -> NDArray[Any]:
@@ -118,7 +119,7 @@ class Values(NDArrayOperatorsMixin):
 
     @property
     def coordinates(self) -> dict[str, Values]:
-        """The datasets along its axes, by the names of these."""
+        """Datasets along the axes, by the names of the axes."""
         found = {}
         with self._file.reading() as file:
             for dim in filter(None, self.dims):
@@ -129,11 +130,11 @@ class Values(NDArrayOperatorsMixin):
         return found
 
     def xarray(self) -> xr.DataArray:
-        """The same as an ``xarray.DataArray``."""
+        """Return the dataset as an ``xarray.DataArray``."""
         return _data_array(self)
 
     def pandas(self) -> pd.Series:
-        """A curve as a ``pandas.Series`` over what it is along; :class:`UserError` for others."""
+        """Return a curve as a ``pandas.Series``; raise :class:`UserError` for other datasets."""
         return _series(self)
 
     def __repr__(self) -> str:
@@ -145,13 +146,13 @@ class Values(NDArrayOperatorsMixin):
 
 
 class Group(Mapping[str, "Group | Values"]):
-    """What lies under one name in ``results.h5``: groups and datasets, by name or path.
+    """Groups and datasets under one name in ``results.h5``, accessed by name or path.
 
-    ``attributes`` are the numbers and texts that belong to it.
+    ``attributes`` are the numbers and texts that belong to the group.
 
     Examples
     --------
-    What lies in it has names, and may be reached by paths:
+    Access by names and by paths:
 
     >>> import fretscale, tempfile
     >>> coarse = fretscale.load_case(
@@ -195,16 +196,16 @@ class Group(Mapping[str, "Group | Values"]):
 
     @property
     def attributes(self) -> dict[str, Any]:
-        """Numbers and texts that belong to it, by name."""
+        """Numbers and texts that belong to the group, by name."""
         with self._reading() as group:
             return {name: _plain(value) for name, value in group.attrs.items()}
 
     def tree(self, depth: int = 20) -> str:
-        """What there is, with shapes and units, as lines; so many levels of it."""
+        """Return the contents as lines with shapes and units, down to ``depth`` levels."""
         return "\n".join(self._lines(depth))
 
     def _lines(self, depth: int, indent: str = "") -> Iterator[str]:
-        """The same; of numbered groups, which are alike, the first."""
+        """Yield the lines of the tree, with only the first of numbered groups."""
         numbered = [name for name in self if name.isdecimal()]
         for name in self:
             if name in numbered[1:]:
@@ -219,16 +220,16 @@ class Group(Mapping[str, "Group | Values"]):
                     yield from item._lines(depth - 1, indent + "  ")
 
     def xarray(self) -> xr.Dataset:
-        """Its datasets as an ``xarray.Dataset``; those of numbered groups are put together.
+        """Return the datasets as an ``xarray.Dataset``; those of numbered groups are concatenated.
 
-        The new axis is the cycles, increments or forces that tell the groups apart.
+        The new axis has the cycles, increments or forces that distinguish the groups.
         """
         return _data_set(self)
 
     def pandas(self) -> pd.DataFrame:
-        """Its curves as a ``pandas.DataFrame``, or the numbers of numbered groups, a row for each.
+        """Return the curves as a ``pandas.DataFrame``, or the numbers of numbered groups.
 
-        Raises :class:`UserError` where there is nothing of the kind.
+        Numbered groups have a row each. Raises :class:`UserError` where there is neither.
         """
         return _data_frame(self)
 
@@ -240,7 +241,7 @@ class Group(Mapping[str, "Group | Values"]):
 
 
 def _plain(value: Any) -> Any:
-    """An attribute as Python has it."""
+    """Return an attribute as a Python object."""
     return value.item() if isinstance(value, np.generic) else value
 
 
@@ -248,7 +249,7 @@ def _plain(value: Any) -> Any:
 
 
 def _data_array(values: Values) -> xr.DataArray:
-    """A dataset over its coordinates."""
+    """Return a dataset with its coordinates."""
     import xarray
 
     dims = _dims(values)
@@ -263,7 +264,7 @@ def _data_array(values: Values) -> xr.DataArray:
 
 
 def _data_set(group: Group) -> xr.Dataset:
-    """The datasets of a group, and those of the numbered groups in it put together."""
+    """Return the datasets of a group, with those of its numbered groups concatenated."""
     import xarray
 
     arrays = {name: _data_array(item) for name, item in _datasets(group).items()}
@@ -279,7 +280,7 @@ def _data_set(group: Group) -> xr.Dataset:
 
 
 def _series(values: Values) -> pd.Series:
-    """A curve over what it is along."""
+    """Return a curve over its coordinate."""
     import pandas
 
     if values.ndim != 1:
@@ -288,7 +289,7 @@ def _series(values: Values) -> pd.Series:
 
 
 def _data_frame(group: Group) -> pd.DataFrame:
-    """The curves of a group side by side, or the numbers of the numbered groups in it."""
+    """Return the curves of a group as columns, or the numbers of its numbered groups."""
     import pandas
 
     datasets = {name: item for name, item in _datasets(group).items() if item.ndim == 1}
@@ -314,7 +315,7 @@ def _data_frame(group: Group) -> pd.DataFrame:
 
 
 def _attributes(values: Values) -> dict[str, str]:
-    """As others name them (CF conventions)."""
+    """Return the attributes under their names in the CF conventions."""
     return {"units": values.unit, "long_name": values.description}
 
 
@@ -324,13 +325,13 @@ def _heading(values: Values) -> str:
 
 
 def _dims(values: Values) -> list[str]:
-    """Names of all axes; one without is of this dataset alone."""
+    """Return the names of all axes; an unnamed axis gets a name from its dataset."""
     name = values.name.rpartition("/")[2]
     return [dim or f"{name}_{axis}" for axis, dim in enumerate(values.dims)]
 
 
 def _index(values: Values) -> Any:
-    """What curves are along, if they are along something."""
+    """Return the coordinate of curves as an index; None if they have none."""
     along = values.coordinates.get(values.dims[0])
     if along is None:
         return None
@@ -344,13 +345,13 @@ def _datasets(group: Group) -> dict[str, Values]:
 
 
 def _numbered(group: Group) -> dict[str, Group]:
-    """The groups in a group whose names are numbers."""
+    """Return the groups in a group whose names are numbers."""
     groups = {name: item for name, item in group.items() if isinstance(item, Group)}
     return {name: item for name, item in groups.items() if name.isdecimal()}
 
 
 def _told_apart(numbered: dict[str, Group]) -> tuple[str, list[Any]]:
-    """What tells them apart, and its value for each."""
+    """Return the attribute that distinguishes the groups, and its value for each."""
     attributes = [part.attributes for part in numbered.values()]
     for name in TOLD_APART_BY:
         places = [found.get(name) for found in attributes]
@@ -360,7 +361,7 @@ def _told_apart(numbered: dict[str, Group]) -> tuple[str, list[Any]]:
 
 
 def _alike(numbered: dict[str, Group]) -> dict[str, list[Values]]:
-    """The datasets that all of them have in the same shape."""
+    """Return the datasets that all groups have in the same shape."""
     parts = [_datasets(part) for part in numbered.values()]
     return {
         name: [part[name] for part in parts]

@@ -1,4 +1,4 @@
-"""Parameters from measurements, from a program."""
+"""Fits of parameters to measurements in Python."""
 
 from __future__ import annotations
 
@@ -16,33 +16,33 @@ from workflow.fit.schema import load_fit, parse_fit, text_of
 from workflow.fit.section import section_of
 
 AnyFit = str | os.PathLike[str] | Mapping[str, Any]
-"""A fit: the path of its file, or its entries as nested dictionaries."""
+"""Fit: the path of its file, or its entries as nested dictionaries."""
 
 
 def fit(
     asked: AnyFit, /, out: str | os.PathLike[str] | None = None, *, force: bool = False
 ) -> FitResult:
-    """Find parameters of a case from measurements.
+    r"""Fit parameters of a case to measurements.
 
-    ``asked`` is what ``fretscale new`` writes as ``fit_joint``, ``fit_loops``, ``fit_wear`` or
-    ``fit_profiles``: the path of such a file, or a dictionary of its entries, whose tables are
-    looked for from the current folder. With ``out`` the section of a case, tables, summary and
-    figure are written there, over what an earlier one has left if ``force``; ``fit_profiles`` needs
-    it for its runs.
+    ``asked`` has the contents that ``fretscale new`` writes for ``fit_joint``, ``fit_loops``,
+    ``fit_wear`` or ``fit_profiles``: it is the path of such a file, or a dictionary of its entries,
+    in which relative file names start from the current folder. The section of a case, tables,
+    summary and figure are written to the folder ``out``, if given; with ``force`` they replace
+    those of an earlier fit. ``fit_profiles`` needs ``out`` for its runs.
 
     Returns the parameters with their bounds. Raises :class:`CaseError` and :class:`UserError` for a
-    file, tables or data that allow no fit, in the words of the command; :class:`FretscaleError`
-    where no start leads to a solution.
+    file, tables or data that allow no fit, and :class:`FretscaleError` where no start leads to a
+    solution.
 
     Examples
     --------
-    Volumes that four tests wore:
+    Worn volumes of four tests:
 
     >>> import fretscale, pathlib, tempfile
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     table = pathlib.Path(folder, "volumes.csv")
     ...     rows = ["energy [kJ], volume [mm^3]", "2, 3e-3", "4, 6.1e-3", "6, 9e-3", "8, 12e-3"]
-    ...     _ = table.write_text("\\n".join(rows))
+    ...     _ = table.write_text("\n".join(rows))
     ...     found = fretscale.fit(
     ...         {
     ...             "title": "Four tests",
@@ -67,10 +67,11 @@ def fit(
 
 
 class FittedParameter(NamedTuple):
-    """A free parameter, in ``unit``: its ``value``, standard ``deviation`` and bounds of 95 %.
+    """Free parameter in ``unit``: its ``value``, standard ``deviation`` and 95 % bounds.
 
-    The bounds are ``lower`` and ``upper``. All are None where the data do not determine it, and
-    ``doubt`` says why. ``shares`` are those of each kind of data in its variance.
+    The bounds are ``lower`` and ``upper``. Numbers are None where the data do not determine the
+    parameter; ``doubt`` then says why. ``shares`` are the contributions of each kind of data to
+    the variance.
 
     Examples
     --------
@@ -90,11 +91,11 @@ class FittedParameter(NamedTuple):
 
 
 class FitResult:
-    """What a fit has found; printed, it is what ``fretscale fit`` says.
+    r"""Result of a fit; printed, it is the report of ``fretscale fit``.
 
-    ``parameters`` by their paths in a case, ``result["joint.friction"]`` the one of that path,
-    ``correlation`` of them ``(p, p)``, ``section`` the YAML of a case, ``doubts`` what speaks
-    against the fit, ``summary`` all of it as the command writes it.
+    ``parameters`` has the parameters by their paths in a case, as has ``result["joint.friction"]``.
+    ``correlation`` is their correlation matrix ``(p, p)``, ``section`` the YAML of a case, and
+    ``doubts`` are warnings about the fit. ``summary`` has all of this, as in ``summary.json``.
 
     Examples
     --------
@@ -104,7 +105,7 @@ class FitResult:
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     table = pathlib.Path(folder, "loops.csv")
     ...     rows = [f"{10 * k}, {20 - 0.1 * k}" for k in range(6)]
-    ...     _ = table.write_text("\\n".join(["energy [J], kt [N/um]", *rows]))
+    ...     _ = table.write_text("\n".join(["energy [J], kt [N/um]", *rows]))
     ...     found = fretscale.fit(
     ...         {
     ...             "title": "Six loops",
@@ -132,12 +133,12 @@ class FitResult:
 
     @property
     def parameters(self) -> dict[str, FittedParameter]:
-        """All free parameters by their paths."""
+        """Free parameters by their paths."""
         return {path: _parameter(told) for path, told in self.summary["parameters"].items()}
 
     @property
     def correlation(self) -> Array:
-        """Of the parameters in their order ``(p, p)``; NaN where one is not determined."""
+        """Correlation of the parameters ``(p, p)`` in order; NaN where one is not determined."""
         return self._fitted.fit.correlation
 
 

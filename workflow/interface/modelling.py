@@ -12,12 +12,12 @@ from workflow.models.wear import WearModel
 def wear_model(case: AnyCase, /, **overrides: Any) -> WearModel:
     """Return the model that a wear case describes, to be changed and run in Python.
 
-    Case and overrides are those of :func:`fretscale.load_case`. Raises :class:`CaseError` for a bad
+    Takes the arguments of :func:`fretscale.load_case`. Raises :class:`CaseError` for an invalid
     case, and :class:`UserError` for a case of another kind.
 
     Examples
     --------
-    The same joint with another friction on both flanks:
+    The same joint with another coefficient of friction on both flanks:
 
     >>> from dataclasses import replace
     >>> import fretscale

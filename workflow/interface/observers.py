@@ -1,4 +1,4 @@
-"""Observers of a model that runs in Python: its progress, and a checkpoint to go on from."""
+"""Observers of a model that runs in Python: its progress, and a checkpoint to resume from."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from workflow.shell.store import DamagedFile, read_arrays, write_arrays
 
 
 class Progress(Observer):
-    """Print a line for each part of a run, and one after every jump.
+    """Observer that prints a line for each part of a run, and one after every jump.
 
     Parameters
     ----------
@@ -50,16 +50,16 @@ class Progress(Observer):
 
 
 class Checkpoint(Observer):
-    """Write the state of a run to a file after every jump, so that another run can go on from it.
+    """Observer that writes the state of a run to a file after every jump, to resume from it.
 
     Parameters
     ----------
     path : path
-        The file. It is replaced when a new state is written in full, so that it is always whole.
+        The file. It is replaced only when a new state is written in full, so it is never partial.
 
     Examples
     --------
-    The second run goes on where the first one ended, or was interrupted:
+    The second run continues where the first one ended, or was interrupted:
 
     >>> import tempfile, fretscale
     >>> folder = tempfile.TemporaryDirectory()
@@ -75,9 +75,9 @@ class Checkpoint(Observer):
         write_arrays(self.path, *stored_state(after))
 
     def state(self) -> CoupledState | None:
-        """Return the state that was written last, or None without a file.
+        """Return the last state written, or None if there is no file.
 
-        Raises UserError for a file that holds no such state.
+        Raises UserError for a file without such a state.
         """
         if not self.path.exists():
             return None

@@ -1,4 +1,4 @@
-"""The results in the folder of a finished run."""
+"""Results in the folder of a finished run."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ from workflow.shell.summary import required_number
 
 
 def open(folder: str | os.PathLike[str]) -> Results:  # noqa: A001 - fretscale.open
-    """The results in the folder of a finished run.
+    """Return the results in the folder of a finished run.
 
-    Raises :class:`UserError` where the folder has no run of fretscale, one that is not finished, or
-    one whose results are not as it has left them.
+    Raises :class:`UserError` where the folder has no run of fretscale, an unfinished run, or
+    results that were changed since the run.
 
     Examples
     --------
@@ -41,13 +41,14 @@ def open(folder: str | os.PathLike[str]) -> Results:  # noqa: A001 - fretscale.o
 
 
 class MainResult(NamedTuple):
-    """A main result: of what, its name and value in a base ``unit``, its estimated error.
+    """Main result of a run: its name and ``value`` in a base ``unit``, and its estimated error.
 
-    ``of`` is empty for the whole run; ``error`` is relative, None where nobody knows.
+    ``of`` is the part that the result belongs to, empty for the whole run, and ``name`` its name.
+    ``error`` is relative, None where it is not known.
 
     Examples
     --------
-    The load that was asked for:
+    The applied load:
 
     >>> import fretscale, tempfile
     >>> coarse = fretscale.load_case(
@@ -70,7 +71,7 @@ class MainResult(NamedTuple):
 
 
 class MainResults(tuple[MainResult, ...]):
-    """The main results of a run; printed, they are a table with units and estimated errors."""
+    """Main results of a run; printed, they are a table with units and estimated errors."""
 
     __slots__ = ()
 
@@ -94,16 +95,15 @@ class MainResults(tuple[MainResult, ...]):
 
 
 class Results(Group):
-    """The results of a run: ``summary`` has the numbers, names lead to all that was computed.
+    """Results of a run: numbers in ``summary``, and everything computed, by name.
 
-    ``folder`` is where it lies, ``warnings`` what the run has warned of, ``main`` its main results
-    with units and estimated errors. ``results["contact"]`` is
-    a :class:`Group`, ``results["kinetics/cycles"]`` are :class:`Values`; ``tree()`` tells what
-    there is.
+    ``folder`` is the folder of the run, ``warnings`` are its warnings, and ``main`` are its main
+    results with units and estimated errors. ``results["contact"]`` is a :class:`Group`,
+    ``results["kinetics/cycles"]`` a :class:`Values`; ``tree()`` lists the contents.
 
     Examples
     --------
-    On a grid so coarse the largest pressure is within 1 % of Hertz's, 1450 MPa:
+    On this coarse grid the largest pressure is within 1 % of Hertz's, 1450 MPa:
 
     >>> import fretscale, tempfile
     >>> coarse = fretscale.load_case(
@@ -126,22 +126,22 @@ class Results(Group):
 
     @property
     def title(self) -> str:
-        """Of the case."""
+        """Title of the case."""
         return str(self.summary["title"])
 
     @property
     def warnings(self) -> list[str]:
-        """What the run has warned of."""
+        """Warnings of the run."""
         return list(self.summary["warnings"])
 
     @cached_property
     def case(self) -> Case:
-        """The case as run. Raises :class:`CaseError` where a file that it names has gone."""
+        """Case as run; :class:`CaseError` is raised if a file that it names no longer exists."""
         return load_case(OutputFolder(self.folder).case)
 
     @property
     def main(self) -> MainResults:
-        """The main results, as the report and ``fretscale compare`` have them."""
+        """Main results, as in the report and in ``fretscale compare``."""
         found = analysis_of(self.case).quantities(self.case, self.summary)
         return MainResults(
             MainResult(q.group, q.name, required_number(self.summary, q.path), q.unit, q.error)
@@ -149,7 +149,7 @@ class Results(Group):
         )
 
     def report(self, out: str | os.PathLike[str] | None = None) -> Path:
-        """Write ``report.html`` of the run anew, into its folder or a file ``out``; its path."""
+        """Write ``report.html`` again, into the folder or to a file ``out``; return its path."""
         return write_report(self.folder, None if out is None else Path(out))
 
     def __repr__(self) -> str:

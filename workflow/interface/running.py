@@ -1,4 +1,4 @@
-"""A run of a case from a program."""
+"""Runs of cases in Python."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ from workflow.runs.run import bring_to_end, kept_in, run_case
 from workflow.shell.screen import Loudness
 from workflow.shell.streams import hold_standard_streams
 
-# Where runs go that are given no folder.
+# Parent folder of runs for which no folder is given.
 OUT = Path("out")
-# Letters of the name of such a folder, before the digits that tell its case from others.
+# Letters in the name of such a folder, before the hash digits that identify the case.
 LONGEST_NAME = 40
 DIGITS = 8
 
@@ -34,18 +34,17 @@ def run(
     quiet: bool = False,
     **overrides: Any,
 ) -> Results:
-    """Compute a case, or find the results of it again.
+    """Compute a case, or return its results if they exist already.
 
-    ``case`` and ``overrides`` are those of :func:`fretscale.load_case`. The folder ``out`` is by
-    default one below ``out`` with a name made of the case and its values, the same for the same
-    case. A finished run of this case that it holds is not computed again, one that was interrupted
-    goes on from there; a run of another case is in the way. With ``force`` all that a run has
-    written there gives way. What a run says goes to stderr, no more than warnings if ``quiet``, and
-    into its log.
+    ``case`` and ``overrides`` are the arguments of :func:`fretscale.load_case`. By default, results
+    are written below the folder ``out``, in a folder named after the case and its values, so that
+    the same case has the same folder. If the folder has a finished run of this case, nothing is
+    computed; an interrupted run is resumed; a run of another case is an error. With ``force``, the
+    files of an earlier run are replaced. Messages go to stderr, only warnings if ``quiet``, and to
+    the log.
 
-    Returns the results, which are read from the folder when they are asked for. Raises
-    :class:`FretscaleError`; KeyboardInterrupt leaves a folder to go on from, by the same call or
-    by ``fretscale resume``.
+    Returns the results, which are read from the folder on demand. Raises :class:`FretscaleError`.
+    After a KeyboardInterrupt, the same call or ``fretscale resume`` continues the run.
 
     Examples
     --------
@@ -75,7 +74,7 @@ def run(
 
 
 def _name(case: AnyCase, loaded: Case) -> str:
-    """The name of a folder for a case, and for no other."""
+    """Return the name of a folder for a case, different for every case."""
     text = Path(case).stem if isinstance(case, str | os.PathLike) else loaded.title
     words = re.sub(r"\W+", "-", text.lower()).strip("-")[:LONGEST_NAME].strip("-")
     digits = hashlib.sha256(dump_case(loaded).encode("utf-8")).hexdigest()[:DIGITS]

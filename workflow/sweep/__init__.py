@@ -1,4 +1,4 @@
-"""Many runs of one case, each with other values: ``fretscale sweep``."""
+"""Sweeps: many runs of one case, each with other values (``fretscale sweep``)."""
 
 from workflow.sweep.running import run_sweep
 

@@ -1,4 +1,4 @@
-"""Figures of a sweep: 95 % bands of the curves that its kind of run is compared by."""
+"""Figures of a sweep: 95 % bands of the curves by which runs of an analysis are compared."""
 
 from __future__ import annotations
 
@@ -25,9 +25,9 @@ from workflow.sweep.bands import FEWEST, Piece, curve_band, quantiles
 from workflow.sweep.first_order import sides
 from workflow.sweep.table import Row
 
-# Of a row of panels, and of title and legend [inches].
+# Heights of a row of panels, and of title and legend [inches].
 ROW, REST = 4.0, 1.3
-# Runs shown where there is no band.
+# Largest number of runs drawn where there is no band.
 MOST_RUNS = 100
 
 Curves = dict[str, list[Curve]]
@@ -36,7 +36,7 @@ Curves = dict[str, list[Curve]]
 
 @dataclass(frozen=True)
 class Way:
-    """How a band is made of runs: of how many at least, its ``sides``, and what they are called."""
+    """Way to make a band of runs: the fewest runs, the function of its ``sides``, and labels."""
 
     fewest: int
     sides: Callable[[Array], Array]
@@ -48,7 +48,7 @@ OF_A_SAMPLE = Way(FEWEST, quantiles, "95 % of the runs at each place", "median")
 
 
 def to_first_order(runs: int) -> Way:
-    """That of all ``runs`` about one in the middle."""
+    """Return the way that needs all ``runs``, which are spaced about one in the middle."""
     return Way(runs, sides, "95 % to first order", "best values")
 
 
@@ -61,7 +61,7 @@ def write_band_figures(
 ) -> list[Path]:
     """Draw the bands of all curves that enough runs have, a figure for each horizontal axis.
 
-    Returns their paths.
+    Returns the paths of the figures.
     """
     figures: dict[str, Curves] = {}
     for name, curves in _curves(analysis, rows).items():
@@ -73,7 +73,7 @@ def write_band_figures(
 
 
 def _curves(analysis: Analysis[Any], rows: Sequence[Row]) -> Curves:
-    """Curves of the runs that have ended, by title."""
+    """Return the curves of the finished runs, by title."""
     curves: Curves = {}
     for row in rows:
         if not row.done:
@@ -86,7 +86,7 @@ def _curves(analysis: Analysis[Any], rows: Sequence[Row]) -> Curves:
 
 
 def _changes(curves: Sequence[Curve]) -> bool:
-    """Whether any run has another curve than the first."""
+    """Return whether any run has another curve than the first."""
     first = curves[0]
     return any(
         len(c.x) != len(first.x) or not np.array_equal(c.y, first.y) or np.any(c.x != first.x)

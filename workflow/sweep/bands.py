@@ -1,10 +1,10 @@
-"""95 % bands of what the runs of a sample give: of numbers, and of curves.
+"""95 % bands of the results of a sample of runs, for numbers and for curves.
 
-A band goes from the 2.5 to the 97.5 % quantile of the runs. How well these are known is told by
-the order statistics between which the quantile of all possible runs lies in at least 95 of 100
-samples, whatever the distribution (David and Nagaraja 2003, *Order Statistics*, section 7.1): for
-the outer side of a band that takes 146 runs. It holds for independent draws; a Latin hypercube is
-mostly better.
+A band extends from the 2.5 to the 97.5 % quantile of the runs. The accuracy of a quantile is given
+by two order statistics that enclose the quantile of all possible runs in at least 95 of 100
+samples, whatever the distribution (David and Nagaraja 2003, *Order Statistics*, section 7.1). For
+the outer limit of a band this takes 146 runs. The interval holds for independent draws; a Latin
+hypercube is mostly more accurate.
 """
 
 from __future__ import annotations
@@ -18,16 +18,16 @@ import numpy as np
 from sa_solver.types import Array
 
 LOWER, UPPER = 0.025, 0.975
-# From here on the quantiles lie within the runs: k/(n + 1) for the k-th.
+# Fewest runs for which the quantiles lie within the runs: the k-th run is at k/(n + 1).
 FEWEST = 39
-# A step back of less, in what a curve spans, is rounding.
+# Smaller steps backward, relative to the range of a curve, are rounding.
 STILL = 1e-9
-# Places of a piece of a band.
+# Largest number of places in a piece of a band.
 MOST_PLACES = 400
 
 
 class Piece(NamedTuple):
-    """A band from turn to turn: places ``(m,)``, its lower side, the median, its upper side."""
+    """Band between two turns of a curve: places ``(m,)``, lower side, median, and upper side."""
 
     places: Array
     lower: Array
@@ -36,9 +36,9 @@ class Piece(NamedTuple):
 
 
 def band_of(values: Array) -> dict[str, object] | None:
-    """The band of numbers ``(n,)``, and between what each side is known; None of too few.
+    """Return the band of numbers ``(n,)`` and the intervals of its sides; None for too few.
 
-    None in place of a number is one that so many runs cannot tell.
+    None in place of a limit means that more runs are needed to determine it.
     """
     known = np.sort(values[np.isfinite(values)])
     if len(known) < FEWEST:
@@ -53,7 +53,7 @@ def band_of(values: Array) -> dict[str, object] | None:
 
 
 def _known_within(ordered: Array, quantile: float) -> list[float | None]:
-    """Two of the numbers between which the quantile lies in 95 % of samples."""
+    """Return two of the numbers that enclose the quantile in 95 % of samples."""
     from scipy.stats import binom
 
     first, last = binom.ppf([LOWER, UPPER], len(ordered), quantile).astype(int)
@@ -63,7 +63,7 @@ def _known_within(ordered: Array, quantile: float) -> list[float | None]:
 
 
 def quantiles(values: Array) -> Array:
-    """Lower side, median and upper side ``(3, m)`` of what a sample gives ``(runs, m)``."""
+    """Return lower side, median and upper side ``(3, m)`` of a sample of values ``(runs, m)``."""
     return np.quantile(values, [LOWER, 0.5, UPPER], axis=0, method="weibull")
 
 
@@ -72,11 +72,12 @@ def curve_band(
     fewest: int = FEWEST,
     sides: Callable[[Array], Array] = quantiles,
 ) -> list[Piece]:
-    """The band of curves, each x and y ``(n,)``, piece by piece between their turns in x.
+    """Return the band of curves, each x and y ``(n,)``, in pieces between their turns in x.
 
-    ``sides`` are those of the values at a place. Empty where curves do not turn alike, or are too
-    few: there is no place to compare them at. It ends where the first of them does: those that go
-    on, as runs that dissipate more, are not all.
+    ``sides`` maps the values at a place to the sides of the band. The result is empty if the curves
+    have different numbers of turns, and so no common places, or if there are too few of them. A
+    piece ends where the first curve ends: beyond it, as for runs that dissipate more, some are
+    missing.
     """
     cut = [_pieces(x, y) for x, y in curves if len(x) > 1]
     if len(cut) < fewest or len({len(pieces) for pieces in cut}) > 1:
@@ -85,7 +86,7 @@ def curve_band(
 
 
 def _pieces(x: Array, y: Array) -> list[tuple[Array, Array]]:
-    """A curve cut where it turns in x; each piece ascends."""
+    """Return the pieces of a curve between its turns in x, each with ascending x."""
     steps = np.diff(x)
     moving = np.flatnonzero(np.abs(steps) > STILL * max(float(np.ptp(x)), np.finfo(float).tiny))
     ways = np.sign(steps[moving])

@@ -1,4 +1,4 @@
-"""From what varies to the runs: a grid, values in step, a Latin hypercube, or steps to a side."""
+"""Designs of a sweep: a grid, values in step, a Latin hypercube, or runs to first order."""
 
 from __future__ import annotations
 
@@ -20,28 +20,28 @@ from workflow.sweep.first_order import positions
 from workflow.sweep.fitted import REACH, FittedParameter, FittedSample
 from workflow.sweep.schema import DRAWN, MOST_RUNS, Amount, LogNormal, Normal, Sweep, Variation
 
-# Of a folder; what is longer is called by its hash.
+# Largest length of a folder name; a longer name is shortened with a hash.
 LONGEST_NAME = 100
-# Pictures of every run would take longer than many a run; `set` can have them.
+# Figures of every run would take longer than many a run; `set` can switch them on.
 QUIET = {"output.paraview": False, "output.figures": False}
 
 
 @dataclass(frozen=True)
 class Run:
-    """One run of a sweep: the values of what varies, as written, by path."""
+    """One run of a sweep: its name, and the varied values, as written, by path."""
 
     name: str
     values: dict[str, Any]
 
     def job(self, sweep: Sweep) -> Job:
-        """What to compute."""
+        """Return the job that computes this run."""
         entries = QUIET | sweep.file.set | self.values
         overrides = tuple(f"{path}={scalar(value)}" for path, value in entries.items())
         return Job(self.name, Path(sweep.file.case), overrides)
 
 
 def runs_of(sweep: Sweep) -> list[Run]:
-    """The runs of a sweep; a sample may draw the same one twice. Raises CaseError."""
+    """Return the runs of a sweep, which a sample may contain twice; raise CaseError."""
     varied = sweep.file.variations()
     paths = list(varied)
     if sweep.file.design in DRAWN:
@@ -68,7 +68,7 @@ def _combined(sweep: Sweep, columns: list[list[Any]]) -> list[tuple[Any, ...]]:
 
 
 def _listed(variation: Variation) -> list[Any]:
-    """All values of a list or range."""
+    """Return all values of a list or range."""
     if variation.values is not None:
         return list(variation.values)
     assert variation.range is not None
@@ -80,7 +80,7 @@ def _listed(variation: Variation) -> list[Any]:
 
 
 def _between(first: Amount, last: Amount, share: Array, scale: str) -> Array:
-    """Numbers at ``share`` (0 to 1) of the way between two ends."""
+    """Return numbers at ``share`` (0 to 1) of the way between two ends."""
     if scale == "log":
         return np.asarray(first.number * (last.number / first.number) ** share)
     return np.asarray(first.number * (1.0 - share) + last.number * share)
@@ -94,11 +94,11 @@ def _written(like: Amount, number: float) -> int | float | str:
 
 
 def _sampled(sweep: Sweep) -> dict[str, list[Any]]:
-    """A Latin hypercube: in every column each of ``samples`` equal shares is hit once.
+    """Return a Latin hypercube: every column has one value in each of ``samples`` equal shares.
 
-    Of what a fit gives this holds before its correlation ties the columns together.
+    For parameters of a fit this holds before their correlation is applied.
     """
-    from scipy.stats import qmc  # half a second
+    from scipy.stats import qmc  # takes half a second to import
 
     varied, fitted = sweep.file.variations(), sweep.fitted
     count = len(varied) + (len(fitted.parameters) if fitted else 0)
@@ -112,7 +112,7 @@ def _sampled(sweep: Sweep) -> dict[str, list[Any]]:
 
 
 def _drawn(variation: Variation, share: Array) -> list[Any]:
-    """Values below which ``share`` of the distribution lies; those of a list are as likely."""
+    """Return the quantiles for each ``share``; values of a list are equally likely."""
     if variation.values is not None:
         return [variation.values[int(u * len(variation.values))] for u in share]
     if variation.range is not None:
@@ -124,7 +124,7 @@ def _drawn(variation: Variation, share: Array) -> list[Any]:
 
 
 def _quantiles(distribution: Any, share: Array) -> tuple[Amount, Array]:
-    """Quantiles of a distribution, and an amount of its unit."""
+    """Return quantiles of a distribution, and an amount with their unit."""
     from scipy.special import ndtri
 
     if isinstance(distribution, Normal):
@@ -141,7 +141,7 @@ def _quantiles(distribution: Any, share: Array) -> tuple[Amount, Array]:
 
 
 def _stepped(sweep: Sweep) -> dict[str, list[Any]]:
-    """Each of the independent normal numbers at either end of its 95 %, and all together."""
+    """Return runs with each independent normal number at the ends of its 95 %, and all at once."""
     known = sweep.fitted or FittedSample((), np.eye(0))
     varied = sweep.file.variations().items()
     known = known.beside([_normal(name, variation.distribution) for name, variation in varied])
@@ -149,7 +149,7 @@ def _stepped(sweep: Sweep) -> dict[str, list[Any]]:
 
 
 def _normal(name: str, distribution: Any) -> FittedParameter:
-    """An entry of a normal or lognormal distribution as a parameter of a fit would be."""
+    """Return an entry with a normal or lognormal distribution in the form of a fitted parameter."""
     logarithmic = isinstance(distribution, LogNormal)
     best = distribution.median if logarithmic else distribution.mean
     if logarithmic:
@@ -167,7 +167,7 @@ def _normal(name: str, distribution: Any) -> FittedParameter:
 
 
 def _short_names(paths: list[str]) -> list[str]:
-    """The fewest last keys of each path that no other one ends in."""
+    """Return the shortest end of each path that no other path has."""
     return [_shortest(path, [other for other in paths if other != path]) for path in paths]
 
 
@@ -178,7 +178,7 @@ def _shortest(path: str, others: list[str]) -> str:
 
 
 def _names(short: list[str], rows: list[tuple[Any, ...]]) -> list[str]:
-    """The folder of each run: what varies and its values, by which it is recognised later."""
+    """Return the folder of each run: the varied entries and values, which identify it later."""
     whole = ["_".join(f"{n}={scalar(v)}" for n, v in zip(short, row, strict=True)) for row in rows]
     plain = [re.sub(r"[^\w.+=-]", "", text.replace(", ", "x")) for text in whole]
     texts = {name: {w for w, p in zip(whole, plain, strict=True) if p == name} for name in plain}
@@ -189,5 +189,5 @@ def _names(short: list[str], rows: list[tuple[Any, ...]]) -> list[str]:
 
 
 def _hashed(name: str, text: str) -> str:
-    """A name that is short and that no other run has."""
+    """Return a short name that no other run has."""
     return f"{name[: LONGEST_NAME // 2]}-{hashlib.sha256(text.encode()).hexdigest()[:8]}"

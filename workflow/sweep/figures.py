@@ -1,4 +1,4 @@
-"""Figures of a sweep: results of its runs, as bands over the cycles and against what varies."""
+"""Figures of a sweep: results of its runs, as bands over the cycles and against varied entries."""
 
 from __future__ import annotations
 
@@ -26,14 +26,14 @@ from workflow.pictures.scales import TO_MICRONS
 from workflow.pictures.style import BLACK, BLUE, ORANGE, write_figures
 from workflow.sweep.table import Row, Varied, columns_of, interfaces_of, unit_of, varied_in
 
-# So many runs can be distinguished as separate lines.
+# Largest number of runs that can be distinguished as separate lines.
 LINES = 30
-# From a ratio of largest to smallest on, an axis is logarithmic.
+# Ratio of largest to smallest above which an axis is logarithmic.
 LOGARITHMIC = 30.0
-# With fewer runs a rank correlation says nothing.
+# Fewest runs for which a rank correlation is meaningful.
 FEWEST_TO_CORRELATE = 6
-# What to show, in words: of a wear run, with scale and unit ("" for that of the table), and of
-# others what they have of these.
+# Quantities to show, with labels: for wear runs with scale and unit ("" for the unit of the table);
+# for other runs the first of OTHERS that they have.
 WEAR = (
     ("depth", "largest depths, both bodies", TO_MICRONS, "µm"),
     ("volume", "volume, both bodies", 1.0, ""),
@@ -44,12 +44,12 @@ OTHERS = (
     ("states.-1.cumulative_energy", "energy dissipated on the path", "N mm"),
 )
 MOST_ROWS = 2
-# What only contacts of lines have, whose energies are per length.
+# Result of line contacts only, whose energies are per length.
 LINE_CONTACT = "states.-1.contact_half_width"
 
 
 def write_sweep_figures(title: str, rows: Sequence[Row], folder: Path) -> list[Path]:
-    """Draw the figures of a sweep as PNG files; returns their paths."""
+    """Draw the figures of a sweep as PNG files; return their paths."""
     figures = {}
     if names := _wearing(rows):
         figures["kinetics"] = partial(kinetics_bands, title, rows, names)
@@ -61,7 +61,7 @@ def write_sweep_figures(title: str, rows: Sequence[Row], folder: Path) -> list[P
 
 
 def _wearing(rows: Sequence[Row]) -> list[str]:
-    """The interfaces that wear in any of the runs."""
+    """Return the interfaces that wear in any of the runs."""
     summaries = [row.finished.summary or {} for row in rows]
     return list(dict.fromkeys(name for summary in summaries for name in interfaces_of(summary)))
 
@@ -70,7 +70,7 @@ def _wearing(rows: Sequence[Row]) -> list[str]:
 
 
 def kinetics_bands(title: str, rows: Sequence[Row], names: Sequence[str]) -> Figure:
-    """Depth and volume of all runs against cycles, by interface."""
+    """Draw depth and volume of all runs against cycles, by interface."""
     done = [row.finished.summary for row in rows if row.finished.summary]
     statistics = "median (least to largest) at their end"
     figure = new_figure(f"{title}: {len(done)} runs, {statistics}", 9.0 * blocks(len(names)))
@@ -94,10 +94,10 @@ def kinetics_bands(title: str, rows: Sequence[Row], names: Sequence[str]) -> Fig
 def _draw_bands(
     axis: Axes, summaries: Sequence[dict[str, Any]], name: str, quantity: str, scale: float
 ) -> Array:
-    """Bands of the runs; returns their last values ``(runs,)``."""
+    """Draw the bands of the runs; return their last values ``(runs,)``."""
     curves = [_curve(summary, name, quantity, scale) for summary in summaries]
     cycles = np.unique(np.concatenate([counts for counts, _ in curves]))
-    # A run says nothing beyond its end.
+    # A run has no values beyond its end.
     values = np.array([np.interp(cycles, *curve, right=np.nan) for curve in curves])
     median = _fill_bands(axis, cycles, values.T)
     if len(curves) <= LINES:
@@ -109,7 +109,7 @@ def _draw_bands(
 
 
 def _fill_bands(axis: Axes, places: Array, values: Sequence[Array] | Array) -> Array:
-    """All and the middle half of the values at each place, those that are numbers; the medians."""
+    """Draw range and middle half of the finite values at each place; return the medians."""
     quantiles = [np.nanquantile(at, [0.0, 0.25, 0.5, 0.75, 1.0]) for at in values]
     low, quarter, median, three, high = np.transpose(quantiles)
     look: dict[str, Any] = {"color": BLUE, "lw": 0}
@@ -119,18 +119,18 @@ def _fill_bands(axis: Axes, places: Array, values: Sequence[Array] | Array) -> A
 
 
 def _curve(summary: dict[str, Any], name: str, quantity: str, scale: float) -> tuple[Array, Array]:
-    """Cycles ``(j,)`` and what both bodies have worn together ``(j,)``."""
+    """Return cycles ``(j,)`` and the wear of both bodies together ``(j,)``."""
     kinetics = summary["kinetics"][name]
     worn = np.array(kinetics[f"{quantity}_1"]) + np.array(kinetics[f"{quantity}_2"])
     return np.array(summary["kinetics"]["cycles"]), scale * worn
 
 
-# --- against what varies ------------------------------------------------------------------------
+# --- against varied entries ---------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
 class Panel:
-    """Results of the runs ``(runs,)``, NaN for one that failed, with its label and title."""
+    """Results of the runs ``(runs,)``, NaN for a failed one, with label and title."""
 
     label: str
     title: str
@@ -138,7 +138,7 @@ class Panel:
 
 
 def _panels(rows: Sequence[Row], names: Sequence[str]) -> list[list[Panel]]:
-    """Panels by row and column of a figure, of what wears at the interfaces ``names``, if any."""
+    """Return panels by row and column of a figure, for the wearing interfaces ``names`` if any."""
     columns = columns_of(rows)
     if names:
         return [
@@ -161,12 +161,12 @@ def _panels(rows: Sequence[Row], names: Sequence[str]) -> list[list[Panel]]:
 
 
 def _unit(name: str, rows: Sequence[Row]) -> str:
-    """Unit of a column, for an axis."""
+    """Return the unit of a column, for an axis."""
     return unit_of(name, rows).replace("^3", "³")
 
 
 def against(title: str, varied: Varied, panels: list[list[Panel]]) -> Figure:
-    """Results of the runs against one entry that varies."""
+    """Draw results of the runs against one varied entry."""
     rows, columns = len(panels), len(panels[0])
     figure = new_figure(f"{title}: against {varied.path}", 4.5 * rows * blocks(columns))
     axes = panel_rows(figure, rows, columns)
@@ -188,7 +188,7 @@ def against(title: str, varied: Varied, panels: list[list[Panel]]) -> Figure:
 
 
 def _places(varied: Varied) -> tuple[Array, list[str]]:
-    """Where each run is along the axis; with the words of the ticks where values are no numbers."""
+    """Return the place of each run on the axis, and tick labels if the values are not numbers."""
     if varied.numbers is not None:
         return varied.numbers, []
     words = list(dict.fromkeys(varied.texts))
@@ -196,7 +196,7 @@ def _places(varied: Varied) -> tuple[Array, list[str]]:
 
 
 def _draw_against(axis: Axes, places: Array, panel: Panel) -> None:
-    """A dot for each run; where runs share a value, their spread and median from value to value."""
+    """Draw a dot for each run; if runs share values, also the spread and median at each value."""
     done = np.isfinite(panel.values)
     distinct = np.unique(places[done])
     groups = [panel.values[done & (places == place)] for place in distinct]
@@ -212,7 +212,7 @@ def _draw_against(axis: Axes, places: Array, panel: Panel) -> None:
 
 
 def _correlation(places: Array, values: Array) -> str:
-    """Spearman's rank correlation, for a title."""
+    """Return Spearman's rank correlation, for a title."""
     done = np.isfinite(values)
     if np.count_nonzero(done) < FEWEST_TO_CORRELATE or np.ptp(places[done]) == 0.0:
         return ""

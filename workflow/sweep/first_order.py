@@ -1,15 +1,15 @@
-"""95 % bands to first order, of what is linear in normal parameters: a few runs for a sample.
+"""95 % bands to first order, for results that are linear in normal parameters, from a few runs.
 
-Parameters are normal numbers tied by their correlation C, of which the symmetric root makes
-independent ones. Runs are their middle, and each independent number alone at the ends of its own
-95 %. With g the derivatives by the parameters in deviations, the sum of the squares of half the
-differences is 1.96² g C gᵀ, and its root half the width of the band (the law of propagation of
-uncertainty, JCGM 100:2008, 5.1.2 and 5.2.2).
+The parameters are normal numbers with the correlation C; the symmetric root of C makes them from
+independent numbers. One run is at the middle; two runs for each independent number have it alone at
+the ends of its 95 %. With g the derivatives by the parameters in deviations, the sum of the squares
+of half the differences is 1.96² g C gᵀ, and its root is half the width of the band (the law of
+propagation of uncertainty, JCGM 100:2008, 5.1.2 and 5.2.2).
 
-What is not linear shows: both ends of a pair are then not as far from the middle, which moves a
-side by as much along the steepest way, and by 1/1.96² of that across it, where the number's mean
-square counts. That it is the sum of what each number does alone is seen on a last pair, all numbers
-together; of several products that cancel there it sees nothing.
+Nonlinearity shows in pairs whose ends are not equally far from the middle. Along the steepest
+direction this moves a side of the band by the same amount; across it, where the mean square of the
+number counts, by 1/1.96² of it. That the effects of the numbers add up is checked with a last pair,
+all numbers together; this pair does not detect several products that cancel there.
 """
 
 from __future__ import annotations
@@ -21,14 +21,14 @@ import numpy as np
 from sa_solver.types import Array, Mask
 from workflow.sweep.fitted import REACH
 
-# What the ends of a pair may lie beside a line, of half the width of the band.
+# Largest deviation of the ends of a pair from a line, relative to half the width of the band.
 LINEAR = 0.1
-# Of the number itself: less is rounding, of one that no parameter changes.
+# Relative width of a band below which it is rounding, of a number that no parameter changes.
 ROUNDING = 1e-9
 
 
 def positions(count: int) -> Array:
-    """Independent normal numbers ``(runs, count)`` of the runs that so many parameters take.
+    """Return independent normal numbers ``(runs, count)`` of the runs for ``count`` parameters.
 
     Examples
     --------
@@ -38,7 +38,7 @@ def positions(count: int) -> Array:
     >>> print(len(positions(1)), len(positions(2)))
     3 7
     >>> print((positions(2) / 1.959963984540054).round(3)[[0, 1, 2, 5]].tolist())
-    [[0.0, 0.0], [1.0, 0.0], [-1.0, 0.0], [0.707, 0.707]]
+    [[0.0, 0.0], [1.0, 0.0], [-1.0, -0.0], [0.707, 0.707]]
     """
     directions = np.eye(count)
     if count > 1:
@@ -49,7 +49,7 @@ def positions(count: int) -> Array:
 
 @dataclass(frozen=True)
 class FirstOrder:
-    """The band of numbers ``(...)``: its ``middle``, ``half`` its width, and how far it is off."""
+    """Band of numbers ``(...)``: its ``middle``, ``half`` its width, and ``error`` of its sides."""
 
     middle: Array
     half: Array
@@ -57,21 +57,21 @@ class FirstOrder:
 
     @property
     def linear(self) -> Mask:
-        """Which of the numbers are linear enough."""
+        """Mask of the numbers that are linear enough."""
         return np.asarray(self.error <= np.maximum(LINEAR * self.half, self._still))
 
     @property
     def _still(self) -> Array:
-        """A band of no more is that of a number that no parameter changes."""
+        """Half width of a band below which no parameter changes the number."""
         return ROUNDING * np.abs(self.middle)
 
     @property
     def bent(self) -> float | None:
-        """Of one number: its error over half the width of its band; None where that is none."""
+        """Error of one number over half the width of its band; None if the band has no width."""
         return float(self.error / self.half) if self.half > self._still else None
 
     def told(self) -> dict[str, object] | None:
-        """Of one number: its band, and what its sides may be off; None where it is not linear."""
+        """Return the band of one number with the error of its sides; None if it is not linear."""
         if not self.linear:
             return None
         middle, half = float(self.middle), float(self.half)
@@ -79,14 +79,14 @@ class FirstOrder:
 
 
 def sides(values: Array) -> Array:
-    """Lower side, middle and upper side ``(3, ...)`` of bands; NaN where they are not linear."""
+    """Return lower side, middle and upper side ``(3, ...)`` of bands; NaN where not linear."""
     found = first_order(values)
     half = np.where(found.linear, found.half, np.nan)
     return np.stack([found.middle - half, found.middle, found.middle + half])
 
 
 def first_order(values: Array) -> FirstOrder:
-    """The bands of numbers ``(runs, ...)`` of the runs that :func:`positions` has."""
+    """Return the bands of numbers ``(runs, ...)`` from the runs of :func:`positions`."""
     middle, ends = values[0], values[1:].reshape(-1, 2, *values.shape[1:])
     rising = 0.5 * (ends[:, 0] - ends[:, 1])
     bent = 0.5 * (ends[:, 0] + ends[:, 1]) - middle
@@ -94,7 +94,7 @@ def first_order(values: Array) -> FirstOrder:
         return FirstOrder(middle, np.abs(rising[0]), np.abs(bent[0]))
     alone, bends = rising[:-1], bent[:-1]
     half = np.sqrt(np.sum(alone**2, axis=0))
-    # Along the steepest way, on whose ends the sides of the band are.
+    # The sides of the band are at the ends of the steepest direction.
     steep = np.divide(alone, half, out=np.zeros_like(alone), where=half > 0.0) ** 2
     along = np.abs(np.sum(bends * steep, axis=0))
     across = np.sum(np.abs(bends) * (1.0 - steep), axis=0) / REACH**2

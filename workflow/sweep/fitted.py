@@ -1,9 +1,10 @@
-"""Parameters of a fit as a sample: values as the fit knows them, together as it knows them.
+"""Sample of the parameters of a fit, with the distributions and the correlation from the fit.
 
-Each is normal, with halves of their own width: its best value is the median, and its 95 % bounds,
-Student's or of the profile, are the 2.5 and 97.5 % quantiles. One that was fitted as its logarithm
-is drawn as that. Their normal numbers have the correlation of the fit (Nelsen 2006, *An
-Introduction to Copulas*, section 2.3). What lies beyond its limits is put at them.
+Each distribution is normal with two half widths: the best value is the median, and the 95 % bounds,
+from Student's distribution or from the profile, are the 2.5 and 97.5 % quantiles. A parameter that
+was fitted as its logarithm is drawn as its logarithm. The normal numbers have the correlation of
+the fit (Nelsen 2006, *An Introduction to Copulas*, section 2.3). Values beyond the limits of a
+parameter are set to the limit.
 """
 
 from __future__ import annotations
@@ -21,17 +22,17 @@ from sa_solver.types import Array
 from workflow.case.source import read_text
 from workflow.errors import UserError
 
-# Of a normal quantity, in deviations: its 97.5 % quantile.
+# 97.5 % quantile of the normal distribution, in standard deviations.
 REACH = 1.959963984540054
-# Of values: correlated ones are known together far better than each alone.
+# Digits of values: correlated parameters are known together far better than each alone.
 SIGNIFICANT = 10
 
 
 @dataclass(frozen=True)
 class FittedParameter:
-    """A parameter in its ``unit`` ("1" for none): ``value``, 95 % ``bounds``, what is ``allowed``.
+    """Parameter in its ``unit`` ("1" for none): ``value``, 95 % ``bounds``, and limits ``allowed``.
 
-    ``entries`` are those of a case that have it: several, where functions share it.
+    ``entries`` are the entries of a case that contain it: several, where functions share it.
     """
 
     name: str
@@ -43,7 +44,7 @@ class FittedParameter:
     entries: tuple[str, ...]
 
     def at(self, normal: Array) -> Array:
-        """Values ``(n,)`` of standard normal numbers ``(n,)``."""
+        """Return the values ``(n,)`` for standard normal numbers ``(n,)``."""
         ends = np.array([self.bounds[0], self.value, self.bounds[1]])
         lower, best, upper = np.log(ends) if self.logarithmic else ends
         width = np.where(normal < 0.0, best - lower, upper - best) / REACH
@@ -51,14 +52,14 @@ class FittedParameter:
         return np.clip(np.exp(drawn) if self.logarithmic else drawn, *self.allowed)
 
     def written(self, value: float) -> float | str:
-        """A value as a case has it."""
+        """Return a value as it is written in a case."""
         number = f"{value:.{SIGNIFICANT}g}"
         return float(number) if self.unit == "1" else f"{number} {self.unit}"
 
 
 @dataclass(frozen=True)
 class FittedSample:
-    """Parameters that entries of a case have, and their ``correlation`` ``(p, p)``."""
+    """Parameters that entries of a case contain, and their ``correlation`` ``(p, p)``."""
 
     parameters: tuple[FittedParameter, ...]
     correlation: Array
@@ -69,22 +70,22 @@ class FittedSample:
         return [entry for parameter in self.parameters for entry in parameter.entries]
 
     def draw(self, normal: Array) -> Array:
-        """Values ``(n, p)`` of independent standard normal numbers ``(n, p)``."""
+        """Return values ``(n, p)`` for independent standard normal numbers ``(n, p)``."""
         sizes, directions = np.linalg.eigh(self.correlation)
-        # Symmetric, so that each keeps as much of its own even spread as it can.
+        # The root is symmetric, so that each column keeps its even spread as far as possible.
         root = (directions * np.sqrt(np.maximum(sizes, 0.0))) @ directions.T
         tied = normal @ root
         columns = [parameter.at(z) for parameter, z in zip(self.parameters, tied.T, strict=True)]
         return np.stack(columns, axis=1)
 
     def columns(self, shares: Array) -> dict[str, list[float | str]]:
-        """What each entry is given, of independent shares ``(n, p)`` from 0 to 1."""
+        """Return the values of each entry for independent shares ``(n, p)`` from 0 to 1."""
         from scipy.special import ndtri
 
         return self.given(ndtri(shares))
 
     def given(self, normal: Array) -> dict[str, list[float | str]]:
-        """The same, of independent standard normal numbers ``(n, p)``."""
+        """Return the values of each entry for independent standard normal numbers ``(n, p)``."""
         return {
             entry: [parameter.written(float(value)) for value in column]
             for parameter, column in zip(self.parameters, self.draw(normal).T, strict=True)
@@ -92,7 +93,7 @@ class FittedSample:
         }
 
     def beside(self, others: Sequence[FittedParameter]) -> FittedSample:
-        """These, and after them others of which each is known for itself."""
+        """Return a sample with further parameters, which are uncorrelated with all others."""
         here, count = len(self.parameters), len(self.parameters) + len(others)
         correlation = np.eye(count)
         correlation[:here, :here] = self.correlation
@@ -100,9 +101,9 @@ class FittedSample:
 
 
 def read_fit(path: Path) -> FittedSample:
-    """The parameters that the ``summary.json`` of a fit tells.
+    """Return the parameters in the ``summary.json`` of a fit.
 
-    Raises UserError for another file, a fit without a parameter that a case has, and one of them
+    Raises UserError for another file, for a fit without a parameter of a case, and for a parameter
     that the data do not determine.
     """
     try:
@@ -140,5 +141,5 @@ def _parameter(name: str, told: Mapping[str, Any]) -> FittedParameter:
 
 
 def _correlation(matrix: Sequence[Sequence[float]], here: Sequence[int]) -> Array:
-    """Of some of the parameters."""
+    """Return the correlation of some of the parameters."""
     return np.array([[matrix[i][k] for k in here] for i in here], dtype=np.float64)

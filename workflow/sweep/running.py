@@ -1,6 +1,6 @@
-"""``fretscale sweep``: check all runs, run them, and write the table, the summary and the figures.
+"""``fretscale sweep``: checks all runs, runs them, and writes table, summary and figures.
 
-All is taken up where an earlier call was interrupted: the runs are found again by their folders.
+An interrupted sweep is resumed: finished runs are recognized by their folders.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ from workflow.sweep.table import Row, columns_of, spread, unit_of, varied_in, wr
 
 FILE, RUNS, TABLE, LOG = "sweep.yaml", "runs", "sweep.csv", "sweep.log"
 FIGURES = "figures"
-# Lines about cases that cannot be run; the same mistake mostly is in many of them.
+# Largest number of lines about invalid cases; the same mistake is often in many of them.
 MOST_LINES = 10
 
 
@@ -49,10 +49,10 @@ def run_sweep(
     force: bool,
     loudness: Loudness = Loudness.NORMAL,
 ) -> bool:
-    """Run the sweep in file ``path`` into ``out``; False if any of its runs failed.
+    """Run the sweep in file ``path`` into ``out``; return False if any of its runs failed.
 
     Raises CaseError, before anything runs, if the file or the case of any run is wrong, and
-    UserError if ``out`` has something else, or runs of another case and ``force`` is not given.
+    UserError if ``out`` holds other files, or runs of another case and ``force`` is not given.
     """
     sweep = load_sweep(path)
     text, runs = path.read_text(encoding="utf-8"), runs_of(sweep)
@@ -78,14 +78,14 @@ def run_sweep(
             reporter.say(f"{len(rows) - failed} runs done, {failed} failed: {out / TABLE}")
             if lacking := _lacking(sweep, rows):
                 reporter.say(f"  {lacking}")
-            # Of what neither wears nor is a contact there are none, and no folder.
+            # Cases without wear and contact have no figures and no folder of them.
             if figures := sorted((out / FIGURES).glob("*")) if failed < len(rows) else []:
                 reporter.say(f"  figure    {figures[0]}")
     return failed == 0
 
 
 def _check_runs(sweep: Sweep, runs: Sequence[Run], out: Path, force: bool) -> int:
-    """Load the case of every run and look at its folder; how many are finished."""
+    """Load the case and check the folder of every run; return how many are finished."""
     wrong: dict[str, None] = {}
     states = []
     for run in {run.name: run for run in runs}.values():
@@ -106,7 +106,7 @@ def _check_runs(sweep: Sweep, runs: Sequence[Run], out: Path, force: bool) -> in
 
 
 def _explained(sweep: Sweep, job: Job, text: str) -> Iterator[str]:
-    """Lines about a case; of what the sweep sets, with its place in the sweep's file."""
+    """Yield lines about a case; errors in what the sweep sets point to the sweep's file."""
     paths = {f"--set {override}: ": override.partition("=")[0] for override in job.overrides}
     for line in text.splitlines():
         start = next((start for start in paths if line.startswith(start)), "")
@@ -114,7 +114,7 @@ def _explained(sweep: Sweep, job: Job, text: str) -> Iterator[str]:
         if start:
             yield f"{sweep.place(paths[start])}: {line.removeprefix(start)}"
         elif unknown and (below := [p for p in paths.values() if p.startswith(f"{unknown[1]}.")]):
-            # The case has no such section: what the sweep sets below it is what made it.
+            # The case has no such section; it exists only because the sweep sets an entry below it.
             yield f"{sweep.place(below[0])}: {line[unknown.start(1) :]}"
         else:
             yield line
@@ -129,10 +129,10 @@ def _run(
     finished_before: int,
     reporter: Reporter,
 ) -> list[Row]:
-    """Run all there are, each once; the table is written of those that have ended, come what may.
+    """Run each different run once; always write the table of those that have ended.
 
-    Those that were ``finished_before`` end first. A sample may draw the same run twice, which then
-    has two rows.
+    The ``finished_before`` runs end first. A sample may contain the same run twice, which then has
+    two rows.
     """
     jobs = {run.name: run.job(sweep) for run in runs}
     ended: dict[str, Finished] = {}
@@ -190,7 +190,7 @@ def _write_summary(sweep: Sweep, rows: list[Row], folder: OutputFolder) -> None:
 
 
 def _found(sweep: Sweep, values: Array) -> dict[str, Any] | None:
-    """What the runs say of a number; of a sample and to first order with its 95 % band."""
+    """Return the statistics of a number over the runs, with its 95 % band if there is one."""
     if sweep.file.design == "linear":
         return _stepped(values)
     statistics = spread(values)
@@ -200,7 +200,7 @@ def _found(sweep: Sweep, values: Array) -> dict[str, Any] | None:
 
 
 def _stepped(values: Array) -> dict[str, Any] | None:
-    """A number to first order, and how far the runs are off a line in half widths of its band."""
+    """Return a number to first order, with its band and its nonlinearity in half widths."""
     if not np.isfinite(values[0]):
         return None
     if not np.all(np.isfinite(values)):
@@ -210,7 +210,7 @@ def _stepped(values: Array) -> dict[str, Any] | None:
 
 
 def _lacking(sweep: Sweep, rows: Sequence[Row]) -> str:
-    """What bands the runs cannot tell, empty if they tell all."""
+    """Return which bands cannot be determined; empty if there are all."""
     done = sum(row.done for row in rows)
     if sweep.file.design == "sample" and done < FEWEST:
         return f"no 95 % bands: {counted(done, 'run')} done; they take {FEWEST}"
@@ -233,7 +233,7 @@ def _bent(values: Array) -> bool:
 
 
 def _title(sweep: Sweep, rows: Sequence[Row]) -> str:
-    """Of the sweep, or else of its first run's case."""
+    """Return the title of the sweep, or else that of its first run."""
     if sweep.file.title is not None:
         return sweep.file.title
     summaries = (row.finished.summary for row in rows if row.finished.summary)

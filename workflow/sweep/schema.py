@@ -1,4 +1,4 @@
-"""The file of a sweep: which case, which of its entries vary, and how they are combined."""
+"""Schema of the file of a sweep: the case, the varied entries, and how they are combined."""
 
 from __future__ import annotations
 
@@ -18,42 +18,42 @@ from workflow.case.writing import scalar
 from workflow.errors import CaseError, UserError
 from workflow.sweep.fitted import FittedSample, read_fit
 
-# Beyond it a sweep is a slip of the pen: a run takes seconds at least.
+# Largest number of runs: more are a mistake, as each takes seconds at least.
 MOST_RUNS = 10_000
-# Designs of what is known with its uncertainty.
+# Designs for entries that are known with their uncertainty.
 DRAWN = "sample", "linear"
-# Of what is computed from a range or a distribution: what the table says is what was run.
+# Digits of values computed from a range or a distribution: the table shows exactly what was run.
 SIGNIFICANT = 6
 
 
 @dataclass(frozen=True)
 class Amount:
-    """A number and the unit it was written with, "" for none."""
+    """Number and the unit it was written with, "" for none."""
 
     number: float
     unit: str = ""
 
     @property
     def written(self) -> int | float | str:
-        """As one would write it into a case."""
+        """Value as it is written in a case."""
         if self.unit:
             return f"{self.number:.{SIGNIFICANT}g} {self.unit}"
         return int(self.number) if self.number.is_integer() else self.number
 
     def over(self, unit: str) -> float:
-        """As a multiple of ``unit``; "" is the base unit, as a case has it."""
+        """Return the number as a multiple of ``unit``; "" is the base unit, as in a case."""
         if unit == self.unit:
             return self.number
         sizes = [units.to_base(f"1 {name}", None) if name else 1.0 for name in (self.unit, unit)]
         return self.number * sizes[0] / sizes[1]
 
     def with_number(self, number: float) -> Amount:
-        """Another number of the same unit, rounded."""
+        """Return another number with the same unit, rounded."""
         return Amount(float(f"{number:.{SIGNIFICANT}g}"), self.unit)
 
 
 def amount_of(value: object) -> Amount | None:
-    """A value of an entry as a number with its unit; None if it is no number."""
+    """Return a value of an entry as a number with its unit; None if it is not a number."""
     if isinstance(value, str):
         try:
             number, unit = units.split(value)
@@ -68,7 +68,7 @@ def amount_of(value: object) -> Amount | None:
 
 @dataclass(frozen=True)
 class Quantity(Entry):
-    """A number with or without a unit; that the unit suits is for the case to say."""
+    """Number with or without a unit; the case checks whether the unit is suitable."""
 
     positive: bool = False
 
@@ -94,11 +94,11 @@ Scale = Literal["linear", "log"]
 
 
 class _Between(Section):
-    """Base of what lies between two ends; ``from`` is a word of Python, hence their making."""
+    """Base of a range between two ends, set by name since ``from`` is a Python keyword."""
 
     @property
     def ends(self) -> tuple[Amount, Amount]:
-        """First and last, of one unit."""
+        """First and last value, in the same unit."""
         return getattr(self, "from"), getattr(self, "to")  # noqa: B009
 
     @model_validator(mode="after")
@@ -127,7 +127,7 @@ class _Range(_Between):
 
 
 class _Uniform(_Between):
-    """Every value between two ends is as likely."""
+    """Uniform distribution between two ends."""
 
     kind: Literal["uniform"] = entry("of the distribution", "uniform")
 
@@ -139,7 +139,7 @@ Uniform = create_model("Uniform", __base__=_Uniform, **_FIRST, **_LAST)  # type:
 
 
 class Normal(Section):
-    """Normal distribution; its tails go on without end, and a case may refuse what they bring."""
+    """Normal distribution; its tails are unbounded, so that a case may refuse extreme values."""
 
     kind: Literal["normal"] = entry("of the distribution", "normal")
     mean: AnyAmount = entry("of the values", "30 mm")
@@ -152,7 +152,7 @@ class Normal(Section):
 
 
 class LogNormal(Section):
-    """Logarithms are normal: 68 % of the values are within ``factor`` of the median."""
+    """Lognormal distribution: 68 % of the values are within ``factor`` of the median."""
 
     kind: Literal["lognormal"] = entry("of the distribution", "lognormal")
     median: PositiveAmount = entry("half of the values are below it", "1e4 um^3/J")
@@ -174,7 +174,7 @@ Distribution = Annotated[Uniform | Normal | LogNormal, Field(discriminator="kind
 
 
 class Variation(Section):
-    """What one entry of the case is given: exactly one of values, range and distribution."""
+    """Values that one entry of the case is given: exactly one of values, range and distribution."""
 
     in_schema: ClassVar[Mapping[str, Any]] = one_of("values", "range", "distribution")
 
@@ -227,12 +227,12 @@ class SweepFile(Section):
     seed: Annotated[int, Whole(0, 2**31)] = entry("of the sample", 0, default=0)
 
     def variations(self) -> dict[str, Variation]:
-        """What each entry is given, by its path."""
+        """Return the variation of each entry, by its path."""
         return {name: getattr(self.vary, name) for name in type(self.vary).model_fields}
 
 
 class AnySweepFile(SweepFile):
-    """The same, whatever varies: as editors take it."""
+    """Sweep file with any varied entries, for editors."""
 
     vary: dict[str, Variation] = entry(  # type: ignore[assignment]
         "what each entry is given, by its dotted path in the case", default={}
@@ -241,7 +241,7 @@ class AnySweepFile(SweepFile):
 
 @dataclass(frozen=True)
 class Sweep:
-    """The file of a sweep, read, where its entries were written, and the fit that it names."""
+    """File of a sweep as read, with the places of its entries and the fit that it names."""
 
     name: str
     file: SweepFile
@@ -249,7 +249,7 @@ class Sweep:
     fitted: FittedSample | None = None
 
     def place(self, path: str) -> str:
-        """File and line, and the entry that varies or is set."""
+        """Return file and line, and the entry that varies or is set."""
         if self.fitted is not None and path in self.fitted.entries:
             return f"{self.source.where(('fit',))[1]}: fit: {path}"
         section = "set" if path in self.file.set else "vary"
@@ -257,7 +257,7 @@ class Sweep:
 
 
 def load_sweep(path: Path) -> Sweep:
-    """Read the file of a sweep. Raises CaseError, a line ``file:line: key: ...`` for each thing."""
+    """Read the file of a sweep; raise CaseError with a line ``file:line: key: ...`` per error."""
     source = Source(str(path), read_text(path))
     check_command(source, "sweep")
     file = validated(source, _kind_of(source))
@@ -277,7 +277,7 @@ def _fitted(source: Source, file: SweepFile) -> FittedSample | None:
 
 
 def _kind_of(source: Source) -> type[SweepFile]:
-    """The kind of file whose section ``vary`` has the entries that this one gives it."""
+    """Return a model of the file whose section ``vary`` has the entries of this file."""
     entries = source.at(("vary",))
     names = list(entries) if isinstance(entries, dict) else []
     fields: Any = {name: (Variation, entry("values, range or distribution")) for name in names}
@@ -287,7 +287,7 @@ def _kind_of(source: Source) -> type[SweepFile]:
 
 
 def _disagreements(sweep: Sweep) -> Iterator[str]:
-    """What does not go together."""
+    """Yield lines about entries that contradict each other."""
     file, varied = sweep.file, sweep.file.variations()
     place = sweep.source.where
     yield from _without_variation(sweep)
@@ -318,7 +318,7 @@ def _without_variation(sweep: Sweep) -> Iterator[str]:
 
 
 def _beside_a_fit(sweep: Sweep) -> Iterator[str]:
-    """What does not go with the fit that is named."""
+    """Yield lines about entries that contradict the fit."""
     if sweep.fitted is None:
         return
     file, varied, place = sweep.file, sweep.file.variations(), sweep.source.where
@@ -332,7 +332,7 @@ def _beside_a_fit(sweep: Sweep) -> Iterator[str]:
 
 
 def _not_normal(sweep: Sweep, name: str, variation: Variation) -> Iterator[str]:
-    """What a band to first order cannot be made of."""
+    """Yield a line if a band to first order is impossible for a variation."""
     if not isinstance(variation.distribution, Normal | LogNormal):
         yield (
             f"{sweep.place(name)}: in design: linear; allowed: a distribution of kind normal or "
@@ -341,7 +341,7 @@ def _not_normal(sweep: Sweep, name: str, variation: Variation) -> Iterator[str]:
 
 
 def _without_sample(sweep: Sweep, name: str, variation: Variation) -> Iterator[str]:
-    """What a variation lacks where values are combined, not drawn."""
+    """Yield lines about what a variation lacks where values are combined, not drawn."""
     where = f"{sweep.place(name)}"
     if variation.distribution is not None:
         yield f"{where}: a distribution in design: {sweep.file.design}; allowed: design: sample"

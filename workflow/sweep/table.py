@@ -1,4 +1,4 @@
-"""The runs of a sweep as a table: a row each, with the numbers that its summary has."""
+"""Table of the runs of a sweep: a row for each, with the numbers of its summary."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from workflow.sweep.design import Run
 from workflow.sweep.schema import Amount, amount_of
 
 DONE, FAILED = "done", "failed"
-# What wear runs report of an interface, with units.
+# Results of an interface in wear runs, with units.
 WEAR_UNITS = {
     "depth": "mm",
     "depth_1": "mm",
@@ -29,31 +29,31 @@ WEAR_UNITS = {
     "peak_pressure.unworn": "MPa",
     "peak_pressure.worn": "MPa",
 }
-# Of other kinds of run every number is a column but these; of the states of a path the last.
+# For other kinds of run every number is a column except these; of a path only the last state.
 LEFT_OUT = ("seconds", "versions")
 PATH = "states"
 
 
 @dataclass(frozen=True)
 class Row:
-    """One run: its values of what varies, how it ended, and its results."""
+    """One run: its values of the varied entries, how it ended, and its results."""
 
     run: Run
     finished: Finished
 
     @property
     def done(self) -> bool:
-        """Whether it has come to its end."""
+        """Whether the run has finished."""
         return self.finished.summary is not None
 
     @property
     def seconds(self) -> float | None:
-        """Of all stages of the run."""
+        """Seconds of all stages of the run."""
         summary = self.finished.summary
         return None if summary is None else round(sum(summary["seconds"].values()), 2)
 
     def numbers(self) -> dict[str, float]:
-        """Results by path in the summary."""
+        """Return the results by path in the summary."""
         summary = self.finished.summary
         if summary is None:
             return {}
@@ -61,12 +61,12 @@ class Row:
 
 
 def interfaces_of(summary: Mapping[str, Any]) -> list[str]:
-    """Names of the contacts that wear; none in other kinds of run."""
+    """Return the names of the contacts that wear; empty for other kinds of run."""
     return [name for name in summary.get("kinetics", {}) if name != "cycles"]
 
 
 def _wear_numbers(summary: dict[str, Any]) -> dict[str, float]:
-    """The end of a wear run; depth and volume are those of both bodies together."""
+    """Return the final results of a wear run; depth and volume are sums over both bodies."""
     results: dict[str, float] = {"cycles": summary["cycles"], "jumps": summary["jumps"]}
     for name in interfaces_of(summary):
         interface = summary[name]
@@ -80,7 +80,7 @@ def _wear_numbers(summary: dict[str, Any]) -> dict[str, float]:
 
 
 def _numbers(node: Any, path: str = "") -> Iterator[tuple[str, float]]:
-    """All numbers below a node with their dotted paths."""
+    """Yield all numbers below a node with their dotted paths."""
     if isinstance(node, dict):
         for key, value in node.items():
             if not path and key == PATH and value:
@@ -99,9 +99,10 @@ def _numbers(node: Any, path: str = "") -> Iterator[tuple[str, float]]:
 
 @dataclass(frozen=True)
 class Varied:
-    """An entry that varies: its values as ``texts``, with the ``unit`` left out where all share it.
+    """Varied entry: its values as ``texts``, without the ``unit`` where all values share it.
 
-    ``numbers`` ``(runs,)`` are in ``unit``, the first one's; None where some value is no number.
+    ``numbers`` ``(runs,)`` are in ``unit``, that of the first value; None where some value is not a
+    number.
     """
 
     path: str
@@ -116,7 +117,7 @@ class Varied:
 
 
 def varied_in(rows: Sequence[Row]) -> list[Varied]:
-    """What varies over the runs, as it was written."""
+    """Return the varied entries over the runs, as written."""
     return [_varied(path, [row.run.values[path] for row in rows]) for path in rows[0].run.values]
 
 
@@ -131,7 +132,7 @@ def _varied(path: str, values: list[Any]) -> Varied:
 
 
 def _text(value: object) -> str:
-    """A value in a cell."""
+    """Return a value as the text of a cell."""
     if isinstance(value, tuple):
         return " ".join(map(_text, value))
     if isinstance(value, bool):
@@ -140,7 +141,7 @@ def _text(value: object) -> str:
 
 
 def columns_of(rows: Sequence[Row]) -> dict[str, Array]:
-    """All results of the runs ``(runs,)``, by path; NaN where a run has none."""
+    """Return all results of the runs ``(runs,)``, by path; NaN where a run has none."""
     by_run = [row.numbers() for row in rows]
     names = dict.fromkeys(name for numbers in by_run for name in numbers)
     return {
@@ -150,7 +151,7 @@ def columns_of(rows: Sequence[Row]) -> dict[str, Array]:
 
 
 def unit_of(name: str, rows: Sequence[Row]) -> str:
-    """Unit of a column of a wear run; "" where it goes without saying, and of any other run."""
+    """Return the unit of a column of a wear run; "" for counts and ratios, and for other runs."""
     unit = WEAR_UNITS.get(name.partition(".")[2], "")
     if not unit:
         return ""
@@ -163,7 +164,7 @@ def unit_of(name: str, rows: Sequence[Row]) -> str:
 
 
 def write_sweep_table(rows: Sequence[Row], path: Path) -> None:
-    """Write the table as CSV: name, what varies, how the run ended, and its results.
+    """Write the table as CSV: name, varied values, how the run ended, and its results.
 
     Numbers are in base units, with all their digits; cells of a run that failed are empty.
     """
@@ -180,20 +181,20 @@ def write_sweep_table(rows: Sequence[Row], path: Path) -> None:
 
 
 def _heading(varied: Varied) -> str:
-    """The path, with the unit unless the cells have it."""
+    """Return the path of an entry, with its unit unless the cells contain it."""
     cells_have_it = any(varied.unit and varied.unit in text for text in varied.texts)
     return varied.path if cells_have_it else varied.heading
 
 
 def _cell(number: float) -> float | None:
-    """The number, whole if it can be; None for one that a run does not have."""
+    """Return the number, as an integer if possible; None if the run has no such number."""
     if np.isnan(number):
         return None
     return int(number) if number.is_integer() and abs(number) < 1e15 else number
 
 
 def spread(values: Array) -> dict[str, float] | None:
-    """How values spread over the runs; None where no run has one."""
+    """Return the spread of values over the runs; None where no run has one."""
     known = values[np.isfinite(values)]
     if not known.size:
         return None

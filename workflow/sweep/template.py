@@ -1,4 +1,4 @@
-"""The file of a sweep that ``fretscale new sweep`` writes."""
+"""Template of the file of a sweep, for ``fretscale new sweep``."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ DISTRIBUTED = ((WEAR, LogNormal, ""), (RADIUS, Normal, "or: "), (RADIUS, Uniform
 
 
 def sweep_template() -> str:
-    """A commented sweep of a case, with every way to vary an entry."""
+    """Return a commented sweep of a case, with every way to vary an entry."""
     rows = {name: _row(SweepFile, name) for name in SweepFile.model_fields}
     rows["case"] = replace(rows["case"], value="my.yaml")
     rows["set"] = replace(rows["set"], value=[Row("output.paraview", False)], off=True)

@@ -1,49 +1,49 @@
 """Fretting wear across scales, from Python.
 
-What is done with a case
-    - ``run``: compute it, or find its results again.
-    - ``load_case``: read and check it.
-    - ``check``: what it would run, in what memory and time.
-    - ``Check``: that, as numbers.
+Cases
+    - ``run``: compute a case, or return its results if they exist already.
+    - ``load_case``: read and check a case.
+    - ``check``: return what a case would run, with its memory and run time.
+    - ``Check``: the result of ``check``.
 
-What is modelled in Python
+Models in Python
     - ``WearModel``: a structure, its contacts and how they wear; ``run`` computes the wear.
     - ``wear_model``: the model that a case describes.
     - ``DovetailJoint``, ``DovetailMesh``, ``Dovetail``, ``Mission``: the built-in blade root in its
       disk: the joint, its mesh, its section and its loads.
     - ``MeshAssembly``, ``LegPath``, ``TightenedBolt``: bodies of a mesh or CAD file under loads.
-    - ``UncoupledSource``, ``LoadSource``: the bases of loads of one's own, for ``ContactFace`` s.
-    - ``Contact``, ``CoulombFriction``: what a contact is made of, and how it is computed.
+    - ``UncoupledSource``, ``LoadSource``: base classes for user-defined loads of ``ContactFace`` s.
+    - ``Contact``, ``CoulombFriction``: properties of a contact, and how it is computed.
     - ``Wear``, ``JumpSize``, ``Stop``: how far contacts wear, and in which steps.
     - ``AddedGap``: a profile on top of the form of a face.
-    - ``Observer``, ``Progress``, ``Checkpoint``: what is called while a model runs.
+    - ``Observer``, ``Progress``, ``Checkpoint``: objects that are called while a model runs.
 
-What comes out
+Results
     - ``open``: the results in the folder of a finished run.
-    - ``Results``: its summary, warnings and case, and all that it has computed.
-    - ``MainResult``: one of its main results, with unit and estimated error.
+    - ``Results``: the summary, warnings and case of a run, and everything that it computed.
+    - ``MainResult``: a main result of a run, with unit and estimated error.
     - ``Group``: datasets and groups of ``results.h5`` under one name.
-    - ``Values``: a dataset, read when it is needed, with its unit and description.
+    - ``Values``: a dataset, read on demand, with its unit and description.
 
-What several runs have in common
-    - ``compare``: put finished runs side by side.
-    - ``Comparison``: what differs in their cases and results, as text, table and page.
-    - ``ComparedResult``: a main result in each of them, and how far they are apart.
+Comparison of runs
+    - ``compare``: compare finished runs.
+    - ``Comparison``: differences of their cases and results, as text, table and page.
+    - ``ComparedResult``: a main result in each run, with the differences.
 
-What was measured
-    - ``fit``: find parameters of a case from measurements.
-    - ``FitResult``: these with their bounds, and the section of a case.
-    - ``FittedParameter``: one of them.
+Measurements
+    - ``fit``: fit parameters of a case to measurements.
+    - ``FitResult``: the fitted parameters with their bounds, and the section of a case.
+    - ``FittedParameter``: a fitted parameter.
 
-What is raised
-    - ``FretscaleError``: the base of all; each says in a line what is wrong and what to do.
+Exceptions
+    - ``FretscaleError``: the base class; each message says what is wrong and what to do.
     - ``CaseError``: a case that cannot be run.
-    - ``UserError``: a bad argument, file or folder; a ``CaseError`` is one.
+    - ``UserError``: a bad argument, file or folder; ``CaseError`` is derived from it.
     - ``MethodFailed``: a numerical method did not converge.
     - ``OutOfMemory``: the case needs more memory than there is.
-    - ``NotWritten``: the disk is full.
+    - ``NotWritten``: output could not be written, for example because the disk is full.
 
-A case is a file, a dictionary of the same entries, or what ``load_case`` gives:
+A case is a file, a dictionary of the same entries, or the result of ``load_case``:
 
 >>> import fretscale
 >>> case = fretscale.load_case("cases/sphere_normal.yaml", contact__grid=[64, 64])
@@ -56,7 +56,8 @@ A case is a file, a dictionary of the same entries, or what ``load_case`` gives:
 --set friction.coefficient=-1: -1: out of range; allowed: at least 0 and at most 2, as a bare number or in %
 """
 
-# Not from __future__ import annotations: nothing may be imported before the check, nor is needed.
+# No `from __future__ import annotations` here: nothing is imported before the check, and it is not
+# needed.
 
 import sys
 from importlib.metadata import PackageNotFoundError
@@ -65,9 +66,10 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-# Our packages lie beside this one under names of their own, and not within it: type checkers,
-# editors and import-linter read folders, and would not find what is mapped from elsewhere. So a
-# file of somebody else's may have such a name. These are files that only ours have.
+# The packages of fretscale are installed next to this one, not within it: type checkers, editors
+# and import-linter read folders, and would not find modules that are mapped from elsewhere. A file
+# of the user may therefore shadow one of them. Each package is recognized by a file that
+# only it has.
 _OURS = {
     "sa_solver": "rigid_modes.py",
     "wear": "coupled.py",
@@ -77,11 +79,11 @@ _OURS = {
 
 
 def _check_packages() -> None:
-    """Raise ImportError where the packages that Python would import are not ours."""
+    """Raise ImportError where Python would import other packages of the same names."""
     for name, of_ours in _OURS.items():
         try:
             spec = find_spec(name)
-        except ValueError:  # a module that somebody has made up
+        except ValueError:  # a module that was created without a spec
             spec = None
         places = list(spec.submodule_search_locations or ()) if spec else []
         if any(Path(place, of_ours).is_file() for place in places):

@@ -1,10 +1,10 @@
-"""``python -m fretscale``: the command, whose packages ``fretscale`` has looked for."""
+"""``python -m fretscale``: the command, after ``fretscale`` has checked its packages."""
 
 import sys
 
 try:
     from workflow.cli import main
-except KeyboardInterrupt:  # before there is anything that could say so in its own words
+except KeyboardInterrupt:  # before the command can report an interruption itself
     sys.exit(130)
 
 if __name__ == "__main__":
