@@ -63,7 +63,7 @@ class WearModel:
         return self.contacts[name]
 
     def loads(self, store: StructureStore | None = None) -> LoadSource:
-        """Return the loads of the contacts; a structure is condensed, or found in the ``store``."""
+        """Return the loads of the contacts; a structure is condensed, or found in ``store``."""
         if hasattr(self.structure, "meshed"):
             structure = cast("StructureModel", self.structure)
             return StructureLoads(structure, self._unworn_friction, store)

@@ -1,4 +1,4 @@
-"""A wear case as a model that runs without it."""
+"""Translation of a wear case into a model that runs without the case."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from workflow.models.wear import WearModel
 
 
 def wear_model(case: WearCase) -> WearModel:
-    """Return the model that a case describes: its structure, its contacts and how they wear."""
+    """Return the model that a case describes: its structure, its contacts and their wear."""
     names = case.contact_names
     contacts: Contact | dict[str, Contact] = contact_of(case, names[0])
     if len(names) > 1:

@@ -1,4 +1,4 @@
-"""A wear case as a model: its contacts and how they wear, one function for each section."""
+"""Translation of a wear case into a model: one function for each section."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ AnyWearCase = TypeVar("AnyWearCase", bound=WearCase)
 
 
 def contact_of(case: WearCase, name: str) -> Contact:
-    """Return the contact of a name."""
+    """Return the contact with this name."""
     terms, settings = case.terms(name), case.contact
     return Contact(
         grid=terms.grid,
@@ -34,7 +34,7 @@ def contact_of(case: WearCase, name: str) -> Contact:
 
 
 def wear_of(case: WearCase) -> Wear:
-    """Return how far the contacts of a case wear, and when they change their loads."""
+    """Return the wear settings of a case, including when loads are updated."""
     wear, step, coupling = case.wear, case.wear.step, case.recoupling
     return Wear(
         cycles=wear.cycles,
@@ -53,7 +53,7 @@ def wear_of(case: WearCase) -> Wear:
 def face_contact(
     case: WearCase, face: ContactFace, stepper: WearStepper | None = None
 ) -> FaceContact:
-    """Return the contact of a face; it wears by the steps of the case unless others are given."""
+    """Return the contact of a face; it wears by the steps of the case unless a stepper is given."""
     contact = contact_of(case, face.face.name)
     _check_section(case.stress, face.grid(contact.grid))
     return FaceContact(face, contact, wear_of(case), stepper)
@@ -62,7 +62,7 @@ def face_contact(
 def structure_loads(
     case: AnyWearCase, model: Callable[[AnyWearCase], StructureModel]
 ) -> StructureLoads:
-    """Return the loads of the structure that ``model`` makes of a case.
+    """Return the loads of the structure that ``model`` returns for a case.
 
     Its condensed parts are stored in the user's cache.
     """
@@ -70,7 +70,7 @@ def structure_loads(
 
 
 def _check_section(stress: ContactStress, grid: Grid) -> None:
-    """Refuse at once a section that could not be drawn at the end."""
+    """Refuse at the start a section that could not be drawn at the end."""
     if stress.section == "none":
         return
     if stress.section == "y" and grid.line:

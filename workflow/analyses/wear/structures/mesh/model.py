@@ -1,4 +1,4 @@
-"""A mesh case as a structure."""
+"""Translation of a mesh case into a model of its structure."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ from workflow.models.structure import LoadCycle, Remark
 
 
 class MeshModel:
-    """The bodies of the file with supports, loads and cycle as the case gives them."""
+    """The bodies of the file with supports, loads and cycle of the case."""
 
     def __init__(self, case: MeshCase) -> None:
         self._case = case
@@ -49,7 +49,7 @@ class MeshModel:
         structure = self._case.structure
         contents = Path(structure.file).read_bytes()
         loads = [(load.model_dump(exclude={"path"}), load.contents) for load in structure.loads]
-        # What contacts are made of does not change how the bodies deform.
+        # Properties of the contacts do not change how the bodies deform.
         of_contacts = {"__all__": {"friction", "wear", "grid", "gap", "surfaces"}}
         described = structure.model_dump(
             exclude={"file": True, "loads": True, "contacts": of_contacts}
@@ -73,7 +73,7 @@ class MeshModel:
         return how + (", or take mesh.order: 2" if self.order == 1 else "")
 
     def _path(self, factors: tuple[float, ...]) -> Array:
-        """Amplitudes of the loads, ``(t, loads)``; squared where a load is a rotation."""
+        """Return the amplitudes of the loads ``(t, loads)``, squared for rotations."""
         legs, loads = self._case.load_path.legs, self._case.structure.loads
         ends = np.insert(np.cumsum(legs), 0, 0)
         steps = np.arange(1, ends[-1] + 1)
@@ -94,13 +94,13 @@ class MeshModel:
 
     @cached_property
     def _meshed(self) -> StructureMesh:
-        """The mesh of the file, without the gaps that the case gives."""
+        """Mesh of the file, without the gaps that the case adds."""
         return self._case.structure.mesh(self._case.mesh.size, self.order)
 
     def _with_gap(self, interface: Interface) -> Interface:
-        """The interface with the gap of the case on top of the meshes'.
+        """Return the interface with the gap of the case added to that of the meshes.
 
-        Of surfaces as measured, nodes have the means about them.
+        Nodes get the local means of measured surfaces.
         """
         extra, gap = self._case_gap(interface), interface.gap
         if extra is not None:
@@ -112,11 +112,11 @@ class MeshModel:
 
     @cached_property
     def _scanned(self) -> dict[str, ScannedFace]:
-        """Faces with surfaces as measured, by name."""
+        """Faces with measured surfaces, by name."""
         return {face.name: face for face in self._case.scanned()}
 
     def _case_gap(self, interface: Interface) -> GapFunction | None:
-        """The gap that the case gives an interface, if it does."""
+        """Return the gap that the case gives for an interface, or None."""
         (pair,) = (p for p in self._case.structure.contacts if p.name == interface.name)
         if pair.gap is None:
             return None
@@ -162,7 +162,7 @@ class MeshModel:
         return numbers[self._mesh.bodies[place].name]
 
     def remarks(self, structure: Structure, friction: Sequence[float]) -> Iterator[Remark]:
-        """Return the unit of the mesh, and contacts that supports or planes of symmetry cut."""
+        """Yield the unit of the mesh, and contacts that supports or planes of symmetry cut."""
         unit = self._case.structure.read(self._case.mesh.size).unit
         if unit.size != 1.0:
             yield Remark(
@@ -189,16 +189,16 @@ class MeshModel:
 
 
 class _MeshGap:
-    """Gap of the surfaces that were meshed; the bodies part beyond the ends of their faces.
+    """Gap of the meshed surfaces; beyond the ends of the faces it widens.
 
-    ``extra`` is a gap that the case gives beside it.
+    ``extra`` is a gap of the case to add.
     """
 
     def __init__(self, face: Face, extra: GapFunction | None) -> None:
         self._face, self._extra = face, extra
 
     def __call__(self, x: Array, y: Array) -> Array:
-        """Gap ``(nx, ny)`` [mm] at ``x`` ``(nx, 1)`` and ``y`` ``(1, ny)``."""
+        """Return the gap ``(nx, ny)`` [mm] at ``x`` ``(nx, 1)`` and ``y`` ``(1, ny)``."""
         gap = _parting(self._face, x, y)
         if (other := self._face.face(1)) is not self._face:
             gap -= _parting(other, x, y, sign=-1.0)
@@ -206,7 +206,7 @@ class _MeshGap:
 
 
 def _parting(face: Face, x: Array, y: Array, sign: float = 1.0) -> Array:
-    """Height of a face, of nodes that meet 0; beyond it farther and farther towards ``sign``."""
+    """Return the height of a face over its nodes; beyond it, the height moves towards ``sign``."""
     surface = face.surface or Surface.flat(len(face), face.facets)
     height = surface.over(face.coordinates, face.facets, x, y)
     outside = np.isnan(height)
@@ -217,7 +217,7 @@ def _parting(face: Face, x: Array, y: Array, sign: float = 1.0) -> Array:
 
 
 def _coarse(face: Face, size: tuple[float, float]) -> tuple[int, int]:
-    """About as many cells as nodes, as square as may be."""
+    """Return a grid of about as many cells as nodes, with nearly square cells."""
     if face.line:
         return len(face), 1
     across = max(int(np.sqrt(len(face) * size[0] / size[1])), 1)
