@@ -42,7 +42,7 @@ RECORDS = 10
 
 @dataclass(frozen=True)
 class Contact:
-    """What a contact is made of, and how it is computed.
+    """Materials, wear laws and friction of a contact, and how it is solved.
 
     Parameters
     ----------
@@ -58,7 +58,7 @@ class Contact:
         Pressure of the half-space under the slips of the loads; pressure, shear and slip of the
         half-space; or no half-space: the nodes of the structure wear.
     link : {"corrected", "half_space"}
-        Whether bodies deform as their structure says where it knows, or as half-spaces.
+        Whether bodies deform as their structure does, where it is known, or as half-spaces.
     gross_slip : {"force", "energies"}
         How a face that slides as a whole finds its direction (``method`` "full"): with the shear
         force of the loads, or sharing their energy between x and y.
@@ -104,7 +104,7 @@ class Contact:
 
 @dataclass(frozen=True)
 class Wear:
-    """How far contacts wear, in which steps, and when worn surfaces change their loads.
+    """Length and steps of the wear of contacts, and when worn surfaces change their loads.
 
     Without ``jump`` and ``fraction`` the length of steps is chosen for an error of the depth.
 
@@ -211,11 +211,11 @@ class FaceContact(InterfaceContact):
     face : ContactFace
         The face and the gap over it.
     contact : Contact
-        What the contact is made of.
+        Materials, laws and settings of the contact.
     wear : Wear
-        How it wears.
+        Wear settings.
     stepper : Stepper, optional
-        Steps in the place of those of ``wear``.
+        Stepper to use instead of that of ``wear``.
     """
 
     transfer: FaceTransfer

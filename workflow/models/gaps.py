@@ -15,7 +15,7 @@ GapFunction = Callable[[Array, Array], Array]
 
 @dataclass(frozen=True)
 class AddedGap:
-    """A gap that comes on top of the form of a contact face, such as a measured or worn profile.
+    """A gap added to the form of a contact face, such as a measured or worn profile.
 
     Parameters
     ----------

@@ -37,9 +37,9 @@ class ContactFace:
     coarse : (int, int)
         About as many cells as the face has nodes.
     remedy : str
-        What to do where the contact reaches the end of the face, for messages.
+        Advice if the contact reaches the end of the face, for messages.
     drive : Drive
-        Motions that are imposed in the place of forces of the loads.
+        Motions that are imposed instead of forces of the loads.
 
     Examples
     --------
@@ -118,7 +118,7 @@ class LoadSource(load_sources.LoadSource, Protocol):
         ...
 
     def prepare(self) -> None:
-        """Do the costly part now."""
+        """Carry out the costly part of the computation now."""
         ...
 
     def unworn(self) -> Sequence[FaceLoads]:

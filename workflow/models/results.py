@@ -91,7 +91,7 @@ class Recorder(Observer):
 
 @dataclass(frozen=True)
 class WearResults:
-    """Results of a run, from what was recorded and its ``state`` at the end.
+    """Results of a run, from its recorder and its ``state`` at the end.
 
     The tree has a group for each contact face, by its name: fields over ``x`` and ``y`` of the face
     after every jump (``cycles``), depths, volumes and energy, and the resultants of the closed

@@ -56,7 +56,7 @@ class LoadCycle:
 
 @dataclass(frozen=True)
 class Nonlinearity:
-    """Which geometric nonlinearity of a structure is taken into account.
+    """Geometric nonlinearity of a structure that is taken into account.
 
     Parameters
     ----------
@@ -143,12 +143,12 @@ class StructureModel(Protocol):
         ...
 
     def remarks(self, structure: Structure, friction: Sequence[float]) -> Iterable[Remark]:
-        """Return what a user should know of this structure under this friction."""
+        """Return remarks on this structure and friction for the user."""
         ...
 
 
 class StructureStore(Protocol):
-    """Where condensed structures and their unworn cycles are stored between runs."""
+    """Storage of condensed structures and their unworn cycles between runs."""
 
     def body(self, made_from: Sequence[np.ndarray], make: Callable[[], Condensed]) -> Condensed:
         """Return the condensed body made from these arrays; ``make`` it if it is not stored."""
@@ -172,7 +172,7 @@ class StructureStore(Protocol):
 
 
 class NoStore:
-    """A store that keeps nothing: everything is computed anew."""
+    """A store without contents: everything is computed anew."""
 
     def body(self, made_from: Sequence[np.ndarray], make: Callable[[], Condensed]) -> Condensed:
         return make()
@@ -231,7 +231,7 @@ class StructureLoads(ReportsProgress):
         return tuple(self._friction(interface.name) for interface in self.mesh.interfaces)
 
     def remarks(self) -> Iterable[Remark]:
-        """Return what a user should know of the structure."""
+        """Return remarks on the structure for the user."""
         return self.model.remarks(self.structure, self.friction)
 
     @property
@@ -244,7 +244,7 @@ class StructureLoads(ReportsProgress):
 
     @cached_property
     def joint(self) -> FrictionalJoint:
-        """The condensed joint before any wear, from the cache when it is there."""
+        """The condensed joint before any wear, from the cache if it is there."""
         return FrictionalJoint(self._resolvent, self._nodal_friction())
 
     @cached_property
@@ -326,7 +326,7 @@ class StructureLoads(ReportsProgress):
         return sum(len(interface) for interface in self.mesh.interfaces)
 
     def prepare(self) -> None:
-        """Do the costly part now: condense the structure, or find it in the cache."""
+        """Condense the structure now, which is costly, or find it in the cache."""
         _ = self.joint
 
     @cached_property
@@ -415,8 +415,7 @@ class StructureLoads(ReportsProgress):
     ) -> CycleSolution:
         """Return the cycle that follows the unworn one when worn depths widen the gaps.
 
-        A single mission may start from the cycle ``after`` which the gaps were less wide; this is
-        faster.
+        A single mission may start from a cycle ``after`` less wear, which is faster.
         """
         missions, asked = self._unworn_missions, np.concatenate([*depths, friction or ()])
         if after is not None:
@@ -545,7 +544,7 @@ class StructureLoads(ReportsProgress):
         """
         mesh = worn_mesh(self.mesh, depths)
         structure = self._on(mesh)
-        # Assembling the stiffness shows whether the mesh is valid; the result is stored.
+        # Asking what is held assembles the stiffness, which the bodies store.
         _ = [body.is_held for body in structure.bodies]
         self._on_worn = mesh, structure
         return mesh

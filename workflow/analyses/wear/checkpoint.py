@@ -61,7 +61,7 @@ def _arrays_of(interface: InterfaceState, group: str) -> dict[str, object]:
     }
     arrays |= {f"{group}/{name}": getattr(interface, name) for name in ARRAYS}
     arrays[f"{group}/scalars"] = np.array([getattr(interface, name) for name in SCALARS])
-    # The fields of all increments form one dataset, since every dataset takes the time of a field.
+    # The fields of all increments form one dataset, because each dataset has a fixed cost.
     if interface.starts:
         arrays[f"{group}/{INCREMENTS}"] = np.array(list(interface.starts))
         for name in START:

@@ -19,7 +19,7 @@ MIDDLE = "middle"
 MIDDLE_ROWS = 1
 # Name of the largest difference of the worn depth over the face.
 PROFILE = "depth anywhere"
-# Overrides that skip quantities which only entries below these need.
+# Overrides, by entry of the summary, that skip what only quantities below the entry need.
 PLAIN = {
     "stress": ("stress.section=none", "stress.life.parameter=none"),
     "error": ("error_budget=known",),

@@ -104,7 +104,7 @@ def run_time(case: WearCase, extent: Extent) -> RunTime:
         worn += solves(steps * extent.increments, cells, FRICTIONAL)
     if case.loops.wanted:
         increments = jumps * BRANCHES * case.loops.increments
-        # The errors of a loop take another one, with half the cells along each side and half the
+        # The errors of a loop need a second one, with half the cells per side and half the
         # increments.
         worn += solves(increments, cells, NORMAL) + solves(increments // 2, cells // 4, NORMAL)
     if case.contact.method == "nodes":

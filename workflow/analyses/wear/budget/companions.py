@@ -29,8 +29,8 @@ if TYPE_CHECKING:
 
 # Order of convergence of wear in the size of the contact cells.
 ORDER = 2.0
-# Cells along a direction of the contact of a probe run: at most half of the case's, and no probe
-# runs with fewer than the least number. Line contacts use the largest number, since they are cheap.
+# Cells along a direction of the contact of a probe run: at most half of the case's, and no coarser
+# grid has fewer than the least number. Line contacts use the largest number, since they are cheap.
 MOST_CELLS, FEWEST = 64, 8
 # Below this rate, loads that follow wear have hardly settled by the end of a probe run.
 SLOW = 1e-2

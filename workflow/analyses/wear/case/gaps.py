@@ -24,7 +24,7 @@ ROUNDING = 1e-9
 
 
 class RoundedGap(Section):
-    """Flat, with rounded edges along x and rounded ends along y."""
+    """Gap of a flat face with rounded edges along x and rounded ends along y."""
 
     in_schema: ClassVar[Mapping[str, Any]] = together("end_width", "end_radius")
 
@@ -62,7 +62,7 @@ def check_arcs(face: Section) -> None:
 
 
 class ParaboloidGap(Section):
-    """Paraboloid x² / 2 Rx + y² / 2 Ry; straight along an axis without a radius."""
+    """Paraboloid gap x² / 2 Rx + y² / 2 Ry; straight along an axis without a radius."""
 
     also_filled_in: ClassVar[tuple[str, ...]] = ("radius_x", "radius_y")
     in_schema: ClassVar[Mapping[str, Any]] = one_of("radius_x", "radius_y")

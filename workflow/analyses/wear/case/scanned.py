@@ -22,8 +22,8 @@ if TYPE_CHECKING:
     from workflow.models.gaps import GapFunction
 
 # Least number of cells per facet. With 1.5 cells, nodal forces under a cylinder had errors of up to
-# 4 % of the largest force, with 4 cells 0.02 %. With 8, steps between cells are a hundredth of the
-# rise over a facet.
+# 4 % of the largest force, with 4 cells 0.02 %. The steps between cells cause an error of a
+# hundredth of the rise over a facet.
 IN_A_FACET = 8
 # Heights may differ by this share of their range across a symmetry plane, as files are rounded.
 MIRRORED = 1e-6

@@ -280,15 +280,15 @@ class Laws(Section):
 
 
 class BodiesThatWear(Laws, Duration):
-    """Laws of both bodies, and how far they wear."""
+    """Wear laws of both bodies, and length of the run."""
 
 
 class DovetailWear(BladeAndDisk[BodyWear], BodiesThatWear):
-    """Wear of blade and disk, and how far it goes."""
+    """Wear laws of blade and disk, and length of the run."""
 
 
 class Wear(TwoBodies[BodyWear], BodiesThatWear):
-    """Wear of two bodies, and how far it goes."""
+    """Wear laws of two bodies, and length of the run."""
 
 
 class Nonlinearity(Section):

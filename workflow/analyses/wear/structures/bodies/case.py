@@ -218,7 +218,7 @@ LINK = "there is no structure to link the contact to: both bodies are half-space
 
 
 class BodiesWear(Wear):
-    """Wear of two bodies, and how far it goes."""
+    """Wear laws of two bodies, and length of the run."""
 
     cycles: Cycles = entry("of the whole run [1]", 1e5)
 
@@ -322,7 +322,7 @@ class TwoBodiesWearCase(WearCase):
 
 
 class BodiesWearCase(TwoBodiesWearCase):
-    """Two bodies that wear over an area of both directions."""
+    """Two bodies that wear over an area."""
 
     about: ClassVar[str] = "a ball, flat or measured heights that wear under a cycle of loads"
     line: ClassVar[bool] = False

@@ -1,4 +1,4 @@
-"""A dovetail case: a blade root in its disk, its mission, its flanks and how they wear."""
+"""A dovetail case: a blade root in its disk, its mission, its flanks and their wear."""
 
 from __future__ import annotations
 
